@@ -1,0 +1,80 @@
+//! The coefficient set of one unit: plain parts in, immutable and validated [`Calibration`] out.
+//!
+//! Everything that can be worked out once (nested polynomials, spline coefficients, normalised rows, lag decay
+//! factors) is worked out here, so that the running state ([`crate::unit::Unit`]) holds memory only and a swap
+//! replaces one pointer.
+//!
+//! Directions, stated once: a gyro's **increment weight** multiplies (rad per count), an accelerometer's
+//! **scale factor** divides (output per m/s²), a **bias** is subtracted.
+
+mod check;
+mod parts;
+
+use alloc::vec::Vec;
+
+pub use check::{Defect, DefectKind, Section};
+pub use parts::{
+    AccelParts, BranchArgument, BranchedParts, CalibrationParts, GyroParts, LagParts, TrendParts,
+};
+
+use crate::channel::{Channel, ThermalFilter};
+use crate::orientation::Orientation;
+use crate::reversal::Reversal;
+use crate::sample::OutputKind;
+use crate::thermal::{AccelModel, GyroModel};
+
+/// A validated coefficient set; immutable, shared by pointer.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Calibration {
+    pub(crate) filter: ThermalFilter,
+    pub(crate) channels: Vec<Channel>,
+    pub(crate) gyro_output: OutputKind,
+    pub(crate) gyros: Vec<GyroModel>,
+    pub(crate) gyro_orientation: Orientation,
+    pub(crate) gyro_orientation_channels: Vec<usize>,
+    pub(crate) accel_output: OutputKind,
+    pub(crate) accels: Vec<AccelModel>,
+    pub(crate) accel_orientation: Option<Orientation>,
+    pub(crate) accel_orientation_channels: Vec<usize>,
+    pub(crate) reversal: Option<Reversal>,
+}
+
+impl Calibration {
+    /// Validates and compiles the parts.
+    ///
+    /// # Errors
+    /// Every [`Defect`] of the set, in the order of its sections; nothing is compiled unless there is none.
+    pub fn new(parts: &CalibrationParts) -> Result<Self, Vec<Defect>> {
+        check::compile(parts)
+    }
+
+    /// Number of gyros, 3…8.
+    #[must_use]
+    pub fn gyro_count(&self) -> usize {
+        self.gyros.len()
+    }
+
+    /// Number of accelerometers, 3…8, or 0 for a unit of gyros only.
+    #[must_use]
+    pub fn accel_count(&self) -> usize {
+        self.accels.len()
+    }
+
+    /// What the gyros' raw readings stand for.
+    #[must_use]
+    pub fn gyro_output(&self) -> OutputKind {
+        self.gyro_output
+    }
+
+    /// What the accelerometers' raw readings stand for.
+    #[must_use]
+    pub fn accel_output(&self) -> OutputKind {
+        self.accel_output
+    }
+
+    /// The temperature channels that the set follows, in its own order.
+    #[must_use]
+    pub fn channels(&self) -> &[Channel] {
+        &self.channels
+    }
+}

@@ -1,0 +1,296 @@
+//! Functions of one variable as a calibration states them: polynomial, piecewise-linear table, natural cubic
+//! spline.
+//!
+//! A curve is never extrapolated: outside its fitted range the argument is clamped to the range and the
+//! result says so (models §2). The unit of argument and value is that of the term that owns the curve.
+
+use alloc::vec::Vec;
+
+use arrayvec::ArrayVec;
+
+/// Most coefficients of a polynomial: degree 9.
+pub const MAX_COEFFICIENTS: usize = 10;
+/// Fewest knots of a table or spline.
+pub const MIN_KNOTS: usize = 2;
+/// Most knots of a table or spline.
+pub const MAX_KNOTS: usize = 64;
+
+/// A curve as the calibration document states it.
+#[derive(Debug, Clone, PartialEq)]
+pub enum CurveParts {
+    /// `Σ c_k·(x − reference)^k`.
+    Polynomial {
+        /// Point about which the powers are taken (argument's unit, finite).
+        reference: f64,
+        /// `c_0`, `c_1`, … (value's unit per argument's unit^k, 1…10 of them, finite).
+        coefficients: Vec<f64>,
+        /// Fitted range: first and last valid argument (argument's unit, first < last).
+        range: [f64; 2],
+    },
+    /// Straight lines between knots.
+    PiecewiseLinear {
+        /// [argument, value] pairs (2…64, arguments strictly increasing, finite).
+        knots: Vec<[f64; 2]>,
+    },
+    /// Cubic spline through the knots, natural: second derivative zero at both ends.
+    Spline {
+        /// [argument, value] pairs (2…64, arguments strictly increasing, finite).
+        knots: Vec<[f64; 2]>,
+    },
+}
+
+/// What is wrong with a stated curve.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CurveError {
+    /// The polynomial has no coefficients, or too many.
+    #[error("{got} coefficients; from 1 to {max} are allowed")]
+    CoefficientCount {
+        /// Coefficients stated.
+        got: usize,
+        /// Most that are allowed.
+        max: usize,
+    },
+    /// The table or spline has too few or too many knots.
+    #[error("{got} knots; from {min} to {max} are allowed")]
+    KnotCount {
+        /// Knots stated.
+        got: usize,
+        /// Fewest that are allowed.
+        min: usize,
+        /// Most that are allowed.
+        max: usize,
+    },
+    /// A number is NaN or infinite.
+    #[error("{name} {index} is {got}; a finite number is needed")]
+    NotFinite {
+        /// What the number is.
+        name: &'static str,
+        /// Its index in its list, from 0.
+        index: usize,
+        /// The number.
+        got: f64,
+    },
+    /// The knots' arguments do not increase.
+    #[error("knot {index} is at {got}, not above the one before it at {previous}")]
+    KnotsNotIncreasing {
+        /// Index of the offending knot, from 0.
+        index: usize,
+        /// Argument of the knot before it.
+        previous: f64,
+        /// Argument of the knot.
+        got: f64,
+    },
+    /// The fitted range is empty or reversed.
+    #[error("range from {first} to {last}; the first must be below the last")]
+    EmptyRange {
+        /// Stated first argument.
+        first: f64,
+        /// Stated last argument.
+        last: f64,
+    },
+    /// Somewhere in its range the curve is too large for a number of 64 bits.
+    #[error("values near argument {near} overflow")]
+    Overflow {
+        /// Where: first argument of the offending stretch.
+        near: f64,
+    },
+}
+
+/// A curve's value at one argument.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Evaluated {
+    /// The value (the owning term's unit).
+    pub value: f64,
+    /// The argument was outside the fitted range (or not a number) and was clamped to it.
+    pub clamped: bool,
+}
+
+/// One stretch of a table or spline: `Σ c_k·(x − from)^k` up to the next stretch's start.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Piece {
+    from: f64,
+    coefficients: [f64; 4],
+}
+
+/// Compiled form.
+#[derive(Debug, Clone, PartialEq)]
+enum Form {
+    /// Reference and coefficients in ascending order.
+    Polynomial(f64, ArrayVec<f64, MAX_COEFFICIENTS>),
+    /// One piece per knot: the last one holds the last knot's value, so that it is met exactly.
+    Pieces(Vec<Piece>),
+}
+
+/// A validated curve, ready to evaluate without allocation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Curve {
+    form: Form,
+    range: [f64; 2],
+}
+
+impl Curve {
+    /// Validates and compiles a stated curve.
+    ///
+    /// # Errors
+    ///
+    /// The first thing that is wrong with it.
+    pub fn new(parts: &CurveParts) -> Result<Self, CurveError> {
+        match parts {
+            CurveParts::Polynomial { reference, coefficients, range } => {
+                polynomial(*reference, coefficients, *range)
+            }
+            CurveParts::PiecewiseLinear { knots } => pieces(knots, |_| Vec::new()),
+            CurveParts::Spline { knots } => pieces(knots, natural_second_derivatives),
+        }
+    }
+
+    /// The same value everywhere; only a NaN argument counts as clamped.
+    #[must_use]
+    pub fn constant(value: f64) -> Self {
+        let mut coefficients = ArrayVec::new();
+        coefficients.push(value);
+        Self { form: Form::Polynomial(0.0, coefficients), range: [f64::NEG_INFINITY, f64::INFINITY] }
+    }
+
+    /// Evaluates at `x`, clamped to the fitted range.
+    ///
+    /// A NaN argument gives the value at the polynomial's reference (clamped) or at the first knot.
+    #[must_use]
+    pub fn at(&self, x: f64) -> Evaluated {
+        let [first, last] = self.range;
+        let clamped = !(x >= first && x <= last);
+        let value = match &self.form {
+            Form::Polynomial(reference, coefficients) => {
+                let x = if x.is_nan() { *reference } else { x };
+                nested(coefficients, x.max(first).min(last) - reference)
+            }
+            Form::Pieces(pieces) => {
+                // `max` returns the other operand for a NaN: the first knot.
+                let x = x.max(first).min(last);
+                let after = pieces.partition_point(|piece| piece.from <= x);
+                let piece = pieces.get(after.saturating_sub(1));
+                piece.map_or(0.0, |piece| nested(&piece.coefficients, x - piece.from))
+            }
+        };
+        Evaluated { value, clamped }
+    }
+
+    /// First and last argument of the fitted range; infinite for a constant.
+    #[must_use]
+    pub const fn range(&self) -> [f64; 2] {
+        self.range
+    }
+}
+
+/// `Σ c_k·x^k` in nested (Horner) form.
+fn nested(coefficients: &[f64], x: f64) -> f64 {
+    let mut descending = coefficients.iter().rev();
+    let highest = descending.next().copied().unwrap_or(0.0);
+    descending.fold(highest, |sum, c| sum * x + c)
+}
+
+/// Whether `Σ |c_k|·x^k`, a bound of the polynomial on [−x, x], is representable.
+fn is_bounded(coefficients: &[f64], x: f64) -> bool {
+    let bound = coefficients.iter().rev().fold(0.0, |sum: f64, c| sum * x.abs() + c.abs());
+    bound.is_finite()
+}
+
+/// Checks one number.
+fn finite(name: &'static str, index: usize, got: f64) -> Result<(), CurveError> {
+    if got.is_finite() { Ok(()) } else { Err(CurveError::NotFinite { name, index, got }) }
+}
+
+/// Compiles a polynomial.
+fn polynomial(reference: f64, stated: &[f64], range: [f64; 2]) -> Result<Curve, CurveError> {
+    let mut coefficients = ArrayVec::new();
+    if stated.is_empty() || coefficients.try_extend_from_slice(stated).is_err() {
+        return Err(CurveError::CoefficientCount { got: stated.len(), max: MAX_COEFFICIENTS });
+    }
+    finite("reference", 0, reference)?;
+    for (index, got) in stated.iter().enumerate() {
+        finite("coefficient", index, *got)?;
+    }
+    for (index, got) in range.iter().enumerate() {
+        finite("range limit", index, *got)?;
+    }
+    let [first, last] = range;
+    if first >= last {
+        return Err(CurveError::EmptyRange { first, last });
+    }
+    for end in range {
+        if !is_bounded(stated, end - reference) {
+            return Err(CurveError::Overflow { near: end });
+        }
+    }
+    Ok(Curve { form: Form::Polynomial(reference, coefficients), range })
+}
+
+/// Compiles a table or spline; `second` gives the second derivatives at the knots, empty for straight lines.
+fn pieces(knots: &[[f64; 2]], second: fn(&[[f64; 2]]) -> Vec<f64>) -> Result<Curve, CurveError> {
+    let ([first, ..], [.., last]) = (knots, knots) else {
+        return Err(CurveError::KnotCount { got: 0, min: MIN_KNOTS, max: MAX_KNOTS });
+    };
+    if knots.len() < MIN_KNOTS || knots.len() > MAX_KNOTS {
+        return Err(CurveError::KnotCount { got: knots.len(), min: MIN_KNOTS, max: MAX_KNOTS });
+    }
+    for (index, [x, y]) in knots.iter().enumerate() {
+        finite("argument of knot", index, *x)?;
+        finite("value of knot", index, *y)?;
+    }
+    for (index, (a, b)) in knots.iter().zip(knots.iter().skip(1)).enumerate() {
+        if b[0] <= a[0] {
+            let (previous, got) = (a[0], b[0]);
+            return Err(CurveError::KnotsNotIncreasing { index: index + 1, previous, got });
+        }
+    }
+
+    let second = second(knots);
+    let second_at = |index: usize| second.get(index).copied().unwrap_or(0.0);
+    let mut pieces = Vec::with_capacity(knots.len());
+    for (index, (a, b)) in knots.iter().zip(knots.iter().skip(1)).enumerate() {
+        let width = b[0] - a[0];
+        let (m, n) = (second_at(index), second_at(index + 1));
+        let slope = (b[1] - a[1]) / width - width * (2.0 * m + n) / 6.0;
+        let coefficients = [a[1], slope, m / 2.0, (n - m) / (6.0 * width)];
+        if !is_bounded(&coefficients, width) {
+            return Err(CurveError::Overflow { near: a[0] });
+        }
+        pieces.push(Piece { from: a[0], coefficients });
+    }
+    pieces.push(Piece { from: last[0], coefficients: [last[1], 0.0, 0.0, 0.0] });
+    Ok(Curve { form: Form::Pieces(pieces), range: [first[0], last[0]] })
+}
+
+/// Second derivatives of the natural cubic spline at its knots.
+///
+/// `h_{i−1}·m_{i−1} + 2(h_{i−1} + h_i)·m_i + h_i·m_{i+1} = 6(s_i − s_{i−1})`, m = 0 at both ends; the system
+/// is diagonally dominant, so elimination without pivoting is stable.
+fn natural_second_derivatives(knots: &[[f64; 2]]) -> Vec<f64> {
+    let inner = knots.iter().zip(knots.iter().skip(1)).zip(knots.iter().skip(2));
+    // Row i after elimination: m_i = right − upper · m_{i+1}.
+    let mut rows = Vec::with_capacity(knots.len());
+    let (mut upper, mut right) = (0.0, 0.0);
+    for ((a, b), c) in inner {
+        let (h, g) = (b[0] - a[0], c[0] - b[0]);
+        let bend = 6.0 * ((c[1] - b[1]) / g - (b[1] - a[1]) / h);
+        let pivot = 2.0 * (h + g) - h * upper;
+        right = (bend - h * right) / pivot;
+        upper = g / pivot;
+        rows.push((upper, right));
+    }
+    let mut second = Vec::with_capacity(knots.len());
+    second.push(0.0);
+    let mut next = 0.0;
+    for (upper, right) in rows.into_iter().rev() {
+        next = right - upper * next;
+        second.push(next);
+    }
+    second.push(0.0);
+    second.reverse();
+    second
+}
+
+#[cfg(test)]
+#[expect(clippy::float_cmp, reason = "knots and clamped ends are met to the bit")]
+mod tests;

@@ -1,0 +1,40 @@
+//! Correction models of inertial sensors and the per-unit state machine that applies them.
+//!
+//! Raw ticks of three to eight gyros and three to eight accelerometers go in together with temperature
+//! readings; corrected angle and velocity increments in case axes come out. Everything is a function of the
+//! events and their own timestamps.
+//!
+//! What this crate refuses to do: read a clock, do I/O, spawn anything, allocate per tick, or use a
+//! transcendental function from anywhere but `libm`. It is `no_std`; `alloc` serves the calibration and the
+//! buffers that a unit makes once.
+//!
+//! # Map
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`units`] | one newtype per quantity, with named constructors |
+//! | [`sample`] | what goes in (raw ticks, temperature readings) and what comes out (corrected ticks, flags) |
+//! | [`calibration`] | the immutable, validated coefficient set |
+//! | [`curve`] | polynomial, piecewise-linear table and cubic spline, clamped to their fitted range |
+//! | [`channel`] | temperature channel: gating, smoothing, three-point derivatives |
+//! | [`thermal`] | the gyro's and accelerometer's thermal terms and their continuous update |
+//! | [`orientation`] | input axes to case axes, parity residuals, exclusion of a failed sensor |
+//! | [`reversal`] | the four-step substitution over a mode switch |
+//! | [`servo`] | the perimeter-servo transient after a mode switch |
+//! | [`navigation`] | sums of ticks with coning and sculling terms |
+//! | [`unit`] | the state machine that puts them together |
+#![no_std]
+
+extern crate alloc;
+
+pub mod calibration;
+pub mod channel;
+pub mod curve;
+pub mod navigation;
+pub mod orientation;
+pub mod reversal;
+pub mod sample;
+pub mod servo;
+pub mod thermal;
+pub mod unit;
+pub mod units;

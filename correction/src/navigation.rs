@@ -1,0 +1,230 @@
+//! Sums of ticks as output steps, with coning and sculling terms where asked for (models §10).
+//!
+//! Over the ticks l of a step, with α and ν the sums of angle and velocity increments before tick l:
+//!
+//! ```text
+//! β  += ½·(α + Δα_{l−1}/6) × Δα_l
+//! σ  += ½·[(α + Δα_{l−1}/6) × Δν_l + (ν + Δν_{l−1}/6) × Δα_l]
+//! Δθ  = α + β
+//! Δv  = ν + ρ + σ,    ρ = (1 − cos a)/a²·α×ν + (1 − sin a/a)/a²·α×(α×ν),   a = |α|
+//! ```
+//!
+//! Source: P. G. Savage, Strapdown inertial navigation integration algorithm design, J. Guidance, Control and
+//! Dynamics 21 (1998): part 1, the coning integral with the 1/6 term of the preceding increment; part 2, the
+//! sculling integral of the same form and the exact velocity rotation compensation.
+//!
+//! *Frame*: Δθ is the rotation vector over the step, Δv is in case axes as they stood at its start; without the
+//! terms both are plain sums of the ticks' own increments. The preceding increment is carried from step to step
+//! and dropped at a gap.
+
+use crate::sample::{CorrectedTick, SensorFlags, Sensors, TickFlags};
+use crate::units::Span;
+
+/// Most ticks of one step.
+pub const MAX_STEP_TICKS: u16 = 1000;
+/// Squared angle below which the rotation's coefficients are taken from their series (rad²): four terms leave
+/// less than 10⁻¹⁵ there, where the closed forms would lose digits.
+const SERIES_LIMIT: f64 = 0.01;
+
+/// What is wrong with a stated step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum NavigationError {
+    /// No ticks, or too many.
+    #[error("a step of {got} ticks; from 1 to {max} are allowed")]
+    Ticks {
+        /// Ticks stated.
+        got: u16,
+        /// Most allowed.
+        max: u16,
+    },
+}
+
+/// How ticks are summed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct NavigationStep {
+    ticks: u16,
+    coning_sculling: bool,
+}
+
+impl Default for NavigationStep {
+    /// Every tick as it is.
+    fn default() -> Self {
+        Self { ticks: 1, coning_sculling: false }
+    }
+}
+
+impl NavigationStep {
+    /// Steps of `ticks` (1…1000), as plain sums or with coning and sculling terms.
+    ///
+    /// # Errors
+    ///
+    /// [`NavigationError::Ticks`] outside that range.
+    pub const fn new(ticks: u16, coning_sculling: bool) -> Result<Self, NavigationError> {
+        if ticks == 0 || ticks > MAX_STEP_TICKS {
+            return Err(NavigationError::Ticks { got: ticks, max: MAX_STEP_TICKS });
+        }
+        Ok(Self { ticks, coning_sculling })
+    }
+
+    /// Ticks of a full step.
+    #[must_use]
+    pub const fn ticks(&self) -> u16 {
+        self.ticks
+    }
+
+    /// Whether coning and sculling terms are applied.
+    #[must_use]
+    pub const fn coning_sculling(&self) -> bool {
+        self.coning_sculling
+    }
+}
+
+/// The step that is being summed.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct StepSum {
+    /// Plain sums and flags so far; `None` between steps.
+    open: Option<CorrectedTick>,
+    /// β of the open step (rad).
+    coning: [f64; 3],
+    /// σ of the open step (m/s).
+    sculling: [f64; 3],
+    /// Increments of the tick before: Δα (rad) and Δν (m/s); zero where there is none next to it.
+    last: ([f64; 3], [f64; 3]),
+}
+
+impl StepSum {
+    /// A sum of nothing.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Takes one tick and emits each step that it closes.
+    ///
+    /// A step ends early, shorter than stated, before a tick that announces missing ticks or a restart, and
+    /// where the calibration revision changes or the unit becomes calibrated or ceases to be. Raw readings of
+    /// an uncalibrated unit are summed plainly: cross products of counts mean nothing.
+    pub fn push(
+        &mut self,
+        step: &NavigationStep,
+        tick: &CorrectedTick,
+        emit: &mut impl FnMut(CorrectedTick),
+    ) {
+        let breaks = tick.missed > 0 || tick.flags.intersects(TickFlags::GAP | TickFlags::RESTART);
+        let differs = self.open.as_ref().is_some_and(|open| {
+            let changed = open.flags.symmetric_difference(tick.flags);
+            open.revision != tick.revision || changed.contains(TickFlags::UNCALIBRATED)
+        });
+        if breaks || differs {
+            self.flush(step, emit);
+        }
+        if breaks {
+            self.last = Default::default();
+        }
+
+        let sums = self.open.as_ref().map(|open| (open.delta_angle, open.delta_velocity));
+        let (angle, velocity) = sums.unwrap_or_default();
+        let arm = plus(angle, self.last.0.map(|c| c / 6.0));
+        let drive = plus(velocity, self.last.1.map(|c| c / 6.0));
+        let coning = cross(arm, tick.delta_angle);
+        let sculling = plus(cross(arm, tick.delta_velocity), cross(drive, tick.delta_angle));
+        self.coning = plus(self.coning, coning.map(|c| c / 2.0));
+        self.sculling = plus(self.sculling, sculling.map(|c| c / 2.0));
+        self.last = (tick.delta_angle, tick.delta_velocity);
+
+        let full = if let Some(open) = &mut self.open {
+            add(open, tick);
+            open.ticks >= step.ticks
+        } else {
+            self.open = Some(tick.clone());
+            tick.ticks.max(1) >= step.ticks
+        };
+        if full {
+            self.flush(step, emit);
+        }
+    }
+
+    /// Whether no step is open.
+    #[must_use]
+    pub const fn is_empty(&self) -> bool {
+        self.open.is_none()
+    }
+
+    /// Closes the open step, if there is one, and emits it.
+    pub fn flush(&mut self, step: &NavigationStep, emit: &mut impl FnMut(CorrectedTick)) {
+        let coning = core::mem::take(&mut self.coning);
+        let sculling = core::mem::take(&mut self.sculling);
+        let Some(mut sum) = self.open.take() else {
+            return;
+        };
+        if step.coning_sculling && !sum.flags.contains(TickFlags::UNCALIBRATED) {
+            let rotated = rotation(sum.delta_angle, sum.delta_velocity);
+            sum.delta_velocity = plus(sum.delta_velocity, plus(rotated, sculling));
+            sum.delta_angle = plus(sum.delta_angle, coning);
+            sum.flags |= TickFlags::CONING_SCULLING;
+        }
+        emit(sum);
+    }
+}
+
+/// Adds a tick to a sum, with the increments as they are.
+///
+/// What has no sum (time, sequence, mode, parity) is that of the last tick.
+fn add(sum: &mut CorrectedTick, tick: &CorrectedTick) {
+    sum.sequence = tick.sequence;
+    sum.end_time = tick.end_time;
+    sum.duration = Span::from_ns(sum.duration.as_ns().saturating_add(tick.duration.as_ns()));
+    sum.ticks = sum.ticks.saturating_add(tick.ticks.max(1));
+    sum.missed = sum.missed.saturating_add(tick.missed);
+    sum.delta_angle = plus(sum.delta_angle, tick.delta_angle);
+    sum.delta_velocity = plus(sum.delta_velocity, tick.delta_velocity);
+    sum.mode = tick.mode;
+    sum.flags |= tick.flags;
+    merge(&mut sum.gyro_flags, &tick.gyro_flags);
+    merge(&mut sum.accel_flags, &tick.accel_flags);
+    sum.gyro_parity.clone_from(&tick.gyro_parity);
+    sum.accel_parity.clone_from(&tick.accel_parity);
+}
+
+/// A sensor is valid over a step where it is valid in every tick; anything else is told if it happened once.
+fn merge(sum: &mut Sensors<SensorFlags>, tick: &Sensors<SensorFlags>) {
+    let mut all = tick.iter();
+    for sum in sum.iter_mut() {
+        let flags = all.next().copied().unwrap_or_default();
+        let valid = *sum & flags & SensorFlags::VALID;
+        *sum = (*sum | flags).difference(SensorFlags::VALID) | valid;
+    }
+    // A sensor that the first ticks did not have was not valid in them.
+    sum.extend(all.map(|flags| flags.difference(SensorFlags::VALID)));
+}
+
+/// ρ: what the rotation over the step adds to the velocity in the axes at its start.
+fn rotation(angle: [f64; 3], velocity: [f64; 3]) -> [f64; 3] {
+    let square: f64 = angle.iter().map(|c| c * c).sum();
+    let (first, second) = if square < SERIES_LIMIT {
+        (
+            1.0 / 2.0 - square * (1.0 / 24.0 - square * (1.0 / 720.0 - square / 40_320.0)),
+            1.0 / 6.0 - square * (1.0 / 120.0 - square * (1.0 / 5040.0 - square / 362_880.0)),
+        )
+    } else {
+        let a = libm::sqrt(square);
+        ((1.0 - libm::cos(a)) / square, (1.0 - libm::sin(a) / a) / square)
+    };
+    let once = cross(angle, velocity);
+    let twice = cross(angle, once);
+    plus(once.map(|c| c * first), twice.map(|c| c * second))
+}
+
+/// Sum of two vectors.
+fn plus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
+}
+
+/// Vector product.
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,300 @@
+//! From the sensors' input axes to case axes, with temperature, for three to eight sensors (models §4).
+//!
+//! ```text
+//! s = C(T)·v,   C(T) = C_0 + C_1·(T − T_ref),   v = C(T)⁺·s
+//! ```
+//!
+//! More than three sensors leave N − 3 parity residuals; [`ParityCheck`] publishes them and names the sensor
+//! that explains them. Everything here works on arrays of fixed size: only the statement ([`OrientationParts`])
+//! and the compiled calibration own memory from the heap.
+
+mod linear;
+mod parity;
+mod parts;
+
+use alloc::vec::Vec;
+
+use linear::{Rows, condition_number, orthonormal_columns};
+
+pub use parity::{ISOLATION_RATIO, ParityCheck, ParityVerdict};
+pub use parts::{
+    CONDITION_LIMIT, OrientationError, OrientationParts, ROW_NORM_TOLERANCE, WEIGHT_RATIO_LIMIT,
+};
+
+use crate::sample::{MAX_SENSORS, MIN_SENSORS, Sensors};
+
+/// Which sensors of a kind take part: bit i for sensor i.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub struct SensorMask(u8);
+
+impl SensorMask {
+    /// No sensor.
+    pub const NONE: Self = Self(0);
+
+    /// Sensors 0…n−1; n above eight counts as eight.
+    #[must_use]
+    pub const fn all(n: usize) -> Self {
+        if n >= MAX_SENSORS { Self(u8::MAX) } else { Self((1 << n) - 1) }
+    }
+
+    /// Whether sensor `index` takes part.
+    #[must_use]
+    pub const fn contains(self, index: usize) -> bool {
+        index < MAX_SENSORS && self.0 & (1 << index) != 0
+    }
+
+    /// The same sensors but for `index`.
+    #[must_use]
+    pub const fn without(self, index: usize) -> Self {
+        if index < MAX_SENSORS { Self(self.0 & !(1 << index)) } else { self }
+    }
+
+    /// The same sensors and `index`; beyond the eighth there is none to add.
+    #[must_use]
+    pub const fn with(self, index: usize) -> Self {
+        if index < MAX_SENSORS { Self(self.0 | (1 << index)) } else { self }
+    }
+
+    /// The sensors that both masks hold.
+    #[must_use]
+    pub const fn intersection(self, other: Self) -> Self {
+        Self(self.0 & other.0)
+    }
+
+    /// How many sensors take part.
+    #[must_use]
+    pub const fn count(self) -> usize {
+        self.0.count_ones() as usize
+    }
+}
+
+/// A validated orientation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Orientation {
+    reference_deg_c: f64,
+    range_deg_c: [f64; 2],
+    sensors: usize,
+    /// Rows of `C_0`, normalised; rows beyond `sensors` are zero.
+    rows: Rows,
+    slopes_per_deg_c: Rows,
+    /// √w with the mean of w over all sensors made one, so that parity keeps the sensors' unit.
+    root_weights: [f64; MAX_SENSORS],
+    parity_limit: Option<f64>,
+    parity_confirm_ticks: u32,
+}
+
+impl Orientation {
+    /// Validates a stated orientation and normalises its rows.
+    ///
+    /// # Errors
+    ///
+    /// Everything that is wrong with it.
+    pub fn new(parts: &OrientationParts) -> Result<Self, Vec<OrientationError>> {
+        let mut errors = Vec::new();
+        parts.check_counts(&mut errors);
+        parts.check_numbers(&mut errors);
+        // The matrix checks below would only repeat what is already known of broken numbers.
+        if !errors.is_empty() {
+            return Err(errors);
+        }
+
+        let mut rows = Rows::default();
+        for (row, (to, from)) in rows.iter_mut().zip(&parts.rows).enumerate() {
+            let norm = libm::sqrt(from.iter().map(|c| c * c).sum());
+            if (norm - 1.0).abs() <= ROW_NORM_TOLERANCE {
+                *to = from.map(|c| c / norm);
+            } else {
+                errors.push(OrientationError::RowNorm { row, norm, tolerance: ROW_NORM_TOLERANCE });
+            }
+        }
+        if !errors.is_empty() {
+            return Err(errors);
+        }
+
+        let mut slopes_per_deg_c = Rows::default();
+        for (to, from) in slopes_per_deg_c.iter_mut().zip(&parts.slopes_per_deg_c) {
+            *to = *from;
+        }
+        let orientation = Self {
+            reference_deg_c: parts.reference_deg_c,
+            range_deg_c: parts.range_deg_c,
+            sensors: parts.rows.len(),
+            rows,
+            slopes_per_deg_c,
+            root_weights: root_weights(&parts.weights, parts.rows.len()),
+            parity_limit: parts.parity_limit,
+            parity_confirm_ticks: parts.parity_confirm_ticks,
+        };
+        let [first, last] = parts.range_deg_c;
+        let at_reference = condition_number(&orientation.rows);
+        let stated = [
+            (parts.reference_deg_c, at_reference),
+            (first, condition_number(&orientation.rows_at(first))),
+            (last, condition_number(&orientation.rows_at(last))),
+        ];
+        for (temperature_deg_c, got) in stated {
+            // NaN comes from slopes that overflow.
+            if got.is_nan() || got > CONDITION_LIMIT {
+                let limit = CONDITION_LIMIT;
+                errors.push(OrientationError::Condition { temperature_deg_c, got, limit });
+            }
+        }
+        if errors.is_empty() { Ok(orientation) } else { Err(errors) }
+    }
+
+    /// Number of sensors N (3…8).
+    #[must_use]
+    pub const fn sensors(&self) -> usize {
+        self.sensors
+    }
+
+    /// First and last temperature of the fitted range (°C).
+    #[must_use]
+    pub const fn range_deg_c(&self) -> [f64; 2] {
+        self.range_deg_c
+    }
+
+    /// Length of the parity vector beyond which a sensor must be at fault (the sensor's unit).
+    #[must_use]
+    pub const fn parity_limit(&self) -> Option<f64> {
+        self.parity_limit
+    }
+
+    /// C(T)⁺ over the sensors of `mask`: the inverse of three, the weighted pseudo-inverse
+    /// (CᵀWC)⁻¹CᵀW of more.
+    ///
+    /// `None` where fewer than three sensors remain or their condition number is over
+    /// [`CONDITION_LIMIT`]. T is clamped to the fitted range; NaN stands for the reference.
+    #[must_use]
+    pub fn inverse(&self, temperature_deg_c: f64, mask: SensorMask) -> Option<Inverse> {
+        let mask = mask.intersection(SensorMask::all(self.sensors));
+        if mask.count() < MIN_SENSORS {
+            return None;
+        }
+        let rows = masked(self.rows_at(temperature_deg_c), mask);
+        let condition = condition_number(&rows);
+        if condition.is_nan() || condition > CONDITION_LIMIT {
+            return None;
+        }
+        // √W·C = Q·R, hence (CᵀWC)⁻¹CᵀW = R⁻¹·Qᵀ·√W; the condition number is not squared this way.
+        let (q, r) = orthonormal_columns(&self.weighted(rows))?;
+        let mut matrix = [[0.0; MAX_SENSORS]; 3];
+        let [row_x, row_y, row_z] = &mut matrix;
+        let columns = row_x.iter_mut().zip(row_y).zip(row_z);
+        for ((((x, y), z), q), root_weight) in columns.zip(&q).zip(&self.root_weights) {
+            let b = q.map(|q| q * root_weight);
+            *z = b[2] / r[2][2];
+            *y = (b[1] - r[1][2] * *z) / r[1][1];
+            *x = (b[0] - r[0][1] * *y - r[0][2] * *z) / r[0][0];
+        }
+        Some(Inverse { matrix, mask })
+    }
+
+    /// What the sensors read for the vector `v` in case axes: s = C(T)·v (unit of `v`).
+    #[must_use]
+    pub fn forward(&self, temperature_deg_c: f64, v: [f64; 3]) -> Sensors<f64> {
+        let rows = self.rows_at(temperature_deg_c);
+        rows.iter().take(self.sensors).map(|row| dot(row, &v)).collect()
+    }
+
+    /// C(T), with T clamped to the fitted range and NaN standing for the reference.
+    fn rows_at(&self, temperature_deg_c: f64) -> Rows {
+        let [first, last] = self.range_deg_c;
+        let stated = if temperature_deg_c.is_nan() { self.reference_deg_c } else { temperature_deg_c };
+        let excess = stated.max(first).min(last) - self.reference_deg_c;
+        let mut rows = self.rows;
+        for (row, slope) in rows.iter_mut().zip(&self.slopes_per_deg_c) {
+            for (c, slope) in row.iter_mut().zip(slope) {
+                *c += slope * excess;
+            }
+        }
+        rows
+    }
+
+    /// √W·C.
+    fn weighted(&self, mut rows: Rows) -> Rows {
+        for (row, root_weight) in rows.iter_mut().zip(&self.root_weights) {
+            *row = row.map(|c| c * root_weight);
+        }
+        rows
+    }
+}
+
+/// √w with the mean of w over the sensors made one; all ones where no weights are stated.
+fn root_weights(weights: &[f64], sensors: usize) -> [f64; MAX_SENSORS] {
+    let mut roots = [1.0; MAX_SENSORS];
+    // Scaled by the largest first, so that the sum cannot overflow.
+    let largest = weights.iter().copied().fold(0.0, f64::max);
+    let sum: f64 = weights.iter().map(|w| w / largest).sum();
+    let count = weights.iter().take(sensors).fold(0.0, |n, _| n + 1.0);
+    for (root, weight) in roots.iter_mut().zip(weights) {
+        *root = libm::sqrt(weight / largest * count / sum);
+    }
+    roots
+}
+
+/// The rows with those of the sensors outside the mask made zero.
+fn masked(mut rows: Rows, mask: SensorMask) -> Rows {
+    for (index, row) in rows.iter_mut().enumerate() {
+        if !mask.contains(index) {
+            *row = [0.0; 3];
+        }
+    }
+    rows
+}
+
+/// Scalar product.
+fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// A compiled C(T)⁺: three rows of one coefficient per sensor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Inverse {
+    matrix: [[f64; MAX_SENSORS]; 3],
+    mask: SensorMask,
+}
+
+impl Inverse {
+    /// The sensors that take part.
+    #[must_use]
+    pub const fn mask(&self) -> SensorMask {
+        self.mask
+    }
+
+    /// v = C⁺·s (unit of `readings`).
+    ///
+    /// A sensor outside the mask is not looked at, so its reading may be anything, NaN too. Readings that are
+    /// missing count as zero.
+    #[must_use]
+    pub fn apply(&self, readings: &[f64]) -> [f64; 3] {
+        self.matrix.map(|row| {
+            let products = row.iter().zip(readings).enumerate();
+            let used = products.filter(|(index, _)| self.mask.contains(*index));
+            used.fold(0.0, |sum, (_, (c, s))| sum + c * s)
+        })
+    }
+
+    /// The matrix a fraction `u` of the way from this one to `other`, u clamped to 0…1.
+    ///
+    /// Only between matrices of the same sensors: where the masks differ the result is `other` at once, since a
+    /// blend would still use the sensor that was just taken out.
+    #[must_use]
+    pub fn lerp(&self, other: &Self, u: f64) -> Self {
+        if self.mask != other.mask || u.is_nan() || u >= 1.0 {
+            return *other;
+        }
+        let u = u.max(0.0);
+        let mut matrix = self.matrix;
+        for (row, target) in matrix.iter_mut().zip(&other.matrix) {
+            for (c, target) in row.iter_mut().zip(target) {
+                *c += (target - *c) * u;
+            }
+        }
+        Self { matrix, mask: self.mask }
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::float_cmp, reason = "the identity is inverted to the bit")]
+mod tests;

@@ -1,0 +1,189 @@
+//! An orientation as a calibration states it, and the checks that need no matrix.
+
+use alloc::vec::Vec;
+
+use crate::sample::{MAX_SENSORS, MIN_SENSORS};
+
+/// Largest deviation of a row's norm from one that is taken for rounding in the document.
+pub const ROW_NORM_TOLERANCE: f64 = 1e-3;
+/// Largest condition number of an orientation that can be inverted sensibly [models §4].
+pub const CONDITION_LIMIT: f64 = 100.0;
+/// Largest ratio of two sensors' weights: beyond it the lighter sensor should be left out instead.
+pub const WEIGHT_RATIO_LIMIT: f64 = 1e6;
+
+/// The orientation of one kind of sensor as the calibration document states it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OrientationParts {
+    /// Reference temperature (°C, finite).
+    pub reference_deg_c: f64,
+    /// `C_0`: one unit vector in case axes per sensor (dimensionless, 3…8 rows, norm 1 ± 10⁻³).
+    pub rows: Vec<[f64; 3]>,
+    /// `C_1`: change of each row with temperature (1/°C); empty for none.
+    pub slopes_per_deg_c: Vec<[f64; 3]>,
+    /// Weight of each sensor in the pseudo-inverse, 1/σ² up to a common factor (> 0); empty for equal.
+    pub weights: Vec<f64>,
+    /// Fitted range: first and last temperature (°C, first ≤ last); outside it T is clamped.
+    pub range_deg_c: [f64; 2],
+    /// Length of the parity vector beyond which a sensor must be at fault (the sensor's unit: rad/s or
+    /// m/s², > 0); `None` to publish residuals only.
+    pub parity_limit: Option<f64>,
+    /// Ticks in a row that must point at the same sensor before it is excluded (≥ 1 where there is a limit).
+    pub parity_confirm_ticks: u32,
+}
+
+/// What is wrong with a stated orientation.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum OrientationError {
+    /// Too few or too many sensors.
+    #[error("{got} rows; from {min} to {max} are allowed")]
+    RowCount {
+        /// Rows stated.
+        got: usize,
+        /// Fewest that are allowed.
+        min: usize,
+        /// Most that are allowed.
+        max: usize,
+    },
+    /// A list has neither one entry per sensor nor none.
+    #[error("{got} {name} for {rows} rows; one per row, or none")]
+    ListCount {
+        /// What the list holds.
+        name: &'static str,
+        /// Entries stated.
+        got: usize,
+        /// Rows of `C_0`.
+        rows: usize,
+    },
+    /// A number is NaN or infinite.
+    #[error("{name} {index} is {got}; a finite number is needed")]
+    NotFinite {
+        /// What the number is.
+        name: &'static str,
+        /// Index of its row or entry, from 0.
+        index: usize,
+        /// The number.
+        got: f64,
+    },
+    /// A row of `C_0` is not a unit vector.
+    #[error("row {row} has norm {norm}; it must be 1 within {tolerance}")]
+    RowNorm {
+        /// Index of the row, from 0.
+        row: usize,
+        /// Its norm.
+        norm: f64,
+        /// Largest deviation allowed.
+        tolerance: f64,
+    },
+    /// The axes are too close to one plane.
+    #[error("condition number {got} at {temperature_deg_c} °C; at most {limit} is allowed")]
+    Condition {
+        /// Temperature of the offending matrix (°C): the reference or an end of the range.
+        temperature_deg_c: f64,
+        /// Its condition number.
+        got: f64,
+        /// Largest one allowed.
+        limit: f64,
+    },
+    /// A weight is zero or negative.
+    #[error("weight {index} is {got}; it must be above 0")]
+    WeightNotPositive {
+        /// Index of the weight, from 0.
+        index: usize,
+        /// The weight.
+        got: f64,
+    },
+    /// The weights differ beyond what can be inverted.
+    #[error("largest weight is {got} times the smallest; at most {limit} is allowed")]
+    WeightRatio {
+        /// Largest weight over smallest.
+        got: f64,
+        /// Largest ratio allowed.
+        limit: f64,
+    },
+    /// The temperature range is reversed.
+    #[error("range from {first} °C to {last} °C; the first must not be above the last")]
+    EmptyRange {
+        /// Stated first temperature (°C).
+        first: f64,
+        /// Stated last temperature (°C).
+        last: f64,
+    },
+    /// The parity limit is zero or negative.
+    #[error("parity limit is {got}; it must be above 0")]
+    ParityLimit {
+        /// The limit.
+        got: f64,
+    },
+    /// A parity limit without ticks to confirm it.
+    #[error("parity is to be confirmed by 0 ticks; at least 1 is needed")]
+    ParityConfirm,
+}
+
+impl OrientationParts {
+    /// Checks the lengths of the lists.
+    pub(super) fn check_counts(&self, errors: &mut Vec<OrientationError>) {
+        let rows = self.rows.len();
+        if !(MIN_SENSORS..=MAX_SENSORS).contains(&rows) {
+            let (min, max) = (MIN_SENSORS, MAX_SENSORS);
+            errors.push(OrientationError::RowCount { got: rows, min, max });
+        }
+        for (name, got) in [("slopes", self.slopes_per_deg_c.len()), ("weights", self.weights.len())] {
+            if got != 0 && got != rows {
+                errors.push(OrientationError::ListCount { name, got, rows });
+            }
+        }
+    }
+
+    /// Checks every number by itself, and the weights against each other.
+    pub(super) fn check_numbers(&self, errors: &mut Vec<OrientationError>) {
+        let mut finite = |name, index, got: f64| {
+            if !got.is_finite() {
+                errors.push(OrientationError::NotFinite { name, index, got });
+            }
+            got.is_finite()
+        };
+        finite("reference temperature", 0, self.reference_deg_c);
+        for (name, rows) in [("row", &self.rows), ("slope", &self.slopes_per_deg_c)] {
+            for (index, row) in rows.iter().enumerate() {
+                for c in row {
+                    finite(name, index, *c);
+                }
+            }
+        }
+        let [first, last] = self.range_deg_c;
+        let range_is_finite = finite("range limit", 0, first) & finite("range limit", 1, last);
+        let limit_is_finite = self.parity_limit.is_some_and(|limit| finite("parity limit", 0, limit));
+        let (mut smallest, mut largest) = (f64::INFINITY, 0.0_f64);
+        let mut weights_are_finite = true;
+        for (index, weight) in self.weights.iter().enumerate() {
+            weights_are_finite &= finite("weight", index, *weight);
+            smallest = smallest.min(*weight);
+            largest = largest.max(*weight);
+        }
+
+        if range_is_finite && first > last {
+            errors.push(OrientationError::EmptyRange { first, last });
+        }
+        if let (true, Some(got)) = (limit_is_finite, self.parity_limit) {
+            if got <= 0.0 {
+                errors.push(OrientationError::ParityLimit { got });
+            }
+            if self.parity_confirm_ticks == 0 {
+                errors.push(OrientationError::ParityConfirm);
+            }
+        }
+        if !weights_are_finite {
+            return;
+        }
+        for (index, got) in self.weights.iter().copied().enumerate() {
+            if got <= 0.0 {
+                errors.push(OrientationError::WeightNotPositive { index, got });
+            }
+        }
+        if smallest > 0.0 && largest / smallest > WEIGHT_RATIO_LIMIT {
+            let (got, limit) = (largest / smallest, WEIGHT_RATIO_LIMIT);
+            errors.push(OrientationError::WeightRatio { got, limit });
+        }
+    }
+}

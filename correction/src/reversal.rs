@@ -1,0 +1,340 @@
+//! The four-step substitution over a mode switch [003; models §5].
+//!
+//! While the lasing mode switches, n = 1…3 ticks carry nothing. Tick j = 0 is the last good one, j = 1 the
+//! commanded one:
+//!
+//! 1. before: a polynomial is fitted to the last good readings (by default j = −3…0);
+//! 2. during, j = 1…n: the predicted increments are published, flagged interpolated;
+//! 3. after: a second polynomial is fitted to readings from both sides (by default j = −1, 0, n+1, n+2);
+//! 4. `Σ_j (P_fit(j) − P_pred(j))` over the published ticks is added to the next good reading (j = n+3).
+//!
+//! Everything runs on the ticks' own times, so a gap in the stream shifts no abscissa, and a tick that is
+//! missing is not restored: it is announced as a gap, which the navigator bridges by itself. The mode-dependent
+//! bias must already be out of the increments; it would be fitted as a step.
+
+mod fit;
+mod history;
+mod parts;
+
+use arrayvec::ArrayVec;
+
+use fit::{Fit, Points};
+use history::{History, Reading, mid_time_s};
+
+pub use parts::{
+    MAX_FIT_DEGREE, MAX_FIT_READINGS, MAX_PREDICT_DEGREE, MAX_TRANSITION_TICKS, Reversal, ReversalError,
+    ReversalParts,
+};
+
+use crate::sample::{LasingMode, MAX_SENSORS, Sensors, TickFlags};
+use crate::units::{Span, Timestamp};
+
+/// A reading farther than this many tick durations from the ticks to be bridged says nothing about them.
+pub const REACH_TICKS: f64 = 16.0;
+/// Most interpolated ticks that can wait for one two-sided fit (switches back to back).
+pub const MAX_LOST_TICKS: usize = 16;
+
+/// What the substitution must know of a tick besides its increments.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct TickInput {
+    /// End of the tick on the producer's clock.
+    pub end_time: Timestamp,
+    /// Measured duration of the tick.
+    pub duration: Span,
+    /// Lasing mode commanded at the end of the tick; `None` for an instrument without modes.
+    pub mode: Option<LasingMode>,
+    /// The switch was commanded at the start of this tick: j = 1.
+    pub switch_command: bool,
+    /// Ticks that were lost right before this one.
+    pub missed: u64,
+    /// The producer restarted: nothing before this tick can be related to it.
+    pub restart: bool,
+}
+
+/// An interpolated tick that has been published and waits for the two-sided fit.
+#[derive(Debug, Clone, Copy)]
+struct LostTick {
+    end_time: Timestamp,
+    duration: Span,
+    /// What was published per sensor (rad).
+    predicted: [f64; MAX_SENSORS],
+    /// Sensors of the tick.
+    sensors: usize,
+}
+
+/// Good readings on one side of a switch, with their abscissas (s).
+type Window<'a> = ArrayVec<(f64, &'a Reading), { MAX_FIT_READINGS as usize }>;
+
+/// Memory of the substitution of one unit: all gyros switch together.
+#[derive(Debug, Clone, Default)]
+pub struct Substitution {
+    /// Good readings, uncorrected.
+    history: History,
+    /// Interpolated ticks without their fit; no good reading lies between two of them.
+    lost: ArrayVec<LostTick, MAX_LOST_TICKS>,
+    /// Good readings since the last tick of `lost`.
+    after: usize,
+    /// Angle per sensor that the next good reading brings back (rad).
+    pending: Option<[f64; MAX_SENSORS]>,
+    /// Ticks of the running transition that are still to come.
+    left: u8,
+    /// Mode of the last tick that stated one.
+    mode: Option<LasingMode>,
+    /// A command has been seen, but the mode has not changed yet: the change, when it comes, is that
+    /// command's and not a second switch.
+    change_due: bool,
+}
+
+impl Substitution {
+    /// A memory that has seen nothing.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Whether the coming tick carries nothing: it falls into a transition that is running or begins with it.
+    ///
+    /// For terms that need to know before [`tick`](Self::tick) is called (the perimeter servo).
+    #[must_use]
+    pub fn is_lost(&self, reversal: &Reversal, input: &TickInput) -> bool {
+        self.left_from(*reversal, input) > 0
+    }
+
+    /// Whether no transition is running and no angle waits to be restored.
+    #[must_use]
+    pub fn is_settled(&self) -> bool {
+        self.left == 0 && self.lost.is_empty() && self.pending.is_none()
+    }
+
+    /// Takes one tick: replaces the increments of a lost tick, restores angle in a good one.
+    ///
+    /// `increments` are the angle increments per sensor (rad), scaled and with every bias removed; those of a
+    /// lost tick are overwritten unread. Returns which of `INTERPOLATED`, `ANGLE_RESTORED` and
+    /// `SWITCH_UNRESOLVED` apply.
+    ///
+    /// A mode that differs from the last one without a command begins a transition at this tick; where ticks
+    /// are missing before it the switch may have come later than the gap's start, so all n are counted
+    /// from here. Ticks missing inside a transition count as ticks of it.
+    pub fn tick(
+        &mut self,
+        reversal: &Reversal,
+        input: TickInput,
+        increments: &mut Sensors<f64>,
+    ) -> TickFlags {
+        let mut flags = TickFlags::empty();
+        if input.restart {
+            if !(self.lost.is_empty() && self.pending.is_none()) {
+                flags |= TickFlags::SWITCH_UNRESOLVED;
+            }
+            *self = Self::default();
+        }
+
+        let left = self.left_from(*reversal, &input);
+        self.note_mode(&input, left > 0);
+        self.left = left.saturating_sub(1);
+        let resolved = if left > 0 {
+            self.take_lost(*reversal, &input, increments, &mut flags)
+        } else {
+            self.take_good(*reversal, &input, increments, &mut flags)
+        };
+        if !resolved {
+            flags |= TickFlags::SWITCH_UNRESOLVED;
+        }
+        flags
+    }
+
+    /// Ticks of the transition still to come, the coming one included.
+    fn left_from(&self, reversal: Reversal, input: &TickInput) -> u8 {
+        let changed = matches!((self.mode, input.mode), (Some(old), Some(new)) if old != new);
+        if input.switch_command || (changed && !input.restart && !self.change_due) {
+            reversal.parts.transition_ticks
+        } else if input.restart {
+            0
+        } else {
+            self.left.saturating_sub(u8::try_from(input.missed).unwrap_or(u8::MAX))
+        }
+    }
+
+    /// Remembers the mode and whether a command's change is still due.
+    fn note_mode(&mut self, input: &TickInput, lost: bool) {
+        let changed = matches!((self.mode, input.mode), (Some(old), Some(new)) if old != new);
+        if input.switch_command {
+            self.change_due = self.mode.is_some() && !changed;
+        } else if changed || !lost {
+            // A producer that reports the mode as it is, not as it is commanded, changes it at the
+            // latest with the first good tick.
+            self.change_due = false;
+        }
+        self.mode = input.mode.or(self.mode);
+    }
+
+    /// Step 2. Returns false where an angle had to be given up.
+    fn take_lost(
+        &mut self,
+        reversal: Reversal,
+        input: &TickInput,
+        increments: &mut Sensors<f64>,
+        flags: &mut TickFlags,
+    ) -> bool {
+        let mut resolved = true;
+        // The switch before this one gets the fit that its readings allow; without any it is bridged
+        // together with this one.
+        if self.after > 0 || self.is_overdue(input, None) {
+            resolved = self.resolve(reversal);
+        }
+        *flags |= TickFlags::INTERPOLATED;
+        let predicted = self.predict(reversal, input);
+        for (increment, predicted) in increments.iter_mut().zip(&predicted) {
+            *increment = *predicted;
+        }
+        if self.lost.is_full() {
+            self.lost.remove(0);
+            resolved = false;
+        }
+        let (end_time, duration) = (input.end_time, input.duration);
+        self.lost.push(LostTick { end_time, duration, predicted, sensors: increments.len() });
+        resolved
+    }
+
+    /// Steps 3 and 4. Returns false where an angle had to be given up.
+    fn take_good(
+        &mut self,
+        reversal: Reversal,
+        input: &TickInput,
+        increments: &mut Sensors<f64>,
+        flags: &mut TickFlags,
+    ) -> bool {
+        let reading = Reading::new(input.end_time, input.duration, increments);
+        let mut resolved = true;
+        if self.is_overdue(input, reading.as_ref()) {
+            resolved = self.resolve(reversal);
+        }
+        if let Some(pending) = self.pending.take() {
+            for (increment, angle) in increments.iter_mut().zip(&pending) {
+                *increment += angle;
+            }
+            *flags |= TickFlags::ANGLE_RESTORED;
+        }
+        if let Some(reading) = reading {
+            self.history.push(reading);
+            if !self.lost.is_empty() {
+                self.after += 1;
+                if self.after >= usize::from(reversal.parts.fit_readings_after) {
+                    resolved &= self.resolve(reversal);
+                }
+            }
+        }
+        resolved
+    }
+
+    /// Whether the readings after the switch are no longer to be waited for.
+    fn is_overdue(&self, input: &TickInput, reading: Option<&Reading>) -> bool {
+        let Some(last) = self.lost.last() else {
+            return false;
+        };
+        let known = self.history.newest().or(reading);
+        let nominal = known.map_or(last.duration, |reading| reading.duration);
+        let waited = mid_time_s(input.end_time, input.duration, last.end_time)
+            - mid_time_s(last.end_time, last.duration, last.end_time);
+        waited.abs() > REACH_TICKS * nominal.as_s()
+    }
+
+    /// `P_pred` of the coming tick per sensor (rad); zero where nothing is known.
+    fn predict(&self, reversal: Reversal, input: &TickInput) -> [f64; MAX_SENSORS] {
+        let mut predicted = [0.0; MAX_SENSORS];
+        let Some(newest) = self.history.newest() else {
+            return predicted;
+        };
+        let reach = REACH_TICKS * newest.duration.as_s();
+        let x = mid_time_s(input.end_time, input.duration, input.end_time);
+        let window = self.history.newest_first().take(reversal.parts.predict_readings.into());
+        let window: Window<'_> = window
+            .map(|reading| (reading.mid_time_s(input.end_time), reading))
+            .filter(|(at, _)| (x - at).abs() <= reach)
+            .collect();
+        for (sensor, predicted) in predicted.iter_mut().enumerate() {
+            let points: Points = window.iter().filter_map(|(at, r)| r.point(*at, sensor)).collect();
+            let fit = Fit::new(&points, reversal.parts.predict_degree.into());
+            let angle = fit.map_or(0.0, |fit| fit.at(x) * input.duration.as_s());
+            *predicted = if angle.is_finite() { angle } else { 0.0 };
+        }
+        predicted
+    }
+
+    /// Step 3 for the ticks in `lost`, with the readings at hand; the correction becomes pending.
+    ///
+    /// Returns false where the angle of a tick could not be restored.
+    fn resolve(&mut self, reversal: Reversal) -> bool {
+        let waiting = core::mem::take(&mut self.lost);
+        let after = core::mem::take(&mut self.after);
+        let (Some(first), Some(last), Some(newest)) =
+            (waiting.first(), waiting.last(), self.history.newest())
+        else {
+            return waiting.is_empty();
+        };
+        if after == 0 {
+            return false;
+        }
+        let parts = &reversal.parts;
+        let origin = first.end_time;
+        let reach = REACH_TICKS * newest.duration.as_s();
+        let near = |tick: &LostTick| {
+            let edge = mid_time_s(tick.end_time, tick.duration, origin);
+            move |(at, _): &(f64, &Reading)| (at - edge).abs() <= reach
+        };
+        let timed = |reading| (Reading::mid_time_s(reading, origin), reading);
+        // The first readings after the switch and the last ones before it.
+        let spare = after.saturating_sub(parts.fit_readings_after.into());
+        let after_side: Window<'_> =
+            self.history.newest_first().take(after).skip(spare).map(timed).filter(near(last)).collect();
+        let before_side: Window<'_> = self
+            .history
+            .newest_first()
+            .skip(after)
+            .take(parts.fit_readings_before.into())
+            .map(timed)
+            .filter(near(first))
+            .collect();
+
+        let mut resolved = true;
+        let mut any_restored = false;
+        let mut restored = [0.0; MAX_SENSORS];
+        for (sensor, restored) in restored.iter_mut().enumerate().take(last.sensors) {
+            let mut points: Points =
+                after_side.iter().filter_map(|(at, reading)| reading.point(*at, sensor)).collect();
+            if points.is_empty() {
+                // Nothing new is known of this sensor: the prediction stands.
+                resolved = false;
+                continue;
+            }
+            points.extend(before_side.iter().filter_map(|(at, r)| r.point(*at, sensor)));
+            let Some(fit) = Fit::new(&points, parts.fit_degree.into()) else {
+                continue;
+            };
+            for (tick, predicted) in
+                waiting.iter().filter_map(|tick| Some((tick, tick.predicted.get(sensor)?)))
+            {
+                let x = mid_time_s(tick.end_time, tick.duration, origin);
+                let correction = fit.at(x) * tick.duration.as_s() - predicted;
+                let within = points.iter().any(|[at, _]| (at - x).abs() <= reach);
+                if within && tick.duration.as_s() <= reach && correction.is_finite() {
+                    *restored += correction;
+                    any_restored = true;
+                } else {
+                    resolved = false;
+                }
+            }
+        }
+        if !any_restored {
+            return resolved;
+        }
+        let pending = self.pending.get_or_insert([0.0; MAX_SENSORS]);
+        for (pending, restored) in pending.iter_mut().zip(&restored) {
+            *pending += restored;
+        }
+        resolved
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,87 @@
+//! The last good readings, as rates against their mid-tick times.
+
+use crate::sample::MAX_SENSORS;
+use crate::units::{Span, Timestamp};
+
+/// Readings kept: eight on either side of a switch.
+const KEPT: usize = 2 * super::MAX_FIT_READINGS as usize;
+
+/// Middle of a tick, from `origin` (s).
+pub(super) fn mid_time_s(end_time: Timestamp, duration: Span, origin: Timestamp) -> f64 {
+    end_time.seconds_from(origin) - duration.as_s() / 2.0
+}
+
+/// One good tick of all sensors.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Reading {
+    end_time: Timestamp,
+    /// Measured duration, above zero.
+    pub(super) duration: Span,
+    /// Mean rate per sensor (rad/s); NaN where there is no sensor or no number.
+    rates: [f64; MAX_SENSORS],
+}
+
+impl Reading {
+    const NONE: Self =
+        Self { end_time: Timestamp::from_ns(0), duration: Span::ZERO, rates: [f64::NAN; MAX_SENSORS] };
+
+    /// The rates of a tick; `None` where it has no duration, so that no rate can be formed.
+    pub(super) fn new(end_time: Timestamp, duration: Span, increments: &[f64]) -> Option<Self> {
+        if duration == Span::ZERO {
+            return None;
+        }
+        let mut rates = [f64::NAN; MAX_SENSORS];
+        for (rate, increment) in rates.iter_mut().zip(increments) {
+            *rate = increment / duration.as_s();
+        }
+        Some(Self { end_time, duration, rates })
+    }
+
+    /// Middle of the tick, from `origin` (s).
+    pub(super) fn mid_time_s(&self, origin: Timestamp) -> f64 {
+        mid_time_s(self.end_time, self.duration, origin)
+    }
+
+    /// [abscissa, rate] of one sensor, where it has a finite rate.
+    pub(super) fn point(&self, at: f64, sensor: usize) -> Option<[f64; 2]> {
+        let rate = self.rates.get(sensor).copied().filter(|rate| rate.is_finite());
+        rate.map(|rate| [at, rate])
+    }
+}
+
+/// A ring of the newest readings.
+#[derive(Debug, Clone)]
+pub(super) struct History {
+    ring: [Reading; KEPT],
+    /// Where the next reading goes, below [`KEPT`].
+    next: usize,
+    /// Readings held, at most [`KEPT`].
+    held: usize,
+}
+
+impl Default for History {
+    fn default() -> Self {
+        Self { ring: [Reading::NONE; KEPT], next: 0, held: 0 }
+    }
+}
+
+impl History {
+    /// Adds the newest reading; the oldest gives way.
+    pub(super) fn push(&mut self, reading: Reading) {
+        if let Some(slot) = self.ring.get_mut(self.next) {
+            *slot = reading;
+        }
+        self.next = (self.next + 1) % KEPT;
+        self.held = (self.held + 1).min(KEPT);
+    }
+
+    /// The readings from the newest to the oldest.
+    pub(super) fn newest_first(&self) -> impl Iterator<Item = &Reading> {
+        (1..=self.held).filter_map(|age| self.ring.get((self.next + KEPT - age) % KEPT))
+    }
+
+    /// The newest reading.
+    pub(super) fn newest(&self) -> Option<&Reading> {
+        self.newest_first().next()
+    }
+}

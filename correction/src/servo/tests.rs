@@ -1,0 +1,187 @@
+use alloc::vec;
+use alloc::vec::Vec;
+
+use proptest::prelude::*;
+
+use super::*;
+
+const TICK: Span = Span::from_ns(5_000_000);
+const TAU_S: f64 = 0.05;
+/// A thousand times a real instrument's, so that the rounding of counts does not hide the model's error.
+const REST_HZ: f64 = 4e7;
+const FIRST_HZ: f64 = 3.6e7;
+/// 0.002 ″ per count.
+const SCALE: f64 = 2e-3 * core::f64::consts::PI / 180.0 / 3600.0;
+
+fn servo(form: ServoForm) -> Servo {
+    Servo::new(&ServoParts {
+        form,
+        time_constant_s: TAU_S,
+        rest_frequency: CurveParts::PiecewiseLinear {
+            knots: vec![[-40.0, REST_HZ - 60.0], [80.0, REST_HZ + 60.0]],
+        },
+        settle_time_constants: DEFAULT_SETTLE_TIME_CONSTANTS,
+    })
+    .unwrap()
+}
+
+/// A dithered counter, integrated step by step: counts of the positive and the negative half of the tick that
+/// starts `start_s` after the transition, with an input rate in counts per second.
+fn halves(start_s: f64, tick_s: f64, input: f64) -> [f64; 2] {
+    let steps = 2000;
+    let step = tick_s / 2.0 / f64::from(steps);
+    [(0.0, 1.0), (tick_s / 2.0, -1.0)].map(|(offset, sign)| {
+        (0..steps)
+            .map(|i| start_s + offset + (f64::from(i) + 0.5) * step)
+            .map(|t| REST_HZ - (REST_HZ - FIRST_HZ) * libm::exp(-2.0 * t / TAU_S))
+            .map(|f| (sign * f + input) * step)
+            .sum()
+    })
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "counts of one tick are small")]
+fn whole(counts: f64) -> i32 {
+    libm::round(counts) as i32
+}
+
+fn tick(end_ns: i64, half_periods: Option<HalfPeriodCounts>) -> ServoTick {
+    ServoTick {
+        end_time: Timestamp::from_ns(end_ns),
+        duration: TICK,
+        temperature_deg_c: 20.0,
+        scale_rad_per_count: SCALE,
+        half_periods,
+    }
+}
+
+/// Runs one transition of three ticks and then `ticks` good ones; gives the residual rate of each after the
+/// correction and the transient itself (rad/s).
+fn run(form: ServoForm, input: f64, ticks: i32) -> Vec<(f64, Transient)> {
+    let servo = servo(form);
+    let mut memory = ServoMemory::new();
+    for j in 1..=3_i64 {
+        memory.advance(true, Timestamp::from_ns((j - 3) * TICK.as_ns()), TICK);
+    }
+    (0..ticks)
+        .map(|i| {
+            let [positive, negative] = halves(f64::from(i) * TICK.as_s(), TICK.as_s(), input);
+            let counts = HalfPeriodCounts { positive: whole(positive), negative: whole(negative) };
+            let tick = tick(i64::from(i + 1) * TICK.as_ns(), Some(counts));
+            memory.advance(false, tick.end_time, TICK);
+            let transient = memory.apparent_rate(0, &servo, &tick);
+            let rate = SCALE * (positive + negative) / TICK.as_s();
+            (rate - SCALE * input - transient.rate_rad_per_s(), transient)
+        })
+        .collect()
+}
+
+#[test]
+fn the_transient_of_a_dithered_counter_is_removed() {
+    // Inputs: none, small, and beyond the dither amplitude, where the negative half counts forward too.
+    for input in [0.0, 1e6, -1e6, 6e7, -6e7] {
+        for form in [ServoForm::Measured, ServoForm::Modelled] {
+            let raw = SCALE * (FIRST_HZ - REST_HZ) * TICK.as_s() / (2.0 * TAU_S);
+            for (residual, transient) in run(form, input, 40) {
+                assert!(matches!(transient, Transient::Apparent { .. }));
+                // What is left is the rounding of the counts: one count through f_i.
+                assert!(residual.abs() < raw.abs() / 10_000.0, "{residual} of {raw} at input {input}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_dither_that_is_still_rising_shows_as_a_negative_rate() {
+    let (_, first) = run(ServoForm::Measured, 0.0, 1)[0];
+    let expected = SCALE * (FIRST_HZ - REST_HZ) * TICK.as_s() / (2.0 * TAU_S);
+    assert!(first.rate_rad_per_s() < 0.0);
+    // Mean over the first tick: e^(−Δt/τ) of the start; models §6 to first order in Δt/τ.
+    let ratio = first.rate_rad_per_s() / (expected * libm::exp(-TICK.as_s() / TAU_S));
+    assert!((ratio - 1.0).abs() < 0.01);
+}
+
+#[test]
+fn the_correction_begins_with_the_first_good_tick_and_ends_when_settled() {
+    let servo = servo(ServoForm::Measured);
+    let mut memory = ServoMemory::new();
+    let counts = Some(HalfPeriodCounts { positive: 100, negative: -100 });
+    let at = |k: i64| tick(k * TICK.as_ns(), counts);
+    memory.advance(false, at(0).end_time, TICK);
+    assert_eq!(memory.apparent_rate(0, &servo, &at(0)), Transient::Settled);
+    memory.advance(true, at(1).end_time, TICK);
+    assert_eq!(memory.apparent_rate(0, &servo, &at(1)), Transient::Settled);
+    for k in 2..200 {
+        memory.advance(false, at(k).end_time, TICK);
+        // 8·τ = 0.4 s = 80 ticks after the transition's end at tick 1.
+        let running = matches!(memory.apparent_rate(0, &servo, &at(k)), Transient::Apparent { .. });
+        assert_eq!(running, k <= 81, "tick {k}");
+    }
+}
+
+#[test]
+fn without_half_periods_nothing_is_subtracted_and_it_says_so() {
+    let mut memory = ServoMemory::new();
+    memory.advance(true, Timestamp::from_ns(0), TICK);
+    let none = tick(TICK.as_ns(), None);
+    memory.advance(false, none.end_time, TICK);
+    for form in [ServoForm::Measured, ServoForm::Modelled] {
+        let transient = memory.apparent_rate(0, &servo(form), &none);
+        assert_eq!(transient, Transient::Unmeasured);
+        assert_eq!(transient.rate_rad_per_s().to_bits(), 0.0_f64.to_bits());
+    }
+    // The model begins with the first tick that has counts and then goes on without.
+    let counts = Some(HalfPeriodCounts { positive: 90, negative: -90 });
+    let modelled = servo(ServoForm::Modelled);
+    let second = tick(2 * TICK.as_ns(), counts);
+    let first_rate = memory.apparent_rate(0, &modelled, &second).rate_rad_per_s();
+    let third_rate = memory.apparent_rate(0, &modelled, &tick(3 * TICK.as_ns(), None));
+    let decay = libm::exp(-2.0 * TICK.as_s() / TAU_S);
+    assert!((third_rate.rate_rad_per_s() / first_rate - decay).abs() < 1e-12);
+    // The other gyros have no f_1 yet.
+    assert_eq!(memory.apparent_rate(1, &modelled, &none), Transient::Unmeasured);
+}
+
+#[test]
+fn every_error_is_reported_at_once() {
+    let parts = ServoParts {
+        form: ServoForm::Modelled,
+        time_constant_s: 0.0,
+        rest_frequency: CurveParts::Spline { knots: vec![] },
+        settle_time_constants: f64::NAN,
+    };
+    let errors = Servo::new(&parts).unwrap_err();
+    assert!(matches!(
+        errors[..],
+        [
+            ServoError::OutOfRange { name: "time_constant_s", .. },
+            ServoError::OutOfRange { name: "settle_time_constants", .. },
+            ServoError::RestFrequency(CurveError::KnotCount { .. }),
+        ]
+    ));
+}
+
+proptest! {
+    #[test]
+    fn no_input_panics_or_gives_anything_but_a_finite_rate(
+        ticks in prop::collection::vec((any::<bool>(), any::<i64>(), any::<i64>(), any::<[i32; 2]>()), 0..20),
+        numbers in prop::array::uniform2(prop::num::f64::ANY),
+        sensor in 0..20_usize,
+    ) {
+        for form in [ServoForm::Measured, ServoForm::Modelled] {
+            let servo = servo(form);
+            let mut memory = ServoMemory::new();
+            for (lost, end, duration, [positive, negative]) in &ticks {
+                let tick = ServoTick {
+                    end_time: Timestamp::from_ns(*end),
+                    duration: Span::from_ns(*duration),
+                    temperature_deg_c: numbers[0],
+                    scale_rad_per_count: numbers[1],
+                    half_periods: Some(HalfPeriodCounts { positive: *positive, negative: *negative }),
+                };
+                memory.advance(*lost, tick.end_time, tick.duration);
+                let transient = memory.apparent_rate(sensor, &servo, &tick);
+                prop_assert!(transient.rate_rad_per_s().is_finite());
+            }
+        }
+    }
+}

@@ -1,0 +1,13 @@
+//! Thermal terms of gyros and accelerometers, and their continuous update (models §2, §3).
+//!
+//! Temperature moves slowly, so every term is evaluated once per temperature sample and the value in use moves
+//! on a straight line to the new one over the next sample interval: the corrected rate has no staircase.
+
+mod accel;
+mod gyro;
+mod ramp;
+
+pub use accel::{AccelModel, AccelThermal};
+pub(crate) use gyro::TermError;
+pub use gyro::{GyroModel, GyroThermal, MAX_LAGS, TrendModel};
+pub use ramp::Ramp;

@@ -1,0 +1,69 @@
+//! Values that move on a straight line from one to the next.
+
+use crate::units::{Span, Timestamp};
+
+/// `N` values on their way from one thermal evaluation to the next.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ramp<const N: usize> {
+    start: Timestamp,
+    per_second: f64,
+    from: [f64; N],
+    step: [f64; N],
+}
+
+impl<const N: usize> Ramp<N> {
+    /// Values that stand still.
+    #[must_use]
+    pub const fn hold(values: [f64; N]) -> Self {
+        Self { start: Timestamp::from_ns(0), per_second: 0.0, from: values, step: [0.0; N] }
+    }
+
+    /// The values at `time`: exactly the starting ones before the start, exactly the target at and after the end.
+    #[must_use]
+    pub fn at(&self, time: Timestamp) -> [f64; N] {
+        let share = self.share(time);
+        core::array::from_fn(|i| match (self.from.get(i), self.step.get(i)) {
+            (Some(from), Some(step)) => from + step * share,
+            _ => 0.0,
+        })
+    }
+
+    /// Turns towards `target`, to be reached `over` later; from where the values are at `start`.
+    pub fn turn(&mut self, start: Timestamp, over: Span, target: [f64; N]) {
+        let from = self.at(start);
+        if over == Span::ZERO {
+            *self = Self::hold(target);
+            return;
+        }
+        self.start = start;
+        self.per_second = 1.0 / over.as_s();
+        self.from = from;
+        self.step = core::array::from_fn(|i| match (target.get(i), from.get(i)) {
+            (Some(to), Some(from)) => to - from,
+            _ => 0.0,
+        });
+    }
+
+    /// How far along the line `time` is, 0…1.
+    #[must_use]
+    pub fn share(&self, time: Timestamp) -> f64 {
+        (time.seconds_from(self.start) * self.per_second).clamp(0.0, 1.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_turn_in_mid_way_is_continuous() {
+        let at = |ms: i64| Timestamp::from_ns(ms * 1_000_000);
+        let mut ramp = Ramp::hold([1.0, -1.0]);
+        ramp.turn(at(0), Span::from_ms(100), [2.0, -3.0]);
+        let before = ramp.at(at(40));
+        ramp.turn(at(40), Span::from_ms(100), [0.0, 0.0]);
+        assert_eq!(ramp.at(at(40)), before);
+        assert_eq!(ramp.at(at(39)), before);
+        assert!(ramp.at(at(140))[0].abs() < 1e-15);
+    }
+}

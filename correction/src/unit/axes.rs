@@ -1,0 +1,88 @@
+//! Input axes to case axes, following temperature on a straight line.
+
+use crate::orientation::{Inverse, Orientation, ParityCheck, ParityVerdict, SensorMask};
+use crate::thermal::Ramp;
+use crate::units::{Span, Timestamp};
+
+/// Memory of one kind of sensor's orientation.
+#[derive(Debug)]
+pub(super) struct Axes {
+    /// Temperature that the orientation follows (°C); `share` of its way is the share between the inverses.
+    temperature: Ramp<1>,
+    target: f64,
+    mask: SensorMask,
+    from: Option<Inverse>,
+    to: Option<Inverse>,
+    excluded: SensorMask,
+    parity: ParityCheck,
+}
+
+impl Axes {
+    /// Starts at the assumed temperature (°C).
+    pub(super) fn new(orientation: &Orientation, target: f64) -> Self {
+        let mask = SensorMask::all(orientation.sensors());
+        let inverse = orientation.inverse(target, mask);
+        Self {
+            temperature: Ramp::hold([target]),
+            target,
+            mask,
+            from: inverse,
+            to: inverse,
+            excluded: SensorMask::NONE,
+            parity: ParityCheck::new(),
+        }
+    }
+
+    /// Turns towards the orientation at a new temperature (°C).
+    pub(super) fn update(&mut self, orientation: &Orientation, temperature: f64, start: Timestamp, over: Span) {
+        let now = self.at(start);
+        self.to = orientation.inverse(temperature, self.mask);
+        self.from = now.or(self.to);
+        self.target = temperature;
+        self.temperature.turn(start, over, [temperature]);
+    }
+
+    /// Sensors that the parity check has not excluded.
+    pub(super) fn included(&self, orientation: &Orientation) -> SensorMask {
+        (0..orientation.sensors())
+            .filter(|&i| self.excluded.contains(i))
+            .fold(SensorMask::all(orientation.sensors()), SensorMask::without)
+    }
+
+    /// Whether a sensor is excluded.
+    pub(super) fn is_excluded(&self, sensor: usize) -> bool {
+        self.excluded.contains(sensor)
+    }
+
+    /// Resolves case axes from the sensors of `mask`; `None` where they do not span the space.
+    pub(super) fn resolve(
+        &mut self,
+        orientation: &Orientation,
+        mask: SensorMask,
+        readings: &[f64],
+        time: Timestamp,
+    ) -> Option<[f64; 3]> {
+        if mask != self.mask {
+            let [now] = self.temperature.at(time);
+            self.mask = mask;
+            // Both ends anew, from where the temperature is now, so that the change of sensors is all that steps.
+            self.from = orientation.inverse(now, mask);
+            self.to = orientation.inverse(self.target, mask);
+        }
+        self.at(time).map(|inverse| inverse.apply(readings))
+    }
+
+    /// Watches the parity residuals; excludes a sensor where they call for it.
+    pub(super) fn watch(&mut self, orientation: &Orientation, mask: SensorMask, rates: &[f64]) -> ParityVerdict {
+        let verdict = self.parity.check(orientation, self.target, mask, rates);
+        if let Some(sensor) = verdict.exclude {
+            self.excluded = self.excluded.with(sensor);
+        }
+        verdict
+    }
+
+    fn at(&self, time: Timestamp) -> Option<Inverse> {
+        let (from, to) = (self.from.as_ref()?, self.to.as_ref()?);
+        Some(from.lerp(to, self.temperature.share(time)))
+    }
+}

@@ -1,0 +1,213 @@
+//! Order and plausibility of the raw gyro stream.
+//!
+//! Ticks leave here in sequence, each exactly once. A tick that is missing is waited for as long as the pairing
+//! window (in event time) allows; then the ticks behind it go on and the gap is announced.
+
+use alloc::collections::VecDeque;
+
+use super::counters::Counters;
+use crate::sample::GyroTick;
+use crate::units::{Span, Timestamp};
+
+/// Most gyro ticks that wait for an accelerometer tick or a missing neighbour.
+const MAX_PENDING: usize = 8192;
+/// Longest tick (10 s).
+pub(super) const MAX_DURATION: Span = Span::from_ns(10_000_000_000);
+/// A step of time larger than this, and than twice the ticks it claims to span, is not believed at once (1 h).
+const MAX_STEP: Span = Span::from_ns(3_600_000_000_000);
+/// So many consistent ticks in a row make a jump of sequence or time believed.
+const BELIEVED_AFTER: u32 = 8;
+
+/// A tick that waits for its release.
+#[derive(Debug, Clone)]
+struct Pending {
+    tick: GyroTick,
+    /// End of the last tick of the batch in which it came. The window counts from here, so that the size of a
+    /// batch does not eat into it.
+    batch_end: Timestamp,
+    restart: bool,
+    refused_before: u64,
+}
+
+/// A tick on its way into the correction.
+#[derive(Debug, Clone)]
+pub(super) struct Released {
+    pub(super) tick: GyroTick,
+    pub(super) missed: u64,
+    pub(super) restart: bool,
+}
+
+/// A jump of sequence or time that is not believed yet.
+#[derive(Debug, Clone, Copy)]
+struct Jump {
+    sequence: u64,
+    end_time: Timestamp,
+    consistent: u32,
+    refused: u64,
+}
+
+/// The newest tick that was admitted.
+#[derive(Debug, Clone, Copy)]
+struct Newest {
+    sequence: u64,
+    end_time: Timestamp,
+}
+
+/// Memory of the gyro stream.
+#[derive(Debug, Default)]
+pub(super) struct GyroIntake {
+    pending: VecDeque<Pending>,
+    /// Ticks among the pending ones at which a restart was followed.
+    restarts_pending: usize,
+    newest: Option<Newest>,
+    jump: Option<Jump>,
+    /// Sequence number that is to be released next; `None` until the first tick has left. That one waits out its
+    /// window like a tick behind a gap: the stream may have begun with an earlier one that is still on its way.
+    next: Option<u64>,
+    /// Bit i: the tick `next − 1 − i` was released.
+    released: u128,
+}
+
+/// What became of a tick.
+enum Admission {
+    Admitted { restart: bool, refused_before: u64 },
+    Refused,
+}
+
+impl GyroIntake {
+    /// Takes one tick of a batch that ends at `batch_end`.
+    pub(super) fn admit(&mut self, tick: &GyroTick, batch_end: Timestamp, counters: &mut Counters) {
+        if tick.duration == Span::ZERO || tick.duration > MAX_DURATION {
+            counters.bad_duration += 1;
+            return;
+        }
+        let Admission::Admitted { restart, refused_before } = self.judge(tick, counters) else { return };
+        let pending = Pending { tick: tick.clone(), batch_end, restart, refused_before };
+        if restart || self.newest.is_none_or(|newest| tick.sequence > newest.sequence) {
+            self.newest = Some(Newest { sequence: tick.sequence, end_time: tick.end_time });
+            self.restarts_pending += usize::from(restart);
+            self.pending.push_back(pending);
+            counters.pending_overflow += u64::from(self.pending.len() > MAX_PENDING);
+        } else {
+            self.insert_between(pending, counters);
+        }
+    }
+
+    /// Compares sequence and time with what came before.
+    fn judge(&mut self, tick: &GyroTick, counters: &mut Counters) -> Admission {
+        const PLAIN: Admission = Admission::Admitted { restart: false, refused_before: 0 };
+        let Some(newest) = self.newest else { return PLAIN };
+        if tick.sequence > newest.sequence && plausible_step(newest, tick) {
+            self.jump = None;
+            return PLAIN;
+        }
+        if tick.sequence <= newest.sequence && tick.end_time <= newest.end_time {
+            return self.judge_old(tick, counters);
+        }
+        counters.gyro_implausible += 1;
+        self.follow_jump(tick, counters)
+    }
+
+    /// A tick from before the newest one: late, doubled, filling a hole, or the sign of a restart.
+    fn judge_old(&mut self, tick: &GyroTick, counters: &mut Counters) -> Admission {
+        if self.next.is_none_or(|next| tick.sequence >= next) {
+            return Admission::Admitted { restart: false, refused_before: 0 };
+        }
+        let age = self.next.unwrap_or_default().saturating_sub(1).saturating_sub(tick.sequence);
+        let known = u32::try_from(age).ok().and_then(|age| self.released.checked_shr(age)).is_some_and(|bits| bits & 1 == 1);
+        if known {
+            counters.gyro_duplicates += 1;
+            return Admission::Refused;
+        }
+        // Too far back to tell late from anew: a producer that was switched off and on begins like this.
+        if age >= u64::from(u128::BITS) {
+            counters.gyro_implausible += 1;
+            return self.follow_jump(tick, counters);
+        }
+        counters.gyro_late += 1;
+        Admission::Refused
+    }
+
+    /// Refuses a jump until enough ticks agree with it, then follows it.
+    fn follow_jump(&mut self, tick: &GyroTick, counters: &mut Counters) -> Admission {
+        let before = self.jump.filter(|jump| {
+            let place = Newest { sequence: jump.sequence, end_time: jump.end_time };
+            tick.sequence > jump.sequence && plausible_step(place, tick)
+        });
+        let refused = self.jump.map_or(0, |jump| jump.refused);
+        let consistent = before.map_or(1, |jump| jump.consistent + 1);
+        if consistent <= BELIEVED_AFTER {
+            self.jump =
+                Some(Jump { sequence: tick.sequence, end_time: tick.end_time, consistent, refused: refused + 1 });
+            return Admission::Refused;
+        }
+        self.jump = None;
+        counters.restarts += 1;
+        Admission::Admitted { restart: true, refused_before: refused }
+    }
+
+    /// Puts a tick that came out of order in its place among those that wait.
+    fn insert_between(&mut self, pending: Pending, counters: &mut Counters) {
+        // Only ticks behind the last restart can still be joined.
+        let from = self.pending.iter().rposition(|p| p.restart).map_or(0, |i| i + 1);
+        let behind = self.pending.iter().skip(from);
+        let place = from + behind.take_while(|p| p.tick.sequence < pending.tick.sequence).count();
+        let neighbour = self.pending.get(place);
+        if neighbour.is_some_and(|p| p.tick.sequence == pending.tick.sequence) {
+            counters.gyro_duplicates += 1;
+            return;
+        }
+        let time = pending.tick.end_time;
+        let earlier = place.checked_sub(1).and_then(|i| self.pending.get(i));
+        if neighbour.is_some_and(|p| p.tick.end_time <= time) || earlier.is_some_and(|p| p.tick.end_time >= time) {
+            counters.gyro_implausible += 1;
+            return;
+        }
+        self.pending.insert(place, pending);
+    }
+
+    /// The tick that is to leave next, and whether its window has passed; `None` while it must wait for a
+    /// missing neighbour.
+    pub(super) fn front(&self, window: Span, flushing: bool) -> Option<(&GyroTick, bool)> {
+        let front = self.pending.front()?;
+        // What waits before a restart lives in another time: the newest tick says nothing of its window.
+        let restarted_behind = self.restarts_pending > usize::from(front.restart);
+        let passed = self.newest.is_some_and(|newest| {
+            newest.end_time > front.batch_end && newest.end_time >= front.batch_end + window
+        });
+        let expired = flushing || restarted_behind || passed || self.pending.len() > MAX_PENDING;
+        let in_sequence = front.restart || self.next == Some(front.tick.sequence);
+        (in_sequence || expired).then_some((&front.tick, expired))
+    }
+
+    /// Releases the front tick.
+    pub(super) fn release(&mut self) -> Option<Released> {
+        let Pending { tick, restart, refused_before, .. } = self.pending.pop_front()?;
+        self.restarts_pending -= usize::from(restart);
+        let missed = match self.next {
+            Some(next) if !restart => tick.sequence.saturating_sub(next),
+            _ => refused_before,
+        };
+        let moved = missed.saturating_add(1);
+        let kept = if restart { 0 } else { u32::try_from(moved).ok().and_then(|n| self.released.checked_shl(n)).unwrap_or(0) };
+        self.released = kept | 1;
+        self.next = Some(tick.sequence.saturating_add(1));
+        Some(Released { tick, missed, restart })
+    }
+
+    /// Whether any tick waits.
+    pub(super) fn is_empty(&self) -> bool {
+        self.pending.is_empty()
+    }
+}
+
+/// Whether a later sequence number and its time fit the newest tick.
+fn plausible_step(newest: Newest, tick: &GyroTick) -> bool {
+    if tick.end_time <= newest.end_time {
+        return false;
+    }
+    let step_ns = i128::from(tick.end_time.as_ns()) - i128::from(newest.end_time.as_ns());
+    let claimed_ns = i128::from(tick.sequence - newest.sequence) * i128::from(tick.duration.as_ns());
+    // Half and twice: durations vary, and a producer may idle between ticks for up to MAX_STEP.
+    step_ns >= claimed_ns / 2 && step_ns <= (2 * claimed_ns).max(i128::from(MAX_STEP.as_ns()))
+}

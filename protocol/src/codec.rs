@@ -1,0 +1,215 @@
+//! Frames: kind, version, body, checksum.
+//!
+//! | bytes | meaning |
+//! |---|---|
+//! | 0 | kind of message ([`Kind`]) |
+//! | 1 | version ([`crate::version`]) |
+//! | 2 … n−4 | body, postcard |
+//! | last 4 | CRC-32 (ISO-HDLC, as in zlib) of all bytes before, little-endian |
+//!
+//! Decoding never panics and never allocates more than a fixed multiple of the frame's length, which is bounded too.
+
+use std::fmt;
+use std::marker::PhantomData;
+
+use serde::de::{DeserializeOwned, Error as _, SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
+use thiserror::Error;
+
+use crate::version;
+
+/// Longest frame that is decoded, in bytes.
+pub const MAX_FRAME: usize = 1 << 20;
+/// Most ticks in one batch.
+pub const MAX_TICKS: usize = 4096;
+/// Kind and version in front.
+const HEADER: usize = 2;
+/// CRC-32 behind.
+const CHECKSUM: usize = 4;
+
+/// Kind of a message: the first byte of its frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Kind {
+    /// [`crate::raw::GyroBatch`].
+    RawGyro = 1,
+    /// [`crate::raw::AccelBatch`].
+    RawAccel = 2,
+    /// [`crate::raw::TemperatureBatch`].
+    RawTemperature = 3,
+    /// [`crate::corrected::CorrectedBatch`].
+    Corrected = 4,
+    /// [`crate::status::Status`].
+    Status = 5,
+}
+
+/// A message that has a frame of its own.
+pub trait Message: Serialize + DeserializeOwned {
+    /// Its kind.
+    const KIND: Kind;
+
+    /// Checks what the types cannot say; called on encoding and after decoding.
+    ///
+    /// # Errors
+    /// [`CodecError`] where the parts of the message contradict each other.
+    fn check(&self) -> Result<(), CodecError> {
+        Ok(())
+    }
+}
+
+/// Why a frame cannot be read or written.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum CodecError {
+    /// Too short to hold header and checksum, or longer than [`MAX_FRAME`].
+    #[error("frame has {length} bytes, must have {} to {MAX_FRAME}", HEADER + CHECKSUM)]
+    Length {
+        /// Its length in bytes.
+        length: usize,
+    },
+    /// Another kind than the key promises.
+    #[error("message is of kind {got}, expected {need}")]
+    Kind {
+        /// The byte found.
+        got: u8,
+        /// The byte expected.
+        need: u8,
+    },
+    /// A version that this reader does not know.
+    #[error("message has version {got}, this reader knows {} to {}", version::MIN, version::CURRENT)]
+    Version {
+        /// The byte found.
+        got: u8,
+    },
+    /// The bytes changed on their way.
+    #[error("checksum is {got:#010x}, the bytes give {need:#010x}")]
+    Checksum {
+        /// The checksum found.
+        got: u32,
+        /// The checksum of the bytes.
+        need: u32,
+    },
+    /// The body does not decode as its version says.
+    #[error("body is malformed")]
+    Malformed,
+    /// Bytes are left over behind the body.
+    #[error("{count} bytes are left over behind the body")]
+    Trailing {
+        /// How many.
+        count: usize,
+    },
+    /// A batch without ticks, or with too many.
+    #[error("batch has {count} ticks, must have 1 to {MAX_TICKS}")]
+    Ticks {
+        /// How many.
+        count: usize,
+    },
+    /// Counts and means, or different numbers of sensors, in one batch.
+    #[error("tick {index} of the batch has other readings than the first")]
+    MixedReadings {
+        /// Index of the first such tick.
+        index: usize,
+    },
+    /// Half-period counts for another number of gyros than there are.
+    #[error("tick {index} of the batch has half-period counts of {got} gyros, must be 0 or {need}")]
+    HalfPeriods {
+        /// Index of the first such tick.
+        index: usize,
+        /// How many it has.
+        got: usize,
+        /// How many gyros there are.
+        need: usize,
+    },
+}
+
+/// Encodes a message into `frame`, whose old contents are dropped and whose capacity is kept.
+///
+/// # Errors
+/// What [`Message::check`] finds; [`CodecError::Length`] beyond [`MAX_FRAME`].
+pub fn encode_into<M: Message>(message: &M, frame: &mut Vec<u8>) -> Result<(), CodecError> {
+    message.check()?;
+    frame.clear();
+    frame.extend([M::KIND as u8, version::CURRENT]);
+    let mut body = postcard::to_extend(message, std::mem::take(frame)).map_err(|_| CodecError::Malformed)?;
+    let checksum = crc32fast::hash(&body);
+    body.extend(checksum.to_le_bytes());
+    *frame = body;
+    if frame.len() > MAX_FRAME {
+        return Err(CodecError::Length { length: frame.len() });
+    }
+    Ok(())
+}
+
+/// Encodes a message.
+///
+/// # Errors
+/// As [`encode_into`].
+pub fn encode<M: Message>(message: &M) -> Result<Vec<u8>, CodecError> {
+    let mut frame = Vec::new();
+    encode_into(message, &mut frame)?;
+    Ok(frame)
+}
+
+/// Decodes a frame.
+///
+/// # Errors
+/// [`CodecError`], whatever the bytes are.
+pub fn decode<M: Message>(frame: &[u8]) -> Result<M, CodecError> {
+    let length = frame.len();
+    if !(HEADER + CHECKSUM..=MAX_FRAME).contains(&length) {
+        return Err(CodecError::Length { length });
+    }
+    let Some((&[kind, frame_version], _)) = frame.split_first_chunk() else {
+        return Err(CodecError::Length { length });
+    };
+    let Some((covered, checksum)) = frame.split_last_chunk::<CHECKSUM>() else {
+        return Err(CodecError::Length { length });
+    };
+    if kind != M::KIND as u8 {
+        return Err(CodecError::Kind { got: kind, need: M::KIND as u8 });
+    }
+    if !(version::MIN..=version::CURRENT).contains(&frame_version) {
+        return Err(CodecError::Version { got: frame_version });
+    }
+    let (got, need) = (u32::from_le_bytes(*checksum), crc32fast::hash(covered));
+    if got != need {
+        return Err(CodecError::Checksum { got, need });
+    }
+    let body = covered.get(HEADER..).unwrap_or_default();
+    let (message, rest) = postcard::take_from_bytes::<M>(body).map_err(|_| CodecError::Malformed)?;
+    if !rest.is_empty() {
+        return Err(CodecError::Trailing { count: rest.len() });
+    }
+    message.check()?;
+    Ok(message)
+}
+
+/// Deserialises a sequence of at most `MAX` elements, allocating as they come and never ahead.
+pub(crate) fn bounded<'de, D, T, const MAX: usize>(deserializer: D) -> Result<Vec<T>, D::Error>
+where
+    D: Deserializer<'de>,
+    T: Deserialize<'de>,
+{
+    struct Bounded<T, const MAX: usize>(PhantomData<T>);
+
+    impl<'de, T: Deserialize<'de>, const MAX: usize> Visitor<'de> for Bounded<T, MAX> {
+        type Value = Vec<T>;
+
+        fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+            write!(f, "at most {MAX} elements")
+        }
+
+        fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Vec<T>, A::Error> {
+            let mut elements = Vec::new();
+            while let Some(element) = seq.next_element()? {
+                if elements.len() == MAX {
+                    return Err(A::Error::invalid_length(MAX + 1, &self));
+                }
+                elements.push(element);
+            }
+            Ok(elements)
+        }
+    }
+
+    deserializer.deserialize_seq(Bounded::<T, MAX>(PhantomData))
+}

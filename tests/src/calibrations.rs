@@ -1,0 +1,133 @@
+//! Calibrations for tests, built from plain parts.
+
+use std::sync::Arc;
+
+use isotherm_correction::calibration::{AccelParts, Calibration, CalibrationParts, GyroParts};
+use isotherm_correction::channel::{ChannelParts, ThermalFilterParts};
+use isotherm_correction::curve::CurveParts;
+use isotherm_correction::orientation::OrientationParts;
+use isotherm_correction::reversal::ReversalParts;
+use isotherm_correction::sample::{ChannelName, OutputKind};
+
+/// A constant over −60…100 °C.
+#[must_use]
+pub fn constant(value: f64) -> CurveParts {
+    polynomial(&[value])
+}
+
+/// A polynomial about 20 °C over −60…100 °C.
+#[must_use]
+pub fn polynomial(coefficients: &[f64]) -> CurveParts {
+    CurveParts::Polynomial { reference: 20.0, coefficients: coefficients.to_vec(), range: [-60.0, 100.0] }
+}
+
+/// A gyro with mean output (rad/s) that is right as it stands.
+#[must_use]
+pub fn plain_gyro() -> GyroParts {
+    GyroParts {
+        channel: Some(0),
+        increment_weight: 1.0,
+        increment_weight_error: None,
+        input_limit: 1e6,
+        static_bias: None,
+        magnetic_bias: None,
+        slow_meander: None,
+        thermal_rate: None,
+        thermal_acceleration: None,
+        lags: Vec::new(),
+        trend: None,
+        servo: None,
+    }
+}
+
+/// An accelerometer with mean output (m/s²) that is right as it stands.
+#[must_use]
+pub fn plain_accel() -> AccelParts {
+    AccelParts {
+        channel: Some(0),
+        board_channel: None,
+        scale_factor: constant(1.0),
+        bias: None,
+        board_ratio: None,
+        input_limit: 1e6,
+    }
+}
+
+/// An orientation from rows, without temperature dependence.
+#[must_use]
+pub fn orientation(rows: &[[f64; 3]]) -> OrientationParts {
+    OrientationParts {
+        reference_deg_c: 20.0,
+        rows: rows.to_vec(),
+        slopes_per_deg_c: Vec::new(),
+        weights: Vec::new(),
+        range_deg_c: [-60.0, 100.0],
+        parity_limit: None,
+        parity_confirm_ticks: 1,
+    }
+}
+
+/// Sensors along the case axes.
+pub const ALONG_CASE_AXES: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
+/// One temperature channel "t" that reads °C, evaluated each second.
+#[must_use]
+pub fn channel(name: &str) -> ChannelParts {
+    ChannelParts {
+        name: ChannelName::from(name).expect("a short name"),
+        conversion: vec![0.0, 1.0],
+        range_deg_c: [-100.0, 150.0],
+        spike_limit_deg_c: 20.0,
+    }
+}
+
+/// Three gyros and three accelerometers along the case axes that are right as they stand.
+#[must_use]
+pub fn identity() -> CalibrationParts {
+    CalibrationParts {
+        filter: ThermalFilterParts {
+            grid_step_s: 1.0,
+            smoothing_s: 1.0,
+            derivative_step_s: 1.0,
+            stale_after_s: 60.0,
+            branch_dead_band: 1e-6,
+            assumed_deg_c: 20.0,
+        },
+        channels: vec![channel("t")],
+        gyro_output: OutputKind::Mean,
+        gyros: vec![plain_gyro(); 3],
+        gyro_orientation: orientation(&ALONG_CASE_AXES),
+        gyro_orientation_channels: vec![0],
+        accel_output: OutputKind::Mean,
+        accels: vec![plain_accel(); 3],
+        accel_orientation: Some(orientation(&ALONG_CASE_AXES)),
+        accel_orientation_channels: vec![0],
+        reversal: None,
+    }
+}
+
+/// Three gyros only, with a magnetic bias and the substitution over a mode switch.
+#[must_use]
+pub fn mode_reversed(reversal: ReversalParts) -> CalibrationParts {
+    let mut parts = identity();
+    parts.accels.clear();
+    parts.accel_orientation = None;
+    parts.accel_orientation_channels.clear();
+    parts.reversal = Some(reversal);
+    for (i, gyro) in parts.gyros.iter_mut().enumerate() {
+        gyro.magnetic_bias = Some(constant(MAGNETIC_BIAS_RAD_PER_S * [1.0, -0.5, 2.0][i]));
+    }
+    parts
+}
+
+/// Magnetic bias of the first gyro of [`mode_reversed`] (rad/s): 10 °/h.
+pub const MAGNETIC_BIAS_RAD_PER_S: f64 = 10.0 * std::f64::consts::PI / 180.0 / 3600.0;
+
+/// Compiles parts that are known to be sound.
+///
+/// # Panics
+/// Where they are not.
+#[must_use]
+pub fn compile(parts: &CalibrationParts) -> Arc<Calibration> {
+    Arc::new(Calibration::new(parts).expect("the fixture is sound"))
+}

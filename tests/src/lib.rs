@@ -1,0 +1,8 @@
+//! Fixtures that the system tests share: calibrations, streams and ways to drive a unit with them.
+//!
+//! The tests themselves are in `tests/tests/`.
+
+pub mod calibrations;
+pub mod data;
+pub mod drive;
+pub mod streams;

@@ -1,0 +1,105 @@
+//! I1: every raw gyro tick gives exactly one corrected tick, or is counted in a gap that the next output announces.
+//! Duplicates give none.
+
+use isotherm_correction::sample::{CorrectedTick, TickFlags};
+use isotherm_correction::unit::{Uncalibrated, Unit, UnitSettings};
+use isotherm_tests::calibrations::{compile, identity};
+use isotherm_tests::drive::{self, Owned};
+use isotherm_tests::streams::{accel, gyro};
+use proptest::prelude::*;
+
+const RATES: [f64; 3] = [0.1, 0.2, 0.3];
+
+/// The accounting rule of a consumer: returns (ticks, announced missing), panics where they do not add up.
+fn account(out: &[CorrectedTick]) -> (u64, u64) {
+    let mut next = None;
+    for tick in out {
+        if let Some(next) = next {
+            assert_eq!(tick.sequence, next + tick.missed, "{tick:?}");
+        }
+        assert_eq!(tick.missed > 0, tick.flags.contains(TickFlags::GAP));
+        next = Some(tick.sequence + 1);
+    }
+    (out.len() as u64, out.iter().map(|tick| tick.missed).sum())
+}
+
+fn batch(k: u64) -> [Owned; 2] {
+    [Owned::Accel(vec![accel(k, &RATES)]), Owned::Gyro(vec![gyro(k, &RATES)])]
+}
+
+proptest! {
+    #[test]
+    fn i1_every_tick_is_given_once_or_announced(
+        // What happens to each tick: 0 lost, 1 sent once, 2 sent twice, 3 swapped with the next one.
+        fates in prop::collection::vec(0_u8..=3, 20..200)
+    ) {
+        let mut order: Vec<u64> = Vec::new();
+        for (k, fate) in fates.iter().enumerate() {
+            match fate {
+                0 if k > 0 => {}
+                2 => order.extend([k as u64; 2]),
+                // Not twice in a row: the tick in front would fall back beyond the window.
+                3 if order.len() > 1 && fates[k - 1] != 3 => order.insert(order.len() - 1, k as u64),
+                _ => order.push(k as u64),
+            }
+        }
+        let events: Vec<Owned> = order.iter().copied().flat_map(batch).collect();
+        let mut unit = drive::unit(&compile(&identity()));
+        let out = drive::run(&mut unit, &events);
+        let (given, announced) = account(&out);
+        let last = *order.iter().max().unwrap();
+        prop_assert_eq!(given + announced, last + 1 - order[0]);
+        let mut distinct = order.clone();
+        distinct.sort_unstable();
+        distinct.dedup();
+        prop_assert_eq!(given, distinct.len() as u64, "a tick that came in time was not given");
+    }
+}
+
+#[test]
+fn i1_a_duplicate_of_any_age_gives_nothing() {
+    let mut unit = drive::unit(&compile(&identity()));
+    let mut out = Vec::new();
+    for k in 0..100 {
+        batch(k).iter().for_each(|event| drive::hand(&mut unit, event, &mut out));
+    }
+    for k in [99, 98, 50, 1] {
+        batch(k).iter().for_each(|event| drive::hand(&mut unit, event, &mut out));
+    }
+    assert_eq!(out.len(), 100);
+    assert_eq!(unit.counters().gyro_duplicates, 4);
+}
+
+#[test]
+fn i1_a_gap_of_a_million_ticks_is_one_announcement() {
+    let mut unit = drive::unit(&compile(&identity()));
+    let events: Vec<Owned> = (0..10).chain(1_000_010..1_000_020).flat_map(batch).collect();
+    let out = drive::run(&mut unit, &events);
+    assert_eq!(account(&out), (20, 1_000_000));
+    assert_eq!(unit.counters().gaps, 1);
+}
+
+#[test]
+fn i1_ticks_that_were_held_back_are_announced_once_a_calibration_is_there() {
+    let mut unit = Unit::new(UnitSettings { uncalibrated: Uncalibrated::Hold, ..UnitSettings::default() });
+    let mut out = Vec::new();
+    (0..30).flat_map(batch).for_each(|event| drive::hand(&mut unit, &event, &mut out));
+    assert!(out.is_empty());
+    let held = unit.counters().ticks_held;
+    unit.install(compile(&identity()), 1);
+    (30..60).flat_map(batch).for_each(|event| drive::hand(&mut unit, &event, &mut out));
+    assert_eq!(out[0].missed, held);
+    assert_eq!(held + out.len() as u64, 60);
+}
+
+#[test]
+fn i1_a_restarted_producer_is_followed_and_its_lost_ticks_are_announced() {
+    let mut unit = drive::unit(&compile(&identity()));
+    let mut out = Vec::new();
+    (1000..1300).flat_map(batch).for_each(|event| drive::hand(&mut unit, &event, &mut out));
+    (0..300).flat_map(batch).for_each(|event| drive::hand(&mut unit, &event, &mut out));
+    let restart = out.iter().position(|tick| tick.flags.contains(TickFlags::RESTART)).expect("a restart");
+    assert_eq!(restart, 300);
+    assert_eq!(out[restart].sequence, out[restart].missed, "the new series began at 0");
+    assert_eq!(out.len() as u64 + out[restart].missed, 600);
+}

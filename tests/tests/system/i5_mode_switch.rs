@@ -1,0 +1,149 @@
+//! I5: over a mode switch the accumulated angle is that of the two-sided fit (models §5), in a stream with gaps too.
+
+use std::f64::consts::{PI, TAU};
+
+use isotherm_correction::reversal::ReversalParts;
+use isotherm_correction::sample::{CorrectedTick, GyroTick, LasingMode, TickFlags};
+use isotherm_tests::calibrations::{MAGNETIC_BIAS_RAD_PER_S, compile, mode_reversed};
+use isotherm_tests::drive::{self, Owned};
+use isotherm_tests::streams;
+
+const TICK_S: f64 = 0.005;
+const ARCSEC: f64 = PI / 180.0 / 3600.0;
+const AMPLITUDE_RAD: f64 = PI / 180.0;
+/// Tick of j = 0, the last good one of the old mode.
+const LAST_GOOD: u64 = 20;
+const TICKS: u64 = 60;
+const PHASES: u32 = 180;
+
+/// Angle increment of tick `k` under sine motion (rad), exactly integrated.
+fn truth(k: u64, frequency_hz: f64, phase: f64) -> f64 {
+    let angle = |t: f64| AMPLITUDE_RAD * (TAU * frequency_hz * t + phase).sin();
+    #[expect(clippy::cast_precision_loss, reason = "a small tick number")]
+    let end = k as f64 * TICK_S;
+    angle(end) - angle(end - TICK_S)
+}
+
+/// A tick as the gyros would give it: the magnetic bias in it, rubbish while nothing lases.
+fn raw(k: u64, frequency_hz: f64, phase: f64, switches: &[u64], n: u64) -> GyroTick {
+    let done = switches.iter().filter(|&&s| k >= s).count();
+    let mode = if done % 2 == 0 { LasingMode::Plus } else { LasingMode::Minus };
+    let lost = switches.iter().any(|&s| (s..s + n).contains(&k));
+    let motion = truth(k, frequency_hz, phase) / TICK_S;
+    let rates = [1.0, -0.5, 2.0].map(|share| if lost { 1e3 } else { motion + mode.sign() * share * MAGNETIC_BIAS_RAD_PER_S });
+    GyroTick { mode: Some(mode), switch_command: switches.contains(&k), ..streams::gyro(k, &rates) }
+}
+
+/// Runs one phase through the state machine; `missing` ticks never arrive.
+fn run(parts: ReversalParts, frequency_hz: f64, phase: f64, switches: &[u64], missing: &[u64]) -> Vec<CorrectedTick> {
+    let calibration = compile(&mode_reversed(parts));
+    let n = u64::from(parts.transition_ticks);
+    let ticks = (0..TICKS).filter(|k| !missing.contains(k)).map(|k| raw(k, frequency_hz, phase, switches, n));
+    drive::run(&mut drive::unit(&calibration), &[Owned::Gyro(ticks.collect())])
+}
+
+/// Accumulated error of the published ticks from `from` to `to`, about the first axis (rad).
+fn error(out: &[CorrectedTick], from: u64, to: u64, frequency_hz: f64, phase: f64) -> f64 {
+    let published = out.iter().filter(|tick| (from..=to).contains(&tick.sequence));
+    published.map(|tick| tick.delta_angle[0] - truth(tick.sequence, frequency_hz, phase)).sum()
+}
+
+/// Root mean square over phase (″).
+fn rms_over_phase(error_at: impl Fn(f64) -> f64) -> f64 {
+    let sum: f64 = (0..PHASES).map(|i| error_at(TAU * f64::from(i) / f64::from(PHASES)).powi(2)).sum();
+    (sum / f64::from(PHASES)).sqrt() / ARCSEC
+}
+
+#[test]
+fn i5_the_reference_table_is_reproduced_through_the_whole_state_machine() {
+    // models §5: 1° amplitude, 5 ms, n = 3; constant, linear, parabola after step 2, then after step 4 (″).
+    let table =
+        [(1.0, [26.35, 1.380, 0.053, 0.000_27]), (5.0, [642.9, 169.7, 32.68, 0.842]), (10.0, [2381.0, 1288.0, 503.8, 25.96])];
+    let (first, last) = (LAST_GOOD + 1, LAST_GOOD + 3);
+    for (frequency, figures) in table {
+        for (degree, expected) in (0_u8..).zip(&figures[..3]) {
+            let parts = ReversalParts { predict_degree: degree, ..ReversalParts::default() };
+            let got = rms_over_phase(|phase| {
+                error(&run(parts, frequency, phase, &[first], &[]), first, last, frequency, phase)
+            });
+            assert!((got / expected - 1.0).abs() < 0.01, "{frequency} Hz, degree {degree}: {got} ″, table {expected} ″");
+        }
+        let got = rms_over_phase(|phase| {
+            let out = run(ReversalParts::default(), frequency, phase, &[first], &[]);
+            error(&out, first, TICKS, frequency, phase)
+        });
+        let expected = figures[3];
+        assert!((got / expected - 1.0).abs() < 0.02, "{frequency} Hz, after step 4: {got} ″, table {expected} ″");
+    }
+}
+
+#[test]
+fn i5_the_restored_angle_does_not_depend_on_how_the_prediction_was_made() {
+    let first = LAST_GOOD + 1;
+    let sums = [0, 1, 2].map(|predict_degree| {
+        let parts = ReversalParts { predict_degree, ..ReversalParts::default() };
+        error(&run(parts, 5.0, 0.3, &[first], &[]), first, TICKS, 5.0, 0.3)
+    });
+    assert!((sums[0] - sums[2]).abs() < 1e-15 && (sums[1] - sums[2]).abs() < 1e-15, "{sums:?}");
+}
+
+#[test]
+fn i5_shorter_transitions_are_bridged_too() {
+    let first = LAST_GOOD + 1;
+    for n in 1..=3 {
+        let parts = ReversalParts { transition_ticks: n, ..ReversalParts::default() };
+        let out = run(parts, 1.0, 0.7, &[first], &[]);
+        assert_eq!(out.iter().filter(|t| t.flags.contains(TickFlags::INTERPOLATED)).count(), usize::from(n));
+        let restored: Vec<_> = out.iter().filter(|t| t.flags.contains(TickFlags::ANGLE_RESTORED)).collect();
+        assert_eq!(restored.len(), 1);
+        assert_eq!(restored[0].sequence, LAST_GOOD + u64::from(n) + 3, "the correction goes into j = n + 3");
+        assert!(error(&out, first, TICKS, 1.0, 0.7).abs() < 0.001 * ARCSEC);
+    }
+}
+
+#[test]
+fn i5_a_switch_during_a_gap() {
+    // The command and one more tick of the transition are lost: the published ticks still add up to the two-sided fit.
+    let first = LAST_GOOD + 1;
+    for missing in [vec![first], vec![first, first + 1], vec![first - 1, first], vec![first + 1], vec![first + 4], vec![first + 3, first + 4]] {
+        let got = rms_over_phase(|phase| {
+            let out = run(ReversalParts::default(), 1.0, phase, &[first], &missing);
+            let announced: u64 = out.iter().map(|tick| tick.missed).sum();
+            assert_eq!(announced, missing.len() as u64);
+            assert_eq!(out.len() as u64, TICKS - announced);
+            error(&out, 0, TICKS, 1.0, phase)
+        });
+        assert!(got < 0.02, "missing {missing:?}: {got} ″ rms");
+    }
+}
+
+#[test]
+fn i5_two_switches_ten_ticks_apart() {
+    let switches = [LAST_GOOD + 1, LAST_GOOD + 11];
+    for (frequency, limit) in [(1.0, 0.001), (5.0, 2.0)] {
+        let got = rms_over_phase(|phase| {
+            let out = run(ReversalParts::default(), frequency, phase, &switches, &[]);
+            assert_eq!(out.iter().filter(|t| t.flags.contains(TickFlags::ANGLE_RESTORED)).count(), 2);
+            assert_eq!(out.iter().filter(|t| t.flags.contains(TickFlags::INTERPOLATED)).count(), 6);
+            error(&out, 0, TICKS, frequency, phase)
+        });
+        assert!(got < limit, "{frequency} Hz: {got} ″ rms");
+    }
+}
+
+#[test]
+fn i5_the_mode_dependent_bias_leaves_no_trace() {
+    // At rest the magnetic bias changes its sign at the switch; fitted over it, it would look like motion.
+    let first = LAST_GOOD + 1;
+    let calibration = compile(&mode_reversed(ReversalParts::default()));
+    let ticks = (0..TICKS).map(|k| {
+        let mode = if k < first { LasingMode::Plus } else { LasingMode::Minus };
+        let rates = [1.0, -0.5, 2.0].map(|share| mode.sign() * share * MAGNETIC_BIAS_RAD_PER_S);
+        GyroTick { mode: Some(mode), switch_command: k == first, ..streams::gyro(k, &rates) }
+    });
+    let out = drive::run(&mut drive::unit(&calibration), &[Owned::Gyro(ticks.collect())]);
+    // The first tick comes before any temperature, when the terms stand at their reference.
+    for tick in out.iter().filter(|tick| tick.sequence > 0) {
+        assert!(tick.delta_angle.iter().all(|angle| angle.abs() < 1e-17), "{tick:?}");
+    }
+}

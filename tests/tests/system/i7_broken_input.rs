@@ -1,0 +1,123 @@
+//! I7: no input, however broken, stops a unit or disturbs another; each kind has a counter and a flag.
+//!
+//! Here through the state machine and the frames; over real Zenoh sessions in `over_zenoh`.
+
+use isotherm_correction::sample::{CorrectedTick, GyroTick, SensorFlags, TickFlags};
+use isotherm_correction::unit::{Counters, UnitSettings};
+use isotherm_correction::units::{Span, Timestamp};
+use isotherm_protocol::key::{RawStream, UnitId};
+use isotherm_protocol::stream::UnitStream;
+use isotherm_tests::calibrations::{compile, identity};
+use isotherm_tests::drive::{self, Owned};
+use isotherm_tests::streams::{accel, end_of, gyro, temperature};
+use proptest::prelude::*;
+
+const RATES: [f64; 3] = [0.1, 0.2, 0.3];
+
+/// Runs 100 good ticks, the broken events, then 100 good ticks; what came out and what was counted.
+fn around(broken: Vec<Owned>) -> (Vec<CorrectedTick>, Counters) {
+    let good = |k| [Owned::Accel(vec![accel(k, &RATES)]), Owned::Gyro(vec![gyro(k, &RATES)])];
+    let mut events: Vec<Owned> = (0..100).flat_map(good).collect();
+    events.extend(broken);
+    events.extend((101..201).flat_map(good));
+    let mut unit = drive::unit(&compile(&identity()));
+    let out = drive::run(&mut unit, &events);
+    (out, *unit.counters())
+}
+
+/// The unit goes on as before: all good ticks are there and right.
+fn assert_goes_on(name: &str, out: &[CorrectedTick]) {
+    for k in (0..100).chain(101..201) {
+        let tick = out.iter().find(|tick| tick.sequence == k);
+        let tick = tick.unwrap_or_else(|| panic!("{name}: tick {k} is missing"));
+        for (angle, rate) in tick.delta_angle.iter().zip(RATES) {
+            assert!((angle - rate * 0.005).abs() < 1e-15, "{name}: {tick:?}");
+        }
+    }
+}
+
+#[test]
+fn i7_each_kind_of_broken_tick_is_counted_and_harmless() {
+    let with = |change: &dyn Fn(&mut GyroTick)| {
+        let mut tick = gyro(100, &RATES);
+        change(&mut tick);
+        vec![Owned::Accel(vec![accel(100, &RATES)]), Owned::Gyro(vec![tick])]
+    };
+    type Count = fn(&Counters) -> u64;
+    let cases: [(&str, Vec<Owned>, Count); 11] = [
+        ("time going back", with(&|t| t.end_time = end_of(50)), |c| c.gyro_implausible),
+        ("time in another century", with(&|t| t.end_time = Timestamp::from_ns(i64::MAX)), |c| c.gyro_implausible),
+        ("time at the lower end", with(&|t| t.end_time = Timestamp::from_ns(i64::MIN)), |c| c.gyro_implausible),
+        ("sequence jump", with(&|t| t.sequence = u64::MAX), |c| c.gyro_implausible),
+        ("no duration", with(&|t| t.duration = Span::ZERO), |c| c.bad_duration),
+        ("endless duration", with(&|t| t.duration = Span::from_ns(i64::MAX)), |c| c.bad_duration),
+        ("NaN", with(&|t| t.readings[1] = f64::NAN), |c| c.not_finite_readings),
+        ("infinity", with(&|t| t.readings[0] = f64::INFINITY), |c| c.not_finite_readings),
+        ("at the rails", with(&|t| t.readings[2] = f64::MAX), |c| c.overrange_readings),
+        ("too few sensors", with(&|t| { t.readings.pop(); }), |c| c.wrong_sensor_count),
+        ("too many sensors", with(&|t| t.readings.push(0.0)), |c| c.wrong_sensor_count),
+    ];
+    for (name, broken, count) in cases {
+        let (out, counters) = around(broken);
+        assert_goes_on(name, &out);
+        assert_eq!(count(&counters), 1, "{name}: {counters:?}");
+        match out.iter().find(|tick| tick.sequence == 100) {
+            Some(tick) => {
+                assert!(tick.flags.contains(TickFlags::ANGLE_INVALID), "{name}: {tick:?}");
+                assert!(tick.delta_angle.iter().all(|a| a.is_finite()), "{name}: {tick:?}");
+                assert!(tick.gyro_flags.iter().any(|f| !f.contains(SensorFlags::VALID)), "{name}: {tick:?}");
+            }
+            None => {
+                let announced = out.iter().find(|tick| tick.sequence == 101).map(|tick| tick.missed);
+                assert_eq!(announced, Some(1), "{name}");
+            }
+        }
+    }
+}
+
+#[test]
+fn i7_broken_temperatures_are_held_and_flagged() {
+    for (name, raw, at) in [("NaN", f64::NAN, 100), ("out of range", 1e9, 100), ("a century ahead", 20.0, u64::MAX / 2)] {
+        let mut events = vec![Owned::Temperature(vec![temperature(0, 20.0)])];
+        events.push(Owned::Temperature(vec![temperature(at, raw)]));
+        let (out, _) = around(events);
+        assert_goes_on(name, &out);
+    }
+    let (out, counters) =
+        around(vec![Owned::Temperature(vec![temperature(0, 20.0)]), Owned::Temperature(vec![temperature(100, f64::NAN)])]);
+    assert_eq!(counters.temperature_rejected, 1);
+    assert!(out.last().unwrap().gyro_flags[0].contains(SensorFlags::STALE_TEMPERATURE));
+}
+
+proptest! {
+    #[test]
+    fn i7_no_bytes_and_no_ticks_panic_or_give_a_number_that_is_none(
+        frames in prop::collection::vec((0_usize..3, prop::collection::vec(any::<u8>(), 0..200)), 0..20),
+        ticks in prop::collection::vec(
+            (any::<u64>(), any::<i64>(), any::<i64>(), prop::collection::vec(any::<f64>(), 0..8), any::<bool>()),
+            0..60,
+        ),
+    ) {
+        let mut stream = UnitStream::new(UnitId::new("x").unwrap(), UnitSettings::default());
+        stream.install(compile(&identity()), [0; 8]);
+        for (i, frame) in &frames {
+            prop_assert!(stream.receive(RawStream::ALL[*i], frame).is_err());
+        }
+        let mut unit = drive::unit(&compile(&identity()));
+        let mut out = Vec::new();
+        for (sequence, end, duration, readings, close) in ticks {
+            // Half of the ticks near the last ones, where they are more likely to be taken.
+            let tick = GyroTick {
+                sequence: if close { sequence % 100 } else { sequence },
+                end_time: if close { end_of(sequence % 100) } else { Timestamp::from_ns(end) },
+                duration: if close { Span::from_ms(5) } else { Span::from_ns(duration) },
+                readings: readings.into_iter().collect(),
+                ..GyroTick::default()
+            };
+            drive::hand(&mut unit, &Owned::Gyro(vec![tick]), &mut out);
+        }
+        for tick in &out {
+            prop_assert!(tick.delta_angle.iter().chain(&tick.delta_velocity).all(|x| x.is_finite()), "{:?}", tick);
+        }
+    }
+}
