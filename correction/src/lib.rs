@@ -22,7 +22,7 @@
 //! | [`reversal`] | the four-step substitution over a mode switch |
 //! | [`servo`] | the perimeter-servo transient after a mode switch |
 //! | [`navigation`] | sums of ticks with coning and sculling terms |
-//! | [`unit`] | the state machine that puts them together |
+//! | [`mod@unit`] | the state machine that puts them together |
 #![no_std]
 
 extern crate alloc;

@@ -38,7 +38,7 @@ pub enum LasingMode {
 }
 
 impl LasingMode {
-    /// s_m of models §2: +1 or −1.
+    /// `s_m` of models §2: +1 or −1.
     #[must_use]
     pub const fn sign(self) -> f64 {
         match self {
@@ -160,6 +160,8 @@ bitflags! {
         const VELOCITY_INVALID = 1 << 11;
         /// The modelled or measured perimeter-servo transient was subtracted.
         const SERVO_TRANSIENT = 1 << 12;
+        /// A perimeter-servo transient is running, but the half-period counts that would measure it are missing.
+        const SERVO_UNMEASURED = 1 << 13;
     }
 }
 

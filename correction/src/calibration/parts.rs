@@ -75,7 +75,7 @@ pub enum BranchArgument {
     Derivative,
 }
 
-/// A coefficient with one curve per thermal branch [000]: run-up while Ṫ·T̈ > 0, braking while Ṫ·T̈ < 0.
+/// A coefficient with one curve per thermal branch \[000\]: run-up while Ṫ·T̈ > 0, braking while Ṫ·T̈ < 0.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BranchedParts {
     /// What the curves are functions of.

@@ -1,16 +1,15 @@
 //! Linear algebra on at most eight rows of three, without allocation.
 
 use arrayvec::ArrayVec;
+use nalgebra::SMatrix;
 
 use crate::sample::{MAX_PARITY, MAX_SENSORS};
 
 /// N rows of three, the unused ones zero.
 pub(super) type Rows = [[f64; 3]; MAX_SENSORS];
-/// Upper triangle of a 3×3 matrix.
+/// Upper triangle of a 3×3 matrix, by rows.
 pub(super) type Triangle = [[f64; 3]; 3];
 
-/// Sweeps of the Jacobi iteration: convergence is quadratic, three by three needs four or five.
-const JACOBI_SWEEPS: usize = 12;
 /// A unit vector whose part outside the span found so far is shorter than this adds no parity row.
 ///
 /// The vectors that are passed over hold at most N·10⁻¹² of the squared length that is still to be found, so
@@ -19,78 +18,36 @@ const SHORTEST_PARITY: f64 = 1e-6;
 
 /// Ratio of the largest to the smallest singular value; infinite or NaN for a singular or broken matrix.
 pub(super) fn condition_number(rows: &Rows) -> f64 {
-    let mut gram = [[0.0; 3]; 3];
-    for row in rows {
-        for (sums, a) in gram.iter_mut().zip(row) {
-            for (sum, b) in sums.iter_mut().zip(row) {
-                *sum += a * b;
-            }
-        }
-    }
-    let eigenvalues = symmetric_eigenvalues(gram);
-    if eigenvalues.iter().any(|value| !value.is_finite()) {
+    let matrix = matrix(rows);
+    let gram = matrix.tr_mul(&matrix);
+    if gram.iter().any(|value| !value.is_finite()) {
         return f64::NAN;
     }
-    let largest = eigenvalues.iter().copied().fold(0.0, f64::max);
-    let smallest = eigenvalues.iter().copied().fold(f64::INFINITY, f64::min);
+    let eigenvalues = gram.symmetric_eigenvalues();
+    let (smallest, largest) = (eigenvalues.min(), eigenvalues.max());
     if smallest <= 0.0 { f64::INFINITY } else { libm::sqrt(largest / smallest) }
 }
 
-/// Eigenvalues of a symmetric 3×3 matrix by cyclic Jacobi rotations.
-fn symmetric_eigenvalues(mut a: [[f64; 3]; 3]) -> [f64; 3] {
-    for _ in 0..JACOBI_SWEEPS {
-        // p, q: the element that is made zero; r: the remaining axis.
-        for (p, q, r) in [(0, 1, 2), (0, 2, 1), (1, 2, 0)] {
-            if a[p][q] == 0.0 {
-                continue;
+/// Q with orthonormal columns and upper triangular R, A = Q·R; `None` where A has no full rank.
+pub(super) fn orthonormal_columns(a: &Rows) -> Option<(Rows, Triangle)> {
+    let qr = matrix(a).qr();
+    let (q, r) = (qr.q(), qr.r());
+    let sound = (0..3).all(|i| r[(i, i)] != 0.0) && r.iter().all(|value| value.is_finite());
+    sound.then(|| {
+        let mut columns = Rows::default();
+        for ((row, from), stated) in columns.iter_mut().zip(q.row_iter()).zip(a) {
+            // A sensor that takes no part has no part at all, not one within rounding.
+            if *stated != [0.0; 3] {
+                *row = from.transpose().into();
             }
-            let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
-            let sign = if theta < 0.0 { -1.0 } else { 1.0 };
-            let t = sign / (theta.abs() + libm::sqrt(theta * theta + 1.0));
-            let c = 1.0 / libm::sqrt(t * t + 1.0);
-            let s = t * c;
-            let shift = t * a[p][q];
-            a[p][p] -= shift;
-            a[q][q] += shift;
-            a[p][q] = 0.0;
-            a[q][p] = 0.0;
-            let (rp, rq) = (a[r][p], a[r][q]);
-            a[r][p] = c * rp - s * rq;
-            a[r][q] = s * rp + c * rq;
-            a[p][r] = a[r][p];
-            a[q][r] = a[r][q];
         }
-    }
-    [a[0][0], a[1][1], a[2][2]]
+        (columns, r.transpose().into())
+    })
 }
 
-/// Q with orthonormal columns and upper triangular R, A = Q·R; `None` where A has no full rank.
-///
-/// Gram–Schmidt with every column orthogonalised twice, which is as good as Householder ("twice is enough",
-/// Giraud, Langou and Rozložník 2005) and keeps a zero row exactly zero and the identity exactly itself.
-pub(super) fn orthonormal_columns(a: &Rows) -> Option<(Rows, Triangle)> {
-    let mut q = *a;
-    let mut r = Triangle::default();
-    for k in 0..3 {
-        for _ in 0..2 {
-            for j in 0..k {
-                let projection: f64 = q.iter().map(|row| row[j] * row[k]).sum();
-                r[j][k] += projection;
-                for row in &mut q {
-                    row[k] -= projection * row[j];
-                }
-            }
-        }
-        let norm = libm::sqrt(q.iter().map(|row| row[k] * row[k]).sum());
-        if norm <= 0.0 || !norm.is_finite() {
-            return None;
-        }
-        r[k][k] = norm;
-        for row in &mut q {
-            row[k] /= norm;
-        }
-    }
-    Some((q, r))
+/// The rows as a matrix.
+fn matrix(rows: &Rows) -> SMatrix<f64, MAX_SENSORS, 3> {
+    SMatrix::from_fn(|i, j| rows[i][j])
 }
 
 /// Orthonormal rows that complete the columns of Q to the space of the sensors for which `used` holds: the

@@ -137,9 +137,13 @@ impl Corrector {
                     scale_rad_per_count: terms.increment_weight,
                     half_periods: tick.half_periods.get(i).copied(),
                 };
-                if let Transient::Apparent { rate_rad_per_s } = self.servo.apparent_rate(i, servo, &servo_tick) {
-                    bias += rate_rad_per_s;
-                    out.flags |= TickFlags::SERVO_TRANSIENT;
+                match self.servo.apparent_rate(i, servo, &servo_tick) {
+                    Transient::Settled => {}
+                    Transient::Apparent { rate_rad_per_s } => {
+                        bias += rate_rad_per_s;
+                        out.flags |= TickFlags::SERVO_TRANSIENT;
+                    }
+                    Transient::Unmeasured => out.flags |= TickFlags::SERVO_UNMEASURED,
                 }
             }
             let mut flags = SensorFlags::VALID;
@@ -174,17 +178,24 @@ impl Corrector {
             out.gyro_flags.push(flags);
         }
 
-        if let Some(reversal) = &calibration.reversal {
-            out.flags |= self.substitution.tick(reversal, input, &mut increments);
-        }
-        count_switch_flags(out.flags, counters);
+        // Before the substitution: the angle that it restores is a lump, not a rate.
         let rates: Sensors<f64> = increments.iter().map(|increment| increment / duration_s).collect();
-        let interpolated = out.flags.contains(TickFlags::INTERPOLATED);
         for ((last, rate), flags) in self.last_rates.iter_mut().zip(&rates).zip(&out.gyro_flags) {
-            if flags.contains(SensorFlags::VALID) || interpolated {
+            if flags.contains(SensorFlags::VALID) {
                 *last = *rate;
             }
         }
+        match &calibration.reversal {
+            Some(reversal) => out.flags |= self.substitution.tick(reversal, input, &mut increments),
+            // A swap took the substitution away in the middle of a transition.
+            None if !self.substitution.is_settled() => {
+                self.substitution = Substitution::new();
+                out.flags |= TickFlags::SWITCH_UNRESOLVED;
+            }
+            None => {}
+        }
+        count_switch_flags(out.flags, counters);
+        let interpolated = out.flags.contains(TickFlags::INTERPOLATED);
 
         let orientation = &calibration.gyro_orientation;
         let axes = &mut self.thermal.gyro_axes;
@@ -296,6 +307,7 @@ fn resolve(
 fn count_switch_flags(flags: TickFlags, counters: &mut Counters) {
     counters.ticks_interpolated += u64::from(flags.contains(TickFlags::INTERPOLATED));
     counters.switches_restored += u64::from(flags.contains(TickFlags::ANGLE_RESTORED));
+    counters.servo_unmeasured += u64::from(flags.contains(TickFlags::SERVO_UNMEASURED));
     counters.switches_unresolved += u64::from(flags.contains(TickFlags::SWITCH_UNRESOLVED));
 }
 

@@ -77,6 +77,8 @@ counters! {
     switches_restored,
     /// Mode switches that could not be bridged from both sides.
     switches_unresolved,
+    /// Ticks after a mode switch without the half-period counts that the servo's transient is taken from.
+    servo_unmeasured,
     /// Ticks not published because no calibration is installed and the unit holds back.
     ticks_held,
 }
