@@ -38,8 +38,8 @@ proptest! {
             match fate {
                 0 if k > 0 => {}
                 2 => order.extend([k as u64; 2]),
-                // Not twice in a row: the tick in front would fall back beyond the window.
-                3 if order.len() > 1 && fates[k - 1] != 3 => order.insert(order.len() - 1, k as u64),
+                // Only past its neighbour: a tick that is overtaken again and again falls out of the window.
+                3 if order.len() > 1 && order.last() == Some(&(k as u64 - 1)) && fates[k - 1] == 1 => order.insert(order.len() - 1, k as u64),
                 _ => order.push(k as u64),
             }
         }

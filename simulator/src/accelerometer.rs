@@ -1,0 +1,164 @@
+//! Pendulous accelerometer: quartz with a pulse output, or micromechanical with an output in m/s².
+
+use isotherm_correction::sample::{OutputKind, Sensors};
+use serde::{Deserialize, Serialize};
+
+use crate::counter::Counter;
+use crate::noise::{Noise, Purpose};
+use crate::orientation::Orientation;
+use crate::polynomial;
+use crate::thermal::{Interval, Node, NodeState};
+use crate::vector::dot;
+
+/// One accelerometer: output `U = K(T)·f/r(T_board) + S(T)`, f the specific force along its input axis.
+///
+/// K leads from the input to the output (the direction opposite to the gyros'); `r = K_ref/K(T_board)` is 1 at
+/// the reference temperature. U is in volts for a quartz accelerometer and in m/s² for one that is digital; the
+/// text below writes "V" for either.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Accelerometer {
+    /// Thermal node behind the housing.
+    pub node: Node,
+    /// Reference temperature T₀ of K, S and r (°C).
+    pub reference_deg_c: f64,
+    /// K (V per m/s²) by powers of T − T₀, 0…2.
+    pub scale_v_per_m_per_s2: [f64; 3],
+    /// S (V) by powers of T − T₀, 0…2.
+    pub bias_v: [f64; 3],
+    /// r (dimensionless) by powers of the board's T − T₀, 0…2; the first is 1.
+    pub board_ratio: [f64; 3],
+    /// Velocity random walk (m/s/√s, ≥ 0).
+    #[serde(default)]
+    pub velocity_random_walk_m_per_s_per_sqrt_s: f64,
+}
+
+/// What leaves the accelerometers.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum AccelerometerOutput {
+    /// Counts of a voltage-to-frequency converter over the tick.
+    Counts {
+        /// Converter gain (Hz/V, > 0): a corrector that takes counts as U·Δt has K and S times this.
+        hz_per_v: f64,
+        /// Whole counts, with the fraction carried over; otherwise exact reals.
+        quantised: bool,
+    },
+    /// Mean of U over the tick.
+    Mean,
+}
+
+/// All accelerometers of a unit.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Accelerometers {
+    /// What leaves them.
+    pub output: AccelerometerOutput,
+    /// The sensors, 3…8.
+    pub sensors: Vec<Accelerometer>,
+    /// Their input axes.
+    pub orientation: Orientation,
+}
+
+impl Accelerometers {
+    /// What the readings stand for.
+    #[must_use]
+    pub fn output_kind(&self) -> OutputKind {
+        match self.output {
+            AccelerometerOutput::Counts { .. } => OutputKind::Counts,
+            AccelerometerOutput::Mean => OutputKind::Mean,
+        }
+    }
+}
+
+/// All accelerometers of a unit with their memory.
+#[derive(Debug, Clone)]
+pub(crate) struct AccelerometersState {
+    output: AccelerometerOutput,
+    orientation: Orientation,
+    sensors: Vec<AccelerometerState>,
+}
+
+#[derive(Debug, Clone)]
+struct AccelerometerState {
+    sensor: Accelerometer,
+    node: NodeState,
+    deg_c: Interval,
+    noise: Noise,
+    counter: Counter,
+}
+
+impl AccelerometersState {
+    pub(crate) fn new(block: &Accelerometers, seed: u64, step_s: f64, initial: impl Fn(Node) -> f64) -> Self {
+        let sensor = |(sensor, index): (&Accelerometer, u32)| {
+            let mut noise = Noise::new(seed, Purpose::Accelerometer(index));
+            let deg_c = initial(sensor.node);
+            AccelerometerState {
+                sensor: *sensor,
+                node: NodeState::new(sensor.node, step_s, deg_c),
+                deg_c: Interval::constant(deg_c),
+                counter: Counter::starting_at(noise.uniform()),
+                noise,
+            }
+        };
+        Self {
+            output: block.output,
+            orientation: block.orientation.clone(),
+            sensors: block.sensors.iter().zip(0..).map(sensor).collect(),
+        }
+    }
+
+    pub(crate) fn thermal_step(&mut self, from_deg_c: f64, to_deg_c: f64) {
+        for state in &mut self.sensors {
+            state.deg_c.advance(state.node.step(from_deg_c, to_deg_c));
+        }
+    }
+
+    pub(crate) fn deg_c(&self, share: f64) -> Sensors<f64> {
+        self.sensors.iter().map(|state| state.deg_c.at(share)).collect()
+    }
+
+    /// Readings of a tick; `extra` is added to each sensor's specific force (m/s²).
+    pub(crate) fn tick(
+        &mut self,
+        velocity_m_per_s: [f64; 3],
+        length_s: f64,
+        (housing_deg_c, board_deg_c): (f64, f64),
+        share: f64,
+        extra: impl Fn(usize) -> f64,
+    ) -> Sensors<f64> {
+        let axes = self.orientation.axes(housing_deg_c);
+        let output = self.output;
+        let states = self.sensors.iter_mut().zip(axes).enumerate();
+        let read = |(index, (state, axis)): (usize, (&mut AccelerometerState, [f64; 3]))| {
+            let force = dot(axis, velocity_m_per_s) / length_s + extra(index);
+            state.read(force, length_s, board_deg_c, share, output)
+        };
+        states.map(read).collect()
+    }
+}
+
+impl AccelerometerState {
+    fn read(
+        &mut self,
+        force: f64,
+        length_s: f64,
+        board_deg_c: f64,
+        share: f64,
+        output: AccelerometerOutput,
+    ) -> f64 {
+        let sensor = &self.sensor;
+        let away_k = self.deg_c.at(share) - sensor.reference_deg_c;
+        let walk = sensor.velocity_random_walk_m_per_s_per_sqrt_s;
+        let noise = if walk > 0.0 { walk * self.noise.normal() / libm::sqrt(length_s) } else { 0.0 };
+        let scale = polynomial::at(&sensor.scale_v_per_m_per_s2, away_k);
+        let ratio = polynomial::at(&sensor.board_ratio, board_deg_c - sensor.reference_deg_c);
+        let volts = scale * (force + noise) / ratio + polynomial::at(&sensor.bias_v, away_k);
+        match output {
+            AccelerometerOutput::Mean => volts,
+            AccelerometerOutput::Counts { hz_per_v, quantised } => {
+                self.counter.count(volts * hz_per_v * length_s, quantised)
+            }
+        }
+    }
+}

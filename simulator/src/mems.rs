@@ -1,0 +1,81 @@
+//! Micromechanical gyro with a rate output: bias and scale over its own temperature, noise, resolution.
+
+use serde::{Deserialize, Serialize};
+
+use crate::noise::{GyroNoise, Markov, Noise, Purpose};
+use crate::polynomial;
+use crate::thermal::{Interval, Node, NodeState};
+
+/// One micromechanical gyro.
+///
+/// Reading (rad/s, mean over the tick) = (input rate + bias(T))/K(T): K leads from the reading to the rate. T is
+/// the gyro's own temperature, which its channel shows.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MemsGyro {
+    /// Thermal node behind the housing.
+    pub node: Node,
+    /// Reference temperature T₀ (°C).
+    pub reference_deg_c: f64,
+    /// K at the reference temperature: true rate per indicated rate (dimensionless, near 1).
+    pub scale: f64,
+    /// κ1 (1/K) and κ2 (1/K²): K(T) = K0·(1 + κ1·(T − T₀) + κ2·(T − T₀)²).
+    #[serde(default)]
+    pub scale_per_k: [f64; 2],
+    /// Bias (rad/s) by powers of T − T₀, 0…3.
+    pub bias_rad_per_s: [f64; 4],
+    /// Step of the digital output (rad/s, ≥ 0; 0 for none).
+    #[serde(default)]
+    pub resolution_rad_per_s: f64,
+    /// Noise.
+    #[serde(default)]
+    pub noise: GyroNoise,
+}
+
+/// One micromechanical gyro with its memory.
+#[derive(Debug, Clone)]
+pub(crate) struct MemsState {
+    gyro: MemsGyro,
+    node: NodeState,
+    markov: Markov,
+    noise: Noise,
+    deg_c: Interval,
+    markov_rad_per_s: Interval,
+}
+
+impl MemsState {
+    pub(crate) fn new(gyro: &MemsGyro, seed: u64, index: u32, step_s: f64, deg_c: f64) -> Self {
+        let markov = Markov::new(Noise::new(seed, Purpose::GyroDrift(index)), &gyro.noise, step_s);
+        Self {
+            gyro: gyro.clone(),
+            node: NodeState::new(gyro.node, step_s, deg_c),
+            markov_rad_per_s: Interval::constant(markov.value()),
+            markov,
+            noise: Noise::new(seed, Purpose::Gyro(index)),
+            deg_c: Interval::constant(deg_c),
+        }
+    }
+
+    pub(crate) fn thermal_step(&mut self, from_deg_c: f64, to_deg_c: f64) {
+        self.deg_c.advance(self.node.step(from_deg_c, to_deg_c));
+        self.markov.step();
+        self.markov_rad_per_s.advance(self.markov.value());
+    }
+
+    pub(crate) fn sensor_deg_c(&self, share: f64) -> f64 {
+        self.deg_c.at(share)
+    }
+
+    /// Reading and true drift (both rad/s) of a tick.
+    pub(crate) fn tick(&mut self, input_rad: f64, length_s: f64, share: f64) -> (f64, f64) {
+        let away_k = self.deg_c.at(share) - self.gyro.reference_deg_c;
+        let drift = polynomial::at(&self.gyro.bias_rad_per_s, away_k) + self.markov_rad_per_s.at(share);
+        let [first, second] = self.gyro.scale_per_k;
+        let scale = self.gyro.scale * polynomial::at(&[1.0, first, second], away_k);
+        let walk = self.gyro.noise.angle_random_walk_rad_per_sqrt_s;
+        let noise = if walk > 0.0 { walk * self.noise.normal() / libm::sqrt(length_s) } else { 0.0 };
+        let reading = (input_rad / length_s + drift + noise) / scale;
+        let step = self.gyro.resolution_rad_per_s;
+        (if step > 0.0 { libm::round(reading / step) * step } else { reading }, drift)
+    }
+}

@@ -1,0 +1,294 @@
+//! The simulation: a stream of ticks from a scenario.
+
+use isotherm_correction::sample::{AccelTick, GyroTick, Sensors, TemperatureReading};
+use isotherm_correction::units::{Span, Timestamp};
+
+use crate::accelerometer::AccelerometersState;
+use crate::chamber::Chamber;
+use crate::error::ScenarioErrors;
+use crate::failure::{FailingSensor, Failures};
+use crate::gyros::{GyroOutput, GyrosState, TickTime};
+use crate::noise::{Noise, Purpose};
+use crate::orientation::Orientation;
+use crate::scenario::Scenario;
+use crate::surroundings::Surroundings;
+use crate::temperature::{Place, ThermometersState};
+use crate::trajectory::{Increments, Trajectory};
+use crate::truth::{Step, Truth};
+use crate::vector::{dot, scale};
+
+/// A running simulation: an iterator over the ticks of a scenario.
+///
+/// It holds no buffer that grows with the run; a step allocates only where temperatures are read in it.
+#[derive(Debug, Clone)]
+pub struct Simulation {
+    start: Timestamp,
+    tick_ns: i64,
+    jitter_ns: f64,
+    ticks: u64,
+    sequence: u64,
+    /// End of the last tick after the start (ns).
+    elapsed_ns: i64,
+    jitter: Noise,
+    trajectory: Trajectory,
+    surroundings: Surroundings,
+    gyros: GyrosState,
+    gyro_orientation: Orientation,
+    accelerometers: Option<AccelerometersState>,
+    thermometers: ThermometersState,
+    failures: Failures,
+    last_gyro: GyroOutput,
+    last_accel: Sensors<f64>,
+}
+
+impl Simulation {
+    /// Prepares a scenario.
+    ///
+    /// # Errors
+    ///
+    /// All that is wrong with the scenario.
+    pub fn new(scenario: &Scenario) -> Result<Self, ScenarioErrors> {
+        let errors = scenario.check();
+        if !errors.is_empty() {
+            return Err(ScenarioErrors(errors));
+        }
+        let (instrument, seed) = (&scenario.instrument, scenario.seed);
+        let chamber = Chamber::new(&scenario.chamber);
+        let surroundings = Surroundings::new(chamber, instrument);
+        let (step_s, housing_deg_c) = (instrument.thermal_step_s, surroundings.housing_deg_c(0.0));
+        let initial = |node| surroundings.initial_deg_c(node);
+        let gyros = GyrosState::new(&instrument.gyros, seed, step_s, housing_deg_c, initial);
+        let block = instrument.accelerometers.as_ref();
+        Ok(Self {
+            start: Timestamp::from_ns(scenario.start_ns),
+            tick_ns: scenario.tick_ns,
+            jitter_ns: whole_to_real(scenario.tick_jitter_ns),
+            ticks: real_to_whole(scenario.duration_s * 1e9 / whole_to_real(scenario.tick_ns) + 1e-6)
+                .unsigned_abs(),
+            sequence: 0,
+            elapsed_ns: 0,
+            jitter: Noise::new(seed, Purpose::TickLength),
+            trajectory: Trajectory::new(&scenario.motion),
+            gyros,
+            gyro_orientation: instrument.gyro_orientation.clone(),
+            accelerometers: block.map(|block| AccelerometersState::new(block, seed, step_s, initial)),
+            thermometers: ThermometersState::new(&instrument.thermometers, seed),
+            failures: Failures::new(&scenario.failures),
+            surroundings,
+            last_gyro: GyroOutput::default(),
+            last_accel: Sensors::new(),
+        })
+    }
+
+    /// The motion's exact integrals and attitudes; time zero is the start of the first tick.
+    #[must_use]
+    pub fn trajectory(&self) -> &Trajectory {
+        &self.trajectory
+    }
+
+    /// Ticks that are still to come.
+    #[must_use]
+    pub fn remaining(&self) -> u64 {
+        self.ticks - self.sequence
+    }
+
+    /// End of the present tick after the start (ns).
+    fn next_end_ns(&mut self) -> i64 {
+        let nominal_ns = self.tick_ns.saturating_mul(i64::try_from(self.sequence + 1).unwrap_or(i64::MAX));
+        if self.jitter_ns > 0.0 {
+            nominal_ns + real_to_whole(self.jitter.between(-self.jitter_ns, self.jitter_ns))
+        } else {
+            nominal_ns
+        }
+    }
+
+    fn advance_to(&mut self, time_s: f64) {
+        while let Some((from_deg_c, to_deg_c)) = self.surroundings.step_towards(time_s) {
+            self.gyros.thermal_step(from_deg_c, to_deg_c);
+            if let Some(accelerometers) = &mut self.accelerometers {
+                accelerometers.thermal_step(from_deg_c, to_deg_c);
+            }
+        }
+    }
+
+    /// Input angles of the two halves of the tick for each gyro, and the increments of the whole.
+    fn inputs(
+        &self,
+        middle_s: f64,
+        length_s: f64,
+        axes: &Sensors<[f64; 3]>,
+    ) -> (Sensors<[f64; 2]>, Increments) {
+        let (first, second) = if self.gyros.is_dithered() {
+            let half_s = 0.5 * length_s;
+            let half = |sign: f64| self.trajectory.increments(middle_s + sign * 0.5 * half_s, half_s);
+            (half(-1.0), half(1.0))
+        } else {
+            (self.trajectory.increments(middle_s, length_s), Increments::default())
+        };
+        let halves = axes.iter().map(|&axis| [dot(axis, first.angle), dot(axis, second.angle)]);
+        (halves.collect(), first.plus(second))
+    }
+
+    fn fail_gyros(&mut self, output: &mut GyroOutput, time_s: f64) {
+        for (index, reading) in output.readings.iter_mut().enumerate() {
+            let sensor = FailingSensor::Gyro(index);
+            if self.failures.stuck(sensor, time_s) {
+                *reading = self.last_gyro.readings.get(index).copied().unwrap_or_default();
+                if let Some(halves) = output.halves.get_mut(index) {
+                    *halves = self.last_gyro.halves.get(index).copied().unwrap_or_default();
+                }
+            }
+            if self.failures.not_finite(sensor, time_s) {
+                *reading = f64::NAN;
+            }
+        }
+        self.last_gyro.readings.clone_from(&output.readings);
+        self.last_gyro.halves.clone_from(&output.halves);
+    }
+
+    fn fail_accelerometers(&mut self, readings: &mut Sensors<f64>, time_s: f64) {
+        for (index, reading) in readings.iter_mut().enumerate() {
+            let sensor = FailingSensor::Accelerometer(index);
+            if self.failures.stuck(sensor, time_s) {
+                *reading = self.last_accel.get(index).copied().unwrap_or_default();
+            }
+            if self.failures.not_finite(sensor, time_s) {
+                *reading = f64::NAN;
+            }
+        }
+        self.last_accel.clone_from(readings);
+    }
+
+    fn read_accelerometers(
+        &mut self,
+        velocity: [f64; 3],
+        length_s: f64,
+        middle_s: f64,
+    ) -> Option<Sensors<f64>> {
+        let share = self.surroundings.share(middle_s);
+        let deg_c = (self.surroundings.housing_deg_c(share), self.surroundings.board_deg_c(share));
+        let failures = &self.failures;
+        let extra = |index| failures.extra(FailingSensor::Accelerometer(index), middle_s);
+        let mut readings = self.accelerometers.as_mut()?.tick(velocity, length_s, deg_c, share, extra);
+        if !self.failures.is_empty() {
+            self.fail_accelerometers(&mut readings, middle_s);
+        }
+        Some(readings)
+    }
+
+    fn read_thermometers(&mut self, until_s: f64) -> Vec<TemperatureReading> {
+        let mut readings = Vec::new();
+        while let Some(time_s) = self.thermometers.due(until_s) {
+            let share = self.surroundings.share(time_s);
+            let (gyros, surroundings) = (self.gyros.sensor_deg_c(share), &self.surroundings);
+            let accels = self.accelerometers.as_ref().map(|block| block.deg_c(share)).unwrap_or_default();
+            let time = self.start + Span::from_s(time_s);
+            readings.extend(self.thermometers.read(time, |place| match place {
+                Place::Chamber => surroundings.chamber_deg_c(share),
+                Place::Housing => surroundings.housing_deg_c(share),
+                Place::Board => surroundings.board_deg_c(share),
+                Place::Gyro(index) => gyros.get(index).copied().unwrap_or(f64::NAN),
+                Place::Accelerometer(index) => accels.get(index).copied().unwrap_or(f64::NAN),
+            }));
+        }
+        readings
+    }
+
+    fn step(&mut self) -> Step {
+        let (start_ns, end_ns) = (self.elapsed_ns, self.next_end_ns());
+        let duration = Span::from_ns(end_ns - start_ns);
+        let length_s = duration.as_s();
+        let middle_s = whole_to_real(start_ns + end_ns) * 0.5e-9;
+        self.advance_to(middle_s);
+        let share = self.surroundings.share(middle_s);
+        let axes = self.gyro_orientation.axes(self.surroundings.housing_deg_c(share));
+        let (mut halves, whole) = self.inputs(middle_s, length_s, &axes);
+        if !self.failures.is_empty() {
+            for (index, halves) in halves.iter_mut().enumerate() {
+                let extra = self.failures.extra(FailingSensor::Gyro(index), middle_s) * 0.5 * length_s;
+                *halves = halves.map(|half| half + extra);
+            }
+        }
+        let time = TickTime {
+            start_s: whole_to_real(start_ns) * 1e-9,
+            length_s,
+            nominal_s: whole_to_real(self.tick_ns) * 1e-9,
+            share,
+        };
+        let mut output = self.gyros.tick(&halves, time);
+        if !self.failures.is_empty() {
+            self.fail_gyros(&mut output, middle_s);
+        }
+        let end_time = Timestamp::from_ns(self.start.as_ns().saturating_add(end_ns));
+        let sequence = self.sequence;
+        let accel = self.read_accelerometers(whole.velocity, length_s, middle_s);
+        let truth = self.truth(whole, length_s, share, &output);
+        let temperatures = self.read_thermometers(whole_to_real(end_ns) * 1e-9);
+        self.sequence += 1;
+        self.elapsed_ns = end_ns;
+        Step {
+            gyro: GyroTick {
+                sequence,
+                end_time,
+                duration,
+                readings: output.readings,
+                mode: output.mode,
+                switch_command: output.commanded,
+                meander: output.meander,
+                half_periods: output.halves,
+            },
+            accel: accel.map(|readings| AccelTick { sequence, end_time, duration, readings }),
+            temperatures,
+            truth,
+        }
+    }
+
+    fn truth(&self, whole: Increments, length_s: f64, share: f64, output: &GyroOutput) -> Truth {
+        Truth {
+            delta_angle: whole.angle,
+            delta_velocity: whole.velocity,
+            mean_rate: scale(whole.angle, 1.0 / length_s),
+            mean_force: scale(whole.velocity, 1.0 / length_s),
+            chamber_deg_c: self.surroundings.chamber_deg_c(share),
+            housing_deg_c: self.surroundings.housing_deg_c(share),
+            board_deg_c: self.surroundings.board_deg_c(share),
+            gyro_deg_c: self.gyros.sensor_deg_c(share),
+            accel_deg_c: self.accelerometers.as_ref().map(|block| block.deg_c(share)).unwrap_or_default(),
+            gyro_drift_rad_per_s: output.drift_rad_per_s.clone(),
+            gyro_transient_rad_per_s: output.transient_rad_per_s.clone(),
+            lost: output.lost,
+        }
+    }
+}
+
+impl Iterator for Simulation {
+    type Item = Step;
+
+    fn next(&mut self) -> Option<Step> {
+        (self.sequence < self.ticks).then(|| self.step())
+    }
+
+    fn size_hint(&self) -> (usize, Option<usize>) {
+        let remaining = usize::try_from(self.remaining());
+        (remaining.unwrap_or(usize::MAX), remaining.ok())
+    }
+}
+
+#[expect(
+    clippy::cast_precision_loss,
+    reason = "sums of two run times stay below 2⁶¹ ns; half a µs is lost at most there"
+)]
+fn whole_to_real(ns: i64) -> f64 {
+    ns as f64
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "float-to-int `as` saturates; a run has at most 10¹³ ticks"
+)]
+fn real_to_whole(value: f64) -> i64 {
+    libm::floor(value) as i64
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,210 @@
+//! Zeeman laser gyro: a dithered counter, two lasing modes, and a perimeter servo.
+//!
+//! The counter's frequency is ±f(t) + Ω/K: the dither f is positive in the first half of each tick and negative
+//! in the second, Ω is input rate plus bias. While the servo pulls the perimeter in, f grows to its rest value and
+//! the halves do not cancel; the tick then carries an apparent rate, which is integrated here in closed form.
+
+use isotherm_correction::sample::{HalfPeriodCounts, LasingMode};
+use serde::{Deserialize, Serialize};
+
+use crate::counter::Counter;
+use crate::noise::{GyroNoise, Markov, Noise, Purpose};
+use crate::polynomial;
+use crate::reversal::{Phase, Reversal};
+use crate::thermal::{Interval, Node, NodeState};
+
+/// Temperature to which the slow meander's coefficients refer (°C).
+pub const MEANDER_REFERENCE_DEG_C: f64 = 25.0;
+
+/// All gyros of a Zeeman unit.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Zeeman {
+    /// Whole counts, with the fraction carried over; otherwise exact reals (half-period counts are then rounded).
+    pub quantised: bool,
+    /// Mode reversal.
+    pub reversal: Reversal,
+    /// The gyros, 3…8.
+    pub gyros: Vec<ZeemanGyro>,
+}
+
+/// One Zeeman laser gyro.
+///
+/// Counts of a tick = ∫(input rate + drift) dt/K(T): K is the angle per count and leads from the counts to the angle.
+/// T is the gyro's own temperature, which its channel shows.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ZeemanGyro {
+    /// Thermal node behind the housing.
+    pub node: Node,
+    /// Reference temperature T₀ of all coefficients but the meander's (°C).
+    pub reference_deg_c: f64,
+    /// K0: angle per count at the reference temperature (rad, > 0).
+    pub scale_rad_per_count: f64,
+    /// κ1 (1/K) and κ2 (1/K²): K(T) = K0·(1 + κ1·(T − T₀) + κ2·(T − T₀)²).
+    #[serde(default)]
+    pub scale_per_k: [f64; 2],
+    /// Non-magnetic bias C0, C1, C2 (rad/s) by powers of T − T₀; adds to the input rate.
+    pub bias_nonmagnetic_rad_per_s: [f64; 3],
+    /// Magnetic bias B0, B1, B2 (rad/s) by powers of T − T₀; adds to the input rate with the mode's sign.
+    pub bias_magnetic_rad_per_s: [f64; 3],
+    /// Slow meander D1, D0 (rad/s) by powers of T − 25 °C; adds to the input rate with the meander's sign.
+    #[serde(default)]
+    pub meander_rad_per_s: [f64; 2],
+    /// Rest value f0 of the dither frequency (Hz) by powers of T − T₀.
+    pub dither_hz: [f64; 3],
+    /// Noise.
+    #[serde(default)]
+    pub noise: GyroNoise,
+}
+
+/// A tick of one gyro.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct ZeemanTick {
+    pub(crate) counts: f64,
+    pub(crate) halves: HalfPeriodCounts,
+    pub(crate) drift_rad_per_s: f64,
+    pub(crate) transient_rad_per_s: f64,
+}
+
+/// One gyro with its memory.
+#[derive(Debug, Clone)]
+pub(crate) struct ZeemanState {
+    gyro: ZeemanGyro,
+    quantised: bool,
+    reversal: Reversal,
+    node: NodeState,
+    markov: Markov,
+    noise: Noise,
+    switches: Noise,
+    counter: Counter,
+    deg_c: Interval,
+    markov_rad_per_s: Interval,
+    /// Relative loss of dither frequency when the servo came on, and the time since.
+    dither_loss: f64,
+    servo_age_s: f64,
+}
+
+impl ZeemanState {
+    pub(crate) fn new(
+        unit: &Zeeman,
+        gyro: &ZeemanGyro,
+        seed: u64,
+        index: u32,
+        step_s: f64,
+        deg_c: f64,
+    ) -> Self {
+        let mut noise = Noise::new(seed, Purpose::Gyro(index));
+        let markov = Markov::new(Noise::new(seed, Purpose::GyroDrift(index)), &gyro.noise, step_s);
+        Self {
+            gyro: *gyro,
+            quantised: unit.quantised,
+            reversal: unit.reversal,
+            node: NodeState::new(gyro.node, step_s, deg_c),
+            markov_rad_per_s: Interval::constant(markov.value()),
+            markov,
+            counter: Counter::starting_at(noise.uniform()),
+            noise,
+            switches: Noise::new(seed, Purpose::Perimeter(index)),
+            deg_c: Interval::constant(deg_c),
+            dither_loss: 0.0,
+            servo_age_s: 0.0,
+        }
+    }
+
+    pub(crate) fn thermal_step(&mut self, from_deg_c: f64, to_deg_c: f64) {
+        self.deg_c.advance(self.node.step(from_deg_c, to_deg_c));
+        self.markov.step();
+        self.markov_rad_per_s.advance(self.markov.value());
+    }
+
+    pub(crate) fn sensor_deg_c(&self, share: f64) -> f64 {
+        self.deg_c.at(share)
+    }
+
+    fn drift_rad_per_s(&self, deg_c: f64, share: f64, phase: Phase) -> f64 {
+        let away_k = deg_c - self.gyro.reference_deg_c;
+        let meander_sign = phase.meander.map_or(1.0, LasingMode::sign);
+        polynomial::at(&self.gyro.bias_nonmagnetic_rad_per_s, away_k)
+            + phase.mode.sign() * polynomial::at(&self.gyro.bias_magnetic_rad_per_s, away_k)
+            + meander_sign * polynomial::at(&self.gyro.meander_rad_per_s, deg_c - MEANDER_REFERENCE_DEG_C)
+            + self.markov_rad_per_s.at(share)
+    }
+
+    /// Counts of a tick from the input angle of its two halves.
+    pub(crate) fn tick(
+        &mut self,
+        halves_rad: [f64; 2],
+        length_s: f64,
+        share: f64,
+        phase: Phase,
+    ) -> ZeemanTick {
+        let deg_c = self.deg_c.at(share);
+        let away_k = deg_c - self.gyro.reference_deg_c;
+        let [first, second] = self.gyro.scale_per_k;
+        let scale_rad = self.gyro.scale_rad_per_count * polynomial::at(&[1.0, first, second], away_k);
+        let dither_hz = polynomial::at(&self.gyro.dither_hz, away_k);
+        let drift_rad_per_s = self.drift_rad_per_s(deg_c, share, phase);
+        let walk = self.gyro.noise.angle_random_walk_rad_per_sqrt_s;
+        let noise_rad = if walk > 0.0 { walk * libm::sqrt(length_s) * self.noise.normal() } else { 0.0 };
+        if phase.lost {
+            return self.rubbish(dither_hz * 0.5 * length_s, drift_rad_per_s);
+        }
+        let dither_counts = self.dither_counts(dither_hz, length_s, phase.servo_starts);
+        let own_rad = 0.5 * (drift_rad_per_s * length_s + noise_rad);
+        let positive =
+            self.counter.count((halves_rad[0] + own_rad) / scale_rad + dither_counts[0], self.quantised);
+        let negative =
+            self.counter.count((halves_rad[1] + own_rad) / scale_rad - dither_counts[1], self.quantised);
+        ZeemanTick {
+            counts: positive + negative,
+            halves: HalfPeriodCounts { positive: whole(positive), negative: whole(negative) },
+            drift_rad_per_s,
+            transient_rad_per_s: scale_rad * (dither_counts[0] - dither_counts[1]) / length_s,
+        }
+    }
+
+    /// Counts without two-way generation: anything up to what the dither alone would give.
+    fn rubbish(&mut self, limit: f64, drift_rad_per_s: f64) -> ZeemanTick {
+        let positive = libm::round(self.switches.between(-limit, limit));
+        let negative = libm::round(self.switches.between(-limit, limit));
+        self.counter = Counter::starting_at(self.switches.uniform());
+        ZeemanTick {
+            counts: positive + negative,
+            halves: HalfPeriodCounts { positive: whole(positive), negative: whole(negative) },
+            drift_rad_per_s,
+            transient_rad_per_s: 0.0,
+        }
+    }
+
+    /// ∫f dt over each half of the tick, f = f0·(1 − loss·e^(−2t/τ)), t from the moment the servo came on.
+    fn dither_counts(&mut self, rest_hz: f64, length_s: f64, servo_starts: bool) -> [f64; 2] {
+        if servo_starts {
+            let miss = self.reversal.miss_rms_wavelengths * self.switches.normal();
+            self.dither_loss = (self.reversal.dither_curvature * miss * miss).min(0.5);
+            self.servo_age_s = 0.0;
+        }
+        let rest = rest_hz * 0.5 * length_s;
+        let rate_per_s = 2.0 / self.reversal.servo_time_constant_s;
+        let begin = libm::exp(-rate_per_s * self.servo_age_s);
+        self.servo_age_s += length_s;
+        if self.dither_loss * begin < 1e-18 {
+            self.dither_loss = 0.0;
+            return [rest, rest];
+        }
+        let half = libm::exp(-rate_per_s * 0.5 * length_s);
+        let first = self.dither_loss * begin * (1.0 - half) * rest_hz / rate_per_s;
+        [rest - first, rest - first * half]
+    }
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "float-to-int `as` saturates, as the counter's register does"
+)]
+fn whole(counts: f64) -> i32 {
+    libm::round(counts) as i32
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,7 @@
+//! The invariants of the core, each in a module named after it, and the laws of the correction. No session, no file.
+
+mod i1_each_tick_once;
+mod i2_timing_does_not_matter;
+mod i5_mode_switch;
+mod i7_broken_input;
+mod laws;
