@@ -1,0 +1,40 @@
+# One recipe per step of `.ci/run`; `just` lists them.
+
+_list:
+    @just --list --unsorted
+
+# Run every check, as CI does
+ci:
+    .ci/run
+
+# Pass the tests (the README's second command)
+test:
+    .ci/run test
+
+# Check the formatting
+fmt:
+    .ci/run fmt
+
+# Run clippy with warnings denied
+lint:
+    .ci/run lint
+
+# Build the documentation with warnings denied
+docs:
+    .ci/run docs
+
+# Validate every shipped configuration and calibration document
+configs:
+    .ci/run configs
+
+# Check that the pure crates stay pure
+purity:
+    .ci/run purity
+
+# Check the Python subscriber against the Rust side
+python:
+    .ci/run python
+
+# Run the demo briefly and print its figures
+demo:
+    .ci/run demo
