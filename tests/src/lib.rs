@@ -2,7 +2,9 @@
 //!
 //! The tests themselves are in `tests/tests/`.
 
+pub mod bench;
 pub mod calibrations;
 pub mod data;
 pub mod drive;
+pub mod process;
 pub mod streams;

@@ -1,0 +1,104 @@
+//! The project's programs as separate processes.
+
+use std::io::{BufRead, BufReader};
+use std::path::PathBuf;
+use std::process::{Child, Command, ExitStatus, Output, Stdio};
+use std::sync::Once;
+
+/// Path of a program of the project, built with the profile of the running test.
+///
+/// # Panics
+/// Where it cannot be built.
+#[must_use]
+pub fn program(name: &str) -> PathBuf {
+    static BUILD: Once = Once::new();
+    let test = std::env::current_exe().expect("the running test has a path");
+    let folder = test.parent().and_then(|deps| deps.parent()).expect("target/PROFILE/deps/TEST").to_path_buf();
+    // `cargo test` builds the programs of tested packages only; a test of this package alone needs them too.
+    BUILD.call_once(|| {
+        let target = folder.parent().expect("target/PROFILE");
+        let mut cargo = Command::new(env!("CARGO"));
+        cargo.args(["build", "--quiet", "--bins", "-p", "isotherm-service", "-p", "isotherm-replay-tool"]);
+        cargo.arg("--target-dir").arg(target).current_dir(crate::data::root());
+        if folder.ends_with("release") {
+            cargo.arg("--release");
+        }
+        assert!(cargo.status().expect("cargo runs").success(), "the programs build");
+    });
+    folder.join(name)
+}
+
+/// Runs a program to its end.
+///
+/// # Panics
+/// Where it cannot be started.
+#[must_use]
+pub fn run(name: &str, arguments: &[&str]) -> Output {
+    Command::new(program(name)).args(arguments).current_dir(crate::data::root()).output().expect("the program starts")
+}
+
+/// Runs a program that must succeed; what it printed on stdout.
+///
+/// # Panics
+/// With what it printed on stderr, where it fails.
+#[must_use]
+pub fn run_well(name: &str, arguments: &[&str]) -> String {
+    let output = run(name, arguments);
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{name} {}: {}\n{stderr}", arguments.join(" "), output.status);
+    String::from_utf8(output.stdout).expect("stdout is text")
+}
+
+/// `isotherm serve` in a process of its own; killed when dropped.
+#[derive(Debug)]
+pub struct Service {
+    child: Child,
+    /// Where it listens.
+    pub locator: String,
+}
+
+impl Service {
+    /// Starts it on a port of the system's choice and waits until it says that it is ready.
+    ///
+    /// # Panics
+    /// Where it does not.
+    #[must_use]
+    pub fn start(arguments: &[&str]) -> Self {
+        let mut child = Command::new(program("isotherm"))
+            .args(["serve", "--announce", "--json", "--listen", "tcp/127.0.0.1:0"])
+            .args(arguments)
+            .current_dir(crate::data::root())
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("the service starts");
+        let mut line = String::new();
+        let stdout = child.stdout.as_mut().expect("stdout is piped");
+        // One byte at a time: what follows the line belongs to `stop`.
+        BufReader::with_capacity(1, stdout).read_line(&mut line).expect("stdout is read");
+        let ready: serde_json::Value = serde_json::from_str(&line).expect("one line of JSON");
+        let locator = ready["locators"][0].as_str().expect("a locator").to_owned();
+        Self { child, locator }
+    }
+
+    /// Asks it to stop as an operator would; how it ended and what it said of its totals.
+    ///
+    /// # Panics
+    /// Where it cannot be asked.
+    #[must_use]
+    pub fn stop(mut self) -> (ExitStatus, String) {
+        let asked = Command::new("kill").args(["-TERM", &self.child.id().to_string()]).status();
+        assert!(asked.is_ok_and(|status| status.success()), "SIGTERM is sent");
+        let mut totals = String::new();
+        let stdout = self.child.stdout.as_mut().expect("stdout is piped");
+        std::io::Read::read_to_string(stdout, &mut totals).expect("stdout is read");
+        (self.child.wait().expect("the service ends"), totals)
+    }
+}
+
+impl Drop for Service {
+    fn drop(&mut self) {
+        // Ended already after `stop`.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}

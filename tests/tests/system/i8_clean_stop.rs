@@ -1,0 +1,62 @@
+//! I8: on SIGINT or SIGTERM what was received is corrected, published and flushed, then the sessions close within a
+//! bounded time.
+
+use isotherm_bus::{Consumer, Producer, ProducerOptions, SessionOptions, close, open, presence};
+use isotherm_correction::sample::{OutputKind, TickFlags};
+use isotherm_protocol::key::UnitId;
+use isotherm_tests::bench::{Bench, LIMIT};
+use isotherm_tests::calibrations::{compile, identity};
+use isotherm_tests::process::Service;
+use isotherm_tests::streams::gyro;
+
+/// Sends gyro ticks that all wait for accelerometer ticks which never come.
+async fn send_waiting_ticks(session: &zenoh::Session, unit: &UnitId, count: u64) {
+    let options = ProducerOptions { batch_ticks: 10, max_in_flight: None, ..ProducerOptions::default() };
+    let mut producer = Producer::declare(session, unit, options).await.unwrap();
+    for k in 0..count {
+        producer.gyro(OutputKind::Mean, gyro(k, &[0.1, 0.2, 0.3])).await.unwrap();
+    }
+    producer.flush().await.unwrap();
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn i8_what_waits_inside_is_published_on_stop() {
+    let mut bench = Bench::start(&[("UNIT", compile(&identity()))]).await;
+    let unit = UnitId::new("UNIT").unwrap();
+    let session = open(&bench.options).await.unwrap();
+    send_waiting_ticks(&session, &unit, 100).await;
+    // A session closes behind what it has sent: the service has everything once the producer's is closed and its own
+    // receive thread is done, which `stop` waits for. The first ticks tell that it has begun.
+    let first = bench.receive("UNIT", 1).await;
+    close(session, LIMIT).await.unwrap();
+    let (totals, rest) = bench.stop().await;
+    assert!(totals.stopped_in_time);
+    let ticks: Vec<_> = first.into_iter().chain(rest.into_iter().map(|(_, tick)| tick)).collect();
+    assert_eq!(ticks.len(), 100);
+    assert!(ticks.iter().zip(0..).all(|(tick, k)| tick.sequence == k), "each once, in order");
+    let missing = TickFlags::ACCELEROMETER_MISSING.bits();
+    assert!(ticks.iter().all(|tick| tick.flags & missing != 0));
+    assert_eq!(totals.unit(&unit).ticks_out, 100);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn i8_sigterm_ends_the_process_well() {
+    let service = Service::start(&["--calibrations", "config/calibration"]);
+    let options = SessionOptions { connect: vec![service.locator.clone()], ..SessionOptions::default() };
+    let session = open(&options).await.unwrap();
+    let unit = UnitId::new("SIGTERM-TEST").unwrap();
+    let mut consumer = Consumer::declare(&session, Some(&unit)).await.unwrap();
+    presence::wait_for_service(&session, LIMIT).await.unwrap();
+    send_waiting_ticks(&session, &unit, 50).await;
+    let mut ticks = 0;
+    // Uncalibrated ticks wait for their accelerometer ticks too; the tail comes when the service flushes it.
+    while ticks < 50 {
+        let batch = tokio::time::timeout(LIMIT, consumer.next()).await.expect("in time").expect("open");
+        ticks += batch.ticks.len();
+    }
+    let (status, totals) = tokio::task::spawn_blocking(move || service.stop()).await.unwrap();
+    assert_eq!(status.code(), Some(0), "{totals}");
+    let totals: serde_json::Value = serde_json::from_str(&totals).expect("totals are JSON");
+    assert_eq!(totals["units"]["SIGTERM-TEST"]["ticks_out"], 50);
+    close(session, LIMIT).await.unwrap();
+}

@@ -1,0 +1,7 @@
+//! System tests on real Zenoh sessions, one binary: linking Zenoh once is enough.
+
+mod i7_broken_input_over_zenoh;
+mod i8_clean_stop;
+mod online_equals_offline;
+mod python_subscriber;
+mod real_logs;
