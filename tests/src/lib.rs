@@ -6,5 +6,7 @@ pub mod bench;
 pub mod calibrations;
 pub mod data;
 pub mod drive;
+pub mod logs;
 pub mod process;
+pub mod simulated;
 pub mod streams;

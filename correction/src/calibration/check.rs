@@ -238,7 +238,8 @@ fn check_filter(checker: &mut Checker, filter: &ThermalFilterParts) {
     let longest = filter.grid_step_s * MAX_GRID_POINTS as f64;
     checker.within(section, "smoothing_s", filter.smoothing_s, 0.0, longest);
     checker.within(section, "derivative_step_s", filter.derivative_step_s, 0.0, longest);
-    checker.within(section, "stale_after_s", filter.stale_after_s, filter.grid_step_s, 1e6);
+    // Bounded in grid steps too: a reading after a silence walks over all of them at once.
+    checker.within(section, "stale_after_s", filter.stale_after_s, filter.grid_step_s, 1e4 * filter.grid_step_s);
     checker.within(section, "assumed_deg_c", filter.assumed_deg_c, -273.15, 1000.0);
     checker.within(section, "branch_dead_band", filter.branch_dead_band, f64::MIN_POSITIVE, HUGE);
 }

@@ -87,7 +87,7 @@ pub fn fibre_optic_chamber(seed: u64, chamber: Profile) -> Scenario {
         gyro(0.40, 12.0, 0.05, 0.13, -0.8),
     ];
     Scenario {
-        unit: "FOG-001".into(),
+        unit: "FOG-0001".into(),
         seed,
         start_ns: 0,
         duration_s: chamber.duration_s(),

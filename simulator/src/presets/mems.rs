@@ -43,7 +43,7 @@ pub fn mems_chamber(seed: u64) -> Scenario {
     let chamber = Profile::constant(25.0).hold(15.0).ramp(-40.0, 2.0).hold(20.0).ramp(80.0, 2.0).hold(20.0);
     let chamber = chamber.ramp(25.0, 2.0).hold(15.0);
     Scenario {
-        unit: "MEMS-001".into(),
+        unit: "MEMS-0001".into(),
         seed,
         start_ns: 0,
         duration_s: chamber.duration_s(),
@@ -62,7 +62,7 @@ pub fn mems_chamber(seed: u64) -> Scenario {
 pub fn skewed_six(seed: u64, failure: Option<Failure>) -> Scenario {
     let swing = Path::Sine { axis: [0.5, -1.0, 0.8], amplitude_deg: 5.0, frequency_hz: 0.5, phase_deg: 0.0 };
     Scenario {
-        unit: "SKEW-006".into(),
+        unit: "SKEW-0006".into(),
         seed,
         duration_s: 600.0,
         chamber: Profile::constant(20.0).hold(1.0).ramp(40.0, 3.0),

@@ -58,7 +58,7 @@ fn unit(period_s: f64) -> Instrument {
 #[must_use]
 pub fn zeeman_rest(seed: u64) -> Scenario {
     Scenario {
-        unit: "ZLG-001".into(),
+        unit: "ZLG-0001".into(),
         seed,
         start_ns: 0,
         duration_s: 3600.0,

@@ -1,0 +1,29 @@
+//! Zenoh sessions for producers, consumers and the service.
+//!
+//! What every program of the project needs of Zenoh stands here once: how a session is opened and closed in bounded
+//! time, how a producer publishes raw batches in the right order without outrunning the service, how a consumer
+//! receives corrected batches and proves that none was lost.
+//!
+//! What this crate refuses to do: correct anything, read a log, or sleep until something has probably happened.
+//! Every wait is a wait for a state, and every wait has a limit.
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`session`] | options, open, locators, close |
+//! | [`producer`] | raw batches out, bounded by what comes back |
+//! | [`consumer`] | corrected batches in |
+//! | [`continuity`] | the rule by which a consumer notices a lost tick |
+//! | [`presence`] | waiting until the service is there |
+
+pub mod consumer;
+pub mod continuity;
+mod error;
+pub mod presence;
+pub mod producer;
+pub mod session;
+
+pub use consumer::Consumer;
+pub use continuity::Continuity;
+pub use error::BusError;
+pub use producer::{Producer, ProducerOptions};
+pub use session::{SessionOptions, close, locators, open};

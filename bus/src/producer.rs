@@ -1,0 +1,262 @@
+//! Publishing raw batches in the order that the service needs, without outrunning it.
+
+mod assemble;
+mod in_flight;
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use isotherm_correction::sample::{AccelTick, GyroTick, OutputKind, TemperatureReading};
+use isotherm_protocol::codec::{self, MAX_TICKS, Message};
+use isotherm_protocol::key::{self, RawStream, UnitId};
+use isotherm_protocol::raw::{AccelBatch, GyroBatch};
+use zenoh::Session;
+use zenoh::pubsub::{Publisher, Subscriber};
+use zenoh::qos::{CongestionControl, Priority};
+
+use crate::{BusError, presence};
+use assemble::{Pending, temperature_batches};
+use in_flight::InFlight;
+
+/// How a producer publishes.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ProducerOptions {
+    /// Gyro ticks in one batch (1…4096). Default 1.
+    pub batch_ticks: usize,
+    /// Most gyro ticks sent and not yet come back corrected; `None` does not wait for anything to come back.
+    ///
+    /// It must be well above what a unit holds inside (pairing window, ticks of a mode switch), or the service flushes
+    /// by the clock while the producer waits: at least two batches and 256 ticks. Default `None`.
+    pub max_in_flight: Option<u64>,
+    /// How long to wait for a subscriber of every raw topic. Default 10 s.
+    pub match_timeout: Duration,
+    /// How long nothing may come back while the bound is reached. Default 10 s.
+    pub acknowledge_timeout: Duration,
+}
+
+impl Default for ProducerOptions {
+    fn default() -> Self {
+        Self {
+            batch_ticks: 1,
+            max_in_flight: None,
+            match_timeout: Duration::from_secs(10),
+            acknowledge_timeout: Duration::from_secs(10),
+        }
+    }
+}
+
+impl ProducerOptions {
+    /// Checks the ranges.
+    fn check(&self) -> Result<(), BusError> {
+        let batch = self.batch_ticks as u64;
+        if !(1..=MAX_TICKS as u64).contains(&batch) {
+            return Err(BusError::Range { option: "batch_ticks", got: batch, min: 1, max: MAX_TICKS as u64 });
+        }
+        let min = 2 * batch + 256;
+        match self.max_in_flight {
+            Some(got) if got < min => {
+                Err(BusError::Range { option: "max_in_flight", got, min, max: u64::MAX })
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Publishes one unit's raw ticks.
+///
+/// Ticks and readings are handed over in the order of their times, at equal times temperatures before accelerometer before
+/// gyro ticks. A gyro batch goes out when it is full; the temperatures and accelerometer ticks handed over before it go
+/// out first. Congestion blocks: nothing is dropped on the way out.
+#[derive(Debug)]
+pub struct Producer {
+    unit: UnitId,
+    options: ProducerOptions,
+    gyro: Publisher<'static>,
+    accel: Publisher<'static>,
+    temperature: Publisher<'static>,
+    gyro_pending: Pending<GyroTick>,
+    accel_pending: Pending<AccelTick>,
+    temperature_pending: Vec<TemperatureReading>,
+    frame: Vec<u8>,
+    sent: u64,
+    in_flight: Option<(Arc<InFlight>, Subscriber<()>)>,
+}
+
+impl Producer {
+    /// Declares the raw topics of `unit` and waits until each has a subscriber.
+    ///
+    /// # Errors
+    /// [`BusError::Range`], [`BusError::Declare`], [`BusError::NoSubscriber`].
+    pub async fn declare(
+        session: &Session,
+        unit: &UnitId,
+        options: ProducerOptions,
+    ) -> Result<Self, BusError> {
+        options.check()?;
+        let publisher = async |stream| {
+            let key = key::raw(unit, stream);
+            let publisher = session
+                .declare_publisher(key.clone())
+                .congestion_control(CongestionControl::Block)
+                .priority(Priority::RealTime)
+                .await
+                .map_err(|source| BusError::Declare { key, source })?;
+            presence::wait_for_subscriber(&publisher, options.match_timeout).await?;
+            Ok::<_, BusError>(publisher)
+        };
+        let in_flight = if options.max_in_flight.is_some() {
+            Some(InFlight::declare(session, unit).await?)
+        } else {
+            None
+        };
+        Ok(Self {
+            unit: unit.clone(),
+            gyro: publisher(RawStream::Gyro).await?,
+            accel: publisher(RawStream::Accel).await?,
+            temperature: publisher(RawStream::Temperature).await?,
+            gyro_pending: Pending::default(),
+            accel_pending: Pending::default(),
+            temperature_pending: Vec::new(),
+            frame: Vec::new(),
+            sent: 0,
+            in_flight,
+            options,
+        })
+    }
+
+    /// Takes one gyro tick.
+    ///
+    /// # Errors
+    /// [`BusError::NotCounts`], [`BusError::Encode`], [`BusError::Put`], [`BusError::NoAcknowledgement`].
+    pub async fn gyro(&mut self, output: OutputKind, tick: GyroTick) -> Result<(), BusError> {
+        if !self.gyro_pending.continues(output, tick.sequence, tick.readings.len()) {
+            self.flush().await?;
+        }
+        self.gyro_pending.push(output, tick);
+        if self.gyro_pending.len() >= self.options.batch_ticks { self.flush().await } else { Ok(()) }
+    }
+
+    /// Takes one accelerometer tick.
+    ///
+    /// # Errors
+    /// As [`Producer::gyro`].
+    pub async fn accel(&mut self, output: OutputKind, tick: AccelTick) -> Result<(), BusError> {
+        if !self.accel_pending.continues(output, tick.sequence, tick.readings.len())
+            || self.accel_pending.len() == MAX_TICKS
+        {
+            self.flush_accel().await?;
+        }
+        self.accel_pending.push(output, tick);
+        Ok(())
+    }
+
+    /// Takes temperature readings.
+    ///
+    /// # Errors
+    /// As [`Producer::gyro`].
+    pub async fn temperatures(&mut self, readings: &[TemperatureReading]) -> Result<(), BusError> {
+        self.temperature_pending.extend_from_slice(readings);
+        if self.temperature_pending.len() >= MAX_TICKS { self.flush_temperatures().await } else { Ok(()) }
+    }
+
+    /// Publishes everything that was handed over, full batch or not.
+    ///
+    /// # Errors
+    /// As [`Producer::gyro`].
+    pub async fn flush(&mut self) -> Result<(), BusError> {
+        self.flush_temperatures().await?;
+        self.flush_accel().await?;
+        self.flush_gyro().await
+    }
+
+    /// Waits until every tick sent has come back, at most the acknowledge timeout without progress.
+    ///
+    /// The last ticks come back when the service has noticed by the clock that the stream has stopped. Without
+    /// `max_in_flight` there is nothing to wait for.
+    ///
+    /// # Errors
+    /// [`BusError::NoAcknowledgement`].
+    pub async fn drain(&mut self) -> Result<(), BusError> {
+        self.wait_below(1).await
+    }
+
+    /// Gyro ticks published so far.
+    #[must_use]
+    pub fn sent(&self) -> u64 {
+        self.sent
+    }
+
+    /// Gyro ticks published and not come back; 0 without `max_in_flight`.
+    #[must_use]
+    pub fn in_flight(&self) -> u64 {
+        self.in_flight.as_ref().map_or(0, |(in_flight, _)| in_flight.ticks())
+    }
+
+    async fn flush_temperatures(&mut self) -> Result<(), BusError> {
+        for batch in temperature_batches(&self.temperature_pending) {
+            publish(&self.temperature, &mut self.frame, &batch).await?;
+        }
+        self.temperature_pending.clear();
+        Ok(())
+    }
+
+    async fn flush_accel(&mut self) -> Result<(), BusError> {
+        let Some(output) = self.accel_pending.output() else {
+            return Ok(());
+        };
+        let ticks = self.accel_pending.take();
+        for part in ticks.chunks(self.options.batch_ticks) {
+            let batch =
+                AccelBatch::from_core(output, part).ok_or_else(|| self.not_counts(part[0].sequence))?;
+            publish(&self.accel, &mut self.frame, &batch).await?;
+        }
+        Ok(())
+    }
+
+    async fn flush_gyro(&mut self) -> Result<(), BusError> {
+        let Some(output) = self.gyro_pending.output() else {
+            return Ok(());
+        };
+        let ticks = self.gyro_pending.take();
+        let (first, count) = (ticks[0].sequence, ticks.len() as u64);
+        let batch = GyroBatch::from_core(output, &ticks).ok_or_else(|| self.not_counts(first))?;
+        if let Some(limit) = self.options.max_in_flight {
+            self.wait_below((limit + 1).saturating_sub(count)).await?;
+        }
+        if let Some((in_flight, _)) = &self.in_flight {
+            in_flight.sent(first, count);
+        }
+        publish(&self.gyro, &mut self.frame, &batch).await?;
+        self.sent += count;
+        Ok(())
+    }
+
+    async fn wait_below(&self, limit: u64) -> Result<(), BusError> {
+        let Some((in_flight, _)) = &self.in_flight else {
+            return Ok(());
+        };
+        in_flight.wait_below(limit, self.options.acknowledge_timeout).await.map_err(|in_flight| {
+            BusError::NoAcknowledgement {
+                unit: self.unit.clone(),
+                key: key::corrected(&self.unit),
+                waited: self.options.acknowledge_timeout,
+                in_flight,
+            }
+        })
+    }
+
+    fn not_counts(&self, sequence: u64) -> BusError {
+        BusError::NotCounts { unit: self.unit.clone(), sequence }
+    }
+}
+
+/// Encodes and publishes one batch.
+async fn publish<M: Message>(
+    publisher: &Publisher<'_>,
+    frame: &mut Vec<u8>,
+    batch: &M,
+) -> Result<(), BusError> {
+    let key = || publisher.key_expr().to_string();
+    codec::encode_into(batch, frame).map_err(|source| BusError::Encode { key: key(), source })?;
+    publisher.put(std::mem::take(frame)).await.map_err(|source| BusError::Put { key: key(), source })
+}

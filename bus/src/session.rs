@@ -1,0 +1,113 @@
+//! Opening and closing sessions.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use serde_json::Value;
+use zenoh::{Config, Session, Wait};
+
+use crate::BusError;
+
+/// Where a session listens and connects when neither options nor a configuration say so.
+const LOOPBACK: &str = "tcp/127.0.0.1:0";
+
+/// How long an endpoint given as an option may stay unreachable before opening fails (ms).
+const CONNECT_TIMEOUT_MS: u32 = 10_000;
+
+/// How to open a session.
+///
+/// Without a configuration file a session is a peer that listens on loopback only, on a port of the system's choice,
+/// and finds nobody by itself: no multicast, no gossip. The other options replace what a file says.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+pub struct SessionOptions {
+    /// Zenoh configuration file (JSON5); without it: peer on loopback, no scouting
+    #[cfg_attr(feature = "clap", arg(long = "zenoh-config", value_name = "FILE"))]
+    pub config: Option<PathBuf>,
+    /// Endpoint to connect to, e.g. tcp/127.0.0.1:7447; may be given several times
+    #[cfg_attr(feature = "clap", arg(long, value_name = "ENDPOINT"))]
+    pub connect: Vec<String>,
+    /// Endpoint to listen on, e.g. tcp/127.0.0.1:0; may be given several times
+    #[cfg_attr(feature = "clap", arg(long, value_name = "ENDPOINT"))]
+    pub listen: Vec<String>,
+    /// Key prefix of the site, e.g. site/a; all keys stand below it
+    #[cfg_attr(feature = "clap", arg(long, value_name = "PREFIX"))]
+    pub namespace: Option<String>,
+}
+
+impl SessionOptions {
+    /// The configuration that these options stand for.
+    ///
+    /// # Errors
+    /// [`BusError::Configuration`] and [`BusError::Option`].
+    pub fn to_config(&self) -> Result<Config, BusError> {
+        let mut config = match &self.config {
+            Some(path) => Config::from_file(path)
+                .map_err(|source| BusError::Configuration { path: path.clone(), source })?,
+            None => loopback()?,
+        };
+        if !self.connect.is_empty() {
+            set(&mut config, "connect/endpoints", self.connect.clone())?;
+        }
+        if !self.listen.is_empty() {
+            set(&mut config, "listen/endpoints", self.listen.clone())?;
+        }
+        if let Some(namespace) = &self.namespace {
+            set(&mut config, "namespace", namespace.as_str())?;
+        }
+        Ok(config)
+    }
+}
+
+/// The configuration without a file; `config/zenoh/peer.json5` says the same, with the reasons.
+fn loopback() -> Result<Config, BusError> {
+    let mut config = Config::default();
+    set(&mut config, "mode", "peer")?;
+    set(&mut config, "listen/endpoints", vec![LOOPBACK])?;
+    set(&mut config, "connect/timeout_ms", CONNECT_TIMEOUT_MS)?;
+    set(&mut config, "connect/exit_on_failure", true)?;
+    set(&mut config, "scouting/multicast/enabled", false)?;
+    set(&mut config, "scouting/gossip/enabled", false)?;
+    set(&mut config, "transport/link/tx/queue/batching/time_limit", 0)?;
+    set(&mut config, "transport/link/tx/queue/size/real_time", 16)?;
+    Ok(config)
+}
+
+/// Sets one value of a configuration.
+fn set(config: &mut Config, option: &'static str, value: impl Into<Value>) -> Result<(), BusError> {
+    let value = value.into().to_string();
+    config.insert_json5(option, &value).map_err(|source| BusError::Option { option, value, source })
+}
+
+/// Opens a session.
+///
+/// Zenoh needs tokio's multi-threaded runtime: a test says `#[tokio::test(flavor = "multi_thread")]`.
+///
+/// # Errors
+/// [`BusError::Configuration`] and [`BusError::Option`] for what the options say, [`BusError::Open`] where a port
+/// cannot be bound or an endpoint not be reached.
+pub async fn open(options: &SessionOptions) -> Result<Session, BusError> {
+    zenoh::open(options.to_config()?).await.map_err(BusError::Open)
+}
+
+/// The endpoints that others can connect to, with the ports that the system has chosen.
+#[must_use]
+pub fn locators(session: &Session) -> Vec<String> {
+    session.info().locators().wait().iter().map(ToString::to_string).collect()
+}
+
+/// Closes a session, waiting no longer than `limit`.
+///
+/// What was published before is written out first. Zenoh itself may take 10 s where a peer no longer answers; such a
+/// session is left to close by itself.
+///
+/// # Errors
+/// [`BusError::CloseTimeout`] and [`BusError::Close`].
+pub async fn close(session: Session, limit: Duration) -> Result<(), BusError> {
+    let closing = tokio::spawn(async move { session.close().await });
+    match tokio::time::timeout(limit, closing).await {
+        Ok(Ok(closed)) => closed.map_err(BusError::Close),
+        Ok(Err(join)) => Err(BusError::Close(join.into())),
+        Err(_) => Err(BusError::CloseTimeout(limit)),
+    }
+}

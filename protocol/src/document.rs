@@ -1,0 +1,190 @@
+//! The calibration document: TOML text in, a validated calibration out, or every error at once.
+//!
+//! A document states the coefficients of one unit in the units of its catalogue (°/h, ″, ppm, °C), with the unit
+//! of measure in every key. `docs/calibration-document.md` lists the keys; `config/calibration.schema.json` lets
+//! editors complete and check them; `config/calibration/` holds examples. The first two are generated from the
+//! types here.
+//!
+//! ```
+//! use isotherm_protocol::document::Document;
+//!
+//! let problems = Document::parse("schema = 1\nunit = \"ZLG 42\"\n", Some("zlg-42.toml")).unwrap_err();
+//! let unit = problems.iter().find(|problem| problem.key == "unit").unwrap();
+//! assert!(unit.to_string().starts_with("zlg-42.toml:2:8: unit: is \"ZLG 42\" (a string), must be 1 to 64 letters"));
+//! ```
+//!
+//! How a text becomes a calibration:
+//!
+//! 1. size, UTF-8, TOML syntax: an error here ends the matter, for nothing after it can be trusted;
+//! 2. the walk (`read`) asks for every key and replaces what is wrong by a harmless stand-in;
+//! 3. the checks between keys (`check`), then the core's own, on everything that is not a stand-in.
+
+mod check;
+mod convert;
+mod curve;
+mod defects;
+mod measure;
+mod problem;
+mod read;
+mod reader;
+mod reference;
+mod schema;
+mod suggest;
+#[cfg(test)]
+mod tests;
+mod types;
+mod values;
+mod warnings;
+
+use isotherm_correction::calibration::Calibration;
+use sha2::{Digest, Sha256};
+use toml::de::DeTable;
+
+pub use curve::{
+    Curve, Frequency, LagGain, OutputBias, Quantity, RateBias, Relative, ScaleFactor, Shape,
+    ThermalAcceleration, ThermalRate,
+};
+pub use measure::{Argument, Unit};
+pub use problem::Problem;
+pub use reference::reference;
+pub use schema::schema;
+pub use types::{
+    Accel, AccelOrientation, AccelOutput, AccelParity, AccelSensor, Branches, Channel, Created, Document,
+    Filter, Gyro, GyroOrientation, GyroOutput, GyroParity, GyroSensor, Lag, Log, Measure, ModeReversal,
+    Orientation, OrientationThermal, Origin, Residual, Sample, Servo, ServoKind, Temperature, Trend,
+};
+
+use problem::Lines;
+use reader::{Reader, Table};
+
+/// Oldest version of the document's form that is still read.
+///
+/// Policy: `schema` is the first key of every document. A reader accepts every version from [`MIN_SCHEMA`] to
+/// [`CURRENT_SCHEMA`] and refuses others by number, reading nothing else of them. A new optional key whose absence
+/// means what it meant before leaves the version as it is: an older reader refuses the unknown key by name. A key that
+/// is removed, renamed or given another meaning or unit makes a new version, and the older one goes on being read,
+/// with its own meaning, until a release says at the top of its changelog that it is dropped.
+pub const MIN_SCHEMA: u32 = 1;
+/// The version that is written.
+pub const CURRENT_SCHEMA: u32 = 1;
+
+/// Longest document that is read, in bytes.
+pub const MAX_DOCUMENT_BYTES: usize = 1 << 20;
+
+/// What the TOML parser says of a key that is given twice.
+const DUPLICATE_KEY: &str = "duplicate key";
+
+/// A document that holds, and what was made of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Parsed {
+    /// What stands in the document, defaults filled in.
+    pub document: Document,
+    /// The calibration.
+    pub calibration: Calibration,
+    /// SHA-256 of the text's bytes.
+    pub digest: [u8; 32],
+    /// What is doubtful, though valid.
+    pub warnings: Vec<Problem>,
+}
+
+impl Document {
+    /// Reads a document; `file` is the name that its problems are to carry.
+    ///
+    /// # Errors
+    /// Every [`Problem`], in the order of the text.
+    pub fn parse(text: &str, file: Option<&str>) -> Result<Parsed, Vec<Problem>> {
+        let mut reader = Reader::new(text, file);
+        if text.len() > MAX_DOCUMENT_BYTES {
+            reader.report_at(0, "", format!("is {} bytes long, may have {MAX_DOCUMENT_BYTES}", text.len()));
+            return Err(reader.into_problems().unwrap_or_default());
+        }
+        let (root, errors) = DeTable::parse_recoverable(text);
+        for error in &errors {
+            let span = error.span().unwrap_or(0..0);
+            let message = match error.message() {
+                DUPLICATE_KEY => {
+                    format!("TOML: {DUPLICATE_KEY} `{}`: remove one", reader.excerpt(span.clone()))
+                }
+                other => format!("TOML: {other}"),
+            };
+            reader.report_at(span.start, "", message);
+        }
+        // After a duplicate key (the first one counts) the walk can go on; after any other error of syntax it
+        // would find fault with what the author never wrote.
+        if errors.iter().any(|error| error.message() != DUPLICATE_KEY)
+            || foreign_schema(&mut reader, root.get_ref())
+        {
+            return Err(reader.into_problems().unwrap_or_default());
+        }
+
+        let document = read::document(&mut reader, Table::root(root.get_ref()));
+        check::check(&mut reader, &document);
+        let compiled = Calibration::new(&document.to_parts());
+        if let Err(defects) = &compiled {
+            defects::report(&mut reader, &document, defects);
+        }
+        let warnings = warnings::warnings(&reader, &document);
+        match (reader.into_problems(), compiled) {
+            (None, Ok(calibration)) => {
+                Ok(Parsed { document, calibration, digest: Sha256::digest(text.as_bytes()).into(), warnings })
+            }
+            (Some(problems), _) => Err(problems),
+            // Every defect rests on a stand-in, and every stand-in has its problem: not to be reached, but if it is,
+            // the document is refused with what the core said.
+            (None, Err(defects)) => {
+                Err(defects.iter().map(|defect| unplaced(file, format!("{defect:?}"))).collect())
+            }
+        }
+    }
+
+    /// Reads a document from bytes that may not be UTF-8.
+    ///
+    /// # Errors
+    /// Every [`Problem`], in the order of the text; the first bytes that are not UTF-8 are the only one.
+    pub fn parse_bytes(bytes: &[u8], file: Option<&str>) -> Result<Parsed, Vec<Problem>> {
+        match std::str::from_utf8(bytes) {
+            Ok(text) => Self::parse(text, file),
+            Err(error) => {
+                let valid = error.valid_up_to();
+                let before = bytes
+                    .get(..valid)
+                    .and_then(|before| std::str::from_utf8(before).ok())
+                    .unwrap_or_default();
+                let (line, column) = Lines::new(before).position(valid);
+                let message = format!("is not UTF-8 at byte {valid}: save the document as UTF-8");
+                Err(vec![Problem { line, column, ..unplaced(file, message) }])
+            }
+        }
+    }
+
+    /// Writes the document as text that [`Document::parse`] reads back as an equal document.
+    ///
+    /// # Errors
+    /// What the TOML writer refuses: `origin.details` may hold nothing that TOML cannot state.
+    pub fn to_toml(&self) -> Result<String, toml::ser::Error> {
+        toml::to_string(self)
+    }
+}
+
+/// A problem of the document as a whole.
+fn unplaced(file: Option<&str>, message: String) -> Problem {
+    Problem { file: file.map(Into::into), line: 1, column: 1, key: String::new(), message }
+}
+
+/// Refuses a document of another version before anything else is said about its keys.
+fn foreign_schema(reader: &mut Reader<'_>, root: &DeTable<'_>) -> bool {
+    let Some(value) = root.get("schema") else { return false };
+    let version = value.get_ref().as_integer().map(|integer| integer.as_str().parse::<u32>());
+    let Some(Ok(version)) = version else { return false };
+    let foreign = !(MIN_SCHEMA..=CURRENT_SCHEMA).contains(&version);
+    if foreign {
+        let known = if MIN_SCHEMA == CURRENT_SCHEMA {
+            format!("{CURRENT_SCHEMA}")
+        } else {
+            format!("{MIN_SCHEMA} to {CURRENT_SCHEMA}")
+        };
+        let message = format!("is version {version}; this release reads {known}: nothing else was read");
+        reader.report_at(value.span().start, "schema", message);
+    }
+    foreign
+}

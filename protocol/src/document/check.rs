@@ -1,0 +1,217 @@
+//! What holds between keys: names that must be known, curves that must be sound, lists that must be of one length.
+//!
+//! The core checks most of this again when it compiles the parts; it is checked here first because here the key
+//! and its line are known. A path that was reported is marked, so that the core does not report it once more.
+
+use std::collections::BTreeMap;
+
+use isotherm_correction::curve::{Curve as CoreCurve, CurveError};
+use isotherm_correction::orientation::ROW_NORM_TOLERANCE;
+
+use super::curve::{Curve, Quantity};
+use super::reader::{Reader, element, join};
+use super::types::{AccelSensor, Branches, Document, Filter, GyroSensor, Orientation};
+
+/// Checks everything between keys.
+pub(super) fn check(r: &mut Reader<'_>, document: &Document) {
+    let channels = channels(r, document);
+    let channels = channels.as_deref();
+    names(r, "gyro.sensor", document.gyro.sensor.iter().map(|sensor| sensor.name.as_str()));
+    for (i, sensor) in document.gyro.sensor.iter().enumerate() {
+        gyro(r, &element("gyro.sensor", i), sensor, channels);
+        lags(r, &element("gyro.sensor", i), sensor, document.temperature.filter.as_ref());
+    }
+    orientation(r, "gyro", &document.gyro.orientation, document.gyro.sensor.len(), channels);
+    filter(r, document);
+    if let Some(section) = &document.accel {
+        names(r, "accel.sensor", section.sensor.iter().map(|sensor| sensor.name.as_str()));
+        for (i, sensor) in section.sensor.iter().enumerate() {
+            accel(r, &element("accel.sensor", i), sensor, channels);
+        }
+        orientation(r, "accel", &section.orientation, section.sensor.len(), channels);
+    }
+}
+
+/// Reports, and marks what was reported.
+fn report(r: &mut Reader<'_>, path: &str, message: String) {
+    r.report(path, message);
+    r.damage(path);
+}
+
+/// No two sensors of a kind have one name.
+fn names<'n>(r: &mut Reader<'_>, sensors: &str, names: impl Iterator<Item = &'n str>) {
+    let mut seen = BTreeMap::new();
+    for (i, name) in names.enumerate() {
+        if let Some(earlier) = seen.insert(name, i) {
+            let path = join(&element(sensors, i), "name");
+            report(r, &path, format!("is {name:?}, the name of {sensors}[{earlier}] too: names must differ"));
+        }
+    }
+}
+
+/// Names of the channels; `None` where one of them is not known.
+fn channels<'d>(r: &Reader<'_>, document: &'d Document) -> Option<Vec<&'d str>> {
+    let name = |i| join(&element("temperature.channel", i), "name");
+    let channels = document.temperature.channel.iter().enumerate();
+    let known = channels.map(|(i, channel)| (!r.is_marked(&name(i))).then_some(channel.name.as_str()));
+    known
+        .collect::<Option<Vec<_>>>()
+        .filter(|_| !r.is_marked("temperature") && !r.is_marked("temperature.channel"))
+}
+
+/// A name that must be that of a channel.
+fn channel(r: &mut Reader<'_>, path: &str, name: Option<&str>, channels: Option<&[&str]>) {
+    if let (Some(name), Some(channels)) = (name, channels)
+        && !channels.contains(&name)
+    {
+        let known = if channels.is_empty() { "none".into() } else { channels.join(", ") };
+        report(r, path, format!("is {name:?}, which is no temperature channel; the channels are: {known}"));
+    }
+}
+
+fn gyro(r: &mut Reader<'_>, path: &str, sensor: &GyroSensor, channels: Option<&[&str]>) {
+    channel(r, &join(path, "channel"), sensor.channel.as_deref(), channels);
+    curve(r, &join(path, "increment_weight_error"), sensor.increment_weight_error.as_ref());
+    curve(r, &join(path, "static_bias"), sensor.static_bias.as_ref());
+    curve(r, &join(path, "magnetic_bias"), sensor.magnetic_bias.as_ref());
+    curve(r, &join(path, "slow_meander"), sensor.slow_meander.as_ref());
+    branches(r, &join(path, "thermal_rate"), sensor.thermal_rate.as_ref());
+    branches(r, &join(path, "thermal_acceleration"), sensor.thermal_acceleration.as_ref());
+    curve(
+        r,
+        &join_dotted(path, "servo.rest_frequency"),
+        sensor.servo.as_ref().map(|servo| &servo.rest_frequency),
+    );
+}
+
+fn lags(r: &mut Reader<'_>, path: &str, sensor: &GyroSensor, filter: Option<&Filter>) {
+    for (i, lag) in sensor.lag.iter().enumerate() {
+        let path = element(&join(path, "lag"), i);
+        curve(r, &join(&path, "gain"), Some(&lag.gain));
+        let Some(Filter { grid_step_s, .. }) = filter else { continue };
+        if lag.time_constant_s < *grid_step_s && !r.is_damaged("temperature.filter.grid_step_s") {
+            let (tau, path) = (lag.time_constant_s, join(&path, "time_constant_s"));
+            report(
+                r,
+                &path,
+                format!("is {tau} s, must be at least temperature.filter.grid_step_s, {grid_step_s} s"),
+            );
+        }
+    }
+}
+
+fn accel(r: &mut Reader<'_>, path: &str, sensor: &AccelSensor, channels: Option<&[&str]>) {
+    channel(r, &join(path, "channel"), sensor.channel.as_deref(), channels);
+    channel(r, &join(path, "board_channel"), sensor.board_channel.as_deref(), channels);
+    curve(r, &join(path, "scale_factor"), Some(&sensor.scale_factor));
+    curve(r, &join(path, "bias"), sensor.bias.as_ref());
+    curve(r, &join(path, "board_ratio_error"), sensor.board_ratio_error.as_ref());
+}
+
+/// A curve that the core must be able to compile.
+fn curve<Q: Quantity>(r: &mut Reader<'_>, path: &str, curve: Option<&Curve<Q>>) {
+    let Some(curve) = curve else { return };
+    if r.is_damaged(path) {
+        return;
+    }
+    let Err(error) = CoreCurve::new(&curve.to_parts(0.0)) else { return };
+    let keys = curve.keys();
+    let place = match error {
+        CurveError::KnotsNotIncreasing { index, .. } => element(&join(path, &keys.knots), index),
+        CurveError::EmptyRange { .. } => join(path, &keys.range),
+        _ => path.to_owned(),
+    };
+    report(r, &place, error.to_string());
+}
+
+/// Both curves of a branched coefficient have one argument.
+fn branches<Q: Quantity>(r: &mut Reader<'_>, path: &str, branches: Option<&Branches<Curve<Q>>>) {
+    let Some(Branches { run_up, braking }) = branches else { return };
+    let (run_up_path, braking_path) = (join(path, "run_up"), join(path, "braking"));
+    curve(r, &run_up_path, Some(run_up));
+    curve(r, &braking_path, Some(braking));
+    if let (Some(first), Some(second)) = (run_up.argument(), braking.argument())
+        && first != second
+        && !r.is_damaged(&run_up_path)
+    {
+        let (first, second) = (first.symbol(), second.symbol());
+        report(
+            r,
+            &braking_path,
+            format!("is over {second}, but run_up is over {first}: both must have one argument"),
+        );
+    }
+}
+
+/// The filter and its dead band are there where something needs them.
+fn filter(r: &mut Reader<'_>, document: &Document) {
+    const KEY: &str = "branch_dead_band_deg_c2_per_s3";
+    let Some(filter) = &document.temperature.filter else {
+        if !document.temperature.channel.is_empty() {
+            report(
+                r,
+                "temperature.filter",
+                "is missing: temperature.channel[0] needs it, add `[temperature.filter]`".into(),
+            );
+        }
+        return;
+    };
+    let mut sensors = document.gyro.sensor.iter();
+    let branched =
+        |sensor: &GyroSensor| sensor.thermal_rate.is_some() || sensor.thermal_acceleration.is_some();
+    let Some(i) = sensors.position(branched) else { return };
+    if filter.branch_dead_band_deg_c2_per_s3.is_none() {
+        let why = "run-up and braking curves of";
+        report(
+            r,
+            &join("temperature.filter", KEY),
+            format!("is missing: the {why} gyro.sensor[{i}] need it, add `{KEY}`"),
+        );
+    }
+}
+
+/// Rows, weights and slopes for each sensor; rows of norm one; known channels.
+fn orientation<P>(
+    r: &mut Reader<'_>,
+    section: &str,
+    orientation: &Orientation<P>,
+    sensors: usize,
+    channels: Option<&[&str]>,
+) {
+    let path = join(section, "orientation");
+    let thermal = orientation.thermal.as_ref();
+    for (key, count) in [
+        ("rows", Some(orientation.rows.len())),
+        ("weights", orientation.weights.as_ref().map(Vec::len)),
+        ("thermal.slopes_arcsec_per_deg_c", thermal.map(|thermal| thermal.slopes_arcsec_per_deg_c.len())),
+    ] {
+        let path = join_dotted(&path, key);
+        if count.is_some_and(|count| count != sensors) && !r.is_marked(&join(section, "sensor")) {
+            let count = count.unwrap_or_default();
+            report(
+                r,
+                &path,
+                format!("has {count} entries, must have {sensors}: one for each {section}.sensor"),
+            );
+        }
+    }
+    for (i, row) in orientation.rows.iter().enumerate() {
+        let norm = row.iter().map(|c| c * c).sum::<f64>().sqrt();
+        if (norm - 1.0).abs() > ROW_NORM_TOLERANCE {
+            let path = element(&join(&path, "rows"), i);
+            report(
+                r,
+                &path,
+                format!("has norm {norm:.6}, must be 1 within {ROW_NORM_TOLERANCE}: a unit vector"),
+            );
+        }
+    }
+    for (i, name) in thermal.iter().flat_map(|thermal| &thermal.channels).enumerate() {
+        channel(r, &element(&join_dotted(&path, "thermal.channels"), i), Some(name), channels);
+    }
+}
+
+/// Path of a key of a table within a table.
+fn join_dotted(path: &str, keys: &str) -> String {
+    keys.split('.').fold(path.to_owned(), |path, key| join(&path, key))
+}

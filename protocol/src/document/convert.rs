@@ -1,0 +1,225 @@
+//! Document → the core's parts: names become indices, the file's units become SI.
+
+use isotherm_correction::calibration::{
+    AccelParts, BranchArgument, BranchedParts, CalibrationParts, GyroParts, LagParts, TrendParts,
+};
+use isotherm_correction::channel::{ChannelParts, ThermalFilterParts};
+use isotherm_correction::orientation::OrientationParts;
+use isotherm_correction::reversal::ReversalParts;
+use isotherm_correction::sample::{ChannelName, MAX_CHANNEL_NAME, OutputKind};
+use isotherm_correction::servo::{ServoForm, ServoParts};
+
+use super::curve::{Curve, Quantity};
+use super::measure::{ARCSEC, Argument, DEG_PER_H, DEG_PER_S, HOUR};
+use super::types::{
+    AccelOutput, AccelSensor, Branches, Channel, Document, GyroOutput, GyroSensor, Lag, ModeReversal,
+    Orientation, Servo, ServoKind, Temperature, Trend,
+};
+use super::values::HUGE;
+
+/// Temperature range of an orientation that does not depend on temperature (°C): nothing lies outside.
+const EVERYWHERE_DEG_C: [f64; 2] = [-1e9, 1e9];
+/// Half width of the blend where no term is branched (°C²/s³): any positive number.
+const NO_BRANCHES: f64 = 1.0;
+/// Filter of a unit without temperature channels: never run.
+const NO_FILTER: ThermalFilterParts = ThermalFilterParts {
+    grid_step_s: 1.0,
+    smoothing_s: 0.0,
+    derivative_step_s: 1.0,
+    stale_after_s: 1.0,
+    branch_dead_band: NO_BRANCHES,
+    assumed_deg_c: 0.0,
+};
+
+impl Document {
+    /// The core's parts, in SI. A channel name that is not in the document becomes an index that the core refuses.
+    #[must_use]
+    pub fn to_parts(&self) -> CalibrationParts {
+        let temperature = &self.temperature;
+        let accel = self.accel.as_ref();
+        let gyro_thermal = self.gyro.orientation.thermal.as_ref();
+        let accel_thermal = accel.and_then(|accel| accel.orientation.thermal.as_ref());
+        let following =
+            |channels: &Vec<String>| channels.iter().map(|name| self.channel_index(name)).collect();
+        CalibrationParts {
+            filter: filter(temperature),
+            channels: temperature.channel.iter().map(channel).collect(),
+            gyro_output: match self.gyro.output {
+                GyroOutput::Counts => OutputKind::Counts,
+                GyroOutput::Mean => OutputKind::Mean,
+            },
+            gyros: self.gyro.sensor.iter().map(|sensor| self.gyro_parts(sensor)).collect(),
+            gyro_orientation: orientation(
+                &self.gyro.orientation,
+                self.gyro
+                    .orientation
+                    .parity
+                    .as_ref()
+                    .map(|parity| (parity.limit_deg_per_h * DEG_PER_H, parity.confirm_ticks)),
+            ),
+            gyro_orientation_channels: gyro_thermal
+                .map(|thermal| following(&thermal.channels))
+                .unwrap_or_default(),
+            accel_output: match accel.map(|accel| accel.output) {
+                Some(AccelOutput::Counts) => OutputKind::Counts,
+                _ => OutputKind::Mean,
+            },
+            accels: accel
+                .map_or_else(Vec::new, |accel| accel.sensor.iter().map(|s| self.accel_parts(s)).collect()),
+            accel_orientation: accel.map(|accel| {
+                let parity = accel.orientation.parity.as_ref();
+                orientation(
+                    &accel.orientation,
+                    parity.map(|parity| (parity.limit_m_per_s2, parity.confirm_ticks)),
+                )
+            }),
+            accel_orientation_channels: accel_thermal
+                .map(|thermal| following(&thermal.channels))
+                .unwrap_or_default(),
+            reversal: self.mode_reversal.as_ref().map(reversal),
+        }
+    }
+
+    /// Index of a channel by its name; one that is too large where there is none of the name.
+    fn channel_index(&self, name: &str) -> usize {
+        self.temperature.channel.iter().position(|channel| channel.name == name).unwrap_or(usize::MAX)
+    }
+
+    fn gyro_parts(&self, sensor: &GyroSensor) -> GyroParts {
+        let (increment_weight, input_limit) = match self.gyro.output {
+            GyroOutput::Counts => (
+                sensor.increment_weight_arcsec_per_count.map(|weight| weight * ARCSEC),
+                sensor.input_limit_counts_per_tick,
+            ),
+            GyroOutput::Mean => (
+                sensor.increment_weight_rad_per_rad,
+                sensor.input_limit_deg_per_s.map(|limit| limit * DEG_PER_S),
+            ),
+        };
+        GyroParts {
+            channel: sensor.channel.as_ref().map(|name| self.channel_index(name)),
+            increment_weight: increment_weight.unwrap_or(f64::NAN),
+            increment_weight_error: sensor.increment_weight_error.as_ref().map(|curve| curve.to_parts(0.0)),
+            input_limit: input_limit.unwrap_or(HUGE),
+            static_bias: sensor.static_bias.as_ref().map(|curve| curve.to_parts(0.0)),
+            magnetic_bias: sensor.magnetic_bias.as_ref().map(|curve| curve.to_parts(0.0)),
+            slow_meander: sensor.slow_meander.as_ref().map(|curve| curve.to_parts(0.0)),
+            thermal_rate: sensor.thermal_rate.as_ref().map(branched),
+            thermal_acceleration: sensor.thermal_acceleration.as_ref().map(branched),
+            lags: sensor.lag.iter().map(lag).collect(),
+            trend: sensor.trend.as_ref().map(trend),
+            servo: sensor.servo.as_ref().map(servo),
+        }
+    }
+
+    fn accel_parts(&self, sensor: &AccelSensor) -> AccelParts {
+        let input_limit = match self.accel.as_ref().map(|accel| accel.output) {
+            Some(AccelOutput::Counts) => sensor.input_limit_counts_per_tick,
+            Some(AccelOutput::Volts) => sensor.input_limit_v,
+            Some(AccelOutput::MetresPerSecondSquared) | None => sensor.input_limit_m_per_s2,
+        };
+        AccelParts {
+            channel: sensor.channel.as_ref().map(|name| self.channel_index(name)),
+            board_channel: sensor.board_channel.as_ref().map(|name| self.channel_index(name)),
+            scale_factor: sensor.scale_factor.to_parts(0.0),
+            bias: sensor.bias.as_ref().map(|curve| curve.to_parts(0.0)),
+            board_ratio: sensor.board_ratio_error.as_ref().map(|curve| curve.to_parts(1.0)),
+            input_limit: input_limit.unwrap_or(HUGE),
+        }
+    }
+}
+
+fn filter(temperature: &Temperature) -> ThermalFilterParts {
+    let assumed_deg_c = temperature.assumed_deg_c;
+    match &temperature.filter {
+        Some(filter) => ThermalFilterParts {
+            grid_step_s: filter.grid_step_s,
+            smoothing_s: filter.smoothing_s,
+            derivative_step_s: filter.derivative_step_s,
+            stale_after_s: filter.stale_after_s,
+            branch_dead_band: filter.branch_dead_band_deg_c2_per_s3.unwrap_or(NO_BRANCHES),
+            assumed_deg_c,
+        },
+        None => ThermalFilterParts { assumed_deg_c, ..NO_FILTER },
+    }
+}
+
+fn channel(channel: &Channel) -> ChannelParts {
+    let mut name = ChannelName::new();
+    for c in channel.name.chars().take(MAX_CHANNEL_NAME) {
+        // A name that is too long was reported by the walk; here it is cut.
+        if name.try_push(c).is_err() {
+            break;
+        }
+    }
+    ChannelParts {
+        name,
+        conversion: channel.conversion_deg_c.clone(),
+        range_deg_c: channel.range_deg_c,
+        spike_limit_deg_c: channel.spike_limit_deg_c,
+    }
+}
+
+fn orientation<P>(orientation: &Orientation<P>, parity: Option<(f64, u32)>) -> OrientationParts {
+    let thermal = orientation.thermal.as_ref();
+    let slopes = thermal
+        .map(|thermal| thermal.slopes_arcsec_per_deg_c.iter().map(|row| row.map(|slope| slope * ARCSEC)));
+    OrientationParts {
+        reference_deg_c: thermal.map_or(0.0, |thermal| thermal.reference_deg_c),
+        rows: orientation.rows.clone(),
+        slopes_per_deg_c: slopes.map(Iterator::collect).unwrap_or_default(),
+        weights: orientation.weights.clone().unwrap_or_default(),
+        range_deg_c: thermal.map_or(EVERYWHERE_DEG_C, |thermal| thermal.range_deg_c),
+        parity_limit: parity.map(|(limit, _)| limit),
+        parity_confirm_ticks: parity.map_or(1, |(_, ticks)| ticks),
+    }
+}
+
+fn branched<Q: Quantity>(branches: &Branches<Curve<Q>>) -> BranchedParts {
+    let argument = branches.run_up.argument().or(branches.braking.argument());
+    BranchedParts {
+        argument: match argument {
+            None | Some(Argument::DegC) => BranchArgument::Temperature,
+            Some(Argument::DegCPerS | Argument::DegCPerS2) => BranchArgument::Derivative,
+        },
+        run_up: branches.run_up.to_parts(0.0),
+        braking: branches.braking.to_parts(0.0),
+    }
+}
+
+fn lag(lag: &Lag) -> LagParts {
+    LagParts { time_constant_s: lag.time_constant_s, gain: lag.gain.to_parts(0.0) }
+}
+
+fn trend(trend: &Trend) -> TrendParts {
+    // °/h per hʲ → rad/s per sʲ.
+    let per_hour = std::iter::successors(Some(1.0), |power| Some(power * HOUR));
+    let coefficients = trend.coefficients_deg_per_h.iter().zip(per_hour);
+    TrendParts {
+        coefficients: coefficients.map(|(c, power)| c * DEG_PER_H / power).collect(),
+        interval_s: trend.interval_h.map(|end| end * HOUR),
+    }
+}
+
+fn servo(servo: &Servo) -> ServoParts {
+    ServoParts {
+        form: match servo.form {
+            ServoKind::Measured => ServoForm::Measured,
+            ServoKind::Modelled => ServoForm::Modelled,
+        },
+        time_constant_s: servo.time_constant_s,
+        rest_frequency: servo.rest_frequency.to_parts(0.0),
+        settle_time_constants: servo.settle_time_constants,
+    }
+}
+
+fn reversal(reversal: &ModeReversal) -> ReversalParts {
+    ReversalParts {
+        transition_ticks: reversal.transition_ticks,
+        predict_readings: reversal.predict_readings,
+        predict_degree: reversal.predict_degree,
+        fit_readings_before: reversal.fit_readings_before,
+        fit_readings_after: reversal.fit_readings_after,
+        fit_degree: reversal.fit_degree,
+    }
+}

@@ -1,0 +1,370 @@
+//! Curves as the document states them, in the units of its keys.
+
+use std::borrow::Cow;
+use std::marker::PhantomData;
+
+use isotherm_correction::curve::{CurveParts, MAX_COEFFICIENTS, MAX_KNOTS, MIN_KNOTS};
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::ser::{Serialize, SerializeMap, Serializer};
+use serde_json::{Map, Value as Json, json};
+
+use super::measure::{Argument, Unit};
+use super::reader::{Reader, Table};
+use super::values::Limits;
+
+/// What a curve's values stand for: which units and arguments its keys may name.
+pub trait Quantity: std::fmt::Debug + Clone + PartialEq + 'static {
+    /// Name of the definition in the schema.
+    const NAME: &'static str;
+    /// Units of the values, the usual one first.
+    const UNITS: &'static [Unit];
+    /// Units of the argument, the usual one first.
+    const ARGUMENTS: &'static [Argument];
+}
+
+/// Defines the quantities.
+macro_rules! quantities {
+    ($($(#[$doc:meta])* $name:ident: [$($unit:ident),+] over [$($argument:ident),+];)+) => {$(
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        pub enum $name {}
+        impl Quantity for $name {
+            const NAME: &'static str = concat!("CurveOf", stringify!($name));
+            const UNITS: &'static [Unit] = &[$(Unit::$unit),+];
+            const ARGUMENTS: &'static [Argument] = &[$(Argument::$argument),+];
+        }
+    )+};
+}
+
+quantities! {
+    /// Relative deviation from one.
+    Relative: [Ppm] over [DegC];
+    /// Bias of a gyro.
+    RateBias: [DegPerH] over [DegC];
+    /// K1 of models §2.
+    ThermalRate: [DegPerHPerDegCPerS] over [DegC, DegCPerS];
+    /// K2 of models §2.
+    ThermalAcceleration: [DegPerHPerDegCPerS2] over [DegC, DegCPerS2];
+    /// Gain of a thermal lag.
+    LagGain: [DegPerHPerDegCPerS] over [DegC];
+    /// Rest frequency of the dither.
+    Frequency: [Hz] over [DegC];
+    /// Scale factor of an accelerometer.
+    ScaleFactor: [CountsPerSPerMPerS2, VPerMPerS2, MPerS2PerMPerS2] over [DegC];
+    /// Bias of an accelerometer, in units of its output.
+    OutputBias: [CountsPerS, V, MPerS2] over [DegC];
+}
+
+/// A curve of one quantity over temperature or one of its derivatives, in the units of its keys.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Curve<Q> {
+    unit: Unit,
+    argument: Argument,
+    shape: Shape,
+    quantity: PhantomData<Q>,
+}
+
+/// Form of a curve.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Shape {
+    /// The same value everywhere.
+    Constant {
+        /// The value.
+        value: f64,
+    },
+    /// Σ cⱼ·(x − reference)ʲ.
+    Polynomial {
+        /// Point about which the powers are taken.
+        reference: f64,
+        /// c₀, c₁, …
+        coefficients: Vec<f64>,
+        /// Fitted range; outside it the argument is clamped.
+        range: [f64; 2],
+    },
+    /// Straight lines between knots.
+    PiecewiseLinear {
+        /// [argument, value] pairs.
+        knots: Vec<[f64; 2]>,
+    },
+    /// Natural cubic spline through the knots.
+    Spline {
+        /// [argument, value] pairs.
+        knots: Vec<[f64; 2]>,
+    },
+}
+
+impl Shape {
+    /// Value of the `kind` key.
+    const fn kind(&self) -> &'static str {
+        match self {
+            Self::Constant { .. } => "constant",
+            Self::Polynomial { .. } => "polynomial",
+            Self::PiecewiseLinear { .. } => "piecewise-linear",
+            Self::Spline { .. } => "spline",
+        }
+    }
+}
+
+/// Argument range of a constant in the core, which has no form for it: wider than any temperature or rate.
+const EVERYWHERE: [f64; 2] = [-1e9, 1e9];
+
+impl<Q: Quantity> Curve<Q> {
+    /// A curve over temperature in the quantity's usual unit.
+    #[must_use]
+    pub fn new(shape: Shape) -> Self {
+        let (unit, argument) = match (Q::UNITS, Q::ARGUMENTS) {
+            ([unit, ..], [argument, ..]) => (*unit, *argument),
+            _ => (Unit::Ppm, Argument::DegC),
+        };
+        Self { unit, argument, shape, quantity: PhantomData }
+    }
+
+    /// The same curve with its values in another unit; one that the quantity does not allow changes nothing.
+    #[must_use]
+    pub fn in_unit(self, unit: Unit) -> Self {
+        if Q::UNITS.contains(&unit) { Self { unit, ..self } } else { self }
+    }
+
+    /// The same curve over another argument; one that the quantity does not allow changes nothing, and so does
+    /// any for a constant.
+    #[must_use]
+    pub fn over(self, argument: Argument) -> Self {
+        let applies = Q::ARGUMENTS.contains(&argument) && !matches!(self.shape, Shape::Constant { .. });
+        if applies { Self { argument, ..self } } else { self }
+    }
+
+    /// Unit of the values.
+    #[must_use]
+    pub fn unit(&self) -> Unit {
+        self.unit
+    }
+
+    /// Unit of the argument; `None` for a constant.
+    #[must_use]
+    pub fn argument(&self) -> Option<Argument> {
+        (!matches!(self.shape, Shape::Constant { .. })).then_some(self.argument)
+    }
+
+    /// Form and numbers.
+    #[must_use]
+    pub fn shape(&self) -> &Shape {
+        &self.shape
+    }
+
+    /// First and last argument of the fitted range; `None` for a constant.
+    #[must_use]
+    pub fn range(&self) -> Option<[f64; 2]> {
+        match &self.shape {
+            Shape::Constant { .. } => None,
+            Shape::Polynomial { range, .. } => Some(*range),
+            Shape::PiecewiseLinear { knots } | Shape::Spline { knots } => {
+                Some([knots.first()?[0], knots.last()?[0]])
+            }
+        }
+    }
+
+    /// The core's parts, `plus` a constant in its units.
+    pub(super) fn to_parts(&self, plus: f64) -> CurveParts {
+        let factor = self.unit.in_core_units();
+        let convert =
+            |knots: &[[f64; 2]]| knots.iter().map(|[x, value]| [*x, value * factor + plus]).collect();
+        match &self.shape {
+            Shape::Constant { value } => CurveParts::Polynomial {
+                reference: 0.0,
+                coefficients: vec![value * factor + plus],
+                range: EVERYWHERE,
+            },
+            Shape::Polynomial { reference, coefficients, range } => {
+                let mut coefficients: Vec<f64> = coefficients.iter().map(|c| c * factor).collect();
+                if let Some(first) = coefficients.first_mut() {
+                    *first += plus;
+                }
+                CurveParts::Polynomial { reference: *reference, coefficients, range: *range }
+            }
+            Shape::PiecewiseLinear { knots } => CurveParts::PiecewiseLinear { knots: convert(knots) },
+            Shape::Spline { knots } => CurveParts::Spline { knots: convert(knots) },
+        }
+    }
+
+    /// Keys of the numbers of this curve.
+    pub(super) fn keys(&self) -> Keys {
+        Keys::new(self.unit, self.argument)
+    }
+
+    /// Reads a curve whose values must be in `unit`.
+    pub(super) fn read(reader: &mut Reader<'_>, mut table: Table<'_>, unit: Unit) -> Self {
+        let kinds = ["constant", "polynomial", "piecewise-linear", "spline"].map(|kind| (kind, kind));
+        let kind = table.choice(reader, "kind", &kinds);
+        let argument = Q::ARGUMENTS
+            .iter()
+            .copied()
+            .find(|argument| Keys::new(unit, *argument).over().iter().any(|key| table.has(key)))
+            .or_else(|| Q::ARGUMENTS.first().copied())
+            .unwrap_or(Argument::DegC);
+        let Keys { value, reference, coefficients, range, knots } = Keys::new(unit, argument);
+        let shape = match kind {
+            Some("constant") => Shape::Constant { value: table.number(reader, value, Limits::Any) },
+            Some("polynomial") => Shape::Polynomial {
+                reference: table.number(reader, reference, Limits::Any),
+                coefficients: {
+                    let numbers =
+                        table.numbers_opt(reader, coefficients.clone(), (1, MAX_COEFFICIENTS), Limits::Any);
+                    table.need(reader, &coefficients, numbers, vec![1.0])
+                },
+                range: table.pair(reader, range, Limits::Any),
+            },
+            Some("piecewise-linear") => {
+                Shape::PiecewiseLinear { knots: table.rows(reader, knots, (MIN_KNOTS, MAX_KNOTS)) }
+            }
+            Some("spline") => Shape::Spline { knots: table.rows(reader, knots, (MIN_KNOTS, MAX_KNOTS)) },
+            _ => {
+                // Without its kind nothing can be said about the other keys.
+                let path = table.path().to_owned();
+                reader.damage(&path);
+                return Self::new(Shape::Constant { value: 1.0 }).in_unit(unit);
+            }
+        };
+        for other in Q::UNITS.iter().copied().filter(|other| *other != unit) {
+            let keys = Keys::new(other, argument);
+            let why = format!("is in {}, but the output calls for {}", other.symbol(), unit.symbol());
+            for key in [keys.value, keys.coefficients, keys.knots] {
+                table.forbid(reader, key, &why);
+            }
+        }
+        table.finish(reader);
+        Self::new(shape).in_unit(unit).over(argument)
+    }
+}
+
+/// Keys of a curve's numbers.
+#[derive(Debug)]
+pub(super) struct Keys {
+    pub(super) value: String,
+    pub(super) reference: String,
+    pub(super) coefficients: String,
+    pub(super) range: String,
+    pub(super) knots: String,
+}
+
+impl Keys {
+    pub(super) fn new(unit: Unit, argument: Argument) -> Self {
+        let (unit, over) = (unit.suffix(), argument.suffix());
+        Self {
+            value: format!("value_{unit}"),
+            reference: format!("reference_{over}"),
+            coefficients: format!("coefficients_{unit}"),
+            range: format!("range_{over}"),
+            knots: match argument {
+                Argument::DegC => format!("knots_{unit}"),
+                _ => format!("knots_{unit}_over_{over}"),
+            },
+        }
+    }
+
+    /// The keys that tell the argument.
+    fn over(&self) -> [&str; 3] {
+        [&self.reference, &self.range, &self.knots]
+    }
+}
+
+impl<Q: Quantity> Serialize for Curve<Q> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let keys = self.keys();
+        let mut map = serializer.serialize_map(None)?;
+        map.serialize_entry("kind", self.shape.kind())?;
+        match &self.shape {
+            Shape::Constant { value } => map.serialize_entry(&keys.value, value)?,
+            Shape::Polynomial { reference, coefficients, range } => {
+                map.serialize_entry(&keys.reference, reference)?;
+                map.serialize_entry(&keys.coefficients, coefficients)?;
+                map.serialize_entry(&keys.range, range)?;
+            }
+            Shape::PiecewiseLinear { knots } | Shape::Spline { knots } => {
+                map.serialize_entry(&keys.knots, knots)?;
+            }
+        }
+        map.end()
+    }
+}
+
+impl<Q: Quantity> JsonSchema for Curve<Q> {
+    fn schema_name() -> Cow<'static, str> {
+        Q::NAME.into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        let mut forms = Vec::new();
+        for &unit in Q::UNITS {
+            let value = |keys: Keys| vec![(keys.value, number(&format!("The value ({}).", unit.symbol())))];
+            forms.push(form("constant", "the same value everywhere", value(Keys::new(unit, Argument::DegC))));
+            for &argument in Q::ARGUMENTS {
+                let (symbol, over) = (unit.symbol(), argument.symbol());
+                let keys = Keys::new(unit, argument);
+                let pair =
+                    format!("[argument in {over}, value in {symbol}] pairs with increasing arguments.");
+                let knots = pairs(&pair);
+                let polynomial = vec![
+                    (keys.reference, number(&format!("Point about which the powers are taken ({over})."))),
+                    (
+                        keys.coefficients,
+                        coefficients(&format!("Coefficients of power j = 0, 1, … ({symbol} per ({over})ʲ).")),
+                    ),
+                    (
+                        keys.range,
+                        range(&format!("Fitted range; outside it the argument is clamped ({over}).")),
+                    ),
+                ];
+                forms.push(form("polynomial", "Σ cⱼ·(x − reference)ʲ", polynomial));
+                forms.push(form(
+                    "piecewise-linear",
+                    "straight lines between knots",
+                    vec![(keys.knots.clone(), knots.clone())],
+                ));
+                forms.push(form(
+                    "spline",
+                    "natural cubic spline through the knots",
+                    vec![(keys.knots, knots)],
+                ));
+            }
+        }
+        let units: Vec<_> = Q::UNITS.iter().map(|unit| unit.symbol()).collect();
+        let over: Vec<_> = Q::ARGUMENTS.iter().map(|argument| argument.symbol()).collect();
+        json_schema!({
+            "title": format!("Curve of {} over {}", units.join(" or "), over.join(" or ")),
+            "type": "object",
+            "oneOf": forms,
+        })
+    }
+}
+
+/// One form of a curve: its kind and the keys that go with it, all of them required.
+fn form(kind: &str, meaning: &str, keys: Vec<(String, Json)>) -> Json {
+    let required: Vec<_> = std::iter::once("kind").chain(keys.iter().map(|(key, _)| key.as_str())).collect();
+    let required = json!(required);
+    let mut properties = Map::new();
+    properties.insert("kind".into(), json!({ "const": kind, "description": format!("{kind}: {meaning}.") }));
+    properties.extend(keys);
+    json!({ "type": "object", "title": kind, "properties": properties, "required": required, "additionalProperties": false })
+}
+
+fn number(description: &str) -> Json {
+    json!({ "type": "number", "description": description })
+}
+
+fn coefficients(description: &str) -> Json {
+    json!({
+        "type": "array", "items": { "type": "number" }, "minItems": 1, "maxItems": MAX_COEFFICIENTS,
+        "description": description,
+    })
+}
+
+fn range(description: &str) -> Json {
+    json!({ "type": "array", "items": { "type": "number" }, "minItems": 2, "maxItems": 2, "description": description })
+}
+
+fn pairs(description: &str) -> Json {
+    json!({
+        "type": "array", "items": { "type": "array", "items": { "type": "number" }, "minItems": 2, "maxItems": 2 },
+        "minItems": MIN_KNOTS, "maxItems": MAX_KNOTS, "description": description,
+    })
+}

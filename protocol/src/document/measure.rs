@@ -1,0 +1,153 @@
+//! Units of measure as the document's keys spell them, and their size in SI.
+
+use isotherm_correction::units::{Angle, AngularRate};
+
+/// rad/s in one °/h.
+pub(super) const DEG_PER_H: f64 = AngularRate::from_deg_per_h(1.0).as_rad_per_s();
+/// rad/s in one °/s.
+pub(super) const DEG_PER_S: f64 = AngularRate::from_deg_per_s(1.0).as_rad_per_s();
+/// rad in one ″.
+pub(super) const ARCSEC: f64 = Angle::from_arcsec(1.0).as_rad();
+/// One part per million.
+pub(super) const PPM: f64 = 1e-6;
+/// Seconds in an hour.
+pub(super) const HOUR: f64 = 3600.0;
+
+/// Unit of a curve's values.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Unit {
+    /// °/h.
+    DegPerH,
+    /// (°/h)/(°C/s).
+    DegPerHPerDegCPerS,
+    /// (°/h)/(°C/s²).
+    DegPerHPerDegCPerS2,
+    /// 10⁻⁶.
+    Ppm,
+    /// Hz.
+    Hz,
+    /// (counts/s)/(m/s²).
+    CountsPerSPerMPerS2,
+    /// V/(m/s²).
+    VPerMPerS2,
+    /// (m/s²)/(m/s²).
+    MPerS2PerMPerS2,
+    /// counts/s.
+    CountsPerS,
+    /// V.
+    V,
+    /// m/s².
+    MPerS2,
+}
+
+impl Unit {
+    /// Spelling in keys.
+    #[must_use]
+    pub const fn suffix(self) -> &'static str {
+        match self {
+            Self::DegPerH => "deg_per_h",
+            Self::DegPerHPerDegCPerS => "deg_per_h_per_deg_c_per_s",
+            Self::DegPerHPerDegCPerS2 => "deg_per_h_per_deg_c_per_s2",
+            Self::Ppm => "ppm",
+            Self::Hz => "hz",
+            Self::CountsPerSPerMPerS2 => "counts_per_s_per_m_per_s2",
+            Self::VPerMPerS2 => "v_per_m_per_s2",
+            Self::MPerS2PerMPerS2 => "m_per_s2_per_m_per_s2",
+            Self::CountsPerS => "counts_per_s",
+            Self::V => "v",
+            Self::MPerS2 => "m_per_s2",
+        }
+    }
+
+    /// Spelling for readers.
+    #[must_use]
+    pub const fn symbol(self) -> &'static str {
+        match self {
+            Self::DegPerH => "°/h",
+            Self::DegPerHPerDegCPerS => "(°/h)/(°C/s)",
+            Self::DegPerHPerDegCPerS2 => "(°/h)/(°C/s²)",
+            Self::Ppm => "ppm",
+            Self::Hz => "Hz",
+            Self::CountsPerSPerMPerS2 => "(counts/s)/(m/s²)",
+            Self::VPerMPerS2 => "V/(m/s²)",
+            Self::MPerS2PerMPerS2 => "(m/s²)/(m/s²)",
+            Self::CountsPerS => "counts/s",
+            Self::V => "V",
+            Self::MPerS2 => "m/s²",
+        }
+    }
+
+    /// How much of the core's unit it is (rad/s, 1, Hz, counts/s, V or m/s²; per °C/s or °C/s² where it says so).
+    #[must_use]
+    pub const fn in_core_units(self) -> f64 {
+        match self {
+            Self::DegPerH | Self::DegPerHPerDegCPerS | Self::DegPerHPerDegCPerS2 => DEG_PER_H,
+            Self::Ppm => PPM,
+            _ => 1.0,
+        }
+    }
+}
+
+/// Unit of a curve's argument.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Argument {
+    /// Temperature, °C.
+    DegC,
+    /// Its rate, °C/s.
+    DegCPerS,
+    /// Its acceleration, °C/s².
+    DegCPerS2,
+}
+
+impl Argument {
+    /// Spelling in keys.
+    #[must_use]
+    pub const fn suffix(self) -> &'static str {
+        match self {
+            Self::DegC => "deg_c",
+            Self::DegCPerS => "deg_c_per_s",
+            Self::DegCPerS2 => "deg_c_per_s2",
+        }
+    }
+
+    /// Spelling for readers.
+    #[must_use]
+    pub const fn symbol(self) -> &'static str {
+        match self {
+            Self::DegC => "°C",
+            Self::DegCPerS => "°C/s",
+            Self::DegCPerS2 => "°C/s²",
+        }
+    }
+}
+
+/// Spellings at the end of a key that state its unit, the longest first, with the symbol for readers.
+const KEY_UNITS: [(&str, &str); 21] = [
+    ("_arcsec_per_deg_c", "″/°C"),
+    ("_arcsec_per_count", "″/count"),
+    ("_counts_per_tick", "counts/tick"),
+    ("_deg_c2_per_s3", "°C²/s³"),
+    ("_rad_per_rad", "rad/rad"),
+    ("_time_constants", "time constants"),
+    ("_deg_c_per_s", "°C/s"),
+    ("_deg_per_h", "°/h"),
+    ("_deg_per_s", "°/s"),
+    ("_m_per_s2", "m/s²"),
+    ("_readings", "readings"),
+    ("_readings_before", "readings"),
+    ("_readings_after", "readings"),
+    ("_degree", "degree"),
+    ("_deg_c", "°C"),
+    ("_ticks", "ticks"),
+    ("_ratio", "1"),
+    ("_h", "h"),
+    ("_s", "s"),
+    ("_v", "V"),
+    ("_hz", "Hz"),
+];
+
+/// Symbol of the unit that a key ends with; `None` for a key without one.
+#[must_use]
+pub(super) fn unit_of_key(key: &str) -> Option<&'static str> {
+    KEY_UNITS.iter().find(|(suffix, _)| key.ends_with(suffix)).map(|(_, symbol)| *symbol)
+}

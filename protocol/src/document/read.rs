@@ -1,0 +1,169 @@
+//! The walk through a document: every key is asked for here once, with its limits.
+
+mod accel;
+mod gyro;
+mod origin;
+
+use isotherm_correction::reversal::{
+    MAX_FIT_DEGREE, MAX_FIT_READINGS, MAX_PREDICT_DEGREE, MAX_TRANSITION_TICKS,
+};
+use isotherm_correction::sample::{MAX_CHANNEL_NAME, MAX_SENSORS, MIN_SENSORS};
+use toml::de::DeValue;
+
+use super::reader::{Reader, Table};
+use super::types::{
+    Channel, Created, Document, Filter, ModeReversal, Orientation, OrientationThermal, Temperature,
+};
+use super::values::Limits;
+use super::{CURRENT_SCHEMA, MIN_SCHEMA};
+
+/// As many entries as there can be sensors of a kind.
+const SENSORS: (usize, usize) = (MIN_SENSORS, MAX_SENSORS);
+/// Any range of temperatures (°C).
+const TEMPERATURES: Limits = Limits::Within(-273.15, 1000.0);
+
+/// Reads the whole document.
+pub(super) fn document(r: &mut Reader<'_>, mut root: Table<'_>) -> Document {
+    let document = Document {
+        schema: root.whole(r, "schema", MIN_SCHEMA, CURRENT_SCHEMA),
+        unit: unit(r, &mut root),
+        created: created(r, &mut root),
+        note: root.text_opt(r, "note", "a string", |_| true),
+        origin: root.table_opt(r, "origin").map(|table| origin::origin(r, table)),
+        temperature: {
+            let table = root.table(r, "temperature");
+            temperature(r, table)
+        },
+        gyro: {
+            let table = root.table(r, "gyro");
+            gyro::gyro(r, table)
+        },
+        accel: root.table_opt(r, "accel").map(|table| accel::accel(r, table)),
+        mode_reversal: root.table_opt(r, "mode_reversal").map(|table| mode_reversal(r, table)),
+    };
+    root.finish(r);
+    document
+}
+
+fn unit(r: &mut Reader<'_>, root: &mut Table<'_>) -> String {
+    let allowed = |c: char| c.is_ascii_alphanumeric() || "._-".contains(c);
+    root.text(r, "unit", "1 to 64 letters A-Z a-z, digits, '.', '_' or '-'", |text| {
+        (1..=64).contains(&text.len()) && text.chars().all(allowed)
+    })
+}
+
+fn created(r: &mut Reader<'_>, root: &mut Table<'_>) -> Option<Created> {
+    let value = root.take(r, "created")?;
+    let created = match value.get_ref() {
+        DeValue::Datetime(datetime) => Created::new(*datetime),
+        _ => None,
+    };
+    if created.is_none() {
+        r.refuse(
+            "created",
+            value,
+            "a date (2026-11-21), or a date and time with offset (2026-11-21T08:00:00Z), without quotes",
+        );
+    }
+    created
+}
+
+fn temperature(r: &mut Reader<'_>, mut table: Table<'_>) -> Temperature {
+    let temperature = Temperature {
+        assumed_deg_c: table.number(r, "assumed_deg_c", TEMPERATURES),
+        filter: table.table_opt(r, "filter").map(|table| filter(r, table)),
+        channel: {
+            let tables = table.tables(r, "channel", (0, 32));
+            tables.into_iter().map(|table| channel(r, table)).collect()
+        },
+    };
+    table.finish(r);
+    temperature
+}
+
+fn filter(r: &mut Reader<'_>, mut table: Table<'_>) -> Filter {
+    let filter = Filter {
+        grid_step_s: table.number(r, "grid_step_s", Limits::Within(1e-3, 3600.0)),
+        smoothing_s: table.number(r, "smoothing_s", Limits::Within(0.0, 14_745_600.0)),
+        derivative_step_s: table.number(r, "derivative_step_s", Limits::Within(0.0, 14_745_600.0)),
+        stale_after_s: table.number(r, "stale_after_s", Limits::Within(1e-3, 3.6e7)),
+        branch_dead_band_deg_c2_per_s3: table.number_opt(
+            r,
+            "branch_dead_band_deg_c2_per_s3",
+            Limits::Positive,
+        ),
+    };
+    table.finish(r);
+    filter
+}
+
+fn channel(r: &mut Reader<'_>, mut table: Table<'_>) -> Channel {
+    let channel = Channel {
+        name: name(r, &mut table, "name"),
+        conversion_deg_c: table
+            .numbers_opt(r, "conversion_deg_c", (1, 8), Limits::Any)
+            .unwrap_or_else(Channel::identity),
+        range_deg_c: table.pair(r, "range_deg_c", TEMPERATURES),
+        spike_limit_deg_c: table.number(r, "spike_limit_deg_c", Limits::Positive),
+    };
+    table.finish(r);
+    channel
+}
+
+/// A name of a sensor or channel.
+fn name(r: &mut Reader<'_>, table: &mut Table<'_>, key: &'static str) -> String {
+    let value = name_opt(r, table, key);
+    table.need(r, key, value, String::new())
+}
+
+fn name_opt(r: &mut Reader<'_>, table: &mut Table<'_>, key: &'static str) -> Option<String> {
+    let allowed = |text: &str| (1..=MAX_CHANNEL_NAME).contains(&text.len());
+    table.text_opt(r, key, "a name of 1 to 24 bytes", allowed)
+}
+
+/// Reads an orientation; `parity` reads what is special to gyros or accelerometers.
+fn orientation<P>(
+    r: &mut Reader<'_>,
+    mut table: Table<'_>,
+    parity: impl FnOnce(&mut Reader<'_>, Table<'_>) -> P,
+) -> Orientation<P> {
+    let orientation = Orientation {
+        rows: table.rows(r, "rows", SENSORS),
+        weights: table.numbers_opt(r, "weights", SENSORS, Limits::Positive),
+        thermal: table.table_opt(r, "thermal").map(|table| orientation_thermal(r, table)),
+        parity: table.table_opt(r, "parity").map(|table| parity(r, table)),
+    };
+    table.finish(r);
+    orientation
+}
+
+fn orientation_thermal(r: &mut Reader<'_>, mut table: Table<'_>) -> OrientationThermal {
+    let thermal = OrientationThermal {
+        channels: table.texts(r, "channels", (1, MAX_SENSORS)),
+        reference_deg_c: table.number(r, "reference_deg_c", TEMPERATURES),
+        range_deg_c: table.pair(r, "range_deg_c", TEMPERATURES),
+        slopes_arcsec_per_deg_c: table.rows(r, "slopes_arcsec_per_deg_c", SENSORS),
+    };
+    table.finish(r);
+    thermal
+}
+
+/// Ticks that confirm a parity failure.
+fn confirm_ticks(r: &mut Reader<'_>, table: &mut Table<'_>) -> u32 {
+    table.whole(r, "confirm_ticks", 1, 1_000_000)
+}
+
+fn mode_reversal(r: &mut Reader<'_>, mut table: Table<'_>) -> ModeReversal {
+    let default = ModeReversal::default();
+    let mut small = |key, low, high, default| table.small_opt(r, key, low, high).unwrap_or(default);
+    let reversal = ModeReversal {
+        transition_ticks: small("transition_ticks", 1, MAX_TRANSITION_TICKS, default.transition_ticks),
+        predict_readings: small("predict_readings", 1, MAX_FIT_READINGS, default.predict_readings),
+        predict_degree: small("predict_degree", 0, MAX_PREDICT_DEGREE, default.predict_degree),
+        fit_readings_before: small("fit_readings_before", 1, MAX_FIT_READINGS, default.fit_readings_before),
+        fit_readings_after: small("fit_readings_after", 1, MAX_FIT_READINGS, default.fit_readings_after),
+        fit_degree: small("fit_degree", 0, MAX_FIT_DEGREE, default.fit_degree),
+    };
+    table.finish(r);
+    reversal
+}

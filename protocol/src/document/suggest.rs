@@ -1,0 +1,66 @@
+//! "Did you mean": the known word that an unknown one was probably meant to be.
+
+/// Words longer than this are no slips of the pen.
+const LONGEST: usize = 64;
+
+/// The closest of the known words, where one is close enough to be worth a guess.
+pub(super) fn closest<'k>(unknown: &str, known: impl Iterator<Item = &'k str> + Clone) -> Option<&'k str> {
+    if unknown.len() > LONGEST {
+        return None;
+    }
+    let allowed = (unknown.chars().count() / 3).max(1);
+    let nearest =
+        known.clone().map(|word| (distance(unknown, word), word)).min_by_key(|(distance, _)| *distance);
+    if let Some((distance, word)) = nearest
+        && distance <= allowed
+    {
+        return Some(word);
+    }
+    // The unit forgotten or another one taken: the only known word that starts with the same one.
+    let first = unknown.split('_').next().filter(|first| first.len() > 2)?;
+    let mut same = known.filter(|word| word.split('_').next() == Some(first));
+    same.next().filter(|_| same.next().is_none())
+}
+
+/// Edits (insert, delete, replace, swap of neighbours) from one word to another.
+fn distance(a: &str, b: &str) -> usize {
+    let a: Vec<char> = a.chars().collect();
+    let b: Vec<char> = b.chars().collect();
+    let mut rows = vec![vec![0_usize; b.len() + 1]; a.len() + 1];
+    for i in 0..=a.len() {
+        for j in 0..=b.len() {
+            rows[i][j] = if i == 0 || j == 0 {
+                i.max(j)
+            } else {
+                let replaced = rows[i - 1][j - 1] + usize::from(a[i - 1] != b[j - 1]);
+                let mut least = replaced.min(rows[i - 1][j] + 1).min(rows[i][j - 1] + 1);
+                if i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1] {
+                    least = least.min(rows[i - 2][j - 2] + 1);
+                }
+                least
+            };
+        }
+    }
+    rows[a.len()][b.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slips_and_missing_units_find_their_word() {
+        let known = ["grid_step_s", "smoothing_s", "range_deg_c", "channel"];
+        for (unknown, expected) in [
+            ("grid_setp_s", Some("grid_step_s")),
+            ("smoothing", Some("smoothing_s")),
+            ("range", Some("range_deg_c")),
+            ("range_kelvin", Some("range_deg_c")),
+            ("Channel", Some("channel")),
+            ("colour", None),
+            ("", None),
+        ] {
+            assert_eq!(closest(unknown, known.into_iter()), expected, "{unknown}");
+        }
+    }
+}

@@ -1,0 +1,150 @@
+//! Tests of the document as a whole.
+
+mod broken;
+mod keys;
+mod published;
+mod robust;
+
+use super::{Document, Parsed, Problem};
+
+/// The document that shows every key.
+const FULL: &str = include_str!("../../../config/calibration/example-full.toml");
+/// The same for the keys that exclude others: mean rate, volts, no temperature channels.
+const OTHER: &str = include_str!("tests/other.toml");
+
+/// Parses a document that must hold.
+#[track_caller]
+fn accept(text: &str) -> Parsed {
+    match Document::parse(text, Some("test.toml")) {
+        Ok(parsed) => parsed,
+        Err(problems) => panic!("refused:\n{}", listed(&problems)),
+    }
+}
+
+/// Parses a document that must be refused.
+#[track_caller]
+fn refuse(text: &str) -> Vec<Problem> {
+    match Document::parse(text, Some("test.toml")) {
+        Ok(_) => panic!("not refused:\n{text}"),
+        Err(problems) => problems,
+    }
+}
+
+fn listed(problems: &[Problem]) -> String {
+    problems.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
+}
+
+#[test]
+fn the_examples_hold_and_raise_no_warnings() {
+    for text in [FULL, OTHER] {
+        let parsed = accept(text);
+        assert_eq!(listed(&parsed.warnings), "");
+    }
+}
+
+#[test]
+fn every_document_in_config_holds() {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/calibration");
+    let mut checked = 0;
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|extension| extension == "toml") {
+            let bytes = std::fs::read(&path).unwrap();
+            if let Err(problems) = Document::parse_bytes(&bytes, path.to_str()) {
+                panic!("{}", listed(&problems));
+            }
+            assert!(bytes.starts_with(b"#:schema ../calibration.schema.json\n"), "{}", path.display());
+            checked += 1;
+        }
+    }
+    assert!(checked > 0);
+}
+
+#[test]
+fn what_is_written_is_read_back() {
+    for text in [FULL, OTHER] {
+        let first = accept(text);
+        let written = first.document.to_toml().unwrap();
+        let second = accept(&written);
+        assert_eq!(first.document, second.document, "{written}");
+        assert_eq!(first.calibration, second.calibration);
+        assert_ne!(first.digest, second.digest);
+        assert_eq!(second.document.to_toml().unwrap(), written);
+    }
+}
+
+#[test]
+fn units_become_si() {
+    let parts = accept(FULL).document.to_parts();
+    let close = |a: f64, b: f64| assert!((a - b).abs() <= 1e-12 * b.abs(), "{a} {b}");
+    let rad_per_s = |deg_per_h: f64| deg_per_h.to_radians() / 3600.0;
+    let x = &parts.gyros[0];
+    close(x.increment_weight, (0.9837_f64 / 3600.0).to_radians());
+    let trend = x.trend.as_ref().unwrap();
+    close(trend.coefficients[2], rad_per_s(0.0017) / (3600.0 * 3600.0));
+    close(trend.interval_s[1], 21600.0);
+    close(parts.gyro_orientation.slopes_per_deg_c[0][1], (0.12_f64 / 3600.0).to_radians());
+    close(parts.gyro_orientation.parity_limit.unwrap(), rad_per_s(20.0));
+    match x.increment_weight_error.as_ref().unwrap() {
+        isotherm_correction::curve::CurveParts::Polynomial { coefficients, .. } => {
+            close(coefficients[1], 0.42e-6);
+        }
+        other => panic!("{other:?}"),
+    }
+    match parts.accels[0].board_ratio.as_ref().unwrap() {
+        isotherm_correction::curve::CurveParts::Polynomial { coefficients, .. } => {
+            close(coefficients[0], 1.0);
+            close(coefficients[1], 8.4e-6);
+        }
+        other => panic!("{other:?}"),
+    }
+    let other = accept(OTHER).document.to_parts();
+    close(other.gyros[0].input_limit, 400_f64.to_radians());
+}
+
+#[test]
+fn doubts_are_warnings() {
+    for (from, to, key, message) in [
+        ("smoothing_s = 20.0", "smoothing_s = 20.4", "temperature.filter.smoothing_s", "20 s is used"),
+        ("channel = \"coil\"\n", "", "temperature.channel[1].name", "is \"coil\", which no sensor"),
+        ("channel = \"coil\"\n", "", "gyro.sensor[3].lag", "has no effect"),
+        (
+            "range_deg_c = [-65.0, 110.0]",
+            "range_deg_c = [-30.0, 60.0]",
+            "gyro.sensor[0].static_bias",
+            "rejects readings",
+        ),
+    ] {
+        let warnings = accept(&FULL.replacen(from, to, 1)).warnings;
+        let found = warnings.iter().any(|warning| warning.key == key && warning.message.contains(message));
+        assert!(found, "{key}: {message}\nin\n{}", listed(&warnings));
+    }
+    let single_mode = OTHER.replace("[mode_reversal]\n", "");
+    let warnings = listed(&accept(&single_mode).warnings);
+    assert!(
+        warnings.contains("gyro.sensor[0].magnetic_bias: changes its sign with the lasing mode"),
+        "{warnings}"
+    );
+}
+
+#[test]
+fn bytes_that_are_no_text_are_placed() {
+    let mut bytes = FULL.as_bytes().to_vec();
+    let at = FULL.find("unit =").unwrap();
+    bytes[at + 8] = 0xff;
+    let problems = Document::parse_bytes(&bytes, None).unwrap_err();
+    let line = FULL[..at].matches('\n').count() + 1;
+    assert_eq!(
+        listed(&problems),
+        format!("{line}:9: is not UTF-8 at byte {}: save the document as UTF-8", at + 8)
+    );
+}
+
+#[test]
+fn problems_are_serialised_field_by_field() {
+    let problem = &refuse("schema = 2")[0];
+    let json = serde_json::to_value(problem).unwrap();
+    let message = "is version 2; this release reads 1: nothing else was read";
+    let expected = serde_json::json!({"file": "test.toml", "line": 1, "column": 10, "key": "schema", "message": message});
+    assert_eq!(json, expected);
+}

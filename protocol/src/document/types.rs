@@ -1,0 +1,194 @@
+//! The document as types: field for field what stands in the file, in the file's units.
+//!
+//! The doc comments below are also the descriptions in `config/calibration.schema.json` and in
+//! `docs/calibration-document.md`; "Source:" names the paper or section that the term comes from.
+
+mod accel;
+mod gyro;
+mod origin;
+
+pub use accel::{Accel, AccelOrientation, AccelOutput, AccelParity, AccelSensor};
+pub use gyro::{
+    Branches, Gyro, GyroOrientation, GyroOutput, GyroParity, GyroSensor, Lag, Servo, ServoKind, Trend,
+};
+pub use origin::{Created, Log, Measure, Origin, Residual, Sample};
+
+use isotherm_correction::reversal::ReversalParts;
+use schemars::JsonSchema;
+use serde::Serialize;
+
+/// The calibration of one unit.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(deny_unknown_fields, title = "Isotherm calibration document")]
+pub struct Document {
+    /// Version of the document's form. Source: `document::MIN_SCHEMA`, `document::CURRENT_SCHEMA`.
+    #[schemars(range(min = super::MIN_SCHEMA, max = super::CURRENT_SCHEMA))]
+    pub schema: u32,
+    /// Serial of the unit: 1 to 64 letters, digits, '.', '_' or '-'; the chunk that stands for it in every key.
+    #[schemars(regex(pattern = "^[A-Za-z0-9._-]{1,64}$"))]
+    pub unit: String,
+    /// Date, or date and time with offset, of the calibration: RFC 3339, without quotes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub created: Option<Created>,
+    /// Free text for readers.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub note: Option<String>,
+    /// Where the numbers come from; changes nothing. Source: models §8.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub origin: Option<Origin>,
+    /// Temperature channels and their common filter.
+    pub temperature: Temperature,
+    /// Gyros.
+    pub gyro: Gyro,
+    /// Accelerometers; absent for a unit of gyros only.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub accel: Option<Accel>,
+    /// Substitution over a switch of the lasing mode; absent for an instrument without modes. Source: models §5, 003.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mode_reversal: Option<ModeReversal>,
+}
+
+/// Temperature channels and the filter that all of them use.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(deny_unknown_fields, title = "Temperature")]
+pub struct Temperature {
+    /// Temperature that every term assumes before its channel's first reading, and for ever without a channel.
+    #[schemars(range(min = -273.15, max = 1000.0))]
+    pub assumed_deg_c: f64,
+    /// Filter of all channels; needed where there is a channel.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub filter: Option<Filter>,
+    /// The channels; sensors follow them by name. None for a unit without temperature sensors.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[schemars(default, length(max = 32))]
+    pub channel: Vec<Channel>,
+}
+
+/// Filter of all temperature channels.
+///
+/// It belongs to the fit: coefficients that were fitted with one filter are wrong with another.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(deny_unknown_fields, title = "Temperature filter")]
+pub struct Filter {
+    /// Step of the grid of event time on which temperature is evaluated. Source: models §1.
+    #[schemars(range(min = 0.001, max = 3600.0))]
+    pub grid_step_s: f64,
+    /// Length of the causal moving average, up to 4096 grid steps; 0 for none. Source: models §1.
+    #[schemars(range(min = 0.0, max = 14_745_600.0))]
+    pub smoothing_s: f64,
+    /// h of the three-point backward differences, up to 4096 grid steps. Source: 000 eq. 2.
+    #[schemars(range(min = 0.0, max = 14_745_600.0))]
+    pub derivative_step_s: f64,
+    /// Age at which a temperature counts as stale and its sensors are flagged: 1 to 10⁴ grid steps.
+    #[schemars(range(min = 0.001, max = 3.6e7))]
+    pub stale_after_s: f64,
+    /// Half width, in Ṫ·T̈, of the blend between run-up and braking curves; needed where a gyro has a
+    /// `thermal_rate` or `thermal_acceleration`. Source: models §2, 000.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub branch_dead_band_deg_c2_per_s3: Option<f64>,
+}
+
+/// One temperature channel.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(deny_unknown_fields, title = "Temperature channel")]
+pub struct Channel {
+    /// Name, as on the raw temperature topic (1 to 24 bytes).
+    #[schemars(length(min = 1, max = 24))]
+    pub name: String,
+    /// a₀, a₁, … of T = Σ aⱼ·Uʲ, U being the raw reading (V, counts or already °C): °C per raw unitʲ. Source: models §1, 003.
+    #[schemars(length(min = 1, max = 8), default = "Channel::identity")]
+    pub conversion_deg_c: Vec<f64>,
+    /// Physical range of the sensor; a reading outside is rejected.
+    pub range_deg_c: [f64; 2],
+    /// Largest distance from the median of the last five readings; a reading beyond is rejected.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub spike_limit_deg_c: f64,
+}
+
+impl Channel {
+    /// The conversion of a channel whose readings are °C already.
+    pub(super) fn identity() -> Vec<f64> {
+        vec![0.0, 1.0]
+    }
+}
+
+/// Input axes in case axes: `s = C(T)·v`, with `C(T) = C0 + C1·(T − T_ref)`.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub struct Orientation<P> {
+    /// C0: one unit vector per sensor, in the order of the sensors (norm 1 within 10⁻³). Source: models §4, 004.
+    #[schemars(length(min = 3, max = 8))]
+    pub rows: Vec<[f64; 3]>,
+    /// Weight of each sensor in the pseudo-inverse, above 0, 1/σ² up to a common factor; equal where left out. Source: models §4.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(length(min = 3, max = 8))]
+    pub weights: Option<Vec<f64>>,
+    /// Change with temperature; absent where C does not depend on it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub thermal: Option<OrientationThermal>,
+    /// Detection and exclusion of a failed sensor; absent to publish the residuals only. Source: models §4.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub parity: Option<P>,
+}
+
+/// How the input axes turn with temperature.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(deny_unknown_fields, title = "Thermal slopes of an orientation")]
+pub struct OrientationThermal {
+    /// Temperature channels whose mean is T.
+    #[schemars(length(min = 1, max = 8))]
+    pub channels: Vec<String>,
+    /// `T_ref`, at which C is C0.
+    pub reference_deg_c: f64,
+    /// Fitted range; outside it T is clamped.
+    pub range_deg_c: [f64; 2],
+    /// C1: change of each row; an element of C is a direction cosine, 1 rad = 206265″. Source: 004.
+    #[schemars(length(min = 3, max = 8))]
+    pub slopes_arcsec_per_deg_c: Vec<[f64; 3]>,
+}
+
+/// The four-step substitution over a switch of the lasing mode.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(deny_unknown_fields, default, title = "Mode reversal")]
+pub struct ModeReversal {
+    /// n: ticks without a signal, the one with the switch command included. Source: 003.
+    #[schemars(range(min = 1, max = 3))]
+    pub transition_ticks: u8,
+    /// Readings before the switch that the prediction is fitted to. Source: 003 step 1.
+    #[schemars(range(min = 1, max = 8))]
+    pub predict_readings: u8,
+    /// Degree of the prediction, below the number of its readings. Source: 003 step 2.
+    #[schemars(range(min = 0, max = 2))]
+    pub predict_degree: u8,
+    /// Readings before the switch in the two-sided fit. Source: 003 step 3.
+    #[schemars(range(min = 1, max = 8))]
+    pub fit_readings_before: u8,
+    /// Readings after the switch in the two-sided fit. Source: 003 step 3.
+    #[schemars(range(min = 1, max = 8))]
+    pub fit_readings_after: u8,
+    /// Degree of the two-sided fit, below the number of its readings. Source: 003 step 3.
+    #[schemars(range(min = 0, max = 3))]
+    pub fit_degree: u8,
+}
+
+impl Default for ModeReversal {
+    fn default() -> Self {
+        let ReversalParts {
+            transition_ticks,
+            predict_readings,
+            predict_degree,
+            fit_readings_before,
+            fit_readings_after,
+            fit_degree,
+        } = ReversalParts::default();
+        Self {
+            transition_ticks,
+            predict_readings,
+            predict_degree,
+            fit_readings_before,
+            fit_readings_after,
+            fit_degree,
+        }
+    }
+}

@@ -1,0 +1,88 @@
+//! The accelerometers of a document.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::super::curve::{Curve, OutputBias, Relative, ScaleFactor};
+use super::Orientation;
+
+/// The accelerometers of the unit: `f = (U − S(T))·r(T_board)/K(T)`.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(deny_unknown_fields, title = "Accelerometers")]
+pub struct Accel {
+    /// What a raw reading is: "counts" of the tick, or the mean output over the tick in "V" or "m/s2".
+    pub output: AccelOutput,
+    /// The accelerometers, in the order of the raw readings.
+    #[schemars(length(min = 3, max = 8))]
+    pub sensor: Vec<AccelSensor>,
+    /// Their input axes in case axes. Source: models §4, 004.
+    pub orientation: AccelOrientation,
+}
+
+/// What an accelerometer's raw reading is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[schemars(inline)]
+pub enum AccelOutput {
+    /// Counts of the tick.
+    #[serde(rename = "counts")]
+    Counts,
+    /// Mean output (V).
+    #[serde(rename = "V")]
+    Volts,
+    /// Mean specific force (m/s²).
+    #[serde(rename = "m/s2")]
+    MetresPerSecondSquared,
+}
+
+/// Orientation of the accelerometers.
+pub type AccelOrientation = Orientation<AccelParity>;
+
+/// One accelerometer.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(deny_unknown_fields, title = "Accelerometer")]
+pub struct AccelSensor {
+    /// Name for readers and reports, different from the other accelerometers' (1 to 24 bytes).
+    #[schemars(length(min = 1, max = 24))]
+    pub name: String,
+    /// Temperature channel of the sensor; `temperature.assumed_deg_c` holds where left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(length(min = 1, max = 24))]
+    pub channel: Option<String>,
+    /// Temperature channel of the electronics board; needed with `board_ratio_error`. Source: 001.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(length(min = 1, max = 24))]
+    pub board_channel: Option<String>,
+    /// Outputs of this magnitude and above are flagged overrange, where the output is "counts"; no limit where left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub input_limit_counts_per_tick: Option<f64>,
+    /// Outputs of this magnitude and above are flagged overrange, where the output is "V"; no limit where left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub input_limit_v: Option<f64>,
+    /// Outputs of this magnitude and above are flagged overrange, where the output is "m/s2"; no limit where left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub input_limit_m_per_s2: Option<f64>,
+    /// K(T): output per specific force; divides. Never zero over its range. Source: models §3, 001 (k1…k3).
+    pub scale_factor: Curve<ScaleFactor>,
+    /// S(T): output at no specific force; subtracted. Source: models §3, 001 (z1…z3).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bias: Option<Curve<OutputBias>>,
+    /// `r(T_board) − 1`: scale factor of the board at the calibration temperature over that at `T_board`, less one.
+    /// Source: models §3, 001 (y1…y3).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub board_ratio_error: Option<Curve<Relative>>,
+}
+
+/// Detection and exclusion of a failed accelerometer.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(deny_unknown_fields, title = "Parity check of the accelerometers")]
+pub struct AccelParity {
+    /// Length of the parity vector beyond which an accelerometer must be at fault.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub limit_m_per_s2: f64,
+    /// Ticks in a row that must point at the same accelerometer before it is excluded.
+    #[schemars(range(min = 1, max = 1_000_000))]
+    pub confirm_ticks: u32,
+}

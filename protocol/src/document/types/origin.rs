@@ -1,0 +1,142 @@
+//! Where the numbers of a document come from.
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::fmt;
+
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::Serialize;
+use toml::value::Datetime;
+
+/// Where the numbers come from: for readers and reports, never for the correction.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, JsonSchema)]
+#[schemars(deny_unknown_fields, title = "Origin")]
+pub struct Origin {
+    /// Program and version that made the document.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tool: Option<String>,
+    /// Command line that made it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub command: Option<String>,
+    /// Method of the fit, such as "joint". Source: models §8.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub method: Option<String>,
+    /// Range of temperature in the logs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub range_deg_c: Option<[f64; 2]>,
+    /// Range of the temperature's rate in the logs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rate_range_deg_c_per_s: Option<[f64; 2]>,
+    /// Logs that the numbers were fitted to.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[schemars(default, length(max = 64))]
+    pub log: Vec<Log>,
+    /// Residuals before and after the correction.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[schemars(default, length(max = 256))]
+    pub residual: Vec<Residual>,
+    /// Anything else worth keeping, such as the parameters' covariance.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<BTreeMap<String, serde_json::Value>>")]
+    pub details: Option<toml::Table>,
+}
+
+/// One log.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(deny_unknown_fields, title = "Log")]
+pub struct Log {
+    /// Name of the file.
+    pub name: String,
+    /// SHA-256 of its bytes, 64 lower-case hexadecimal digits.
+    #[schemars(regex(pattern = "^[0-9a-f]{64}$"))]
+    pub sha256: String,
+}
+
+/// Residual of one sensor over one set of samples.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(deny_unknown_fields, title = "Residual")]
+pub struct Residual {
+    /// What it is the residual of, such as "gyro.x".
+    pub of: String,
+    /// "in" the samples of the fit, or "out" of them (cross-validation).
+    pub sample: Sample,
+    /// Unit of the four numbers.
+    pub measure: Measure,
+    /// Root mean square before the correction.
+    #[schemars(range(min = 0.0))]
+    pub rms_before: f64,
+    /// Root mean square after it.
+    #[schemars(range(min = 0.0))]
+    pub rms_after: f64,
+    /// Peak to peak before the correction.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0))]
+    pub peak_to_peak_before: Option<f64>,
+    /// Peak to peak after it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0))]
+    pub peak_to_peak_after: Option<f64>,
+}
+
+/// Whether a residual was taken over the samples of the fit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+#[schemars(inline)]
+pub enum Sample {
+    /// In sample.
+    In,
+    /// Out of sample.
+    Out,
+}
+
+/// Unit of a residual.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[schemars(inline)]
+pub enum Measure {
+    /// °/h.
+    #[serde(rename = "deg/h")]
+    DegPerH,
+    /// m/s².
+    #[serde(rename = "m/s2")]
+    MetresPerSecondSquared,
+}
+
+/// Date, or date and time with offset.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(transparent)]
+pub struct Created(Datetime);
+
+impl Created {
+    /// Accepts a date, or a date and time with offset.
+    #[must_use]
+    pub fn new(datetime: Datetime) -> Option<Self> {
+        let complete = datetime.date.is_some() && datetime.time.is_some() == datetime.offset.is_some();
+        complete.then_some(Self(datetime))
+    }
+
+    /// The date and time.
+    #[must_use]
+    pub fn datetime(&self) -> &Datetime {
+        &self.0
+    }
+}
+
+impl fmt::Display for Created {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
+impl JsonSchema for Created {
+    fn schema_name() -> Cow<'static, str> {
+        "Created".into()
+    }
+
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "type": "string", "anyOf": [{ "format": "date" }, { "format": "date-time" }] })
+    }
+}

@@ -1,0 +1,49 @@
+//! The bytes of the wire messages: frozen vectors of every version, laws of the codec, and `docs/wire.md`.
+
+// Conditional so that the lints know: everything here is a test.
+#[cfg(test)]
+mod laws;
+#[cfg(test)]
+mod page;
+#[cfg(test)]
+mod v1;
+
+use isotherm_protocol::codec::{self, CodecError, Kind};
+use isotherm_protocol::corrected::CorrectedBatch;
+use isotherm_protocol::raw::{AccelBatch, GyroBatch, TemperatureBatch};
+use isotherm_protocol::status::Status;
+
+/// Bytes written in hexadecimal; spaces and line ends between them, and comments behind `#`, mean nothing.
+#[cfg(test)]
+fn bytes(hex: &str) -> Vec<u8> {
+    let digits: Vec<u32> = hex
+        .lines()
+        .flat_map(|line| line.split('#').next().unwrap_or_default().chars())
+        .filter(|c| !c.is_whitespace())
+        .map(|c| c.to_digit(16).expect("hexadecimal"))
+        .collect();
+    assert!(digits.len().is_multiple_of(2), "two digits per byte: {hex}");
+    digits.chunks(2).map(|pair| u8::try_from(pair[0] * 16 + pair[1]).expect("two digits")).collect()
+}
+
+/// Decodes a frame as a message of a kind, and gives it back in JSON (NaN as null).
+#[cfg(test)]
+fn decode_as(kind: u8, frame: &[u8]) -> Result<serde_json::Value, CodecError> {
+    fn json<M: codec::Message>(frame: &[u8]) -> Result<serde_json::Value, CodecError> {
+        codec::decode::<M>(frame).map(|message| serde_json::to_value(message).expect("JSON takes it"))
+    }
+    match kind {
+        1 => json::<GyroBatch>(frame),
+        2 => json::<AccelBatch>(frame),
+        3 => json::<TemperatureBatch>(frame),
+        4 => json::<CorrectedBatch>(frame),
+        5 => json::<Status>(frame),
+        _ => panic!("there is no kind {kind}"),
+    }
+}
+
+#[test]
+fn the_numbers_of_the_kinds_are_fixed() {
+    let kinds = [Kind::RawGyro, Kind::RawAccel, Kind::RawTemperature, Kind::Corrected, Kind::Status];
+    assert_eq!(kinds.map(|kind| kind as u8), [1, 2, 3, 4, 5]);
+}

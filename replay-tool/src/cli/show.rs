@@ -1,0 +1,61 @@
+//! Summaries as tables and as JSON.
+
+use comfy_table::{CellAlignment, Table, presets};
+use serde::Serialize;
+
+use crate::log::ReadReport;
+
+/// A table of two columns, figures to the right.
+pub(super) fn table(rows: &[(&str, String)]) -> String {
+    let mut table = Table::new();
+    table.load_preset(presets::NOTHING);
+    for (name, figure) in rows {
+        table.add_row([*name, figure.as_str()]);
+    }
+    if let Some(column) = table.column_mut(1) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    format!("{table}\n")
+}
+
+/// A table of the three case axes.
+pub(super) fn axes(rows: &[(&str, [f64; 3], usize)]) -> String {
+    let mut table = Table::new();
+    table.load_preset(presets::NOTHING);
+    table.set_header(["", "x", "y", "z"]);
+    for (name, values, digits) in rows {
+        let mut cells = vec![(*name).to_owned()];
+        cells.extend(values.iter().map(|value| format!("{value:.digits$}")));
+        table.add_row(cells);
+    }
+    for column in table.column_iter_mut().skip(1) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    format!("{table}\n")
+}
+
+/// One JSON object on one line.
+pub(super) fn json(value: &impl Serialize) -> String {
+    // The values are plain structures of numbers and texts, which always serialise.
+    serde_json::to_string(value).map(|text| text + "\n").unwrap_or_default()
+}
+
+/// What reading the log came to, in words; empty where there is nothing to say.
+pub(super) fn reading(report: &ReadReport) -> String {
+    let mut text = String::new();
+    if report.skipped_rows > 0 {
+        let first = report.first_skipped.as_deref().unwrap_or_default();
+        let rows = report.skipped_rows;
+        text.push_str(
+            &[&rows.to_string(), " rows could not be read and were passed over; the first:\n  ", first, "\n"]
+                .concat(),
+        );
+    }
+    if report.cut_short {
+        text += "the compressed log ends in the middle; what there was has been used\n";
+    }
+    if report.unterminated_last_line {
+        text += "the log's last line has no line end: its last cell may be cut\n";
+    }
+    text
+}

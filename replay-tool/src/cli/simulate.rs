@@ -1,0 +1,253 @@
+//! `isotherm-replay simulate`.
+
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use clap::{ArgGroup, Args};
+use flate2::{Compression, write::GzEncoder};
+use isotherm_simulator::{Scenario, Simulation, presets};
+use serde::Serialize;
+
+use super::{Outcome, print, show};
+use crate::error::Error;
+use crate::progress::Bar;
+use crate::simulated::{Columns, LogWriter, write_truth, write_truth_header};
+
+/// Simulate a log, with the mapping that reads it back beside it
+#[derive(Debug, Args)]
+#[command(
+    group = ArgGroup::new("what").required(true).args(["scenario", "preset", "list_presets"]),
+    after_help = "Example:\n  isotherm-replay simulate --preset zeeman-sine --duration 60 --out zeeman.csv --truth truth.csv\n\n\
+        Writes zeeman.csv and zeeman.mapping.toml; a name that ends in .gz is compressed."
+)]
+pub(super) struct SimulateArgs {
+    /// Scenario (TOML)
+    #[arg(value_name = "SCENARIO")]
+    scenario: Option<PathBuf>,
+    /// A ready-made scenario
+    #[arg(long, value_name = "NAME")]
+    preset: Option<String>,
+    /// List the ready-made scenarios
+    #[arg(long)]
+    list_presets: bool,
+    /// Where the log goes
+    #[arg(long, short, value_name = "FILE", required_unless_present = "list_presets")]
+    out: Option<PathBuf>,
+    /// Where the truth goes: true increments, temperatures and drifts
+    #[arg(long, value_name = "FILE")]
+    truth: Option<PathBuf>,
+    /// Seed of all noise, in place of the scenario's
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Duration (s), in place of the scenario's
+    #[arg(long, value_name = "SECONDS")]
+    duration: Option<f64>,
+    /// Print the summary as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// A ready-made scenario.
+struct Preset {
+    name: &'static str,
+    about: &'static str,
+    make: fn(u64) -> Scenario,
+}
+
+/// All ready-made scenarios.
+const PRESETS: [Preset; 6] = [
+    Preset {
+        name: "zeeman-rest",
+        about: "laser unit at rest, +20 to +50 °C, mode reversal every two minutes, 1 h",
+        make: presets::zeeman_rest,
+    },
+    Preset {
+        name: "zeeman-sine",
+        about: "laser unit swinging by 1° at 1 Hz, +20 to +50 °C, mode reversal every 12 s, 20 min",
+        make: presets::zeeman_sine,
+    },
+    Preset {
+        name: "fibre-optic-training",
+        about: "fibre-optic unit at rest through the chamber programme to fit a model on, 6 h 20 min",
+        make: |seed| presets::fibre_optic_chamber(seed, presets::training_profile()),
+    },
+    Preset {
+        name: "fibre-optic-judging",
+        about: "fibre-optic unit at rest through the chamber programme to judge a model on, 5 h 28 min",
+        make: |seed| presets::fibre_optic_chamber(seed, presets::judging_profile()),
+    },
+    Preset {
+        name: "mems-chamber",
+        about: "micromechanical unit at rest through a chamber cycle, +25 to -40 to +80 to +25 °C, 100 Hz",
+        make: presets::mems_chamber,
+    },
+    Preset {
+        name: "skewed-six",
+        about: "six gyros and six accelerometers along the axes of a dodecahedron, swinging, 10 min",
+        make: |seed| presets::skewed_six(seed, None),
+    },
+];
+
+/// What was written.
+#[derive(Debug, Serialize)]
+struct Report {
+    unit: String,
+    seed: u64,
+    ticks: u64,
+    temperature_readings: u64,
+    log: String,
+    mapping: String,
+    truth: Option<String>,
+}
+
+impl SimulateArgs {
+    /// The scenario that the arguments name.
+    fn scenario(&self) -> Result<Scenario, Error> {
+        let mut scenario = match (&self.scenario, &self.preset) {
+            (Some(path), _) => load(path)?,
+            (None, Some(name)) => {
+                let preset = PRESETS.iter().find(|preset| preset.name == name).ok_or_else(|| {
+                    let names: Vec<_> = PRESETS.iter().map(|preset| preset.name).collect();
+                    Error::Usage(format!("there is no preset {name:?}, there are {}", names.join(", ")))
+                })?;
+                (preset.make)(1)
+            }
+            (None, None) => return Err(Error::Usage("give a scenario or --preset".into())),
+        };
+        scenario.seed = self.seed.unwrap_or(scenario.seed);
+        scenario.duration_s = self.duration.unwrap_or(scenario.duration_s);
+        Ok(scenario)
+    }
+}
+
+/// Reads a scenario from a file.
+fn load(path: &Path) -> Result<Scenario, Error> {
+    let text =
+        std::fs::read_to_string(path).map_err(|source| Error::file(path, "read the scenario", source))?;
+    toml::from_str(&text).map_err(|error| {
+        let (line, column) = error.span().map_or((1, 1), |span| crate::mapping::place(&text, span.start));
+        Error::Scenario(vec![format!("{}:{line}:{column}: {}", path.display(), error.message())])
+    })
+}
+
+/// Runs the command.
+pub(super) fn run(args: &SimulateArgs) -> Result<Outcome, Error> {
+    if args.list_presets {
+        let rows: Vec<_> =
+            PRESETS.iter().map(|preset| format!("{:21} {}\n", preset.name, preset.about)).collect();
+        print(rows.concat().as_bytes());
+        return Ok(Outcome::Complete);
+    }
+    let Some(out) = &args.out else { return Err(Error::Usage("give --out".into())) };
+    let scenario = args.scenario()?;
+    let columns = Columns::of(&scenario)?;
+    let simulation = Simulation::new(&scenario)
+        .map_err(|errors| Error::Scenario(errors.0.iter().map(ToString::to_string).collect()))?;
+
+    let mapping = mapping_path(out);
+    std::fs::write(&mapping, columns.mapping()).map_err(|source| Error::file(&mapping, "write", source))?;
+    let mut log = create(out)?;
+    let failed = |source| Error::file(out, "write", source);
+    let mut rows = LogWriter::new(columns, &mut log).map_err(failed)?;
+    let mut truth = match &args.truth {
+        Some(path) => Some((create(path)?, path)),
+        None => None,
+    };
+    if let Some((writer, path)) = &mut truth {
+        write_truth_header(scenario.instrument.gyros.count(), writer)
+            .map_err(|source| Error::file(path, "write", source))?;
+    }
+    let mut report = Report {
+        unit: scenario.unit.clone(),
+        seed: scenario.seed,
+        ticks: 0,
+        temperature_readings: 0,
+        log: out.display().to_string(),
+        mapping: mapping.display().to_string(),
+        truth: args.truth.as_ref().map(|path| path.display().to_string()),
+    };
+    let mut bar = Bar::over_ticks(simulation.remaining());
+    for step in simulation {
+        rows.write(&step, &mut log).map_err(failed)?;
+        if let Some((writer, path)) = &mut truth {
+            write_truth(&step, writer).map_err(|source| Error::file(path, "write", source))?;
+        }
+        report.ticks += 1;
+        report.temperature_readings += step.temperatures.len() as u64;
+        bar.step(String::new);
+    }
+    bar.finish();
+    log.finish().map_err(failed)?;
+    if let Some((writer, path)) = truth {
+        writer.finish().map_err(|source| Error::file(path, "write", source))?;
+    }
+    print(if args.json { show::json(&report) } else { human(&report) }.as_bytes());
+    Ok(Outcome::Complete)
+}
+
+/// The summary as a table.
+fn human(report: &Report) -> String {
+    let mut rows = vec![
+        ("unit", report.unit.clone()),
+        ("ticks", report.ticks.to_string()),
+        ("temperature readings", report.temperature_readings.to_string()),
+        ("log", report.log.clone()),
+        ("mapping", report.mapping.clone()),
+    ];
+    rows.extend(report.truth.iter().map(|truth| ("truth", truth.clone())));
+    show::table(&rows)
+}
+
+/// Where the mapping of a log goes: `zeeman.csv.gz` has `zeeman.mapping.toml`.
+fn mapping_path(log: &Path) -> PathBuf {
+    let plain = if log.extension().is_some_and(|extension| extension == "gz") {
+        log.with_extension("")
+    } else {
+        log.into()
+    };
+    plain.with_extension("mapping.toml")
+}
+
+/// A file, compressed where its name says so.
+enum Sink {
+    Plain(BufWriter<File>),
+    Gzip(Box<GzEncoder<BufWriter<File>>>),
+}
+
+/// Creates a file.
+fn create(path: &Path) -> Result<Sink, Error> {
+    let file = BufWriter::new(File::create(path).map_err(|source| Error::file(path, "create", source))?);
+    let compressed = path.extension().is_some_and(|extension| extension == "gz");
+    Ok(if compressed {
+        Sink::Gzip(Box::new(GzEncoder::new(file, Compression::default())))
+    } else {
+        Sink::Plain(file)
+    })
+}
+
+impl Sink {
+    /// Writes out what is still here.
+    fn finish(self) -> std::io::Result<()> {
+        match self {
+            Self::Plain(mut file) => file.flush(),
+            Self::Gzip(encoder) => encoder.finish()?.flush(),
+        }
+    }
+}
+
+impl Write for Sink {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        match self {
+            Self::Plain(file) => file.write(bytes),
+            Self::Gzip(encoder) => encoder.write(bytes),
+        }
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        match self {
+            Self::Plain(file) => file.flush(),
+            Self::Gzip(encoder) => encoder.flush(),
+        }
+    }
+}

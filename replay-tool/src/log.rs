@@ -1,0 +1,240 @@
+//! Text logs as events in time order, in constant memory.
+
+mod assemble;
+mod cells;
+mod error;
+mod file;
+mod input;
+mod number;
+mod resolve;
+mod row;
+#[cfg(test)]
+mod tests;
+mod timeline;
+mod window;
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use isotherm_correction::sample::{AccelTick, GyroTick, OutputKind, TemperatureReading};
+use isotherm_correction::units::Timestamp;
+use serde::Serialize;
+
+use crate::error::Error;
+use crate::mapping::Mapping;
+use file::FileReader;
+
+pub use error::{LogError, LogFault, Reason};
+pub use window::Window;
+
+/// One thing that happened in a log.
+#[derive(Debug, Clone, PartialEq)]
+pub enum LogEvent {
+    /// A gyro tick.
+    Gyro {
+        /// What its readings stand for.
+        output: OutputKind,
+        /// The tick.
+        tick: GyroTick,
+    },
+    /// An accelerometer tick.
+    Accel {
+        /// What its readings stand for.
+        output: OutputKind,
+        /// The tick.
+        tick: AccelTick,
+    },
+    /// A temperature reading.
+    Temperature(TemperatureReading),
+}
+
+impl LogEvent {
+    /// When it happened: the end of a tick, or the time of a reading.
+    #[must_use]
+    pub fn time(&self) -> Timestamp {
+        match self {
+            Self::Gyro { tick, .. } => tick.end_time,
+            Self::Accel { tick, .. } => tick.end_time,
+            Self::Temperature(reading) => reading.time,
+        }
+    }
+
+    /// Place among events of the same time: temperature, accelerometers, gyros.
+    fn rank(&self) -> u8 {
+        match self {
+            Self::Temperature(_) => 0,
+            Self::Accel { .. } => 1,
+            Self::Gyro { .. } => 2,
+        }
+    }
+
+    /// What events are ordered by.
+    fn order(&self) -> (Timestamp, u8) {
+        (self.time(), self.rank())
+    }
+}
+
+/// What reading a log came to.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
+pub struct ReadReport {
+    /// Rows that gave events.
+    pub rows: u64,
+    /// Rows in front that the mapping drops.
+    pub dropped_rows: u64,
+    /// Rows that could not be read and were passed over.
+    pub skipped_rows: u64,
+    /// Why the first of them could not be read.
+    pub first_skipped: Option<String>,
+    /// A file's last line has no line end: its last cell may be cut.
+    pub unterminated_last_line: bool,
+    /// A compressed file ends in the middle.
+    pub cut_short: bool,
+}
+
+impl ReadReport {
+    /// Whether anything of the log was lost.
+    #[must_use]
+    pub fn lost_data(&self) -> bool {
+        self.skipped_rows > 0 || self.cut_short
+    }
+
+    /// Adds what another file came to.
+    fn add(&mut self, other: &Self) {
+        self.rows += other.rows;
+        self.dropped_rows += other.dropped_rows;
+        self.skipped_rows += other.skipped_rows;
+        self.first_skipped = self.first_skipped.take().or_else(|| other.first_skipped.clone());
+        self.unterminated_last_line |= other.unterminated_last_line;
+        self.cut_short |= other.cut_short;
+    }
+}
+
+/// How far a log has been read; cheap to clone and to ask from another thread.
+#[derive(Debug, Clone)]
+pub struct Progress {
+    /// Bytes read of all files, compressed where they are.
+    read: Arc<AtomicU64>,
+    /// Bytes of all files.
+    total: u64,
+}
+
+impl Progress {
+    /// Bytes read so far.
+    #[must_use]
+    pub fn read(&self) -> u64 {
+        self.read.load(Ordering::Relaxed)
+    }
+
+    /// Bytes there are.
+    #[must_use]
+    pub fn total(&self) -> u64 {
+        self.total
+    }
+}
+
+/// Reads a log's events in time order; at equal time temperature, accelerometers, gyros.
+///
+/// After an error there are no further events.
+#[derive(Debug)]
+pub struct LogReader {
+    /// Its files, each with its next event.
+    files: Vec<(FileReader, Option<LogEvent>)>,
+    /// How far it has been read.
+    progress: Progress,
+    /// The next events have been asked for.
+    primed: bool,
+    /// An error was given.
+    failed: bool,
+}
+
+impl LogReader {
+    /// Opens a log: `paths` are its files in the order of the mapping's, or one folder that has them all.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] where files and mapping do not go together, [`Error::File`] where one cannot be opened,
+    /// [`Error::Log`] where its header does not have the mapping's columns.
+    pub fn open(mapping: &Mapping, paths: &[PathBuf]) -> Result<Self, Error> {
+        let paths = locate(mapping, paths)?;
+        let read = Arc::new(AtomicU64::new(0));
+        let mut total = 0;
+        let mut files = Vec::with_capacity(paths.len());
+        for (path, mapping) in paths.iter().zip(&mapping.files) {
+            let (source, size) = input::open(path, &read)?;
+            total += size;
+            files.push((FileReader::new(path, source, mapping)?, None));
+        }
+        Ok(Self { files, progress: Progress { read, total }, primed: false, failed: false })
+    }
+
+    /// How far it has been read.
+    #[must_use]
+    pub fn progress(&self) -> Progress {
+        self.progress.clone()
+    }
+
+    /// What reading came to so far.
+    #[must_use]
+    pub fn report(&self) -> ReadReport {
+        let mut report = ReadReport::default();
+        for (file, _) in &self.files {
+            report.add(file.report());
+        }
+        report
+    }
+
+    /// The next event of whichever file has the earliest.
+    fn merge(&mut self) -> Result<Option<LogEvent>, LogError> {
+        if let [(file, _)] = self.files.as_mut_slice() {
+            return file.next_event();
+        }
+        if !self.primed {
+            for (file, next) in &mut self.files {
+                *next = file.next_event()?;
+            }
+            self.primed = true;
+        }
+        let earliest = self.files.iter_mut().filter(|(_, next)| next.is_some());
+        let Some((file, next)) = earliest.min_by_key(|(_, next)| next.as_ref().map(LogEvent::order)) else {
+            return Ok(None);
+        };
+        let following = file.next_event()?;
+        Ok(std::mem::replace(next, following))
+    }
+}
+
+impl Iterator for LogReader {
+    type Item = Result<LogEvent, LogError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.failed {
+            return None;
+        }
+        let event = self.merge();
+        self.failed = event.is_err();
+        event.transpose()
+    }
+}
+
+/// The path of each file of the mapping.
+fn locate(mapping: &Mapping, paths: &[PathBuf]) -> Result<Vec<PathBuf>, Error> {
+    let need = mapping.files.len();
+    if let [folder] = paths
+        && folder.is_dir()
+    {
+        let names: Option<Vec<_>> = mapping.files.iter().map(|file| file.name.as_deref()).collect();
+        let names = names.ok_or(Error::Usage(
+            "the log is a folder, so every [[file]] of the mapping needs a `name`".into(),
+        ))?;
+        return Ok(names.into_iter().map(|name| folder.join(name)).collect());
+    }
+    if paths.len() != need {
+        let got = paths.len();
+        let list: Vec<_> = mapping.files.iter().filter_map(|file| file.name.as_deref()).collect();
+        let names = if list.is_empty() { String::new() } else { format!(" ({})", list.join(", ")) };
+        return Err(Error::Usage(format!(
+            "{got} log files are given, the mapping describes {need}{names}: give them in its order, or the folder that has them"
+        )));
+    }
+    Ok(paths.iter().map(|path| Path::to_path_buf(path)).collect())
+}

@@ -1,0 +1,151 @@
+//! What is wrong with a log, and where.
+
+use std::io;
+
+use thiserror::Error;
+
+/// What is wrong with a log; boxed, because it is rare and large.
+#[derive(Debug, Error)]
+#[error(transparent)]
+pub struct LogError(pub Box<LogFault>);
+
+/// What is wrong with a log, and where.
+#[derive(Debug, Error)]
+#[error("{file}:{line}:{column}: {}{reason}{}", self.subject(), self.advice())]
+pub struct LogFault {
+    /// The file.
+    pub file: String,
+    /// Line, from 1.
+    pub line: u64,
+    /// Column in bytes, from 1.
+    pub column: u32,
+    /// Number and name of the cell, where one is to blame.
+    pub cell: Option<(usize, Option<String>)>,
+    /// The cell as written, shortened.
+    pub value: String,
+    /// What is wrong.
+    pub reason: Reason,
+}
+
+/// What is wrong with a row, or with a file.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum Reason {
+    /// The row ends before this cell.
+    #[error("is missing, the row has only {cells} cells{}", if *.cut { "; the last line has no line end, so the log was cut off here" } else { "" })]
+    MissingCell {
+        /// How many it has.
+        cells: usize,
+        /// It is the last line and has no line end.
+        cut: bool,
+    },
+    /// Nothing in the cell.
+    #[error("is empty")]
+    Empty,
+    /// Not a number.
+    #[error("is not a number{}", if *.comma { " (decimal commas need decimal_mark = \",\" in the mapping)" } else { "" })]
+    NotANumber {
+        /// It has a comma where the mapping says that decimals have a point.
+        comma: bool,
+    },
+    /// A count that is not whole, or does not fit 32 bits.
+    #[error("is not a whole number of 32 bits, as counts must be (for other readings: output = \"mean\")")]
+    NotACount,
+    /// A sequence number that is none.
+    #[error("is not a sequence number, a whole number from 0")]
+    NotASequence,
+    /// Not a time.
+    #[error("is not a time that fits 64 bits of nanoseconds")]
+    NotATime,
+    /// A duration below zero.
+    #[error("is a duration below 0")]
+    NegativeDuration,
+    /// The time does not increase.
+    #[error("is not after the row before it, {previous_ns} ns: time stands still or goes back")]
+    TimeNotIncreasing {
+        /// Time of the row before (ns).
+        previous_ns: i64,
+    },
+    /// A state that the mapping does not name.
+    #[error("must be {plus:?} or {minus:?}")]
+    UnknownState {
+        /// Cell that means +1, or yes.
+        plus: String,
+        /// Cell that means −1, or no.
+        minus: String,
+    },
+    /// A quoted cell that does not end on its line.
+    #[error("opens a quote that does not end on this line")]
+    OpenQuote,
+    /// A line that no text log has.
+    #[error("line is longer than {limit} bytes: is this a text log?")]
+    LineTooLong {
+        /// Longest line (bytes).
+        limit: usize,
+    },
+    /// The header does not have a column of the mapping.
+    #[error("the header has no column {name:?}, it has {header}")]
+    NoSuchColumn {
+        /// Name in the mapping.
+        name: String,
+        /// Names in the header.
+        header: String,
+    },
+    /// The header has a column of the mapping more than once.
+    #[error("the header has the column {name:?} more than once: give its number instead")]
+    AmbiguousColumn {
+        /// Name in the mapping.
+        name: String,
+    },
+    /// The header line is missing.
+    #[error("the file ends before its header")]
+    NoHeader,
+    /// Text in another encoding.
+    #[error("is UTF-16 text: save it as UTF-8")]
+    Utf16,
+    /// A compressed file ends in the middle.
+    #[error("the compressed file ends in the middle")]
+    CutShort,
+    /// The file cannot be read on.
+    #[error("cannot read on: {0}")]
+    Io(io::Error),
+}
+
+impl Reason {
+    /// Whether passing over the row helps.
+    pub(super) fn concerns_one_row(&self) -> bool {
+        !matches!(
+            self,
+            Self::NoSuchColumn { .. }
+                | Self::AmbiguousColumn { .. }
+                | Self::NoHeader
+                | Self::Utf16
+                | Self::Io(_)
+                | Self::CutShort
+        )
+    }
+}
+
+impl LogFault {
+    /// The cell that is to blame and its value.
+    fn subject(&self) -> String {
+        let Some((number, name)) = &self.cell else { return String::new() };
+        let name = name.as_ref().map(|name| format!(" {name:?}")).unwrap_or_default();
+        let value = match self.reason {
+            Reason::MissingCell { .. } | Reason::Empty => String::new(),
+            _ => format!("{:?} ", self.value),
+        };
+        format!("column {number}{name}: {value}")
+    }
+
+    /// What to do.
+    fn advice(&self) -> &'static str {
+        match self.reason {
+            Reason::CutShort => "; to use what there is, set on_bad_row = \"skip\" in the mapping",
+            ref reason if reason.concerns_one_row() => {
+                "; correct the row, or set on_bad_row = \"skip\" in the mapping to pass over such rows and count them"
+            }
+            _ => "",
+        }
+    }
+}

@@ -1,0 +1,263 @@
+//! One file of a log: rows in, events out in time order.
+
+use std::path::Path;
+
+use isotherm_correction::sample::TemperatureReading;
+use isotherm_correction::units::{Span, Timestamp};
+
+use super::assemble::{Assembler, Parts};
+use super::cells::{Cell, OpenQuote, split};
+use super::error::{LogError, LogFault, Reason};
+use super::input::{LONGEST_LINE, Line, Lines, Source};
+use super::resolve::{Columns, resolve};
+use super::row::{Fault, Row};
+use super::{LogEvent, ReadReport};
+use crate::mapping::{FileMapping, Layout, OnBadRow, TimeMapping};
+
+/// Reads one file.
+#[derive(Debug)]
+pub(super) struct FileReader {
+    /// Its name, for messages.
+    name: String,
+    /// Its lines.
+    lines: Lines,
+    /// Cells of the current line.
+    cells: Vec<Cell>,
+    /// Names of the columns, where it has a header.
+    header: Vec<String>,
+    /// How bytes become rows.
+    layout: Layout,
+    /// How rows get their time.
+    time: TimeMapping,
+    /// Where the columns are.
+    columns: Columns,
+    /// Makes events of rows.
+    assembler: Assembler,
+    /// Temperature readings of the current row.
+    readings: Vec<TemperatureReading>,
+    /// Rows read, without the dropped ones.
+    rows: i64,
+    /// Stamp of the last good row.
+    last_stamp: Option<i64>,
+    /// There are no further rows.
+    ended: bool,
+    /// What reading came to so far.
+    report: ReadReport,
+}
+
+impl FileReader {
+    /// Reads up to the first row of data.
+    pub(super) fn new(path: &Path, source: Source, mapping: &FileMapping) -> Result<Self, LogError> {
+        let mut reader = Self {
+            name: path.display().to_string(),
+            lines: Lines::new(source),
+            cells: Vec::new(),
+            header: Vec::new(),
+            layout: mapping.layout.clone(),
+            time: mapping.time.clone(),
+            columns: Columns { stamps: None, gyro: None, accel: None, temperatures: Vec::new() },
+            assembler: Assembler::new(&mapping.time),
+            readings: Vec::new(),
+            rows: 0,
+            last_stamp: None,
+            ended: false,
+            report: ReadReport::default(),
+        };
+        let resolved = reader
+            .skip_and_name()
+            .and_then(|()| resolve(mapping, &reader.header).map_err(|reason| Fault { cell: None, reason }));
+        reader.columns = resolved.map_err(|fault| reader.error(fault))?;
+        Ok(reader)
+    }
+
+    /// Passes over the lines in front and reads the header.
+    fn skip_and_name(&mut self) -> Result<(), Fault> {
+        for _ in 0..self.layout.skip_lines {
+            self.line()?;
+        }
+        if self.layout.header {
+            if !self.line()? {
+                return Err(Fault { cell: None, reason: Reason::NoHeader });
+            }
+            self.split()?;
+            let line = self.lines.line();
+            let names = self.cells.iter().map(|cell| line.get(cell.start..cell.end).unwrap_or_default());
+            self.header = names.map(|name| String::from_utf8_lossy(name).into_owned()).collect();
+        }
+        Ok(())
+    }
+
+    /// Goes to the next line that is neither blank nor a comment; false at the end.
+    fn line(&mut self) -> Result<bool, Fault> {
+        let whole = |reason| Fault { cell: None, reason };
+        loop {
+            let line = self.lines.advance().map_err(|error| match error.kind() {
+                std::io::ErrorKind::UnexpectedEof => whole(Reason::CutShort),
+                _ => whole(Reason::Io(error)),
+            })?;
+            if self.lines.is_utf16() {
+                return Err(whole(Reason::Utf16));
+            }
+            match line {
+                Line::End => return Ok(false),
+                Line::TooLong => return Err(whole(Reason::LineTooLong { limit: LONGEST_LINE })),
+                Line::Read => {}
+            }
+            let text = self.lines.line().trim_ascii_start();
+            let comment =
+                self.layout.comment.as_ref().is_some_and(|prefix| text.starts_with(prefix.as_bytes()));
+            if !text.is_empty() && !comment {
+                return Ok(true);
+            }
+        }
+    }
+
+    /// Cuts the current line into cells.
+    fn split(&mut self) -> Result<(), Fault> {
+        split(self.lines.line_mut(), self.layout.delimiter, &mut self.cells).map_err(|OpenQuote(at)| {
+            let column = u32::try_from(at + 1).unwrap_or(u32::MAX);
+            self.cells.push(Cell { start: at, end: self.lines.line().len(), column });
+            Fault { cell: Some(self.cells.len() - 1), reason: Reason::OpenQuote }
+        })
+    }
+
+    /// The next event in time order.
+    pub(super) fn next_event(&mut self) -> Result<Option<LogEvent>, LogError> {
+        loop {
+            if let Some(event) = self.assembler.next() {
+                return Ok(Some(event));
+            }
+            if self.ended {
+                return Ok(None);
+            }
+            self.row()?;
+        }
+    }
+
+    /// Reads one row, or notes the end.
+    fn row(&mut self) -> Result<(), LogError> {
+        let mut stamp = None;
+        let parts = match self.line() {
+            Ok(false) => {
+                self.end();
+                return Ok(());
+            }
+            Ok(true) if self.report.dropped_rows < self.layout.drop_rows => {
+                self.report.dropped_rows += 1;
+                return Ok(());
+            }
+            Ok(true) => self.split().and_then(|()| self.parts(&mut stamp)),
+            Err(fault) => Err(fault),
+        };
+        self.rows += 1;
+        match parts {
+            Ok(parts) => {
+                self.report.rows += 1;
+                self.report.unterminated_last_line |= !self.lines.terminated();
+                self.last_stamp = Some(parts.stamp);
+                self.assembler.take(parts, &self.readings, &self.columns);
+                Ok(())
+            }
+            Err(fault) => self.bad_row(fault, stamp),
+        }
+    }
+
+    /// Passes over a bad row, where the mapping says so.
+    #[cold]
+    fn bad_row(&mut self, fault: Fault, stamp: Option<i64>) -> Result<(), LogError> {
+        let cut_short = matches!(fault.reason, Reason::CutShort);
+        let skippable = cut_short || fault.reason.concerns_one_row();
+        let error = self.error(fault);
+        if self.layout.on_bad_row == OnBadRow::Refuse || !skippable {
+            return Err(error);
+        }
+        self.report.first_skipped.get_or_insert_with(|| error.to_string());
+        if cut_short {
+            self.report.cut_short = true;
+            self.end();
+            return Ok(());
+        }
+        self.report.skipped_rows += 1;
+        self.assembler.skip(stamp, &self.columns);
+        Ok(())
+    }
+
+    /// There are no further rows: everything can be given.
+    fn end(&mut self) {
+        self.assembler.end(&self.columns);
+        self.ended = true;
+    }
+
+    /// Reads all cells of the row that are used; `stamp` is set as soon as it is known to be good.
+    fn parts(&mut self, stamp: &mut Option<i64>) -> Result<Parts, Fault> {
+        let row = Row {
+            line: self.lines.line(),
+            cells: &self.cells,
+            decimal_mark: self.layout.decimal_mark,
+            terminated: self.lines.terminated(),
+        };
+        let now = if let Some(cell) = self.columns.stamps {
+            let now = row.time_ns(cell)?.saturating_add(self.time.origin_ns);
+            if let Some(previous_ns) = self.last_stamp.filter(|last| now <= *last) {
+                let reason = Reason::TimeNotIncreasing { previous_ns };
+                return Err(Fault { cell: Some(cell.cell), reason });
+            }
+            now
+        } else {
+            let tick = self.time.tick.unwrap_or(Span::ZERO).as_ns();
+            self.time.origin_ns.saturating_add(tick.saturating_mul(self.rows + 1))
+        };
+        *stamp = Some(now);
+        let gyro = match &self.columns.gyro {
+            Some(cells) => match row.readings(&cells.ticks)? {
+                Some(readings) => Some((readings, row.states(cells)?)),
+                None => None,
+            },
+            None => None,
+        };
+        let accel = match &self.columns.accel {
+            Some(cells) => row.readings(cells)?,
+            None => None,
+        };
+        self.readings.clear();
+        for temperature in &mut self.columns.temperatures {
+            let due = temperature.since == 0;
+            if temperature.may_be_empty && row.is_empty(temperature.cell)? {
+                continue;
+            }
+            let raw = row.float(temperature.cell)? + temperature.shift;
+            temperature.since = (temperature.since + 1) % temperature.every_rows;
+            if due {
+                let reading =
+                    TemperatureReading { channel: temperature.channel, time: Timestamp::from_ns(now), raw };
+                self.readings.push(reading);
+            }
+        }
+        Ok(Parts { stamp: now, gyro, accel })
+    }
+
+    /// What reading came to so far.
+    pub(super) fn report(&self) -> &ReadReport {
+        &self.report
+    }
+
+    /// A fault with its place.
+    #[cold]
+    fn error(&self, fault: Fault) -> LogError {
+        let cell = fault.cell.and_then(|index| self.cells.get(index));
+        let value = cell.and_then(|cell| self.lines.line().get(cell.start..cell.end)).unwrap_or_default();
+        let behind = u32::try_from(self.lines.line().len() + 1).unwrap_or(u32::MAX);
+        LogError(Box::new(LogFault {
+            file: self.name.clone(),
+            line: self.lines.number().max(1),
+            column: match (fault.cell, cell) {
+                (Some(_), Some(cell)) => cell.column,
+                (Some(_), None) => behind,
+                (None, _) => 1,
+            },
+            cell: fault.cell.map(|index| (index + 1, self.header.get(index).cloned())),
+            value: String::from_utf8_lossy(value).chars().take(40).collect(),
+            reason: fault.reason,
+        }))
+    }
+}

@@ -1,0 +1,186 @@
+//! A file's mapping with every column as an index.
+
+use isotherm_correction::sample::{ChannelName, OutputKind, Sensors};
+
+use super::error::Reason;
+use crate::mapping::{Column, Conversion, FileMapping, ModeMapping, SwitchMapping, TickMapping, TimeColumn};
+
+/// A column of times or durations.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct TimeCell {
+    /// Which cell.
+    pub(super) cell: usize,
+    /// Its unit is 10ⁿ ns.
+    pub(super) exponent: i32,
+}
+
+/// Sensors of one kind.
+#[derive(Debug, Clone)]
+pub(super) struct TickCells {
+    /// What the readings stand for.
+    pub(super) output: OutputKind,
+    /// Cell and conversion of each sensor.
+    pub(super) sensors: Sensors<(usize, Conversion)>,
+    /// Sequence numbers.
+    pub(super) sequence: Option<usize>,
+    /// Durations.
+    pub(super) duration: Option<TimeCell>,
+    /// Rows without these sensors are in order.
+    pub(super) may_be_empty: bool,
+}
+
+/// A cell of two states.
+#[derive(Debug, Clone)]
+pub(super) struct StateCell {
+    /// Which cell.
+    pub(super) cell: usize,
+    /// What means +1, or yes.
+    pub(super) plus: String,
+    /// What means −1, or no.
+    pub(super) minus: String,
+    /// An empty cell is no state at all.
+    pub(super) may_be_empty: bool,
+}
+
+/// Where switch commands come from.
+#[derive(Debug, Clone)]
+pub(super) enum SwitchCells {
+    /// There are none.
+    None,
+    /// A cell.
+    Cell(StateCell),
+    /// Changes of mode.
+    ModeChange,
+}
+
+/// The gyros.
+#[derive(Debug, Clone)]
+pub(super) struct GyroCells {
+    /// Sensors and their ticks.
+    pub(super) ticks: TickCells,
+    /// Lasing mode.
+    pub(super) mode: Option<StateCell>,
+    /// Switch commands.
+    pub(super) switch: SwitchCells,
+    /// Phase of the slow meander.
+    pub(super) meander: Option<StateCell>,
+    /// Half-period counts.
+    pub(super) half_periods: Sensors<(usize, usize)>,
+}
+
+/// One temperature channel.
+#[derive(Debug, Clone)]
+pub(super) struct TemperatureCell {
+    /// Name.
+    pub(super) channel: ChannelName,
+    /// Which cell.
+    pub(super) cell: usize,
+    /// Added to what it holds.
+    pub(super) shift: f64,
+    /// Every how many rows a reading is taken.
+    pub(super) every_rows: u64,
+    /// Rows without a reading are in order.
+    pub(super) may_be_empty: bool,
+    /// Rows since the last reading that was taken.
+    pub(super) since: u64,
+}
+
+/// All columns of a file.
+#[derive(Debug, Clone)]
+pub(super) struct Columns {
+    /// Stamps.
+    pub(super) stamps: Option<TimeCell>,
+    /// The gyros.
+    pub(super) gyro: Option<GyroCells>,
+    /// The accelerometers.
+    pub(super) accel: Option<TickCells>,
+    /// Temperature channels.
+    pub(super) temperatures: Vec<TemperatureCell>,
+}
+
+/// Finds every column of a mapping among the names of a header.
+pub(super) fn resolve(mapping: &FileMapping, header: &[String]) -> Result<Columns, Reason> {
+    let find = |column: &Column| find(column, header);
+    let stamps = mapping.time.stamps.as_ref().map(|stamps| time(stamps, header)).transpose()?;
+    let gyro = match &mapping.gyro {
+        None => None,
+        Some(gyro) => {
+            let mut half_periods = Sensors::new();
+            for (positive, negative) in &gyro.half_periods {
+                half_periods.push((find(positive)?, find(negative)?));
+            }
+            Some(GyroCells {
+                ticks: ticks(&gyro.ticks, header)?,
+                mode: gyro.mode.as_ref().map(|mode| state(mode, header)).transpose()?,
+                switch: match &gyro.switch {
+                    None => SwitchCells::None,
+                    Some(SwitchMapping::ModeChange) => SwitchCells::ModeChange,
+                    Some(SwitchMapping::Column(column)) => SwitchCells::Cell(StateCell {
+                        cell: find(column)?,
+                        plus: "1".into(),
+                        minus: "0".into(),
+                        may_be_empty: false,
+                    }),
+                },
+                meander: gyro.meander.as_ref().map(|mode| state(mode, header)).transpose()?,
+                half_periods,
+            })
+        }
+    };
+    let accel = mapping.accel.as_ref().map(|accel| ticks(accel, header)).transpose()?;
+    let temperatures = mapping.temperatures.iter().map(|temperature| {
+        Ok(TemperatureCell {
+            channel: temperature.channel,
+            cell: find(&temperature.column)?,
+            shift: temperature.shift,
+            every_rows: temperature.every_rows,
+            may_be_empty: temperature.may_be_empty,
+            since: 0,
+        })
+    });
+    Ok(Columns { stamps, gyro, accel, temperatures: temperatures.collect::<Result<_, Reason>>()? })
+}
+
+/// Sensors of one kind.
+fn ticks(mapping: &TickMapping, header: &[String]) -> Result<TickCells, Reason> {
+    let mut sensors = Sensors::new();
+    for sensor in &mapping.sensors {
+        sensors.push((find(&sensor.column, header)?, sensor.conversion));
+    }
+    Ok(TickCells {
+        output: mapping.output,
+        sensors,
+        sequence: mapping.sequence.as_ref().map(|column| find(column, header)).transpose()?,
+        duration: mapping.duration.as_ref().map(|duration| time(duration, header)).transpose()?,
+        may_be_empty: mapping.may_be_empty,
+    })
+}
+
+/// A column of times.
+fn time(mapping: &TimeColumn, header: &[String]) -> Result<TimeCell, Reason> {
+    Ok(TimeCell { cell: find(&mapping.column, header)?, exponent: mapping.unit.exponent() })
+}
+
+/// A column of two states.
+fn state(mapping: &ModeMapping, header: &[String]) -> Result<StateCell, Reason> {
+    Ok(StateCell {
+        cell: find(&mapping.column, header)?,
+        plus: mapping.plus.clone(),
+        minus: mapping.minus.clone(),
+        may_be_empty: mapping.may_be_empty,
+    })
+}
+
+/// Index of a column.
+fn find(column: &Column, header: &[String]) -> Result<usize, Reason> {
+    let name = match column {
+        Column::Index(index) => return Ok(*index),
+        Column::Name(name) => name,
+    };
+    let mut found = header.iter().enumerate().filter(|(_, head)| *head == name).map(|(index, _)| index);
+    match (found.next(), found.next()) {
+        (Some(index), None) => Ok(index),
+        (Some(_), Some(_)) => Err(Reason::AmbiguousColumn { name: name.clone() }),
+        (None, _) => Err(Reason::NoSuchColumn { name: name.clone(), header: header.join(", ") }),
+    }
+}

@@ -1,0 +1,185 @@
+//! The current row of a file: its cells as numbers, times and states.
+
+use isotherm_correction::sample::{HalfPeriodCounts, LasingMode, OutputKind, Sensors};
+use isotherm_correction::units::Span;
+
+use super::cells::Cell;
+use super::error::Reason;
+use super::number;
+use super::resolve::{GyroCells, StateCell, TickCells, TimeCell};
+
+/// What is wrong with a row: the cell's index and the reason.
+#[derive(Debug)]
+pub(super) struct Fault {
+    /// Index of the cell; `None` for the line as a whole.
+    pub(super) cell: Option<usize>,
+    /// What is wrong.
+    pub(super) reason: Reason,
+}
+
+/// A row of cells.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Row<'a> {
+    /// The line.
+    pub(super) line: &'a [u8],
+    /// Where its cells are.
+    pub(super) cells: &'a [Cell],
+    /// Decimal mark.
+    pub(super) decimal_mark: u8,
+    /// The line has its end.
+    pub(super) terminated: bool,
+}
+
+/// Readings of one kind in a row, before they have a time.
+#[derive(Debug)]
+pub(super) struct Readings {
+    /// One per sensor; increments are not yet divided by the duration.
+    pub(super) values: Sensors<f64>,
+    /// Sequence number that the row states.
+    pub(super) sequence: Option<u64>,
+    /// Duration that the row states.
+    pub(super) duration: Option<Span>,
+}
+
+/// What gyros have beside their readings.
+#[derive(Debug)]
+pub(super) struct GyroStates {
+    /// Lasing mode.
+    pub(super) mode: Option<LasingMode>,
+    /// Switch command, where it has a column.
+    pub(super) switch_command: bool,
+    /// Phase of the slow meander.
+    pub(super) meander: Option<LasingMode>,
+    /// Half-period counts.
+    pub(super) half_periods: Sensors<HalfPeriodCounts>,
+}
+
+impl<'a> Row<'a> {
+    /// What a cell holds; an empty cell is in order.
+    fn text(&self, cell: usize) -> Result<&'a [u8], Fault> {
+        let found = self.cells.get(cell).and_then(|at| self.line.get(at.start..at.end));
+        found.ok_or_else(|| self.missing(cell))
+    }
+
+    /// What a cell holds, which must be something.
+    fn filled(&self, cell: usize) -> Result<&'a [u8], Fault> {
+        let text = self.text(cell)?;
+        if text.is_empty() { Err(Fault { cell: Some(cell), reason: Reason::Empty }) } else { Ok(text) }
+    }
+
+    /// The row is too short for a cell.
+    #[cold]
+    fn missing(&self, cell: usize) -> Fault {
+        Fault {
+            cell: Some(cell),
+            reason: Reason::MissingCell { cells: self.cells.len(), cut: !self.terminated },
+        }
+    }
+
+    /// A number.
+    pub(super) fn float(&self, cell: usize) -> Result<f64, Fault> {
+        let text = self.filled(cell)?;
+        number::float(text, self.decimal_mark).ok_or_else(|| {
+            let comma = self.decimal_mark == b'.' && text.contains(&b',');
+            Fault { cell: Some(cell), reason: Reason::NotANumber { comma } }
+        })
+    }
+
+    /// A count.
+    fn count(&self, cell: usize) -> Result<i32, Fault> {
+        let count = number::count(self.filled(cell)?, self.decimal_mark);
+        count.ok_or(Fault { cell: Some(cell), reason: Reason::NotACount })
+    }
+
+    /// A time (ns).
+    pub(super) fn time_ns(&self, time: TimeCell) -> Result<i64, Fault> {
+        let ns = number::time_ns(self.filled(time.cell)?, time.exponent, self.decimal_mark);
+        ns.ok_or(Fault { cell: Some(time.cell), reason: Reason::NotATime })
+    }
+
+    /// A duration.
+    fn span(&self, time: TimeCell) -> Result<Span, Fault> {
+        match self.time_ns(time)? {
+            ns if ns < 0 => Err(Fault { cell: Some(time.cell), reason: Reason::NegativeDuration }),
+            ns => Ok(Span::from_ns(ns)),
+        }
+    }
+
+    /// A state.
+    fn state(&self, state: &StateCell) -> Result<bool, Fault> {
+        match self.filled(state.cell)? {
+            text if text == state.plus.as_bytes() => Ok(true),
+            text if text == state.minus.as_bytes() => Ok(false),
+            _ => {
+                let reason = Reason::UnknownState { plus: state.plus.clone(), minus: state.minus.clone() };
+                Err(Fault { cell: Some(state.cell), reason })
+            }
+        }
+    }
+
+    /// A mode, where the file has a column for it.
+    fn mode(&self, state: Option<&StateCell>) -> Result<Option<LasingMode>, Fault> {
+        let sign = |plus| if plus { LasingMode::Plus } else { LasingMode::Minus };
+        match state {
+            Some(state) if state.may_be_empty && self.is_empty(state.cell)? => Ok(None),
+            Some(state) => self.state(state).map(sign).map(Some),
+            None => Ok(None),
+        }
+    }
+
+    /// Whether a cell holds nothing.
+    pub(super) fn is_empty(&self, cell: usize) -> Result<bool, Fault> {
+        self.text(cell).map(<[u8]>::is_empty)
+    }
+
+    /// Readings of one kind; `None` where the row has none and may have none.
+    pub(super) fn readings(&self, cells: &TickCells) -> Result<Option<Readings>, Fault> {
+        if cells.may_be_empty && self.all_empty(cells)? {
+            return Ok(None);
+        }
+        let mut values = Sensors::new();
+        for (cell, conversion) in &cells.sensors {
+            values.push(match cells.output {
+                OutputKind::Counts => f64::from(self.count(*cell)?) * conversion.factor,
+                OutputKind::Mean => (self.float(*cell)? - conversion.mid_scale) * conversion.factor,
+            });
+        }
+        let sequence = cells.sequence.map(|cell| {
+            let sequence = number::natural(self.filled(cell)?);
+            sequence.ok_or(Fault { cell: Some(cell), reason: Reason::NotASequence })
+        });
+        let duration = cells.duration.map(|duration| self.span(duration));
+        Ok(Some(Readings { values, sequence: sequence.transpose()?, duration: duration.transpose()? }))
+    }
+
+    /// Whether all sensors' cells hold nothing.
+    fn all_empty(&self, cells: &TickCells) -> Result<bool, Fault> {
+        for (cell, _) in &cells.sensors {
+            if !self.is_empty(*cell)? {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    /// What gyros have beside their readings.
+    pub(super) fn states(&self, cells: &GyroCells) -> Result<GyroStates, Fault> {
+        let mut half_periods = Sensors::new();
+        for (positive, negative) in &cells.half_periods {
+            half_periods.push(HalfPeriodCounts {
+                positive: self.count(*positive)?,
+                negative: self.count(*negative)?,
+            });
+        }
+        let switch_command = match &cells.switch {
+            super::resolve::SwitchCells::Cell(cell) => self.state(cell)?,
+            _ => false,
+        };
+        Ok(GyroStates {
+            mode: self.mode(cells.mode.as_ref())?,
+            switch_command,
+            meander: self.mode(cells.meander.as_ref())?,
+            half_periods,
+        })
+    }
+}

@@ -1,0 +1,280 @@
+//! Logs as others write them: read right, or refused with line and column.
+
+use std::io::Write;
+
+use super::*;
+use crate::mapping::FileMapping;
+
+/// A mapping for `t;x;y;z;T` with these keys of the file and of its time.
+fn mapping(file: &str, time: &str) -> Mapping {
+    let text = format!(
+        "version = 1\n[[file]]\n{file}\n[file.time]\n{time}\n[file.gyro]\noutput = \"mean\"\n\
+         sensors = [{{ column = 2, unit = \"rad_per_s\" }}, {{ column = 3, unit = \"rad_per_s\" }}]\n\
+         [[file.temperature]]\nchannel = \"case\"\ncolumn = 4\nunit = \"deg_c\"\n"
+    );
+    Mapping::parse(&text, "m.toml").unwrap_or_else(|problems| panic!("{problems:?}"))
+}
+
+/// Stamps in ms, ticks of 10 ms.
+const STAMPS: &str = "column = 1\nunit = \"ms\"\ntick_ms = 10";
+
+/// A log in a file of its own.
+fn stored(bytes: &[u8]) -> tempfile::NamedTempFile {
+    let mut file = tempfile::NamedTempFile::new().unwrap();
+    file.write_all(bytes).unwrap();
+    file
+}
+
+/// All events of a log and what reading came to.
+fn read(mapping: &Mapping, bytes: &[u8]) -> (Vec<LogEvent>, ReadReport) {
+    let file = stored(bytes);
+    let mut reader = LogReader::open(mapping, &[file.path().to_path_buf()]).unwrap();
+    let events = reader.by_ref().map(|event| event.unwrap_or_else(|error| panic!("{error}"))).collect();
+    (events, reader.report())
+}
+
+/// The error that a log ends with.
+fn error(mapping: &Mapping, bytes: &[u8]) -> LogFault {
+    let file = stored(bytes);
+    let mut reader = match LogReader::open(mapping, &[file.path().to_path_buf()]) {
+        Ok(reader) => reader,
+        Err(Error::Log(error)) => return *error.0,
+        Err(other) => panic!("{other}"),
+    };
+    *reader.find_map(Result::err).expect("must be refused").0
+}
+
+/// Sequence, end (ms), duration (ms) and first reading of the gyro ticks.
+fn gyro(events: &[LogEvent]) -> Vec<(u64, i64, i64, f64)> {
+    let tick = |event: &LogEvent| match event {
+        LogEvent::Gyro { tick, .. } => {
+            let ms = |ns: i64| ns / 1_000_000;
+            Some((tick.sequence, ms(tick.end_time.as_ns()), ms(tick.duration.as_ns()), tick.readings[0]))
+        }
+        _ => None,
+    };
+    events.iter().filter_map(tick).collect()
+}
+
+#[test]
+fn the_same_log_in_every_guise() {
+    let expected = [(0, 10, 10, 1.5), (1, 21, 11, -2.0), (2, 30, 9, 0.25)];
+    let plain = "10;1.5;7;20\n21;-2;7;20\n30;2.5e-1;7;20\n";
+    let table: &[(&str, &str, Vec<u8>)] = &[
+        ("plain", "delimiter = \"semicolon\"", plain.into()),
+        ("decimal commas", "delimiter = \"semicolon\"\ndecimal_mark = \",\"", plain.replace('.', ",").into()),
+        ("line ends of Windows", "delimiter = \"semicolon\"", plain.replace('\n', "\r\n").into()),
+        ("byte-order mark", "delimiter = \"semicolon\"", format!("\u{feff}{plain}").into()),
+        ("no last line end", "delimiter = \"semicolon\"", plain.trim_end().into()),
+        ("spaces around cells", "delimiter = \"semicolon\"", plain.replace(';', " ; ").into()),
+        ("blank lines", "delimiter = \"semicolon\"", plain.replace('\n', "\n \n").into()),
+        ("tabs", "delimiter = \"tab\"", plain.replace(';', "\t").into()),
+        ("runs of spaces", "delimiter = \"whitespace\"", plain.replace(';', "  \t ").into()),
+        (
+            "quotes",
+            "delimiter = \"comma\"",
+            plain
+                .replace(';', "\",\"")
+                .replace('\n', "\"\n")
+                .replace("10\"", "\"10\"")
+                .replace("\n2", "\n\"2")
+                .replace("\n3", "\n\"3")
+                .into(),
+        ),
+        (
+            "comments",
+            "delimiter = \"comma\"\ncomment = \"//\"",
+            format!("// a\n{}//", plain.replace(';', ",")).into(),
+        ),
+        (
+            "lines in front",
+            "delimiter = \"comma\"\nskip_lines = 2",
+            format!("a,\"b\nc\n{}", plain.replace(';', ",")).into(),
+        ),
+        (
+            "a row dropped",
+            "delimiter = \"comma\"\ndrop_rows = 1",
+            format!("9,x,,\n{}", plain.replace(';', ",")).into(),
+        ),
+        (
+            "header",
+            "delimiter = \"comma\"\nheader = true",
+            format!("\u{feff}t,x,y,T\r\n{}", plain.replace(';', ",")).into(),
+        ),
+    ];
+    for (name, layout, bytes) in table {
+        let mapping = mapping(layout, STAMPS);
+        let (events, report) = read(&mapping, bytes);
+        assert_eq!(gyro(&events), expected, "{name}");
+        assert_eq!(events.len(), 6, "{name}");
+        assert_eq!((report.rows, report.skipped_rows), (3, 0), "{name}");
+        assert_eq!(report.unterminated_last_line, *name == "no last line end", "{name}");
+
+        let mut gzip = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+        gzip.write_all(bytes).unwrap();
+        assert_eq!(read(&mapping, &gzip.finish().unwrap()).0, events, "{name}, compressed");
+    }
+}
+
+#[test]
+fn broken_rows_are_refused_with_line_column_cell_and_value() {
+    let rows = "10,1.5,7,20\n";
+    let table: &[(&str, &str, u64, u32, usize, &str)] = &[
+        ("missing cell", "20,1\n", 2, 5, 3, "is missing, the row has only 2 cells"),
+        ("truncated last line", "20,1,7", 2, 7, 4, "the log was cut off here"),
+        ("empty cell", "20,,7,20\n", 2, 4, 2, "is empty"),
+        ("not a number", "20,1.5.2,7,20\n", 2, 4, 2, "\"1.5.2\" is not a number"),
+        ("a decimal comma", "20;1,5;7;20\n", 2, 4, 2, "decimal_mark"),
+        ("not a time", "2o,1,7,20\n", 2, 1, 1, "\"2o\" is not a time"),
+        ("time stands still", "10,1,7,20\n", 2, 1, 1, "time stands still or goes back"),
+        ("time goes back", "9,1,7,20\n", 2, 1, 1, "10000000 ns"),
+        ("bad temperature", "20,1,7,warm\n", 2, 8, 4, "\"warm\" is not a number"),
+        ("an open quote", "20,\"1,7,20\n", 2, 4, 2, "opens a quote"),
+    ];
+    for (name, row, line, column, cell, message) in table {
+        let delimiter = if row.contains(';') { "semicolon" } else { "comma" };
+        let good = if row.contains(';') { rows.replace(',', ";") } else { rows.to_owned() };
+        let mapping = mapping(&format!("delimiter = \"{delimiter}\""), STAMPS);
+        let fault = error(&mapping, format!("{good}{row}").as_bytes());
+        assert_eq!((fault.line, fault.column), (*line, *column), "{name}: {fault}");
+        assert_eq!(fault.cell.as_ref().map(|(number, _)| *number), Some(*cell), "{name}: {fault}");
+        assert!(fault.to_string().contains(message), "{name}: {fault}");
+    }
+}
+
+#[test]
+fn files_that_are_no_such_log_are_refused() {
+    let named = Mapping::parse(
+        "version = 1\n[[file]]\ndelimiter = \"comma\"\nheader = true\n[file.time]\ntick_ms = 1\n[file.gyro]\n\
+         output = \"counts\"\nsensors = [{ column = \"x\" }]\n",
+        "m.toml",
+    )
+    .unwrap();
+    assert!(error(&named, b"a,b\n1,2\n").to_string().contains("no column \"x\", it has a, b"));
+    assert!(error(&named, b"x,x\n1,2\n").to_string().contains("more than once"));
+    assert!(error(&named, b"").to_string().contains("ends before its header"));
+    assert!(error(&named, b"\xff\xfex\0\n\0").to_string().contains("UTF-16"));
+    assert!(error(&named, b"x\n1.5\n").to_string().contains("column 1 \"x\": \"1.5\" is not a whole number"));
+    assert!(error(&named, &vec![b'1'; (1 << 20) + 5]).to_string().contains("longer than 1048576 bytes"));
+}
+
+#[test]
+fn bad_rows_can_be_passed_over_and_become_gaps() {
+    let layout = "delimiter = \"comma\"\non_bad_row = \"skip\"";
+    let bytes = b"10,1,7,20\n20,x,7,20\n30,3,7,20\n?,4,7,20\n50,5,7,20\n45,6,7,20\n60,7,7,20\n7";
+    let (events, report) = read(&mapping(layout, STAMPS), bytes);
+    // After a row without a stamp, the nominal duration stands in for the measured one.
+    let expected = [(0, 10, 10, 1.0), (2, 30, 10, 3.0), (4, 50, 10, 5.0), (6, 60, 10, 7.0)];
+    assert_eq!(gyro(&events), expected);
+    assert_eq!((report.rows, report.skipped_rows, report.lost_data()), (4, 4, true));
+    assert!(report.first_skipped.is_some_and(|first| first.contains(":2:4: column 2")));
+}
+
+#[test]
+fn a_compressed_log_that_ends_in_the_middle() {
+    let rows: String =
+        (1..5000).flat_map(|row| [(row * 10).to_string(), format!(",{},7,20\n", row % 97)]).collect();
+    let mut gzip = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+    gzip.write_all(rows.as_bytes()).unwrap();
+    let whole = gzip.finish().unwrap();
+    let half = &whole[..whole.len() / 2];
+    assert!(
+        error(&mapping("delimiter = \"comma\"", STAMPS), half).to_string().contains("ends in the middle")
+    );
+    let skip = mapping("delimiter = \"comma\"\non_bad_row = \"skip\"", STAMPS);
+    let (events, report) = read(&skip, half);
+    assert!(report.cut_short && report.lost_data() && events.len() > 100);
+}
+
+#[test]
+fn stamps_of_the_start_and_gaps_in_time() {
+    let bytes = b"0,1,7,20\n11,2,7,21\n20,3,7,22\n50,4,7,23\n";
+    let start = format!("{STAMPS}\nmarks = \"start\"\ngap_after_ticks = 1.5");
+    let (events, _) = read(&mapping("delimiter = \"comma\"", &start), bytes);
+    assert_eq!(gyro(&events), [(0, 11, 11, 1.0), (1, 20, 9, 2.0), (2, 30, 10, 3.0), (5, 60, 10, 4.0)]);
+    let orders: Vec<_> = events.iter().map(LogEvent::order).collect();
+    assert!(orders.is_sorted(), "{orders:?}");
+
+    let nominal = format!("{STAMPS}\nduration = \"nominal\"\norigin_ns = 1000000");
+    let (events, _) = read(&mapping("delimiter = \"comma\"", &nominal), bytes);
+    assert_eq!(gyro(&events), [(0, 1, 10, 1.0), (1, 12, 10, 2.0), (2, 21, 10, 3.0), (3, 51, 10, 4.0)]);
+
+    let (events, _) = read(&mapping("delimiter = \"comma\"", "tick_ms = 5"), bytes);
+    assert_eq!(gyro(&events), [(0, 5, 5, 1.0), (1, 10, 5, 2.0), (2, 15, 5, 3.0), (3, 20, 5, 4.0)]);
+}
+
+/// A mapping of one file with modes, increments and half periods.
+fn zeeman() -> Mapping {
+    Mapping::parse(
+        "version = 1\n[[file]]\ndelimiter = \"comma\"\nheader = true\n[file.time]\ntick_ms = 5\n[file.gyro]\n\
+         output = \"counts\"\nsensors = [{ column = \"y\" }, { column = \"x\", sign = -1 }]\n\
+         mode = { column = \"mode\", plus = \"A\", minus = \"B\" }\nswitch = { from = \"mode_change\" }\n\
+         half_periods = [{ positive = \"p\", negative = \"n\" }, { positive = \"n\", negative = \"p\" }]\n\
+         [file.accel]\noutput = \"mean\"\nsensors = [{ column = \"v\", unit = \"m_per_s\" }]\nmay_be_empty = true\n",
+        "m.toml",
+    )
+    .unwrap()
+}
+
+#[test]
+fn modes_switches_order_sign_half_periods_and_increments() {
+    let bytes = b"x,y,mode,p,n,v\n1,2,A,10,-9,0.05\n3,4,A,11,-8,\n5,6,B,12,-7,0.1\n";
+    let (events, _) = read(&zeeman(), bytes);
+    let ticks: Vec<_> = events
+        .iter()
+        .filter_map(|event| match event {
+            LogEvent::Gyro { tick, .. } => {
+                Some((tick.readings.to_vec(), tick.switch_command, tick.half_periods[1].positive))
+            }
+            _ => None,
+        })
+        .collect();
+    assert_eq!(
+        ticks,
+        [(vec![2.0, -1.0], false, -9), (vec![4.0, -3.0], false, -8), (vec![6.0, -5.0], true, -7)]
+    );
+    let accel: Vec<_> = events
+        .iter()
+        .filter_map(|event| match event {
+            LogEvent::Accel { tick, .. } => Some((tick.sequence, tick.end_time.as_ns(), tick.readings[0])),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(accel, [(0, 5_000_000, 10.0), (1, 15_000_000, 20.0)]);
+    let fault = error(&zeeman(), b"x,y,mode,p,n,v\n1,2,C,1,1,1\n");
+    assert!(fault.to_string().contains("column 3 \"mode\": \"C\" must be \"A\" or \"B\""), "{fault}");
+}
+
+#[test]
+fn files_are_merged_in_time() {
+    let mut both = mapping("delimiter = \"comma\"\nname = \"a\"", STAMPS);
+    let mut second: FileMapping = both.files[0].clone();
+    let gyro = second.gyro.take().unwrap();
+    second.accel = Some(gyro.ticks);
+    second.temperatures.clear();
+    second.name = Some("b".into());
+    both.files.push(second);
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("a"), "10,1,7,20\n20,2,7,20\n").unwrap();
+    std::fs::write(folder.path().join("b"), "5,1,7\n10,1,7\n25,1,7\n").unwrap();
+    let reader = LogReader::open(&both, &[folder.path().to_path_buf()]).unwrap();
+    let orders: Vec<_> = reader
+        .map(|event| event.unwrap())
+        .map(|event| (event.time().as_ns() / 1_000_000, event.rank()))
+        .collect();
+    assert_eq!(orders, [(5, 1), (10, 0), (10, 1), (10, 2), (20, 0), (20, 2), (25, 1)]);
+    assert!(matches!(LogReader::open(&both, &[folder.path().join("a")]), Err(Error::Usage(_))));
+}
+
+#[test]
+fn a_part_of_a_log() {
+    let rows: String = (1..=100).flat_map(|row| [(row * 10).to_string(), format!(",{row},7,20\n")]).collect();
+    let file = stored(rows.as_bytes());
+    let reader =
+        LogReader::open(&mapping("delimiter = \"comma\"", STAMPS), &[file.path().to_path_buf()]).unwrap();
+    let span = |ms| isotherm_correction::units::Span::from_ms(ms);
+    let part: Vec<_> = Window::new(reader, span(100), Some(span(200))).map(Result::unwrap).collect();
+    let ends: Vec<_> = gyro(&part).into_iter().map(|(_, end, ..)| end).collect();
+    // The log begins with its first temperature reading, at 10 ms.
+    assert_eq!((ends.first(), ends.last(), ends.len()), (Some(&120), Some(&310), 20));
+}

@@ -1,0 +1,263 @@
+//! Column mapping: which column of a text log is what, in which unit.
+//!
+//! A mapping is a small TOML file, described in full by `docs/replay.md` and by the ready ones in
+//! `config/mappings`. Parsing reports every problem at once, each with file, line, column, key and value.
+
+mod columns;
+mod layout;
+mod problem;
+mod schema;
+mod section;
+#[cfg(test)]
+mod tests;
+
+use std::path::Path;
+
+use isotherm_correction::sample::{ChannelName, OutputKind};
+use isotherm_correction::units::Span;
+
+pub use problem::Problem;
+pub(crate) use problem::place;
+
+use crate::error::Error;
+
+/// Version of the mapping format that this program reads.
+pub const VERSION: i64 = 1;
+
+/// How one log, of one or more files, is read.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mapping {
+    /// Its files, at least one; together they have exactly one gyro stream.
+    pub files: Vec<FileMapping>,
+}
+
+/// How one file of a log is read.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FileMapping {
+    /// Its name inside the log's folder, where the log is a folder.
+    pub name: Option<String>,
+    /// How bytes become rows and cells.
+    pub layout: Layout,
+    /// Where the time of a row comes from.
+    pub time: TimeMapping,
+    /// The gyros, where the file has them.
+    pub gyro: Option<GyroMapping>,
+    /// The accelerometers, where the file has them.
+    pub accel: Option<TickMapping>,
+    /// Temperature channels; may be empty.
+    pub temperatures: Vec<TemperatureMapping>,
+}
+
+/// What stands between two cells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Delimiter {
+    /// Any run of spaces and tabs; leading ones do not count.
+    Whitespace,
+    /// One ASCII character; cells may be quoted with `"`.
+    Character(u8),
+}
+
+/// What happens to a row that cannot be read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum OnBadRow {
+    /// Reading ends with an error.
+    Refuse,
+    /// The row is passed over and counted; its tick becomes a gap.
+    Skip,
+}
+
+/// How bytes become rows and cells.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Layout {
+    /// What stands between two cells.
+    pub delimiter: Delimiter,
+    /// Lines that begin with this are passed over.
+    pub comment: Option<String>,
+    /// Lines in front, neither blank nor comments, that are passed over.
+    pub skip_lines: u64,
+    /// Whether the next line names the columns.
+    pub header: bool,
+    /// Rows of data in front that are passed over.
+    pub drop_rows: u64,
+    /// Decimal mark: `.` or `,`.
+    pub decimal_mark: u8,
+    /// What happens to a row that cannot be read.
+    pub on_bad_row: OnBadRow,
+}
+
+/// A column, by name or by place.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Column {
+    /// As the header spells it.
+    Name(String),
+    /// Counted from 0; files count from 1.
+    Index(usize),
+}
+
+/// Unit of a time column.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TimeUnit {
+    /// Nanoseconds.
+    Nanoseconds,
+    /// Microseconds.
+    Microseconds,
+    /// Milliseconds.
+    Milliseconds,
+    /// Seconds.
+    Seconds,
+}
+
+impl TimeUnit {
+    /// n where the unit is 10ⁿ ns.
+    #[must_use]
+    pub const fn exponent(self) -> i32 {
+        match self {
+            Self::Nanoseconds => 0,
+            Self::Microseconds => 3,
+            Self::Milliseconds => 6,
+            Self::Seconds => 9,
+        }
+    }
+}
+
+/// A column that holds a time or a duration.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TimeColumn {
+    /// Which column.
+    pub column: Column,
+    /// Its unit.
+    pub unit: TimeUnit,
+}
+
+/// Which end of the tick a stamp marks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Marks {
+    /// The start.
+    Start,
+    /// The end.
+    End,
+}
+
+/// Where the time of a row comes from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TimeMapping {
+    /// Column of stamps; without one, rows follow each other by `tick`.
+    pub stamps: Option<TimeColumn>,
+    /// Which end of the tick a stamp marks.
+    pub marks: Marks,
+    /// Nominal duration of a tick.
+    pub tick: Option<Span>,
+    /// Whether a tick's duration is the difference of successive stamps; otherwise it is `tick`.
+    pub measured: bool,
+    /// More than this many nominal ticks between two stamps are a gap; `None`: there are no gaps.
+    pub gap_after_ticks: Option<f64>,
+    /// Added to every stamp; without a stamp column, start of the first row's tick (ns).
+    pub origin_ns: i64,
+}
+
+/// Conversion of a cell: `(cell − mid_scale) · factor`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Conversion {
+    /// Raw reading that stands for zero.
+    pub mid_scale: f64,
+    /// Sign, scale and unit together.
+    pub factor: f64,
+    /// The result is an increment over the tick, to be divided by its duration.
+    pub per_tick: bool,
+}
+
+/// One sensor's column.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SensorMapping {
+    /// Which column.
+    pub column: Column,
+    /// To counts, rad/s, or m/s² (V or raw for a calibration that takes these).
+    pub conversion: Conversion,
+}
+
+/// Sensors of one kind.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TickMapping {
+    /// What the readings stand for.
+    pub output: OutputKind,
+    /// One to eight sensors, in the order of the calibration document.
+    pub sensors: Vec<SensorMapping>,
+    /// Column of sequence numbers; without one, rows are counted.
+    pub sequence: Option<Column>,
+    /// Column of durations; overrides the file's rule.
+    pub duration: Option<TimeColumn>,
+    /// A row whose cells of these sensors are all empty has no tick of them.
+    pub may_be_empty: bool,
+}
+
+/// A column of two states.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ModeMapping {
+    /// Which column.
+    pub column: Column,
+    /// Cell that means +1.
+    pub plus: String,
+    /// Cell that means −1.
+    pub minus: String,
+    /// An empty cell is no state at all.
+    pub may_be_empty: bool,
+}
+
+/// Where mode-switch commands come from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum SwitchMapping {
+    /// A column: `1` in the tick at whose start the switch was commanded, else `0`.
+    Column(Column),
+    /// A tick whose mode differs from the last one's.
+    ModeChange,
+}
+
+/// The gyros of a file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GyroMapping {
+    /// Sensors and their ticks.
+    pub ticks: TickMapping,
+    /// Lasing mode.
+    pub mode: Option<ModeMapping>,
+    /// Switch commands.
+    pub switch: Option<SwitchMapping>,
+    /// Phase of the slow meander.
+    pub meander: Option<ModeMapping>,
+    /// Half-period counts, positive and negative, one pair per sensor, or none.
+    pub half_periods: Vec<(Column, Column)>,
+}
+
+/// One temperature channel.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TemperatureMapping {
+    /// Name, as the calibration document spells it.
+    pub channel: ChannelName,
+    /// Which column.
+    pub column: Column,
+    /// Added to the cell to get what the channel takes: 0, or −273.15 for kelvin.
+    pub shift: f64,
+    /// Every how many rows a reading is taken, from the first on.
+    pub every_rows: u64,
+    /// A row whose cell is empty has no reading.
+    pub may_be_empty: bool,
+}
+
+impl Mapping {
+    /// Reads a mapping from a file.
+    ///
+    /// # Errors
+    /// [`Error::File`] where the file cannot be read, [`Error::Mapping`] with all its problems.
+    pub fn load(path: &Path) -> Result<Self, Error> {
+        let text =
+            std::fs::read_to_string(path).map_err(|source| Error::file(path, "read the mapping", source))?;
+        Self::parse(&text, &path.display().to_string()).map_err(Error::Mapping)
+    }
+
+    /// Reads a mapping from text; `file` is for messages.
+    ///
+    /// # Errors
+    /// Every problem that the mapping has, in the order of its lines.
+    pub fn parse(text: &str, file: &str) -> Result<Self, Vec<Problem>> {
+        schema::parse(text, file)
+    }
+}

@@ -1,0 +1,115 @@
+//! Offline correction: a log through the same stream that the service uses.
+
+use std::path::Path;
+use std::slice;
+use std::sync::Arc;
+
+use isotherm_correction::sample::CorrectedTick;
+use isotherm_correction::unit::{Event, UnitSettings};
+use isotherm_protocol::document::{Document, Problem};
+use isotherm_protocol::key::UnitId;
+use isotherm_protocol::stream::UnitStream;
+
+use crate::error::Error;
+use crate::log::LogEvent;
+
+/// A calibration document that was read from a file.
+#[derive(Debug, Clone)]
+pub struct Loaded {
+    /// The calibration.
+    pub calibration: Arc<isotherm_correction::calibration::Calibration>,
+    /// Head of the SHA-256 of the document's text.
+    pub digest: [u8; 8],
+    /// Serial of the unit it is for.
+    pub unit: UnitId,
+    /// What is doubtful about it, though valid.
+    pub warnings: Vec<Problem>,
+}
+
+/// Reads a calibration document.
+///
+/// # Errors
+/// [`Error::File`], [`Error::Calibration`] with every problem, [`Error::Unit`].
+pub fn load_calibration(path: &Path) -> Result<Loaded, Error> {
+    let bytes =
+        std::fs::read(path).map_err(|source| Error::file(path, "read the calibration document", source))?;
+    let parsed = Document::parse_bytes(&bytes, Some(&path.display().to_string()))
+        .map_err(|problems| Error::Calibration(problems.iter().map(ToString::to_string).collect()))?;
+    let mut digest = [0; 8];
+    digest.copy_from_slice(parsed.digest.first_chunk::<8>().unwrap_or(&[0; 8]));
+    Ok(Loaded {
+        calibration: Arc::new(parsed.calibration),
+        digest,
+        unit: unit_id(&parsed.document.unit)?,
+        warnings: parsed.warnings,
+    })
+}
+
+/// A serial from its text.
+///
+/// # Errors
+/// [`Error::Unit`].
+pub fn unit_id(serial: &str) -> Result<UnitId, Error> {
+    UnitId::new(serial).map_err(|source| Error::Unit { serial: serial.to_owned(), source })
+}
+
+/// Corrects events one by one.
+#[derive(Debug)]
+pub struct Offline {
+    /// The unit's stream.
+    stream: UnitStream,
+}
+
+impl Offline {
+    /// A unit with a calibration, as the service has it after its start.
+    #[must_use]
+    pub fn new(loaded: &Loaded, settings: UnitSettings) -> Self {
+        let mut stream = UnitStream::new(loaded.unit.clone(), settings);
+        stream.install(Arc::clone(&loaded.calibration), loaded.digest);
+        Self { stream }
+    }
+
+    /// Takes one event.
+    pub fn handle(&mut self, event: &LogEvent) {
+        self.stream.handle(match event {
+            LogEvent::Gyro { output, tick } => Event::Gyro { output: *output, ticks: slice::from_ref(tick) },
+            LogEvent::Accel { output, tick } => {
+                Event::Accel { output: *output, ticks: slice::from_ref(tick) }
+            }
+            LogEvent::Temperature(reading) => Event::Temperature(slice::from_ref(reading)),
+        });
+    }
+
+    /// Releases what still waits: the log is over.
+    pub fn finish(&mut self) {
+        self.stream.flush();
+    }
+
+    /// How many corrected ticks are ready.
+    #[must_use]
+    pub fn ready(&self) -> usize {
+        self.stream.ready().len()
+    }
+
+    /// Corrected ticks that are ready, without taking them.
+    pub fn peek(&self) -> impl Iterator<Item = &CorrectedTick> {
+        self.stream.ready().iter()
+    }
+
+    /// Takes the corrected ticks that are ready.
+    pub fn take(&mut self) -> Vec<CorrectedTick> {
+        self.stream.take_ready()
+    }
+
+    /// Takes ready ticks as one frame; false where there are none.
+    pub fn next_frame(&mut self, frame: &mut Vec<u8>) -> bool {
+        self.stream.next_frame(frame)
+    }
+
+    /// Counters of the unit that are not zero.
+    #[must_use]
+    pub fn counters(&self) -> Vec<(String, u64)> {
+        let counters = self.stream.counters().into_iter();
+        counters.filter(|counter| counter.value > 0).map(|counter| (counter.name, counter.value)).collect()
+    }
+}

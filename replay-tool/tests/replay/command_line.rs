@@ -1,0 +1,204 @@
+//! The program as it is called: exit codes, what goes to which stream, examples of the help.
+
+use std::fs;
+use std::path::Path;
+use std::process::Output;
+
+use crate::common::{replay, root};
+
+/// Standard output as text.
+fn stdout(output: &Output) -> String {
+    String::from_utf8(output.stdout.clone()).unwrap()
+}
+
+/// Checks the exit code and that the errors name what is wrong.
+fn check(output: &Output, code: i32, errors: &str) {
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(code), "{text}");
+    assert!(text.contains(errors), "{text}");
+}
+
+/// A folder with a simulated log of ten seconds.
+fn simulated() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let args = [
+        "simulate",
+        "--preset",
+        "mems-chamber",
+        "--duration",
+        "10",
+        "--out",
+        "mems.csv",
+        "--truth",
+        "truth.csv",
+    ];
+    check(&replay(folder.path(), &args), 0, "");
+    folder
+}
+
+/// The calibration document for it.
+fn calibration() -> String {
+    root().join("config/calibration/mems-001.toml").display().to_string()
+}
+
+/// `correct` with further arguments.
+fn correct(folder: &Path, more: &[&str]) -> Output {
+    let calibration = calibration();
+    let mut args =
+        vec!["correct", "mems.csv", "--mapping", "mems.mapping.toml", "--calibration", &calibration];
+    args.extend(more);
+    replay(folder, &args)
+}
+
+#[test]
+fn a_simulated_log_is_corrected_and_summed_up() {
+    let folder = simulated();
+    let output = correct(folder.path(), &["--out", "corrected.csv", "--json"]);
+    check(&output, 0, "");
+    let summary: serde_json::Value = serde_json::from_str(&stdout(&output)).unwrap();
+    assert_eq!((summary["ticks"].as_u64(), summary["missed_ticks"].as_u64()), (Some(1000), Some(0)));
+    assert_eq!(summary["log"]["skipped_rows"], 0);
+    let force = summary["mean_specific_force_m_per_s2"][2].as_f64().unwrap();
+    assert!((force.abs() - 9.8).abs() < 0.1, "{force}");
+
+    let csv = fs::read_to_string(folder.path().join("corrected.csv")).unwrap();
+    let mut lines = csv.lines();
+    let header: Vec<_> = lines.next().unwrap().split(',').collect();
+    assert_eq!((header.len(), header[5]), (18, "delta_angle_x_rad"));
+    let sum: f64 = lines.map(|line| line.split(',').nth(10).unwrap().parse::<f64>().unwrap()).sum();
+    assert_eq!((sum / 10.0).to_bits(), force.to_bits(), "the file holds what the summary sums, to the bit");
+    assert_eq!(fs::read_to_string(folder.path().join("truth.csv")).unwrap().lines().count(), 1001);
+}
+
+#[test]
+fn standard_output_holds_the_ticks_alone() {
+    let folder = simulated();
+    let output = correct(folder.path(), &["--out", "-", "--duration", "2"]);
+    check(&output, 0, "mean rate");
+    assert_eq!(stdout(&output).lines().count(), 201);
+}
+
+#[test]
+fn wire_frames_hold_the_same_ticks() {
+    use isotherm_protocol::{codec, corrected::CorrectedBatch};
+    let folder = simulated();
+    check(&correct(folder.path(), &["--out", "c.bin", "--format", "wire"]), 0, "");
+    let bytes = fs::read(folder.path().join("c.bin")).unwrap();
+    let (mut rest, mut sequence) = (bytes.as_slice(), 0);
+    while let Some((length, after)) = rest.split_first_chunk() {
+        let (frame, after) = after.split_at(u32::from_le_bytes(*length) as usize);
+        let batch: CorrectedBatch = codec::decode(frame).unwrap();
+        for tick in &batch.ticks {
+            assert_eq!(tick.sequence, sequence);
+            sequence += 1;
+        }
+        rest = after;
+    }
+    assert_eq!(sequence, 1000);
+}
+
+#[test]
+fn navigation_steps_are_those_of_the_service() {
+    let folder = simulated();
+    let output = correct(folder.path(), &["--navigation-ticks", "10", "--coning-sculling", "--json"]);
+    let summary: serde_json::Value = serde_json::from_str(&stdout(&output)).unwrap();
+    assert_eq!((summary["ticks"].as_u64(), summary["outputs"].as_u64()), (Some(1000), Some(100)));
+    check(&correct(folder.path(), &["--navigation-ticks", "0"]), 2, "--navigation-ticks");
+}
+
+#[test]
+fn every_end_has_its_exit_code() {
+    let folder = simulated();
+    let path = folder.path();
+    check(&replay(path, &[]), 2, "Usage");
+    check(&replay(path, &["play", "mems.csv", "-m", "mems.mapping.toml", "-u", "a b"]), 2, "unit \"a b\"");
+    check(
+        &replay(path, &["play", "mems.csv", "-m", "mems.mapping.toml", "-u", "a", "--speed", "fast"]),
+        2,
+        "must be max",
+    );
+    check(&replay(path, &["simulate", "--preset", "none", "--out", "x.csv"]), 2, "there are zeeman-rest");
+    check(
+        &replay(path, &["play", "mems.csv", "mems.csv", "-m", "mems.mapping.toml", "-u", "a"]),
+        2,
+        "2 log files",
+    );
+    check(
+        &replay(path, &["play", "none.csv", "-m", "mems.mapping.toml", "-u", "a"]),
+        1,
+        "none.csv: cannot open",
+    );
+
+    fs::write(path.join("bad.toml"), "version = 1\nfiles = 2\n").unwrap();
+    let output = replay(path, &["play", "mems.csv", "-m", "bad.toml", "-u", "a"]);
+    check(&output, 78, "bad.toml:2:1: files = 2: unknown key");
+    check(&output, 78, "bad.toml:1:1: file: is missing");
+    let bad = ["correct", "mems.csv", "-m", "mems.mapping.toml", "-c", "bad.toml"];
+    check(&replay(path, &bad), 78, "bad.toml:");
+    fs::write(path.join("scenario.toml"), "unit = 5\n").unwrap();
+    check(&replay(path, &["simulate", "scenario.toml", "--out", "x.csv"]), 78, "scenario.toml:1:8: ");
+}
+
+#[test]
+fn rows_that_cannot_be_read_refuse_or_count() {
+    let folder = simulated();
+    let path = folder.path();
+    let log = fs::read_to_string(path.join("mems.csv")).unwrap();
+    let mut lines: Vec<_> = log.lines().map(str::to_owned).collect();
+    lines[500] = lines[500].replacen(',', ";", 3);
+    fs::write(path.join("mems.csv"), lines.join("\n") + "\n").unwrap();
+    check(&correct(path, &[]), 1, "mems.csv:501:");
+
+    let mapping = fs::read_to_string(path.join("mems.mapping.toml")).unwrap();
+    let skip = mapping.replace("header = true", "header = true\non_bad_row = \"skip\"");
+    fs::write(path.join("mems.mapping.toml"), skip).unwrap();
+    let output = correct(path, &["--json"]);
+    check(&output, 3, "");
+    let summary: serde_json::Value = serde_json::from_str(&stdout(&output)).unwrap();
+    assert_eq!((summary["ticks"].as_u64(), summary["missed_ticks"].as_u64()), (Some(999), Some(1)));
+    assert_eq!(summary["log"]["skipped_rows"], 1);
+}
+
+#[test]
+fn completions_and_presets_go_to_standard_output() {
+    let folder = tempfile::tempdir().unwrap();
+    for shell in ["bash", "zsh", "fish"] {
+        assert!(stdout(&replay(folder.path(), &["completions", shell])).contains("isotherm-replay"));
+    }
+    let presets = stdout(&replay(folder.path(), &["simulate", "--list-presets"]));
+    assert_eq!(presets.lines().count(), 6);
+    for name in presets.lines().map(|line| line.split_whitespace().next().unwrap()) {
+        let output =
+            replay(folder.path(), &["simulate", "--preset", name, "--duration", "1", "--out", "x.csv.gz"]);
+        check(&output, 0, "");
+    }
+}
+
+#[test]
+fn playing_needs_a_service_unless_told_otherwise() {
+    let folder = simulated();
+    let output = replay(
+        folder.path(),
+        &["play", "mems.csv", "-m", "mems.mapping.toml", "-u", "MEMS-001", "--connect", "tcp/127.0.0.1:1"],
+    );
+    assert_eq!(output.status.code(), Some(1), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+#[test]
+fn examples_of_the_help_without_a_service_work_as_printed() {
+    let folder = tempfile::tempdir().unwrap();
+    // The examples name files of the project by their paths from its root.
+    fs::create_dir_all(folder.path().join("config/calibration")).unwrap();
+    fs::copy(calibration(), folder.path().join("config/calibration/mems-001.toml")).unwrap();
+    for command in ["simulate", "correct", "completions"] {
+        let help = stdout(&replay(folder.path(), &[command, "--help"]));
+        let examples = help.lines().filter_map(|line| line.trim().strip_prefix("isotherm-replay "));
+        let mut found = 0;
+        for example in examples.filter(|example| example.starts_with(|c: char| c.is_ascii_lowercase())) {
+            let args: Vec<_> = example.split(" > ").next().unwrap().split_whitespace().collect();
+            check(&replay(folder.path(), &args), 0, "");
+            found += 1;
+        }
+        assert!(found > 0, "{command} has no example:\n{help}");
+    }
+}

@@ -1,0 +1,123 @@
+//! The commands.
+
+use std::path::PathBuf;
+
+use clap::{Args, CommandFactory, Parser, Subcommand};
+use clap_complete::Shell;
+
+use crate::check::CheckArgs;
+use crate::demo::DemoArgs;
+use crate::exit::Exit;
+use crate::logging::LogArgs;
+
+/// Corrects the raw increments of inertial units in a stream, over Zenoh
+#[derive(Debug, Parser)]
+#[command(name = "isotherm", version, arg_required_else_help = true, after_help = EXIT_CODES)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+const EXIT_CODES: &str = "\
+Exit codes:
+  0   done
+  1   failed
+  2   called wrongly
+  3   finished, but data was lost
+  78  a configuration or calibration document is bad";
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Correct raw topics until stopped
+    Serve(ServeArgs),
+    /// Validate calibration documents, service configurations and Zenoh configurations
+    Check(CheckArgs),
+    /// Show simulated units being corrected, with a table and a report
+    Demo(DemoArgs),
+    /// Print the completions of a shell
+    Completions {
+        /// The shell
+        shell: Shell,
+    },
+}
+
+/// Arguments of `serve`.
+#[derive(Debug, Clone, Args)]
+#[command(after_help = "\
+Examples:
+  isotherm serve --config config/service.toml
+  isotherm serve --calibrations config/calibration --listen tcp/127.0.0.1:7447
+  isotherm serve --calibrations units --announce | head -1")]
+pub struct ServeArgs {
+    /// Service configuration (TOML); without it the defaults hold
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// Folder of calibration documents; replaces the configured one
+    #[arg(long, value_name = "FOLDER")]
+    pub calibrations: Option<PathBuf>,
+    /// How to reach others; each option given replaces the configured one
+    #[command(flatten)]
+    pub session: isotherm_bus::SessionOptions,
+    /// When ready, print one line of JSON on stdout: {"ready":true,"locators":[…]}
+    #[arg(long)]
+    pub announce: bool,
+    /// When ready, write the same line to this file
+    #[arg(long, value_name = "FILE")]
+    pub ready_file: Option<PathBuf>,
+    /// Print the totals at the end as JSON on stdout instead of a table
+    #[arg(long)]
+    pub json: bool,
+    /// What is logged, and how
+    #[command(flatten)]
+    pub log: LogArgs,
+}
+
+/// Runs the command line and says how it ended.
+#[must_use]
+pub fn run() -> Exit {
+    match Cli::parse().command {
+        Command::Serve(args) => logged(&args.log.clone(), crate::serve::run(args)),
+        Command::Check(args) => crate::check::run(&args),
+        Command::Demo(args) => logged(&LogArgs::quiet(), demo(args)),
+        Command::Completions { shell } => {
+            clap_complete::generate(shell, &mut Cli::command(), "isotherm", &mut std::io::stdout());
+            Exit::Ok
+        }
+    }
+}
+
+async fn demo(args: DemoArgs) -> Exit {
+    crate::demo::run(args).await.unwrap_or_else(|error| {
+        eprintln!("isotherm: {error}");
+        Exit::Failed
+    })
+}
+
+/// Runs a command that logs and needs a runtime.
+fn logged(log: &LogArgs, command: impl Future<Output = Exit>) -> Exit {
+    if let Err(words) = log.start() {
+        eprintln!("isotherm: {words}");
+        return Exit::Usage;
+    }
+    let runtime = match tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build() {
+        Ok(runtime) => runtime,
+        Err(error) => {
+            eprintln!("isotherm: cannot start the runtime: {error}");
+            return Exit::Failed;
+        }
+    };
+    let exit = runtime.block_on(command);
+    // A stop that was cut short may have left something hanging: it must not hold the process up.
+    runtime.shutdown_background();
+    exit
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+}

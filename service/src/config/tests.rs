@@ -1,0 +1,144 @@
+use super::*;
+
+fn parse(text: &str) -> Result<Settings, Vec<String>> {
+    let settings = Settings::parse(text, Path::new("service.toml"));
+    settings.map_err(|problems| problems.iter().map(ToString::to_string).collect())
+}
+
+#[test]
+fn an_empty_configuration_is_the_default() {
+    assert_eq!(parse(""), Ok(Settings::default()));
+    assert_eq!(parse("[navigation]\n[zenoh]\n"), Ok(Settings::default()));
+}
+
+#[test]
+fn every_key_arrives_where_it_belongs() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir(folder.path().join("units")).unwrap();
+    std::fs::write(folder.path().join("z.json5"), "{ mode: 'client' }").unwrap();
+    let text = r#"
+        calibrations = "units"
+        strict_start = true
+        max_units = 3
+        pairing_window_ms = 20
+        temperature_delay_ms = 0
+        uncalibrated = "hold"
+        tail_flush_ms = 250
+        status_interval_ms = 200
+        stop_timeout_ms = 1_500
+        congestion = "block"
+        [navigation]
+        ticks = 4
+        coning_sculling = true
+        [zenoh]
+        config = "z.json5"
+        connect = ["tcp/127.0.0.1:1"]
+        listen = ["tcp/127.0.0.1:0"]
+        namespace = "site/a"
+    "#;
+    let expected = Settings {
+        calibrations: Some(folder.path().join("units")),
+        strict_start: true,
+        max_units: 3,
+        unit: UnitSettings {
+            pairing_window: Span::from_ms(20),
+            temperature_delay: Span::ZERO,
+            uncalibrated: Uncalibrated::Hold,
+            navigation: NavigationStep::new(4, true).unwrap(),
+        },
+        tail_flush: Duration::from_millis(250),
+        status_interval: Duration::from_millis(200),
+        stop_timeout: Duration::from_millis(1500),
+        congestion: CongestionControl::Block,
+        session: SessionOptions {
+            config: Some(folder.path().join("z.json5")),
+            connect: vec!["tcp/127.0.0.1:1".to_owned()],
+            listen: vec!["tcp/127.0.0.1:0".to_owned()],
+            namespace: Some("site/a".to_owned()),
+        },
+    };
+    assert_eq!(Settings::parse(text, &folder.path().join("service.toml")), Ok(expected));
+}
+
+#[test]
+fn each_problem_names_its_place_its_value_and_its_limit() {
+    let cases = [
+        ("max_units = 0", "1:13: max_units: is 0, must be a whole number from 1 to 4096"),
+        ("\n max_units = 4097", "2:14: max_units: is 4097, must be a whole number from 1 to 4096"),
+        ("max_units = 1.5", "1:13: max_units: is 1.5, must be a whole number from 1 to 4096"),
+        ("max_units = -1", "1:13: max_units: is -1, must be a whole number from 1 to 4096"),
+        ("pairing_window_ms = 0", "1:21: pairing_window_ms: is 0, must be a whole number from 1 to 10000"),
+        (
+            "temperature_delay_ms = \"5\"",
+            "1:24: temperature_delay_ms: is \"5\", must be a whole number from 0 to 10000",
+        ),
+        ("tail_flush_ms = 9", "1:17: tail_flush_ms: is 9, must be a whole number from 10 to 60000"),
+        ("stop_timeout_ms = 99", "1:19: stop_timeout_ms: is 99, must be a whole number from 100 to 60000"),
+        (
+            "status_interval_ms = 60001",
+            "1:22: status_interval_ms: is 60001, must be a whole number from 100 to 60000",
+        ),
+        ("strict_start = 1", "1:16: strict_start: is 1, must be true or false"),
+        ("uncalibrated = \"drop\"", "1:16: uncalibrated: is \"drop\", must be \"pass-through\" or \"hold\""),
+        ("congestion = true", "1:14: congestion: is true, must be \"drop\" or \"block\""),
+        ("navigation = 4", "1:14: navigation: is 4, must be a table"),
+        (
+            "[navigation]\nticks = 1001",
+            "2:9: navigation.ticks: is 1001, must be a whole number from 1 to 1000",
+        ),
+        ("calibrations = 3", "1:16: calibrations: is 3, must be an existing folder"),
+        (
+            "calibrations = \"no/such\"",
+            "1:16: calibrations: is \"no/such\", must be an existing folder; looked for no/such",
+        ),
+        (
+            "[zenoh]\nconfig = \"no.json5\"",
+            "2:10: zenoh.config: is \"no.json5\", must be an existing file; looked for no.json5",
+        ),
+        ("[zenoh]\nlisten = \"tcp/x\"", "2:10: zenoh.listen: is \"tcp/x\", must be a list of strings"),
+        ("[zenoh]\nconnect = [1]", "2:11: zenoh.connect: is [1], must be a list of strings"),
+        ("[zenoh]\nnamespace = \"\"", "2:13: zenoh.namespace: is \"\", must be a string that is not empty"),
+        (
+            "[navigation]\ntick = 1",
+            "2:1: navigation.tick: is not a known key; known here: ticks, coning_sculling",
+        ),
+    ];
+    for (text, expected) in cases {
+        assert_eq!(parse(text), Err(vec![format!("service.toml:{expected}")]), "{text}");
+    }
+}
+
+#[test]
+fn all_problems_come_at_once_in_the_order_of_the_text() {
+    let problems =
+        parse("\"é\" = 1\nmax_units = 0\n[zenoh]\nlisten = 3\n[navigation]\nticks = 0\n").unwrap_err();
+    let places: Vec<_> =
+        problems.iter().map(|p| p.split(": ").take(2).collect::<Vec<_>>().join(" ")).collect();
+    assert_eq!(
+        places,
+        [
+            "service.toml:1:1 é",
+            "service.toml:2:13 max_units",
+            "service.toml:4:10 zenoh.listen",
+            "service.toml:6:9 navigation.ticks"
+        ]
+    );
+}
+
+#[test]
+fn an_endpoint_that_is_none_is_a_problem_of_the_configuration() {
+    let problems = parse("[zenoh]\nlisten = [\"nowhere\"]").unwrap_err();
+    assert_eq!(problems.len(), 1);
+    assert!(
+        problems[0].starts_with("service.toml:1:1: zenoh: listen/endpoints = [\"nowhere\"] is not valid"),
+        "{problems:?}"
+    );
+}
+
+#[test]
+fn syntax_errors_stand_alone() {
+    let problems = parse("max_units = \nstrict_start = 3").unwrap_err();
+    assert!(problems.iter().all(|problem| problem.contains("TOML: ")), "{problems:?}");
+    let problems = parse("max_units = 1\nmax_units = 0").unwrap_err();
+    assert_eq!(problems, ["service.toml:2:1: TOML: duplicate key"]);
+}

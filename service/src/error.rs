@@ -1,0 +1,67 @@
+//! What can stop the service.
+
+use std::path::PathBuf;
+
+use isotherm_bus::BusError;
+use isotherm_protocol::document::Problem;
+use thiserror::Error;
+
+use crate::exit::Exit;
+
+/// Why the service did not start, or a command failed.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum ServiceError {
+    /// A file cannot be read.
+    #[error("cannot read {path}: {source}", path = path.display())]
+    Read {
+        /// The file or folder.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// A file cannot be written.
+    #[error("cannot write {path}: {source}", path = path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The service configuration is bad.
+    #[error("the service configuration has {} problems", .0.len())]
+    Configuration(Vec<Problem>),
+    /// Calibration documents are bad and `strict_start` is set.
+    #[error("{count} calibration documents are bad, and strict_start is set")]
+    BadCalibrations {
+        /// How many.
+        count: usize,
+    },
+    /// The runtime or a thread cannot be started.
+    #[error("cannot start a thread: {0}")]
+    Thread(#[source] std::io::Error),
+    /// Something about the Zenoh session.
+    #[error(transparent)]
+    Bus(#[from] BusError),
+    /// A subscriber or queryable cannot be declared.
+    #[error("cannot declare {key}: {source}")]
+    Declare {
+        /// The key.
+        key: &'static str,
+        /// What Zenoh says.
+        source: zenoh::Error,
+    },
+}
+
+impl ServiceError {
+    /// The exit code that this error stands for.
+    #[must_use]
+    pub fn exit(&self) -> Exit {
+        match self {
+            Self::Configuration(_)
+            | Self::BadCalibrations { .. }
+            | Self::Bus(BusError::Configuration { .. } | BusError::Option { .. }) => Exit::BadConfiguration,
+            _ => Exit::Failed,
+        }
+    }
+}

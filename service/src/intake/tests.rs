@@ -1,0 +1,94 @@
+use isotherm_correction::sample::{GyroTick, OutputKind};
+use isotherm_correction::units::{Span, Timestamp};
+use isotherm_protocol::codec::encode;
+use isotherm_protocol::document::Document;
+
+use super::*;
+
+fn gyro_frame(sequence: u64) -> Vec<u8> {
+    let tick = GyroTick {
+        sequence,
+        end_time: Timestamp::from_ns(i64::try_from(sequence).unwrap() * 5_000_000),
+        duration: Span::from_ms(5),
+        readings: [1.0, 2.0, 3.0].into_iter().collect(),
+        ..GyroTick::default()
+    };
+    encode(&GyroBatch::from_core(OutputKind::Counts, &[tick]).unwrap()).unwrap()
+}
+
+fn intake(max_units: usize, calibrated: &[&str]) -> Intake {
+    let text = include_str!("../../../config/calibration/example-full.toml");
+    let calibration = Arc::new(Document::parse(text, None).unwrap().calibration);
+    let mut calibrations = Calibrations::default();
+    for serial in calibrated {
+        calibrations.insert(UnitId::new(serial).unwrap(), Arc::clone(&calibration), [7; 8]);
+    }
+    let settings = Settings { max_units, ..Settings::default() };
+    Intake::new(settings, calibrations, Box::new(|_| Ok(Box::new(|_| Ok(())))))
+}
+
+fn units(intake: &Intake) -> Vec<String> {
+    intake.each_unit(|actor| actor.id().to_string())
+}
+
+#[test]
+fn what_belongs_to_no_unit_is_counted_and_makes_none() {
+    let intake = intake(8, &[]);
+    let frame = gyro_frame(0);
+    let long = "x".repeat(65);
+    let cases = [
+        ("imu/U/raw/mag", Some(&frame[..]), "unknown_stream"),
+        ("imu/U/raw/gyro", None, "deletions"),
+        (&*format!("imu/{long}/raw/gyro"), Some(&frame[..]), "bad_serial"),
+        ("imu/ü/raw/gyro", Some(&frame[..]), "bad_serial"),
+        ("imu/U/raw/gyro", Some(&[][..]), "bad_frames_length"),
+        ("imu/U/raw/accel", Some(&frame[..]), "bad_frames_kind"),
+    ];
+    for (key, payload, kind) in cases {
+        let before = intake.totals().refused.get(kind).copied().unwrap_or(0);
+        intake.receive(key, payload, Instant::now());
+        assert_eq!(intake.totals().refused.get(kind), Some(&(before + 1)), "{key}");
+    }
+    assert!(units(&intake).is_empty());
+    assert!(intake.receive("imu/U/raw/gyro", Some(&frame), Instant::now()), "a new unit's status is due");
+    assert_eq!(units(&intake), ["U"]);
+}
+
+#[test]
+fn rubbish_for_a_unit_with_a_calibration_is_that_units_rubbish() {
+    let intake = intake(8, &["U"]);
+    intake.receive("imu/U/raw/gyro", Some(&[1, 2]), Instant::now());
+    assert_eq!(intake.totals().unit(&UnitId::new("U").unwrap()).bad, 1);
+    assert!(intake.totals().refused.is_empty());
+}
+
+#[test]
+fn strange_units_do_not_take_the_places_of_calibrated_ones() {
+    let intake = intake(3, &["CAL-1", "CAL-2"]);
+    for serial in ["A", "B", "C", "CAL-1", "CAL-2", "D"] {
+        intake.receive(&format!("imu/{serial}/raw/gyro"), Some(&gyro_frame(0)), Instant::now());
+    }
+    assert_eq!(units(&intake), ["A", "CAL-1", "CAL-2"]);
+    assert_eq!(intake.totals().refused.get("units_refused"), Some(&3));
+}
+
+#[test]
+fn a_panic_costs_one_unit_its_memory_and_nothing_else() {
+    let intake = intake(8, &[]);
+    for serial in ["A", "B"] {
+        intake.receive(&format!("imu/{serial}/raw/gyro"), Some(&gyro_frame(0)), Instant::now());
+    }
+    let reached = intake.each_unit(|actor| {
+        assert_ne!(actor.id().as_str(), "A", "on purpose");
+        actor.id().to_string()
+    });
+    assert_eq!(reached, ["B"]);
+    for serial in ["A", "B"] {
+        intake.receive(&format!("imu/{serial}/raw/gyro"), Some(&gyro_frame(1)), Instant::now());
+    }
+    let totals = intake.totals();
+    let account = |serial: &str| (totals.units[serial].ticks_in, totals.units[serial].alarms);
+    assert_eq!((account("A"), account("B")), ((2, 1), (2, 0)));
+    let status = intake.status(&UnitId::new("A").unwrap()).unwrap();
+    assert!(status.last_fault.unwrap().contains("on purpose"));
+}

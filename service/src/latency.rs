@@ -1,0 +1,115 @@
+//! A histogram of latencies with a bounded relative error.
+
+/// Sub-buckets per power of two: a bucket is at most 1/16 of its lower bound wide.
+const SUB_BUCKETS: u64 = 1 << SUB_BITS;
+/// log₂ of it.
+const SUB_BITS: u32 = 4;
+/// One linear stretch below 16 ns, then sixteen buckets for each power of two up to 2⁶⁴ ns.
+const BUCKETS: usize = ((u64::BITS - SUB_BITS + 1) as usize) << SUB_BITS;
+
+/// Counts latencies in logarithmic buckets; recording never allocates.
+#[derive(Debug, Clone)]
+pub struct Histogram {
+    counts: Box<[u64]>,
+    total: u64,
+    largest: u64,
+}
+
+impl Default for Histogram {
+    fn default() -> Self {
+        Self { counts: vec![0; BUCKETS].into_boxed_slice(), total: 0, largest: 0 }
+    }
+}
+
+impl Histogram {
+    /// Counts one latency (ns).
+    pub fn record(&mut self, ns: u64) {
+        if let Some(count) = self.counts.get_mut(bucket(ns)) {
+            *count += 1;
+        }
+        self.total += 1;
+        self.largest = self.largest.max(ns);
+    }
+
+    /// How many were counted.
+    #[must_use]
+    pub fn total(&self) -> u64 {
+        self.total
+    }
+
+    /// The latency (ns) that the share `share` (0…1) of all counted ones does not exceed; 0 where nothing was counted.
+    ///
+    /// *Numerics*: never below the exact value, at most 1/16 above it.
+    #[must_use]
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        clippy::cast_precision_loss,
+        reason = "a rank among fewer than 2⁵³ latencies; float-to-int saturates"
+    )]
+    pub fn quantile(&self, share: f64) -> u64 {
+        let rank = ((self.total as f64 * share.clamp(0.0, 1.0)).ceil() as u64).max(1);
+        let mut seen = 0;
+        for (index, count) in self.counts.iter().enumerate() {
+            seen += count;
+            if seen >= rank {
+                return upper_bound(index as u64).min(self.largest);
+            }
+        }
+        self.largest
+    }
+}
+
+/// Index of the bucket that a latency falls in.
+fn bucket(ns: u64) -> usize {
+    if ns < SUB_BUCKETS {
+        return usize::try_from(ns).unwrap_or(0);
+    }
+    let shift = ns.ilog2() - SUB_BITS;
+    let sub = (ns >> shift) - SUB_BUCKETS;
+    usize::try_from(u64::from(shift + 1) * SUB_BUCKETS + sub).unwrap_or(BUCKETS - 1)
+}
+
+/// Largest latency of a bucket.
+fn upper_bound(index: u64) -> u64 {
+    if index < SUB_BUCKETS {
+        return index;
+    }
+    let shift = index / SUB_BUCKETS - 1;
+    let lower = (SUB_BUCKETS + index % SUB_BUCKETS) << shift;
+    lower + ((1 << shift) - 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_latency_falls_in_a_bucket_that_ends_at_most_a_sixteenth_above_it() {
+        let powers = (0..u64::BITS).flat_map(|bit| {
+            let power = 1_u64 << bit;
+            [power - 1, power, power | (power >> 1), power | (power >> 2) | 1]
+        });
+        for ns in powers.chain([u64::MAX]) {
+            let index = bucket(ns);
+            assert!(index < BUCKETS, "{ns}");
+            let upper = upper_bound(index as u64);
+            assert!(upper >= ns && upper - ns <= ns / SUB_BUCKETS, "{ns}: {upper}");
+            assert!(index == 0 || upper_bound(index as u64 - 1) < ns, "{ns}");
+        }
+    }
+
+    #[test]
+    fn quantiles_of_a_known_set() {
+        let mut histogram = Histogram::default();
+        assert_eq!(histogram.quantile(0.5), 0);
+        (1..=1000).for_each(|us| histogram.record(us * 1000));
+        for (share, exact) in [(0.0, 1_000), (0.5, 500_000), (0.99, 990_000), (1.0, 1_000_000)] {
+            let got = histogram.quantile(share);
+            assert!(got >= exact && got <= exact + exact / 16, "{share}: {got}");
+        }
+        assert_eq!(histogram.total(), 1000);
+        histogram.record(u64::MAX);
+        assert_eq!(histogram.quantile(1.0), u64::MAX);
+    }
+}

@@ -1,0 +1,118 @@
+//! The `serve` command: from arguments to a running service, and from a signal to its end.
+
+use std::io::Write;
+use std::path::Path;
+
+use tokio::signal::unix::{SignalKind, signal};
+
+use crate::cli::ServeArgs;
+use crate::config::Settings;
+use crate::exit::Exit;
+use crate::{ServiceError, Totals};
+
+/// Serves until a signal comes.
+pub(crate) async fn run(args: ServeArgs) -> Exit {
+    let json = args.json;
+    match serve(args).await {
+        Ok(Some(totals)) => report(&totals, json),
+        Ok(None) => {
+            tracing::error!("stopped at once by a second signal");
+            Exit::DataLoss
+        }
+        Err(error) => failed(&error),
+    }
+}
+
+/// Says what is wrong, every problem on a line of its own.
+fn failed(error: &ServiceError) -> Exit {
+    if let ServiceError::Configuration(problems) = error {
+        for problem in problems {
+            eprintln!("{problem}");
+        }
+    }
+    eprintln!("isotherm: {error}");
+    error.exit()
+}
+
+/// Says what was done.
+fn report(totals: &Totals, json: bool) -> Exit {
+    let text = if json { serde_json::to_string(totals).unwrap_or_default() } else { totals.table() };
+    // Who started the service may have closed the pipe; the exit code tells the rest.
+    let _ = writeln!(std::io::stdout(), "{text}");
+    totals.exit()
+}
+
+/// The configuration with the command line's options put over it.
+fn settings(args: &ServeArgs) -> Result<Settings, ServiceError> {
+    let mut settings = match &args.config {
+        Some(path) => Settings::load(path)?,
+        None => Settings::default(),
+    };
+    if let Some(folder) = &args.calibrations {
+        settings.calibrations = Some(folder.clone());
+    }
+    let (configured, given) = (&mut settings.session, &args.session);
+    if given.config.is_some() {
+        configured.config.clone_from(&given.config);
+    }
+    if !given.connect.is_empty() {
+        configured.connect.clone_from(&given.connect);
+    }
+    if !given.listen.is_empty() {
+        configured.listen.clone_from(&given.listen);
+    }
+    if given.namespace.is_some() {
+        configured.namespace.clone_from(&given.namespace);
+    }
+    Ok(settings)
+}
+
+/// Runs the service between its start and a signal; `None` where a second signal came before it had stopped.
+async fn serve(args: ServeArgs) -> Result<Option<Totals>, ServiceError> {
+    let settings = settings(&args)?;
+    let mut interrupt = signal(SignalKind::interrupt()).map_err(ServiceError::Thread)?;
+    let mut terminate = signal(SignalKind::terminate()).map_err(ServiceError::Thread)?;
+    let mut stop_asked = async || {
+        tokio::select! {
+            _ = interrupt.recv() => "SIGINT",
+            _ = terminate.recv() => "SIGTERM",
+        }
+    };
+
+    let session = tokio::select! {
+        session = isotherm_bus::open(&settings.session) => session?,
+        // Still looking for a router, perhaps: there is nothing to flush.
+        _ = stop_asked() => return Ok(Some(Totals { stopped_in_time: true, ..Totals::default() })),
+    };
+    let locators = isotherm_bus::locators(&session);
+    let service = crate::start(settings, session).await?;
+    tracing::info!(version = env!("CARGO_PKG_VERSION"), locators = locators.join(" "), "ready");
+    announce(&args, &locators)?;
+
+    let name = stop_asked().await;
+    tracing::info!(signal = name, "stopping");
+    tokio::select! {
+        totals = service.stop() => Ok(Some(totals)),
+        _ = stop_asked() => Ok(None),
+    }
+}
+
+/// Tells scripts that the service is ready and where.
+fn announce(args: &ServeArgs, locators: &[String]) -> Result<(), ServiceError> {
+    let line = serde_json::json!({ "ready": true, "locators": locators }).to_string();
+    if args.announce {
+        let mut stdout = std::io::stdout().lock();
+        // Nobody reading is nobody waiting.
+        let _ = writeln!(stdout, "{line}").and_then(|()| stdout.flush());
+    }
+    args.ready_file.as_deref().map_or(Ok(()), |path| write_whole(path, &line))
+}
+
+/// Writes a file that is never seen half written.
+fn write_whole(path: &Path, line: &str) -> Result<(), ServiceError> {
+    let write = |source| ServiceError::Write { path: path.to_owned(), source };
+    let mut partial = path.as_os_str().to_owned();
+    partial.push(".part");
+    std::fs::write(&partial, format!("{line}\n")).map_err(write)?;
+    std::fs::rename(&partial, path).map_err(write)
+}

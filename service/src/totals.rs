@@ -1,0 +1,133 @@
+//! What the service did, as it says at its end.
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+use comfy_table::{CellAlignment, Table, presets};
+use isotherm_protocol::key::UnitId;
+use serde::Serialize;
+
+use crate::exit::Exit;
+
+/// Account of one unit since the service started.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+pub struct UnitTotals {
+    /// Raw gyro ticks received.
+    pub ticks_in: u64,
+    /// Raw gyro ticks given out corrected.
+    pub ticks_out: u64,
+    /// Gaps announced.
+    pub gaps: u64,
+    /// Raw gyro ticks announced as missing in them.
+    pub ticks_missed: u64,
+    /// Messages refused.
+    pub bad: u64,
+    /// Corrected ticks that could not be published.
+    pub unpublished: u64,
+    /// Resets after an event thought impossible.
+    pub alarms: u64,
+    /// Time that the service added, median (ns).
+    pub added_latency_p50_ns: u64,
+    /// The same, 99th percentile (ns).
+    pub added_latency_p99_ns: u64,
+}
+
+/// Account of the service.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
+pub struct Totals {
+    /// Account of each unit, by serial.
+    pub units: BTreeMap<String, UnitTotals>,
+    /// Messages refused that belong to no unit of these, by kind.
+    pub refused: BTreeMap<String, u64>,
+    /// Whether the stop finished within its time: everything flushed, the session closed.
+    pub stopped_in_time: bool,
+}
+
+impl Totals {
+    /// The account of one unit; empty where it never appeared.
+    #[must_use]
+    pub fn unit(&self, unit: &UnitId) -> UnitTotals {
+        self.units.get(unit.as_str()).copied().unwrap_or_default()
+    }
+
+    /// Whether received data was lost inside the service. Announced gaps are not: they say that nothing was received.
+    #[must_use]
+    pub fn lost(&self) -> bool {
+        !self.stopped_in_time || self.units.values().any(|unit| unit.unpublished > 0 || unit.alarms > 0)
+    }
+
+    /// The exit code that these totals stand for.
+    #[must_use]
+    pub fn exit(&self) -> Exit {
+        if self.lost() { Exit::DataLoss } else { Exit::Ok }
+    }
+
+    /// A table for people.
+    #[must_use]
+    pub fn table(&self) -> String {
+        let mut table = Table::new();
+        table.load_preset(presets::UTF8_HORIZONTAL_ONLY);
+        table.set_header([
+            "unit",
+            "ticks in",
+            "ticks out",
+            "gaps",
+            "missed",
+            "bad",
+            "unpublished",
+            "alarms",
+            "added p50 µs",
+            "added p99 µs",
+        ]);
+        for (unit, totals) in &self.units {
+            let counts = [
+                totals.ticks_in,
+                totals.ticks_out,
+                totals.gaps,
+                totals.ticks_missed,
+                totals.bad,
+                totals.unpublished,
+                totals.alarms,
+            ];
+            let latencies = [totals.added_latency_p50_ns, totals.added_latency_p99_ns];
+            let mut row = vec![unit.clone()];
+            row.extend(counts.iter().map(u64::to_string));
+            row.extend(latencies.iter().map(|ns| format!("{}.{}", ns / 1000, ns % 1000 / 100)));
+            table.add_row(row);
+        }
+        table.column_iter_mut().skip(1).for_each(|column| column.set_cell_alignment(CellAlignment::Right));
+        let mut text = table.to_string();
+        for (kind, count) in &self.refused {
+            // Writing to a string cannot fail.
+            let _ = write!(text, "\n{kind} (no unit): {count}");
+        }
+        text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn announced_gaps_are_no_loss_and_unpublished_ticks_are() {
+        let with = |unit: UnitTotals, stopped_in_time| Totals {
+            units: BTreeMap::from([("ZLG-1".to_owned(), unit)]),
+            stopped_in_time,
+            ..Totals::default()
+        };
+        let whole = UnitTotals {
+            ticks_in: 9,
+            ticks_out: 9,
+            gaps: 1,
+            ticks_missed: 4,
+            bad: 2,
+            ..UnitTotals::default()
+        };
+        assert_eq!(with(whole, true).exit(), Exit::Ok);
+        assert_eq!(with(whole, false).exit(), Exit::DataLoss);
+        assert_eq!(with(UnitTotals { unpublished: 1, ..whole }, true).exit(), Exit::DataLoss);
+        assert_eq!(with(UnitTotals { alarms: 1, ..whole }, true).exit(), Exit::DataLoss);
+        assert!(with(whole, true).table().contains("ZLG-1"));
+    }
+}

@@ -1,0 +1,27 @@
+#!/usr/bin/env bash
+# The Python subscriber against docs/wire.md and against the Rust side.
+#
+# Makes a virtual environment under target/ for it. Skipped, in plain words, where Python or its venv module is missing.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/../.."
+
+if ! command -v python3 >/dev/null; then
+    echo "skipped: python3 not found"
+    exit 0
+fi
+if ! python3 -c 'import ensurepip, venv' 2>/dev/null; then
+    echo "skipped: python3 has no venv module with pip"
+    exit 0
+fi
+if ! python3 -c 'import sys; sys.exit(sys.version_info < (3, 9))'; then
+    echo "skipped: python3 is older than 3.9"
+    exit 0
+fi
+
+venv=${CARGO_TARGET_DIR:-target}/python-venv
+case "$venv" in /*) ;; *) venv=$PWD/$venv ;; esac
+[ -x "$venv/bin/pip" ] || python3 -m venv "$venv"
+"$venv/bin/pip" install --quiet --disable-pip-version-check --requirement tests/python/requirements.txt
+
+"$venv/bin/python" tests/python/subscriber.py --vectors docs/wire.md
+ISOTHERM_PYTHON=$venv/bin/python cargo test --release --locked -p isotherm-tests --test system python_subscriber -- --nocapture
