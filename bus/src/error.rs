@@ -12,7 +12,7 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum BusError {
     /// The Zenoh configuration file cannot be read or is not valid.
-    #[error("cannot use the Zenoh configuration {path}: {source}", path = path.display())]
+    #[error("cannot use the Zenoh configuration {path}: {words}", path = path.display(), words = words(source))]
     Configuration {
         /// The file.
         path: PathBuf,
@@ -20,7 +20,7 @@ pub enum BusError {
         source: zenoh::Error,
     },
     /// An option is not valid, e.g. an endpoint that is none.
-    #[error("{option} = {value} is not valid: {source}")]
+    #[error("{option} = {value} is not valid: {words}", words = words(source))]
     Option {
         /// Name of the option.
         option: &'static str,
@@ -30,10 +30,10 @@ pub enum BusError {
         source: zenoh::Error,
     },
     /// The session cannot be opened.
-    #[error("cannot open the Zenoh session: {0}")]
+    #[error("cannot open the Zenoh session: {words}", words = words(.0))]
     Open(#[source] zenoh::Error),
     /// A publisher, subscriber or querier cannot be declared.
-    #[error("cannot declare {key}: {source}")]
+    #[error("cannot declare {key}: {words}", words = words(source))]
     Declare {
         /// The key.
         key: String,
@@ -41,7 +41,7 @@ pub enum BusError {
         source: zenoh::Error,
     },
     /// A message cannot be handed to Zenoh.
-    #[error("cannot publish on {key}: {source}")]
+    #[error("cannot publish on {key}: {words}", words = words(source))]
     Put {
         /// The key.
         key: String,
@@ -115,6 +115,48 @@ pub enum BusError {
     #[error("the Zenoh session did not close within {0:?}")]
     CloseTimeout(Duration),
     /// The session did not close in order.
-    #[error("cannot close the Zenoh session: {0}")]
+    #[error("cannot close the Zenoh session: {words}", words = words(.0))]
     Close(#[source] zenoh::Error),
+}
+
+/// What Zenoh says, without the places in Zenoh's own source that it names in between.
+#[must_use]
+pub fn words(error: &zenoh::Error) -> String {
+    let text = error.to_string();
+    let mut kept = String::with_capacity(text.len());
+    let mut rest = text.as_str();
+    while let Some((before, place)) = rest.split_once(" at ") {
+        kept.push_str(before);
+        let end = place.find(char::is_whitespace).unwrap_or(place.len());
+        let (place, after) = place.split_at(end);
+        let line = place.rsplit_once(".rs:").map(|(_, line)| line);
+        match line {
+            // What stands behind the line number closes a bracket or a sentence.
+            Some(line) => kept.push_str(line.trim_start_matches(|c: char| c.is_ascii_digit())),
+            None => kept.extend([" at ", place]),
+        }
+        rest = after;
+    }
+    kept.push_str(rest);
+    kept
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn places_in_foreign_source_are_left_out() {
+        for (text, expected) in [
+            ("no luck at /a/b-1.2/src/c.rs:388.", "no luck."),
+            (
+                "x: [in use (os error 98) at /a/tcp.rs:61.] at /a/unicast.rs:338.",
+                "x: [in use (os error 98).].",
+            ),
+            ("met at noon at /a.rs:1", "met at noon"),
+            ("plain", "plain"),
+        ] {
+            assert_eq!(words(&text.into()), expected);
+        }
+    }
 }

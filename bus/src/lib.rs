@@ -24,6 +24,6 @@ pub mod session;
 
 pub use consumer::Consumer;
 pub use continuity::Continuity;
-pub use error::BusError;
+pub use error::{BusError, words};
 pub use producer::{Producer, ProducerOptions};
 pub use session::{SessionOptions, close, locators, open};

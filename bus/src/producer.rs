@@ -4,7 +4,8 @@ mod assemble;
 mod in_flight;
 
 use std::sync::Arc;
-use std::time::Duration;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use isotherm_correction::sample::{AccelTick, GyroTick, OutputKind, TemperatureReading};
 use isotherm_protocol::codec::{self, MAX_TICKS, Message};
@@ -79,6 +80,8 @@ pub struct Producer {
     temperature_pending: Vec<TemperatureReading>,
     frame: Vec<u8>,
     sent: u64,
+    /// Number of this producer's run.
+    series: u64,
     in_flight: Option<(Arc<InFlight>, Subscriber<()>)>,
 }
 
@@ -119,16 +122,19 @@ impl Producer {
             temperature_pending: Vec::new(),
             frame: Vec::new(),
             sent: 0,
+            series: new_series(),
             in_flight,
             options,
         })
     }
 
-    /// Takes one gyro tick.
+    /// Takes one gyro tick. It is sent in this producer's own series: what another one of the same unit sent before, in
+    /// this process or another, does not go on with it.
     ///
     /// # Errors
     /// [`BusError::NotCounts`], [`BusError::Encode`], [`BusError::Put`], [`BusError::NoAcknowledgement`].
-    pub async fn gyro(&mut self, output: OutputKind, tick: GyroTick) -> Result<(), BusError> {
+    pub async fn gyro(&mut self, output: OutputKind, mut tick: GyroTick) -> Result<(), BusError> {
+        tick.series = self.series;
         if !self.gyro_pending.continues(output, tick.sequence, tick.readings.len()) {
             self.flush().await?;
         }
@@ -248,6 +254,15 @@ impl Producer {
     fn not_counts(&self, sequence: u64) -> BusError {
         BusError::NotCounts { unit: self.unit.clone(), sequence }
     }
+}
+
+/// A number that no producer of the unit had before: the time of the start, which reaches no corrected increment, and a
+/// count of the producers of this process.
+fn new_series() -> u64 {
+    static COUNT: AtomicU64 = AtomicU64::new(0);
+    let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    let ns = u64::try_from(now.as_nanos()).unwrap_or(u64::MAX);
+    ns.wrapping_add(COUNT.fetch_add(1, Ordering::Relaxed))
 }
 
 /// Encodes and publishes one batch.

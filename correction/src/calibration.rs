@@ -72,6 +72,11 @@ impl Calibration {
         self.accel_output
     }
 
+    /// Whether another set filters the same channels in the same way, so that thermal memory means the same in both.
+    pub(crate) fn same_thermal_basis(&self, other: &Self) -> bool {
+        self.filter == other.filter && self.channels == other.channels
+    }
+
     /// The temperature channels that the set follows, in its own order.
     #[must_use]
     pub fn channels(&self) -> &[Channel] {

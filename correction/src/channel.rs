@@ -134,9 +134,12 @@ pub enum Verdict {
 /// Memory of one channel.
 #[derive(Debug, Clone)]
 pub struct ChannelMemory {
-    /// Last readings, rejected ones included, so that a lasting step is believed after three.
+    /// Last readings within the sensor's range, spikes included, so that a lasting step is believed after three.
     recent: VecDeque<f64>,
+    /// Last reading of the present series.
     last: Option<(Timestamp, f64)>,
+    /// Whether there was a reading ever, in this series or in one before.
+    seen: bool,
     rejected: bool,
     points_since_restart: usize,
     grid: VecDeque<f64>,
@@ -153,6 +156,7 @@ impl ChannelMemory {
         Self {
             recent: VecDeque::with_capacity(MEDIAN_READINGS + 1),
             last: None,
+            seen: false,
             rejected: false,
             points_since_restart: 0,
             grid: VecDeque::with_capacity(filter.smoothing_points + 1),
@@ -162,10 +166,10 @@ impl ChannelMemory {
         }
     }
 
-    /// The state at the last grid point; `None` before the first reading.
+    /// The state at the last grid point, held over a restart; `None` before the first reading of all.
     #[must_use]
     pub fn state(&self) -> Option<ThermalState> {
-        self.last.map(|_| self.state)
+        self.seen.then_some(self.state)
     }
 
     /// Whether the derivatives still rest on the assumption that nothing moved before the first reading.
@@ -205,6 +209,7 @@ impl ChannelMemory {
             return Verdict::Rejected;
         }
         self.rejected = false;
+        self.seen = true;
 
         let step = filter.grid_step.as_ns();
         let Some((last_time, last_temperature)) = self.last.replace((time, temperature)) else {

@@ -85,6 +85,8 @@ pub struct GyroTick {
     pub meander: Option<LasingMode>,
     /// Half-period counts, one per gyro, or empty where the instrument has none.
     pub half_periods: Sensors<HalfPeriodCounts>,
+    /// Number of the producer's run: where it changes, neither sequence nor time continue what came before.
+    pub series: u64,
 }
 
 /// One raw tick of all accelerometers of a unit.

@@ -34,6 +34,9 @@ pub const SETTLE_RANGE: [f64; 2] = [1.0, 20.0];
 /// Time constants after which the transient counts as settled, where nothing else is stated: e⁻¹⁶ remains.
 pub const DEFAULT_SETTLE_TIME_CONSTANTS: f64 = 8.0;
 
+/// Tick durations beyond which two ticks say nothing about the input's acceleration between them.
+const REACH_TICKS: f64 = 16.0;
+
 /// Where `f_i` comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum ServoForm {
@@ -173,6 +176,8 @@ pub struct ServoMemory {
     settles_from: Option<Timestamp>,
     /// Per gyro: middle of the first tick measured after the transition, and its `f_1` (Hz).
     first: [Option<(Timestamp, f64)>; MAX_SENSORS],
+    /// Per gyro: middle of the last good tick, and its mean rate without the transient (counts/s).
+    last: [Option<(Timestamp, f64)>; MAX_SENSORS],
 }
 
 impl ServoMemory {
@@ -188,7 +193,7 @@ impl ServoMemory {
     /// [`Substitution::is_lost`](crate::reversal::Substitution::is_lost)).
     pub fn advance(&mut self, lost: bool, end_time: Timestamp, duration: Span) {
         if lost {
-            *self = Self { switching: true, ..Self::default() };
+            *self = Self { switching: true, last: self.last, ..Self::default() };
         } else if self.switching {
             self.switching = false;
             self.settles_from = Some(end_time - duration);
@@ -200,31 +205,32 @@ impl ServoMemory {
         *self = Self::default();
     }
 
-    /// The apparent rate of gyro `sensor` in the tick of the last [`advance`](Self::advance).
+    /// The apparent rate of gyro `sensor` in the tick of the last [`advance`](Self::advance). Call it for every good
+    /// tick: the last one before a switch tells how the input accelerates over it.
     ///
-    /// Measured form: `f_i = (c⁺ − c⁻)/Δt` with the sign of rotation in the counts, since either half lasts
+    /// Measured form: `f_i = (c⁺ − c⁻)/Δt + r·Δt/4` with the sign of rotation in the counts, since either half lasts
     /// Δt/2 and `f_i` is half the difference of their rates. The input rate cancels in it, also one beyond the
-    /// dither's own. Modelled form: `f_1` is taken the same way from the first tick that has half-period counts,
-    /// and decays from that tick's middle.
+    /// dither's own; its acceleration r (counts/s²) does not, and comes from this tick and the last good one. Modelled
+    /// form: `f_1` is taken the same way from the first tick that has half-period counts, and decays from that
+    /// tick's middle.
     pub fn apparent_rate(&mut self, sensor: usize, servo: &Servo, tick: &ServoTick) -> Transient {
-        let Some(start) = self.settles_from else {
-            return Transient::Settled;
-        };
         let middle = tick.end_time - Span::from_ns(tick.duration.as_ns() / 2);
+        let mean_hz = tick.half_periods.and_then(|counts| mean_hz(counts, tick.duration));
         // A tick before the end of the transition cannot be: its clock is broken.
-        let elapsed_s = middle.seconds_from(start);
-        if !(0.0..=servo.settle_time_s()).contains(&elapsed_s) {
+        let settles = 0.0..=servo.settle_time_s();
+        let running = self.settles_from.is_some_and(|start| settles.contains(&middle.seconds_from(start)));
+        let unbalance = if running { libm::tanh(tick.duration.as_s() / (2.0 * servo.time_constant_s)) } else { 0.0 };
+        let excess_hz = if running { self.frequency_excess_hz(sensor, servo, tick, middle, unbalance) } else { None };
+        if let Some(last) = self.last.get_mut(sensor) {
+            *last = mean_hz.map(|mean| (middle, mean - unbalance * excess_hz.unwrap_or(0.0)));
+        }
+        if !running {
             return Transient::Settled;
         }
-        let Some(excess_hz) = self.frequency_excess_hz(sensor, servo, tick, middle) else {
-            return Transient::Unmeasured;
-        };
-        let unbalance = libm::tanh(tick.duration.as_s() / (2.0 * servo.time_constant_s));
-        let rate_rad_per_s = tick.scale_rad_per_count * unbalance * excess_hz;
-        if rate_rad_per_s.is_finite() {
-            Transient::Apparent { rate_rad_per_s }
-        } else {
-            Transient::Unmeasured
+        let rate = excess_hz.map(|excess_hz| tick.scale_rad_per_count * unbalance * excess_hz);
+        match rate.filter(|rate| rate.is_finite()) {
+            Some(rate_rad_per_s) => Transient::Apparent { rate_rad_per_s },
+            None => Transient::Unmeasured,
         }
     }
 
@@ -235,20 +241,45 @@ impl ServoMemory {
         servo: &Servo,
         tick: &ServoTick,
         middle: Timestamp,
+        unbalance: f64,
     ) -> Option<f64> {
         let rest_hz = servo.rest_frequency_hz.at(tick.temperature_deg_c).value;
-        let measured = tick.half_periods.and_then(|counts| frequency_hz(counts, tick.duration));
+        let measured = tick.half_periods.and_then(|counts| {
+            let excess = frequency_hz(counts, tick.duration)? - rest_hz;
+            let (weight, change) = self.input_change(sensor, tick, middle);
+            // The change of rate since the last tick has `unbalance` times the excess itself in it.
+            Some((excess + weight * change) / (1.0 + weight * unbalance))
+        });
         if servo.form == ServoForm::Measured {
-            return measured.map(|f| f - rest_hz);
+            return measured;
         }
         let first = self.first.get_mut(sensor)?;
         if first.is_none() {
-            *first = measured.map(|f| (middle, f));
+            *first = measured.map(|excess| (middle, rest_hz + excess));
         }
         let (since, first_hz) = (*first)?;
         let decay = libm::exp(-2.0 * middle.seconds_from(since) / servo.time_constant_s);
         Some((first_hz - rest_hz) * decay)
     }
+
+    /// Change of the mean rate since the last good tick (counts/s), and the weight with which it stands for r·Δt/4;
+    /// nothing where that tick is too far away.
+    fn input_change(&self, sensor: usize, tick: &ServoTick, middle: Timestamp) -> (f64, f64) {
+        let last = self.last.get(sensor).copied().flatten();
+        let now = tick.half_periods.and_then(|counts| mean_hz(counts, tick.duration));
+        let (Some((then, before)), Some(now)) = (last, now) else {
+            return (0.0, 0.0);
+        };
+        let (between_s, duration_s) = (middle.seconds_from(then), tick.duration.as_s());
+        let near = between_s > 0.0 && between_s <= REACH_TICKS * duration_s;
+        if near { (0.25 * duration_s / between_s, now - before) } else { (0.0, 0.0) }
+    }
+}
+
+/// `(c⁺ + c⁻)/Δt` (counts/s); `None` for a tick without duration.
+fn mean_hz(counts: HalfPeriodCounts, duration: Span) -> Option<f64> {
+    let sum = f64::from(counts.positive) + f64::from(counts.negative);
+    (duration > Span::ZERO).then(|| sum / duration.as_s())
 }
 
 /// `f_i = (c⁺ − c⁻)/Δt` (Hz); `None` for a tick without duration.

@@ -111,6 +111,8 @@ pub struct Unit {
     unannounced: u64,
     /// The next output must announce a restart that fell on a tick which was held back.
     restart_due: bool,
+    /// End of the first tick since the unit appeared or its producer restarted.
+    turn_on: Option<Timestamp>,
     last_end: Timestamp,
 }
 
@@ -128,6 +130,7 @@ impl Unit {
             counters: Counters::default(),
             unannounced: 0,
             restart_due: false,
+            turn_on: None,
             last_end: Timestamp::default(),
         }
     }
@@ -145,11 +148,15 @@ impl Unit {
         match event {
             Event::Gyro { output, ticks } => {
                 let Some(batch_end) = ticks.iter().map(|tick| tick.end_time).max() else { return };
+                let mut starts_anew = false;
                 for tick in ticks {
                     self.counters.gyro_ticks_in += 1;
                     if self.fits(output, tick.readings.len(), |c| (c.gyro_output(), c.gyro_count())) {
-                        self.gyros.admit(tick, batch_end, &mut self.counters);
+                        starts_anew |= self.gyros.admit(tick, batch_end, &mut self.counters);
                     }
+                }
+                if !starts_anew {
+                    self.accels.goes_on();
                 }
                 self.release(false, emit);
             }
@@ -195,16 +202,19 @@ impl Unit {
 
     /// Gives out every tick that need not wait any longer.
     fn release(&mut self, flushing: bool, emit: &mut dyn FnMut(&CorrectedTick)) {
-        while let Some((front, expired)) = self.gyros.front(self.settings.pairing_window, flushing) {
+        while let Some(front) = self.gyros.front(self.settings.pairing_window, flushing) {
+            if front.restart {
+                self.accels.starts_anew(front.tick.end_time, &mut self.counters);
+            }
             // Whether a unit without calibration has accelerometers is not known: it waits as if it had.
             let expects_accel = self.active.as_ref().is_none_or(|active| active.calibration.accel_count() > 0);
-            let accel = match self.accels.take(front, &mut self.counters) {
+            let accel = match self.accels.take(front.tick, &mut self.counters) {
                 Match::Found(accel) => Some(accel),
-                Match::NotYet if expects_accel && !expired => return,
+                Match::NotYet if expects_accel && !front.expired => return,
                 Match::NotYet => None,
             };
             let Some(released) = self.gyros.release() else { return };
-            self.accels.gyro_released(released.tick.end_time, released.restart);
+            self.accels.gyro_released(released.tick.end_time);
             self.give_out(&released, accel.as_ref(), emit);
         }
     }
@@ -215,13 +225,16 @@ impl Unit {
         self.last_end = tick.end_time;
         if *restart {
             self.waiting.restart(tick.end_time);
+            self.turn_on = None;
         }
+        let turn_on = *self.turn_on.get_or_insert(tick.end_time);
         let settings = &self.settings;
         let mut corrected = match &mut self.active {
             Some(active) => {
                 let mut corrected = active.corrector.correct(
                     &active.calibration,
                     released,
+                    turn_on,
                     accel,
                     (&mut self.waiting, settings.temperature_delay),
                     &mut self.counters,

@@ -136,6 +136,9 @@ pub struct GyroTick {
 pub struct GyroBatch {
     /// Sequence number of the first tick.
     pub first_sequence: u64,
+    /// Number of the producer's run, e.g. the time of its start: where it changes, neither sequence nor time
+    /// continue what came before. A producer without such a number sends 0 for ever.
+    pub series: u64,
     /// 1…4096 ticks, all with readings of one kind and number.
     #[serde(deserialize_with = "bounded::<_, _, MAX_TICKS>")]
     pub ticks: Vec<GyroTick>,
@@ -267,10 +270,11 @@ impl GyroBatch {
                 .iter()
                 .map(|half| core::HalfPeriodCounts { positive: half.positive, negative: half.negative })
                 .collect(),
+            series: self.series,
         })
     }
 
-    /// A batch of consecutive ticks; `None` where a reading is not a count though counts are asked for.
+    /// A batch of consecutive ticks of one series; `None` where a reading is not a count though counts are asked for.
     #[must_use]
     pub fn from_core(kind: OutputKind, ticks: &[core::GyroTick]) -> Option<Self> {
         let wire = ticks.iter().map(|tick| {
@@ -288,7 +292,8 @@ impl GyroBatch {
                     .collect(),
             })
         });
-        Some(Self { first_sequence: ticks.first()?.sequence, ticks: wire.collect::<Option<_>>()? })
+        let first = ticks.first()?;
+        Some(Self { first_sequence: first.sequence, series: first.series, ticks: wire.collect::<Option<_>>()? })
     }
 }
 

@@ -44,7 +44,7 @@ pub enum ServiceError {
     #[error(transparent)]
     Bus(#[from] BusError),
     /// A subscriber or queryable cannot be declared.
-    #[error("cannot declare {key}: {source}")]
+    #[error("cannot declare {key}: {words}", words = isotherm_bus::words(source))]
     Declare {
         /// The key.
         key: &'static str,

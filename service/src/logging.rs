@@ -5,6 +5,10 @@ use std::io::IsTerminal;
 use clap::{Args, ValueEnum};
 use tracing_subscriber::EnvFilter;
 
+/// Zenoh warns of every peer without gossip, which here is how peers are meant to be.
+const QUIET_ZENOH: &str =
+    "zenoh=warn,zenoh_transport=warn,zenoh_link_commons=warn,zenoh::net::routing::hat::peer=error";
+
 /// How the log is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum LogFormat {
@@ -41,7 +45,7 @@ impl LogArgs {
         let directives = if self.log_level.contains("zenoh") {
             self.log_level.clone()
         } else {
-            format!("{},zenoh=warn,zenoh_transport=warn,zenoh_link_commons=warn", self.log_level)
+            format!("{},{QUIET_ZENOH}", self.log_level)
         };
         let filter = EnvFilter::try_new(directives).map_err(|error| {
             format!("log filter {:?} (--log-level, ISOTHERM_LOG): {error}", self.log_level)

@@ -112,7 +112,9 @@ impl UnitActor {
             };
             match sent {
                 Ok(()) => published = true,
-                Err(error) => self.fault(FaultKind::Unpublished, taken, || format!("corrected: {error}")),
+                Err(error) => self.fault(FaultKind::Unpublished, taken, || {
+                    format!("corrected: {}", isotherm_bus::words(&error))
+                }),
             }
             if taken == 0 {
                 // Not to be reached: the stream says that ticks are ready and gives none. Rather lose them than loop.

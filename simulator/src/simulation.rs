@@ -236,6 +236,7 @@ impl Simulation {
                 switch_command: output.commanded,
                 meander: output.meander,
                 half_periods: output.halves,
+                series: 0,
             },
             accel: accel.map(|readings| AccelTick { sequence, end_time, duration, readings }),
             temperatures,

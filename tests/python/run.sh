@@ -23,5 +23,5 @@ case "$venv" in /*) ;; *) venv=$PWD/$venv ;; esac
 [ -x "$venv/bin/pip" ] || python3 -m venv "$venv"
 "$venv/bin/pip" install --quiet --disable-pip-version-check --requirement tests/python/requirements.txt
 
-"$venv/bin/python" tests/python/subscriber.py --vectors docs/wire.md
+"$venv/bin/python" -B tests/python/subscriber.py --vectors docs/wire.md
 ISOTHERM_PYTHON=$venv/bin/python cargo test --release --locked -p isotherm-tests --test system python_subscriber -- --nocapture

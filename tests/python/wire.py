@@ -1,6 +1,6 @@
 """The wire messages of docs/wire.md, version 1, decoded and encoded in plain Python.
 
-Written from that page alone: the tables below have the order, the types and the limits of the page's tables.
+It rests on that page alone: the tables below have the order, the types and the limits of the page's tables.
 A message is a dict with the page's field names; a `readings` is {"Counts": [...]} or {"Means": [...]}.
 """
 
@@ -230,6 +230,7 @@ REVISION = Struct(counter=U64, digest=Array(Byte(), 8))
 
 GYRO_BATCH = Struct(
     first_sequence=U64,
+    restart=Bool(),
     ticks=Seq(
         Struct(
             end_time_ns=I64,

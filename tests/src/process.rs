@@ -41,7 +41,7 @@ pub fn run(name: &str, arguments: &[&str]) -> Output {
 ///
 /// # Panics
 /// With what it printed on stderr, where it fails.
-#[must_use]
+#[expect(clippy::must_use_candidate, reason = "many a run is made for what it does")]
 pub fn run_well(name: &str, arguments: &[&str]) -> String {
     let output = run(name, arguments);
     let stderr = String::from_utf8_lossy(&output.stderr);

@@ -10,7 +10,7 @@ use crate::channel::{Channel, ChannelParts, ThermalFilter, ThermalFilterParts, M
 use crate::curve::{Curve, CurveError};
 use crate::orientation::{Orientation, OrientationError, OrientationParts};
 use crate::reversal::{Reversal, ReversalError};
-use crate::sample::{MAX_SENSORS, MIN_SENSORS};
+use crate::sample::{MAX_SENSORS, MIN_SENSORS, OutputKind};
 use crate::servo::ServoError;
 use crate::thermal::{AccelModel, GyroModel, MAX_LAGS, TermError};
 
@@ -100,6 +100,9 @@ pub enum DefectKind {
         /// Argument at which it is zero.
         at: f64,
     },
+    /// A term that works on counts, for gyros with another output.
+    #[error("needs gyros whose output is counts")]
+    NeedsCounts,
     /// Needed because another part is there.
     #[error("is missing: {needed_by} needs it")]
     Missing {
@@ -286,6 +289,9 @@ fn gyro_model(
     }
     if gyro.servo.is_some() && parts.reversal.is_none() {
         checker.push(Section::Reversal, "transition_ticks", DefectKind::Missing { needed_by: "the gyros' servo term" });
+    }
+    if gyro.servo.is_some() && parts.gyro_output != OutputKind::Counts {
+        checker.push(section, "servo", DefectKind::NeedsCounts);
     }
     GyroModel::new(gyro, filter, &mut |field, error| {
         checker.push(section, field, match error {

@@ -185,3 +185,38 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn an_input_that_accelerates_is_not_taken_for_dither() {
+    // 1° at 1 Hz at its turning point: 39.5 °/s², in counts per second squared.
+    let input = 39.5 * 3600.0 / 2e-3;
+    let (tick_s, half_s) = (TICK.as_s(), TICK.as_s() / 2.0);
+    let counts = |start_s: f64, [positive, negative]: [f64; 2]| {
+        let gained = |from_s: f64| input * half_s * (from_s + half_s / 2.0);
+        [positive + gained(start_s), negative + gained(start_s + half_s)]
+    };
+    for form in [ServoForm::Measured, ServoForm::Modelled] {
+        let servo = servo(form);
+        let mut memory = ServoMemory::new();
+        let mut take = |memory: &mut ServoMemory, start_s: f64, start_ns: i64, [positive, negative]: [f64; 2]| {
+            let halves = HalfPeriodCounts { positive: whole(positive), negative: whole(negative) };
+            let tick = tick(start_ns + TICK.as_ns(), Some(halves));
+            memory.advance(false, tick.end_time, TICK);
+            let transient = memory.apparent_rate(0, &servo, &tick).rate_rad_per_s();
+            SCALE * ((positive + negative) / tick_s - input * (start_s + half_s)) - transient
+        };
+        // The last good tick before three that carry nothing.
+        let rest = counts(-4.0 * tick_s, [REST_HZ * half_s, -REST_HZ * half_s]);
+        take(&mut memory, -4.0 * tick_s, -4 * TICK.as_ns(), rest);
+        for j in 1..=3_i64 {
+            memory.advance(true, Timestamp::from_ns((j - 3) * TICK.as_ns()), TICK);
+        }
+        let raw = SCALE * (FIRST_HZ - REST_HZ) * tick_s / (2.0 * TAU_S);
+        for i in 0..40_i32 {
+            let start_s = f64::from(i) * tick_s;
+            let measured = counts(start_s, halves(start_s, tick_s, 0.0));
+            let residual = take(&mut memory, start_s, i64::from(i) * TICK.as_ns(), measured);
+            assert!(residual.abs() < raw.abs() / 10_000.0, "{form:?}, tick {i}: {residual} of {raw}");
+        }
+    }
+}

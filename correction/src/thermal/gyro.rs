@@ -201,6 +201,15 @@ impl GyroThermal {
         thermal
     }
 
+    /// Goes on with the lags of an earlier calibration, where their time constants are the same.
+    pub fn carry_lags(&mut self, model: &GyroModel, before: (&GyroModel, &Self)) {
+        let (old_model, old) = before;
+        let same = old_model.lags.iter().map(|lag| lag.decay).eq(model.lags.iter().map(|lag| lag.decay));
+        if same {
+            self.lagged = old.lagged;
+        }
+    }
+
     /// Starts the lags anew from a temperature that is taken to have stood for ever.
     pub fn restart(&mut self, temperature: f64) {
         self.lagged = [temperature; MAX_LAGS];

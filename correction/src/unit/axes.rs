@@ -5,11 +5,12 @@ use crate::thermal::Ramp;
 use crate::units::{Span, Timestamp};
 
 /// Memory of one kind of sensor's orientation.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Axes {
     /// Temperature that the orientation follows (°C); `share` of its way is the share between the inverses.
     temperature: Ramp<1>,
     target: f64,
+    clamped: bool,
     mask: SensorMask,
     from: Option<Inverse>,
     to: Option<Inverse>,
@@ -25,6 +26,7 @@ impl Axes {
         Self {
             temperature: Ramp::hold([target]),
             target,
+            clamped: outside(orientation, target),
             mask,
             from: inverse,
             to: inverse,
@@ -39,7 +41,13 @@ impl Axes {
         self.to = orientation.inverse(temperature, self.mask);
         self.from = now.or(self.to);
         self.target = temperature;
+        self.clamped = outside(orientation, temperature);
         self.temperature.turn(start, over, [temperature]);
+    }
+
+    /// Whether the temperature is outside the fitted range.
+    pub(super) fn clamped(&self) -> bool {
+        self.clamped
     }
 
     /// Sensors that the parity check has not excluded.
@@ -85,4 +93,10 @@ impl Axes {
         let (from, to) = (self.from.as_ref()?, self.to.as_ref()?);
         Some(from.lerp(to, self.temperature.share(time)))
     }
+}
+
+/// Whether a temperature (°C) is outside the range over which the orientation was fitted.
+fn outside(orientation: &Orientation, temperature: f64) -> bool {
+    let [first, last] = orientation.range_deg_c();
+    !(first..=last).contains(&temperature)
 }

@@ -28,7 +28,6 @@ pub(super) struct Corrector {
     last_rates: Sensors<f64>,
     /// Last good specific force of each accelerometer (m/s²), likewise.
     last_forces: Sensors<f64>,
-    turn_on: Option<Timestamp>,
 }
 
 impl Corrector {
@@ -49,14 +48,12 @@ impl Corrector {
             servo: ServoMemory::new(),
             last_rates: core::iter::repeat_n(0.0, calibration.gyro_count()).collect(),
             last_forces: core::iter::repeat_n(0.0, calibration.accel_count()).collect(),
-            turn_on: None,
         };
         if let Some((_, old)) = kept {
             new.substitution = old.substitution;
             new.servo = old.servo;
             new.last_rates = old.last_rates;
             new.last_forces = old.last_forces;
-            new.turn_on = old.turn_on;
         }
         new
     }
@@ -66,11 +63,12 @@ impl Corrector {
         &self.thermal
     }
 
-    /// Corrects one tick.
+    /// Corrects one tick of a unit that was turned on at `turn_on`.
     pub(super) fn correct(
         &mut self,
         calibration: &Calibration,
         released: &Released,
+        turn_on: Timestamp,
         accel: Option<&AccelTick>,
         (waiting, delay): (&mut Waiting, Span),
         counters: &mut Counters,
@@ -79,9 +77,7 @@ impl Corrector {
         if released.restart {
             self.thermal.restart();
             self.servo.reset();
-            self.turn_on = None;
         }
-        let turn_on = *self.turn_on.get_or_insert(tick.end_time);
         self.thermal.advance(calibration, waiting, delay, tick.end_time, counters);
 
         let mut out = CorrectedTick {
@@ -147,7 +143,8 @@ impl Corrector {
                 }
             }
             let mut flags = SensorFlags::VALID;
-            flags.set(SensorFlags::CLAMPED_TEMPERATURE, thermal.clamped());
+            let clamped = thermal.clamped() || self.thermal.gyro_axes.clamped();
+            flags.set(SensorFlags::CLAMPED_TEMPERATURE, clamped);
             flags.set(SensorFlags::STALE_TEMPERATURE, self.thermal.stale(calibration, model.channel, tick.end_time));
             flags.set(SensorFlags::EXCLUDED, self.thermal.gyro_axes.is_excluded(i));
 
@@ -233,7 +230,7 @@ impl Corrector {
             let stale = self.thermal.stale(calibration, model.channel, time)
                 || self.thermal.stale(calibration, model.board_channel, time);
             let mut flags = SensorFlags::VALID;
-            flags.set(SensorFlags::CLAMPED_TEMPERATURE, thermal.clamped());
+            flags.set(SensorFlags::CLAMPED_TEMPERATURE, thermal.clamped() || axes.clamped());
             flags.set(SensorFlags::STALE_TEMPERATURE, stale);
             flags.set(SensorFlags::EXCLUDED, axes.is_excluded(i));
             let reading = tick.readings.get(i).copied().unwrap_or(f64::NAN);

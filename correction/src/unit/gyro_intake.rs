@@ -17,6 +17,9 @@ pub(super) const MAX_DURATION: Span = Span::from_ns(10_000_000_000);
 const MAX_STEP: Span = Span::from_ns(3_600_000_000_000);
 /// So many consistent ticks in a row make a jump of sequence or time believed.
 const BELIEVED_AFTER: u32 = 8;
+/// The same where sequence and time both lie in the past: that is how a producer that was switched off and on looks,
+/// but also a stretch of old ticks that is sent again.
+const OLD_BELIEVED_AFTER: u32 = 256;
 
 /// A tick that waits for its release.
 #[derive(Debug, Clone)]
@@ -27,6 +30,16 @@ struct Pending {
     batch_end: Timestamp,
     restart: bool,
     refused_before: u64,
+}
+
+/// The tick that is to leave next.
+#[derive(Debug)]
+pub(super) struct Front<'a> {
+    pub(super) tick: &'a GyroTick,
+    /// Its window has passed: it waits for nothing any more.
+    pub(super) expired: bool,
+    /// It starts a new series.
+    pub(super) restart: bool,
 }
 
 /// A tick on its way into the correction.
@@ -61,6 +74,9 @@ pub(super) struct GyroIntake {
     restarts_pending: usize,
     newest: Option<Newest>,
     jump: Option<Jump>,
+    /// The producer's run in force, and the one that it took over from, whose stragglers are late.
+    series: Option<u64>,
+    superseded: Option<u64>,
     /// Sequence number that is to be released next; `None` until the first tick has left. That one waits out its
     /// window like a tick behind a gap: the stream may have begun with an earlier one that is still on its way.
     next: Option<u64>,
@@ -75,13 +91,13 @@ enum Admission {
 }
 
 impl GyroIntake {
-    /// Takes one tick of a batch that ends at `batch_end`.
-    pub(super) fn admit(&mut self, tick: &GyroTick, batch_end: Timestamp, counters: &mut Counters) {
+    /// Takes one tick of a batch that ends at `batch_end`; whether it starts a new series.
+    pub(super) fn admit(&mut self, tick: &GyroTick, batch_end: Timestamp, counters: &mut Counters) -> bool {
         if tick.duration == Span::ZERO || tick.duration > MAX_DURATION {
             counters.bad_duration += 1;
-            return;
+            return false;
         }
-        let Admission::Admitted { restart, refused_before } = self.judge(tick, counters) else { return };
+        let Admission::Admitted { restart, refused_before } = self.judge(tick, counters) else { return false };
         let pending = Pending { tick: tick.clone(), batch_end, restart, refused_before };
         if restart || self.newest.is_none_or(|newest| tick.sequence > newest.sequence) {
             self.newest = Some(Newest { sequence: tick.sequence, end_time: tick.end_time });
@@ -91,12 +107,25 @@ impl GyroIntake {
         } else {
             self.insert_between(pending, counters);
         }
+        restart
     }
 
     /// Compares sequence and time with what came before.
     fn judge(&mut self, tick: &GyroTick, counters: &mut Counters) -> Admission {
         const PLAIN: Admission = Admission::Admitted { restart: false, refused_before: 0 };
+        let series = *self.series.get_or_insert(tick.series);
         let Some(newest) = self.newest else { return PLAIN };
+        if tick.series != series {
+            if self.superseded == Some(tick.series) {
+                counters.gyro_late += 1;
+                return Admission::Refused;
+            }
+            self.superseded = Some(series);
+            self.series = Some(tick.series);
+            counters.restarts += 1;
+            let refused_before = self.jump.take().map_or(0, |jump| jump.refused);
+            return Admission::Admitted { restart: true, refused_before };
+        }
         if tick.sequence > newest.sequence && plausible_step(newest, tick) {
             self.jump = None;
             return PLAIN;
@@ -105,7 +134,7 @@ impl GyroIntake {
             return self.judge_old(tick, counters);
         }
         counters.gyro_implausible += 1;
-        self.follow_jump(tick, counters)
+        self.follow_jump(tick, BELIEVED_AFTER, counters)
     }
 
     /// A tick from before the newest one: late, doubled, filling a hole, or the sign of a restart.
@@ -122,21 +151,21 @@ impl GyroIntake {
         // Too far back to tell late from anew: a producer that was switched off and on begins like this.
         if age >= u64::from(u128::BITS) {
             counters.gyro_implausible += 1;
-            return self.follow_jump(tick, counters);
+            return self.follow_jump(tick, OLD_BELIEVED_AFTER, counters);
         }
         counters.gyro_late += 1;
         Admission::Refused
     }
 
     /// Refuses a jump until enough ticks agree with it, then follows it.
-    fn follow_jump(&mut self, tick: &GyroTick, counters: &mut Counters) -> Admission {
+    fn follow_jump(&mut self, tick: &GyroTick, believed_after: u32, counters: &mut Counters) -> Admission {
         let before = self.jump.filter(|jump| {
             let place = Newest { sequence: jump.sequence, end_time: jump.end_time };
             tick.sequence > jump.sequence && plausible_step(place, tick)
         });
         let refused = self.jump.map_or(0, |jump| jump.refused);
         let consistent = before.map_or(1, |jump| jump.consistent + 1);
-        if consistent <= BELIEVED_AFTER {
+        if consistent <= believed_after {
             self.jump =
                 Some(Jump { sequence: tick.sequence, end_time: tick.end_time, consistent, refused: refused + 1 });
             return Admission::Refused;
@@ -166,9 +195,8 @@ impl GyroIntake {
         self.pending.insert(place, pending);
     }
 
-    /// The tick that is to leave next, and whether its window has passed; `None` while it must wait for a
-    /// missing neighbour.
-    pub(super) fn front(&self, window: Span, flushing: bool) -> Option<(&GyroTick, bool)> {
+    /// The tick that is to leave next; `None` while it must wait for a missing neighbour.
+    pub(super) fn front(&self, window: Span, flushing: bool) -> Option<Front<'_>> {
         let front = self.pending.front()?;
         // What waits before a restart lives in another time: the newest tick says nothing of its window.
         let restarted_behind = self.restarts_pending > usize::from(front.restart);
@@ -177,7 +205,7 @@ impl GyroIntake {
         });
         let expired = flushing || restarted_behind || passed || self.pending.len() > MAX_PENDING;
         let in_sequence = front.restart || self.next == Some(front.tick.sequence);
-        (in_sequence || expired).then_some((&front.tick, expired))
+        (in_sequence || expired).then_some(Front { tick: &front.tick, expired, restart: front.restart })
     }
 
     /// Releases the front tick.

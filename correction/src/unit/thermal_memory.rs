@@ -89,10 +89,53 @@ impl ThermalMemory {
         for index in 0..memory.channels.len() {
             if let Some(state) = memory.channels.get(index).and_then(ChannelMemory::state) {
                 memory.restart_lags(calibration, index, state.temperature);
+                if let Some((old, old_memory)) = before {
+                    memory.carry_lags(calibration, (old, old_memory));
+                }
                 memory.update(calibration, index, now, Span::ZERO);
             }
         }
+        if let Some((old, old_memory)) = before.filter(|(old, _)| old.same_thermal_basis(calibration)) {
+            memory.carry_unchanged(calibration, (old, old_memory));
+        }
         memory
+    }
+
+    /// Goes on with lags that were filtered in the same way.
+    fn carry_lags(&mut self, calibration: &Calibration, (old, old_memory): (&Calibration, &Self)) {
+        let models = calibration.gyros.iter().zip(&old.gyros);
+        for ((model, old_model), (thermal, old)) in models.zip(self.gyros.iter_mut().zip(&old_memory.gyros)) {
+            if old_model.channel == model.channel {
+                thermal.carry_lags(model, (old_model, old));
+            }
+        }
+    }
+
+    /// Goes on with what a swap did not change, on its way as it is: a swap to the same coefficients is no event.
+    fn carry_unchanged(&mut self, calibration: &Calibration, (old, old_memory): (&Calibration, &Self)) {
+        self.updated.clone_from(&old_memory.updated);
+        let models = calibration.gyros.iter().zip(&old.gyros);
+        for ((new, old), (thermal, kept)) in models.zip(self.gyros.iter_mut().zip(&old_memory.gyros)) {
+            if new == old {
+                thermal.clone_from(kept);
+            }
+        }
+        let models = calibration.accels.iter().zip(&old.accels);
+        for ((new, old), (thermal, kept)) in models.zip(self.accels.iter_mut().zip(&old_memory.accels)) {
+            if new == old {
+                thermal.clone_from(kept);
+            }
+        }
+        if calibration.gyro_orientation == old.gyro_orientation
+            && calibration.gyro_orientation_channels == old.gyro_orientation_channels
+        {
+            self.gyro_axes.clone_from(&old_memory.gyro_axes);
+        }
+        if calibration.accel_orientation == old.accel_orientation
+            && calibration.accel_orientation_channels == old.accel_orientation_channels
+        {
+            self.accel_axes.clone_from(&old_memory.accel_axes);
+        }
     }
 
     /// Applies every waiting reading that takes effect before a tick ending at `end_time`.

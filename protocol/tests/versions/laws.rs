@@ -56,7 +56,11 @@ fn gyro_batch() -> impl Strategy<Value = GyroBatch> {
     let ticks = (1..20usize)
         .prop_flat_map(readings)
         .prop_flat_map(|all| all.into_iter().map(gyro_tick).collect::<Vec<_>>());
-    (any::<u64>(), ticks).prop_map(|(first_sequence, ticks)| GyroBatch { first_sequence, ticks })
+    (any::<(u64, bool)>(), ticks).prop_map(|((first_sequence, restart), ticks)| GyroBatch {
+        first_sequence,
+        restart,
+        ticks,
+    })
 }
 
 fn accel_batch() -> impl Strategy<Value = AccelBatch> {

@@ -63,18 +63,23 @@ fn raw_gyro() {
         meander: Some(Mode::Plus),
         half_periods: [].into_iter().collect(),
     };
-    holds("raw-gyro-counts", &GyroBatch { first_sequence: 1000, ticks: vec![counts, switch] });
+    holds(
+        "raw-gyro-counts",
+        &GyroBatch { first_sequence: 1000, restart: false, ticks: vec![counts, switch] },
+    );
 
     let means = GyroTick {
         end_time_ns: -1,
         duration_ns: 10_000_000,
-        readings: Readings::Means([0.5, -0.25, 1e-3, -1e-3, 0.0, -0.0, f64::NAN, 7.29e-5].into_iter().collect()),
+        readings: Readings::Means(
+            [0.5, -0.25, 1e-3, -1e-3, 0.0, -0.0, f64::NAN, 7.29e-5].into_iter().collect(),
+        ),
         mode: None,
         switch_command: false,
         meander: None,
         half_periods: [].into_iter().collect(),
     };
-    holds("raw-gyro-means", &GyroBatch { first_sequence: 0, ticks: vec![means] });
+    holds("raw-gyro-means", &GyroBatch { first_sequence: 0, restart: false, ticks: vec![means] });
 
     let edges = GyroTick {
         end_time_ns: i64::MIN,
@@ -85,7 +90,7 @@ fn raw_gyro() {
         meander: Some(Mode::Minus),
         half_periods: [half(i32::MIN, i32::MAX); 8].into_iter().collect(),
     };
-    holds("raw-gyro-edges", &GyroBatch { first_sequence: u64::MAX, ticks: vec![edges] });
+    holds("raw-gyro-edges", &GyroBatch { first_sequence: u64::MAX, restart: true, ticks: vec![edges] });
 
     let empty = GyroTick {
         end_time_ns: 0,
@@ -96,7 +101,7 @@ fn raw_gyro() {
         meander: None,
         half_periods: [].into_iter().collect(),
     };
-    holds("raw-gyro-empty", &GyroBatch { first_sequence: 128, ticks: vec![empty] });
+    holds("raw-gyro-empty", &GyroBatch { first_sequence: 128, restart: false, ticks: vec![empty] });
 }
 
 #[test]
@@ -167,11 +172,8 @@ fn corrected() {
         gyro_parity_rad_per_s: [1e-9].into_iter().collect(),
         accel_parity_m_per_s2: [].into_iter().collect(),
     };
-    let body = AppliedTemperature {
-        channel: channel("body"),
-        temperature_deg_c: 25.125,
-        rate_deg_c_per_s: -0.0166,
-    };
+    let body =
+        AppliedTemperature { channel: channel("body"), temperature_deg_c: 25.125, rate_deg_c_per_s: -0.0166 };
     let batch = CorrectedBatch {
         unit: "ZLG-0042".to_owned(),
         revision: Revision { counter: 3, digest: [0x01, 0x23, 0x45, 0x67, 0x89, 0xab, 0xcd, 0xef] },

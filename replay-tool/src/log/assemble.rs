@@ -194,5 +194,6 @@ fn gyro_tick(timing: Timing, readings: Readings, states: GyroStates, changed: bo
         switch_command: states.switch_command || changed,
         meander: states.meander,
         half_periods: states.half_periods,
+        series: 0,
     }
 }

@@ -109,7 +109,7 @@ fn check_zenoh(bytes: &[u8], path: &Path) -> Checked {
             Ok((Summary { summary: words, unit: None, digest: None }, Vec::new()))
         }
         Err(error) => {
-            let message = error.to_string();
+            let message = isotherm_bus::words(&error);
             let (line, column) = position(&message).unwrap_or((1, 1));
             let file = Some(path.display().to_string());
             let message = message.lines().map(str::trim).collect::<Vec<_>>().join(" ");

@@ -15,7 +15,7 @@ use crate::report::ReportError;
 #[non_exhaustive]
 pub enum DemoError {
     /// A shipped calibration document is bad.
-    #[error("a shipped calibration document is bad: {}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))]
+    #[error("a shipped calibration document is bad: {}", words(.0))]
     Document(Vec<Problem>),
     /// A shipped calibration document does not suit the demo.
     #[error("the shipped calibration document {file} cannot be used in the demo")]
@@ -60,4 +60,8 @@ pub enum DemoError {
     /// The figures cannot be written as JSON.
     #[error("cannot write the figures as JSON: {0}")]
     Json(#[source] serde_json::Error),
+}
+
+fn words(problems: &[Problem]) -> String {
+    problems.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ")
 }

@@ -12,7 +12,8 @@ use isotherm_simulator::{Scenario, Simulation};
 
 use super::DemoError;
 
-/// Tick of the units in the chamber (ns): hours of event time pass in half a minute, and 20 Hz shows them as well as more.
+/// Tick of the units in the chamber (ns): hours of event time pass in half a minute, and 20 Hz shows them as well as
+/// more would.
 const CHAMBER_TICK_NS: i64 = 50_000_000;
 
 /// A calibration document that the program carries, so that the demo runs from any folder.
@@ -95,8 +96,8 @@ impl Member {
     pub(super) fn story(&self) -> String {
         match (&self.scenario.instrument.gyros, &self.scenario.motion.path) {
             (Gyros::Zeeman(zeeman), Path::Sine { amplitude_deg, frequency_hz, .. }) => format!(
-                "On a stand that swings by {amplitude_deg}° at {frequency_hz}\u{a0}Hz, in a chamber that warms, with mode reversal \
-                 every {}\u{a0}s. At each switch the counts of some ticks carry nothing.",
+                "On a stand that swings by {amplitude_deg}° at {frequency_hz}\u{a0}Hz, in a chamber that warms, \
+                 with mode reversal every {}\u{a0}s. At each switch the counts of some ticks carry nothing.",
                 zeeman.reversal.period_s
             ),
             (Gyros::FibreOptic(_), _) => {

@@ -21,10 +21,10 @@ pub(super) fn page(summary: &Summary, fleet: &[Member], watched: &[Watched]) -> 
         page.headline(&headline(unit));
     }
     page.paragraph(
-        "Three simulated units sent gyro, accelerometer and temperature ticks over Zenoh; the service corrected each with its own \
-         calibration; a subscriber received the result. Raw is what the readings give with nominal scale factor and input axes \
-         alone. The errors are differences from the simulation's exact rate, averaged as the table says; rms is over all three \
-         axes, peak to peak that of the worst axis.",
+        "Three simulated units sent gyro, accelerometer and temperature ticks over Zenoh; the service corrected \
+         each with its own calibration; a subscriber received the result. Raw is what the readings give with \
+         nominal scale factor and input axes alone. The errors are differences from the simulation's exact rate, \
+         averaged as the table says; rms is over all three axes, peak to peak that of the worst axis.",
     );
     let (head, rows) = summary.rows();
     page.table(&Table { head, rows });
@@ -84,7 +84,8 @@ fn rate_errors(unit: &UnitSummary, member: &Member, watched: &Watched) -> Figure
     panels.push(temperatures(member, watched, divisor));
     Figure {
         caption: format!(
-            "Rate error of {} about the {} axis, the worst of the three: means over {} s of event time. Below: temperature.",
+            "Rate error of {} about the {} axis, the worst of the three: means over {} s of event time. \
+             Below: temperature.",
             member.id, AXES[axis], unit.averaging_s
         ),
         x_label: format!("event time, {symbol}"),
@@ -149,8 +150,9 @@ fn mode_switch(switch: &Switch) -> Figure {
     };
     Figure {
         caption: format!(
-            "One mode switch, {} axis. Shaded: the ticks whose counts carry nothing and are predicted instead; the two-sided \
-             fit then restores their angle. Angle error at the right edge: raw {}″, corrected {}″ (the quantisation of the counts, about 2″ each, is what remains).",
+            "One mode switch, {} axis. Shaded: the ticks whose counts carry nothing and are predicted instead; the \
+             two-sided fit then restores their angle. Angle error at the right edge: raw {}″, corrected {}″ (the \
+             quantisation of the counts, about 2″ each, is what remains).",
             AXES[axis],
             signed(total(|tick| tick.raw)),
             signed(total(|tick| tick.corrected)),

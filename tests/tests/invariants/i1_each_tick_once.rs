@@ -103,3 +103,36 @@ fn i1_a_restarted_producer_is_followed_and_its_lost_ticks_are_announced() {
     assert_eq!(out[restart].sequence, out[restart].missed, "the new series began at 0");
     assert_eq!(out.len() as u64 + out[restart].missed, 600);
 }
+
+#[test]
+fn i1_a_stretch_of_old_ticks_sent_again_gives_nothing() {
+    let mut unit = drive::unit(&compile(&identity()));
+    let mut out = Vec::new();
+    (0..1000).flat_map(batch).for_each(|event| drive::hand(&mut unit, &event, &mut out));
+    (100..300).flat_map(batch).for_each(|event| drive::hand(&mut unit, &event, &mut out));
+    (1000..1100).flat_map(batch).for_each(|event| drive::hand(&mut unit, &event, &mut out));
+    assert_eq!(account(&out), (1100, 0));
+}
+
+#[test]
+fn i1_a_producer_that_says_it_starts_anew_loses_nothing() {
+    let mut unit = drive::unit(&compile(&identity()));
+    let mut out = Vec::new();
+    let in_series = |series, k| {
+        let [accels, Owned::Gyro(mut gyros)] = batch(k) else { unreachable!("a batch ends with its gyro ticks") };
+        gyros[0].series = series;
+        [accels, Owned::Gyro(gyros)]
+    };
+    for series in [10, 30, 20] {
+        // The same short log again and again, its first message twice, and then one from the run before.
+        let first = in_series(series, 0).into_iter().chain(in_series(series, 0));
+        for event in first.chain((1..100).flat_map(|k| in_series(series, k))) {
+            drive::hand(&mut unit, &event, &mut out);
+        }
+    }
+    in_series(30, 99).iter().for_each(|event| drive::hand(&mut unit, event, &mut out));
+    let sequences: Vec<u64> = out.iter().map(|tick| tick.sequence).collect();
+    assert!(sequences.iter().copied().eq((0..3).flat_map(|_| 0..100)), "{sequences:?}");
+    assert_eq!(out.iter().filter(|tick| tick.flags.contains(TickFlags::RESTART)).count(), 2);
+    assert!(out.iter().all(|tick| tick.missed == 0));
+}

@@ -1,6 +1,6 @@
 //! I7: no input, however broken, stops a unit or disturbs another; each kind has a counter and a flag.
 //!
-//! Here through the state machine and the frames; over real Zenoh sessions in `over_zenoh`.
+//! Here through the state machine and the frames; over real Zenoh sessions in `system/i7_broken_input_over_zenoh.rs`.
 
 use isotherm_correction::sample::{CorrectedTick, GyroTick, SensorFlags, TickFlags};
 use isotherm_correction::unit::{Counters, UnitSettings};

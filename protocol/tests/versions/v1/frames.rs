@@ -5,32 +5,29 @@ pub(in super::super) const FRAMES: &[(&str, &str)] = &[
     (
         "raw-gyro-counts",
         "
-        01 01 e8 07 02 80 ad e2 04 c0 96 b1 02 00 03 a4 13 ed 08 00 01 00 00 00 03 d0 0f d4 03 d7 04 95
-        04 80 01 7f f6 db c4 09 bb 97 b1 02 00 03 18 06 07 01 01 01 01 00 00 f2 d2 53 49
+        01 01 e8 07 00 02 80 ad e2 04 c0 96 b1 02 00 03 a4 13 ed 08 00 01 00 00 00 03 d0 0f d4 03 d7 04
+        95 04 80 01 7f f6 db c4 09 bb 97 b1 02 00 03 18 06 07 01 01 01 01 00 00 d9 16 e2 5e
         ",
     ),
     (
         "raw-gyro-means",
         "
-        01 01 00 01 01 80 ad e2 04 01 08 00 00 00 00 00 00 e0 3f 00 00 00 00 00 00 d0 bf fc a9 f1 d2 4d
-        62 50 3f fc a9 f1 d2 4d 62 50 bf 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 80 00 00 00 00 00
-        00 f8 7f c9 d3 a8 76 3c 1c 13 3f 00 00 00 00 1b 88 e3 f4
+        01 01 00 00 01 01 80 ad e2 04 01 08 00 00 00 00 00 00 e0 3f 00 00 00 00 00 00 d0 bf fc a9 f1 d2
+        4d 62 50 3f fc a9 f1 d2 4d 62 50 bf 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 80 00 00 00 00
+        00 00 f8 7f c9 d3 a8 76 3c 1c 13 3f 00 00 00 00 76 71 d9 09
         ",
     ),
     (
         "raw-gyro-edges",
         "
-        01 01 ff ff ff ff ff ff ff ff ff 01 01 ff ff ff ff ff ff ff ff ff 01 ff ff ff ff ff ff ff ff ff
-        01 00 08 ff ff ff ff 0f fe ff ff ff 0f 01 02 7e 7f 80 01 81 01 01 01 01 01 01 08 ff ff ff ff 0f
-        fe ff ff ff 0f ff ff ff ff 0f fe ff ff ff 0f ff ff ff ff 0f fe ff ff ff 0f ff ff ff ff 0f fe ff
-        ff ff 0f ff ff ff ff 0f fe ff ff ff 0f ff ff ff ff 0f fe ff ff ff 0f ff ff ff ff 0f fe ff ff ff
-        0f ff ff ff ff 0f fe ff ff ff 0f 86 26 00 c4
+        01 01 ff ff ff ff ff ff ff ff ff 01 01 01 ff ff ff ff ff ff ff ff ff 01 ff ff ff ff ff ff ff ff
+        ff 01 00 08 ff ff ff ff 0f fe ff ff ff 0f 01 02 7e 7f 80 01 81 01 01 01 01 01 01 08 ff ff ff ff
+        0f fe ff ff ff 0f ff ff ff ff 0f fe ff ff ff 0f ff ff ff ff 0f fe ff ff ff 0f ff ff ff ff 0f fe
+        ff ff ff 0f ff ff ff ff 0f fe ff ff ff 0f ff ff ff ff 0f fe ff ff ff 0f ff ff ff ff 0f fe ff ff
+        ff 0f ff ff ff ff 0f fe ff ff ff 0f 80 be e1 dc
         ",
     ),
-    (
-        "raw-gyro-empty",
-        "01 01 80 01 01 00 00 00 00 00 00 00 00 8a 99 1f c6",
-    ),
+    ("raw-gyro-empty", "01 01 80 01 00 01 00 00 00 00 00 00 00 00 57 e5 10 27"),
     (
         "raw-accel-counts",
         "
@@ -53,10 +50,7 @@ pub(in super::super) const FRAMES: &[(&str, &str)] = &[
         00 20 44 c0 21 07 83 ff
         ",
     ),
-    (
-        "raw-temp-empty",
-        "03 01 00 01 0e 00 04 bd 77 95",
-    ),
+    ("raw-temp-empty", "03 01 00 01 0e 00 04 bd 77 95"),
     (
         "corrected",
         "
