@@ -70,7 +70,11 @@ impl ThermalFilter {
 }
 
 /// Whole grid points in a length, at least one.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to 1…MAX_GRID_POINTS first")]
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "clamped to 1…MAX_GRID_POINTS first"
+)]
 pub(crate) fn grid_points(length_s: f64, step_s: f64) -> usize {
     #[expect(clippy::cast_precision_loss, reason = "a small constant")]
     let most = MAX_GRID_POINTS as f64;
@@ -241,7 +245,8 @@ impl ChannelMemory {
         if !(low..=high).contains(&temperature) {
             return false;
         }
-        let spike = self.median().is_some_and(|median| (temperature - median).abs() > channel.0.spike_limit_deg_c);
+        let spike =
+            self.median().is_some_and(|median| (temperature - median).abs() > channel.0.spike_limit_deg_c);
         if self.recent.len() == MEDIAN_READINGS {
             self.recent.pop_front();
         }
@@ -281,7 +286,8 @@ impl ChannelMemory {
         let h = filter.derivative_step_s();
         let rate = backward_difference(&self.smoothed, h);
         rotate(&mut self.rates, rate);
-        self.state = ThermalState { temperature: mean, rate, acceleration: backward_difference(&self.rates, h) };
+        self.state =
+            ThermalState { temperature: mean, rate, acceleration: backward_difference(&self.rates, h) };
     }
 }
 

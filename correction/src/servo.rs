@@ -219,8 +219,10 @@ impl ServoMemory {
         // A tick before the end of the transition cannot be: its clock is broken.
         let settles = 0.0..=servo.settle_time_s();
         let running = self.settles_from.is_some_and(|start| settles.contains(&middle.seconds_from(start)));
-        let unbalance = if running { libm::tanh(tick.duration.as_s() / (2.0 * servo.time_constant_s)) } else { 0.0 };
-        let excess_hz = if running { self.frequency_excess_hz(sensor, servo, tick, middle, unbalance) } else { None };
+        let unbalance =
+            if running { libm::tanh(tick.duration.as_s() / (2.0 * servo.time_constant_s)) } else { 0.0 };
+        let excess_hz =
+            if running { self.frequency_excess_hz(sensor, servo, tick, middle, unbalance) } else { None };
         if let Some(last) = self.last.get_mut(sensor) {
             *last = mean_hz.map(|mean| (middle, mean - unbalance * excess_hz.unwrap_or(0.0)));
         }

@@ -24,8 +24,8 @@ use accel_intake::{AccelIntake, Match};
 use correct::Corrector;
 pub use counters::Counters;
 use gyro_intake::{GyroIntake, Released};
-use thermal_memory::Waiting;
 pub use thermal_memory::ChannelReport;
+use thermal_memory::Waiting;
 
 use crate::calibration::Calibration;
 use crate::navigation::{NavigationStep, StepSum};
@@ -186,7 +186,12 @@ impl Unit {
     }
 
     /// Checks kind and number of readings against the calibration, if there is one.
-    fn fits(&mut self, output: OutputKind, sensors: usize, expect: fn(&Calibration) -> (OutputKind, usize)) -> bool {
+    fn fits(
+        &mut self,
+        output: OutputKind,
+        sensors: usize,
+        expect: fn(&Calibration) -> (OutputKind, usize),
+    ) -> bool {
         let Some(active) = &self.active else { return true };
         let (need_output, need_sensors) = expect(&active.calibration);
         if sensors != need_sensors {
@@ -207,7 +212,8 @@ impl Unit {
                 self.accels.starts_anew(front.tick.end_time, &mut self.counters);
             }
             // Whether a unit without calibration has accelerometers is not known: it waits as if it had.
-            let expects_accel = self.active.as_ref().is_none_or(|active| active.calibration.accel_count() > 0);
+            let expects_accel =
+                self.active.as_ref().is_none_or(|active| active.calibration.accel_count() > 0);
             let accel = match self.accels.take(front.tick, &mut self.counters) {
                 Match::Found(accel) => Some(accel),
                 Match::NotYet if expects_accel && !front.expired => return,
@@ -220,7 +226,12 @@ impl Unit {
     }
 
     /// Corrects one tick and gives it out.
-    fn give_out(&mut self, released: &Released, accel: Option<&AccelTick>, emit: &mut dyn FnMut(&CorrectedTick)) {
+    fn give_out(
+        &mut self,
+        released: &Released,
+        accel: Option<&AccelTick>,
+        emit: &mut dyn FnMut(&CorrectedTick),
+    ) {
         let Released { tick, missed, restart } = released;
         self.last_end = tick.end_time;
         if *restart {

@@ -100,7 +100,10 @@ impl Span {
 
     /// From seconds, rounded to the nearest nanosecond; NaN and negative values become zero.
     #[must_use]
-    #[expect(clippy::cast_possible_truncation, reason = "float-to-int `as` saturates, which is the documented behaviour")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "float-to-int `as` saturates, which is the documented behaviour"
+    )]
     pub fn from_s(s: f64) -> Self {
         Self(libm::round(s.max(0.0) * 1e9) as i64)
     }
@@ -113,7 +116,10 @@ impl Span {
 
     /// In seconds.
     #[must_use]
-    #[expect(clippy::cast_precision_loss, reason = "spans handled as seconds are far below 2⁵³ ns (104 days)")]
+    #[expect(
+        clippy::cast_precision_loss,
+        reason = "spans handled as seconds are far below 2⁵³ ns (104 days)"
+    )]
     pub const fn as_s(self) -> f64 {
         self.0 as f64 * 1e-9
     }
@@ -147,7 +153,10 @@ impl Timestamp {
 
     /// Signed time from `other` to `self` (s).
     #[must_use]
-    #[expect(clippy::cast_precision_loss, reason = "differences handled as seconds are far below 2⁵³ ns (104 days)")]
+    #[expect(
+        clippy::cast_precision_loss,
+        reason = "differences handled as seconds are far below 2⁵³ ns (104 days)"
+    )]
     pub const fn seconds_from(self, other: Self) -> f64 {
         self.0.saturating_sub(other.0) as f64 * 1e-9
     }

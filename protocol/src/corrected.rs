@@ -1,7 +1,9 @@
 //! Corrected batches: what a navigation computer subscribes to.
 
 use arrayvec::ArrayVec;
-use isotherm_correction::sample::{self as core, ChannelName, MAX_PARITY, MAX_SENSORS, SensorFlags, TickFlags};
+use isotherm_correction::sample::{
+    self as core, ChannelName, MAX_PARITY, MAX_SENSORS, SensorFlags, TickFlags,
+};
 use isotherm_correction::units::{Span, Timestamp};
 use serde::{Deserialize, Serialize};
 

@@ -151,7 +151,8 @@ mod tests {
         }
         assert_eq!(parse_corrected(&corrected(&unit)), Some("ZLG-0042"));
         assert_eq!(parse_status(&status(&unit)), Some("ZLG-0042"));
-        for other in ["", "imu", "imu/x", "imu/x/raw", "imu/x/raw/mag", "imu/x/raw/gyro/y", "gps/x/raw/gyro"] {
+        for other in ["", "imu", "imu/x", "imu/x/raw", "imu/x/raw/mag", "imu/x/raw/gyro/y", "gps/x/raw/gyro"]
+        {
             assert_eq!(parse_raw(other), None, "{other}");
         }
     }

@@ -62,7 +62,9 @@ impl Readings {
         }
         match kind {
             OutputKind::Mean => Some(Self::Means(values.iter().copied().collect())),
-            OutputKind::Counts => values.iter().map(|&value| whole(value)).collect::<Option<_>>().map(Self::Counts),
+            OutputKind::Counts => {
+                values.iter().map(|&value| whole(value)).collect::<Option<_>>().map(Self::Counts)
+            }
         }
     }
 }
@@ -293,7 +295,11 @@ impl GyroBatch {
             })
         });
         let first = ticks.first()?;
-        Some(Self { first_sequence: first.sequence, series: first.series, ticks: wire.collect::<Option<_>>()? })
+        Some(Self {
+            first_sequence: first.sequence,
+            series: first.series,
+            ticks: wire.collect::<Option<_>>()?,
+        })
     }
 }
 

@@ -82,7 +82,8 @@ impl UnitStream {
                 let batch: AccelBatch = codec::decode(frame)?;
                 self.accel_ticks.clear();
                 self.accel_ticks.extend(batch.to_core());
-                self.unit.handle(Event::Accel { output: batch.output(), ticks: &self.accel_ticks }, &mut emit);
+                self.unit
+                    .handle(Event::Accel { output: batch.output(), ticks: &self.accel_ticks }, &mut emit);
             }
             RawStream::Temperature => {
                 let batch: TemperatureBatch = codec::decode(frame)?;
@@ -168,7 +169,12 @@ impl UnitStream {
 
     /// What the unit says of itself. `added_latency_ns` is median and 99th percentile.
     #[must_use]
-    pub fn status(&self, service_version: &str, last_fault: Option<&str>, added_latency_ns: [u64; 2]) -> Status {
+    pub fn status(
+        &self,
+        service_version: &str,
+        last_fault: Option<&str>,
+        added_latency_ns: [u64; 2],
+    ) -> Status {
         let [added_latency_p50_ns, added_latency_p99_ns] = added_latency_ns;
         let state = match (self.unit.calibration(), self.unit.settings().uncalibrated) {
             (Some(_), _) => State::Running,

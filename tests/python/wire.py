@@ -230,7 +230,7 @@ REVISION = Struct(counter=U64, digest=Array(Byte(), 8))
 
 GYRO_BATCH = Struct(
     first_sequence=U64,
-    restart=Bool(),
+    series=U64,
     ticks=Seq(
         Struct(
             end_time_ns=I64,

@@ -62,7 +62,9 @@ pub fn correct(calibration: &Arc<Calibration>, events: &[LogEvent]) -> Vec<Corre
     for event in events {
         let event = match event {
             LogEvent::Gyro { output, tick } => Event::Gyro { output: *output, ticks: slice::from_ref(tick) },
-            LogEvent::Accel { output, tick } => Event::Accel { output: *output, ticks: slice::from_ref(tick) },
+            LogEvent::Accel { output, tick } => {
+                Event::Accel { output: *output, ticks: slice::from_ref(tick) }
+            }
             LogEvent::Temperature(reading) => Event::Temperature(slice::from_ref(reading)),
         };
         unit.handle(event, &mut emit);

@@ -13,7 +13,8 @@ use std::sync::Once;
 pub fn program(name: &str) -> PathBuf {
     static BUILD: Once = Once::new();
     let test = std::env::current_exe().expect("the running test has a path");
-    let folder = test.parent().and_then(|deps| deps.parent()).expect("target/PROFILE/deps/TEST").to_path_buf();
+    let folder =
+        test.parent().and_then(|deps| deps.parent()).expect("target/PROFILE/deps/TEST").to_path_buf();
     // `cargo test` builds the programs of tested packages only; a test of this package alone needs them too.
     BUILD.call_once(|| {
         let target = folder.parent().expect("target/PROFILE");
@@ -34,7 +35,11 @@ pub fn program(name: &str) -> PathBuf {
 /// Where it cannot be started.
 #[must_use]
 pub fn run(name: &str, arguments: &[&str]) -> Output {
-    Command::new(program(name)).args(arguments).current_dir(crate::data::root()).output().expect("the program starts")
+    Command::new(program(name))
+        .args(arguments)
+        .current_dir(crate::data::root())
+        .output()
+        .expect("the program starts")
 }
 
 /// Runs a program that must succeed; what it printed on stdout.

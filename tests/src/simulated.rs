@@ -6,8 +6,8 @@ use std::sync::Arc;
 
 use isotherm_correction::calibration::Calibration;
 use isotherm_correction::sample::CorrectedTick;
-use isotherm_correction::units::AngularRate;
 use isotherm_correction::unit::Event;
+use isotherm_correction::units::AngularRate;
 use isotherm_protocol::document::Document;
 use isotherm_simulator::{Scenario, ScenarioErrors, Simulation, Step};
 
@@ -142,9 +142,9 @@ impl Size {
 pub fn rate_errors(
     calibration: &Arc<Calibration>,
     scenario: &Scenario,
-    window_s: f64,
+    averaging_s: f64,
 ) -> Result<Windows, ScenarioErrors> {
-    let mut windows = Windows::new(window_s);
+    let mut windows = Windows::new(averaging_s);
     run(calibration, scenario, |step, tick| {
         let truth = step.truth.delta_angle;
         let error = [0, 1, 2].map(|axis| tick.delta_angle[axis] - truth[axis]);

@@ -29,7 +29,12 @@ pub fn gyro(k: u64, rates: &[f64]) -> GyroTick {
 /// Accelerometer tick `k` with mean outputs.
 #[must_use]
 pub fn accel(k: u64, outputs: &[f64]) -> AccelTick {
-    AccelTick { sequence: k, end_time: end_of(k), duration: TICK, readings: outputs.iter().copied().collect() }
+    AccelTick {
+        sequence: k,
+        end_time: end_of(k),
+        duration: TICK,
+        readings: outputs.iter().copied().collect(),
+    }
 }
 
 /// A reading of channel "t" at the end of tick `k`.

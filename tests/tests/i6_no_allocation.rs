@@ -21,8 +21,11 @@ fn i6_a_hundred_thousand_ticks_allocate_nothing() {
     parts.gyro_orientation.parity_limit = Some(1e-3);
     parts.gyros.resize(5, parts.gyros[0].clone());
     for gyro in &mut parts.gyros {
-        let branched =
-            BranchedParts { argument: BranchArgument::Temperature, run_up: constant(1e-4), braking: constant(2e-4) };
+        let branched = BranchedParts {
+            argument: BranchArgument::Temperature,
+            run_up: constant(1e-4),
+            braking: constant(2e-4),
+        };
         gyro.static_bias = Some(polynomial(&[1e-4, 1e-5]));
         gyro.magnetic_bias = Some(constant(1e-5));
         gyro.thermal_rate = Some(branched.clone());
@@ -42,7 +45,16 @@ fn i6_a_hundred_thousand_ticks_allocate_nothing() {
         .map(|k| GyroTick {
             mode: Some(if (k / 1000) % 2 == 0 { LasingMode::Plus } else { LasingMode::Minus }),
             switch_command: k % 1000 == 0 && k > 0,
-            ..gyro(k, &[0.1, 0.2, if k % 777 == 0 { f64::NAN } else { 0.3 }, 0.1 * 0.6 + 0.3 * 0.8, 0.2 * 0.6 + 0.3 * 0.8])
+            ..gyro(
+                k,
+                &[
+                    0.1,
+                    0.2,
+                    if k % 777 == 0 { f64::NAN } else { 0.3 },
+                    0.1 * 0.6 + 0.3 * 0.8,
+                    0.2 * 0.6 + 0.3 * 0.8,
+                ],
+            )
         })
         .collect();
     let accels: Vec<_> = (0..110_000).map(|k| accel(k, &[0.0, 0.0, 9.8])).collect();
@@ -55,11 +67,15 @@ fn i6_a_hundred_thousand_ticks_allocate_nothing() {
                 unit.handle(Event::Temperature(&[reading]), &mut |_| {});
             }
             if k % 5000 != 0 {
-                unit.handle(Event::Accel { output: OutputKind::Mean, ticks: &accels[k..=k] }, &mut |_| out += 1);
+                unit.handle(Event::Accel { output: OutputKind::Mean, ticks: &accels[k..=k] }, &mut |_| {
+                    out += 1
+                });
             }
             let repeated = if k % 3000 == 0 { 2 } else { usize::from(k % 4000 != 1) };
             for _ in 0..repeated {
-                unit.handle(Event::Gyro { output: OutputKind::Mean, ticks: &ticks[k..=k] }, &mut |_| out += 1);
+                unit.handle(Event::Gyro { output: OutputKind::Mean, ticks: &ticks[k..=k] }, &mut |_| {
+                    out += 1
+                });
             }
         }
     };

@@ -4,9 +4,9 @@ use alloc::vec::Vec;
 
 use thiserror::Error;
 
-use super::parts::{AccelParts, CalibrationParts, GyroParts, LagParts, TrendParts};
 use super::Calibration;
-use crate::channel::{Channel, ChannelParts, ThermalFilter, ThermalFilterParts, MAX_GRID_POINTS};
+use super::parts::{AccelParts, CalibrationParts, GyroParts, LagParts, TrendParts};
+use crate::channel::{Channel, ChannelParts, MAX_GRID_POINTS, ThermalFilter, ThermalFilterParts};
 use crate::curve::{Curve, CurveError};
 use crate::orientation::{Orientation, OrientationError, OrientationParts};
 use crate::reversal::{Reversal, ReversalError};
@@ -172,7 +172,11 @@ pub(super) fn compile(parts: &CalibrationParts) -> Result<Calibration, Vec<Defec
     let channels = parts.channels.len();
 
     checker.count(Section::Gyros, "sensors", parts.gyros.len(), MIN_SENSORS, MAX_SENSORS);
-    let gyros = parts.gyros.iter().enumerate().filter_map(|(i, gyro)| gyro_model(&mut checker, i, gyro, &filter, parts));
+    let gyros = parts
+        .gyros
+        .iter()
+        .enumerate()
+        .filter_map(|(i, gyro)| gyro_model(&mut checker, i, gyro, &filter, parts));
     let gyros: Vec<_> = gyros.collect();
     let gyro_orientation = orientation(
         &mut checker,
@@ -242,7 +246,13 @@ fn check_filter(checker: &mut Checker, filter: &ThermalFilterParts) {
     checker.within(section, "smoothing_s", filter.smoothing_s, 0.0, longest);
     checker.within(section, "derivative_step_s", filter.derivative_step_s, 0.0, longest);
     // Bounded in grid steps too: a reading after a silence walks over all of them at once.
-    checker.within(section, "stale_after_s", filter.stale_after_s, filter.grid_step_s, 1e4 * filter.grid_step_s);
+    checker.within(
+        section,
+        "stale_after_s",
+        filter.stale_after_s,
+        filter.grid_step_s,
+        1e4 * filter.grid_step_s,
+    );
     checker.within(section, "assumed_deg_c", filter.assumed_deg_c, -273.15, 1000.0);
     checker.within(section, "branch_dead_band", filter.branch_dead_band, f64::MIN_POSITIVE, HUGE);
 }
@@ -288,20 +298,33 @@ fn gyro_model(
         }
     }
     if gyro.servo.is_some() && parts.reversal.is_none() {
-        checker.push(Section::Reversal, "transition_ticks", DefectKind::Missing { needed_by: "the gyros' servo term" });
+        checker.push(
+            Section::Reversal,
+            "transition_ticks",
+            DefectKind::Missing { needed_by: "the gyros' servo term" },
+        );
     }
     if gyro.servo.is_some() && parts.gyro_output != OutputKind::Counts {
         checker.push(section, "servo", DefectKind::NeedsCounts);
     }
     GyroModel::new(gyro, filter, &mut |field, error| {
-        checker.push(section, field, match error {
-            TermError::Curve(error) => DefectKind::Curve(error),
-            TermError::Servo(error) => DefectKind::Servo(error),
-        });
+        checker.push(
+            section,
+            field,
+            match error {
+                TermError::Curve(error) => DefectKind::Curve(error),
+                TermError::Servo(error) => DefectKind::Servo(error),
+            },
+        );
     })
 }
 
-fn accel_model(checker: &mut Checker, index: usize, accel: &AccelParts, channels: usize) -> Option<AccelModel> {
+fn accel_model(
+    checker: &mut Checker,
+    index: usize,
+    accel: &AccelParts,
+    channels: usize,
+) -> Option<AccelModel> {
     let section = Section::Accel(index);
     checker.channel(section, "channel", accel.channel, channels);
     checker.channel(section, "board_channel", accel.board_channel, channels);
@@ -309,7 +332,8 @@ fn accel_model(checker: &mut Checker, index: usize, accel: &AccelParts, channels
         checker.push(section, "board_channel", DefectKind::Missing { needed_by: "board_ratio" });
     }
     checker.within(section, "input_limit", accel.input_limit, f64::MIN_POSITIVE, HUGE);
-    let model = AccelModel::new(accel, &mut |field, error| checker.push(section, field, DefectKind::Curve(error)))?;
+    let model =
+        AccelModel::new(accel, &mut |field, error| checker.push(section, field, DefectKind::Curve(error)))?;
     if let Some(at) = sign_change(&model.scale_factor) {
         checker.push(section, "scale_factor", DefectKind::Zero { at });
     }

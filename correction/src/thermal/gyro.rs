@@ -60,7 +60,8 @@ impl GyroModel {
         let slow_meander = curve("slow_meander", parts.slow_meander.as_ref());
         let mut branched = |run_up, braking, parts: Option<&crate::calibration::BranchedParts>| {
             let parts = parts?;
-            let (run_up, braking) = (curve(run_up, Some(&parts.run_up)), curve(braking, Some(&parts.braking)));
+            let (run_up, braking) =
+                (curve(run_up, Some(&parts.run_up)), curve(braking, Some(&parts.braking)));
             Some(Branched { argument: parts.argument, run_up: run_up?, braking: braking? })
         };
         let thermal_rate =

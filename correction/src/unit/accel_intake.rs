@@ -91,7 +91,9 @@ impl AccelIntake {
     /// Starts a new series whose first gyro tick ends at `end_time`; ticks of the old one are dropped.
     pub(super) fn starts_anew(&mut self, end_time: Timestamp, counters: &mut Counters) {
         self.released = None;
-        let near = |tick: &AccelTick| tick.end_time + MAX_DURATION > end_time && tick.end_time < end_time + MAX_DURATION;
+        let near = |tick: &AccelTick| {
+            tick.end_time + MAX_DURATION > end_time && tick.end_time < end_time + MAX_DURATION
+        };
         let before = self.pending.len();
         self.pending.retain(near);
         counters.accel_unpaired += before.abs_diff(self.pending.len()) as u64;

@@ -36,7 +36,13 @@ impl Axes {
     }
 
     /// Turns towards the orientation at a new temperature (°C).
-    pub(super) fn update(&mut self, orientation: &Orientation, temperature: f64, start: Timestamp, over: Span) {
+    pub(super) fn update(
+        &mut self,
+        orientation: &Orientation,
+        temperature: f64,
+        start: Timestamp,
+        over: Span,
+    ) {
         let now = self.at(start);
         self.to = orientation.inverse(temperature, self.mask);
         self.from = now.or(self.to);
@@ -81,7 +87,12 @@ impl Axes {
     }
 
     /// Watches the parity residuals; excludes a sensor where they call for it.
-    pub(super) fn watch(&mut self, orientation: &Orientation, mask: SensorMask, rates: &[f64]) -> ParityVerdict {
+    pub(super) fn watch(
+        &mut self,
+        orientation: &Orientation,
+        mask: SensorMask,
+        rates: &[f64],
+    ) -> ParityVerdict {
         let verdict = self.parity.check(orientation, self.target, mask, rates);
         if let Some(sensor) = verdict.exclude {
             self.excluded = self.excluded.with(sensor);

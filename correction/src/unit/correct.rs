@@ -145,7 +145,10 @@ impl Corrector {
             let mut flags = SensorFlags::VALID;
             let clamped = thermal.clamped() || self.thermal.gyro_axes.clamped();
             flags.set(SensorFlags::CLAMPED_TEMPERATURE, clamped);
-            flags.set(SensorFlags::STALE_TEMPERATURE, self.thermal.stale(calibration, model.channel, tick.end_time));
+            flags.set(
+                SensorFlags::STALE_TEMPERATURE,
+                self.thermal.stale(calibration, model.channel, tick.end_time),
+            );
             flags.set(SensorFlags::EXCLUDED, self.thermal.gyro_axes.is_excluded(i));
 
             let reading = tick.readings.get(i).copied().unwrap_or(f64::NAN);
@@ -159,13 +162,16 @@ impl Corrector {
                 }
                 // Beyond its limit a reading says no more than the limit, and stays finite whatever it is.
                 let reading = reading.clamp(-model.input_limit, model.input_limit);
-                scaled(calibration.gyro_output, reading, terms.increment_weight, duration_s) - bias * duration_s
+                scaled(calibration.gyro_output, reading, terms.increment_weight, duration_s)
+                    - bias * duration_s
             } else {
                 flags |= SensorFlags::NOT_FINITE;
                 counters.not_finite_readings += 1;
                 last_rate * duration_s
             };
-            if lost || flags.intersects(SensorFlags::OVERRANGE | SensorFlags::NOT_FINITE | SensorFlags::EXCLUDED) {
+            if lost
+                || flags.intersects(SensorFlags::OVERRANGE | SensorFlags::NOT_FINITE | SensorFlags::EXCLUDED)
+            {
                 flags -= SensorFlags::VALID;
             }
             if flags.intersects(SensorFlags::OVERRANGE | SensorFlags::NOT_FINITE) {
@@ -310,7 +316,9 @@ fn count_switch_flags(flags: TickFlags, counters: &mut Counters) {
 
 /// The first three raw readings as they are, unscaled and flagged.
 pub(super) fn pass_through(tick: &GyroTick, accel: Option<&AccelTick>) -> CorrectedTick {
-    let first_three = |readings: &[f64]| core::array::from_fn(|i| readings.get(i).copied().filter(|r| r.is_finite()).unwrap_or(0.0));
+    let first_three = |readings: &[f64]| {
+        core::array::from_fn(|i| readings.get(i).copied().filter(|r| r.is_finite()).unwrap_or(0.0))
+    };
     CorrectedTick {
         sequence: tick.sequence,
         end_time: tick.end_time,
@@ -324,7 +332,8 @@ pub(super) fn pass_through(tick: &GyroTick, accel: Option<&AccelTick>) -> Correc
             | TickFlags::VELOCITY_INVALID
             | if accel.is_none() { TickFlags::ACCELEROMETER_MISSING } else { TickFlags::empty() },
         gyro_flags: tick.readings.iter().map(|_| SensorFlags::empty()).collect(),
-        accel_flags: accel.map_or_else(Sensors::new, |a| a.readings.iter().map(|_| SensorFlags::empty()).collect()),
+        accel_flags: accel
+            .map_or_else(Sensors::new, |a| a.readings.iter().map(|_| SensorFlags::empty()).collect()),
         ..CorrectedTick::default()
     }
 }

@@ -97,7 +97,9 @@ impl GyroIntake {
             counters.bad_duration += 1;
             return false;
         }
-        let Admission::Admitted { restart, refused_before } = self.judge(tick, counters) else { return false };
+        let Admission::Admitted { restart, refused_before } = self.judge(tick, counters) else {
+            return false;
+        };
         let pending = Pending { tick: tick.clone(), batch_end, restart, refused_before };
         if restart || self.newest.is_none_or(|newest| tick.sequence > newest.sequence) {
             self.newest = Some(Newest { sequence: tick.sequence, end_time: tick.end_time });
@@ -143,7 +145,10 @@ impl GyroIntake {
             return Admission::Admitted { restart: false, refused_before: 0 };
         }
         let age = self.next.unwrap_or_default().saturating_sub(1).saturating_sub(tick.sequence);
-        let known = u32::try_from(age).ok().and_then(|age| self.released.checked_shr(age)).is_some_and(|bits| bits & 1 == 1);
+        let known = u32::try_from(age)
+            .ok()
+            .and_then(|age| self.released.checked_shr(age))
+            .is_some_and(|bits| bits & 1 == 1);
         if known {
             counters.gyro_duplicates += 1;
             return Admission::Refused;
@@ -166,8 +171,12 @@ impl GyroIntake {
         let refused = self.jump.map_or(0, |jump| jump.refused);
         let consistent = before.map_or(1, |jump| jump.consistent + 1);
         if consistent <= believed_after {
-            self.jump =
-                Some(Jump { sequence: tick.sequence, end_time: tick.end_time, consistent, refused: refused + 1 });
+            self.jump = Some(Jump {
+                sequence: tick.sequence,
+                end_time: tick.end_time,
+                consistent,
+                refused: refused + 1,
+            });
             return Admission::Refused;
         }
         self.jump = None;
@@ -188,7 +197,9 @@ impl GyroIntake {
         }
         let time = pending.tick.end_time;
         let earlier = place.checked_sub(1).and_then(|i| self.pending.get(i));
-        if neighbour.is_some_and(|p| p.tick.end_time <= time) || earlier.is_some_and(|p| p.tick.end_time >= time) {
+        if neighbour.is_some_and(|p| p.tick.end_time <= time)
+            || earlier.is_some_and(|p| p.tick.end_time >= time)
+        {
             counters.gyro_implausible += 1;
             return;
         }
@@ -217,7 +228,11 @@ impl GyroIntake {
             _ => refused_before,
         };
         let moved = missed.saturating_add(1);
-        let kept = if restart { 0 } else { u32::try_from(moved).ok().and_then(|n| self.released.checked_shl(n)).unwrap_or(0) };
+        let kept = if restart {
+            0
+        } else {
+            u32::try_from(moved).ok().and_then(|n| self.released.checked_shl(n)).unwrap_or(0)
+        };
         self.released = kept | 1;
         self.next = Some(tick.sequence.saturating_add(1));
         Some(Released { tick, missed, restart })

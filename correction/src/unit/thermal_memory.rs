@@ -70,21 +70,37 @@ pub(super) struct ThermalMemory {
 
 impl ThermalMemory {
     /// Makes the memory for a calibration; channels that `before` filtered in the same way go on where they are.
-    pub(super) fn new(calibration: &Calibration, before: Option<(&Calibration, &Self)>, now: Timestamp) -> Self {
+    pub(super) fn new(
+        calibration: &Calibration,
+        before: Option<(&Calibration, &Self)>,
+        now: Timestamp,
+    ) -> Self {
         let channels = calibration.channels.iter().map(|channel| {
-            let kept = before.filter(|(old, _)| old.filter == calibration.filter).and_then(|(old, memory)| {
-                let index = old.channels.iter().position(|c| c == channel)?;
-                memory.channels.get(index).cloned()
-            });
+            let kept =
+                before.filter(|(old, _)| old.filter == calibration.filter).and_then(|(old, memory)| {
+                    let index = old.channels.iter().position(|c| c == channel)?;
+                    memory.channels.get(index).cloned()
+                });
             kept.unwrap_or_else(|| ChannelMemory::new(&calibration.filter))
         });
         let mut memory = Self {
             channels: channels.collect(),
             updated: alloc::vec![None; calibration.channels.len()],
-            gyros: calibration.gyros.iter().map(|model| GyroThermal::new(model, &calibration.filter)).collect(),
-            accels: calibration.accels.iter().map(|model| AccelThermal::new(model, &calibration.filter)).collect(),
+            gyros: calibration
+                .gyros
+                .iter()
+                .map(|model| GyroThermal::new(model, &calibration.filter))
+                .collect(),
+            accels: calibration
+                .accels
+                .iter()
+                .map(|model| AccelThermal::new(model, &calibration.filter))
+                .collect(),
             gyro_axes: Axes::new(&calibration.gyro_orientation, calibration.filter.assumed_deg_c),
-            accel_axes: calibration.accel_orientation.as_ref().map(|o| Axes::new(o, calibration.filter.assumed_deg_c)),
+            accel_axes: calibration
+                .accel_orientation
+                .as_ref()
+                .map(|o| Axes::new(o, calibration.filter.assumed_deg_c)),
         };
         for index in 0..memory.channels.len() {
             if let Some(state) = memory.channels.get(index).and_then(ChannelMemory::state) {

@@ -56,9 +56,9 @@ fn gyro_batch() -> impl Strategy<Value = GyroBatch> {
     let ticks = (1..20usize)
         .prop_flat_map(readings)
         .prop_flat_map(|all| all.into_iter().map(gyro_tick).collect::<Vec<_>>());
-    (any::<(u64, bool)>(), ticks).prop_map(|((first_sequence, restart), ticks)| GyroBatch {
+    (any::<(u64, u64)>(), ticks).prop_map(|((first_sequence, series), ticks)| GyroBatch {
         first_sequence,
-        restart,
+        series,
         ticks,
     })
 }

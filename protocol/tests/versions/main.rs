@@ -1,11 +1,8 @@
 //! The bytes of the wire messages: frozen vectors of every version, laws of the codec, and `docs/wire.md`.
+#![expect(clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 
-// Conditional so that the lints know: everything here is a test.
-#[cfg(test)]
 mod laws;
-#[cfg(test)]
 mod page;
-#[cfg(test)]
 mod v1;
 
 use isotherm_protocol::codec::{self, CodecError, Kind};
@@ -14,7 +11,6 @@ use isotherm_protocol::raw::{AccelBatch, GyroBatch, TemperatureBatch};
 use isotherm_protocol::status::Status;
 
 /// Bytes written in hexadecimal; spaces and line ends between them, and comments behind `#`, mean nothing.
-#[cfg(test)]
 fn bytes(hex: &str) -> Vec<u8> {
     let digits: Vec<u32> = hex
         .lines()
@@ -27,7 +23,6 @@ fn bytes(hex: &str) -> Vec<u8> {
 }
 
 /// Decodes a frame as a message of a kind, and gives it back in JSON (NaN as null).
-#[cfg(test)]
 fn decode_as(kind: u8, frame: &[u8]) -> Result<serde_json::Value, CodecError> {
     fn json<M: codec::Message>(frame: &[u8]) -> Result<serde_json::Value, CodecError> {
         codec::decode::<M>(frame).map(|message| serde_json::to_value(message).expect("JSON takes it"))

@@ -65,7 +65,7 @@ fn raw_gyro() {
     };
     holds(
         "raw-gyro-counts",
-        &GyroBatch { first_sequence: 1000, restart: false, ticks: vec![counts, switch] },
+        &GyroBatch { first_sequence: 1000, series: 1_700_000_000_000_000_000, ticks: vec![counts, switch] },
     );
 
     let means = GyroTick {
@@ -79,7 +79,7 @@ fn raw_gyro() {
         meander: None,
         half_periods: [].into_iter().collect(),
     };
-    holds("raw-gyro-means", &GyroBatch { first_sequence: 0, restart: false, ticks: vec![means] });
+    holds("raw-gyro-means", &GyroBatch { first_sequence: 0, series: 0, ticks: vec![means] });
 
     let edges = GyroTick {
         end_time_ns: i64::MIN,
@@ -90,7 +90,7 @@ fn raw_gyro() {
         meander: Some(Mode::Minus),
         half_periods: [half(i32::MIN, i32::MAX); 8].into_iter().collect(),
     };
-    holds("raw-gyro-edges", &GyroBatch { first_sequence: u64::MAX, restart: true, ticks: vec![edges] });
+    holds("raw-gyro-edges", &GyroBatch { first_sequence: u64::MAX, series: u64::MAX, ticks: vec![edges] });
 
     let empty = GyroTick {
         end_time_ns: 0,
@@ -101,7 +101,7 @@ fn raw_gyro() {
         meander: None,
         half_periods: [].into_iter().collect(),
     };
-    holds("raw-gyro-empty", &GyroBatch { first_sequence: 128, restart: false, ticks: vec![empty] });
+    holds("raw-gyro-empty", &GyroBatch { first_sequence: 128, series: 0, ticks: vec![empty] });
 }
 
 #[test]

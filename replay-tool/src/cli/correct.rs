@@ -24,7 +24,7 @@ const BLOCK: usize = 512;
 #[derive(Debug, Args)]
 #[command(after_help = "Example, in two steps:\n  \
     isotherm-replay simulate --preset mems-chamber --duration 60 --out mems.csv\n  \
-    isotherm-replay correct mems.csv --mapping mems.mapping.toml --calibration config/calibration/mems-001.toml --out corrected.csv\n\n\
+    isotherm-replay correct mems.csv --mapping mems.mapping.toml --calibration config/calibration/MEMS-0001.toml --out corrected.csv\n\n\
     The CSV's columns are named with their units; its numbers read back to the bit.")]
 pub(super) struct CorrectArgs {
     #[command(flatten)]

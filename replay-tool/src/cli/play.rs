@@ -19,7 +19,7 @@ const IN_FLIGHT: u64 = 4096;
 #[derive(Debug, Args)]
 #[command(after_help = "Example, with `isotherm serve --listen tcp/127.0.0.1:7447` running:\n  \
     isotherm-replay simulate --preset mems-chamber --duration 60 --out mems.csv\n  \
-    isotherm-replay play mems.csv --mapping mems.mapping.toml --unit MEMS-001 --connect tcp/127.0.0.1:7447 --speed max\n\n\
+    isotherm-replay play mems.csv --mapping mems.mapping.toml --unit MEMS-0001 --connect tcp/127.0.0.1:7447 --speed max\n\n\
     At any speed, ticks are sent no further ahead of what comes back corrected than --in-flight, so that none is lost.\n\
     Exit code 3: ticks were lost, or rows of the log could not be read.")]
 pub(super) struct PlayArgs {

@@ -38,7 +38,7 @@ fn simulated() -> tempfile::TempDir {
 
 /// The calibration document for it.
 fn calibration() -> String {
-    root().join("config/calibration/mems-001.toml").display().to_string()
+    root().join("config/calibration/MEMS-0001.toml").display().to_string()
 }
 
 /// `correct` with further arguments.
@@ -179,7 +179,7 @@ fn playing_needs_a_service_unless_told_otherwise() {
     let folder = simulated();
     let output = replay(
         folder.path(),
-        &["play", "mems.csv", "-m", "mems.mapping.toml", "-u", "MEMS-001", "--connect", "tcp/127.0.0.1:1"],
+        &["play", "mems.csv", "-m", "mems.mapping.toml", "-u", "MEMS-0001", "--connect", "tcp/127.0.0.1:1"],
     );
     assert_eq!(output.status.code(), Some(1), "{}", String::from_utf8_lossy(&output.stderr));
 }
@@ -189,7 +189,7 @@ fn examples_of_the_help_without_a_service_work_as_printed() {
     let folder = tempfile::tempdir().unwrap();
     // The examples name files of the project by their paths from its root.
     fs::create_dir_all(folder.path().join("config/calibration")).unwrap();
-    fs::copy(calibration(), folder.path().join("config/calibration/mems-001.toml")).unwrap();
+    fs::copy(calibration(), folder.path().join("config/calibration/MEMS-0001.toml")).unwrap();
     for command in ["simulate", "correct", "completions"] {
         let help = stdout(&replay(folder.path(), &[command, "--help"]));
         let examples = help.lines().filter_map(|line| line.trim().strip_prefix("isotherm-replay "));

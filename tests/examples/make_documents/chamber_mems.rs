@@ -49,12 +49,15 @@ pub(crate) fn make(data: &Path) -> Result<Document, Failure> {
         }
         let with = outputs(&with_cubics(&bare, &coefficients), &events)?;
         let pairs = before.iter().zip(with);
-        Ok(pairs.map(|(before, with)| before.iter().zip(with).map(|(b, w)| b - w).collect::<Vec<_>>()).collect())
+        Ok(pairs
+            .map(|(before, with)| before.iter().zip(with).map(|(b, w)| b - w).collect::<Vec<_>>())
+            .collect())
     };
     let columns: Vec<Vec<Vec<f64>>> = (0..=DEGREE).map(column).collect::<Result<_, Failure>>()?;
     let mut cubics = [[0.0; DEGREE + 1]; 6];
     for (sensor, (cubic, target)) in cubics.iter_mut().zip(&before).enumerate() {
-        let columns: Vec<Vec<f64>> = columns.iter().filter_map(|column| column.get(sensor).cloned()).collect();
+        let columns: Vec<Vec<f64>> =
+            columns.iter().filter_map(|column| column.get(sensor).cloned()).collect();
         let failure = || Failure::NoSolution { of: format!("sensor {sensor} of the chamber log") };
         let solution = solve(&columns, target).ok_or_else(failure)?;
         // The constant belongs to the fit, not to the document: see the note.
@@ -147,7 +150,8 @@ fn with_cubics(bare: &Document, cubics: &[[f64; DEGREE + 1]; 6]) -> Document {
 
 /// The log through the state machine, without its first row.
 fn outputs(document: &Document, events: &[LogEvent]) -> Result<Outputs, Failure> {
-    let calibration = Calibration::new(&document.to_parts()).map_err(|defects| Failure::Compile(format!("{defects:?}")))?;
+    let calibration =
+        Calibration::new(&document.to_parts()).map_err(|defects| Failure::Compile(format!("{defects:?}")))?;
     let mut outputs = Outputs::default();
     for tick in correct(&Arc::new(calibration), events).iter().skip(1) {
         let duration_s = tick.duration.as_s();
@@ -163,11 +167,17 @@ fn outputs(document: &Document, events: &[LogEvent]) -> Result<Outputs, Failure>
 /// Deviations before and after.
 fn residuals(before: &Outputs, after: &Outputs) -> Vec<Residual> {
     let kinds = [("gyro", Measure::DegPerH), ("accel", Measure::MetresPerSecondSquared)];
-    let sensors = kinds.into_iter().flat_map(|(kind, measure)| AXES.map(|axis| (format!("{kind}.{axis}"), measure)));
-    let residual = |((of, measure), (before, after)): ((String, Measure), (&Vec<f64>, &Vec<f64>))| {
+    let sensors =
+        kinds.into_iter().flat_map(|(kind, measure)| AXES.map(|axis| (format!("{kind}.{axis}"), measure)));
+    let mut residuals = Vec::new();
+    for ((of, measure), (before, after)) in sensors.zip(before.iter().zip(after)) {
         let (before, after) = (Size::of(before.iter().copied()), Size::of(after.iter().copied()));
-        println!("CHAMBER-MEMS {of} in sample: deviation {:.4} -> {:.4} {measure:?}", before.deviation, after.deviation);
-        Residual {
+        let unit = if measure == Measure::DegPerH { "°/h" } else { "m/s²" };
+        println!(
+            "CHAMBER-MEMS {of} in sample: deviation {:.4} -> {:.4} {unit}",
+            before.deviation, after.deviation
+        );
+        residuals.push(Residual {
             of,
             sample: Sample::In,
             measure,
@@ -175,7 +185,7 @@ fn residuals(before: &Outputs, after: &Outputs) -> Vec<Residual> {
             rms_after: stated(after.deviation),
             peak_to_peak_before: Some(stated(before.peak_to_peak)),
             peak_to_peak_after: Some(stated(after.peak_to_peak)),
-        }
-    };
-    sensors.zip(before.iter().zip(after)).map(residual).collect()
+        });
+    }
+    residuals
 }

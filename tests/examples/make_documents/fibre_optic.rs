@@ -6,12 +6,14 @@ use isotherm_correction::calibration::Calibration;
 use isotherm_protocol::document::{
     Document, Filter, Gyro, GyroOutput, GyroSensor, Measure, Orientation, Origin, Residual, Sample,
 };
+use isotherm_simulator::Scenario;
 use isotherm_simulator::instrument::Gyros;
 use isotherm_simulator::presets::{fibre_optic_chamber, judging_profile, training_profile};
-use isotherm_simulator::Scenario;
 use isotherm_tests::simulated::{Size, Windows, nominal, rate_errors};
 
-use crate::instrument::{AXES, accelerometers, bare_gyro, orientation, scale_error, stated, temperature, tidy};
+use crate::instrument::{
+    AXES, accelerometers, bare_gyro, orientation, scale_error, stated, temperature, tidy,
+};
 use crate::least_squares::solve;
 use crate::regressors::{Term, columns, rates};
 use crate::write::{Failure, document};
@@ -109,6 +111,7 @@ fn with_scale(scenario: &Scenario) -> Result<Document, Failure> {
                 ("preset".into(), "fibre_optic_chamber".into()),
                 ("training_seed".into(), toml::Value::Integer(SEEDS[0].cast_signed())),
                 ("judging_seed".into(), toml::Value::Integer(SEEDS[1].cast_signed())),
+                ("tick_ns".into(), toml::Value::Integer(TICK_NS)),
                 ("averaging_of_the_residuals_s".into(), JUDGE_WINDOW_S.into()),
             ])),
             ..Origin::default()
@@ -141,7 +144,12 @@ fn residuals(document: &Document, scenario: &Scenario, sample: Sample) -> Result
         let (before, after) = (Size::of(before.axis(axis)), Size::of(after.axis(axis)));
         println!(
             "{} gyro.{name} {sample:?}: rms {:.4} -> {:.4} °/h ({:.1} times), peak to peak {:.3} -> {:.3}",
-            scenario.unit, before.rms, after.rms, before.rms / after.rms, before.peak_to_peak, after.peak_to_peak,
+            scenario.unit,
+            before.rms,
+            after.rms,
+            before.rms / after.rms,
+            before.peak_to_peak,
+            after.peak_to_peak,
         );
         Residual {
             of: format!("gyro.{name}"),

@@ -6,8 +6,8 @@
 
 use isotherm_correction::units::{Angle, AngularRate};
 use isotherm_protocol::document::{
-    Accel, AccelOutput, AccelSensor, Channel, Curve, Filter, GyroSensor, Orientation, OrientationThermal, Quantity,
-    Shape, Temperature, Unit,
+    Accel, AccelOutput, AccelSensor, Channel, Curve, Filter, GyroSensor, Orientation, OrientationThermal,
+    Quantity, Shape, Temperature, Unit,
 };
 use isotherm_simulator::accelerometer::{AccelerometerOutput, Accelerometers};
 use isotherm_simulator::instrument::Instrument;
@@ -109,7 +109,9 @@ pub(crate) fn accelerometers(block: &Accelerometers) -> Accel {
         AccelerometerOutput::Counts { hz_per_v, .. } => {
             (AccelOutput::Counts, Unit::CountsPerSPerMPerS2, Unit::CountsPerS, hz_per_v)
         }
-        AccelerometerOutput::Mean => (AccelOutput::MetresPerSecondSquared, Unit::MPerS2PerMPerS2, Unit::MPerS2, 1.0),
+        AccelerometerOutput::Mean => {
+            (AccelOutput::MetresPerSecondSquared, Unit::MPerS2PerMPerS2, Unit::MPerS2, 1.0)
+        }
     };
     let sensors = block.sensors.iter().zip(AXES).enumerate().map(|(index, (sensor, name))| {
         let reference = sensor.reference_deg_c;
@@ -121,7 +123,8 @@ pub(crate) fn accelerometers(block: &Accelerometers) -> Accel {
             input_limit_counts_per_tick: None,
             input_limit_v: None,
             input_limit_m_per_s2: None,
-            scale_factor: polynomial(reference, &sensor.scale_v_per_m_per_s2.map(|k| k * per_output)).in_unit(scale_unit),
+            scale_factor: polynomial(reference, &sensor.scale_v_per_m_per_s2.map(|k| k * per_output))
+                .in_unit(scale_unit),
             bias: Some(polynomial(reference, &sensor.bias_v.map(|s| s * per_output)).in_unit(bias_unit)),
             board_ratio_error: Some(scale_error(reference, [first, second])),
         }

@@ -13,7 +13,8 @@ pub(crate) fn solve(columns: &[Vec<f64>], target: &[f64]) -> Option<Vec<f64>> {
     if columns.is_empty() || columns.iter().any(|column| column.len() != target.len()) {
         return None;
     }
-    let norms = columns.iter().map(|column| column.iter().map(|x| x * x).sum::<f64>().sqrt().max(f64::MIN_POSITIVE));
+    let norms =
+        columns.iter().map(|column| column.iter().map(|x| x * x).sum::<f64>().sqrt().max(f64::MIN_POSITIVE));
     let norms: Vec<f64> = norms.collect();
     let scaled = columns.iter().zip(&norms).flat_map(|(column, norm)| column.iter().map(move |x| x / norm));
     let matrix = DMatrix::from_iterator(target.len(), columns.len(), scaled);

@@ -27,6 +27,6 @@ pub(crate) fn origin(data: &Path, log: RealLog) -> Result<Log, Failure> {
     let path: PathBuf = log.path(data);
     let bytes = std::fs::read(&path).map_err(|source| Failure::File { path: path.clone(), source })?;
     let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    let digest = Sha256::digest(&bytes);
-    Ok(Log { name, sha256: digest.iter().map(|byte| format!("{byte:02x}")).collect() })
+    let sha256 = Sha256::digest(&bytes).iter().fold(String::new(), |hex, byte| format!("{hex}{byte:02x}"));
+    Ok(Log { name, sha256 })
 }

@@ -37,7 +37,12 @@ pub(crate) fn make(scenario: &Scenario) -> Result<Document, Failure> {
         temperature: temperature(instrument, FILTER, 25.0),
         gyro: Gyro {
             output: GyroOutput::Mean,
-            sensor: gyros.iter().zip(AXES).enumerate().map(|(index, (gyro, name))| sensor(gyro, index, name)).collect(),
+            sensor: gyros
+                .iter()
+                .zip(AXES)
+                .enumerate()
+                .map(|(index, (gyro, name))| sensor(gyro, index, name))
+                .collect(),
             orientation: orientation(&instrument.gyro_orientation),
         },
         accel: Some(accelerometers(block)),

@@ -33,7 +33,8 @@ impl Term {
                 sensor.static_bias = Some(with(before.as_ref(), power, coefficient, range));
             }
             Self::Lag(time_constant_s, power) => {
-                let lag = sensor.lag.iter().position(|lag| lag.time_constant_s.total_cmp(&time_constant_s).is_eq());
+                let lag =
+                    sensor.lag.iter().position(|lag| lag.time_constant_s.total_cmp(&time_constant_s).is_eq());
                 let before = lag.map(|index| sensor.lag.remove(index));
                 let gain = with(before.as_ref().map(|lag| &lag.gain), power, coefficient, range);
                 sensor.lag.insert(lag.unwrap_or(sensor.lag.len()), Lag { time_constant_s, gain });
@@ -61,12 +62,12 @@ fn with<Q: Quantity>(before: Option<&Curve<Q>>, power: usize, coefficient: f64, 
 pub(crate) fn rates(
     document: &Document,
     scenario: &Scenario,
-    window_s: f64,
+    averaging_s: f64,
     known: impl Fn(&Step) -> [f64; 3],
 ) -> Result<Windows, Failure> {
     let text = document.to_toml().map_err(|error| Failure::Serialise(error.to_string()))?;
     let parsed = Document::parse(&text, None).map_err(Failure::Refused)?;
-    let mut windows = Windows::new(window_s);
+    let mut windows = Windows::new(averaging_s);
     run(&Arc::new(parsed.calibration), scenario, |step, tick| {
         let known = known(step);
         let angle = [0, 1, 2].map(|axis| tick.delta_angle[axis] - known[axis]);
@@ -79,17 +80,17 @@ pub(crate) fn rates(
 pub(crate) fn columns(
     bare: &Document,
     scenario: &Scenario,
-    window_s: f64,
+    averaging_s: f64,
     terms: &[Term],
     range: [f64; 2],
 ) -> Result<Vec<Windows>, Failure> {
-    let without = rates(bare, scenario, window_s, |_| [0.0; 3])?;
+    let without = rates(bare, scenario, averaging_s, |_| [0.0; 3])?;
     let column = |term: &Term| {
         let mut document = bare.clone();
         for sensor in &mut document.gyro.sensor {
             term.add(sensor, 1.0, range);
         }
-        let mut with = rates(&document, scenario, window_s, |_| [0.0; 3])?;
+        let mut with = rates(&document, scenario, averaging_s, |_| [0.0; 3])?;
         for (with, without) in with.means.iter_mut().zip(&without.means) {
             *with = [0, 1, 2].map(|axis| without[axis] - with[axis]);
         }

@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use isotherm_protocol::document::{
-    Accel, AccelOutput, AccelSensor, Curve, Document, Gyro, GyroOutput, GyroSensor, Orientation, Origin, Shape, Unit,
+    Accel, AccelOutput, AccelSensor, Curve, Document, Gyro, GyroOutput, GyroSensor, Orientation, Origin,
+    Shape, Unit,
 };
 use isotherm_tests::logs::RealLog;
 
@@ -20,8 +21,8 @@ const G_M_PER_S2: f64 = 9.780_327;
 
 const NOTE: &str = "Scale factors as the log's header states them, nothing else: no temperature was logged and no bias is \
 known. One gyro count is 0.1\u{2033}. One accelerometer count is 125 \u{b5}g\u{b7}s with the g of the header's second row, \
-9.780327 m/s\u{b2} (gravity on the equator, which the recording toolbox takes for its unit), neither the standard \
-9.80665 nor the 9.796 of the place. Axes: x right, y forward, z up.";
+9.780327 m/s\u{b2} (gravity on the equator), not the standard 9.80665: the mean force of the log then agrees with normal \
+gravity at its place, 9.7955 m/s\u{b2}, to some \u{b5}g. Axes: x right, y forward, z up.";
 
 /// The document of the real laser-gyro log.
 ///

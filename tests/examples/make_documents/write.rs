@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use isotherm_protocol::document::{
-    Created, Document, Gyro, GyroOutput, Orientation, Problem, Temperature, CURRENT_SCHEMA,
+    CURRENT_SCHEMA, Created, Document, Gyro, GyroOutput, Orientation, Problem, Temperature,
 };
 use isotherm_simulator::ScenarioErrors;
 use thiserror::Error;

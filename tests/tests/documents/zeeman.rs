@@ -34,9 +34,7 @@ fn stretches(document: &Document, scenario: &Scenario) -> Vec<(LasingMode, [f64;
             all.push((mode, [0.0; 3], 0.0));
         }
         let (_, angle, time_s) = all.last_mut().unwrap();
-        for axis in 0..3 {
-            angle[axis] += tick.delta_angle[axis] - step.truth.delta_angle[axis];
-        }
+        *angle = [0, 1, 2].map(|axis| angle[axis] + tick.delta_angle[axis] - step.truth.delta_angle[axis]);
         *time_s += tick.duration.as_s();
     })
     .unwrap();
@@ -64,7 +62,10 @@ fn at_rest_the_mode_dependent_drift_is_removed_to_the_noise_floor() {
         for mode in [LasingMode::Plus, LasingMode::Minus] {
             let (error, standard_error) = mean(&corrected, mode, axis);
             println!("gyro {axis} {mode:?}: {error:.4} ± {standard_error:.4} °/h");
-            assert!(error.abs() < 3.0 * standard_error, "gyro {axis} {mode:?}: {error} ± {standard_error} °/h");
+            assert!(
+                error.abs() < 3.0 * standard_error,
+                "gyro {axis} {mode:?}: {error} ± {standard_error} °/h"
+            );
             assert!(standard_error < 0.02, "{standard_error} °/h");
         }
     }
@@ -82,10 +83,8 @@ fn switch_errors(document: &Document, scenario: &Scenario, ticks: usize) -> Vec<
         if left > 0 {
             left -= 1;
             let error: &mut [f64; 3] = errors.last_mut().unwrap();
-            for axis in 0..3 {
-                let angle = Angle::from_rad(tick.delta_angle[axis] - step.truth.delta_angle[axis]);
-                error[axis] += angle.as_arcsec();
-            }
+            let angle = |axis: usize| Angle::from_rad(tick.delta_angle[axis] - step.truth.delta_angle[axis]);
+            *error = [0, 1, 2].map(|axis| error[axis] + angle(axis).as_arcsec());
         }
     })
     .unwrap();
@@ -119,7 +118,9 @@ fn finer(scenario: &mut Scenario, document: &mut Document) {
     for sensor in &mut document.gyro.sensor {
         *sensor.increment_weight_arcsec_per_count.as_mut().unwrap() /= FINER;
         let rest_frequency = &mut sensor.servo.as_mut().unwrap().rest_frequency;
-        let Shape::Polynomial { reference, coefficients, range } = rest_frequency.shape().clone() else { panic!() };
+        let Shape::Polynomial { reference, coefficients, range } = rest_frequency.shape().clone() else {
+            panic!()
+        };
         let coefficients = coefficients.iter().map(|hz| hz * FINER).collect();
         *rest_frequency = Curve::new(Shape::Polynomial { reference, coefficients, range });
     }
@@ -155,7 +156,7 @@ fn without_quantisation_fifty_switches_keep_their_angle_within_0_05_arcsec_rms()
 /// part a + b·u² goes through both pairs' means A and B, and 3a + 2b = 5A − 2B. The ticks 4, 5, 6 are in the sum
 /// themselves, so that they weigh 2.5 + 1, −1 + 1 and 1 in the angle from the command to the restoring tick 6.
 ///
-/// The servo's transient is modelled from tick 4 alone: its half-period counts c⁺ − c⁻ are wrong by φ₃ − 2φ_m + φ₄, φ_m
+/// The servo's transient is modelled from tick 4 alone: its half-period counts c⁺ − c⁻ are wrong by φ₃ − 2φ′ + φ₄, φ′
 /// being the fraction in mid-tick. Times tanh(Δt/2τ) that is what is wrongly taken from tick 4, times e^(−2Δt/τ) from each
 /// further tick.
 fn floor_counts(quantised: bool) -> f64 {
@@ -163,7 +164,7 @@ fn floor_counts(quantised: bool) -> f64 {
     let decay = (-2.0 * tick_s / tau_s).exp();
     let [four, five, six] = [3.5, 0.0, 1.0];
     let servo = (tick_s / (2.0 * tau_s)).tanh() * (four + five * decay + six * decay * decay);
-    // Weights of the errors of the readings −1, 0, then of φ₃, φ_m, φ₄, φ₅, φ₆.
+    // Weights of the errors of the readings −1, 0, then of φ₃, φ′, φ₄, φ₅, φ₆.
     let squares = if quantised {
         let [before, last] = [-1.0, 2.5];
         let old_mode: [f64; 3] = [before, last - before, -last];

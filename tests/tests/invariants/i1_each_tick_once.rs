@@ -119,7 +119,9 @@ fn i1_a_producer_that_says_it_starts_anew_loses_nothing() {
     let mut unit = drive::unit(&compile(&identity()));
     let mut out = Vec::new();
     let in_series = |series, k| {
-        let [accels, Owned::Gyro(mut gyros)] = batch(k) else { unreachable!("a batch ends with its gyro ticks") };
+        let [accels, Owned::Gyro(mut gyros)] = batch(k) else {
+            unreachable!("a batch ends with its gyro ticks")
+        };
         gyros[0].series = series;
         [accels, Owned::Gyro(gyros)]
     };

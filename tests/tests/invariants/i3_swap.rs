@@ -52,11 +52,14 @@ fn i3_a_swap_to_the_same_coefficients_changes_the_revision_and_no_other_bit() {
 
 #[test]
 fn i3_before_the_swap_the_old_coefficients_and_after_it_the_new_ones() {
-    let [old, new] = [run(|_, _| {}), run(|k, unit| {
-        if k == 0 {
-            unit.install(compile(&thermal(3e-4)), 1);
-        }
-    })];
+    let [old, new] = [
+        run(|_, _| {}),
+        run(|k, unit| {
+            if k == 0 {
+                unit.install(compile(&thermal(3e-4)), 1);
+            }
+        }),
+    ];
     let swapped = run(|k, unit| {
         if k == 2000 {
             unit.install(compile(&thermal(3e-4)), 2);

@@ -30,12 +30,19 @@ fn raw(k: u64, frequency_hz: f64, phase: f64, switches: &[u64], n: u64) -> GyroT
     let mode = if done % 2 == 0 { LasingMode::Plus } else { LasingMode::Minus };
     let lost = switches.iter().any(|&s| (s..s + n).contains(&k));
     let motion = truth(k, frequency_hz, phase) / TICK_S;
-    let rates = [1.0, -0.5, 2.0].map(|share| if lost { 1e3 } else { motion + mode.sign() * share * MAGNETIC_BIAS_RAD_PER_S });
+    let rates = [1.0, -0.5, 2.0]
+        .map(|share| if lost { 1e3 } else { motion + mode.sign() * share * MAGNETIC_BIAS_RAD_PER_S });
     GyroTick { mode: Some(mode), switch_command: switches.contains(&k), ..streams::gyro(k, &rates) }
 }
 
 /// Runs one phase through the state machine; `missing` ticks never arrive.
-fn run(parts: ReversalParts, frequency_hz: f64, phase: f64, switches: &[u64], missing: &[u64]) -> Vec<CorrectedTick> {
+fn run(
+    parts: ReversalParts,
+    frequency_hz: f64,
+    phase: f64,
+    switches: &[u64],
+    missing: &[u64],
+) -> Vec<CorrectedTick> {
     let calibration = compile(&mode_reversed(parts));
     let n = u64::from(parts.transition_ticks);
     let ticks = (0..TICKS).filter(|k| !missing.contains(k)).map(|k| raw(k, frequency_hz, phase, switches, n));
@@ -57,8 +64,11 @@ fn rms_over_phase(error_at: impl Fn(f64) -> f64) -> f64 {
 #[test]
 fn i5_the_reference_table_is_reproduced_through_the_whole_state_machine() {
     // models §5: 1° amplitude, 5 ms, n = 3; constant, linear, parabola after step 2, then after step 4 (″).
-    let table =
-        [(1.0, [26.35, 1.380, 0.053, 0.000_27]), (5.0, [642.9, 169.7, 32.68, 0.842]), (10.0, [2381.0, 1288.0, 503.8, 25.96])];
+    let table = [
+        (1.0, [26.35, 1.380, 0.053, 0.000_27]),
+        (5.0, [642.9, 169.7, 32.68, 0.842]),
+        (10.0, [2381.0, 1288.0, 503.8, 25.96]),
+    ];
     let (first, last) = (LAST_GOOD + 1, LAST_GOOD + 3);
     for (frequency, figures) in table {
         for (degree, expected) in (0_u8..).zip(&figures[..3]) {
@@ -66,14 +76,20 @@ fn i5_the_reference_table_is_reproduced_through_the_whole_state_machine() {
             let got = rms_over_phase(|phase| {
                 error(&run(parts, frequency, phase, &[first], &[]), first, last, frequency, phase)
             });
-            assert!((got / expected - 1.0).abs() < 0.01, "{frequency} Hz, degree {degree}: {got} ″, table {expected} ″");
+            assert!(
+                (got / expected - 1.0).abs() < 0.01,
+                "{frequency} Hz, degree {degree}: {got} ″, table {expected} ″"
+            );
         }
         let got = rms_over_phase(|phase| {
             let out = run(ReversalParts::default(), frequency, phase, &[first], &[]);
             error(&out, first, TICKS, frequency, phase)
         });
         let expected = figures[3];
-        assert!((got / expected - 1.0).abs() < 0.02, "{frequency} Hz, after step 4: {got} ″, table {expected} ″");
+        assert!(
+            (got / expected - 1.0).abs() < 0.02,
+            "{frequency} Hz, after step 4: {got} ″, table {expected} ″"
+        );
     }
 }
 
@@ -105,7 +121,14 @@ fn i5_shorter_transitions_are_bridged_too() {
 fn i5_a_switch_during_a_gap() {
     // The command and one more tick of the transition are lost: the published ticks still add up to the two-sided fit.
     let first = LAST_GOOD + 1;
-    for missing in [vec![first], vec![first, first + 1], vec![first - 1, first], vec![first + 1], vec![first + 4], vec![first + 3, first + 4]] {
+    for missing in [
+        vec![first],
+        vec![first, first + 1],
+        vec![first - 1, first],
+        vec![first + 1],
+        vec![first + 4],
+        vec![first + 3, first + 4],
+    ] {
         let got = rms_over_phase(|phase| {
             let out = run(ReversalParts::default(), 1.0, phase, &[first], &missing);
             let announced: u64 = out.iter().map(|tick| tick.missed).sum();

@@ -46,15 +46,25 @@ fn i7_each_kind_of_broken_tick_is_counted_and_harmless() {
     type Count = fn(&Counters) -> u64;
     let cases: [(&str, Vec<Owned>, Count); 11] = [
         ("time going back", with(&|t| t.end_time = end_of(50)), |c| c.gyro_implausible),
-        ("time in another century", with(&|t| t.end_time = Timestamp::from_ns(i64::MAX)), |c| c.gyro_implausible),
-        ("time at the lower end", with(&|t| t.end_time = Timestamp::from_ns(i64::MIN)), |c| c.gyro_implausible),
+        ("time in another century", with(&|t| t.end_time = Timestamp::from_ns(i64::MAX)), |c| {
+            c.gyro_implausible
+        }),
+        ("time at the lower end", with(&|t| t.end_time = Timestamp::from_ns(i64::MIN)), |c| {
+            c.gyro_implausible
+        }),
         ("sequence jump", with(&|t| t.sequence = u64::MAX), |c| c.gyro_implausible),
         ("no duration", with(&|t| t.duration = Span::ZERO), |c| c.bad_duration),
         ("endless duration", with(&|t| t.duration = Span::from_ns(i64::MAX)), |c| c.bad_duration),
         ("NaN", with(&|t| t.readings[1] = f64::NAN), |c| c.not_finite_readings),
         ("infinity", with(&|t| t.readings[0] = f64::INFINITY), |c| c.not_finite_readings),
         ("at the rails", with(&|t| t.readings[2] = f64::MAX), |c| c.overrange_readings),
-        ("too few sensors", with(&|t| { t.readings.pop(); }), |c| c.wrong_sensor_count),
+        (
+            "too few sensors",
+            with(&|t| {
+                t.readings.pop();
+            }),
+            |c| c.wrong_sensor_count,
+        ),
         ("too many sensors", with(&|t| t.readings.push(0.0)), |c| c.wrong_sensor_count),
     ];
     for (name, broken, count) in cases {
@@ -77,14 +87,18 @@ fn i7_each_kind_of_broken_tick_is_counted_and_harmless() {
 
 #[test]
 fn i7_broken_temperatures_are_held_and_flagged() {
-    for (name, raw, at) in [("NaN", f64::NAN, 100), ("out of range", 1e9, 100), ("a century ahead", 20.0, u64::MAX / 2)] {
+    for (name, raw, at) in
+        [("NaN", f64::NAN, 100), ("out of range", 1e9, 100), ("a century ahead", 20.0, u64::MAX / 2)]
+    {
         let mut events = vec![Owned::Temperature(vec![temperature(0, 20.0)])];
         events.push(Owned::Temperature(vec![temperature(at, raw)]));
         let (out, _) = around(events);
         assert_goes_on(name, &out);
     }
-    let (out, counters) =
-        around(vec![Owned::Temperature(vec![temperature(0, 20.0)]), Owned::Temperature(vec![temperature(100, f64::NAN)])]);
+    let (out, counters) = around(vec![
+        Owned::Temperature(vec![temperature(0, 20.0)]),
+        Owned::Temperature(vec![temperature(100, f64::NAN)]),
+    ]);
     assert_eq!(counters.temperature_rejected, 1);
     assert!(out.last().unwrap().gyro_flags[0].contains(SensorFlags::STALE_TEMPERATURE));
 }

@@ -52,7 +52,9 @@ fn broken() -> Vec<(&'static str, Vec<u8>)> {
     broken.extend(tick(11, |b| mean(b, &[f64::MAX, f64::MIN, 0.0])));
     broken.extend(tick(12, |b| mean(b, &[0.0; 8])));
     broken.extend(tick(13, |b| mean(b, &[0.0])));
-    broken.extend(tick(14, |b| b.ticks[0].readings = isotherm_protocol::raw::Readings::Counts([1, 2, 3].into_iter().collect())));
+    broken.extend(tick(14, |b| {
+        b.ticks[0].readings = isotherm_protocol::raw::Readings::Counts([1, 2, 3].into_iter().collect())
+    }));
     broken.extend(tick(15, |b| b.ticks[0].duration_ns = 0));
     broken.extend(tick(16, |b| b.ticks[0].duration_ns = u64::MAX));
     broken.extend(tick(17, |b| b.ticks[0].end_time_ns -= 3_000_000_000));

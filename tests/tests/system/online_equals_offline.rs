@@ -40,7 +40,10 @@ async fn i2_online_equals_offline_to_the_bit() {
     let calibration = Arc::new(Document::parse(&text, None).expect("a shipped document").calibration);
     let document = document.to_str().unwrap();
     // Accelerometers, temperatures, mode switches: everything whose moment could matter.
-    process::run_well("isotherm-replay", &["simulate", "--preset", "zeeman-sine", "--duration", "150", "--out", &log]);
+    process::run_well(
+        "isotherm-replay",
+        &["simulate", "--preset", "zeeman-sine", "--duration", "150", "--out", &log],
+    );
 
     for (seconds, speed) in RUNS {
         let seconds = seconds.to_string();
@@ -63,7 +66,10 @@ async fn i2_online_equals_offline_to_the_bit() {
                 .map(ToOwned::to_owned)
                 .collect::<Vec<_>>();
             let player = tokio::task::spawn_blocking(move || {
-                process::run_well("isotherm-replay", &arguments.iter().map(String::as_str).collect::<Vec<_>>())
+                process::run_well(
+                    "isotherm-replay",
+                    &arguments.iter().map(String::as_str).collect::<Vec<_>>(),
+                )
             });
             let online = bench.receive(UNIT, offline.len() as u64).await;
             player.await.unwrap();

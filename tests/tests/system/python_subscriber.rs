@@ -1,6 +1,7 @@
 //! A subscriber in another language, which rests on `docs/wire.md` alone, gets what a Rust consumer gets, to the bit.
 //!
 //! `tests/python/run.sh` sets `ISOTHERM_PYTHON` to an interpreter with eclipse-zenoh, and runs this.
+#![expect(clippy::unwrap_used, clippy::expect_used, reason = "a test fails by panicking")]
 
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Read};
@@ -31,7 +32,7 @@ const RESTART: u64 = 800;
 const THERMAL: &str = "PY-THERMAL";
 /// Calibrated, with mode switches, and with a restart of its producer.
 const REVERSED: &str = "PY-REVERSED";
-/// Eight gyros that count, no calibration, and a producer that says that it restarts.
+/// Eight gyros that count, no calibration, and a second producer that takes over.
 const BARE: &str = "PY-BARE";
 
 /// What the subscriber says of one unit, as this side counts it.
@@ -69,7 +70,7 @@ impl Account {
 }
 
 fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+    bytes.iter().fold(String::new(), |text, byte| text + &format!("{byte:02x}"))
 }
 
 /// The subscriber's process; killed when dropped.
@@ -132,7 +133,7 @@ fn since_restart(k: u64) -> u64 {
 /// A tick of the unit with mode switches, whose producer starts anew at [`RESTART`] without a word.
 fn reversed(k: u64) -> GyroTick {
     let switch = k % 97 == 96;
-    let mode = if (k + 1) / 97 % 2 == 0 { LasingMode::Plus } else { LasingMode::Minus };
+    let mode = if ((k + 1) / 97).is_multiple_of(2) { LasingMode::Plus } else { LasingMode::Minus };
     let rates = [wave(k, 11.0), wave(k, 17.0), wave(k, 23.0)];
     GyroTick { sequence: since_restart(k), mode: Some(mode), switch_command: switch, ..gyro(k, &rates) }
 }
@@ -153,7 +154,11 @@ async fn produce(session: &Session) {
             thermal.gyro(OutputKind::Mean, gyro(k, &rates)).await.unwrap();
         }
         let counts = [1.0, -2.0, 3.0, -4.0, 5.0, -6.0, 7.0, -8.0].map(|c| (c * 1e4 * wave(k, 41.0)).round());
-        let tick = GyroTick { sequence: since_restart(k), restart: k == RESTART, ..gyro(k, &counts) };
+        if k == RESTART {
+            bare.flush().await.unwrap();
+            bare = producer(session, BARE, 64).await;
+        }
+        let tick = GyroTick { sequence: since_restart(k), ..gyro(k, &counts) };
         bare.gyro(OutputKind::Counts, tick).await.unwrap();
         modes.gyro(OutputKind::Mean, reversed(k)).await.unwrap();
     }

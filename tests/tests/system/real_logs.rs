@@ -65,7 +65,10 @@ async fn real_laser_gyro_log_from_the_data_folder_keeps_every_tick_and_its_mean_
     let Some(folder) = data::folder() else { return };
     let log = folder.join("rlg-static/rlg-static.imu.gz");
     let ticks = play("RLG-STATIC", "config/mappings/rlg-static.toml", log.to_str().unwrap(), 184_718).await;
-    assert!(ticks.windows(2).all(|pair| pair[1].sequence == pair[0].sequence + 1), "each tick once, in order");
+    assert!(
+        ticks.windows(2).all(|pair| pair[1].sequence == pair[0].sequence + 1),
+        "each tick once, in order"
+    );
     // Mean over the first 1800 s of 10 ms ticks (°/h), from the log's README.
     for (axis, expected) in [-12.265, 0.474, 8.354].into_iter().enumerate() {
         let angle: f64 = ticks[..180_000].iter().map(|tick| tick.delta_angle_rad[axis]).sum();
@@ -86,9 +89,10 @@ async fn real_chamber_log_from_the_data_folder_reaches_the_cubic_residuals() {
     let seconds = |tick: &CorrectedTick| tick.duration_ns as f64 * 1e-9;
     let gyro_y = ticks.iter().map(|tick| tick.delta_angle_rad[1] / seconds(tick) / RAD_PER_DEG);
     let accel_z = ticks.iter().map(|tick| tick.delta_velocity_m_per_s[2] / seconds(tick));
-    for (name, (_, got), expected) in
-        [("gyro.y (°/s)", mean_and_deviation(gyro_y), 9.5e-4), ("acc.z (m/s²)", mean_and_deviation(accel_z), 0.044)]
-    {
+    for (name, (_, got), expected) in [
+        ("gyro.y (°/s)", mean_and_deviation(gyro_y), 9.5e-4),
+        ("acc.z (m/s²)", mean_and_deviation(accel_z), 0.044),
+    ] {
         println!("{name}: residual {got:.4e}, expected {expected:.2e}");
         assert!((got / expected - 1.0).abs() < 0.02, "{name}: residual {got}, expected {expected}");
     }

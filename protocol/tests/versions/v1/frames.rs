@@ -5,8 +5,9 @@ pub(in super::super) const FRAMES: &[(&str, &str)] = &[
     (
         "raw-gyro-counts",
         "
-        01 01 e8 07 00 02 80 ad e2 04 c0 96 b1 02 00 03 a4 13 ed 08 00 01 00 00 00 03 d0 0f d4 03 d7 04
-        95 04 80 01 7f f6 db c4 09 bb 97 b1 02 00 03 18 06 07 01 01 01 01 00 00 d9 16 e2 5e
+        01 01 e8 07 80 80 a8 b1 e3 9f e7 cb 17 02 80 ad e2 04 c0 96 b1 02 00 03 a4 13 ed 08 00 01 00 00
+        00 03 d0 0f d4 03 d7 04 95 04 80 01 7f f6 db c4 09 bb 97 b1 02 00 03 18 06 07 01 01 01 01 00 00
+        55 2f 63 58
         ",
     ),
     (
@@ -20,11 +21,11 @@ pub(in super::super) const FRAMES: &[(&str, &str)] = &[
     (
         "raw-gyro-edges",
         "
-        01 01 ff ff ff ff ff ff ff ff ff 01 01 01 ff ff ff ff ff ff ff ff ff 01 ff ff ff ff ff ff ff ff
-        ff 01 00 08 ff ff ff ff 0f fe ff ff ff 0f 01 02 7e 7f 80 01 81 01 01 01 01 01 01 08 ff ff ff ff
-        0f fe ff ff ff 0f ff ff ff ff 0f fe ff ff ff 0f ff ff ff ff 0f fe ff ff ff 0f ff ff ff ff 0f fe
-        ff ff ff 0f ff ff ff ff 0f fe ff ff ff 0f ff ff ff ff 0f fe ff ff ff 0f ff ff ff ff 0f fe ff ff
-        ff 0f ff ff ff ff 0f fe ff ff ff 0f 80 be e1 dc
+        01 01 ff ff ff ff ff ff ff ff ff 01 ff ff ff ff ff ff ff ff ff 01 01 ff ff ff ff ff ff ff ff ff
+        01 ff ff ff ff ff ff ff ff ff 01 00 08 ff ff ff ff 0f fe ff ff ff 0f 01 02 7e 7f 80 01 81 01 01
+        01 01 01 01 08 ff ff ff ff 0f fe ff ff ff 0f ff ff ff ff 0f fe ff ff ff 0f ff ff ff ff 0f fe ff
+        ff ff 0f ff ff ff ff 0f fe ff ff ff 0f ff ff ff ff 0f fe ff ff ff 0f ff ff ff ff 0f fe ff ff ff
+        0f ff ff ff ff 0f fe ff ff ff 0f ff ff ff ff 0f fe ff ff ff 0f 87 90 8f 6e
         ",
     ),
     ("raw-gyro-empty", "01 01 80 01 00 01 00 00 00 00 00 00 00 00 57 e5 10 27"),
