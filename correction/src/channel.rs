@@ -86,7 +86,7 @@ pub(crate) fn grid_points(length_s: f64, step_s: f64) -> usize {
 pub struct ChannelParts {
     /// Name, as on the raw temperature topic.
     pub name: ChannelName,
-    /// a_j of T = Σ a_j·Uʲ (°C per raw unitʲ), one to eight of them.
+    /// `a_j` of `T = Σ a_j·Uʲ` (°C per raw unitʲ), one to eight of them.
     pub conversion: Vec<f64>,
     /// Physical range of the sensor (°C); a reading outside is rejected.
     pub range_deg_c: [f64; 2],
@@ -297,7 +297,7 @@ fn rotate(ring: &mut VecDeque<f64>, value: f64) {
     ring.push_back(value);
 }
 
-/// Three-point backward difference over the whole ring: (3·x_n − 4·x_{n−1} + x_{n−2})/(2h) [000 eq. 2].
+/// Three-point backward difference over the whole ring: `(3·x_n − 4·x_{n−1} + x_{n−2})/(2h)` \[000 eq. 2\].
 fn backward_difference(ring: &VecDeque<f64>, h: f64) -> f64 {
     match (ring.back(), ring.get(ring.len() / 2), ring.front()) {
         (Some(now), Some(before), Some(first)) => (3.0 * now - 4.0 * before + first) / (2.0 * h),

@@ -10,4 +10,4 @@ mod ramp;
 pub use accel::{AccelModel, AccelThermal};
 pub(crate) use gyro::TermError;
 pub use gyro::{GyroModel, GyroThermal, MAX_LAGS, TrendModel};
-pub use ramp::Ramp;
+pub use ramp::{Follower, Ramp};

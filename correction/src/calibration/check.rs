@@ -146,7 +146,7 @@ impl Checker {
     }
 
     fn range(&mut self, section: Section, field: &'static str, [low, high]: [f64; 2]) {
-        if !(low < high) {
+        if low.is_nan() || high.is_nan() || low >= high {
             self.push(section, field, DefectKind::InvertedRange { low, high });
         }
     }
@@ -345,8 +345,8 @@ fn sign_change(curve: &Curve) -> Option<f64> {
     let [low, high] = curve.range();
     let first = curve.at(low).value;
     (0..=256).map(|i| low + (high - low) * f64::from(i) / 256.0).find(|&x| {
-        let value = curve.at(x).value;
-        !(value * first > 0.0)
+        let same_sign = curve.at(x).value * first;
+        same_sign.is_nan() || same_sign <= 0.0
     })
 }
 

@@ -41,10 +41,10 @@ pub struct CalibrationParts {
 pub struct GyroParts {
     /// Index of the temperature channel that the gyro follows; `None`: the assumed temperature holds for ever.
     pub channel: Option<usize>,
-    /// K_0: angle that one count stands for (rad per count), or dimensionless (rad per rad) for a mean-rate output;
+    /// `K_0`: angle that one count stands for (rad per count), or dimensionless (rad per rad) for a mean-rate output;
     /// the raw reading is multiplied by it. Non-zero; negative where the input axis is mounted reversed.
     pub increment_weight: f64,
-    /// κ(T) = K(T)/K_0 − 1 over temperature (dimensionless over °C).
+    /// `κ(T) = K(T)/K_0 − 1` over temperature (dimensionless over °C).
     pub increment_weight_error: Option<CurveParts>,
     /// Readings of this magnitude and above are flagged overrange (counts per tick, or rad/s).
     pub input_limit: f64,
@@ -86,7 +86,7 @@ pub struct BranchedParts {
     pub braking: CurveParts,
 }
 
-/// One thermal lag (models §2, §8): g(T)·(T − L_τ\[T\])/τ.
+/// One thermal lag (models §2, §8): `g(T)·(T − L_τ[T])/τ`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LagParts {
     /// τ (s), at least the filter's grid step.
@@ -104,7 +104,7 @@ pub struct TrendParts {
     pub interval_s: [f64; 2],
 }
 
-/// One accelerometer (models §3): f = (U − S(T))·r(T_board)/K(T).
+/// One accelerometer (models §3): `f = (U − S(T))·r(T_board)/K(T)`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AccelParts {
     /// Index of the temperature channel of the sensor; `None`: the assumed temperature holds for ever.

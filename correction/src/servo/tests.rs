@@ -198,14 +198,13 @@ fn an_input_that_accelerates_is_not_taken_for_dither() {
     for form in [ServoForm::Measured, ServoForm::Modelled] {
         let servo = servo(form);
         let mut memory = ServoMemory::new();
-        let mut take =
-            |memory: &mut ServoMemory, start_s: f64, start_ns: i64, [positive, negative]: [f64; 2]| {
-                let halves = HalfPeriodCounts { positive: whole(positive), negative: whole(negative) };
-                let tick = tick(start_ns + TICK.as_ns(), Some(halves));
-                memory.advance(false, tick.end_time, TICK);
-                let transient = memory.apparent_rate(0, &servo, &tick).rate_rad_per_s();
-                SCALE * ((positive + negative) / tick_s - input * (start_s + half_s)) - transient
-            };
+        let take = |memory: &mut ServoMemory, start_s: f64, start_ns: i64, [positive, negative]: [f64; 2]| {
+            let halves = HalfPeriodCounts { positive: whole(positive), negative: whole(negative) };
+            let tick = tick(start_ns + TICK.as_ns(), Some(halves));
+            memory.advance(false, tick.end_time, TICK);
+            let transient = memory.apparent_rate(0, &servo, &tick).rate_rad_per_s();
+            SCALE * ((positive + negative) / tick_s - input * (start_s + half_s)) - transient
+        };
         // The last good tick before three that carry nothing.
         let rest = counts(-4.0 * tick_s, [REST_HZ * half_s, -REST_HZ * half_s]);
         take(&mut memory, -4.0 * tick_s, -4 * TICK.as_ns(), rest);

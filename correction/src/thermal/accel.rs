@@ -1,6 +1,6 @@
-//! An accelerometer's terms (models §3): f = (U − S(T))·r(T_board)/K(T).
+//! An accelerometer's terms (models §3): `f = (U − S(T))·r(T_board)/K(T)`.
 
-use super::ramp::Ramp;
+use super::ramp::Follower;
 use crate::calibration::AccelParts;
 use crate::channel::ThermalFilter;
 use crate::curve::{Curve, CurveError, CurveParts};
@@ -48,50 +48,33 @@ impl AccelModel {
 #[derive(Debug, Clone)]
 pub struct AccelThermal {
     /// S (output units) and 1/K (m/s² per output unit).
-    sensor: Ramp<2>,
+    sensor: Follower<2>,
     /// r (dimensionless).
-    board: Ramp<1>,
-    clamped_sensor: bool,
-    clamped_board: bool,
-    started_sensor: bool,
-    started_board: bool,
+    board: Follower<1>,
 }
 
 impl AccelThermal {
     /// Starts with the terms as they are at the assumed temperature.
     #[must_use]
     pub fn new(model: &AccelModel, filter: &ThermalFilter) -> Self {
-        let mut thermal = Self {
-            sensor: Ramp::hold([0.0; 2]),
-            board: Ramp::hold([1.0]),
-            clamped_sensor: false,
-            clamped_board: false,
-            started_sensor: false,
-            started_board: false,
-        };
-        thermal.update_sensor(model, filter.assumed_deg_c, Timestamp::default(), Span::ZERO);
-        thermal.update_board(model, filter.assumed_deg_c, Timestamp::default(), Span::ZERO);
-        thermal.started_sensor = false;
-        thermal.started_board = false;
-        thermal
+        let (sensor, sensor_clamped) = sensor_terms(model, filter.assumed_deg_c);
+        let ratio = model.board_ratio.at(filter.assumed_deg_c);
+        Self {
+            sensor: Follower::assumed(sensor, sensor_clamped),
+            board: Follower::assumed([ratio.value], ratio.clamped),
+        }
     }
 
     /// Evaluates bias and scale factor at the sensor's temperature (°C).
     pub fn update_sensor(&mut self, model: &AccelModel, temperature: f64, start: Timestamp, over: Span) {
-        let (bias, scale_factor) = (model.bias.at(temperature), model.scale_factor.at(temperature));
-        self.clamped_sensor = bias.clamped || scale_factor.clamped;
-        let over = if self.started_sensor { over } else { Span::ZERO };
-        self.started_sensor = true;
-        self.sensor.turn(start, over, [bias.value, 1.0 / scale_factor.value]);
+        let (terms, clamped) = sensor_terms(model, temperature);
+        self.sensor.follow(terms, clamped, start, over);
     }
 
     /// Evaluates the board ratio at the board's temperature (°C).
     pub fn update_board(&mut self, model: &AccelModel, temperature: f64, start: Timestamp, over: Span) {
         let ratio = model.board_ratio.at(temperature);
-        self.clamped_board = ratio.clamped;
-        let over = if self.started_board { over } else { Span::ZERO };
-        self.started_board = true;
-        self.board.turn(start, over, [ratio.value]);
+        self.board.follow([ratio.value], ratio.clamped, start, over);
     }
 
     /// Specific force (m/s²) that an output (V, counts/s or m/s²) stands for at `time`.
@@ -105,6 +88,12 @@ impl AccelThermal {
     /// Whether an argument was outside its fitted range at the last evaluation.
     #[must_use]
     pub fn clamped(&self) -> bool {
-        self.clamped_sensor || self.clamped_board
+        self.sensor.clamped() || self.board.clamped()
     }
+}
+
+/// S and 1/K at a temperature (°C), and whether it is outside their fitted range.
+fn sensor_terms(model: &AccelModel, temperature: f64) -> ([f64; 2], bool) {
+    let (bias, scale_factor) = (model.bias.at(temperature), model.scale_factor.at(temperature));
+    ([bias.value, 1.0 / scale_factor.value], bias.clamped || scale_factor.clamped)
 }

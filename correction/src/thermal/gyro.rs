@@ -4,7 +4,7 @@ use arrayvec::ArrayVec;
 
 use alloc::vec::Vec;
 
-use super::ramp::Ramp;
+use super::ramp::Follower;
 use crate::calibration::{BranchArgument, GyroParts};
 use crate::channel::{ThermalFilter, ThermalState};
 use crate::curve::{Curve, CurveError};
@@ -178,28 +178,20 @@ pub struct GyroTerms {
 /// Memory of one gyro's thermal terms.
 #[derive(Debug, Clone)]
 pub struct GyroThermal {
-    ramp: Ramp<4>,
-    /// L_τ\[T\] of each lag (°C).
+    /// Increment weight, bias, magnetic and slow-meander term, in the order of [`GyroTerms`].
+    terms: Follower<4>,
+    /// `L_τ[T]` of each lag (°C).
     lagged: [f64; MAX_LAGS],
-    clamped: bool,
-    /// Whether a reading has been seen: the first one is not approached from the assumed temperature, but met.
-    started: bool,
 }
 
 impl GyroThermal {
     /// Starts with the terms as they are at the assumed temperature.
     #[must_use]
     pub fn new(model: &GyroModel, filter: &ThermalFilter) -> Self {
-        let mut thermal = Self {
-            ramp: Ramp::hold([model.increment_weight, 0.0, 0.0, 0.0]),
-            lagged: [filter.assumed_deg_c; MAX_LAGS],
-            clamped: false,
-            started: false,
-        };
         let assumed = ThermalState { temperature: filter.assumed_deg_c, ..ThermalState::default() };
-        thermal.update(model, &assumed, filter.branch_dead_band, Timestamp::default(), Span::ZERO);
-        thermal.started = false;
-        thermal
+        let lagged = [filter.assumed_deg_c; MAX_LAGS];
+        let (terms, clamped) = evaluate(model, &assumed, &lagged, filter.branch_dead_band);
+        Self { terms: Follower::assumed(terms, clamped), lagged }
     }
 
     /// Goes on with the lags of an earlier calibration, where their time constants are the same.
@@ -223,7 +215,7 @@ impl GyroThermal {
         }
     }
 
-    /// Evaluates every term and turns the ramp towards the result, `over` a sample interval from `start` on.
+    /// Evaluates every term and turns towards the result, `over` a sample interval from `start` on.
     pub fn update(
         &mut self,
         model: &GyroModel,
@@ -232,44 +224,52 @@ impl GyroThermal {
         start: Timestamp,
         over: Span,
     ) {
-        let mut clamped = false;
-        let mut eval = |curve: &Curve| {
-            let evaluated = curve.at(thermal.temperature);
-            clamped |= evaluated.clamped;
-            evaluated.value
-        };
-        let weight = model.increment_weight * (1.0 + eval(&model.increment_weight_error));
-        let mut bias = eval(&model.static_bias);
-        let magnetic = model.magnetic_bias.as_ref().map_or(0.0, &mut eval);
-        let meander = model.slow_meander.as_ref().map_or(0.0, &mut eval);
-        for (lag, lagged) in model.lags.iter().zip(&self.lagged) {
-            bias += eval(&lag.gain) * (thermal.temperature - lagged) * lag.per_second;
-        }
-        for (term, derivative) in
-            [(&model.thermal_rate, thermal.rate), (&model.thermal_acceleration, thermal.acceleration)]
-        {
-            if let Some(branched) = term {
-                let (coefficient, outside) = branched.at(thermal, derivative, dead_band);
-                bias += coefficient * derivative;
-                clamped |= outside;
-            }
-        }
-        self.clamped = clamped;
-        let over = if self.started { over } else { Span::ZERO };
-        self.started = true;
-        self.ramp.turn(start, over, [weight, bias, magnetic, meander]);
+        let (terms, clamped) = evaluate(model, thermal, &self.lagged, dead_band);
+        self.terms.follow(terms, clamped, start, over);
     }
 
     /// The terms in use at `time`.
     #[must_use]
     pub fn at(&self, time: Timestamp) -> GyroTerms {
-        let [increment_weight, bias, magnetic, meander] = self.ramp.at(time);
+        let [increment_weight, bias, magnetic, meander] = self.terms.at(time);
         GyroTerms { increment_weight, bias, magnetic, meander }
     }
 
     /// Whether an argument was outside its fitted range at the last evaluation.
     #[must_use]
     pub fn clamped(&self) -> bool {
-        self.clamped
+        self.terms.clamped()
     }
+}
+
+/// Every term at a thermal state, and whether an argument was clamped.
+fn evaluate(
+    model: &GyroModel,
+    thermal: &ThermalState,
+    lagged: &[f64; MAX_LAGS],
+    dead_band: f64,
+) -> ([f64; 4], bool) {
+    let mut clamped = false;
+    let mut eval = |curve: &Curve| {
+        let evaluated = curve.at(thermal.temperature);
+        clamped |= evaluated.clamped;
+        evaluated.value
+    };
+    let weight = model.increment_weight * (1.0 + eval(&model.increment_weight_error));
+    let mut bias = eval(&model.static_bias);
+    let magnetic = model.magnetic_bias.as_ref().map_or(0.0, &mut eval);
+    let meander = model.slow_meander.as_ref().map_or(0.0, &mut eval);
+    for (lag, lagged) in model.lags.iter().zip(lagged) {
+        bias += eval(&lag.gain) * (thermal.temperature - lagged) * lag.per_second;
+    }
+    for (term, derivative) in
+        [(&model.thermal_rate, thermal.rate), (&model.thermal_acceleration, thermal.acceleration)]
+    {
+        if let Some(branched) = term {
+            let (coefficient, outside) = branched.at(thermal, derivative, dead_band);
+            bias += coefficient * derivative;
+            clamped |= outside;
+        }
+    }
+    ([weight, bias, magnetic, meander], clamped)
 }

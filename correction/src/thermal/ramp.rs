@@ -51,7 +51,44 @@ impl<const N: usize> Ramp<N> {
     }
 }
 
+/// A ramp that is turned after each evaluation of the terms it carries.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Follower<const N: usize> {
+    ramp: Ramp<N>,
+    clamped: bool,
+    /// Whether a reading was seen: the first one is not approached from the assumed temperature, but met.
+    started: bool,
+}
+
+impl<const N: usize> Follower<N> {
+    /// Starts with the terms as they are at the assumed temperature.
+    #[must_use]
+    pub const fn assumed(values: [f64; N], clamped: bool) -> Self {
+        Self { ramp: Ramp::hold(values), clamped, started: false }
+    }
+
+    /// Turns towards new values; `clamped` says whether an argument was outside its fitted range.
+    pub fn follow(&mut self, values: [f64; N], clamped: bool, start: Timestamp, over: Span) {
+        self.ramp.turn(start, if self.started { over } else { Span::ZERO }, values);
+        self.clamped = clamped;
+        self.started = true;
+    }
+
+    /// The values in use at `time`.
+    #[must_use]
+    pub fn at(&self, time: Timestamp) -> [f64; N] {
+        self.ramp.at(time)
+    }
+
+    /// Whether an argument was outside its fitted range at the last evaluation.
+    #[must_use]
+    pub const fn clamped(&self) -> bool {
+        self.clamped
+    }
+}
+
 #[cfg(test)]
+#[expect(clippy::float_cmp, reason = "continuity is to the bit")]
 mod tests {
     use super::*;
 

@@ -47,7 +47,8 @@ impl Waiting {
 
     /// The next reading that takes effect before a tick which ends at `end_time`.
     fn pop_before(&mut self, end_time: Timestamp, delay: Span) -> Option<TemperatureReading> {
-        self.readings.pop_front_if(|reading| reading.time + delay < end_time)
+        let due = self.readings.front().is_some_and(|reading| reading.time + delay < end_time);
+        if due { self.readings.pop_front() } else { None }
     }
 
     /// Drops readings from another time, after a step of the producer's clock.
