@@ -96,8 +96,8 @@ impl From<&core::CorrectedTick> for CorrectedTick {
             delta_velocity_m_per_s: tick.delta_velocity,
             mode: tick.mode.map(Into::into),
             flags: tick.flags.bits(),
-            gyro_flags: tick.gyro_flags.iter().map(|flags| flags.bits()).collect(),
-            accel_flags: tick.accel_flags.iter().map(|flags| flags.bits()).collect(),
+            gyro_flags: tick.gyro_flags.iter().map(SensorFlags::bits).collect(),
+            accel_flags: tick.accel_flags.iter().map(SensorFlags::bits).collect(),
             gyro_parity_rad_per_s: tick.gyro_parity.clone(),
             accel_parity_m_per_s2: tick.accel_parity.clone(),
         }

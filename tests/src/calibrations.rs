@@ -70,7 +70,10 @@ pub fn orientation(rows: &[[f64; 3]]) -> OrientationParts {
 /// Sensors along the case axes.
 pub const ALONG_CASE_AXES: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
-/// One temperature channel "t" that reads °C, evaluated each second.
+/// One temperature channel that reads °C.
+///
+/// # Panics
+/// Where the name is too long.
 #[must_use]
 pub fn channel(name: &str) -> ChannelParts {
     ChannelParts {

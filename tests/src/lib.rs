@@ -2,6 +2,8 @@
 //!
 //! The tests themselves are in `tests/tests/`.
 
+#![expect(clippy::expect_used, reason = "a fixture that does not hold ends the test that asked for it")]
+
 pub mod bench;
 pub mod calibrations;
 pub mod data;

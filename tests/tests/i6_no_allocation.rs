@@ -63,18 +63,18 @@ fn i6_a_hundred_thousand_ticks_allocate_nothing() {
     let mut feed = |unit: &mut Unit, range: std::ops::Range<usize>| {
         for k in range {
             if k % 200 == 0 {
-                let reading = temperature(k as u64, 20.0 + (k % 7) as f64);
+                let reading = temperature(k as u64, [20.0, 21.0, 22.0, 23.0][k % 4]);
                 unit.handle(Event::Temperature(&[reading]), &mut |_| {});
             }
             if k % 5000 != 0 {
                 unit.handle(Event::Accel { output: OutputKind::Mean, ticks: &accels[k..=k] }, &mut |_| {
-                    out += 1
+                    out += 1;
                 });
             }
             let repeated = if k % 3000 == 0 { 2 } else { usize::from(k % 4000 != 1) };
             for _ in 0..repeated {
                 unit.handle(Event::Gyro { output: OutputKind::Mean, ticks: &ticks[k..=k] }, &mut |_| {
-                    out += 1
+                    out += 1;
                 });
             }
         }

@@ -61,10 +61,14 @@ fn i1_a_duplicate_of_any_age_gives_nothing() {
     let mut unit = drive::unit(&compile(&identity()));
     let mut out = Vec::new();
     for k in 0..100 {
-        batch(k).iter().for_each(|event| drive::hand(&mut unit, event, &mut out));
+        for event in &batch(k) {
+            drive::hand(&mut unit, event, &mut out);
+        }
     }
     for k in [99, 98, 50, 1] {
-        batch(k).iter().for_each(|event| drive::hand(&mut unit, event, &mut out));
+        for event in &batch(k) {
+            drive::hand(&mut unit, event, &mut out);
+        }
     }
     assert_eq!(out.len(), 100);
     assert_eq!(unit.counters().gyro_duplicates, 4);
@@ -132,7 +136,9 @@ fn i1_a_producer_that_says_it_starts_anew_loses_nothing() {
             drive::hand(&mut unit, &event, &mut out);
         }
     }
-    in_series(30, 99).iter().for_each(|event| drive::hand(&mut unit, event, &mut out));
+    for event in &in_series(30, 99) {
+        drive::hand(&mut unit, event, &mut out);
+    }
     let sequences: Vec<u64> = out.iter().map(|tick| tick.sequence).collect();
     assert!(sequences.iter().copied().eq((0..3).flat_map(|_| 0..100)), "{sequences:?}");
     assert_eq!(out.iter().filter(|tick| tick.flags.contains(TickFlags::RESTART)).count(), 2);

@@ -140,7 +140,8 @@ proptest! {
     fn no_term_jumps_when_temperature_or_branch_changes(
         amplitude in 1.0_f64..20.0, period_s in 20.0_f64..60.0, run_up in -1e-3..1e-3, braking in -1e-3..1e-3,
     ) {
-        const PER_INTERVAL: usize = 200;
+        const PER_INTERVAL: u16 = 200;
+        let per_interval = usize::from(PER_INTERVAL);
         let mut parts = identity();
         parts.filter.branch_dead_band = 1e-3;
         parts.accels.clear();
@@ -156,26 +157,26 @@ proptest! {
         }
         let mut unit = drive::unit(&compile(&parts));
         let mut out = Vec::new();
-        for k in 0..40 * PER_INTERVAL as u64 {
-            if k % PER_INTERVAL as u64 == 0 {
-                let t = TICK_S * k as f64;
+        for k in 0..40 * u32::from(PER_INTERVAL) {
+            if k % u32::from(PER_INTERVAL) == 0 {
+                let t = TICK_S * f64::from(k);
                 let celsius = 20.0 + amplitude * (std::f64::consts::TAU * t / period_s).sin();
-                drive::hand(&mut unit, &Owned::Temperature(vec![temperature(k, celsius)]), &mut out);
+                drive::hand(&mut unit, &Owned::Temperature(vec![temperature(k.into(), celsius)]), &mut out);
             }
-            drive::hand(&mut unit, &Owned::Gyro(vec![gyro(k, &[0.0; 3])]), &mut out);
+            drive::hand(&mut unit, &Owned::Gyro(vec![gyro(k.into(), &[0.0; 3])]), &mut out);
         }
         // From the second interval on: the first reading is met, not approached.
-        let rates: Vec<f64> = out.iter().skip(2 * PER_INTERVAL).map(|tick| tick.delta_angle[0] / TICK_S).collect();
+        let rates: Vec<f64> = out.iter().skip(2 * per_interval).map(|tick| tick.delta_angle[0] / TICK_S).collect();
         // Without the first and the last interval, whose change is not complete.
-        let whole = rates.len() - PER_INTERVAL;
-        let steps: Vec<f64> = rates[PER_INTERVAL..whole].windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
+        let whole = rates.len() - per_interval;
+        let steps: Vec<f64> = rates[per_interval..whole].windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
         let largest_step = steps.iter().copied().fold(0.0, f64::max);
         let largest_change = rates
-            .windows(PER_INTERVAL + 1)
-            .map(|span| (span[PER_INTERVAL] - span[0]).abs())
+            .windows(per_interval + 1)
+            .map(|span| (span[per_interval] - span[0]).abs())
             .fold(0.0, f64::max);
         prop_assert!(
-            largest_step <= 1.01 * largest_change / PER_INTERVAL as f64 + 1e-18,
+            largest_step <= 1.01 * largest_change / f64::from(PER_INTERVAL) + 1e-18,
             "a step of {largest_step} where an interval changes by {largest_change}"
         );
     }

@@ -1,5 +1,12 @@
 //! The invariants of the core, each in a module named after it, and the laws of the correction. No session, no file.
 
+#![expect(
+    clippy::expect_used,
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "what does not hold ends the test"
+)]
+
 mod i1_each_tick_once;
 mod i2_timing_does_not_matter;
 mod i3_swap;

@@ -53,7 +53,7 @@ fn broken() -> Vec<(&'static str, Vec<u8>)> {
     broken.extend(tick(12, |b| mean(b, &[0.0; 8])));
     broken.extend(tick(13, |b| mean(b, &[0.0])));
     broken.extend(tick(14, |b| {
-        b.ticks[0].readings = isotherm_protocol::raw::Readings::Counts([1, 2, 3].into_iter().collect())
+        b.ticks[0].readings = isotherm_protocol::raw::Readings::Counts([1, 2, 3].into_iter().collect());
     }));
     broken.extend(tick(15, |b| b.ticks[0].duration_ns = 0));
     broken.extend(tick(16, |b| b.ticks[0].duration_ns = u64::MAX));
@@ -82,7 +82,7 @@ async fn run(garbage: &[(&'static str, Vec<u8>)]) -> [Vec<CorrectedTick>; 2] {
     let mut garbage = garbage.iter();
     for k in 0..TICKS {
         for producer in &mut producers {
-            let wave = (k % 13) as f64 * 1e-3;
+            let wave = f64::from(u8::try_from(k % 13).unwrap()) * 1e-3;
             if k % 200 == 0 {
                 producer.temperatures(&[temperature(k, 20.0 + wave)]).await.unwrap();
             }

@@ -17,7 +17,8 @@ async fn play(unit: &str, mapping: &str, log: &str, ticks: u64) -> Vec<Corrected
     let folder = tempfile::tempdir().unwrap();
     let config = folder.path().join("service.toml");
     let calibrations = data::root().join("config/calibration");
-    std::fs::write(&config, format!("calibrations = {calibrations:?}\ncongestion = \"block\"\n")).unwrap();
+    std::fs::write(&config, format!("calibrations = '{}'\ncongestion = \"block\"\n", calibrations.display()))
+        .unwrap();
     let service = Service::start(&["--config", config.to_str().unwrap()]);
     let options = SessionOptions { connect: vec![service.locator.clone()], ..SessionOptions::default() };
     let session = open(&options).await.unwrap();
@@ -86,7 +87,7 @@ async fn real_chamber_log_from_the_data_folder_reaches_the_cubic_residuals() {
     // The first row is an outlier; its figures are left out of the published ones.
     let ticks = &ticks[1..];
     assert!(ticks.iter().all(|tick| tick.flags & TickFlags::ACCELEROMETER_MISSING.bits() == 0));
-    let seconds = |tick: &CorrectedTick| tick.duration_ns as f64 * 1e-9;
+    let seconds = |tick: &CorrectedTick| tick.to_core(0).duration.as_s();
     let gyro_y = ticks.iter().map(|tick| tick.delta_angle_rad[1] / seconds(tick) / RAD_PER_DEG);
     let accel_z = ticks.iter().map(|tick| tick.delta_velocity_m_per_s[2] / seconds(tick));
     for (name, (_, got), expected) in [
