@@ -11,7 +11,7 @@
 //! | [`calibrations`] | the calibration documents of a folder |
 //! | [`service`] | start and stop of the whole |
 //! | [`intake`] | what the receive threads do |
-//! | [`unit`] | one unit's part |
+//! | [`mod@unit`] | one unit's part |
 //! | [`fault`], [`latency`], [`totals`] | what is counted |
 //! | [`check`] | validation of calibration documents and configurations |
 //! | [`report`], [`demo`] | the demonstration and its report |
