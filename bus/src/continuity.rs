@@ -20,6 +20,8 @@ pub struct Continuity {
     pub duplicated: u64,
     /// Times that the producer restarted.
     pub restarts: u64,
+    /// Raw gyro ticks that came back as they were, because the unit has no calibration.
+    pub uncalibrated: u64,
     last: Option<u64>,
 }
 
@@ -32,8 +34,11 @@ impl Continuity {
 
     /// Enters one tick.
     pub fn feed(&mut self, tick: &CorrectedTick) {
-        let restart = TickFlags::from_bits_retain(tick.flags).contains(TickFlags::RESTART);
-        self.enter(tick.sequence, tick.ticks, tick.missed, restart);
+        let flags = TickFlags::from_bits_retain(tick.flags);
+        self.enter(tick.sequence, tick.ticks, tick.missed, flags.contains(TickFlags::RESTART));
+        if flags.contains(TickFlags::UNCALIBRATED) {
+            self.uncalibrated += u64::from(tick.ticks.max(1));
+        }
     }
 
     /// Enters one output by its figures: last raw sequence number, raw ticks in it, raw ticks announced as missing

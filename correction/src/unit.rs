@@ -147,15 +147,17 @@ impl Unit {
     pub fn handle(&mut self, event: Event<'_>, emit: &mut dyn FnMut(&CorrectedTick)) {
         match event {
             Event::Gyro { output, ticks } => {
-                let Some(batch_end) = ticks.iter().map(|tick| tick.end_time).max() else { return };
                 let mut starts_anew = false;
                 for tick in ticks {
                     self.counters.gyro_ticks_in += 1;
                     if self.fits(output, tick.readings.len(), |c| (c.gyro_output(), c.gyro_count())) {
-                        starts_anew |= self.gyros.admit(tick, batch_end, &mut self.counters);
+                        starts_anew |= self.gyros.admit(tick, output, &mut self.counters);
                     }
                 }
-                if !starts_anew {
+                self.gyros.end_batch();
+                if starts_anew {
+                    self.accels.sets_apart();
+                } else {
                     self.accels.goes_on();
                 }
                 self.release(false, emit);
@@ -164,7 +166,7 @@ impl Unit {
                 for tick in ticks {
                     self.counters.accel_ticks_in += 1;
                     if self.fits(output, tick.readings.len(), |c| (c.accel_output(), c.accel_count())) {
-                        self.accels.admit(tick, &mut self.counters);
+                        self.accels.admit(tick, output, &mut self.counters);
                     }
                 }
                 self.release(false, emit);
@@ -215,36 +217,44 @@ impl Unit {
             let expects_accel =
                 self.active.as_ref().is_none_or(|active| active.calibration.accel_count() > 0);
             let accel = match self.accels.take(front.tick, &mut self.counters) {
-                Match::Found(accel) => Some(accel),
+                Match::Found(accel, output) => Some((accel, output)),
                 Match::NotYet if expects_accel && !front.expired => return,
                 Match::NotYet => None,
             };
             let Some(released) = self.gyros.release() else { return };
             self.accels.gyro_released(released.tick.end_time);
-            self.give_out(&released, accel.as_ref(), emit);
+            // A swap since it came may have changed what fits.
+            let accel = accel.filter(|(accel, output)| {
+                self.fits(*output, accel.readings.len(), |c| (c.accel_output(), c.accel_count()))
+            });
+            self.give_out(released, accel.as_ref().map(|(accel, _)| accel), emit);
         }
     }
 
     /// Corrects one tick and gives it out.
     fn give_out(
         &mut self,
-        released: &Released,
+        mut released: Released,
         accel: Option<&AccelTick>,
         emit: &mut dyn FnMut(&CorrectedTick),
     ) {
-        let Released { tick, missed, restart } = released;
-        self.last_end = tick.end_time;
-        if *restart {
-            self.waiting.restart(tick.end_time);
+        self.last_end = released.tick.end_time;
+        if released.restart {
+            self.waiting.restart(self.last_end);
             self.turn_on = None;
         }
+        released.restart |= core::mem::take(&mut self.restart_due);
+        released.missed = released.missed.saturating_add(core::mem::take(&mut self.unannounced));
+        let Released { tick, output, missed, restart } = &released;
+        // A swap since it came may have changed what fits.
+        let fits = self.fits(*output, tick.readings.len(), |c| (c.gyro_output(), c.gyro_count()));
         let turn_on = *self.turn_on.get_or_insert(tick.end_time);
         let settings = &self.settings;
         let mut corrected = match &mut self.active {
-            Some(active) => {
+            Some(active) if fits => {
                 let mut corrected = active.corrector.correct(
                     &active.calibration,
-                    released,
+                    &released,
                     turn_on,
                     accel,
                     (&mut self.waiting, settings.temperature_delay),
@@ -254,20 +264,20 @@ impl Unit {
                 corrected
             }
             None if settings.uncalibrated == Uncalibrated::PassThrough => correct::pass_through(tick, accel),
-            None => {
-                self.unannounced = self.unannounced.saturating_add(missed.saturating_add(1));
-                self.restart_due |= restart;
-                self.counters.ticks_held += 1;
+            held_or_misfit => {
+                self.unannounced = missed.saturating_add(1);
+                self.restart_due = *restart;
+                self.counters.ticks_held += u64::from(held_or_misfit.is_none());
                 return;
             }
         };
-        corrected.missed = missed.saturating_add(core::mem::take(&mut self.unannounced));
+        corrected.missed = *missed;
         if corrected.missed > 0 {
             corrected.flags |= TickFlags::GAP;
             self.counters.gaps += 1;
             self.counters.ticks_missed = self.counters.ticks_missed.saturating_add(corrected.missed);
         }
-        if *restart || core::mem::take(&mut self.restart_due) {
+        if *restart {
             corrected.flags |= TickFlags::RESTART;
         }
         self.counters.ticks_out += 1;

@@ -92,16 +92,19 @@ fn run(cli: Cli) -> Result<Outcome, Error> {
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), "isotherm-replay", &mut script);
-            print(&script);
+            print(&script)?;
             Ok(Outcome::Complete)
         }
     }
 }
 
 /// Writes to standard output; a reader that has gone away is no error.
-fn print(text: &[u8]) {
+fn print(text: &[u8]) -> Result<(), Error> {
     let mut stdout = io::stdout().lock();
-    let _ = stdout.write_all(text).and_then(|()| stdout.flush());
+    match stdout.write_all(text).and_then(|()| stdout.flush()) {
+        Err(source) if source.kind() != io::ErrorKind::BrokenPipe => Err(Error::Stdout { source }),
+        _ => Ok(()),
+    }
 }
 
 /// Runs the program and maps what came of it to its exit code.

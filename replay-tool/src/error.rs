@@ -3,6 +3,7 @@
 use std::io;
 use std::path::Path;
 
+use isotherm_bus::BusError;
 use isotherm_protocol::key::UnitIdError;
 use thiserror::Error;
 
@@ -43,6 +44,12 @@ pub enum Error {
         /// Why.
         source: UnitIdError,
     },
+    /// Standard output that cannot be written.
+    #[error("cannot write to standard output: {source}")]
+    Stdout {
+        /// Why.
+        source: io::Error,
+    },
     /// Arguments that do not go together.
     #[error("{0}")]
     Usage(String),
@@ -51,7 +58,7 @@ pub enum Error {
     Codec(#[from] isotherm_protocol::codec::CodecError),
     /// Zenoh.
     #[error(transparent)]
-    Bus(#[from] isotherm_bus::BusError),
+    Bus(#[from] BusError),
     /// The asynchronous runtime does not start.
     #[error("cannot start the runtime: {source}")]
     Runtime {
@@ -69,12 +76,15 @@ impl Error {
         Self::File { path: path.display().to_string(), action, source }
     }
 
-    /// The program's exit code: 1 failed, 2 usage, 78 bad mapping, calibration document or scenario.
+    /// The program's exit code: 1 failed, 2 usage, 78 bad mapping, calibration document, scenario or Zenoh option.
     #[must_use]
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Usage(_) | Self::Unit { .. } => 2,
-            Self::Mapping(_) | Self::Calibration(_) | Self::Scenario(_) => 78,
+            Self::Usage(_) | Self::Unit { .. } | Self::Bus(BusError::Range { .. }) => 2,
+            Self::Mapping(_)
+            | Self::Calibration(_)
+            | Self::Scenario(_)
+            | Self::Bus(BusError::Configuration { .. } | BusError::Option { .. }) => 78,
             _ => 1,
         }
     }

@@ -15,6 +15,7 @@
 
 pub mod cli;
 pub mod error;
+mod file;
 pub mod log;
 pub mod mapping;
 pub mod offline;

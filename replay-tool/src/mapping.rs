@@ -20,6 +20,7 @@ pub use problem::Problem;
 pub(crate) use problem::place;
 
 use crate::error::Error;
+use crate::file::read_small_text;
 
 /// Version of the mapping format that this program reads.
 pub const VERSION: i64 = 1;
@@ -248,8 +249,7 @@ impl Mapping {
     /// # Errors
     /// [`Error::File`] where the file cannot be read, [`Error::Mapping`] with all its problems.
     pub fn load(path: &Path) -> Result<Self, Error> {
-        let text =
-            std::fs::read_to_string(path).map_err(|source| Error::file(path, "read the mapping", source))?;
+        let text = read_small_text(path, "read the mapping")?;
         Self::parse(&text, &path.display().to_string()).map_err(Error::Mapping)
     }
 

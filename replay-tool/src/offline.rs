@@ -11,6 +11,7 @@ use isotherm_protocol::key::UnitId;
 use isotherm_protocol::stream::UnitStream;
 
 use crate::error::Error;
+use crate::file::read_small;
 use crate::log::LogEvent;
 
 /// A calibration document that was read from a file.
@@ -31,8 +32,7 @@ pub struct Loaded {
 /// # Errors
 /// [`Error::File`], [`Error::Calibration`] with every problem, [`Error::Unit`].
 pub fn load_calibration(path: &Path) -> Result<Loaded, Error> {
-    let bytes =
-        std::fs::read(path).map_err(|source| Error::file(path, "read the calibration document", source))?;
+    let bytes = read_small(path, "read the calibration document")?;
     let parsed = Document::parse_bytes(&bytes, Some(&path.display().to_string()))
         .map_err(|problems| Error::Calibration(problems.iter().map(ToString::to_string).collect()))?;
     let mut digest = [0; 8];
@@ -104,6 +104,46 @@ impl Offline {
     /// Takes ready ticks as one frame; false where there are none.
     pub fn next_frame(&mut self, frame: &mut Vec<u8>) -> bool {
         self.stream.next_frame(frame)
+    }
+
+    /// What was refused or passed over, in words for whoever reads only the summary.
+    #[must_use]
+    pub fn troubles(&self) -> Vec<String> {
+        /// Counters of what is as it should be, or that the summary and its flags show anyway.
+        const EXPECTED: [&str; 8] = [
+            "gyro_ticks_in",
+            "accel_ticks_in",
+            "temperature_readings_in",
+            "ticks_out",
+            "gaps",
+            "ticks_missed",
+            "ticks_interpolated",
+            "switches_restored",
+        ];
+        let channels: Vec<_> =
+            self.stream.unit().channels().map(|channel| channel.name.to_string()).collect();
+        let counters = self.counters().into_iter().filter(|(name, _)| !EXPECTED.contains(&name.as_str()));
+        let words = counters.map(|(name, value)| match name.as_str() {
+            "temperature_unknown_channel" => format!(
+                "{value} temperature readings are of channels that the calibration does not have; it has: {}",
+                if channels.is_empty() { "none".to_owned() } else { channels.join(", ") }
+            ),
+            "wrong_sensor_count" => {
+                format!("{value} ticks refused: another number of sensors than the calibration has")
+            }
+            "wrong_output_kind" => {
+                format!("{value} ticks refused: counts where the calibration has means, or the reverse")
+            }
+            _ => format!("{value} {name}"),
+        });
+        words.collect()
+    }
+
+    /// Gyro ticks that did not go out corrected, though the log has them.
+    #[must_use]
+    pub fn refused(&self) -> u64 {
+        let counters = self.stream.unit().counters();
+        counters.gyro_ticks_in.saturating_sub(counters.ticks_out)
     }
 
     /// Counters of the unit that are not zero.

@@ -7,6 +7,7 @@ use isotherm_correction::sample::GyroTick;
 use isotherm_correction::units::Timestamp;
 use isotherm_protocol::key::UnitId;
 use serde::Serialize;
+use tokio::signal::unix::{SignalKind, signal};
 use tokio::time::{Instant, timeout};
 
 use crate::error::Error;
@@ -50,6 +51,8 @@ pub struct PlayReport {
     pub ticks_acknowledged: Option<u64>,
     /// Gyro ticks that the service announced as missing, those that the log does not have among them.
     pub ticks_announced_missing: Option<u64>,
+    /// Gyro ticks that came back as they were, because the service has no calibration for the unit.
+    pub ticks_uncalibrated: Option<u64>,
     /// Gyro ticks sent that did not come back.
     pub ticks_lost: Option<u64>,
     /// Gyro ticks that came back more than once.
@@ -119,7 +122,7 @@ async fn play_on(
     sent.report.unit = options.unit.to_string();
     let mut pacer = Pacer::new(options.speed);
     let begun = Instant::now();
-    let mut stop = std::pin::pin!(tokio::signal::ctrl_c());
+    let mut stop = std::pin::pin!(stop_asked()?);
     for event in events {
         match event? {
             LogEvent::Gyro { output, tick } => {
@@ -157,6 +160,19 @@ async fn play_on(
     }
     let account = consumer.as_ref().map(|consumer| consumer.continuity(&options.unit));
     Ok(sent.finish(account.as_ref(), elapsed, pacer.latest()))
+}
+
+/// A future that ends with Ctrl-C or a stop signal.
+fn stop_asked() -> Result<impl Future<Output = ()>, Error> {
+    let listen = |kind| signal(kind).map_err(|source| Error::Runtime { source });
+    let (mut interrupt, mut terminate) =
+        (listen(SignalKind::interrupt())?, listen(SignalKind::terminate())?);
+    Ok(async move {
+        tokio::select! {
+            _ = interrupt.recv() => {}
+            _ = terminate.recv() => {}
+        }
+    })
 }
 
 /// Takes what has come back and is still queued here.
@@ -197,6 +213,7 @@ impl Sent {
             report.ticks_acknowledged = Some(back);
             report.ticks_announced_missing = Some(account.announced_missing);
             report.ticks_duplicated = Some(account.duplicated);
+            report.ticks_uncalibrated = Some(account.uncalibrated);
             report.ticks_lost = Some(report.ticks_sent.saturating_sub(back));
         }
         report

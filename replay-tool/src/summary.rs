@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use isotherm_correction::sample::{CorrectedTick, TickFlags};
+use isotherm_correction::sample::{CorrectedTick, SensorFlags, TickFlags};
 use isotherm_correction::units::{AngularRate, Span};
 use serde::Serialize;
 
@@ -25,6 +25,8 @@ pub struct Sums {
     velocity_m_per_s: [f64; 3],
     /// Outputs with each flag, by its bit.
     flags: [u64; 16],
+    /// Outputs in which any sensor has a flag, by its bit.
+    sensor_flags: [u64; 8],
 }
 
 /// What the sums come to.
@@ -46,6 +48,8 @@ pub struct Summary {
     pub mean_specific_force_m_per_s2: [f64; 3],
     /// Outputs with each flag that occurred.
     pub flags: BTreeMap<&'static str, u64>,
+    /// Outputs in which any sensor has a flag other than `VALID`, for each that occurred.
+    pub sensor_flags: BTreeMap<&'static str, u64>,
 }
 
 impl Sums {
@@ -66,6 +70,11 @@ impl Sums {
         for (bit, count) in self.flags.iter_mut().enumerate() {
             *count += u64::from(bits >> bit & 1);
         }
+        let sensors = tick.gyro_flags.iter().chain(&tick.accel_flags);
+        let bits = sensors.fold(0, |bits, flags| bits | (*flags - SensorFlags::VALID).bits());
+        for (bit, count) in self.sensor_flags.iter_mut().enumerate() {
+            *count += u64::from(bits >> bit & 1);
+        }
     }
 
     /// Raw ticks so far.
@@ -83,6 +92,10 @@ impl Sums {
             let count = *self.flags.get(flag.bits().trailing_zeros() as usize)?;
             (count > 0).then_some((name, count))
         });
+        let sensors = SensorFlags::all().iter_names().filter_map(|(name, flag)| {
+            let count = *self.sensor_flags.get(flag.bits().trailing_zeros() as usize)?;
+            (count > 0).then_some((name, count))
+        });
         Summary {
             ticks: self.ticks,
             outputs: self.outputs,
@@ -94,6 +107,7 @@ impl Sums {
                 .map(|sum| AngularRate::from_rad_per_s(mean(sum)).as_deg_per_h()),
             mean_specific_force_m_per_s2: self.velocity_m_per_s.map(mean),
             flags: named.collect(),
+            sensor_flags: sensors.collect(),
         }
     }
 }

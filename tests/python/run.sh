@@ -24,4 +24,4 @@ case "$venv" in /*) ;; *) venv=$PWD/$venv ;; esac
 "$venv/bin/pip" install --quiet --disable-pip-version-check --requirement tests/python/requirements.txt
 
 "$venv/bin/python" -B tests/python/subscriber.py --vectors docs/wire.md
-ISOTHERM_PYTHON=$venv/bin/python cargo test --release --locked -p isotherm-tests --test system python_subscriber -- --nocapture
+ISOTHERM_PYTHON=$venv/bin/python cargo test --release --locked --workspace --test system python_subscriber -- --nocapture

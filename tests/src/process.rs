@@ -19,7 +19,8 @@ pub fn program(name: &str) -> PathBuf {
     BUILD.call_once(|| {
         let target = folder.parent().expect("target/PROFILE");
         let mut cargo = Command::new(env!("CARGO"));
-        cargo.args(["build", "--quiet", "--bins", "-p", "isotherm-service", "-p", "isotherm-replay-tool"]);
+        // The whole workspace, so that the dependencies have the features that they have under test.
+        cargo.args(["build", "--quiet", "--workspace", "--bins"]);
         cargo.arg("--target-dir").arg(target).current_dir(crate::data::root());
         if folder.ends_with("release") {
             cargo.arg("--release");

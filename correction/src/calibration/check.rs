@@ -145,9 +145,13 @@ impl Checker {
         }
     }
 
-    fn range(&mut self, section: Section, field: &'static str, [low, high]: [f64; 2]) {
-        if low.is_nan() || high.is_nan() || low >= high {
-            self.push(section, field, DefectKind::InvertedRange { low, high });
+    /// A range that runs upwards and lies within limits.
+    fn range(&mut self, section: Section, field: &'static str, [from, to]: [f64; 2], low: f64, high: f64) {
+        if from >= to {
+            self.push(section, field, DefectKind::InvertedRange { low: from, high: to });
+        }
+        for end in [from, to] {
+            self.within(section, field, end, low, high);
         }
     }
 
@@ -267,7 +271,7 @@ fn check_channels(checker: &mut Checker, channels: &[ChannelParts]) {
         for &a in &channel.conversion {
             checker.within(section, "conversion", a, -HUGE, HUGE);
         }
-        checker.range(section, "range", channel.range_deg_c);
+        checker.range(section, "range", channel.range_deg_c, -HUGE, HUGE);
         checker.within(section, "spike_limit", channel.spike_limit_deg_c, f64::MIN_POSITIVE, HUGE);
     }
 }
@@ -292,10 +296,7 @@ fn gyro_model(
         for &c in coefficients {
             checker.within(section, "trend.coefficients", c, -HUGE, HUGE);
         }
-        checker.range(section, "trend.interval_s", *interval_s);
-        for &end in interval_s {
-            checker.within(section, "trend.interval_s", end, 0.0, 1e9);
-        }
+        checker.range(section, "trend.interval_s", *interval_s, 0.0, 1e9);
     }
     if gyro.servo.is_some() && parts.reversal.is_none() {
         checker.push(

@@ -77,6 +77,12 @@ impl AccelThermal {
         self.board.follow([ratio.value], ratio.clamped, start, over);
     }
 
+    /// Arrives at once where the terms are heading, after a step of the producer's clock.
+    pub fn settle(&mut self) {
+        self.sensor.settle();
+        self.board.settle();
+    }
+
     /// Specific force (m/s²) that an output (V, counts/s or m/s²) stands for at `time`.
     #[must_use]
     pub fn specific_force(&self, output: f64, time: Timestamp) -> f64 {

@@ -208,6 +208,11 @@ impl GyroThermal {
         self.lagged = [temperature; MAX_LAGS];
     }
 
+    /// Arrives at once where the terms are heading, after a step of the producer's clock.
+    pub fn settle(&mut self) {
+        self.terms.settle();
+    }
+
     /// Moves the lags on by one grid point.
     pub fn grid_point(&mut self, model: &GyroModel, thermal: &ThermalState) {
         for (lag, lagged) in model.lags.iter().zip(&mut self.lagged) {

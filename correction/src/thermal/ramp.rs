@@ -44,7 +44,15 @@ impl<const N: usize> Ramp<N> {
         });
     }
 
-    /// How far along the line `time` is, 0…1.
+    /// Arrives at once.
+    pub fn settle(&mut self) {
+        *self = Self::hold(core::array::from_fn(|i| match (self.from.get(i), self.step.get(i)) {
+            (Some(from), Some(step)) => from + step,
+            _ => 0.0,
+        }));
+    }
+
+    /// How far along the line `time` is, 0…1; 0 for values that stand still.
     #[must_use]
     pub fn share(&self, time: Timestamp) -> f64 {
         (time.seconds_from(self.start) * self.per_second).clamp(0.0, 1.0)
@@ -72,6 +80,11 @@ impl<const N: usize> Follower<N> {
         self.ramp.turn(start, if self.started { over } else { Span::ZERO }, values);
         self.clamped = clamped;
         self.started = true;
+    }
+
+    /// Arrives at once: after a step of the producer's clock the way there means nothing.
+    pub fn settle(&mut self) {
+        self.ramp.settle();
     }
 
     /// The values in use at `time`.

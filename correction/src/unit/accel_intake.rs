@@ -4,7 +4,7 @@ use alloc::collections::VecDeque;
 
 use super::counters::Counters;
 use super::gyro_intake::MAX_DURATION;
-use crate::sample::{AccelTick, GyroTick};
+use crate::sample::{AccelTick, GyroTick, OutputKind};
 use crate::units::{Span, Timestamp};
 
 /// Most accelerometer ticks that wait.
@@ -13,48 +13,61 @@ const MAX_PENDING: usize = 8192;
 /// What the accelerometer stream has for a gyro tick.
 #[derive(Debug)]
 pub(super) enum Match {
-    /// The tick that ends with it.
-    Found(AccelTick),
+    /// The tick that ends with it, and what its readings stand for.
+    Found(AccelTick, OutputKind),
     /// None yet: it may still come.
     NotYet,
+}
+
+/// A tick that waits for its gyro tick.
+#[derive(Debug)]
+struct Pending {
+    tick: AccelTick,
+    output: OutputKind,
+    /// Messages of gyro ticks that had come before it.
+    after: u64,
 }
 
 /// Memory of the accelerometer stream.
 #[derive(Debug, Default)]
 pub(super) struct AccelIntake {
-    pending: VecDeque<AccelTick>,
-    /// Ticks that came after their time, since the last gyro tick: where that next one starts a new series, they
-    /// are the first of it.
-    behind: VecDeque<AccelTick>,
-    /// End of the last gyro tick that was released.
+    pending: VecDeque<Pending>,
+    /// Ticks that came after their time, since the last gyro tick: where the next one starts a new series, they are
+    /// the first of it.
+    behind: VecDeque<Pending>,
+    /// Messages of gyro ticks that started no new series.
+    gyro_messages: u64,
+    /// End of the last gyro tick that was released in this series.
     released: Option<Timestamp>,
 }
 
 impl AccelIntake {
     /// Takes one tick.
-    pub(super) fn admit(&mut self, tick: &AccelTick, counters: &mut Counters) {
+    pub(super) fn admit(&mut self, tick: &AccelTick, output: OutputKind, counters: &mut Counters) {
         if tick.duration == Span::ZERO || tick.duration > MAX_DURATION {
             counters.bad_duration += 1;
             return;
         }
+        let pending = Pending { tick: tick.clone(), output, after: self.gyro_messages };
         if self.released.is_some_and(|released| tick.end_time <= released) {
             counters.accel_late += 1;
             if self.behind.len() < MAX_PENDING {
-                self.behind.push_back(tick.clone());
+                self.behind.push_back(pending);
             }
             return;
         }
-        self.insert(tick.clone(), counters);
+        self.insert(pending, counters);
     }
 
     /// Puts a tick in its place in time.
-    fn insert(&mut self, tick: AccelTick, counters: &mut Counters) {
-        let place = self.pending.iter().rposition(|p| p.end_time < tick.end_time).map_or(0, |i| i + 1);
-        if self.pending.get(place).is_some_and(|p| p.end_time == tick.end_time) {
+    fn insert(&mut self, pending: Pending, counters: &mut Counters) {
+        let time = pending.tick.end_time;
+        let place = self.pending.iter().rposition(|p| p.tick.end_time < time).map_or(0, |i| i + 1);
+        if self.pending.get(place).is_some_and(|p| p.tick.end_time == time) {
             counters.accel_duplicates += 1;
             return;
         }
-        self.pending.insert(place, tick);
+        self.pending.insert(place, pending);
         if self.pending.len() > MAX_PENDING {
             // The one furthest in the future: a broken time stamp would otherwise stay for ever.
             self.pending.pop_back();
@@ -65,12 +78,13 @@ impl AccelIntake {
     /// Looks for the tick that ends with `gyro`, nearer than half the gyro tick's duration.
     pub(super) fn take(&mut self, gyro: &GyroTick, counters: &mut Counters) -> Match {
         let half = Span::from_ns(gyro.duration.as_ns() / 2);
-        while let Some(front) = self.pending.front() {
+        while let Some(Pending { tick: front, .. }) = self.pending.front() {
             if front.end_time + half <= gyro.end_time {
                 self.pending.pop_front();
                 counters.accel_unpaired += 1;
             } else if front.end_time < gyro.end_time + half {
-                return self.pending.pop_front().map_or(Match::NotYet, Match::Found);
+                let found = self.pending.pop_front();
+                return found.map_or(Match::NotYet, |found| Match::Found(found.tick, found.output));
             } else {
                 break;
             }
@@ -86,12 +100,26 @@ impl AccelIntake {
     /// Notes that gyro ticks came which start no new series.
     pub(super) fn goes_on(&mut self) {
         self.behind.clear();
+        self.gyro_messages += 1;
     }
 
-    /// Starts a new series whose first gyro tick ends at `end_time`; ticks of the old one are dropped.
+    /// Notes that gyro ticks came which start a new series: what came since the last message of the old one is set
+    /// apart, so that ticks of the old one that still wait do not take it.
+    pub(super) fn sets_apart(&mut self) {
+        for _ in 0..self.pending.len() {
+            let Some(pending) = self.pending.pop_front() else { return };
+            let side = if pending.after == self.gyro_messages { &mut self.behind } else { &mut self.pending };
+            side.push_back(pending);
+        }
+    }
+
+    /// Starts a new series whose first gyro tick ends at `end_time`; ticks of the old one are dropped. May be called
+    /// again until that gyro tick has been released.
     pub(super) fn starts_anew(&mut self, end_time: Timestamp, counters: &mut Counters) {
-        self.released = None;
-        let near = |tick: &AccelTick| {
+        if self.released.take().is_none() {
+            return;
+        }
+        let near = |Pending { tick, .. }: &Pending| {
             tick.end_time + MAX_DURATION > end_time && tick.end_time < end_time + MAX_DURATION
         };
         let before = self.pending.len();

@@ -11,6 +11,8 @@ pub(super) struct Axes {
     temperature: Ramp<1>,
     target: f64,
     clamped: bool,
+    /// Whether a temperature was read: the first one is not approached from the assumed one, but met.
+    started: bool,
     mask: SensorMask,
     from: Option<Inverse>,
     to: Option<Inverse>,
@@ -27,6 +29,7 @@ impl Axes {
             temperature: Ramp::hold([target]),
             target,
             clamped: outside(orientation, target),
+            started: false,
             mask,
             from: inverse,
             to: inverse,
@@ -43,12 +46,23 @@ impl Axes {
         start: Timestamp,
         over: Span,
     ) {
+        let over = if self.started { over } else { Span::ZERO };
+        self.started = true;
         let now = self.at(start);
         self.to = orientation.inverse(temperature, self.mask);
         self.from = now.or(self.to);
         self.target = temperature;
         self.clamped = outside(orientation, temperature);
         self.temperature.turn(start, over, [temperature]);
+        if over == Span::ZERO {
+            self.settle();
+        }
+    }
+
+    /// Arrives at once where it is heading, after a step of the producer's clock.
+    pub(super) fn settle(&mut self) {
+        self.temperature.settle();
+        self.from = self.to;
     }
 
     /// Whether the temperature is outside the fitted range.

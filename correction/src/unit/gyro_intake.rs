@@ -4,9 +4,10 @@
 //! window (in event time) allows; then the ticks behind it go on and the gap is announced.
 
 use alloc::collections::VecDeque;
+use core::cmp::Ordering;
 
 use super::counters::Counters;
-use crate::sample::GyroTick;
+use crate::sample::{GyroTick, OutputKind};
 use crate::units::{Span, Timestamp};
 
 /// Most gyro ticks that wait for an accelerometer tick or a missing neighbour.
@@ -25,9 +26,10 @@ const OLD_BELIEVED_AFTER: u32 = 256;
 #[derive(Debug, Clone)]
 struct Pending {
     tick: GyroTick,
-    /// End of the last tick of the batch in which it came. The window counts from here, so that the size of a
-    /// batch does not eat into it.
-    batch_end: Timestamp,
+    output: OutputKind,
+    /// End of the last tick that was admitted with it from one batch, once that is known. The window counts from
+    /// here, so that the size of a batch does not eat into it.
+    batch_end: Option<Timestamp>,
     restart: bool,
     refused_before: u64,
 }
@@ -46,6 +48,7 @@ pub(super) struct Front<'a> {
 #[derive(Debug, Clone)]
 pub(super) struct Released {
     pub(super) tick: GyroTick,
+    pub(super) output: OutputKind,
     pub(super) missed: u64,
     pub(super) restart: bool,
 }
@@ -70,6 +73,8 @@ struct Newest {
 #[derive(Debug, Default)]
 pub(super) struct GyroIntake {
     pending: VecDeque<Pending>,
+    /// Ticks admitted from the present batch.
+    batch: usize,
     /// Ticks among the pending ones at which a restart was followed.
     restarts_pending: usize,
     newest: Option<Newest>,
@@ -77,10 +82,10 @@ pub(super) struct GyroIntake {
     /// The producer's run in force, and the one that it took over from, whose stragglers are late.
     series: Option<u64>,
     superseded: Option<u64>,
-    /// Sequence number that is to be released next; `None` until the first tick has left. That one waits out its
-    /// window like a tick behind a gap: the stream may have begun with an earlier one that is still on its way.
-    next: Option<u64>,
-    /// Bit i: the tick `next − 1 − i` was released.
+    /// Sequence number that was released last; `None` until the first tick has left. That one waits out its window
+    /// like a tick behind a gap: the stream may have begun with an earlier one that is still on its way.
+    last: Option<u64>,
+    /// Bit i: the tick `last − i` was released.
     released: u128,
 }
 
@@ -91,8 +96,8 @@ enum Admission {
 }
 
 impl GyroIntake {
-    /// Takes one tick of a batch that ends at `batch_end`; whether it starts a new series.
-    pub(super) fn admit(&mut self, tick: &GyroTick, batch_end: Timestamp, counters: &mut Counters) -> bool {
+    /// Takes one tick of a batch; whether it starts a new series.
+    pub(super) fn admit(&mut self, tick: &GyroTick, output: OutputKind, counters: &mut Counters) -> bool {
         if tick.duration == Span::ZERO || tick.duration > MAX_DURATION {
             counters.bad_duration += 1;
             return false;
@@ -100,16 +105,36 @@ impl GyroIntake {
         let Admission::Admitted { restart, refused_before } = self.judge(tick, counters) else {
             return false;
         };
-        let pending = Pending { tick: tick.clone(), batch_end, restart, refused_before };
+        let pending = Pending { tick: tick.clone(), output, batch_end: None, restart, refused_before };
         if restart || self.newest.is_none_or(|newest| tick.sequence > newest.sequence) {
             self.newest = Some(Newest { sequence: tick.sequence, end_time: tick.end_time });
             self.restarts_pending += usize::from(restart);
             self.pending.push_back(pending);
+            self.batch += 1;
             counters.pending_overflow += u64::from(self.pending.len() > MAX_PENDING);
         } else {
             self.insert_between(pending, counters);
         }
         restart
+    }
+
+    /// Ends a batch: call it behind the last tick of each. Only what was admitted counts; a refused tick's broken
+    /// time would keep the others waiting for ever.
+    pub(super) fn end_batch(&mut self) {
+        let mut end = None;
+        for pending in self.pending.iter_mut().rev() {
+            if self.batch == 0 {
+                break;
+            }
+            if pending.batch_end.is_none() {
+                pending.batch_end = Some(*end.get_or_insert(pending.tick.end_time));
+                self.batch -= 1;
+            }
+            // What came before a restart lives in another time.
+            if pending.restart {
+                end = None;
+            }
+        }
     }
 
     /// Compares sequence and time with what came before.
@@ -141,10 +166,24 @@ impl GyroIntake {
 
     /// A tick from before the newest one: late, doubled, filling a hole, or the sign of a restart.
     fn judge_old(&mut self, tick: &GyroTick, counters: &mut Counters) -> Admission {
-        if self.next.is_none_or(|next| tick.sequence >= next) {
-            return Admission::Admitted { restart: false, refused_before: 0 };
+        const PLAIN: Admission = Admission::Admitted { restart: false, refused_before: 0 };
+        if self.restarts_pending > 0
+            && let Some(first) = self.pending.iter().rfind(|pending| pending.restart)
+        {
+            // What was released is of another series; behind the first tick of this one all may still be joined.
+            return match tick.sequence.cmp(&first.tick.sequence) {
+                Ordering::Greater => PLAIN,
+                Ordering::Equal => {
+                    counters.gyro_duplicates += 1;
+                    Admission::Refused
+                }
+                Ordering::Less => {
+                    counters.gyro_implausible += 1;
+                    self.follow_jump(tick, OLD_BELIEVED_AFTER, counters)
+                }
+            };
         }
-        let age = self.next.unwrap_or_default().saturating_sub(1).saturating_sub(tick.sequence);
+        let Some(age) = self.last.and_then(|last| last.checked_sub(tick.sequence)) else { return PLAIN };
         let known = u32::try_from(age)
             .ok()
             .and_then(|age| self.released.checked_shr(age))
@@ -204,6 +243,7 @@ impl GyroIntake {
             return;
         }
         self.pending.insert(place, pending);
+        self.batch += 1;
     }
 
     /// The tick that is to leave next; `None` while it must wait for a missing neighbour.
@@ -211,20 +251,26 @@ impl GyroIntake {
         let front = self.pending.front()?;
         // What waits before a restart lives in another time: the newest tick says nothing of its window.
         let restarted_behind = self.restarts_pending > usize::from(front.restart);
-        let passed = self.newest.is_some_and(|newest| {
-            newest.end_time > front.batch_end && newest.end_time >= front.batch_end + window
-        });
+        let batch_end = front.batch_end.unwrap_or(front.tick.end_time);
+        let passed = self
+            .newest
+            .is_some_and(|newest| newest.end_time > batch_end && newest.end_time >= batch_end + window);
         let expired = flushing || restarted_behind || passed || self.pending.len() > MAX_PENDING;
-        let in_sequence = front.restart || self.next == Some(front.tick.sequence);
+        let in_sequence = front.restart || self.distance(&front.tick) == Some(1);
         (in_sequence || expired).then_some(Front { tick: &front.tick, expired, restart: front.restart })
+    }
+
+    /// How far a tick lies ahead of the last one that was released; `None` before the first.
+    fn distance(&self, tick: &GyroTick) -> Option<u64> {
+        self.last.map(|last| tick.sequence.saturating_sub(last))
     }
 
     /// Releases the front tick.
     pub(super) fn release(&mut self) -> Option<Released> {
-        let Pending { tick, restart, refused_before, .. } = self.pending.pop_front()?;
+        let Pending { tick, output, restart, refused_before, .. } = self.pending.pop_front()?;
         self.restarts_pending -= usize::from(restart);
-        let missed = match self.next {
-            Some(next) if !restart => tick.sequence.saturating_sub(next),
+        let missed = match self.distance(&tick) {
+            Some(distance) if !restart => distance.saturating_sub(1),
             _ => refused_before,
         };
         let moved = missed.saturating_add(1);
@@ -234,8 +280,8 @@ impl GyroIntake {
             u32::try_from(moved).ok().and_then(|n| self.released.checked_shl(n)).unwrap_or(0)
         };
         self.released = kept | 1;
-        self.next = Some(tick.sequence.saturating_add(1));
-        Some(Released { tick, missed, restart })
+        self.last = Some(tick.sequence);
+        Some(Released { tick, output, missed, restart })
     }
 
     /// Whether any tick waits.

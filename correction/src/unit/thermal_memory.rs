@@ -11,8 +11,9 @@ use crate::sample::{ChannelName, TemperatureReading};
 use crate::thermal::{AccelThermal, GyroThermal};
 use crate::units::{Span, Timestamp};
 
-/// Most readings that wait to take effect.
-const MAX_WAITING: usize = 1024;
+/// Most readings that wait to take effect: two messages of 4096 times with 16 channels each, since a producer sends a
+/// message's readings before its ticks.
+const MAX_WAITING: usize = 2 * 4096 * 16;
 
 /// A temperature channel as it stands.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -121,9 +122,11 @@ impl ThermalMemory {
     /// Goes on with lags that were filtered in the same way.
     fn carry_lags(&mut self, calibration: &Calibration, (old, old_memory): (&Calibration, &Self)) {
         let models = calibration.gyros.iter().zip(&old.gyros);
-        for ((model, old_model), (thermal, old)) in models.zip(self.gyros.iter_mut().zip(&old_memory.gyros)) {
-            if old_model.channel == model.channel {
-                thermal.carry_lags(model, (old_model, old));
+        for ((model, old_model), (thermal, kept)) in models.zip(self.gyros.iter_mut().zip(&old_memory.gyros))
+        {
+            let followed = model.channel.and_then(|index| calibration.channels.get(index));
+            if followed == old_model.channel.and_then(|index| old.channels.get(index)) {
+                thermal.carry_lags(model, (old_model, kept));
             }
         }
     }
@@ -255,6 +258,10 @@ impl ThermalMemory {
     pub(super) fn restart(&mut self) {
         self.channels.iter_mut().for_each(ChannelMemory::restart);
         self.updated.iter_mut().for_each(|updated| *updated = None);
+        self.gyros.iter_mut().for_each(GyroThermal::settle);
+        self.accels.iter_mut().for_each(AccelThermal::settle);
+        self.gyro_axes.settle();
+        self.accel_axes.iter_mut().for_each(Axes::settle);
     }
 
     /// Smoothed temperature of a channel (°C); the assumed one without a channel or before its first reading.

@@ -11,6 +11,7 @@ use serde::Serialize;
 
 use super::{LogArgs, Outcome, print, show};
 use crate::error::Error;
+use crate::file::refuse_overwriting;
 use crate::log::ReadReport;
 use crate::offline::{Offline, load_calibration};
 use crate::output::{Format, Output, write_frame, write_header, write_tick};
@@ -85,9 +86,13 @@ pub(super) fn run(args: &CorrectArgs) -> Result<Outcome, Error> {
     let settings = args.settings()?;
     let loaded = load_calibration(&args.calibration)?;
     for warning in &loaded.warnings {
-        let _ = writeln!(io::stderr(), "warning: {warning}");
+        show::warn(&warning.to_string());
     }
     let mut events = args.log.open()?;
+    if let Some(out) = &args.out {
+        let inputs = args.log.log.iter().chain([&args.log.mapping, &args.calibration]);
+        refuse_overwriting(out, &inputs.map(PathBuf::as_path).collect::<Vec<_>>())?;
+    }
     let mut output = args.out.as_deref().map(Output::create).transpose()?;
     if let Some(output) = output.as_mut().filter(|_| args.format == Format::Csv) {
         output.write(|writer| write_header(writer))?;
@@ -107,6 +112,9 @@ pub(super) fn run(args: &CorrectArgs) -> Result<Outcome, Error> {
     output.map(Output::finish).transpose()?;
     bar.finish();
 
+    for trouble in unit.troubles() {
+        show::warn(&trouble);
+    }
     let (summary, log) = (sums.summary(), events.inner().report());
     let digest = format!("{:016x}", u64::from_be_bytes(loaded.digest));
     let report = Report {
@@ -120,9 +128,9 @@ pub(super) fn run(args: &CorrectArgs) -> Result<Outcome, Error> {
     if args.out.as_deref() == Some(Path::new("-")) {
         let _ = io::stderr().write_all(text.as_bytes());
     } else {
-        print(text.as_bytes());
+        print(text.as_bytes())?;
     }
-    Ok(if log.lost_data() { Outcome::DataLoss } else { Outcome::Complete })
+    Ok(if log.lost_data() || unit.refused() > 0 { Outcome::DataLoss } else { Outcome::Complete })
 }
 
 /// Takes what is ready, sums it up and writes it.
@@ -160,7 +168,8 @@ fn human(report: &Report<'_>) -> String {
         ("missing ticks", summary.missed_ticks.to_string()),
         ("duration (s)", format!("{:.3}", summary.duration_s)),
     ];
-    rows.extend(summary.flags.iter().map(|(flag, count)| (*flag, count.to_string())));
+    let flags = summary.flags.iter().chain(&summary.sensor_flags);
+    rows.extend(flags.map(|(flag, count)| (*flag, count.to_string())));
     let means = [
         ("mean rate (°/h)", summary.mean_rate_deg_per_h, 4),
         ("mean specific force (m/s²)", summary.mean_specific_force_m_per_s2, 6),

@@ -65,6 +65,12 @@ pub(super) fn run(args: PlayArgs) -> Result<Outcome, Error> {
         batch_ticks: usize::from(args.batch),
         max_in_flight: (!args.no_acknowledge).then(|| args.in_flight.unwrap_or(IN_FLIGHT.max(4 * batch))),
     };
+    let least = 2 * batch + 256;
+    if let Some(in_flight) = args.in_flight.filter(|in_flight| *in_flight < least) {
+        return Err(Error::Usage(format!(
+            "--in-flight is {in_flight}, must be at least {least} with --batch {batch}"
+        )));
+    }
     let mut events = args.log.open()?;
     let mut bar = Bar::over_log(events.inner().progress());
     let runtime = tokio::runtime::Runtime::new().map_err(|source| Error::Runtime { source })?;
@@ -75,7 +81,13 @@ pub(super) fn run(args: PlayArgs) -> Result<Outcome, Error> {
     bar.finish();
     let (play, log) = (played?, events.inner().report());
     let report = Report { play: &play, log: &log };
-    print(if args.json { show::json(&report) } else { human(&report) }.as_bytes());
+    if play.ticks_uncalibrated.is_some_and(|ticks| ticks > 0) {
+        show::warn(&format!(
+            "{} has no calibration in the service: its readings came back unscaled",
+            play.unit
+        ));
+    }
+    print(if args.json { show::json(&report) } else { human(&report) }.as_bytes())?;
     if play.stopped {
         return Err(Error::Stopped);
     }
@@ -91,7 +103,8 @@ fn human(report: &Report<'_>) -> String {
         ("gyro ticks sent", play.ticks_sent.to_string()),
         ("accelerometer ticks sent", play.accel_ticks_sent.to_string()),
         ("temperature readings sent", play.temperature_readings_sent.to_string()),
-        ("acknowledged", back(play.ticks_acknowledged)),
+        ("came back", back(play.ticks_acknowledged)),
+        ("of these uncalibrated", back(play.ticks_uncalibrated)),
         ("lost", back(play.ticks_lost)),
         ("duplicated", back(play.ticks_duplicated)),
         ("announced missing", back(play.ticks_announced_missing)),
@@ -99,7 +112,7 @@ fn human(report: &Report<'_>) -> String {
         ("time in the log (s)", format!("{:.3}", play.log_s)),
         ("time taken (s)", format!("{:.3}", play.elapsed_s)),
         ("actual speed", format!("{:.2}×", play.actual_speed)),
-        ("latest tick (ms)", format!("{:.3}", play.latest_s * 1e3)),
+        ("most behind schedule (ms)", format!("{:.3}", play.latest_s * 1e3)),
     ];
     show::table(&rows) + &show::reading(report.log)
 }

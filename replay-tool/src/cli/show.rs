@@ -1,5 +1,7 @@
 //! Summaries as tables and as JSON.
 
+use std::io::{self, Write};
+
 use comfy_table::{CellAlignment, Table, presets};
 use serde::Serialize;
 
@@ -32,6 +34,12 @@ pub(super) fn axes(rows: &[(&str, [f64; 3], usize)]) -> String {
         column.set_cell_alignment(CellAlignment::Right);
     }
     format!("{table}\n")
+}
+
+/// A warning on standard error.
+pub(super) fn warn(words: &str) {
+    // A reader that has gone away is no error.
+    let _ = writeln!(io::stderr(), "warning: {words}");
 }
 
 /// One JSON object on one line.

@@ -6,11 +6,13 @@ use std::path::{Path, PathBuf};
 
 use clap::{ArgGroup, Args};
 use flate2::{Compression, write::GzEncoder};
+use isotherm_correction::units::Span;
 use isotherm_simulator::{Scenario, Simulation, presets};
 use serde::Serialize;
 
-use super::{Outcome, print, show};
+use super::{Outcome, print, seconds, show};
 use crate::error::Error;
+use crate::file::{read_small_text, refuse_overwriting};
 use crate::progress::Bar;
 use crate::simulated::{Columns, LogWriter, write_truth, write_truth_header};
 
@@ -41,8 +43,8 @@ pub(super) struct SimulateArgs {
     #[arg(long)]
     seed: Option<u64>,
     /// Duration (s), in place of the scenario's
-    #[arg(long, value_name = "SECONDS")]
-    duration: Option<f64>,
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    duration: Option<Span>,
     /// Print the summary as one JSON object
     #[arg(long)]
     json: bool,
@@ -116,15 +118,24 @@ impl SimulateArgs {
             (None, None) => return Err(Error::Usage("give a scenario or --preset".into())),
         };
         scenario.seed = self.seed.unwrap_or(scenario.seed);
-        scenario.duration_s = self.duration.unwrap_or(scenario.duration_s);
+        scenario.duration_s = self.duration.map_or(scenario.duration_s, Span::as_s);
         Ok(scenario)
+    }
+
+    /// Refuses files that are given twice, or would be written over the scenario.
+    fn refuse_overwriting(&self, out: &Path, mapping: &Path) -> Result<(), Error> {
+        let mut others: Vec<&Path> = self.scenario.as_deref().into_iter().collect();
+        for file in [Some(out), Some(mapping), self.truth.as_deref()].into_iter().flatten() {
+            refuse_overwriting(file, &others)?;
+            others.push(file);
+        }
+        Ok(())
     }
 }
 
 /// Reads a scenario from a file.
 fn load(path: &Path) -> Result<Scenario, Error> {
-    let text =
-        std::fs::read_to_string(path).map_err(|source| Error::file(path, "read the scenario", source))?;
+    let text = read_small_text(path, "read the scenario")?;
     toml::from_str(&text).map_err(|error| {
         let (line, column) = error.span().map_or((1, 1), |span| crate::mapping::place(&text, span.start));
         Error::Scenario(vec![format!("{}:{line}:{column}: {}", path.display(), error.message())])
@@ -136,18 +147,20 @@ pub(super) fn run(args: &SimulateArgs) -> Result<Outcome, Error> {
     if args.list_presets {
         let rows: Vec<_> =
             PRESETS.iter().map(|preset| format!("{:21} {}\n", preset.name, preset.about)).collect();
-        print(rows.concat().as_bytes());
+        print(rows.concat().as_bytes())?;
         return Ok(Outcome::Complete);
     }
     let Some(out) = &args.out else { return Err(Error::Usage("give --out".into())) };
     let scenario = args.scenario()?;
     let columns = Columns::of(&scenario)?;
+    let name = args.scenario.as_ref().map_or_else(String::new, |path| format!("{}: ", path.display()));
     let simulation = Simulation::new(&scenario)
-        .map_err(|errors| Error::Scenario(errors.0.iter().map(ToString::to_string).collect()))?;
+        .map_err(|errors| Error::Scenario(errors.0.iter().map(|error| format!("{name}{error}")).collect()))?;
 
     let mapping = mapping_path(out);
-    std::fs::write(&mapping, columns.mapping()).map_err(|source| Error::file(&mapping, "write", source))?;
+    args.refuse_overwriting(out, &mapping)?;
     let mut log = create(out)?;
+    std::fs::write(&mapping, columns.mapping()).map_err(|source| Error::file(&mapping, "write", source))?;
     let failed = |source| Error::file(out, "write", source);
     let mut rows = LogWriter::new(columns, &mut log).map_err(failed)?;
     let mut truth = match &args.truth {
@@ -182,7 +195,7 @@ pub(super) fn run(args: &SimulateArgs) -> Result<Outcome, Error> {
     if let Some((writer, path)) = truth {
         writer.finish().map_err(|source| Error::file(path, "write", source))?;
     }
-    print(if args.json { show::json(&report) } else { human(&report) }.as_bytes());
+    print(if args.json { show::json(&report) } else { human(&report) }.as_bytes())?;
     Ok(Outcome::Complete)
 }
 

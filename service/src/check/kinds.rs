@@ -6,11 +6,17 @@ use isotherm_protocol::document::{Channel, Document, Parsed, Problem};
 use toml::de::DeTable;
 
 use super::{FileKind, Finding, Summary};
-use crate::calibrations::read_bounded;
 use crate::config::Settings;
+use crate::text::{read_bounded, text, whole};
 
 /// Top-level keys that only a calibration document has.
 const CALIBRATION_KEYS: [&str; 6] = ["schema", "unit", "gyro", "accel", "temperature", "mode_reversal"];
+
+/// What is said of a file that may be anything.
+const NO_KEYS: &str = "holds no keys: say with --kind what it is meant to be";
+
+/// Longest message of the JSON5 parser that is passed on; long enough for Zenoh's lists of known keys.
+const MAX_MESSAGE_CHARS: usize = 1000;
 
 /// Checks one file.
 pub(super) fn check_file(path: &Path, forced: Option<FileKind>) -> Finding {
@@ -29,41 +35,43 @@ pub(super) fn check_file(path: &Path, forced: Option<FileKind>) -> Finding {
             };
         }
     };
-    let kind = forced.unwrap_or_else(|| recognise(path, &bytes));
-    let checked = match kind {
-        FileKind::Calibration => check_calibration(&bytes, &file),
-        FileKind::Service => check_service(&bytes, path),
-        FileKind::Zenoh => check_zenoh(&bytes, path),
-    };
+    let kind = forced.or_else(|| recognise(path, &bytes));
+    let checked = text(&bytes, &file).and_then(|text| match kind {
+        Some(FileKind::Calibration) => check_calibration(text, &file),
+        Some(FileKind::Service) => check_service(text, path),
+        Some(FileKind::Zenoh) => check_zenoh(text, &file),
+        None => Err(vec![whole(&file, NO_KEYS.to_owned())]),
+    });
     let (problems, warnings, summary) = match checked {
         Ok((summary, warnings)) => (Vec::new(), warnings, Some(summary)),
         Err(problems) => (problems, Vec::new(), None),
     };
-    Finding { file, kind: Some(kind), good: summary.is_some(), unreadable: None, problems, warnings, summary }
+    Finding { file, kind, good: summary.is_some(), unreadable: None, problems, warnings, summary }
 }
 
 /// Problems, or a summary with warnings.
 type Checked = Result<(Summary, Vec<Problem>), Vec<Problem>>;
 
-/// JSON by its extension; a calibration document by a key that only it has; else a service configuration.
-fn recognise(path: &Path, bytes: &[u8]) -> FileKind {
+/// JSON by its extension; a calibration document by a key that only it has; else a service configuration, unless there
+/// are no keys at all: a calibration document that was cut to nothing must not pass for a configuration of defaults.
+fn recognise(path: &Path, bytes: &[u8]) -> Option<FileKind> {
     let extension = path.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
     if matches!(extension.as_deref(), Some("json" | "json5")) {
-        return FileKind::Zenoh;
+        return Some(FileKind::Zenoh);
     }
     let text = String::from_utf8_lossy(bytes);
     // What has errors of syntax is recognised by what could be read nevertheless.
-    let (root, _) = DeTable::parse_recoverable(&text);
+    let (root, errors) = DeTable::parse_recoverable(&text);
     let root = root.get_ref();
     if CALIBRATION_KEYS.iter().any(|key| root.contains_key(*key)) {
-        FileKind::Calibration
+        Some(FileKind::Calibration)
     } else {
-        FileKind::Service
+        (!root.is_empty() || !errors.is_empty()).then_some(FileKind::Service)
     }
 }
 
-fn check_calibration(bytes: &[u8], file: &str) -> Checked {
-    let Parsed { document, calibration, digest, warnings } = Document::parse_bytes(bytes, Some(file))?;
+fn check_calibration(text: &str, file: &str) -> Checked {
+    let Parsed { document, calibration, digest, warnings } = Document::parse(text, Some(file))?;
     let digest = digest.iter().fold(String::new(), |text, byte| text + &format!("{byte:02x}"));
     let words = format!(
         "calibration of unit {}: {} gyros, {} accelerometers, {}, sha256 {}",
@@ -80,12 +88,15 @@ fn check_calibration(bytes: &[u8], file: &str) -> Checked {
 fn temperatures(channels: &[Channel]) -> String {
     let lowest = channels.iter().map(|channel| channel.range_deg_c[0]).fold(f64::INFINITY, f64::min);
     let highest = channels.iter().map(|channel| channel.range_deg_c[1]).fold(f64::NEG_INFINITY, f64::max);
+    if channels.is_empty() {
+        return "no temperature channels".to_owned();
+    }
     let plural = if channels.len() == 1 { "" } else { "s" };
     format!("{lowest}…{highest} °C in {} channel{plural}", channels.len())
 }
 
-fn check_service(bytes: &[u8], path: &Path) -> Checked {
-    let settings = Settings::parse(&String::from_utf8_lossy(bytes), path)?;
+fn check_service(text: &str, path: &Path) -> Checked {
+    let settings = Settings::parse(text, path)?;
     let calibrations = settings
         .calibrations
         .as_deref()
@@ -95,9 +106,8 @@ fn check_service(bytes: &[u8], path: &Path) -> Checked {
     Ok((Summary { summary: words, unit: None, digest: None }, Vec::new()))
 }
 
-fn check_zenoh(bytes: &[u8], path: &Path) -> Checked {
-    let text = String::from_utf8_lossy(bytes);
-    match zenoh::Config::from_json5(&text) {
+fn check_zenoh(text: &str, file: &str) -> Checked {
+    match zenoh::Config::from_json5(text) {
         Ok(config) => {
             let value = |key: &str| config.get_json(key).unwrap_or_else(|_| "null".to_owned());
             let words = format!(
@@ -111,9 +121,11 @@ fn check_zenoh(bytes: &[u8], path: &Path) -> Checked {
         Err(error) => {
             let message = isotherm_bus::words(&error);
             let (line, column) = position(&message).unwrap_or((1, 1));
-            let file = Some(path.display().to_string());
             let message = message.lines().map(str::trim).collect::<Vec<_>>().join(" ");
-            Err(vec![Problem { file, line, column, key: String::new(), message }])
+            // The parser quotes the whole line, however long, and whatever is in it.
+            let message: String =
+                message.chars().filter(|c| !c.is_control()).take(MAX_MESSAGE_CHARS).collect();
+            Err(vec![Problem { line, column, ..whole(file, message) }])
         }
     }
 }

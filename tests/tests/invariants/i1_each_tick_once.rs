@@ -1,8 +1,8 @@
 //! I1: every raw gyro tick gives exactly one corrected tick, or is counted in a gap that the next output announces.
 //! Duplicates give none.
 
-use isotherm_correction::sample::{CorrectedTick, TickFlags};
-use isotherm_correction::unit::{Uncalibrated, Unit, UnitSettings};
+use isotherm_correction::sample::{CorrectedTick, GyroTick, TickFlags};
+use isotherm_correction::unit::{Event, Uncalibrated, Unit, UnitSettings};
 use isotherm_tests::calibrations::{compile, identity};
 use isotherm_tests::drive::{self, Owned};
 use isotherm_tests::streams::{accel, gyro};
@@ -143,4 +143,35 @@ fn i1_a_producer_that_says_it_starts_anew_loses_nothing() {
     assert!(sequences.iter().copied().eq((0..3).flat_map(|_| 0..100)), "{sequences:?}");
     assert_eq!(out.iter().filter(|tick| tick.flags.contains(TickFlags::RESTART)).count(), 2);
     assert!(out.iter().all(|tick| tick.missed == 0));
+}
+
+#[test]
+fn i1_a_restart_that_was_held_back_is_announced_once() {
+    let mut unit = Unit::new(UnitSettings { uncalibrated: Uncalibrated::Hold, ..UnitSettings::default() });
+    let mut out = Vec::new();
+    let in_series = |series, k| Owned::Gyro(vec![GyroTick { series, ..gyro(k, &RATES) }]);
+    for (series, k) in (0..30).map(|k| (0, k)).chain((0..30).map(|k| (1, k))) {
+        drive::hand(&mut unit, &in_series(series, k), &mut out);
+    }
+    unit.handle(Event::Flush, &mut |tick| out.push(tick.clone()));
+    unit.install(compile(&identity()), 1);
+    // The first tick that goes out is a restart itself.
+    (0..30).for_each(|k| drive::hand(&mut unit, &in_series(2, k), &mut out));
+    let restarts = out.iter().map(|tick| tick.flags.contains(TickFlags::RESTART));
+    assert!(restarts.eq((0..out.len()).map(|i| i == 0)));
+    assert_eq!(out[0].missed, 60);
+}
+
+#[test]
+fn i1_the_last_number_of_all_is_given_once() {
+    let mut unit = drive::unit(&compile(&identity()));
+    let mut out = Vec::new();
+    for k in [0, 1, 2, 2, 2] {
+        let tick = GyroTick { sequence: u64::MAX - 2 + k, ..gyro(k, &RATES) };
+        drive::hand(&mut unit, &Owned::Accel(vec![accel(k, &RATES)]), &mut out);
+        drive::hand(&mut unit, &Owned::Gyro(vec![tick]), &mut out);
+        unit.handle(Event::Flush, &mut |tick| out.push(tick.clone()));
+    }
+    assert_eq!(out.len(), 3, "{out:?}");
+    assert_eq!(unit.counters().gyro_duplicates, 2);
 }

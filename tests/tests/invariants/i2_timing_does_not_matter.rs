@@ -4,7 +4,8 @@
 use std::sync::Arc;
 
 use isotherm_correction::calibration::{BranchArgument, BranchedParts, Calibration, LagParts};
-use isotherm_correction::sample::CorrectedTick;
+use isotherm_correction::sample::{AccelTick, CorrectedTick, GyroTick, TickFlags};
+use isotherm_correction::units::{Span, Timestamp};
 use isotherm_tests::calibrations::{compile, constant, identity, polynomial};
 use isotherm_tests::drive::{self, Owned};
 use isotherm_tests::streams::{accel, gyro, temperature};
@@ -82,4 +83,89 @@ proptest! {
         let reference = run(1, |_| 0);
         prop_assert!(run(1, |i| delays[i % delays.len()]) == reference);
     }
+}
+
+#[test]
+fn i2_batching_changes_no_bit_over_a_restart_either() {
+    // Ticks of one second, so that a batch is longer than any wait.
+    let second = |k: i64| Timestamp::from_ns(k * 1_000_000_000);
+    let duration = Span::from_ms(1000);
+    let run = |batch: usize| {
+        let mut events = Vec::new();
+        for (series, start) in [(1, 0), (2, 5000), (3, 2000), (4, 1990)] {
+            let ticks: Vec<i64> = (0..200).collect();
+            for batch in ticks.chunks(batch) {
+                let accels = batch.iter().map(|&k| AccelTick {
+                    end_time: second(start + k),
+                    duration,
+                    ..accel(k.unsigned_abs(), &[0.1, 0.2, 9.8])
+                });
+                let gyros = batch.iter().map(|&k| GyroTick {
+                    end_time: second(start + k),
+                    duration,
+                    series,
+                    ..gyro(k.unsigned_abs(), &[0.01; 3])
+                });
+                let (accels, gyros) = (accels.collect(), gyros.collect());
+                events.extend([Owned::Accel(accels), Owned::Gyro(gyros)]);
+            }
+        }
+        drive::run(&mut drive::unit(&compile(&identity())), &events)
+    };
+    let reference = run(1);
+    assert_eq!(reference.len(), 800);
+    assert!(reference.iter().all(|tick| !tick.flags.contains(TickFlags::ACCELEROMETER_MISSING)));
+    for batch in [7, 64, 200] {
+        assert!(run(batch) == reference, "batches of {batch}");
+    }
+}
+
+#[test]
+fn i2_ticks_that_change_places_behind_a_restart_are_put_in_order() {
+    let mut unit = drive::unit(&compile(&identity()));
+    let mut out = Vec::new();
+    let tick = |series, k| Owned::Gyro(vec![GyroTick { series, ..gyro(k, &[0.01; 3]) }]);
+    for k in 1000..1300 {
+        drive::hand(&mut unit, &Owned::Accel(vec![accel(k, &[0.1; 3])]), &mut out);
+        drive::hand(&mut unit, &tick(1, k), &mut out);
+    }
+    for k in [0, 2, 1, 3, 5, 4] {
+        drive::hand(&mut unit, &tick(2, k), &mut out);
+    }
+    (0..6).for_each(|k| drive::hand(&mut unit, &Owned::Accel(vec![accel(k, &[0.1; 3])]), &mut out));
+    assert!(out.iter().map(|tick| tick.sequence).eq((1000..1300).chain(0..6)));
+    assert!(out.iter().all(|tick| tick.missed == 0));
+}
+
+#[test]
+fn i2_the_largest_temperature_message_is_felt_reading_by_reading() {
+    let celsius = |k: u64| 20.0 + 0.01 * f64::from(u32::try_from(k % 1000).unwrap_or(0));
+    let run = |batch: u64| {
+        let mut events = Vec::new();
+        for first in (0..8192).step_by(usize::try_from(batch).unwrap()) {
+            let range = first..first + batch;
+            events.push(Owned::Temperature(range.clone().map(|k| temperature(k, celsius(k))).collect()));
+            events.push(Owned::Accel(range.clone().map(|k| accel(k, &[0.1; 3])).collect()));
+            events.push(Owned::Gyro(range.map(|k| gyro(k, &[0.01; 3])).collect()));
+        }
+        drive::run(&mut drive::unit(&thermal()), &events)
+    };
+    assert!(run(4096) == run(1));
+}
+
+#[test]
+fn i2_ticks_that_still_wait_take_nothing_from_the_series_behind_them() {
+    let mut unit = drive::unit(&compile(&identity()));
+    let mut out = Vec::new();
+    for (series, k) in (1000..1010).map(|k| (1, k)).chain((0..10).map(|k| (2, k))) {
+        // The last tick of the first series never gets its accelerometer tick.
+        if k != 1009 {
+            drive::hand(&mut unit, &Owned::Accel(vec![accel(k, &[0.1; 3])]), &mut out);
+        }
+        let tick = GyroTick { series, ..gyro(k, &[0.01; 3]) };
+        drive::hand(&mut unit, &Owned::Gyro(vec![tick]), &mut out);
+    }
+    let missing = out.iter().filter(|tick| tick.flags.contains(TickFlags::ACCELEROMETER_MISSING));
+    assert_eq!(missing.map(|tick| tick.sequence).collect::<Vec<_>>(), [1009]);
+    assert_eq!(out.len(), 20);
 }

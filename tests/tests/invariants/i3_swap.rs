@@ -2,8 +2,8 @@
 //! doubled or delayed by a swap.
 
 use isotherm_correction::calibration::{CalibrationParts, LagParts};
-use isotherm_correction::sample::CorrectedTick;
-use isotherm_tests::calibrations::{compile, constant, identity, polynomial};
+use isotherm_correction::sample::{ChannelName, CorrectedTick, OutputKind, TemperatureReading};
+use isotherm_tests::calibrations::{ALONG_CASE_AXES, channel, compile, constant, identity, polynomial};
 use isotherm_tests::drive::{self, Owned};
 use isotherm_tests::streams::{accel, gyro, temperature};
 
@@ -71,4 +71,94 @@ fn i3_before_the_swap_the_old_coefficients_and_after_it_the_new_ones() {
     for (swapped, new) in swapped[2300..].iter().zip(&new[2300..]) {
         assert_eq!(swapped.delta_angle.map(f64::to_bits), new.delta_angle.map(f64::to_bits));
     }
+}
+
+#[test]
+fn i3_a_swapped_orientation_is_that_of_the_present_temperature() {
+    let with = |slope: f64| {
+        let mut parts = identity();
+        parts.gyro_orientation.rows = ALONG_CASE_AXES.to_vec();
+        parts.gyro_orientation.slopes_per_deg_c = vec![[0.0, slope, 0.0], [0.0; 3], [0.0; 3]];
+        compile(&parts)
+    };
+    // One reading of 60 °C, 40 °C from the assumed temperature, long before the swap.
+    let run = |first, swap: bool| {
+        let mut unit = drive::unit(&with(first));
+        let mut out = Vec::new();
+        drive::hand(&mut unit, &Owned::Temperature(vec![temperature(0, 60.0)]), &mut out);
+        for k in 0..1000 {
+            if swap && k == 900 {
+                unit.install(with(2e-4), 2);
+            }
+            drive::hand(&mut unit, &Owned::Accel(vec![accel(k, &[0.0; 3])]), &mut out);
+            drive::hand(&mut unit, &Owned::Gyro(vec![gyro(k, &[0.1, 0.2, 0.3])]), &mut out);
+        }
+        out
+    };
+    let (swapped, new) = (run(1e-4, true), run(2e-4, false));
+    for (swapped, new) in swapped.iter().zip(&new).skip(900) {
+        let bits = |tick: &CorrectedTick| tick.delta_angle.map(f64::to_bits);
+        assert_eq!(bits(swapped), bits(new), "tick {}", new.sequence);
+    }
+}
+
+#[test]
+fn i3_lags_go_on_with_their_channel_wherever_it_stands() {
+    let with = |names: [&str; 2], follows: usize| {
+        let mut parts = thermal(0.0);
+        parts.channels = names.map(channel).to_vec();
+        for gyro in &mut parts.gyros {
+            gyro.channel = Some(follows);
+        }
+        compile(&parts)
+    };
+    // Channel t stands at 20 °C, channel u moves. The swap turns their places round, and the gyros follow u from then on.
+    let run = |first, swap: bool| {
+        let mut unit = drive::unit(&first);
+        let mut out = Vec::new();
+        for k in 0..TICKS {
+            if swap && k == 2345 {
+                unit.install(with(["u", "t"], 0), 2);
+            }
+            if k % 100 == 0 {
+                let still = temperature(k, 20.0);
+                let raw = 20.0 + 0.002 * f64::from(u32::try_from(k).unwrap());
+                let moving = TemperatureReading { channel: ChannelName::from("u").unwrap(), raw, ..still };
+                drive::hand(&mut unit, &Owned::Temperature(vec![still, moving]), &mut out);
+            }
+            drive::hand(&mut unit, &Owned::Accel(vec![accel(k, &[0.0; 3])]), &mut out);
+            drive::hand(&mut unit, &Owned::Gyro(vec![gyro(k, &[0.0; 3])]), &mut out);
+        }
+        out
+    };
+    // Before, the gyros followed t, also at place 0: its lags say nothing of u, which is taken to have stood for ever.
+    let swapped = run(with(["t", "u"], 0), true);
+    let at = |tick: &CorrectedTick| tick.delta_angle[0] / 0.005;
+    // The last grid point lies at tick 2200.
+    let static_bias = -1e-5 * (0.002 * 2200.0);
+    assert!((at(&swapped[2345]) - static_bias).abs() < 1e-7, "{} and {static_bias}", at(&swapped[2345]));
+    // Where they followed u all along, at whatever place, nothing happens but the jump to where the ramp was heading.
+    let (swapped, plain) = (run(with(["t", "u"], 1), true), run(with(["t", "u"], 1), false));
+    for (swapped, plain) in swapped.iter().zip(&plain).skip(2700) {
+        assert!((at(swapped) - at(plain)).abs() < 1e-15);
+    }
+}
+
+#[test]
+fn i3_ticks_that_waited_for_a_swap_and_do_not_fit_it_are_announced() {
+    let mut counts = identity();
+    counts.gyro_output = OutputKind::Counts;
+    let mut unit = drive::unit(&compile(&identity()));
+    let mut out = Vec::new();
+    // Without accelerometer ticks they wait.
+    let ticks: Vec<_> = (0..5).map(|k| gyro(k, &[0.1; 3])).collect();
+    drive::hand(&mut unit, &Owned::Gyro(ticks), &mut out);
+    unit.install(compile(&counts), 2);
+    let ticks: Vec<_> = (5..30).map(|k| gyro(k, &[7.0; 3])).collect();
+    let gyros = isotherm_correction::unit::Event::Gyro { output: OutputKind::Counts, ticks: &ticks };
+    unit.handle(gyros, &mut |tick| out.push(tick.clone()));
+    unit.handle(isotherm_correction::unit::Event::Flush, &mut |tick| out.push(tick.clone()));
+    assert_eq!((out[0].sequence, out[0].missed), (5, 5), "{:?}", out[0]);
+    assert_eq!(out.len(), 25);
+    assert_eq!(unit.counters().wrong_output_kind, 5);
 }

@@ -3,11 +3,11 @@
 //! Here through the state machine and the frames; over real Zenoh sessions in `system/i7_broken_input_over_zenoh.rs`.
 
 use isotherm_correction::sample::{CorrectedTick, GyroTick, SensorFlags, TickFlags};
-use isotherm_correction::unit::{Counters, UnitSettings};
+use isotherm_correction::unit::{Counters, Event, UnitSettings};
 use isotherm_correction::units::{Span, Timestamp};
 use isotherm_protocol::key::{RawStream, UnitId};
 use isotherm_protocol::stream::UnitStream;
-use isotherm_tests::calibrations::{compile, identity};
+use isotherm_tests::calibrations::{compile, identity, polynomial};
 use isotherm_tests::drive::{self, Owned};
 use isotherm_tests::streams::{accel, end_of, gyro, temperature};
 use proptest::prelude::*;
@@ -100,6 +100,60 @@ fn i7_broken_temperatures_are_held_and_flagged() {
     ]);
     assert_eq!(counters.temperature_rejected, 1);
     assert!(out.last().unwrap().gyro_flags[0].contains(SensorFlags::STALE_TEMPERATURE));
+}
+
+#[test]
+fn i7_a_broken_time_in_a_batch_does_not_hold_up_the_ticks_beside_it() {
+    let mut unit = drive::unit(&compile(&identity()));
+    let mut out = Vec::new();
+    for first in (0..400).step_by(10) {
+        // One accelerometer tick is missing: its gyro tick waits for the window.
+        let accels = (first..first + 10).filter(|k| *k != 105).map(|k| accel(k, &RATES)).collect();
+        let mut gyros: Vec<_> = (first..first + 10).map(|k| gyro(k, &RATES)).collect();
+        if first == 100 {
+            gyros[9].end_time = Timestamp::from_ns(i64::MAX);
+        }
+        drive::hand(&mut unit, &Owned::Accel(accels), &mut out);
+        drive::hand(&mut unit, &Owned::Gyro(gyros), &mut out);
+    }
+    assert_eq!(out.last().map(|tick| tick.sequence), Some(399));
+    assert_eq!((unit.counters().gyro_implausible, unit.counters().accel_missing), (1, 1));
+}
+
+#[test]
+fn i7_a_clock_that_steps_back_takes_no_term_back_with_it() {
+    let mut parts = identity();
+    parts.filter.stale_after_s = 1000.0;
+    parts.gyros[0].static_bias = Some(polynomial(&[0.0, 1e-3]));
+    parts.accels[0].bias = Some(polynomial(&[0.0, 1e-3]));
+    parts.gyro_orientation.slopes_per_deg_c = vec![[0.0; 3], [0.0, 0.0, 1e-4], [0.0; 3]];
+    let mut unit = drive::unit(&compile(&parts));
+    let mut out = Vec::new();
+    for (k, celsius) in [(0, 20.0), (2_000, 30.0)] {
+        drive::hand(&mut unit, &Owned::Temperature(vec![temperature(k, celsius)]), &mut out);
+    }
+    // 30 °C has been reached after another ten seconds.
+    for (series, k) in (4_990..5_000).map(|k| (0, k)).chain((0..10).map(|k| (1, k))) {
+        if (series, k) == (1, 0) {
+            unit.handle(Event::Flush, &mut |tick| out.push(tick.clone()));
+        }
+        drive::hand(&mut unit, &Owned::Accel(vec![accel(k, &RATES)]), &mut out);
+        drive::hand(&mut unit, &Owned::Gyro(vec![GyroTick { series, ..gyro(k, &RATES) }]), &mut out);
+    }
+    assert_eq!(out.len(), 20);
+    for tick in &out {
+        let bits =
+            |tick: &CorrectedTick| [tick.delta_angle, tick.delta_velocity].map(|v| v.map(f64::to_bits));
+        assert_eq!(bits(tick), bits(&out[0]), "{tick:?}");
+    }
+}
+
+#[test]
+fn i7_a_channel_without_finite_limits_is_refused() {
+    let mut parts = identity();
+    parts.channels[0].range_deg_c = [f64::NEG_INFINITY, f64::INFINITY];
+    let defects = isotherm_correction::calibration::Calibration::new(&parts).unwrap_err();
+    assert_eq!(defects.len(), 2, "{defects:?}");
 }
 
 proptest! {

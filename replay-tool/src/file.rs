@@ -1,0 +1,75 @@
+//! Small files read whole, and outputs that must not fall on inputs.
+
+use std::fs::{File, canonicalize};
+use std::io::{self, Read};
+use std::path::{Path, absolute};
+
+use isotherm_protocol::document::MAX_DOCUMENT_BYTES;
+
+use crate::error::Error;
+
+/// Reads a mapping, calibration document or scenario; a log given in its place must not fill the memory.
+pub(crate) fn read_small(path: &Path, action: &'static str) -> Result<Vec<u8>, Error> {
+    let failed = |source| Error::file(path, action, source);
+    let mut bytes = Vec::new();
+    let file = File::open(path).map_err(failed)?;
+    file.take(MAX_DOCUMENT_BYTES as u64 + 1).read_to_end(&mut bytes).map_err(failed)?;
+    if bytes.len() > MAX_DOCUMENT_BYTES {
+        let words = format!("longer than {MAX_DOCUMENT_BYTES} bytes: is it the right file?");
+        return Err(failed(io::Error::other(words)));
+    }
+    Ok(bytes)
+}
+
+/// The same as text.
+pub(crate) fn read_small_text(path: &Path, action: &'static str) -> Result<String, Error> {
+    String::from_utf8(read_small(path, action)?).map_err(|error| {
+        let words = format!("not UTF-8 at byte {}: is it the right file?", error.utf8_error().valid_up_to());
+        Error::file(path, action, io::Error::other(words))
+    })
+}
+
+/// Refuses an output that is one of the other files of the command, before anything is written.
+pub(crate) fn refuse_overwriting(out: &Path, others: &[&Path]) -> Result<(), Error> {
+    // Of two files that do not exist yet, one is the other where their names are. Devices may be given twice.
+    let resolved = |path: &Path| canonicalize(path).or_else(|_| absolute(path)).ok();
+    let same = |other: &&&Path| resolved(out).is_some_and(|out| resolved(other) == Some(out));
+    match others.iter().find(same) {
+        Some(other) if out.is_file() || !out.exists() => Err(Error::Usage(format!(
+            "{} would be written over: this command has it as {} too",
+            out.display(),
+            other.display()
+        ))),
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_output_never_falls_on_an_input() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        std::fs::write(path("log.csv"), "1\n").unwrap();
+        std::os::unix::fs::symlink(path("log.csv"), path("link.csv")).unwrap();
+        for (out, other, allowed) in [
+            ("log.csv", "log.csv", false),
+            ("link.csv", "log.csv", false),
+            ("./log.csv", "link.csv", false),
+            ("new.csv", "new.csv", false),
+            ("new.csv", "log.csv", true),
+        ] {
+            assert_eq!(refuse_overwriting(&path(out), &[&path(other)]).is_ok(), allowed, "{out} {other}");
+        }
+        let null = Path::new("/dev/null");
+        assert!(refuse_overwriting(null, &[null]).is_ok());
+    }
+
+    #[test]
+    fn a_small_file_is_small() {
+        let error = read_small(Path::new("/dev/zero"), "read the mapping").unwrap_err().to_string();
+        assert_eq!(error, "/dev/zero: cannot read the mapping: longer than 1048576 bytes: is it the right file?");
+    }
+}
