@@ -227,7 +227,7 @@ impl Producer {
         let (first, count) = (ticks[0].sequence, ticks.len() as u64);
         let batch = GyroBatch::from_core(output, &ticks).ok_or_else(|| self.not_counts(first))?;
         if let Some(limit) = self.options.max_in_flight {
-            self.wait_below((limit + 1).saturating_sub(count)).await?;
+            self.wait_below(limit.saturating_add(1).saturating_sub(count)).await?;
         }
         if let Some((in_flight, _)) = &self.in_flight {
             in_flight.sent(first, count);

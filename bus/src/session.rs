@@ -22,7 +22,7 @@ const CONNECT_TIMEOUT_MS: u32 = 10_000;
 #[cfg_attr(feature = "clap", derive(clap::Args))]
 pub struct SessionOptions {
     /// Zenoh configuration file (JSON5); without it: peer on loopback, no scouting
-    #[cfg_attr(feature = "clap", arg(long = "zenoh-config", value_name = "FILE"))]
+    #[cfg_attr(feature = "clap", arg(id = "zenoh_config", long = "zenoh-config", value_name = "FILE"))]
     pub config: Option<PathBuf>,
     /// Endpoint to connect to, e.g. tcp/127.0.0.1:7447; may be given several times
     #[cfg_attr(feature = "clap", arg(long, value_name = "ENDPOINT"))]

@@ -70,6 +70,9 @@ mod tests {
     #[test]
     fn a_small_file_is_small() {
         let error = read_small(Path::new("/dev/zero"), "read the mapping").unwrap_err().to_string();
-        assert_eq!(error, "/dev/zero: cannot read the mapping: longer than 1048576 bytes: is it the right file?");
+        assert_eq!(
+            error,
+            "/dev/zero: cannot read the mapping: longer than 1048576 bytes: is it the right file?"
+        );
     }
 }

@@ -140,6 +140,8 @@ impl Progress {
 pub struct LogReader {
     /// Its files, each with its next event.
     files: Vec<(FileReader, Option<LogEvent>)>,
+    /// Where they are.
+    paths: Vec<PathBuf>,
     /// How far it has been read.
     progress: Progress,
     /// The next events have been asked for.
@@ -164,7 +166,13 @@ impl LogReader {
             total += size;
             files.push((FileReader::new(path, source, mapping)?, None));
         }
-        Ok(Self { files, progress: Progress { read, total }, primed: false, failed: false })
+        Ok(Self { files, paths, progress: Progress { read, total }, primed: false, failed: false })
+    }
+
+    /// Its files.
+    #[must_use]
+    pub fn paths(&self) -> &[PathBuf] {
+        &self.paths
     }
 
     /// How far it has been read.

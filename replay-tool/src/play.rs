@@ -57,6 +57,8 @@ pub struct PlayReport {
     pub ticks_lost: Option<u64>,
     /// Gyro ticks that came back more than once.
     pub ticks_duplicated: Option<u64>,
+    /// Times that the unit's corrected stream began anew meanwhile: other than 0 only where somebody else plays the unit.
+    pub restarts: Option<u64>,
     /// Time that the played part of the log covers (s).
     pub log_s: f64,
     /// Time that playing it took (s).
@@ -128,7 +130,7 @@ async fn play_on(
             LogEvent::Gyro { output, tick } => {
                 tokio::select! {
                     biased;
-                    _ = &mut stop => {
+                    () = &mut stop => {
                         sent.report.stopped = true;
                         break;
                     }
@@ -165,8 +167,7 @@ async fn play_on(
 /// A future that ends with Ctrl-C or a stop signal.
 fn stop_asked() -> Result<impl Future<Output = ()>, Error> {
     let listen = |kind| signal(kind).map_err(|source| Error::Runtime { source });
-    let (mut interrupt, mut terminate) =
-        (listen(SignalKind::interrupt())?, listen(SignalKind::terminate())?);
+    let (mut interrupt, mut terminate) = (listen(SignalKind::interrupt())?, listen(SignalKind::terminate())?);
     Ok(async move {
         tokio::select! {
             _ = interrupt.recv() => {}
@@ -213,6 +214,7 @@ impl Sent {
             report.ticks_acknowledged = Some(back);
             report.ticks_announced_missing = Some(account.announced_missing);
             report.ticks_duplicated = Some(account.duplicated);
+            report.restarts = Some(account.restarts);
             report.ticks_uncalibrated = Some(account.uncalibrated);
             report.ticks_lost = Some(report.ticks_sent.saturating_sub(back));
         }

@@ -1,15 +1,15 @@
 //! The calibration documents of a folder.
 
 use std::collections::BTreeMap;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use isotherm_correction::calibration::Calibration;
-use isotherm_protocol::document::{Document, MAX_DOCUMENT_BYTES, Problem};
+use isotherm_protocol::document::{Document, Problem};
 use isotherm_protocol::key::UnitId;
 
 use crate::ServiceError;
+use crate::text::{self, read_bounded};
 
 /// A calibration as it is installed.
 #[derive(Debug, Clone)]
@@ -110,24 +110,15 @@ pub struct BadDocument {
 /// Reads one document.
 fn read_document(file: &Path) -> Result<(UnitId, Installable), Vec<Problem>> {
     let name = file.display().to_string();
-    let whole = |message: String| {
-        vec![Problem { file: Some(name.clone()), line: 1, column: 1, key: String::new(), message }]
-    };
+    let whole = |message: String| vec![text::whole(&name, message)];
     let bytes = read_bounded(file).map_err(|error| whole(format!("cannot be read: {error}")))?;
-    let parsed = Document::parse_bytes(&bytes, Some(&name))?;
+    let parsed = Document::parse(text::text(&bytes, &name)?, Some(&name))?;
     for warning in &parsed.warnings {
         tracing::warn!("{warning}");
     }
     let unit = UnitId::new(&parsed.document.unit).map_err(|error| whole(format!("unit: {error}")))?;
     let digest = parsed.digest.first_chunk().copied().unwrap_or_default();
     Ok((unit, Installable { calibration: Arc::new(parsed.calibration), digest, file: Some(file.to_owned()) }))
-}
-
-/// Reads a file up to one byte more than a document may have, so that a wrong file cannot fill the memory.
-pub(crate) fn read_bounded(file: &Path) -> std::io::Result<Vec<u8>> {
-    let mut bytes = Vec::new();
-    std::fs::File::open(file)?.take(MAX_DOCUMENT_BYTES as u64 + 1).read_to_end(&mut bytes)?;
-    Ok(bytes)
 }
 
 /// One bad document for each that names the same unit.

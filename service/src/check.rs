@@ -1,8 +1,8 @@
 //! The `check` command: calibration documents, service configurations and Zenoh configurations.
 
 mod kinds;
+mod rivals;
 
-use std::io::Write;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
@@ -10,6 +10,7 @@ use isotherm_protocol::document::Problem;
 use serde::Serialize;
 
 use crate::exit::Exit;
+use crate::words::{print, say};
 
 /// Arguments of `check`.
 #[derive(Debug, Clone, Args)]
@@ -81,7 +82,8 @@ pub struct Summary {
 
 /// Validates the files and says what was found.
 pub(crate) fn run(args: &CheckArgs) -> Exit {
-    let findings: Vec<_> = args.files.iter().map(|file| kinds::check_file(file, args.kind)).collect();
+    let mut findings: Vec<_> = args.files.iter().map(|file| kinds::check_file(file, args.kind)).collect();
+    rivals::refuse(&mut findings);
     let text = if args.json {
         let good = findings.iter().all(|finding| finding.good);
         serde_json::to_string_pretty(&serde_json::json!({ "good": good, "files": findings }))
@@ -90,21 +92,19 @@ pub(crate) fn run(args: &CheckArgs) -> Exit {
     } else {
         findings.iter().map(in_words).collect()
     };
-    // Who called may have closed the pipe; the exit code tells the rest.
-    let _ = std::io::stdout().write_all(text.as_bytes());
-    verdict(&findings)
+    print(&text, verdict(&findings))
 }
 
 /// Problems to stderr; the line for stdout, where the file is good.
 fn in_words(finding: &Finding) -> String {
     if let Some(reason) = &finding.unreadable {
-        eprintln!("{}: cannot be read: {reason}", finding.file);
+        say(format_args!("{}: cannot be read: {reason}", finding.file));
     }
     for problem in &finding.problems {
-        eprintln!("{problem}");
+        say(problem);
     }
     for warning in &finding.warnings {
-        eprintln!("{warning} (warning)");
+        say(format_args!("{warning} (warning)"));
     }
     let summary = finding.summary.as_ref();
     summary.map_or_else(String::new, |summary| format!("{}: {}\n", finding.file, summary.summary))

@@ -9,6 +9,7 @@ use crate::check::CheckArgs;
 use crate::demo::DemoArgs;
 use crate::exit::Exit;
 use crate::logging::LogArgs;
+use crate::words::{print, say};
 
 /// Corrects the raw increments of inertial units in a stream, over Zenoh
 #[derive(Debug, Parser)]
@@ -80,15 +81,16 @@ pub fn run() -> Exit {
         Command::Check(args) => crate::check::run(&args),
         Command::Demo(args) => logged(&LogArgs::quiet(), demo(args)),
         Command::Completions { shell } => {
-            clap_complete::generate(shell, &mut Cli::command(), "isotherm", &mut std::io::stdout());
-            Exit::Ok
+            let mut script = Vec::new();
+            clap_complete::generate(shell, &mut Cli::command(), "isotherm", &mut script);
+            print(&String::from_utf8_lossy(&script), Exit::Ok)
         }
     }
 }
 
 async fn demo(args: DemoArgs) -> Exit {
     crate::demo::run(args).await.unwrap_or_else(|error| {
-        eprintln!("isotherm: {error}");
+        say(format_args!("isotherm: {error}"));
         Exit::Failed
     })
 }
@@ -96,13 +98,13 @@ async fn demo(args: DemoArgs) -> Exit {
 /// Runs a command that logs and needs a runtime.
 fn logged(log: &LogArgs, command: impl Future<Output = Exit>) -> Exit {
     if let Err(words) = log.start() {
-        eprintln!("isotherm: {words}");
+        say(format_args!("isotherm: {words}"));
         return Exit::Usage;
     }
     let runtime = match tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build() {
         Ok(runtime) => runtime,
         Err(error) => {
-            eprintln!("isotherm: cannot start the runtime: {error}");
+            say(format_args!("isotherm: cannot start the runtime: {error}"));
             return Exit::Failed;
         }
     };
@@ -119,5 +121,18 @@ mod tests {
     #[test]
     fn the_command_line_is_consistent() {
         Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn the_two_configurations_are_told_apart() {
+        let parse =
+            |arguments: &[&str]| match Cli::try_parse_from([&["isotherm", "serve"], arguments].concat()) {
+                Ok(Cli { command: Command::Serve(args) }) => (args.config, args.session.config),
+                other => panic!("{other:?}"),
+            };
+        let [service, zenoh] = ["s.toml", "z.json5"].map(|path| Some(PathBuf::from(path)));
+        assert_eq!(parse(&["--config", "s.toml"]), (service.clone(), None));
+        assert_eq!(parse(&["--zenoh-config", "z.json5"]), (None, zenoh.clone()));
+        assert_eq!(parse(&["--config", "s.toml", "--zenoh-config", "z.json5"]), (service, zenoh));
     }
 }

@@ -15,6 +15,7 @@ use isotherm_protocol::document::Problem;
 use zenoh::qos::CongestionControl;
 
 use crate::ServiceError;
+use crate::text::{self, read_bounded};
 use walk::{Table, Walk};
 
 /// Everything that an operator can set, checked.
@@ -64,9 +65,10 @@ impl Settings {
     /// [`ServiceError::Read`], or [`ServiceError::Configuration`] with every problem.
     pub fn load(path: &Path) -> Result<Self, ServiceError> {
         let read = |source| ServiceError::Read { path: path.to_owned(), source };
-        let bytes = std::fs::read(path).map_err(read)?;
-        let text = String::from_utf8_lossy(&bytes);
-        Self::parse(&text, path).map_err(ServiceError::Configuration)
+        let bytes = read_bounded(path).map_err(read)?;
+        text::text(&bytes, &path.display().to_string())
+            .and_then(|text| Self::parse(text, path))
+            .map_err(ServiceError::Configuration)
     }
 
     /// Reads the text of a configuration; `path` names it in problems, and its folder is where relative paths count from.

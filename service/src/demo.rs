@@ -16,7 +16,6 @@ mod watch;
 mod windows;
 
 use std::fs::OpenOptions;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -24,6 +23,7 @@ use tokio::sync::mpsc::unbounded_channel;
 use tokio::task::JoinSet;
 
 use crate::exit::Exit;
+use crate::words::print;
 
 pub use error::DemoError;
 use fleet::Member;
@@ -81,8 +81,8 @@ pub async fn run(args: DemoArgs) -> Result<Exit, DemoError> {
         let html = plots::page(&summary, &fleet, &watched)?;
         std::fs::write(path, html).map_err(|source| write(path, source))?;
     }
-    print(&summary, args.json)?;
-    Ok(if summary.units.iter().all(UnitSummary::is_whole) { Exit::Ok } else { Exit::DataLoss })
+    let exit = if summary.units.iter().all(UnitSummary::is_whole) { Exit::Ok } else { Exit::DataLoss };
+    Ok(print(&(text(&summary, args.json)? + "\n"), exit))
 }
 
 /// Plays all units at once, each within `seconds`, and gives the figures and the curves of each.
@@ -118,8 +118,8 @@ async fn all(mut producers: JoinSet<Result<(), DemoError>>) -> Result<(), DemoEr
     Ok(())
 }
 
-/// Prints the figures on stdout.
-fn print(summary: &Summary, json: bool) -> Result<(), DemoError> {
+/// The figures as they are printed.
+fn text(summary: &Summary, json: bool) -> Result<String, DemoError> {
     let mut text = if json {
         serde_json::to_string(summary).map_err(DemoError::Json)?
     } else {
@@ -131,9 +131,7 @@ fn print(summary: &Summary, json: bool) -> Result<(), DemoError> {
     if let (false, Some(path)) = (json, &summary.report) {
         text = format!("{text}\nreport: {}", path.display());
     }
-    // Who started the demo may have closed the pipe; the exit code tells the rest.
-    let _ = writeln!(std::io::stdout(), "{text}");
-    Ok(())
+    Ok(text)
 }
 
 #[cfg(test)]

@@ -29,10 +29,10 @@ pub enum ServiceError {
         source: std::io::Error,
     },
     /// The service configuration is bad.
-    #[error("the service configuration has {} problems", .0.len())]
+    #[error("the service configuration is bad: {} problem{}", .0.len(), if .0.len() == 1 { "" } else { "s" })]
     Configuration(Vec<Problem>),
     /// Calibration documents are bad and `strict_start` is set.
-    #[error("{count} calibration documents are bad, and strict_start is set")]
+    #[error("strict_start is set, and {count} calibration document{} bad", if *.count == 1 { " is" } else { "s are" })]
     BadCalibrations {
         /// How many.
         count: usize,

@@ -35,8 +35,10 @@ mod logging;
 pub mod report;
 mod serve;
 pub mod service;
+mod text;
 pub mod totals;
 pub mod unit;
+mod words;
 
 pub use config::Settings;
 pub use error::ServiceError;

@@ -8,6 +8,7 @@ use tokio::signal::unix::{SignalKind, signal};
 use crate::cli::ServeArgs;
 use crate::config::Settings;
 use crate::exit::Exit;
+use crate::words::{print, say};
 use crate::{ServiceError, Totals};
 
 /// Serves until a signal comes.
@@ -27,19 +28,17 @@ pub(crate) async fn run(args: ServeArgs) -> Exit {
 fn failed(error: &ServiceError) -> Exit {
     if let ServiceError::Configuration(problems) = error {
         for problem in problems {
-            eprintln!("{problem}");
+            say(problem);
         }
     }
-    eprintln!("isotherm: {error}");
+    say(format_args!("isotherm: {error}"));
     error.exit()
 }
 
 /// Says what was done.
 fn report(totals: &Totals, json: bool) -> Exit {
     let text = if json { serde_json::to_string(totals).unwrap_or_default() } else { totals.table() };
-    // Who started the service may have closed the pipe; the exit code tells the rest.
-    let _ = writeln!(std::io::stdout(), "{text}");
-    totals.exit()
+    print(&(text + "\n"), totals.exit())
 }
 
 /// The configuration with the command line's options put over it.

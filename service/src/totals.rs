@@ -20,6 +20,8 @@ pub struct UnitTotals {
     pub gaps: u64,
     /// Raw gyro ticks announced as missing in them.
     pub ticks_missed: u64,
+    /// Raw gyro ticks refused: late, implausible, or not as the calibration has them. Duplicates are not among them.
+    pub ticks_refused: u64,
     /// Messages refused.
     pub bad: u64,
     /// Corrected ticks that could not be published.
@@ -73,6 +75,7 @@ impl Totals {
             "ticks out",
             "gaps",
             "missed",
+            "refused",
             "bad",
             "unpublished",
             "alarms",
@@ -85,6 +88,7 @@ impl Totals {
                 totals.ticks_out,
                 totals.gaps,
                 totals.ticks_missed,
+                totals.ticks_refused,
                 totals.bad,
                 totals.unpublished,
                 totals.alarms,

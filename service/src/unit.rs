@@ -23,6 +23,11 @@ pub use quiet::QuietSettings;
 /// Where corrected frames go; `Err` is an output that could not be published.
 pub type Outlet = Box<dyn FnMut(Vec<u8>) -> Result<(), zenoh::Error> + Send>;
 
+/// Counters of gyro ticks that were refused, duplicates excepted. Those of the kind and number of sensors count
+/// accelerometer ticks too.
+const REFUSALS: [&str; 5] =
+    ["gyro_late", "gyro_implausible", "wrong_sensor_count", "wrong_output_kind", "bad_duration"];
+
 /// One unit: frames in, frames out, everything counted. Knows nothing of sessions and threads.
 pub struct UnitActor {
     stream: UnitStream,
@@ -197,6 +202,7 @@ impl UnitActor {
             ticks_out: value("ticks_out"),
             gaps: value("gaps"),
             ticks_missed: value("ticks_missed"),
+            ticks_refused: REFUSALS.iter().map(|name| value(name)).sum(),
             bad: self.faults.refused(),
             unpublished: self.faults.count(FaultKind::Unpublished),
             alarms: self.faults.count(FaultKind::Alarm),

@@ -104,8 +104,8 @@ fn what_cannot_be_read_is_a_failure_and_a_wrong_call_is_usage() {
 #[test]
 fn the_kind_can_be_forced() {
     let folder = TempDir::new().unwrap();
-    let file = write(&folder, "empty.toml", "");
-    assert_eq!(check(&[&file]).status.code(), Some(0), "an empty service configuration is the default");
+    let file = write(&folder, "defaults.toml", "[zenoh]\n");
+    assert_eq!(check(&[&file]).status.code(), Some(0), "a service configuration");
     assert_eq!(check(&["--kind", "calibration", &file]).status.code(), Some(78));
 }
 
@@ -127,4 +127,52 @@ fn json_says_the_same_for_programs() {
     assert_eq!((&second["good"], &second["kind"]), (&Value::from(true), &Value::from("calibration")));
     assert_eq!(second["digest"].as_str().unwrap().len(), 64);
     assert!(second["unit"].is_string());
+}
+
+#[test]
+fn documents_of_one_folder_that_name_one_unit_are_bad() {
+    let (folder, other) = (TempDir::new().unwrap(), TempDir::new().unwrap());
+    let text = std::fs::read_to_string(config("calibration/ZLG-0001.toml")).unwrap();
+    let (a, b) = (write(&folder, "a.toml", &text), write(&folder, "b.toml", &text));
+    let output = check(&[&a, &b]);
+    assert_eq!(output.status.code(), Some(78));
+    let problems = lines(&output.stderr);
+    assert_eq!(problems.len(), 2, "{problems:?}");
+    assert!(problems[0].starts_with(&format!("{a}:1:1: unit: unit ZLG-0001 is named by b.toml too")));
+    assert!(lines(&output.stdout).is_empty());
+    // One file given twice, and a candidate elsewhere, are no rivals.
+    assert_eq!(check(&[&a, &a, &write(&other, "a.toml", &text)]).status.code(), Some(0));
+}
+
+#[test]
+fn what_is_nothing_or_no_text_is_bad() {
+    let folder = TempDir::new().unwrap();
+    let empty = write(&folder, "empty.toml", "# nothing\n");
+    let output = check(&[&empty]);
+    assert_eq!(output.status.code(), Some(78));
+    assert!(lines(&output.stderr)[0].starts_with(&format!("{empty}:1:1: holds no keys: say with --kind")));
+    assert_eq!(check(&["--kind", "service", &empty]).status.code(), Some(0));
+    assert_eq!(check(&["--kind", "calibration", &empty]).status.code(), Some(78));
+
+    for name in ["binary.toml", "binary.json5"] {
+        let binary = folder.path().join(name);
+        std::fs::write(&binary, [0x7f, b'E', 0xff, 0]).unwrap();
+        let output = check(&[binary.to_str().unwrap()]);
+        assert_eq!(output.status.code(), Some(78));
+        assert!(lines(&output.stderr)[0].contains(":1:3: is not UTF-8 at byte 2"), "{output:?}");
+    }
+}
+
+#[test]
+fn streams_that_are_full_are_no_panic() {
+    let full = || std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+    let isotherm = || Command::new(env!("CARGO_BIN_EXE_isotherm"));
+    let good = config("service.toml");
+    let unsaid = isotherm().args(["check", "/nonexistent"]).stderr(full()).status().unwrap();
+    assert_eq!(unsaid.code(), Some(1));
+    for arguments in [["check", &good], ["completions", "bash"]] {
+        let unwritten = isotherm().args(arguments).stdout(full()).output().unwrap();
+        assert_eq!(unwritten.status.code(), Some(1));
+        assert!(lines(&unwritten.stderr)[0].contains("cannot write to standard output"), "{unwritten:?}");
+    }
 }

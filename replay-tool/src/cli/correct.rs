@@ -90,7 +90,7 @@ pub(super) fn run(args: &CorrectArgs) -> Result<Outcome, Error> {
     }
     let mut events = args.log.open()?;
     if let Some(out) = &args.out {
-        let inputs = args.log.log.iter().chain([&args.log.mapping, &args.calibration]);
+        let inputs = events.inner().paths().iter().chain([&args.log.mapping, &args.calibration]);
         refuse_overwriting(out, &inputs.map(PathBuf::as_path).collect::<Vec<_>>())?;
     }
     let mut output = args.out.as_deref().map(Output::create).transpose()?;

@@ -87,6 +87,14 @@ pub(super) fn run(args: PlayArgs) -> Result<Outcome, Error> {
             play.unit
         ));
     }
+    if play.restarts.is_some_and(|restarts| restarts > 0)
+        || play.ticks_duplicated.is_some_and(|ticks| ticks > 0)
+    {
+        show::warn(&format!(
+            "somebody else plays {}, or more than one service answers: what came back is not sure to be what was sent",
+            play.unit
+        ));
+    }
     print(if args.json { show::json(&report) } else { human(&report) }.as_bytes())?;
     if play.stopped {
         return Err(Error::Stopped);

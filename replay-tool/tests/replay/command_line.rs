@@ -206,3 +206,40 @@ fn examples_of_the_help_without_a_service_work_as_printed() {
         assert!(found > 0, "{command} has no example:\n{help}");
     }
 }
+
+#[test]
+fn no_output_is_written_over_an_input() {
+    let folder = simulated();
+    let path = folder.path();
+    let before = fs::read(path.join("mems.csv")).unwrap();
+    check(&correct(path, &["--out", "mems.csv"]), 2, "mems.csv would be written over");
+    check(&correct(path, &["--out", "./mems.mapping.toml"]), 2, "would be written over");
+    let simulate = ["simulate", "--preset", "mems-chamber", "--duration", "1", "--out", "x.csv", "--truth"];
+    check(&replay(path, &[&simulate[..], &["x.csv"]].concat()), 2, "x.csv would be written over");
+    check(&replay(path, &[&simulate[..], &["x.mapping.toml"]].concat()), 2, "would be written over");
+    assert_eq!(fs::read(path.join("mems.csv")).unwrap(), before);
+    assert!(!path.join("x.csv").exists());
+}
+
+#[test]
+fn ticks_that_the_calibration_refuses_are_a_loss() {
+    let folder = simulated();
+    let laser = fs::canonicalize(root().join("config/calibration/ZLG-0001.toml")).unwrap();
+    let correct = ["correct", "mems.csv", "-m", "mems.mapping.toml", "-c", laser.to_str().unwrap()];
+    check(&replay(folder.path(), &correct), 3, "ticks refused: counts where the calibration has means");
+}
+
+#[test]
+fn limits_of_options_are_said_before_anything_is_opened() {
+    let folder = simulated();
+    let play = ["play", "mems.csv", "-m", "mems.mapping.toml", "-u", "a"];
+    let with = |more: &[&str]| replay(folder.path(), &[&play[..], more].concat());
+    check(&with(&["--in-flight", "5"]), 2, "--in-flight is 5, must be at least 258 with --batch 1");
+    check(&with(&["--listen", "nonsense"]), 78, "nonsense");
+    check(&with(&["--zenoh-config", "mems.csv"]), 78, "mems.csv");
+    check(
+        &replay(folder.path(), &["simulate", "--preset", "mems-chamber", "--out", "x.csv", "--duration=nan"]),
+        2,
+        "",
+    );
+}
