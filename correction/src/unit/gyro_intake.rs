@@ -79,7 +79,7 @@ pub(super) struct GyroIntake {
     restarts_pending: usize,
     newest: Option<Newest>,
     jump: Option<Jump>,
-    /// The producer's run in force, and the one that it took over from, whose stragglers are late.
+    /// The producer's run in force, and the one that it took over from, whose ticks are late until they are many.
     series: Option<u64>,
     superseded: Option<u64>,
     /// Sequence number that was released last; `None` until the first tick has left. That one waits out its window
@@ -145,7 +145,12 @@ impl GyroIntake {
         if tick.series != series {
             if self.superseded == Some(tick.series) {
                 counters.gyro_late += 1;
-                return Admission::Refused;
+                // Stragglers end; a run that goes on was interrupted by a stray tick of another, and takes over again.
+                let admission = self.follow_jump(tick, OLD_BELIEVED_AFTER, counters);
+                if let Admission::Admitted { .. } = admission {
+                    self.superseded = self.series.replace(tick.series);
+                }
+                return admission;
             }
             self.superseded = Some(series);
             self.series = Some(tick.series);

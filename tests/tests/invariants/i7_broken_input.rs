@@ -188,3 +188,24 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn i7_a_stray_tick_of_another_run_does_not_stop_the_producer() {
+    let in_series = |series, k| {
+        let mut tick = gyro(k, &RATES);
+        tick.series = series;
+        [Owned::Accel(vec![accel(k, &RATES)]), Owned::Gyro(vec![tick])]
+    };
+    let mut events: Vec<Owned> = (0..100).flat_map(|k| in_series(1, k)).collect();
+    events.extend(in_series(2, 7));
+    events.extend((100..1000).flat_map(|k| in_series(1, k)));
+    let mut unit = drive::unit(&compile(&identity()));
+    let out = drive::run(&mut unit, &events);
+    let back = out.iter().rposition(|tick| tick.flags.contains(TickFlags::RESTART)).expect("a restart");
+    assert_eq!(out[back].sequence - 100, out[back].missed, "what was refused is announced");
+    assert!(
+        out[back..].iter().map(|tick| tick.sequence).eq(out[back].sequence..1000),
+        "and the rest is there"
+    );
+    assert!(out[back].missed <= 256);
+}

@@ -1,7 +1,7 @@
 //! I7 over real sessions: broken input of every kind leaves the other units' output bit-identical, and the unit that it
 //! was meant for goes on.
 
-use isotherm_bus::{Producer, ProducerOptions, close, open};
+use isotherm_bus::{Producer, ProducerOptions, close, open, presence};
 use isotherm_correction::sample::OutputKind;
 use isotherm_protocol::codec::encode;
 use isotherm_protocol::corrected::CorrectedTick;
@@ -134,23 +134,15 @@ async fn i7_broken_input_leaves_the_other_units_bit_identical() {
 async fn i7_the_unit_itself_goes_on() {
     let mut bench = Bench::start(&[(VICTIM, compile(&identity()))]).await;
     let session = open(&bench.options).await.unwrap();
-    let options = ProducerOptions { batch_ticks: 1, max_in_flight: None, ..ProducerOptions::default() };
-    let mut producer = Producer::declare(&session, &UnitId::new(VICTIM).unwrap(), options).await.unwrap();
+    presence::wait_for_service(&session, LIMIT).await.unwrap();
     // Without the jump of a million ticks: what comes after that is late by rule.
     let garbage: Vec<_> = broken();
     let garbage = &garbage[..garbage.len() - 2];
-    for k in 0..20 {
-        producer.accel(OutputKind::Mean, accel(k, &[0.0, 0.0, 9.8])).await.unwrap();
-        producer.gyro(OutputKind::Mean, gyro(k, &[0.1, 0.2, 0.3])).await.unwrap();
-    }
-    for (key, frame) in garbage {
+    // Good ticks and garbage at one priority, so that they arrive in the order in which they are sent.
+    let good = |ticks: std::ops::Range<u64>| ticks.flat_map(|k| tick(k, |_| {})).collect::<Vec<_>>();
+    for (key, frame) in good(0..20).iter().chain(garbage).chain(&good(20..200)) {
         put(&session, key, frame).await;
     }
-    for k in 20..200 {
-        producer.accel(OutputKind::Mean, accel(k, &[0.0, 0.0, 9.8])).await.unwrap();
-        producer.gyro(OutputKind::Mean, gyro(k, &[0.1, 0.2, 0.3])).await.unwrap();
-    }
-    producer.flush().await.unwrap();
     let ticks = bench.receive(VICTIM, 200).await;
     assert!(ticks.iter().zip(0..).all(|(tick, k)| tick.sequence == k), "each tick once, in order");
     assert!(ticks[30..].iter().all(|tick| (tick.delta_angle_rad[0] - 0.1 * 0.005).abs() < 1e-15));
