@@ -95,6 +95,11 @@ enum Admission {
     Refused,
 }
 
+impl Admission {
+    /// Admitted as the next of its series.
+    const PLAIN: Self = Self::Admitted { restart: false, refused_before: 0 };
+}
+
 impl GyroIntake {
     /// Takes one tick of a batch; whether it starts a new series.
     pub(super) fn admit(&mut self, tick: &GyroTick, output: OutputKind, counters: &mut Counters) -> bool {
@@ -139,9 +144,8 @@ impl GyroIntake {
 
     /// Compares sequence and time with what came before.
     fn judge(&mut self, tick: &GyroTick, counters: &mut Counters) -> Admission {
-        const PLAIN: Admission = Admission::Admitted { restart: false, refused_before: 0 };
         let series = *self.series.get_or_insert(tick.series);
-        let Some(newest) = self.newest else { return PLAIN };
+        let Some(newest) = self.newest else { return Admission::PLAIN };
         if tick.series != series {
             if self.superseded == Some(tick.series) {
                 counters.gyro_late += 1;
@@ -160,7 +164,7 @@ impl GyroIntake {
         }
         if tick.sequence > newest.sequence && plausible_step(newest, tick) {
             self.jump = None;
-            return PLAIN;
+            return Admission::PLAIN;
         }
         if tick.sequence <= newest.sequence && tick.end_time <= newest.end_time {
             return self.judge_old(tick, counters);
@@ -171,13 +175,12 @@ impl GyroIntake {
 
     /// A tick from before the newest one: late, doubled, filling a hole, or the sign of a restart.
     fn judge_old(&mut self, tick: &GyroTick, counters: &mut Counters) -> Admission {
-        const PLAIN: Admission = Admission::Admitted { restart: false, refused_before: 0 };
         if self.restarts_pending > 0
             && let Some(first) = self.pending.iter().rfind(|pending| pending.restart)
         {
             // What was released is of another series; behind the first tick of this one all may still be joined.
             return match tick.sequence.cmp(&first.tick.sequence) {
-                Ordering::Greater => PLAIN,
+                Ordering::Greater => Admission::PLAIN,
                 Ordering::Equal => {
                     counters.gyro_duplicates += 1;
                     Admission::Refused
@@ -188,7 +191,9 @@ impl GyroIntake {
                 }
             };
         }
-        let Some(age) = self.last.and_then(|last| last.checked_sub(tick.sequence)) else { return PLAIN };
+        let Some(age) = self.last.and_then(|last| last.checked_sub(tick.sequence)) else {
+            return Admission::PLAIN;
+        };
         let known = u32::try_from(age)
             .ok()
             .and_then(|age| self.released.checked_shr(age))
