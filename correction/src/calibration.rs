@@ -8,16 +8,26 @@
 //! **scale factor** divides (output per m/s²), a **bias** is subtracted.
 
 mod check;
+mod defect;
 mod parts;
+mod range;
+mod steady;
+#[cfg(test)]
+#[expect(clippy::float_cmp, reason = "what is not there is zero to the bit")]
+mod tests;
 
 use alloc::vec::Vec;
 
-pub use check::{Defect, DefectKind, Section};
+pub use check::MAX_SELF_TEST_READINGS;
+pub use defect::{Defect, DefectKind, Section};
 pub use parts::{
     AccelParts, BranchArgument, BranchedParts, CalibrationParts, GyroParts, LagParts, TrendParts,
 };
+pub use steady::{Jump, Steady};
 
 use crate::channel::{Channel, ThermalFilter};
+use crate::drift::DriftModel;
+use crate::operation::SelfTestParts;
 use crate::orientation::Orientation;
 use crate::reversal::Reversal;
 use crate::sample::OutputKind;
@@ -30,6 +40,9 @@ pub struct Calibration {
     pub(crate) channels: Vec<Channel>,
     pub(crate) gyro_output: OutputKind,
     pub(crate) gyros: Vec<GyroModel>,
+    /// One for each gyro. Apart from the models: what an estimator expects changes nothing of the correction, and a
+    /// swap that changes it alone must not disturb what follows temperature.
+    drifts: Vec<Option<DriftModel>>,
     pub(crate) gyro_orientation: Orientation,
     pub(crate) gyro_orientation_channels: Vec<usize>,
     pub(crate) accel_output: OutputKind,
@@ -37,6 +50,7 @@ pub struct Calibration {
     pub(crate) accel_orientation: Option<Orientation>,
     pub(crate) accel_orientation_channels: Vec<usize>,
     pub(crate) reversal: Option<Reversal>,
+    self_test: SelfTestParts,
 }
 
 impl Calibration {
@@ -75,6 +89,18 @@ impl Calibration {
     /// Whether another set filters the same channels in the same way, so that thermal memory means the same in both.
     pub(crate) fn same_thermal_basis(&self, other: &Self) -> bool {
         self.filter == other.filter && self.channels == other.channels
+    }
+
+    /// What the drift estimator is to expect of a gyro; `None` where the set says nothing, or there is no such gyro.
+    #[must_use]
+    pub fn drift(&self, gyro: usize) -> Option<&DriftModel> {
+        self.drifts.get(gyro)?.as_ref()
+    }
+
+    /// What the producer's own voltages and counters must be in a self-test.
+    #[must_use]
+    pub fn self_test(&self) -> &SelfTestParts {
+        &self.self_test
     }
 
     /// The temperature channels that the set follows, in its own order.

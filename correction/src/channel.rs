@@ -105,6 +105,12 @@ impl Channel {
         &self.0.name
     }
 
+    /// Physical range of the sensor (°C).
+    #[must_use]
+    pub fn range_deg_c(&self) -> [f64; 2] {
+        self.0.range_deg_c
+    }
+
     /// Raw reading → °C, in nested form.
     fn convert(&self, raw: f64) -> f64 {
         self.0.conversion.iter().rev().fold(0.0, |sum, a| sum * raw + a)

@@ -22,6 +22,12 @@
 //! | [`reversal`] | the four-step substitution over a mode switch |
 //! | [`servo`] | the perimeter-servo transient after a mode switch |
 //! | [`navigation`] | sums of ticks with coning and sculling terms |
+//! | [`operation`] | the unit's states, commands and self-test (models §7) |
+//! | [`observation`] | one tick after its correction, for those who watch the unit |
+//! | [`rest`] | whether the unit stands still |
+//! | [`earth`] | place of the unit and rate of the Earth in case axes |
+//! | [`prelaunch`] | pre-launch calibration at rest: C0 and B0 of each gyro |
+//! | [`drift`] | in-run drift estimator |
 //! | [`mod@unit`] | the state machine that puts them together |
 #![no_std]
 
@@ -30,8 +36,14 @@ extern crate alloc;
 pub mod calibration;
 pub mod channel;
 pub mod curve;
+pub mod drift;
+pub mod earth;
 pub mod navigation;
+pub mod observation;
+pub mod operation;
 pub mod orientation;
+pub mod prelaunch;
+pub mod rest;
 pub mod reversal;
 pub mod sample;
 pub mod servo;

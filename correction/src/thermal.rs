@@ -7,7 +7,7 @@ mod accel;
 mod gyro;
 mod ramp;
 
-pub use accel::{AccelModel, AccelThermal};
+pub use accel::{AccelModel, AccelTerms, AccelThermal};
 pub(crate) use gyro::TermError;
-pub use gyro::{GyroModel, GyroThermal, MAX_LAGS, TrendModel};
+pub use gyro::{GyroModel, GyroTerms, GyroThermal, MAX_LAGS, TrendModel};
 pub use ramp::{Follower, Ramp};

@@ -3,8 +3,8 @@
 //! The contract:
 //!
 //! 1. [`Unit::handle`] takes one [`Event`] and hands each corrected tick that it releases to `emit`, in order.
-//! 2. [`Unit::install`] gives the unit a calibration; it takes effect at a tick boundary, which the space between two
-//!    calls of `handle` always is.
+//! 2. [`Unit::schedule`] gives the unit a calibration; it takes effect at a tick boundary, which the space between two
+//!    calls of `handle` always is. [`Unit::command`] moves it from state to state, likewise.
 //! 3. Output depends on the events alone: gyro ticks wait for their accelerometer tick and for missing
 //!    neighbours as long as *later ticks* say that the pairing window is open; a temperature reading takes effect for
 //!    ticks that end after its time plus [`UnitSettings::temperature_delay`].
@@ -12,23 +12,37 @@
 //! 5. No event, however broken, panics or stops the unit; what is refused is counted and announced as a gap.
 
 mod accel_intake;
+mod at_rest;
 mod axes;
+mod change;
 mod correct;
 mod counters;
 mod gyro_intake;
+mod health;
+mod operating;
+mod slew;
 mod thermal_memory;
+mod view;
 
 use alloc::sync::Arc;
 
 use accel_intake::{AccelIntake, Match};
-use correct::Corrector;
+pub use at_rest::AtRest;
+pub use change::{At, Change};
+pub use correct::Applied;
+use correct::{Corrector, Takeover};
 pub use counters::Counters;
 use gyro_intake::{GyroIntake, Released};
+pub use health::SensorHealth;
+use operating::Operating;
+pub use operating::PreLaunchView;
 pub use thermal_memory::ChannelReport;
 use thermal_memory::Waiting;
 
 use crate::calibration::Calibration;
+use crate::drift::{DriftSettings, Reference};
 use crate::navigation::{NavigationStep, StepSum};
+use crate::operation::{Command, HealthReading, Refusal, State};
 use crate::sample::{AccelTick, CorrectedTick, GyroTick, OutputKind, TemperatureReading, TickFlags};
 use crate::units::{Span, Timestamp};
 
@@ -51,6 +65,12 @@ pub struct UnitSettings {
     pub temperature_delay: Span,
     /// What to do without a calibration.
     pub uncalibrated: Uncalibrated,
+    /// Whether the unit begins in standby; otherwise it runs at once.
+    pub in_standby: bool,
+    /// Whether the estimated drift is subtracted; it is published in any case.
+    pub subtract_drift: bool,
+    /// A reference takes effect for ticks that end after its end plus this.
+    pub reference_delay: Span,
     /// Summation of ticks to navigation steps.
     pub navigation: NavigationStep,
 }
@@ -61,6 +81,9 @@ impl Default for UnitSettings {
             pairing_window: Span::from_ms(50),
             temperature_delay: Span::from_ms(50),
             uncalibrated: Uncalibrated::PassThrough,
+            in_standby: false,
+            subtract_drift: false,
+            reference_delay: Span::from_ms(1000),
             navigation: NavigationStep::default(),
         }
     }
@@ -85,6 +108,10 @@ pub enum Event<'a> {
     },
     /// Temperature readings.
     Temperature(&'a [TemperatureReading]),
+    /// What the producer reports of itself.
+    Health(&'a [HealthReading]),
+    /// The true rate of the case over a span, for the drift estimator.
+    Reference(&'a Reference),
     /// Nothing more is to be waited for.
     Flush,
 }
@@ -102,6 +129,8 @@ struct Active {
 pub struct Unit {
     settings: UnitSettings,
     active: Option<Active>,
+    pending: Option<Change>,
+    operating: Operating,
     gyros: GyroIntake,
     accels: AccelIntake,
     waiting: Waiting,
@@ -109,6 +138,8 @@ pub struct Unit {
     counters: Counters,
     /// Ticks that left the intake and were neither given out nor announced.
     unannounced: u64,
+    /// Ticks that left the intake without being corrected, and whether the producer restarted at one of them.
+    unseen: (u64, bool),
     /// The next output must announce a restart that fell on a tick which was held back.
     restart_due: bool,
     /// End of the first tick since the unit appeared or its producer restarted.
@@ -123,24 +154,62 @@ impl Unit {
         Self {
             settings,
             active: None,
+            pending: None,
+            operating: Operating::new(settings.in_standby),
             gyros: GyroIntake::default(),
             accels: AccelIntake::default(),
             waiting: Waiting::default(),
             steps: StepSum::new(),
             counters: Counters::default(),
             unannounced: 0,
+            unseen: (0, false),
             restart_due: false,
             turn_on: None,
             last_end: Timestamp::default(),
         }
     }
 
-    /// Puts a calibration in force from the next tick on. Running state that still means the same is kept.
+    /// Puts a calibration in force from the next tick on, at once. Running state that still means the same is kept.
     pub fn install(&mut self, calibration: Arc<Calibration>, revision: u64) {
+        self.schedule(Change { calibration, revision, at: At::NextTick, slew: Span::ZERO });
+    }
+
+    /// Has a calibration take effect; running state that still means the same is kept.
+    ///
+    /// Gives the revision counter of a change that was waiting and is replaced by this one.
+    pub fn schedule(&mut self, change: Change) -> Option<u64> {
+        let replaced = self.pending.take().map(|change| change.revision);
+        if change.at == At::NextTick {
+            self.take_effect(change);
+        } else {
+            self.pending = Some(change);
+        }
+        replaced
+    }
+
+    /// Puts a change in force, before the next tick.
+    fn take_effect(&mut self, change: Change) {
+        let Change { calibration, revision, slew, .. } = change;
+        let since_turn_on_s = self.turn_on.map_or(0.0, |turn_on| self.last_end.seconds_from(turn_on));
+        // A unit that has given nothing out has nothing to move away from.
+        let slew = if self.turn_on.is_some() { slew } else { Span::ZERO };
         let before = self.active.take();
         let kept = before.map(|active| (active.calibration, active.corrector));
-        let corrector = Corrector::new(&calibration, kept, self.last_end);
+        let UnitSettings { reference_delay: delay, subtract_drift: subtract, .. } = self.settings;
+        let drift = DriftSettings { delay, subtract };
+        let takeover = Takeover { now: self.last_end, since_turn_on_s, slew, drift };
+        let corrector = Corrector::new(&calibration, kept, takeover);
+        self.operating.calibration_changed(&calibration);
         self.active = Some(Active { calibration, corrector, revision });
+    }
+
+    /// Carries a command out before the next tick; the state that it leads to.
+    ///
+    /// # Errors
+    /// [`Refusal`]: the state is as before.
+    pub fn command(&mut self, command: &Command) -> Result<State, Refusal> {
+        let in_force = self.active.as_ref().map(|active| (&*active.calibration, active.revision));
+        self.operating.command(command, in_force)
     }
 
     /// Takes one event; every corrected tick that it releases goes to `emit`.
@@ -150,7 +219,8 @@ impl Unit {
                 let mut starts_anew = false;
                 for tick in ticks {
                     self.counters.gyro_ticks_in += 1;
-                    if self.fits(output, tick.readings.len(), |c| (c.gyro_output(), c.gyro_count())) {
+                    let due = self.pending.as_ref().is_some_and(|change| change.at.is_due(tick));
+                    if self.fits(due, output, tick.readings.len(), |c| (c.gyro_output(), c.gyro_count())) {
                         starts_anew |= self.gyros.admit(tick, output, &mut self.counters);
                     }
                 }
@@ -165,7 +235,13 @@ impl Unit {
             Event::Accel { output, ticks } => {
                 for tick in ticks {
                     self.counters.accel_ticks_in += 1;
-                    if self.fits(output, tick.readings.len(), |c| (c.accel_output(), c.accel_count())) {
+                    // Which gyro tick it will go with is not known yet.
+                    let due = match self.pending.as_ref().map(|change| change.at) {
+                        Some(At::Time(time)) => tick.end_time >= time,
+                        Some(At::Sequence(_)) => self.pending_takes_accels(output, tick.readings.len()),
+                        Some(At::NextTick) | None => false,
+                    };
+                    if self.fits(due, output, tick.readings.len(), |c| (c.accel_output(), c.accel_count())) {
                         self.accels.admit(tick, output, &mut self.counters);
                     }
                 }
@@ -180,6 +256,13 @@ impl Unit {
                     self.waiting.push(reading, &mut self.counters);
                 }
             }
+            Event::Health(readings) => readings.iter().for_each(|reading| self.operating.health(reading)),
+            Event::Reference(reference) => {
+                if let Some(active) = &mut self.active {
+                    // What is refused is counted.
+                    let _ = active.corrector.drift.submit(reference);
+                }
+            }
             Event::Flush => {
                 self.release(true, emit);
                 self.steps.flush(&self.settings.navigation, &mut |tick| emit(&tick));
@@ -187,15 +270,20 @@ impl Unit {
         }
     }
 
-    /// Checks kind and number of readings against the calibration, if there is one.
+    /// Checks kind and number of readings against the calibration, if there is one: the one in force, or the one that waits.
     fn fits(
         &mut self,
+        waiting: bool,
         output: OutputKind,
         sensors: usize,
         expect: fn(&Calibration) -> (OutputKind, usize),
     ) -> bool {
-        let Some(active) = &self.active else { return true };
-        let (need_output, need_sensors) = expect(&active.calibration);
+        let in_force = self.active.as_ref().map(|active| &active.calibration);
+        let calibration =
+            self.pending.as_ref().filter(|_| waiting).map(|change| &change.calibration).or(in_force);
+        let Some((need_output, need_sensors)) = calibration.map(|calibration| expect(calibration)) else {
+            return true;
+        };
         if sensors != need_sensors {
             self.counters.wrong_sensor_count += 1;
             return false;
@@ -205,6 +293,12 @@ impl Unit {
             return false;
         }
         true
+    }
+
+    /// Whether the calibration that waits takes accelerometer readings of this kind and number.
+    fn pending_takes_accels(&self, output: OutputKind, sensors: usize) -> bool {
+        let waiting = self.pending.as_ref().map(|change| &change.calibration);
+        waiting.is_some_and(|waiting| (waiting.accel_output(), waiting.accel_count()) == (output, sensors))
     }
 
     /// Gives out every tick that need not wait any longer.
@@ -223,9 +317,15 @@ impl Unit {
             };
             let Some(released) = self.gyros.release() else { return };
             self.accels.gyro_released(released.tick.end_time);
+            // The run that a sequence number or a time was meant for is over with a restart.
+            if let Some(change) =
+                self.pending.take_if(|change| released.restart || change.at.is_due(&released.tick))
+            {
+                self.take_effect(change);
+            }
             // A swap since it came may have changed what fits.
             let accel = accel.filter(|(accel, output)| {
-                self.fits(*output, accel.readings.len(), |c| (c.accel_output(), c.accel_count()))
+                self.fits(false, *output, accel.readings.len(), |c| (c.accel_output(), c.accel_count()))
             });
             self.give_out(released, accel.as_ref().map(|(accel, _)| accel), emit);
         }
@@ -243,14 +343,20 @@ impl Unit {
             self.waiting.restart(self.last_end);
             self.turn_on = None;
         }
-        released.restart |= core::mem::take(&mut self.restart_due);
-        released.missed = released.missed.saturating_add(core::mem::take(&mut self.unannounced));
-        let Released { tick, output, missed, restart } = &released;
+        // What the consumer has not been told, and what the corrector has not seen: a tick that is held back in standby
+        // is unknown to the one and not to the other.
+        let restart = released.restart | core::mem::take(&mut self.restart_due);
+        let missed = released.missed.saturating_add(core::mem::take(&mut self.unannounced));
+        let (unseen, restart_unseen) = core::mem::take(&mut self.unseen);
+        released.missed = released.missed.saturating_add(unseen);
+        released.restart |= restart_unseen;
+        let Released { tick, output, .. } = &released;
         // A swap since it came may have changed what fits.
-        let fits = self.fits(*output, tick.readings.len(), |c| (c.gyro_output(), c.gyro_count()));
+        let fits = self.fits(false, *output, tick.readings.len(), |c| (c.gyro_output(), c.gyro_count()));
         let turn_on = *self.turn_on.get_or_insert(tick.end_time);
         let settings = &self.settings;
-        let mut corrected = match &mut self.active {
+        let mut held = false;
+        let corrected = match &mut self.active {
             Some(active) if fits => {
                 let mut corrected = active.corrector.correct(
                     &active.calibration,
@@ -261,57 +367,42 @@ impl Unit {
                     &mut self.counters,
                 );
                 corrected.revision = active.revision;
-                corrected
+                let temperature =
+                    |name: &_| active.corrector.thermal().alive(&active.calibration, name, tick.end_time);
+                let in_force = (&*active.calibration, active.revision);
+                let reference = self.operating.observe(&active.corrector.seen, in_force, &temperature);
+                if let Some(reference) = reference {
+                    // What is refused is counted.
+                    let _ = active.corrector.drift.submit_at_rest(&reference);
+                }
+                Some(corrected)
             }
-            None if settings.uncalibrated == Uncalibrated::PassThrough => correct::pass_through(tick, accel),
-            held_or_misfit => {
-                self.unannounced = missed.saturating_add(1);
-                self.restart_due = *restart;
-                self.counters.ticks_held += u64::from(held_or_misfit.is_none());
-                return;
+            Some(_) => None,
+            None => {
+                held = settings.uncalibrated == Uncalibrated::Hold;
+                Some(correct::pass_through(tick, accel))
             }
         };
-        corrected.missed = *missed;
+        held |= !self.operating.state().is_running();
+        let Some(mut corrected) = corrected.filter(|_| !held) else {
+            self.unannounced = missed.saturating_add(1);
+            self.restart_due = restart;
+            if self.active.is_none() || !fits {
+                self.unseen = (released.missed.saturating_add(1), released.restart);
+            }
+            self.counters.ticks_held += u64::from(held);
+            return;
+        };
+        corrected.missed = missed;
         if corrected.missed > 0 {
             corrected.flags |= TickFlags::GAP;
             self.counters.gaps += 1;
             self.counters.ticks_missed = self.counters.ticks_missed.saturating_add(corrected.missed);
         }
-        if *restart {
+        if restart {
             corrected.flags |= TickFlags::RESTART;
         }
         self.counters.ticks_out += 1;
         self.steps.push(&settings.navigation, &corrected, &mut |tick| emit(&tick));
-    }
-
-    /// What has been counted.
-    #[must_use]
-    pub fn counters(&self) -> &Counters {
-        &self.counters
-    }
-
-    /// The calibration in force and its revision.
-    #[must_use]
-    pub fn calibration(&self) -> Option<(&Arc<Calibration>, u64)> {
-        self.active.as_ref().map(|active| (&active.calibration, active.revision))
-    }
-
-    /// The temperature channels as they stand at the last tick; none without a calibration.
-    pub fn channels(&self) -> impl Iterator<Item = ChannelReport> + '_ {
-        self.active
-            .iter()
-            .flat_map(|active| active.corrector.thermal().report(&active.calibration, self.last_end))
-    }
-
-    /// Whether ticks wait for their accelerometer tick, a missing neighbour, or the end of a navigation step.
-    #[must_use]
-    pub fn is_waiting(&self) -> bool {
-        !self.gyros.is_empty() || !self.steps.is_empty()
-    }
-
-    /// The settings it was made with.
-    #[must_use]
-    pub fn settings(&self) -> &UnitSettings {
-        &self.settings
     }
 }

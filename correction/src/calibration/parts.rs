@@ -4,6 +4,8 @@ use alloc::vec::Vec;
 
 use crate::channel::{ChannelParts, ThermalFilterParts};
 use crate::curve::CurveParts;
+use crate::drift::DriftParts;
+use crate::operation::SelfTestParts;
 use crate::orientation::OrientationParts;
 use crate::reversal::ReversalParts;
 use crate::sample::OutputKind;
@@ -34,6 +36,8 @@ pub struct CalibrationParts {
     pub accel_orientation_channels: Vec<usize>,
     /// The substitution over a mode switch; `None` for an instrument without modes.
     pub reversal: Option<ReversalParts>,
+    /// What the producer's own voltages and counters must be in a self-test.
+    pub self_test: SelfTestParts,
 }
 
 /// One gyro (models §2): θ = K(T)·P − Ω·Δt.
@@ -64,6 +68,8 @@ pub struct GyroParts {
     pub trend: Option<TrendParts>,
     /// Perimeter-servo transient after a mode switch.
     pub servo: Option<ServoParts>,
+    /// What the drift estimator is to expect; `None`: it is not run for this gyro.
+    pub drift: Option<DriftParts>,
 }
 
 /// The argument of a branched coefficient.

@@ -42,6 +42,25 @@ impl AccelModel {
     }
 }
 
+/// Values of an accelerometer's thermal terms.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AccelTerms {
+    /// S (output units).
+    pub bias: f64,
+    /// 1/K (m/s² per output unit).
+    pub per_scale_factor: f64,
+    /// r (dimensionless).
+    pub ratio: f64,
+}
+
+impl AccelTerms {
+    /// Specific force (m/s²) that an output (V, counts/s or m/s²) stands for.
+    #[must_use]
+    pub fn specific_force(&self, output: f64) -> f64 {
+        (output - self.bias) * self.ratio * self.per_scale_factor
+    }
+}
+
 /// Memory of one accelerometer's thermal terms.
 ///
 /// Sensor and board follow channels of their own, so each has its own ramp.
@@ -83,12 +102,12 @@ impl AccelThermal {
         self.board.settle();
     }
 
-    /// Specific force (m/s²) that an output (V, counts/s or m/s²) stands for at `time`.
+    /// The terms in use at `time`.
     #[must_use]
-    pub fn specific_force(&self, output: f64, time: Timestamp) -> f64 {
+    pub fn at(&self, time: Timestamp) -> AccelTerms {
         let [bias, per_scale_factor] = self.sensor.at(time);
         let [ratio] = self.board.at(time);
-        (output - bias) * ratio * per_scale_factor
+        AccelTerms { bias, per_scale_factor, ratio }
     }
 
     /// Whether an argument was outside its fitted range at the last evaluation.

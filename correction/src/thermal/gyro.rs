@@ -109,6 +109,37 @@ impl GyroModel {
     }
 }
 
+impl GyroModel {
+    /// The terms on a ramp that has lasted for long, so that every lag has settled on it.
+    ///
+    /// From one grid point to the next a lag d = T − L becomes (d + Ṫ·step)·decay; it stays where it is at
+    /// d = Ṫ·step·decay/(1 − decay), which is τ·Ṫ for a short step.
+    pub(crate) fn steady(&self, thermal: &ThermalState, filter: &ThermalFilter) -> GyroTerms {
+        let mut lagged = [thermal.temperature; MAX_LAGS];
+        for (lag, lagged) in self.lags.iter().zip(&mut lagged) {
+            *lagged -= thermal.rate * filter.grid_step.as_s() * lag.decay / (1.0 - lag.decay);
+        }
+        let ([increment_weight, bias, magnetic, meander], _) =
+            evaluate(self, thermal, &lagged, filter.branch_dead_band);
+        GyroTerms { increment_weight, bias, magnetic, meander }
+    }
+
+    /// Every curve whose argument is temperature and which flags the gyro outside its fitted range.
+    pub(crate) fn curves_over_temperature(&self) -> impl Iterator<Item = &Curve> {
+        let branched = [&self.thermal_rate, &self.thermal_acceleration].into_iter().flatten();
+        [&self.increment_weight_error, &self.static_bias]
+            .into_iter()
+            .chain(&self.magnetic_bias)
+            .chain(&self.slow_meander)
+            .chain(self.lags.iter().map(|lag| &lag.gain))
+            .chain(
+                branched
+                    .filter(|branched| branched.argument == BranchArgument::Temperature)
+                    .flat_map(|branched| [&branched.run_up, &branched.braking]),
+            )
+    }
+}
+
 /// A coefficient with one curve per thermal branch.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Branched {
@@ -159,6 +190,12 @@ impl TrendModel {
         let [from, to] = self.interval_s;
         let t = since_turn_on_s.max(from).min(to);
         self.coefficients.iter().rev().fold(0.0, |sum, c| sum * t + c)
+    }
+
+    /// Rate (rad/s) from the end of the interval on.
+    #[must_use]
+    pub fn last(&self) -> f64 {
+        self.at(self.interval_s[1])
     }
 }
 

@@ -100,6 +100,17 @@ impl Axes {
         self.at(time).map(|inverse| inverse.apply(readings))
     }
 
+    /// Temperature that the orientation follows (°C).
+    pub(super) fn temperature_deg_c(&self, time: Timestamp) -> f64 {
+        let [now] = self.temperature.at(time);
+        now
+    }
+
+    /// The inverse in use at `time` and the sensors that it takes.
+    pub(super) fn in_use(&self, time: Timestamp) -> Option<(SensorMask, Inverse)> {
+        self.at(time).map(|inverse| (self.mask, inverse))
+    }
+
     /// Watches the parity residuals; excludes a sensor where they call for it.
     pub(super) fn watch(
         &mut self,

@@ -3,24 +3,42 @@
 //! scale and bias per gyro (with the mode's sign) → perimeter-servo transient → four-step substitution → case axes;
 //! accelerometers: bias, scale and board ratio → case axes.
 
+mod accels;
+mod gyros;
+
 use alloc::sync::Arc;
 
 use super::axes::Axes;
 use super::counters::Counters;
 use super::gyro_intake::Released;
+use super::health::SensorHealth;
+use super::slew::Slew;
 use super::thermal_memory::{ThermalMemory, Waiting};
 use crate::calibration::Calibration;
-use crate::orientation::{Orientation, SensorMask};
-use crate::reversal::{Substitution, TickInput};
-use crate::sample::{
-    AccelTick, CorrectedTick, GyroTick, LasingMode, MIN_SENSORS, OutputKind, SensorFlags, Sensors, TickFlags,
-};
-use crate::servo::{ServoMemory, ServoTick, Transient};
+use crate::drift::{DriftEstimator, DriftSettings};
+use crate::observation::Observation;
+use crate::orientation::{Inverse, Orientation, SensorMask};
+use crate::reversal::Substitution;
+use crate::sample::{AccelTick, CorrectedTick, GyroTick, SensorFlags, Sensors, TickFlags};
+use crate::servo::ServoMemory;
 use crate::units::{Span, Timestamp};
+
+/// What is presently subtracted from a unit's readings, in case axes.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Applied {
+    /// Bias of the gyros (rad/s): all terms at the last tick, a subtracted drift included.
+    pub angular_rate: [f64; 3],
+    /// Bias of the accelerometers (m/s²); zero without accelerometers.
+    pub specific_force: [f64; 3],
+}
 
 /// Running state of one unit under one calibration.
 #[derive(Debug)]
 pub(super) struct Corrector {
+    pub(super) drift: DriftEstimator,
+    pub(super) seen: Observation,
+    pub(super) gyro_health: Sensors<SensorHealth>,
+    pub(super) accel_health: Sensors<SensorHealth>,
     thermal: ThermalMemory,
     substitution: Substitution,
     servo: ServoMemory,
@@ -28,6 +46,22 @@ pub(super) struct Corrector {
     last_rates: Sensors<f64>,
     /// Last good specific force of each accelerometer (m/s²), likewise.
     last_forces: Sensors<f64>,
+    /// The swap that is being made over a time, and the share of what was before it at the present tick.
+    slew: Option<Slew>,
+    slew_share: f64,
+}
+
+/// When a corrector begins, as seen from the one before it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Takeover {
+    /// End of the last tick.
+    pub(super) now: Timestamp,
+    /// Time since the unit was turned on (s).
+    pub(super) since_turn_on_s: f64,
+    /// Time over which the change is to be made.
+    pub(super) slew: Span,
+    /// What the drift estimator is to do.
+    pub(super) drift: DriftSettings,
 }
 
 impl Corrector {
@@ -35,27 +69,74 @@ impl Corrector {
     pub(super) fn new(
         calibration: &Calibration,
         before: Option<(Arc<Calibration>, Self)>,
-        now: Timestamp,
+        takeover: Takeover,
     ) -> Self {
+        let Takeover { now, slew, drift, .. } = takeover;
         let thermal =
             ThermalMemory::new(calibration, before.as_ref().map(|(old, c)| (old.as_ref(), &c.thermal)), now);
         let kept = before.filter(|(old, _)| {
             old.gyro_count() == calibration.gyro_count() && old.accel_count() == calibration.accel_count()
         });
+        let drifts: Sensors<_> =
+            (0..calibration.gyro_count()).map(|i| calibration.drift(i).copied()).collect();
+        let fresh = |sensors| core::iter::repeat_n(SensorHealth::default(), sensors).collect();
         let mut new = Self {
+            drift: DriftEstimator::new(&drifts, drift),
+            seen: Observation::default(),
+            gyro_health: fresh(calibration.gyro_count()),
+            accel_health: fresh(calibration.accel_count()),
             thermal,
             substitution: Substitution::new(),
             servo: ServoMemory::new(),
             last_rates: core::iter::repeat_n(0.0, calibration.gyro_count()).collect(),
             last_forces: core::iter::repeat_n(0.0, calibration.accel_count()).collect(),
+            slew: None,
+            slew_share: 0.0,
         };
-        if let Some((_, old)) = kept {
+        if let Some((old_calibration, old)) = kept {
+            let same_output = old_calibration.gyro_output == calibration.gyro_output
+                && old_calibration.accel_output == calibration.accel_output;
+            if slew > Span::ZERO && same_output {
+                new.slew = Some(old.in_use(&old_calibration, takeover));
+            }
+            let same_basis = old_calibration.same_thermal_basis(calibration);
+            let same_bias = |i| same_basis && old_calibration.gyros.get(i) == calibration.gyros.get(i);
+            new.drift.carry(old.drift, same_bias);
+            new.seen = old.seen;
+            new.gyro_health = old.gyro_health;
+            new.accel_health = old.accel_health;
             new.substitution = old.substitution;
             new.servo = old.servo;
             new.last_rates = old.last_rates;
             new.last_forces = old.last_forces;
         }
         new
+    }
+
+    /// Everything as it is in use at the end of the last tick, for a slew away from it.
+    fn in_use(&self, calibration: &Calibration, takeover: Takeover) -> Slew {
+        let Takeover { now, since_turn_on_s, slew: over, .. } = takeover;
+        let gyros = calibration.gyros.iter().enumerate();
+        // In the middle of a slew the axes are on their way too.
+        let on_its_way =
+            |now: Option<(SensorMask, Inverse)>, old: Option<(SensorMask, Inverse)>| match (now, old) {
+                (Some((mask, new)), Some((same, old))) if mask == same && self.slew_share > 0.0 => {
+                    Some((mask, new.lerp(&old, self.slew_share)))
+                }
+                _ => now,
+            };
+        let old = self.slew.as_ref();
+        Slew {
+            start: now,
+            over,
+            gyros: gyros.filter_map(|(i, model)| self.gyro_terms(i, model, now, since_turn_on_s)).collect(),
+            accels: (0..calibration.accels.len()).filter_map(|i| self.accel_terms(i, now)).collect(),
+            gyro_axes: on_its_way(self.thermal.gyro_axes.in_use(now), old.and_then(|slew| slew.gyro_axes)),
+            accel_axes: on_its_way(
+                self.thermal.accel_axes.as_ref().and_then(|axes| axes.in_use(now)),
+                old.and_then(|slew| slew.accel_axes),
+            ),
+        }
     }
 
     /// The thermal memory, for reports.
@@ -77,8 +158,17 @@ impl Corrector {
         if released.restart {
             self.thermal.restart();
             self.servo.reset();
+            self.slew = None;
         }
         self.thermal.advance(calibration, waiting, delay, tick.end_time, counters);
+        let orientation = &calibration.gyro_orientation;
+        let temperature_deg_c = self.thermal.gyro_axes.temperature_deg_c(tick.end_time);
+        let project = |rate| orientation.forward(temperature_deg_c, rate);
+        self.drift.advance(tick.end_time, released.restart, &project);
+        self.slew_share = self.slew.as_ref().map_or(0.0, |slew| slew.share(tick.end_time));
+        if self.slew_share <= 0.0 {
+            self.slew = None;
+        }
 
         let mut out = CorrectedTick {
             sequence: tick.sequence,
@@ -91,203 +181,63 @@ impl Corrector {
         if self.thermal.warming_up(calibration) {
             out.flags |= TickFlags::WARM_UP;
         }
+        self.forget_last_tick();
         self.gyros(calibration, released, tick.end_time.seconds_from(turn_on), &mut out, counters);
         self.accels(calibration, tick.end_time, accel, &mut out, counters);
+        self.note(released, &out);
+        self.drift.observe(&self.seen);
         out
     }
 
-    fn gyros(
-        &mut self,
-        calibration: &Calibration,
-        released: &Released,
-        since_turn_on_s: f64,
-        out: &mut CorrectedTick,
-        counters: &mut Counters,
-    ) {
+    /// Empties what the sensors' loops fill.
+    fn forget_last_tick(&mut self) {
+        let seen = &mut self.seen;
+        seen.gyro_rates.clear();
+        seen.gyro_biases.clear();
+        seen.gyro_drifts.clear();
+        seen.gyro_temperatures_deg_c.clear();
+        seen.accel_readings.clear();
+        seen.specific_force = None;
+    }
+
+    /// Completes the observation of the tick and the sensors' health.
+    fn note(&mut self, released: &Released, out: &CorrectedTick) {
         let tick = &released.tick;
-        let duration_s = tick.duration.as_s();
-        let input = TickInput {
-            end_time: tick.end_time,
-            duration: tick.duration,
-            mode: tick.mode,
-            switch_command: tick.switch_command,
-            missed: released.missed,
-            restart: released.restart,
-        };
-        let lost = calibration.reversal.as_ref().is_some_and(|r| self.substitution.is_lost(r, &input));
-        self.servo.advance(lost, tick.end_time, tick.duration);
-
-        let mut mask = self.thermal.gyro_axes.included(&calibration.gyro_orientation);
-        let mut increments = Sensors::<f64>::new();
-        for (i, (model, thermal)) in calibration.gyros.iter().zip(&self.thermal.gyros).enumerate() {
-            let terms = thermal.at(tick.end_time);
-            let trend = model.trend.as_ref().map_or(0.0, |trend| trend.at(since_turn_on_s));
-            let sign = tick.mode.map_or(1.0, LasingMode::sign);
-            let phase = tick.meander.map_or(1.0, LasingMode::sign);
-            let mut bias = terms.bias + trend + sign * terms.magnetic + phase * terms.meander;
-            if let (Some(servo), false) = (&model.servo, lost) {
-                let servo_tick = ServoTick {
-                    end_time: tick.end_time,
-                    duration: tick.duration,
-                    temperature_deg_c: self.thermal.temperature(calibration, model.channel),
-                    scale_rad_per_count: terms.increment_weight,
-                    half_periods: tick.half_periods.get(i).copied(),
-                };
-                match self.servo.apparent_rate(i, servo, &servo_tick) {
-                    Transient::Settled => {}
-                    Transient::Apparent { rate_rad_per_s } => {
-                        bias += rate_rad_per_s;
-                        out.flags |= TickFlags::SERVO_TRANSIENT;
-                    }
-                    Transient::Unmeasured => out.flags |= TickFlags::SERVO_UNMEASURED,
-                }
-            }
-            let mut flags = SensorFlags::VALID;
-            let clamped = thermal.clamped() || self.thermal.gyro_axes.clamped();
-            flags.set(SensorFlags::CLAMPED_TEMPERATURE, clamped);
-            flags.set(
-                SensorFlags::STALE_TEMPERATURE,
-                self.thermal.stale(calibration, model.channel, tick.end_time),
-            );
-            flags.set(SensorFlags::EXCLUDED, self.thermal.gyro_axes.is_excluded(i));
-
-            let reading = tick.readings.get(i).copied().unwrap_or(f64::NAN);
-            let last_rate = self.last_rates.get(i).copied().unwrap_or(0.0);
-            let increment = if lost {
-                0.0
-            } else if reading.is_finite() {
-                if reading.abs() >= model.input_limit {
-                    flags |= SensorFlags::OVERRANGE;
-                    counters.overrange_readings += 1;
-                }
-                // Beyond its limit a reading says no more than the limit, and stays finite whatever it is.
-                let reading = reading.clamp(-model.input_limit, model.input_limit);
-                scaled(calibration.gyro_output, reading, terms.increment_weight, duration_s)
-                    - bias * duration_s
-            } else {
-                flags |= SensorFlags::NOT_FINITE;
-                counters.not_finite_readings += 1;
-                last_rate * duration_s
-            };
-            if lost
-                || flags.intersects(SensorFlags::OVERRANGE | SensorFlags::NOT_FINITE | SensorFlags::EXCLUDED)
-            {
-                flags -= SensorFlags::VALID;
-            }
-            if flags.intersects(SensorFlags::OVERRANGE | SensorFlags::NOT_FINITE) {
-                mask = mask.without(i);
-            }
-            increments.push(increment);
-            out.gyro_flags.push(flags);
-        }
-
-        // Before the substitution: the angle that it restores is a lump, not a rate.
-        let rates: Sensors<f64> = increments.iter().map(|increment| increment / duration_s).collect();
-        for ((last, rate), flags) in self.last_rates.iter_mut().zip(&rates).zip(&out.gyro_flags) {
-            if flags.contains(SensorFlags::VALID) {
-                *last = *rate;
-            }
-        }
-        match &calibration.reversal {
-            Some(reversal) => out.flags |= self.substitution.tick(reversal, input, &mut increments),
-            // A swap took the substitution away in the middle of a transition.
-            None if !self.substitution.is_settled() => {
-                self.substitution = Substitution::new();
-                out.flags |= TickFlags::SWITCH_UNRESOLVED;
-            }
-            None => {}
-        }
-        count_switch_flags(out.flags, counters);
-        let interpolated = out.flags.contains(TickFlags::INTERPOLATED);
-
-        let orientation = &calibration.gyro_orientation;
-        let axes = &mut self.thermal.gyro_axes;
-        if orientation.sensors() > MIN_SENSORS && !interpolated {
-            let verdict = axes.watch(orientation, mask, &rates);
-            out.gyro_parity = verdict.residuals;
-            out.flags.set(TickFlags::PARITY_EXCEEDED, verdict.exceeded);
-            counters.sensors_excluded += u64::from(verdict.exclude.is_some());
-        }
-        let (angle, trusted) = resolve(axes, orientation, mask, &increments, tick.end_time);
-        out.delta_angle = angle;
-        out.flags.set(TickFlags::ANGLE_INVALID, !trusted);
+        let per_second = 1.0 / tick.duration.as_s();
+        let seen = &mut self.seen;
+        seen.sequence = tick.sequence;
+        seen.end_time = tick.end_time;
+        seen.duration = tick.duration;
+        seen.missed = released.missed;
+        seen.mode = tick.mode;
+        seen.gyro_readings.clone_from(&tick.readings);
+        seen.gyro_flags.clone_from(&out.gyro_flags);
+        seen.accel_flags.clone_from(&out.accel_flags);
+        seen.angular_rate = out.delta_angle.map(|angle| angle * per_second);
+        seen.flags = out.flags;
+        seen.flags.set(TickFlags::RESTART, released.restart);
+        let gyros = self.gyro_health.iter_mut().zip(&out.gyro_flags);
+        let accels = self.accel_health.iter_mut().zip(&out.accel_flags);
+        // A tick without its accelerometers says nothing of them.
+        let accels = accels.filter(|_| !out.flags.contains(TickFlags::ACCELEROMETER_MISSING));
+        gyros.chain(accels).for_each(|(health, flags)| health.note(*flags));
     }
 
-    fn accels(
-        &mut self,
-        calibration: &Calibration,
-        time: Timestamp,
-        accel: Option<&AccelTick>,
-        out: &mut CorrectedTick,
-        counters: &mut Counters,
-    ) {
-        let Some(orientation) = &calibration.accel_orientation else { return };
-        let Some(tick) = accel else {
-            out.flags |= TickFlags::ACCELEROMETER_MISSING | TickFlags::VELOCITY_INVALID;
-            out.accel_flags.extend(core::iter::repeat_n(SensorFlags::empty(), calibration.accel_count()));
-            counters.accel_missing += 1;
-            return;
-        };
-        let duration_s = tick.duration.as_s();
-        let Some(axes) = &self.thermal.accel_axes else { return };
-        let mut mask = axes.included(orientation);
-        let mut forces = Sensors::<f64>::new();
-        for (i, (model, thermal)) in calibration.accels.iter().zip(&self.thermal.accels).enumerate() {
-            let stale = self.thermal.stale(calibration, model.channel, time)
-                || self.thermal.stale(calibration, model.board_channel, time);
-            let mut flags = SensorFlags::VALID;
-            flags.set(SensorFlags::CLAMPED_TEMPERATURE, thermal.clamped() || axes.clamped());
-            flags.set(SensorFlags::STALE_TEMPERATURE, stale);
-            flags.set(SensorFlags::EXCLUDED, axes.is_excluded(i));
-            let reading = tick.readings.get(i).copied().unwrap_or(f64::NAN);
-            let force = if reading.is_finite() {
-                if reading.abs() >= model.input_limit {
-                    flags |= SensorFlags::OVERRANGE;
-                    counters.overrange_readings += 1;
-                }
-                let reading = reading.clamp(-model.input_limit, model.input_limit);
-                let output = match calibration.accel_output {
-                    OutputKind::Counts => reading / duration_s,
-                    OutputKind::Mean => reading,
-                };
-                thermal.specific_force(output, time)
-            } else {
-                flags |= SensorFlags::NOT_FINITE;
-                counters.not_finite_readings += 1;
-                self.last_forces.get(i).copied().unwrap_or(0.0)
-            };
-            if flags.intersects(SensorFlags::OVERRANGE | SensorFlags::NOT_FINITE) {
-                mask = mask.without(i);
-                flags -= SensorFlags::VALID;
-            } else if let Some(last) = self.last_forces.get_mut(i) {
-                *last = force;
-            }
-            if flags.contains(SensorFlags::EXCLUDED) {
-                flags -= SensorFlags::VALID;
-            }
-            forces.push(force);
-            out.accel_flags.push(flags);
+    /// What is presently subtracted, in case axes.
+    pub(super) fn applied(&self, calibration: &Calibration) -> Applied {
+        let time = self.seen.end_time;
+        let gyros = self.thermal.gyro_axes.in_use(time);
+        let accels = self.thermal.accel_axes.as_ref().and_then(|axes| axes.in_use(time));
+        let rates = self.seen.gyro_biases.iter().zip(&self.seen.gyro_drifts);
+        let rates: Sensors<f64> = rates.map(|(bias, drift)| bias + drift).collect();
+        let forces: Sensors<f64> = (0..calibration.accels.len())
+            .filter_map(|i| self.accel_terms(i, time))
+            .map(|terms| terms.bias * terms.ratio * terms.per_scale_factor)
+            .collect();
+        Applied {
+            angular_rate: gyros.map_or([0.0; 3], |(_, inverse)| inverse.apply(&rates)),
+            specific_force: accels.map_or([0.0; 3], |(_, inverse)| inverse.apply(&forces)),
         }
-        let Some(axes) = &mut self.thermal.accel_axes else { return };
-        if orientation.sensors() > MIN_SENSORS {
-            let verdict = axes.watch(orientation, mask, &forces);
-            out.accel_parity = verdict.residuals;
-            if verdict.exceeded {
-                out.flags |= TickFlags::PARITY_EXCEEDED;
-            }
-            counters.sensors_excluded += u64::from(verdict.exclude.is_some());
-        }
-        let (force, trusted) = resolve(axes, orientation, mask, &forces, time);
-        out.delta_velocity = force.map(|f| f * duration_s);
-        out.flags.set(TickFlags::VELOCITY_INVALID, !trusted);
-    }
-}
-
-/// K(T)·P (rad).
-fn scaled(output: OutputKind, reading: f64, increment_weight: f64, duration_s: f64) -> f64 {
-    match output {
-        OutputKind::Counts => increment_weight * reading,
-        OutputKind::Mean => increment_weight * (reading * duration_s),
     }
 }
 
@@ -304,14 +254,6 @@ fn resolve(
     }
     let included = axes.included(orientation);
     (axes.resolve(orientation, included, readings, time).unwrap_or_default(), false)
-}
-
-/// Counts what the substitution did.
-fn count_switch_flags(flags: TickFlags, counters: &mut Counters) {
-    counters.ticks_interpolated += u64::from(flags.contains(TickFlags::INTERPOLATED));
-    counters.switches_restored += u64::from(flags.contains(TickFlags::ANGLE_RESTORED));
-    counters.servo_unmeasured += u64::from(flags.contains(TickFlags::SERVO_UNMEASURED));
-    counters.switches_unresolved += u64::from(flags.contains(TickFlags::SWITCH_UNRESOLVED));
 }
 
 /// The first three raw readings as they are, unscaled and flagged.

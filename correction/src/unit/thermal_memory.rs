@@ -276,6 +276,18 @@ impl ThermalMemory {
         memory.is_some_and(|memory| memory.stale(&calibration.filter, time))
     }
 
+    /// Smoothed temperature of the channel of a name (°C), where it is neither missing nor stale.
+    pub(super) fn alive(
+        &self,
+        calibration: &Calibration,
+        name: &ChannelName,
+        time: Timestamp,
+    ) -> Option<f64> {
+        let index = calibration.channels.iter().position(|channel| channel.name() == name)?;
+        let memory = self.channels.get(index).filter(|memory| !memory.stale(&calibration.filter, time))?;
+        memory.state().map(|state| state.temperature)
+    }
+
     /// Whether any channel is still warming up.
     pub(super) fn warming_up(&self, calibration: &Calibration) -> bool {
         self.channels.iter().any(|memory| memory.warming_up(&calibration.filter))

@@ -1,0 +1,132 @@
+//! What can be wrong with a set of parts, and where.
+
+use thiserror::Error;
+
+use crate::curve::CurveError;
+use crate::drift::DriftError;
+use crate::orientation::OrientationError;
+use crate::reversal::ReversalError;
+use crate::servo::ServoError;
+
+/// Part of the calibration in which a defect lies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Section {
+    /// Filter of all channels.
+    Filter,
+    /// The channel of this index.
+    Channel(usize),
+    /// The gyros as a set.
+    Gyros,
+    /// The gyro of this index.
+    Gyro(usize),
+    /// The gyros' orientation.
+    GyroOrientation,
+    /// The accelerometers as a set.
+    Accels,
+    /// The accelerometer of this index.
+    Accel(usize),
+    /// The accelerometers' orientation.
+    AccelOrientation,
+    /// The substitution over a mode switch.
+    Reversal,
+    /// The self-test's limits as a set.
+    SelfTest,
+    /// The self-test's voltage of this index.
+    SelfTestVoltage(usize),
+    /// The self-test's counter of this index.
+    SelfTestCounter(usize),
+}
+
+/// One thing that is wrong with a set of parts.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Defect {
+    /// Where.
+    pub section: Section,
+    /// Which field of the part.
+    pub field: &'static str,
+    /// What.
+    pub kind: DefectKind,
+}
+
+/// Kinds of wrongness.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum DefectKind {
+    /// Not a finite number, or outside its limits.
+    #[error("is {value}, must be {low} to {high}")]
+    OutOfRange {
+        /// The value.
+        value: f64,
+        /// Smallest value allowed.
+        low: f64,
+        /// Largest value allowed.
+        high: f64,
+    },
+    /// Too few or too many.
+    #[error("has {count} entries, must have {low} to {high}")]
+    Count {
+        /// How many there are.
+        count: usize,
+        /// Fewest allowed.
+        low: usize,
+        /// Most allowed.
+        high: usize,
+    },
+    /// Lower limit at or above the upper one.
+    #[error("runs from {low} to {high}: the first must be below the second")]
+    InvertedRange {
+        /// Lower end.
+        low: f64,
+        /// Upper end.
+        high: f64,
+    },
+    /// An index that names no channel.
+    #[error("names channel {index}, but there are {channels}")]
+    NoSuchChannel {
+        /// The index.
+        index: usize,
+        /// How many channels there are.
+        channels: usize,
+    },
+    /// Two things of one name.
+    #[error("is the name of {of} {other} too: names must differ")]
+    DuplicateName {
+        /// What the earlier one is.
+        of: &'static str,
+        /// Its index.
+        other: usize,
+    },
+    /// A name without a letter.
+    #[error("is empty, must be a name")]
+    NoName,
+    /// Zero where a divisor or a weight is needed.
+    #[error("is zero at {at} °C, must not be zero anywhere in its range")]
+    Zero {
+        /// Argument at which it is zero.
+        at: f64,
+    },
+    /// A term that works on counts, for gyros with another output.
+    #[error("needs gyros whose output is counts")]
+    NeedsCounts,
+    /// Needed because another part is there.
+    #[error("is missing: {needed_by} needs it")]
+    Missing {
+        /// What needs it.
+        needed_by: &'static str,
+    },
+    /// A curve is wrong.
+    #[error(transparent)]
+    Curve(CurveError),
+    /// The orientation is wrong.
+    #[error(transparent)]
+    Orientation(OrientationError),
+    /// The substitution is wrong.
+    #[error(transparent)]
+    Reversal(ReversalError),
+    /// The servo transient is wrong.
+    #[error(transparent)]
+    Servo(ServoError),
+    /// The drift is wrong.
+    #[error(transparent)]
+    Drift(DriftError),
+}

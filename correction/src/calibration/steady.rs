@@ -1,0 +1,199 @@
+//! The correction at a stated thermal state, without memory: what two calibrations are compared by.
+
+use alloc::vec::Vec;
+
+use super::Calibration;
+use crate::channel::ThermalState;
+use crate::earth::EARTH_RATE;
+use crate::orientation::{Inverse, Orientation, SensorMask};
+use crate::sample::{ChannelName, LasingMode, OutputKind, Sensors};
+use crate::thermal::TrendModel;
+use crate::units::STANDARD_GRAVITY_M_PER_S2;
+
+/// What a calibration does to a unit that has been on for long and whose temperatures move steadily.
+///
+/// Lags have settled on the ramp, the trend since turn-on has reached the end of its interval, no switch of the mode
+/// is near, and the slow meander has the sign +. The drift estimate is no part of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Steady {
+    /// Ω: bias of each gyro (rad/s), in the sense of its input axis; subtracted.
+    pub gyro_bias: Sensors<f64>,
+    /// K(T): increment weight of each gyro (rad per count, or rad per rad); multiplies.
+    pub gyro_weight: Sensors<f64>,
+    /// Input axis of each gyro in case axes: the rows of C(T).
+    pub gyro_axes: Sensors<[f64; 3]>,
+    /// `C⁺·Ω`: the rate that the biases take away, in case axes (rad/s).
+    pub gyro_rate_in_case: [f64; 3],
+    /// `S·r/K`: bias of each accelerometer as a specific force (m/s²); subtracted.
+    pub accel_bias: Sensors<f64>,
+    /// `K/r`: output of each accelerometer per specific force, its board included (V, counts/s or m/s² per m/s²);
+    /// divides.
+    pub accel_scale: Sensors<f64>,
+    /// Input axis of each accelerometer in case axes.
+    pub accel_axes: Sensors<[f64; 3]>,
+    /// The specific force that the biases take away, in case axes (m/s²); zero without accelerometers.
+    pub accel_force_in_case: [f64; 3],
+    /// Channels, by index, whose temperature is outside [`Calibration::range_of`].
+    pub outside: Vec<usize>,
+    outputs: (OutputKind, OutputKind),
+    gyro_inverse: Option<Inverse>,
+    accel_inverse: Option<Inverse>,
+}
+
+/// By how much the output of a unit at rest steps when one calibration follows another, in case axes.
+///
+/// What the biases do is known; what weights, scale factors and axes do depends on how the unit stands. Each number is
+/// the difference of the biases, made larger by the most that the rest can do at any attitude: to the Earth's rate and
+/// to 1 g.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Jump {
+    /// Step of the corrected angular rate (rad/s).
+    pub angular_rate: [f64; 3],
+    /// Step of the corrected specific force (m/s²); zero without accelerometers.
+    pub specific_force: [f64; 3],
+}
+
+impl Calibration {
+    /// The correction at the temperatures that `thermal` gives by the channel's name, and in a lasing mode.
+    ///
+    /// A channel without a temperature, and a sensor without a channel, stand at the assumed one. Without a mode the
+    /// magnetic bias has the sign +, as in the state machine.
+    #[must_use]
+    pub fn steady(
+        &self,
+        thermal: impl Fn(&ChannelName) -> Option<ThermalState>,
+        mode: Option<LasingMode>,
+    ) -> Steady {
+        let known: Vec<Option<ThermalState>> =
+            self.channels.iter().map(|channel| thermal(channel.name())).collect();
+        let assumed = ThermalState { temperature: self.filter.assumed_deg_c, ..ThermalState::default() };
+        let state =
+            |channel: Option<usize>| channel.and_then(|channel| *known.get(channel)?).unwrap_or(assumed);
+        let mean = |following: &[usize]| {
+            let known = following.iter().filter_map(|&channel| *known.get(channel)?);
+            let (sum, count) = known.fold((0.0, 0.0), |(sum, n), state| (sum + state.temperature, n + 1.0));
+            if count > 0.0 { sum / count } else { assumed.temperature }
+        };
+        let sign = mode.map_or(1.0, LasingMode::sign);
+
+        let (mut gyro_bias, mut gyro_weight) = (Sensors::new(), Sensors::new());
+        for gyro in &self.gyros {
+            let terms = gyro.steady(&state(gyro.channel), &self.filter);
+            let trend = gyro.trend.as_ref().map_or(0.0, TrendModel::last);
+            gyro_bias.push(terms.bias + trend + sign * terms.magnetic + terms.meander);
+            gyro_weight.push(terms.increment_weight);
+        }
+        let (mut accel_bias, mut accel_scale) = (Sensors::new(), Sensors::new());
+        for accel in &self.accels {
+            let temperature = state(accel.channel).temperature;
+            let ratio = accel.board_ratio.at(state(accel.board_channel).temperature).value;
+            let scale = accel.scale_factor.at(temperature).value / ratio;
+            accel_bias.push(accel.bias.at(temperature).value / scale);
+            accel_scale.push(scale);
+        }
+        let gyro_temperature = mean(&self.gyro_orientation_channels);
+        let accel_temperature = mean(&self.accel_orientation_channels);
+        let accel_orientation = self.accel_orientation.as_ref();
+        let gyro_inverse = inverse(&self.gyro_orientation, gyro_temperature);
+        let accel_inverse = accel_orientation.and_then(|axes| inverse(axes, accel_temperature));
+        let in_case = |inverse: &Option<Inverse>, bias: &[f64]| {
+            inverse.as_ref().map(|inverse| inverse.apply(bias)).unwrap_or_default()
+        };
+        let outside = known.iter().enumerate().filter(|(channel, state)| {
+            let range = self.range_of(*channel);
+            range.zip(**state).is_some_and(|([low, high], state)| !(low..=high).contains(&state.temperature))
+        });
+        Steady {
+            gyro_axes: rows(&self.gyro_orientation, gyro_temperature),
+            gyro_rate_in_case: in_case(&gyro_inverse, &gyro_bias),
+            accel_axes: accel_orientation.map(|axes| rows(axes, accel_temperature)).unwrap_or_default(),
+            accel_force_in_case: in_case(&accel_inverse, &accel_bias),
+            outside: outside.map(|(channel, _)| channel).collect(),
+            outputs: (self.gyro_output, self.accel_output),
+            gyro_bias,
+            gyro_weight,
+            accel_bias,
+            accel_scale,
+            gyro_inverse,
+            accel_inverse,
+        }
+    }
+}
+
+impl Steady {
+    /// The step when `next` follows this one.
+    ///
+    /// `None` where the two are not for the same readings (number of sensors, kind of output), so that there is no such
+    /// step, or where one of them is no number.
+    #[must_use]
+    pub fn jump(&self, next: &Self) -> Option<Jump> {
+        let counts = |steady: &Self| (steady.gyro_bias.len(), steady.accel_bias.len(), steady.outputs);
+        if counts(self) != counts(next) {
+            return None;
+        }
+        let gyro_ratios = next.gyro_weight.iter().zip(&self.gyro_weight).map(|(new, old)| new / old);
+        let angular_rate = step(
+            (&self.gyro_axes, &self.gyro_bias),
+            (next.gyro_inverse.as_ref()?, &next.gyro_bias),
+            &gyro_ratios.collect::<Sensors<f64>>(),
+            EARTH_RATE.as_rad_per_s(),
+        );
+        let accel_ratios = self.accel_scale.iter().zip(&next.accel_scale).map(|(old, new)| old / new);
+        let specific_force = next.accel_inverse.as_ref().map(|inverse| {
+            step(
+                (&self.accel_axes, &self.accel_bias),
+                (inverse, &next.accel_bias),
+                &accel_ratios.collect::<Sensors<f64>>(),
+                STANDARD_GRAVITY_M_PER_S2,
+            )
+        });
+        if specific_force.is_none() && !next.accel_bias.is_empty() {
+            return None;
+        }
+        let jump = Jump { angular_rate, specific_force: specific_force.unwrap_or_default() };
+        let finite = |vector: [f64; 3]| vector.iter().all(|x| x.is_finite());
+        (finite(jump.angular_rate) && finite(jump.specific_force)).then_some(jump)
+    }
+}
+
+/// Change of the output for the worst input of a given size.
+///
+/// A sensor that reads s under the first calibration reads ρ·(s + b) − b′ under the second, ρ being the ratio of the
+/// weights. With s = C·v the output changes by `C′⁺·(ρ·b − b′) + (C′⁺·ρ·C − 1)·v`.
+fn step(
+    (axes, bias): (&[[f64; 3]], &[f64]),
+    (inverse, next_bias): (&Inverse, &[f64]),
+    ratios: &[f64],
+    size: f64,
+) -> [f64; 3] {
+    let biases = ratios.iter().zip(bias).zip(next_bias).map(|((ratio, old), new)| ratio * old - new);
+    let fixed = inverse.apply(&biases.collect::<Sensors<f64>>());
+    let column = |axis: usize| {
+        let along = ratios.iter().zip(axes).map(|(ratio, row)| ratio * row.get(axis).copied().unwrap_or(0.0));
+        inverse.apply(&along.collect::<Sensors<f64>>())
+    };
+    let columns = [column(0), column(1), column(2)];
+    let mut step = fixed;
+    for (i, step) in step.iter_mut().enumerate() {
+        let mut square = 0.0;
+        for (j, column) in columns.iter().enumerate() {
+            let unit = if i == j { 1.0 } else { 0.0 };
+            let turned = column.get(i).copied().unwrap_or(unit) - unit;
+            square += turned * turned;
+        }
+        *step += libm::copysign(libm::sqrt(square) * size, *step);
+    }
+    step
+}
+
+/// C⁺ of all sensors.
+fn inverse(orientation: &Orientation, temperature_deg_c: f64) -> Option<Inverse> {
+    orientation.inverse(temperature_deg_c, SensorMask::all(orientation.sensors()))
+}
+
+/// Rows of C.
+fn rows(orientation: &Orientation, temperature_deg_c: f64) -> Sensors<[f64; 3]> {
+    let along = |axis| orientation.forward(temperature_deg_c, axis);
+    let (x, y, z) = (along([1.0, 0.0, 0.0]), along([0.0, 1.0, 0.0]), along([0.0, 0.0, 1.0]));
+    x.into_iter().zip(y).zip(z).map(|((x, y), z)| [x, y, z]).collect()
+}

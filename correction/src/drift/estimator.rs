@@ -1,0 +1,305 @@
+//! The estimator of a unit: feeds each gyro's filter from ticks and references, and says what to subtract.
+
+use alloc::vec::Vec;
+
+use super::DriftModel;
+use super::filter::{Measured, Verdict};
+use super::gyro::{DriftEstimate, GyroDrift, grid_cell};
+use super::reference::{Reference, ReferenceCounters, ReferenceRefusal, Waiting};
+use super::ring::{NoMean, cell_end};
+use crate::observation::Observation;
+use crate::sample::{SensorFlags, Sensors};
+use crate::units::{Span, Timestamp};
+
+/// Settings of an estimator that are not part of the calibration.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct DriftSettings {
+    /// A reference takes effect for ticks that end after its span plus this.
+    pub delay: Span,
+    /// Whether the drift is subtracted; it is estimated in any case.
+    pub subtract: bool,
+}
+
+/// Follows the drift of every gyro of a unit whose calibration states one.
+///
+/// Everything is a function of the ticks, the references and their own time: a reference takes effect at the first tick
+/// that ends after the end of its span plus a fixed delay (and after the 0.25 s cell in which the span ends). What arrives
+/// later still is counted and applies from the next tick on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DriftEstimator {
+    /// In the order of the calibration, `None` for a gyro without a stated drift; empty where none states one.
+    gyros: Vec<Option<GyroDrift>>,
+    settings: DriftSettings,
+    waiting: Waiting,
+    counters: ReferenceCounters,
+    last_refusal: Option<(Reference, ReferenceRefusal)>,
+    /// End of the tick of the last [`advance`](Self::advance).
+    now: Option<Timestamp>,
+    /// Number of the grid cell in which it lies.
+    grid: i64,
+    /// End of the last tick that was observed.
+    observed_until: Option<Timestamp>,
+    /// End of the last reference that was measured against the readings.
+    used_until: Option<Timestamp>,
+}
+
+impl DriftEstimator {
+    /// An estimator for the gyros of a unit, in the calibration's order; `None` for a gyro that states no drift.
+    ///
+    /// Allocates here and never again, and nothing where no gyro states a drift: then a tick costs one branch.
+    #[must_use]
+    pub fn new(models: &[Option<DriftModel>], settings: DriftSettings) -> Self {
+        let gyros = if models.iter().any(Option::is_some) { models } else { &[] };
+        Self {
+            gyros: gyros.iter().map(|model| model.map(GyroDrift::new)).collect(),
+            settings,
+            waiting: Waiting::default(),
+            counters: ReferenceCounters::default(),
+            last_refusal: None,
+            now: None,
+            grid: 0,
+            observed_until: None,
+            used_until: None,
+        }
+    }
+
+    /// Whether no gyro states a drift: there is nothing to feed.
+    #[must_use]
+    pub fn is_idle(&self) -> bool {
+        self.gyros.is_empty()
+    }
+
+    /// Goes on where `before` is, after a swap of the calibration, for each gyro whose drift parameters are the same and
+    /// for which `same_bias` says that the other biases are too; what is left of a bias that changed is another drift.
+    pub fn carry(&mut self, before: Self, same_bias: impl Fn(usize) -> bool) {
+        for (index, (new, old)) in self.gyros.iter_mut().zip(before.gyros).enumerate() {
+            if let (Some(new), Some(old)) = (new, old)
+                && new.filter.model() == old.filter.model()
+                && same_bias(index)
+            {
+                *new = old;
+            }
+        }
+        self.waiting = before.waiting;
+        self.counters = before.counters;
+        self.last_refusal = before.last_refusal;
+        self.now = before.now;
+        self.grid = before.grid;
+        self.observed_until = before.observed_until;
+        self.used_until = before.used_until;
+    }
+
+    /// Takes a reference from an aiding source.
+    ///
+    /// # Errors
+    ///
+    /// What is wrong with it by itself, or that too many wait. What shows only when it takes effect is counted then.
+    pub fn submit(&mut self, reference: &Reference) -> Result<(), ReferenceRefusal> {
+        self.wait(reference)?;
+        if self.now.is_some_and(|now| self.effective(reference) < now) {
+            self.counters.late += 1;
+        }
+        Ok(())
+    }
+
+    /// Takes a reference that the unit's owner made at rest, from ticks that are long past: it is never late.
+    ///
+    /// # Errors
+    ///
+    /// As [`submit`](Self::submit).
+    pub fn submit_at_rest(&mut self, reference: &Reference) -> Result<(), ReferenceRefusal> {
+        self.wait(reference)
+    }
+
+    fn wait(&mut self, reference: &Reference) -> Result<(), ReferenceRefusal> {
+        self.counters.received += 1;
+        let idle = if self.is_idle() { Err(ReferenceRefusal::NoDrift) } else { Ok(()) };
+        if let Err(refusal) = idle.and_then(|()| reference.check()) {
+            self.refuse(reference, refusal);
+            return Err(refusal);
+        }
+        if let Some(over) = self.waiting.push(reference) {
+            self.refuse(&over, ReferenceRefusal::TooMany);
+            if over == *reference {
+                return Err(ReferenceRefusal::TooMany);
+            }
+        }
+        Ok(())
+    }
+
+    fn refuse(&mut self, reference: &Reference, refusal: ReferenceRefusal) {
+        self.counters.refuse(refusal);
+        self.last_refusal = Some((*reference, refusal));
+    }
+
+    /// Ticks that end after this time feel the reference.
+    fn effective(&self, reference: &Reference) -> Timestamp {
+        (reference.end + self.settings.delay).max(cell_end(reference.end))
+    }
+
+    /// Goes on to the tick that ends at `end_time`, before it is corrected: applies every reference that takes effect.
+    ///
+    /// `restart`: sequence or time starts anew at this tick ([`TickFlags::RESTART`](crate::sample::TickFlags::RESTART)).
+    /// `project` gives the rates along the input axes for a rate in case axes, as
+    /// [`Orientation::forward`](crate::orientation::Orientation::forward) does at the present temperature; it is called
+    /// once per reference.
+    pub fn advance(
+        &mut self,
+        end_time: Timestamp,
+        restart: bool,
+        project: &dyn Fn([f64; 3]) -> Sensors<f64>,
+    ) {
+        if self.is_idle() {
+            return;
+        }
+        let grid = grid_cell(end_time);
+        if restart {
+            self.restart(end_time, grid);
+        } else if grid != self.grid || self.now.is_none() {
+            self.gyros.iter_mut().flatten().for_each(|gyro| gyro.draw(grid));
+        }
+        self.grid = grid;
+        self.now = Some(end_time);
+        let Some(observed_until) = self.observed_until else { return };
+        let delay = self.settings.delay;
+        let due = |r: &Reference| r.end + delay < end_time && cell_end(r.end) <= observed_until;
+        while let Some(reference) = self.waiting.pop_if(due) {
+            match self.apply(&reference, end_time, project) {
+                Ok(()) => self.counters.used += 1,
+                Err(refusal) => self.refuse(&reference, refusal),
+            }
+        }
+    }
+
+    /// Measures the drift of every gyro against a reference.
+    fn apply(
+        &mut self,
+        reference: &Reference,
+        now: Timestamp,
+        project: &dyn Fn([f64; 3]) -> Sensors<f64>,
+    ) -> Result<(), ReferenceRefusal> {
+        if self.used_until.is_some_and(|until| reference.start < until) {
+            return Err(ReferenceRefusal::Overlap);
+        }
+        let grid = self.grid;
+        let (mut taken, mut gated, mut gap) = (false, false, false);
+        for (gyro, rate) in self.gyros.iter_mut().zip(project(reference.angular_rate)) {
+            let Some(gyro) = gyro else { continue };
+            let mean = match gyro.ring.mean(reference) {
+                Ok(mean) => mean,
+                Err(no_mean) => {
+                    gap |= no_mean == NoMean::Gap;
+                    continue;
+                }
+            };
+            let before = gyro.subtrahend(grid, now);
+            let verdict = gyro.filter.update(&Measured {
+                start: reference.start,
+                end: reference.end,
+                mean: mean.rate - rate,
+                variance: mean.variance + reference.sigma * reference.sigma,
+            });
+            if verdict == Verdict::Refused {
+                gated = true;
+            } else {
+                gyro.hand_over(before, grid, now);
+                taken = true;
+            }
+        }
+        if taken || gated {
+            self.used_until = Some(reference.end);
+        }
+        match (taken, gated, gap) {
+            (true, ..) => Ok(()),
+            (_, true, _) => Err(ReferenceRefusal::Gated),
+            (.., true) => Err(ReferenceRefusal::Gap),
+            _ => Err(ReferenceRefusal::TooOld),
+        }
+    }
+
+    /// The producer restarted: its readings are forgotten, the estimate goes on by prediction. Where time stepped back,
+    /// nobody knows how long the producer was away, and the estimate starts anew about its constant part.
+    fn restart(&mut self, end_time: Timestamp, grid: i64) {
+        let last = self.now.replace(end_time);
+        let goes_on = last.is_none_or(|last| last < end_time);
+        for gyro in self.gyros.iter_mut().flatten() {
+            gyro.ring.clear();
+            let before = last.map_or(0.0, |last| gyro.subtrahend(self.grid, last));
+            if !goes_on {
+                gyro.filter.lose_time();
+            }
+            gyro.hand_over(before, grid, end_time);
+        }
+        self.observed_until = None;
+        if !goes_on {
+            self.used_until = None;
+        }
+        for _ in 0..self.waiting.restart(end_time) {
+            self.counters.refuse(ReferenceRefusal::Restarted);
+        }
+    }
+
+    /// Takes a tick after its correction.
+    pub fn observe(&mut self, observation: &Observation) {
+        if self.is_idle() {
+            return;
+        }
+        let end = observation.end_time;
+        let start = end - observation.duration;
+        let readings =
+            observation.gyro_rates.iter().zip(&observation.gyro_biases).zip(&observation.gyro_flags);
+        for (gyro, ((rate, bias), flags)) in self.gyros.iter_mut().zip(readings) {
+            let Some(gyro) = gyro else { continue };
+            gyro.filter.start(start);
+            gyro.ring.reach(end);
+            let residual = rate - bias;
+            if observation.settled && flags.contains(SensorFlags::VALID) && residual.is_finite() {
+                gyro.ring.add(start, end, residual);
+            }
+        }
+        self.observed_until = Some(end);
+    }
+
+    /// What to subtract from gyro `gyro` at the end of the present tick, `time` (rad/s): the prediction, without a step at
+    /// updates. Zero for a gyro without a stated drift, and where the settings do not ask for it.
+    #[must_use]
+    pub fn subtrahend(&self, gyro: usize, time: Timestamp) -> f64 {
+        let gyro = self.gyros.get(gyro).filter(|_| self.settings.subtract).and_then(Option::as_ref);
+        gyro.map_or(0.0, |gyro| gyro.subtrahend(self.grid, time))
+    }
+
+    /// The drift of gyro `gyro` as it is known at the last tick; `None` for a gyro without a stated drift.
+    ///
+    /// The rate comes from a grid of 1 s and moves linearly in between; sigma and trend are evaluated here.
+    #[must_use]
+    pub fn estimate(&self, gyro: usize) -> Option<DriftEstimate> {
+        let gyro = self.gyros.get(gyro)?.as_ref()?;
+        Some(gyro.estimate(self.grid, self.now.unwrap_or_default()))
+    }
+
+    /// The drift of every gyro, in the calibration's order.
+    pub fn estimates(&self) -> impl Iterator<Item = Option<DriftEstimate>> + '_ {
+        (0..self.gyros.len()).map(|gyro| self.estimate(gyro))
+    }
+
+    /// What became of the references.
+    #[must_use]
+    pub const fn counters(&self) -> &ReferenceCounters {
+        &self.counters
+    }
+
+    /// The last reference that was refused, and why.
+    #[must_use]
+    pub const fn last_refusal(&self) -> Option<&(Reference, ReferenceRefusal)> {
+        self.last_refusal.as_ref()
+    }
+
+    /// How many references wait to take effect.
+    #[must_use]
+    pub fn waiting(&self) -> usize {
+        self.waiting.len()
+    }
+}
+
+#[cfg(test)]
+mod tests;

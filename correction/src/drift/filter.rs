@@ -1,0 +1,318 @@
+//! Kalman filter of one gyro's drift over (ε0, ε1, χ), with a gate against wrong references.
+
+use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
+
+use super::moments::Step;
+use super::{DriftModel, DriftParts};
+use crate::units::Timestamp;
+
+/// An innovation beyond this many of its sigmas is refused.
+pub const GATE_SIGMAS: f64 = 5.0;
+/// So many refusals in a row that agree with each other are believed: the drift itself has stepped.
+pub const BELIEF_REFUSALS: u32 = 10;
+/// Innovations beyond this many initial sigmas of the whole drift are never believed: that is no drift.
+pub const BELIEF_LIMIT: f64 = 10.0;
+/// Updates over which the normalised innovation squared is averaged: an hour of references at rest.
+pub const INNOVATIONS_KEPT: usize = 60;
+/// 95 % bounds of the mean normalised innovation squared over [`INNOVATIONS_KEPT`] updates of a consistent filter:
+/// those of χ² with as many degrees of freedom, divided by them.
+pub const MEAN_NIS_BOUNDS: [f64; 2] = [0.6747, 1.3883];
+
+/// A measurement counts for no better than this share of the prediction's variance: beyond it rounding would eat up the
+/// covariance. The next one goes on from there.
+const FINEST: f64 = 1e-10;
+
+/// The last normalised innovations squared.
+#[derive(Debug, Clone, PartialEq)]
+struct Innovations {
+    squares: [f64; INNOVATIONS_KEPT],
+    next: usize,
+    kept: usize,
+}
+
+impl Innovations {
+    const fn new() -> Self {
+        Self { squares: [0.0; INNOVATIONS_KEPT], next: 0, kept: 0 }
+    }
+
+    fn push(&mut self, square: f64) {
+        if let Some(place) = self.squares.get_mut(self.next) {
+            *place = square;
+        }
+        self.next = (self.next + 1) % INNOVATIONS_KEPT;
+        self.kept = (self.kept + 1).min(INNOVATIONS_KEPT);
+    }
+
+    /// Mean over what is kept; summed anew, so that no rounding collects.
+    fn mean(&self) -> Option<f64> {
+        let (sum, count) =
+            self.squares.iter().take(self.kept).fold((0.0, 0.0), |(sum, n), square| (sum + square, n + 1.0));
+        (count > 0.0).then(|| sum / count)
+    }
+}
+
+/// Refusals in a row that agree with each other.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Refusals {
+    count: u32,
+    innovation: f64,
+    variance: f64,
+}
+
+/// What became of a measurement.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Verdict {
+    /// It was used.
+    Taken,
+    /// Its innovation was beyond the gate.
+    Refused,
+    /// As [`Taken`](Self::Taken), after refusals that agree with it.
+    Believed,
+}
+
+/// The measured mean drift over a span.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Measured {
+    pub(super) start: Timestamp,
+    pub(super) end: Timestamp,
+    /// Mean over the span (rad/s).
+    pub(super) mean: f64,
+    /// Its variance without the white noise of the gyro ((rad/s)²).
+    pub(super) variance: f64,
+}
+
+/// What a filter says of a time beside the rate.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Predicted {
+    /// Sigma of the drift (rad/s).
+    pub(super) sigma: f64,
+    /// Trend rate (rad/s²).
+    pub(super) trend: f64,
+    /// Its sigma (rad/s²).
+    pub(super) trend_sigma: f64,
+}
+
+/// The filter of one gyro.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Filter {
+    model: DriftModel,
+    /// Time of state and covariance; `None` before the first tick.
+    time: Option<Timestamp>,
+    /// ε0 (rad/s), ε1 (rad/s), χ (rad/s²).
+    state: Vector3<f64>,
+    covariance: Matrix3<f64>,
+    refusals: Option<Refusals>,
+    innovations: Innovations,
+    last_innovation: Option<f64>,
+    last_update: Option<Timestamp>,
+    updates: u64,
+    refused: u64,
+    believed: u64,
+}
+
+impl Filter {
+    pub(super) fn new(model: DriftModel) -> Self {
+        Self {
+            model,
+            time: None,
+            state: Vector3::zeros(),
+            covariance: Matrix3::from_diagonal(&initial_variances(&model)),
+            refusals: None,
+            innovations: Innovations::new(),
+            last_innovation: None,
+            last_update: None,
+            updates: 0,
+            refused: 0,
+            believed: 0,
+        }
+    }
+
+    /// Says at what time the initial state holds; later calls change nothing.
+    pub(super) fn start(&mut self, time: Timestamp) {
+        self.time.get_or_insert(time);
+    }
+
+    /// The producer's clock stepped back, so nobody knows how long it was away: what changes with time is forgotten, the
+    /// constant part may be another one by its initial sigma.
+    pub(super) fn lose_time(&mut self) {
+        let [constant, markov, trend] = initial_variances(&self.model).into();
+        self.state = Vector3::new(self.state.x, 0.0, 0.0);
+        let grown = self.covariance.m11 + constant;
+        self.covariance = Matrix3::from_diagonal(&Vector3::new(grown, markov, trend));
+        self.time = None;
+        self.refusals = None;
+        self.last_update = None;
+    }
+
+    /// Predicted drift at `time` (rad/s).
+    pub(super) fn rate_at(&self, time: Timestamp) -> f64 {
+        let parts = self.model.parts();
+        let since_s = self.time.map_or(0.0, |t| time.seconds_from(t));
+        let markov = libm::exp(-since_s / parts.correlation_time_s);
+        let tau = parts.trend_correlation_time_s;
+        let trend_s = -tau * libm::expm1(-since_s / tau);
+        self.state.x + markov * self.state.y + trend_s * self.state.z
+    }
+
+    /// What the rate alone does not say, at `time`.
+    pub(super) fn predict(&self, time: Timestamp) -> Predicted {
+        let since_s = self.time.map_or(0.0, |t| time.since(t).as_s());
+        let (state, covariance) = self.predicted(since_s);
+        let drift = Vector3::new(1.0, 1.0, 0.0);
+        let variance = drift.dot(&(covariance * drift));
+        let sigma = |variance: f64| libm::sqrt(variance.max(0.0));
+        Predicted { sigma: sigma(variance), trend: state.z, trend_sigma: sigma(covariance.m33) }
+    }
+
+    pub(super) const fn model(&self) -> &DriftModel {
+        &self.model
+    }
+
+    pub(super) const fn last_update(&self) -> Option<Timestamp> {
+        self.last_update
+    }
+
+    /// Measurements taken, refused by the gate, and believed after refusals (these are among the taken ones).
+    pub(super) const fn counts(&self) -> [u64; 3] {
+        [self.updates, self.refused, self.believed]
+    }
+
+    /// Innovation of the last measurement taken, in its sigmas.
+    pub(super) const fn last_innovation(&self) -> Option<f64> {
+        self.last_innovation
+    }
+
+    /// Mean of the normalised innovations squared over the last [`INNOVATIONS_KEPT`] measurements taken.
+    pub(super) fn mean_nis(&self) -> Option<f64> {
+        self.innovations.mean()
+    }
+
+    /// State and covariance this long after the last update (s).
+    fn predicted(&self, since_s: f64) -> (Vector3<f64>, Matrix3<f64>) {
+        let step = Step::over(since_s, self.model.parts());
+        let transition: Matrix3<f64> = step.transition.fixed_view::<3, 3>(0, 0).into_owned();
+        let noise: Matrix3<f64> = step.noise.fixed_view::<3, 3>(0, 0).into_owned();
+        let covariance = transition * self.covariance * transition.transpose() + noise;
+        (transition * self.state, symmetric(&covariance))
+    }
+
+    /// Takes the mean drift over a span that starts no earlier than the last one ended.
+    pub(super) fn update(&mut self, measured: &Measured) -> Verdict {
+        let parts = *self.model.parts();
+        let span_s = measured.end.since(measured.start).as_s();
+        let since_s = self.time.map_or(0.0, |t| measured.start.since(t).as_s());
+        let white = parts.angle_random_walk_rad_per_sqrt_s;
+        let variance = measured.variance + white * white / span_s;
+
+        let (mut state, mut covariance) = self.predicted(since_s);
+        let mut posterior = Posterior::new(&state, &covariance, span_s, &parts, measured.mean, variance);
+        let mut verdict = Verdict::Taken;
+        if !posterior.plausible() {
+            self.refused += 1;
+            if !self.believes(&posterior) {
+                return Verdict::Refused;
+            }
+            // The step is taken to be one of the constant part, of the size that it shows.
+            self.refused -= 1;
+            self.believed += 1;
+            verdict = Verdict::Believed;
+            covariance.m11 += posterior.innovation * posterior.innovation;
+            posterior = Posterior::new(&state, &covariance, span_s, &parts, measured.mean, variance);
+        }
+        self.refusals = None;
+        (state, covariance) = (posterior.state, posterior.covariance);
+        self.state = state;
+        self.covariance = covariance;
+        self.time = Some(measured.end);
+        self.last_update = Some(measured.end);
+        self.last_innovation = Some(posterior.normalised());
+        self.innovations.push(posterior.normalised() * posterior.normalised());
+        self.updates += 1;
+        verdict
+    }
+
+    /// Whether this implausible measurement ends a row of refusals that agree with each other.
+    fn believes(&mut self, posterior: &Posterior) -> bool {
+        let Posterior { innovation, innovation_variance: variance, .. } = *posterior;
+        let count = match self.refusals {
+            Some(last) if agree((last.innovation, last.variance), (innovation, variance)) => last.count + 1,
+            _ => 1,
+        };
+        self.refusals = Some(Refusals { count, innovation, variance });
+        let [constant, markov, _] = initial_variances(&self.model).into();
+        let limit = BELIEF_LIMIT * libm::sqrt(constant + markov);
+        count >= BELIEF_REFUSALS && innovation.abs() <= limit && variance.is_finite()
+    }
+}
+
+/// Whether two innovations, each with its variance, may be the same one.
+fn agree((a, a_variance): (f64, f64), (b, b_variance): (f64, f64)) -> bool {
+    (a - b).abs() <= GATE_SIGMAS * libm::sqrt(a_variance + b_variance)
+}
+
+/// Variances of ε0, ε1 and χ before anything was measured.
+fn initial_variances(model: &DriftModel) -> Vector3<f64> {
+    let parts = model.parts();
+    let sigmas =
+        Vector3::new(parts.initial_sigma_rad_per_s, parts.sigma_rad_per_s, parts.trend_sigma_rad_per_s2);
+    sigmas.component_mul(&sigmas)
+}
+
+/// State after a measurement of the mean over a span, if it is taken.
+struct Posterior {
+    innovation: f64,
+    innovation_variance: f64,
+    state: Vector3<f64>,
+    covariance: Matrix3<f64>,
+}
+
+impl Posterior {
+    /// From state and covariance at the start of the span. The integral of ε over the span is carried along as a fourth
+    /// state that starts as zero: its quotient by the span is what was measured, at no approximation.
+    fn new(
+        state: &Vector3<f64>,
+        covariance: &Matrix3<f64>,
+        span_s: f64,
+        parts: &DriftParts,
+        mean: f64,
+        variance: f64,
+    ) -> Self {
+        let step = Step::over(span_s, parts);
+        let state = step.transition * state.push(0.0);
+        let mut start = Matrix4::zeros();
+        start.fixed_view_mut::<3, 3>(0, 0).copy_from(covariance);
+        let before = symmetric(&(step.transition * start * step.transition.transpose() + step.noise));
+
+        let h = Vector4::new(0.0, 0.0, 0.0, 1.0 / span_s);
+        let innovation = mean - h.dot(&state);
+        let predicted_variance = h.dot(&(before * h));
+        let variance = variance.max(FINEST * predicted_variance);
+        let innovation_variance = predicted_variance + variance;
+        let gain = before * h / innovation_variance;
+        // Joseph's form: it stays positive whatever the rounding of the gain.
+        let rest = Matrix4::identity() - gain * h.transpose();
+        let after = rest * before * rest.transpose() + gain * gain.transpose() * variance;
+        let state = state + gain * innovation;
+        let covariance: Matrix3<f64> = after.fixed_view::<3, 3>(0, 0).into_owned();
+        Self { innovation, innovation_variance, state: state.xyz(), covariance: symmetric(&covariance) }
+    }
+
+    /// Innovation in its sigmas.
+    fn normalised(&self) -> f64 {
+        self.innovation / libm::sqrt(self.innovation_variance)
+    }
+
+    /// Within the gate; a variance that is no number says that the readings were none.
+    fn plausible(&self) -> bool {
+        self.innovation_variance.is_finite()
+            && self.innovation.abs() <= GATE_SIGMAS * libm::sqrt(self.innovation_variance)
+    }
+}
+
+/// The symmetric part: rounding would otherwise let the two halves drift apart.
+fn symmetric<const N: usize>(matrix: &nalgebra::SMatrix<f64, N, N>) -> nalgebra::SMatrix<f64, N, N> {
+    (matrix + matrix.transpose()) * 0.5
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,118 @@
+//! One gyro of the estimator: its filter, its readings, and what is subtracted from it.
+
+use super::DriftModel;
+use super::filter::{Filter, Predicted};
+use super::ring::Ring;
+use crate::thermal::Ramp;
+use crate::units::{Span, Timestamp};
+
+/// What an update changes is subtracted bit by bit over this time, so that the corrected rate has no step.
+pub const SUBTRACTION_RAMP: Span = Span::from_ms(10_000);
+
+/// Distance of the grid on which the prediction is evaluated.
+const GRID: Span = Span::from_ms(1_000);
+
+/// The drift of one gyro as it is known at the last tick.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DriftEstimate {
+    /// Predicted drift ε along the gyro's input axis (rad/s): what the calibration's biases leave.
+    pub rate: f64,
+    /// Its standard error (rad/s).
+    pub sigma: f64,
+    /// Trend rate χ (rad/s²).
+    pub trend: f64,
+    /// Its standard error (rad/s²).
+    pub trend_sigma: f64,
+    /// Measurements taken.
+    pub updates: u64,
+    /// Measurements refused by the gate.
+    pub refused: u64,
+    /// Of the measurements taken, those that ended a row of refusals which agreed with each other.
+    pub believed: u64,
+    /// End of the last reference taken; `None` before the first and after a step back of the producer's clock.
+    pub last_update: Option<Timestamp>,
+    /// Innovation of the last measurement taken, in its sigmas.
+    pub normalised_innovation: Option<f64>,
+    /// Mean of the normalised innovations squared over the last
+    /// [`INNOVATIONS_KEPT`](super::INNOVATIONS_KEPT) measurements taken; near 1 where the stated drift is the gyro's own,
+    /// see [`MEAN_NIS_BOUNDS`](super::MEAN_NIS_BOUNDS).
+    pub mean_nis: Option<f64>,
+}
+
+/// The prediction on its way from one grid point to the next.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct Line {
+    from: f64,
+    step: f64,
+}
+
+/// One gyro.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct GyroDrift {
+    pub(super) filter: Filter,
+    pub(super) ring: Ring,
+    line: Line,
+    /// What is subtracted beyond the line: the rest of what updates have changed.
+    offset: Ramp<1>,
+}
+
+impl GyroDrift {
+    pub(super) fn new(model: DriftModel) -> Self {
+        Self {
+            filter: Filter::new(model),
+            ring: Ring::new(),
+            line: Line::default(),
+            offset: Ramp::hold([0.0]),
+        }
+    }
+
+    /// Draws the line over the grid cell of this number.
+    pub(super) fn draw(&mut self, grid: i64) {
+        let from = self.filter.rate_at(grid_point(grid));
+        self.line = Line { from, step: self.filter.rate_at(grid_point(grid.saturating_add(1))) - from };
+    }
+
+    fn predicted(&self, grid: i64, time: Timestamp) -> f64 {
+        self.line.from + self.line.step * (time.seconds_from(grid_point(grid)) / GRID.as_s())
+    }
+
+    pub(super) fn subtrahend(&self, grid: i64, time: Timestamp) -> f64 {
+        let [offset] = self.offset.at(time);
+        self.predicted(grid, time) + offset
+    }
+
+    /// Goes on from what was subtracted `before` to what the filter says now.
+    pub(super) fn hand_over(&mut self, before: f64, grid: i64, time: Timestamp) {
+        self.draw(grid);
+        self.offset = Ramp::hold([before - self.predicted(grid, time)]);
+        self.offset.turn(time, SUBTRACTION_RAMP, [0.0]);
+    }
+
+    /// The drift at `time`, that of the last tick.
+    pub(super) fn estimate(&self, grid: i64, time: Timestamp) -> DriftEstimate {
+        let Predicted { sigma, trend, trend_sigma } = self.filter.predict(time);
+        let [updates, refused, believed] = self.filter.counts();
+        DriftEstimate {
+            rate: self.predicted(grid, time),
+            sigma,
+            trend,
+            trend_sigma,
+            updates,
+            refused,
+            believed,
+            last_update: self.filter.last_update(),
+            normalised_innovation: self.filter.last_innovation(),
+            mean_nis: self.filter.mean_nis(),
+        }
+    }
+}
+
+/// Number of the grid cell that holds a time.
+pub(super) const fn grid_cell(time: Timestamp) -> i64 {
+    time.as_ns().div_euclid(GRID.as_ns())
+}
+
+/// Time of a grid point.
+const fn grid_point(number: i64) -> Timestamp {
+    Timestamp::from_ns(number.saturating_mul(GRID.as_ns()))
+}

@@ -1,0 +1,180 @@
+//! The last two minutes of one gyro's residual angle, on a grid of event time.
+//!
+//! Residual: what the gyro measured less every bias of its calibration, without the drift estimate. The angle of each
+//! tick is shared out to the cells that it covers, so the mean rate over any span of whole cells is that of the ticks
+//! within half a tick's change of rate at either end. Where a span ends inside a cell, the cell's angle is divided by
+//! time; for a rate that changes by Δω over the cell this errs by `Δω·c·f(1 − f)/2` of angle (c: length of the cell, f: the
+//! part of it that is used), and that much is added to the stated uncertainty.
+//!
+//! Time without a good reading (a missing tick, a mode switch, a reading beyond its limit) is bridged with the mean of the
+//! rest, as long as it is a small share of the span. What that can err by is the share times the scatter of the
+//! cells' rates, which is added too: at rest it is next to nothing, in motion it takes the measurement's weight away.
+
+use alloc::vec::Vec;
+
+use super::Reference;
+use crate::units::{Span, Timestamp};
+
+/// Length of a cell.
+pub const CELL: Span = Span::from_ms(250);
+/// Cells kept: 128 s.
+pub const RING_CELLS: usize = 512;
+/// Largest share of a span that may be bridged: white noise then adds at most a tenth to the variance over a minute.
+pub const LARGEST_UNOBSERVED_SHARE: f64 = 0.02;
+
+/// One cell: the angle gained in it, and for how much of it there were good readings.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct Cell {
+    angle_rad: f64,
+    observed_s: f64,
+}
+
+impl Cell {
+    fn rate(self) -> f64 {
+        if self.observed_s > 0.0 { self.angle_rad / self.observed_s } else { 0.0 }
+    }
+}
+
+/// Mean residual rate over a span.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Mean {
+    /// rad/s.
+    pub(super) rate: f64,
+    /// Variance from bridged time and from ends inside a cell ((rad/s)²).
+    pub(super) variance: f64,
+}
+
+/// Why there is no mean over a span.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum NoMean {
+    /// The span begins before what is kept.
+    TooOld,
+    /// Too little of the span was observed.
+    Gap,
+}
+
+/// The cells of one gyro.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Ring {
+    cells: Vec<Cell>,
+    /// Number of the newest cell, counted from the clock's epoch.
+    newest: Option<i64>,
+}
+
+impl Ring {
+    pub(super) fn new() -> Self {
+        Self { cells: alloc::vec![Cell::default(); RING_CELLS], newest: None }
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.cells.fill(Cell::default());
+        self.newest = None;
+    }
+
+    /// Makes room up to the cell that holds `end`, without anything observed.
+    pub(super) fn reach(&mut self, end: Timestamp) {
+        let number = last_number(end);
+        let before = self.newest.unwrap_or(i64::MIN);
+        let oldest_new = before.saturating_add(1).max(number.saturating_sub(cells_kept() - 1));
+        for new in oldest_new..=number {
+            if let Some(cell) = self.cells.get_mut(slot(new)) {
+                *cell = Cell::default();
+            }
+        }
+        self.newest = Some(before.max(number));
+    }
+
+    /// Shares the mean rate (rad/s) of a tick out to the cells that it covers. Call [`reach`](Self::reach) first.
+    pub(super) fn add(&mut self, start: Timestamp, end: Timestamp, rate: f64) {
+        let oldest = self.oldest();
+        for number in first_number(start).max(oldest)..=last_number(end) {
+            let covered_s = overlap(number, start, end).as_s();
+            if let Some(cell) = self.cells.get_mut(slot(number)) {
+                cell.angle_rad += rate * covered_s;
+                cell.observed_s += covered_s;
+            }
+        }
+    }
+
+    /// Mean rate over a span whose last cell is complete.
+    pub(super) fn mean(&self, reference: &Reference) -> Result<Mean, NoMean> {
+        let Reference { start, end, .. } = *reference;
+        let (first, last) = (first_number(start), last_number(end));
+        if first < self.oldest() {
+            return Err(NoMean::TooOld);
+        }
+        let span_s = end.since(start).as_s();
+        let used = || {
+            (first..=last).map(|number| {
+                let share = overlap(number, start, end).as_s() / CELL.as_s();
+                let Cell { angle_rad, observed_s } = self.cell(number);
+                (angle_rad * share, observed_s * share)
+            })
+        };
+        let (angle_rad, observed_s) =
+            used().fold((0.0, 0.0), |(angle, observed), (a, s)| (angle + a, observed + s));
+        let unobserved = (1.0 - observed_s / span_s).max(0.0);
+        // Clocks that count a tick's duration and its end time differ by some parts in a thousand, not more.
+        if unobserved > LARGEST_UNOBSERVED_SHARE || observed_s > span_s * (1.0 + LARGEST_UNOBSERVED_SHARE) {
+            return Err(NoMean::Gap);
+        }
+        let rate = angle_rad / observed_s;
+        let scatter = used().fold(0.0, |sum, (angle, s)| {
+            let off = if s > 0.0 { angle / s - rate } else { 0.0 };
+            sum + s * off * off
+        }) / observed_s;
+        let first_end = self.end_error_rad(first, first + 1, overlap(first, start, end));
+        let last_end = self.end_error_rad(last - 1, last, overlap(last, start, end));
+        let ends = (first_end * first_end + last_end * last_end) / (span_s * span_s);
+        Ok(Mean { rate, variance: unobserved * unobserved * scatter + ends })
+    }
+
+    /// `Δω·c·f(1 − f)/2` at an end that uses `part` of its cell; Δω from two neighbouring cells.
+    fn end_error_rad(&self, one: i64, other: i64, part: Span) -> f64 {
+        let f = part.as_s() / CELL.as_s();
+        let change = self.cell(other).rate() - self.cell(one).rate();
+        0.5 * change * CELL.as_s() * f * (1.0 - f)
+    }
+
+    fn cell(&self, number: i64) -> Cell {
+        self.cells.get(slot(number)).copied().unwrap_or_default()
+    }
+
+    fn oldest(&self) -> i64 {
+        self.newest.map_or(i64::MAX, |newest| newest.saturating_sub(cells_kept() - 1))
+    }
+}
+
+/// End of the cell in which a span ends.
+pub(super) fn cell_end(end: Timestamp) -> Timestamp {
+    Timestamp::from_ns(last_number(end).saturating_add(1).saturating_mul(CELL.as_ns()))
+}
+
+#[expect(clippy::cast_possible_wrap, reason = "a small constant")]
+const fn cells_kept() -> i64 {
+    RING_CELLS as i64
+}
+
+/// Number of the cell in which a span starts.
+const fn first_number(start: Timestamp) -> i64 {
+    start.as_ns().div_euclid(CELL.as_ns())
+}
+
+/// Number of the cell in which a span ends.
+const fn last_number(end: Timestamp) -> i64 {
+    end.as_ns().saturating_sub(1).div_euclid(CELL.as_ns())
+}
+
+/// Place of a cell in the ring.
+fn slot(number: i64) -> usize {
+    usize::try_from(number.rem_euclid(cells_kept())).unwrap_or(0)
+}
+
+/// How much of a cell lies between two times.
+fn overlap(number: i64, start: Timestamp, end: Timestamp) -> Span {
+    let from = Timestamp::from_ns(number.saturating_mul(CELL.as_ns()));
+    end.min(from + CELL).since(start.max(from))
+}
+
+#[cfg(test)]
+mod tests;

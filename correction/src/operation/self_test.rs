@@ -1,0 +1,272 @@
+//! Self-test of the instrument (models §7): calibration, gyros, accelerometers, temperature channels, and what the
+//! producer reports of itself.
+//!
+//! It runs for [`SelfTest::LENGTH`] of event time. A sensor is alive while its readings are finite, within the input range,
+//! and not one and the same value for longer than [`SelfTest::LONGEST_STANDSTILL`].
+
+use alloc::vec::Vec;
+
+use crate::calibration::Calibration;
+use crate::observation::Observation;
+use crate::sample::{ChannelName, MAX_SENSORS, SensorFlags, Sensors};
+use crate::units::{Span, Timestamp};
+
+/// Share of a sensor's ticks that must be alive (%).
+const ALIVE_PERCENT: [f64; 2] = [95.0, 100.0];
+
+/// A voltage that the producer reports, such as the half-wave voltage of a gyro's mode control.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SelfTestVoltage {
+    /// Name on the raw health topic.
+    pub name: ChannelName,
+    /// Smallest and largest good value (V).
+    pub range_v: [f64; 2],
+}
+
+/// A counter that the producer reports, such as one of its own errors.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SelfTestCounter {
+    /// Name on the raw health topic.
+    pub name: ChannelName,
+    /// Largest good increase over the self-test.
+    pub max_increase: f64,
+}
+
+/// What the producer's own readings must be.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct SelfTestParts {
+    /// Voltages, with their limits.
+    pub voltages: Vec<SelfTestVoltage>,
+    /// Counters, with their limits.
+    pub counters: Vec<SelfTestCounter>,
+}
+
+/// What the producer reports of itself: a voltage (V) or a counter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HealthReading {
+    /// Name of the quantity.
+    pub name: ChannelName,
+    /// Time of the reading on the producer's clock.
+    pub time: Timestamp,
+    /// Its value.
+    pub value: f64,
+}
+
+/// What is checked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CheckItem {
+    /// A calibration is in force; its value is the revision counter.
+    Calibration,
+    /// Gyro of this index is alive; its value is the share of live ticks (%).
+    Gyro(usize),
+    /// Accelerometer of this index is alive; likewise.
+    Accel(usize),
+    /// Temperature channel of this name is alive; its value is the smoothed temperature (°C).
+    Temperature(ChannelName),
+    /// Voltage of this name; its value (V) is the one nearest to a limit, or furthest beyond it.
+    Voltage(ChannelName),
+    /// Increase of the counter of this name over the test.
+    Counter(ChannelName),
+}
+
+/// One check with its measured value and limits.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CheckResult {
+    /// What was checked.
+    pub item: CheckItem,
+    /// What was measured; `None` where nothing came.
+    pub value: Option<f64>,
+    /// Smallest and largest good value, in the item's unit of measure.
+    pub limits: [f64; 2],
+    /// Whether it is good.
+    pub passed: bool,
+}
+
+/// Result of a self-test.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SelfTestReport {
+    /// End of its last tick; `None` where no tick came.
+    pub ended: Option<Timestamp>,
+    /// Event time that it looked at.
+    pub length: Span,
+    /// Every check, in the order of the calibration.
+    pub checks: Vec<CheckResult>,
+}
+
+impl SelfTestReport {
+    /// Whether every check is good.
+    #[must_use]
+    pub fn passed(&self) -> bool {
+        self.checks.iter().all(|check| check.passed)
+    }
+
+    /// Report on a unit without a calibration: there is nothing to check it against.
+    #[must_use]
+    pub fn uncalibrated() -> Self {
+        Self { ended: None, length: Span::ZERO, checks: [calibration_check(0)].into() }
+    }
+}
+
+/// Whether one sensor moves.
+#[derive(Debug, Clone, Copy, Default)]
+struct Liveness {
+    last: f64,
+    since: Timestamp,
+    live: u64,
+}
+
+impl Liveness {
+    fn observe(&mut self, reading: f64, flags: SensorFlags, first: bool, time: Timestamp) {
+        if first || reading.to_bits() != self.last.to_bits() {
+            *self = Self { last: reading, since: time, ..*self };
+        }
+        let bad = SensorFlags::NOT_FINITE | SensorFlags::OVERRANGE | SensorFlags::EXCLUDED;
+        let moves = time.since(self.since) <= SelfTest::LONGEST_STANDSTILL;
+        self.live += u64::from(reading.is_finite() && moves && !flags.intersects(bad));
+    }
+
+    fn result(self, item: CheckItem, ticks: u64) -> CheckResult {
+        #[expect(clippy::cast_precision_loss, reason = "ticks of a few seconds")]
+        let value = (ticks > 0).then(|| 100.0 * self.live as f64 / ticks as f64);
+        within(item, value, ALIVE_PERCENT)
+    }
+}
+
+/// First, last and worst of what the producer reported under one name.
+#[derive(Debug, Clone, Copy)]
+struct Reported {
+    first: f64,
+    last: f64,
+    worst: f64,
+}
+
+/// A self-test that is running.
+#[derive(Debug, Clone)]
+pub struct SelfTest {
+    start: Option<Timestamp>,
+    end: Timestamp,
+    ticks: u64,
+    accel_ticks: u64,
+    gyros: Sensors<Liveness>,
+    accels: Sensors<Liveness>,
+    parts: SelfTestParts,
+    voltages: Vec<Option<Reported>>,
+    counters: Vec<Option<Reported>>,
+}
+
+impl SelfTest {
+    /// Event time that it takes; the clock ends it after 14 s where no ticks come.
+    pub const LENGTH: Span = Span::from_ms(10_000);
+    /// Longest time that a live sensor gives one and the same reading.
+    pub const LONGEST_STANDSTILL: Span = Span::from_ms(1000);
+
+    /// Begins with the next tick.
+    #[must_use]
+    pub fn new(calibration: &Calibration) -> Self {
+        let fresh = |sensors: usize| (0..sensors.min(MAX_SENSORS)).map(|_| Liveness::default()).collect();
+        let parts = calibration.self_test().clone();
+        Self {
+            start: None,
+            end: Timestamp::default(),
+            ticks: 0,
+            accel_ticks: 0,
+            gyros: fresh(calibration.gyro_count()),
+            accels: fresh(calibration.accel_count()),
+            voltages: alloc::vec![None; parts.voltages.len()],
+            counters: alloc::vec![None; parts.counters.len()],
+            parts,
+        }
+    }
+
+    /// Takes one tick; whether the test is over.
+    pub fn observe(&mut self, seen: &Observation) -> bool {
+        let start = *self.start.get_or_insert(seen.end_time - seen.duration);
+        self.end = seen.end_time;
+        let readings = seen.gyro_readings.iter().zip(&seen.gyro_flags);
+        for (liveness, (reading, flags)) in self.gyros.iter_mut().zip(readings) {
+            // Over a mode switch a gyro may well give nothing.
+            if seen.settled || self.ticks == 0 {
+                liveness.observe(*reading, *flags, self.ticks == 0, seen.end_time);
+            } else {
+                *liveness = Liveness { since: seen.end_time, live: liveness.live + 1, ..*liveness };
+            }
+        }
+        self.ticks += 1;
+        if !seen.accel_readings.is_empty() {
+            let readings = seen.accel_readings.iter().zip(&seen.accel_flags);
+            for (liveness, (reading, flags)) in self.accels.iter_mut().zip(readings) {
+                liveness.observe(*reading, *flags, self.accel_ticks == 0, seen.end_time);
+            }
+            self.accel_ticks += 1;
+        }
+        seen.end_time.since(start) >= Self::LENGTH
+    }
+
+    /// Takes what the producer reports of itself.
+    pub fn health(&mut self, reading: &HealthReading) {
+        let voltages = self.parts.voltages.iter().zip(&mut self.voltages);
+        for (voltage, reported) in voltages.filter(|(voltage, _)| voltage.name == reading.name) {
+            let excess = |value: f64| {
+                let [low, high] = voltage.range_v;
+                if value.is_nan() { f64::INFINITY } else { (low - value).max(value - high) }
+            };
+            report(reported, reading.value, |new, worst| excess(new) > excess(worst));
+        }
+        let counters = self.parts.counters.iter().zip(&mut self.counters);
+        for (_, reported) in counters.filter(|(counter, _)| counter.name == reading.name) {
+            report(reported, reading.value, |_, _| false);
+        }
+    }
+
+    /// The result so far; `temperature` gives each channel's smoothed temperature (°C), where it is alive.
+    #[must_use]
+    pub fn report(
+        &self,
+        calibration: &Calibration,
+        revision: u64,
+        temperature: &dyn Fn(&ChannelName) -> Option<f64>,
+    ) -> SelfTestReport {
+        let mut checks = Vec::new();
+        checks.push(calibration_check(revision));
+        for (i, gyro) in self.gyros.iter().enumerate() {
+            checks.push(gyro.result(CheckItem::Gyro(i), self.ticks));
+        }
+        for (i, accel) in self.accels.iter().enumerate() {
+            checks.push(accel.result(CheckItem::Accel(i), self.accel_ticks));
+        }
+        for channel in calibration.channels() {
+            let value = temperature(channel.name());
+            checks.push(within(CheckItem::Temperature(*channel.name()), value, channel.range_deg_c()));
+        }
+        for (voltage, reported) in self.parts.voltages.iter().zip(&self.voltages) {
+            let value = reported.map(|reported| reported.worst);
+            checks.push(within(CheckItem::Voltage(voltage.name), value, voltage.range_v));
+        }
+        for (counter, reported) in self.parts.counters.iter().zip(&self.counters) {
+            let value = reported.map(|reported| reported.last - reported.first);
+            checks.push(within(CheckItem::Counter(counter.name), value, [0.0, counter.max_increase]));
+        }
+        let length = self.start.map_or(Span::ZERO, |start| self.end.since(start));
+        SelfTestReport { ended: self.start.map(|_| self.end), length, checks }
+    }
+}
+
+/// Enters a value; `worse` compares it with the worst so far.
+fn report(reported: &mut Option<Reported>, value: f64, worse: impl Fn(f64, f64) -> bool) {
+    let entry = reported.get_or_insert(Reported { first: value, last: value, worst: value });
+    entry.last = value;
+    entry.worst = if worse(entry.worst, value) { entry.worst } else { value };
+}
+
+fn within(item: CheckItem, value: Option<f64>, limits: [f64; 2]) -> CheckResult {
+    let [low, high] = limits;
+    CheckResult { item, value, limits, passed: value.is_some_and(|value| (low..=high).contains(&value)) }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "fewer than 2⁵³ swaps")]
+fn calibration_check(revision: u64) -> CheckResult {
+    within(CheckItem::Calibration, Some(revision as f64), [1.0, f64::INFINITY])
+}
+
+#[cfg(test)]
+mod tests;

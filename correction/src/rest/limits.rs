@@ -1,0 +1,94 @@
+//! What still counts as rest.
+
+use alloc::vec::Vec;
+
+use thiserror::Error;
+
+use crate::units::{Angle, AngularRate, SpecificForce};
+
+/// Range of the noise factor.
+const SIGMAS_RANGE: [f64; 2] = [3.0, 100.0];
+
+/// Limits of a [`RestMonitor`](super::RestMonitor). Each is the least that counts as motion where the unit's own noise
+/// is smaller.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RestLimits {
+    /// Angle gathered within a second beyond the mean rate (rad, above 0); default 15″.
+    pub turn_rad: f64,
+    /// The same for a second with a mode switch in it, over which the angle is that of a fit (rad, above 0); default 60″.
+    pub switch_turn_rad: f64,
+    /// Angle gathered within a minute beyond the mean rate of the minutes before (rad, above 0); default 0.02°.
+    pub slow_turn_rad: f64,
+    /// Mean rate of a minute, the Earth's included (rad/s, above 0); default 0.05 °/s.
+    pub rate_rad_per_s: f64,
+    /// Velocity gathered within a second beyond the mean force (m/s, above 0); default 0.5 mg·s.
+    pub push_m_per_s: f64,
+    /// Change of the mean force of a minute since the start (m/s², above 0); default 1 mg, a tilt of 0.06°.
+    pub force_change_m_per_s2: f64,
+    /// Growth of the scatter of the ticks' force within a second (m/s² rms, above 0); default 3 mg.
+    pub shake_m_per_s2: f64,
+    /// Times the standard deviation of a window up to which noise explains it (3…100); default 7.
+    pub sigmas: f64,
+    /// The limit that noise makes of `turn_rad` may not exceed this (rad, at least `turn_rad`); default 0.03°, so that
+    /// a turn of 0.05° is seen at any time.
+    pub turn_ceiling_rad: f64,
+    /// The limit that noise makes of `push_m_per_s` may not exceed this (m/s, at least `push_m_per_s`); default
+    /// 2 mg·s, so that 20 mg for 0.2 s are seen at any time.
+    pub push_ceiling_m_per_s: f64,
+}
+
+impl Default for RestLimits {
+    fn default() -> Self {
+        const fn milli_g(value: f64) -> f64 {
+            SpecificForce::from_g(value * 1e-3).as_m_per_s2()
+        }
+        Self {
+            turn_rad: Angle::from_arcsec(15.0).as_rad(),
+            switch_turn_rad: Angle::from_arcsec(60.0).as_rad(),
+            slow_turn_rad: Angle::from_deg(0.02).as_rad(),
+            rate_rad_per_s: AngularRate::from_deg_per_s(0.05).as_rad_per_s(),
+            push_m_per_s: milli_g(0.5),
+            force_change_m_per_s2: milli_g(1.0),
+            shake_m_per_s2: milli_g(3.0),
+            sigmas: 7.0,
+            turn_ceiling_rad: Angle::from_deg(0.03).as_rad(),
+            push_ceiling_m_per_s: milli_g(2.0),
+        }
+    }
+}
+
+/// A limit that cannot be.
+#[derive(Debug, Clone, Copy, PartialEq, Error)]
+#[error("{name} is {got}; from {min} to {max} is allowed")]
+pub struct RestLimitsError {
+    /// Field of [`RestLimits`].
+    pub name: &'static str,
+    /// The value.
+    pub got: f64,
+    /// Smallest allowed.
+    pub min: f64,
+    /// Largest allowed.
+    pub max: f64,
+}
+
+impl RestLimits {
+    /// Everything that is wrong with the limits; empty for limits that can be used.
+    #[must_use]
+    pub fn validate(&self) -> Vec<RestLimitsError> {
+        let (least, [fewest, most]) = (f64::MIN_POSITIVE, SIGMAS_RANGE);
+        let checks = [
+            ("turn_rad", self.turn_rad, least, f64::MAX),
+            ("switch_turn_rad", self.switch_turn_rad, least, f64::MAX),
+            ("slow_turn_rad", self.slow_turn_rad, least, f64::MAX),
+            ("rate_rad_per_s", self.rate_rad_per_s, least, f64::MAX),
+            ("push_m_per_s", self.push_m_per_s, least, f64::MAX),
+            ("force_change_m_per_s2", self.force_change_m_per_s2, least, f64::MAX),
+            ("shake_m_per_s2", self.shake_m_per_s2, least, f64::MAX),
+            ("sigmas", self.sigmas, fewest, most),
+            ("turn_ceiling_rad", self.turn_ceiling_rad, self.turn_rad.max(least), f64::MAX),
+            ("push_ceiling_m_per_s", self.push_ceiling_m_per_s, self.push_m_per_s.max(least), f64::MAX),
+        ];
+        let wrong = checks.into_iter().filter(|(_, got, min, max)| !(min..=max).contains(&got));
+        wrong.map(|(name, got, min, max)| RestLimitsError { name, got, min, max }).collect()
+    }
+}

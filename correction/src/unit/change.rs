@@ -1,0 +1,44 @@
+//! A calibration that is to take effect: at once, at a stated tick, or at a stated time.
+
+use alloc::sync::Arc;
+
+use crate::calibration::Calibration;
+use crate::sample::GyroTick;
+use crate::units::{Span, Timestamp};
+
+/// When a change takes effect; always before a tick, and at the latest when the producer restarts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum At {
+    /// The next tick that is corrected.
+    #[default]
+    NextTick,
+    /// The first tick with this sequence number or a later one.
+    Sequence(u64),
+    /// The first tick that ends at this time or later.
+    Time(Timestamp),
+}
+
+impl At {
+    /// Whether a tick is at or behind the point.
+    pub(super) fn is_due(self, tick: &GyroTick) -> bool {
+        match self {
+            Self::NextTick => true,
+            Self::Sequence(sequence) => tick.sequence >= sequence,
+            Self::Time(time) => tick.end_time >= time,
+        }
+    }
+}
+
+/// A change of calibration.
+#[derive(Debug, Clone)]
+pub struct Change {
+    /// The calibration.
+    pub calibration: Arc<Calibration>,
+    /// Revision counter that its ticks carry.
+    pub revision: u64,
+    /// When it takes effect.
+    pub at: At,
+    /// Time over which the correction moves from the old terms to the new; zero: at once. Between sets of another number or
+    /// kind of sensors there is no way, and the change is made at once.
+    pub slew: Span,
+}

@@ -1,0 +1,207 @@
+//! The gyros' part of a tick: scale, bias, servo transient, substitution, case axes.
+
+use super::{Corrector, resolve};
+use crate::calibration::Calibration;
+use crate::reversal::{Substitution, TickInput};
+use crate::sample::{
+    CorrectedTick, GyroTick, LasingMode, MIN_SENSORS, OutputKind, SensorFlags, Sensors, TickFlags,
+};
+use crate::servo::{ServoTick, Transient};
+use crate::thermal::{GyroModel, GyroTerms, GyroThermal};
+use crate::unit::counters::Counters;
+use crate::unit::gyro_intake::Released;
+use crate::units::Timestamp;
+
+impl Corrector {
+    /// The terms of a gyro in use, its trend in the bias.
+    pub(super) fn gyro_terms(
+        &self,
+        index: usize,
+        model: &GyroModel,
+        time: Timestamp,
+        since_turn_on_s: f64,
+    ) -> Option<GyroTerms> {
+        let mut terms = self.thermal.gyros.get(index)?.at(time);
+        terms.bias += model.trend.as_ref().map_or(0.0, |trend| trend.at(since_turn_on_s));
+        let slew = self.slew.as_ref().filter(|_| self.slew_share > 0.0);
+        Some(slew.map_or(terms, |slew| slew.gyro(index, terms, self.slew_share)))
+    }
+
+    /// Corrects the gyros' readings of a tick.
+    pub(super) fn gyros(
+        &mut self,
+        calibration: &Calibration,
+        released: &Released,
+        since_turn_on_s: f64,
+        out: &mut CorrectedTick,
+        counters: &mut Counters,
+    ) {
+        let tick = &released.tick;
+        let duration_s = tick.duration.as_s();
+        let input = TickInput {
+            end_time: tick.end_time,
+            duration: tick.duration,
+            mode: tick.mode,
+            switch_command: tick.switch_command,
+            missed: released.missed,
+            restart: released.restart,
+        };
+        let lost = calibration.reversal.as_ref().is_some_and(|r| self.substitution.is_lost(r, &input));
+        self.servo.advance(lost, tick.end_time, tick.duration);
+
+        let mut mask = self.thermal.gyro_axes.included(&calibration.gyro_orientation);
+        let mut increments = Sensors::<f64>::new();
+        for (i, model) in calibration.gyros.iter().enumerate() {
+            let Some(terms) = self.gyro_terms(i, model, tick.end_time, since_turn_on_s) else { continue };
+            let mut bias = bias(&terms, tick);
+            if let (Some(servo), false) = (&model.servo, lost) {
+                let servo_tick = ServoTick {
+                    end_time: tick.end_time,
+                    duration: tick.duration,
+                    temperature_deg_c: self.thermal.temperature(calibration, model.channel),
+                    scale_rad_per_count: terms.increment_weight,
+                    half_periods: tick.half_periods.get(i).copied(),
+                };
+                match self.servo.apparent_rate(i, servo, &servo_tick) {
+                    Transient::Settled => {}
+                    Transient::Apparent { rate_rad_per_s } => {
+                        bias += rate_rad_per_s;
+                        out.flags |= TickFlags::SERVO_TRANSIENT;
+                    }
+                    Transient::Unmeasured => out.flags |= TickFlags::SERVO_UNMEASURED,
+                }
+            }
+            let drift = self.drift.subtrahend(i, tick.end_time);
+            let mut flags = self.temperature_flags(calibration, i, model, tick.end_time);
+
+            let reading = tick.readings.get(i).copied().unwrap_or(f64::NAN);
+            let increment = if lost {
+                0.0
+            } else if reading.is_finite() {
+                if reading.abs() >= model.input_limit {
+                    flags |= SensorFlags::OVERRANGE;
+                    counters.overrange_readings += 1;
+                }
+                // Beyond its limit a reading says no more than the limit, and stays finite whatever it is.
+                let reading = reading.clamp(-model.input_limit, model.input_limit);
+                scaled(calibration.gyro_output, reading, terms.increment_weight, duration_s)
+                    - (bias + drift) * duration_s
+            } else {
+                flags |= SensorFlags::NOT_FINITE;
+                counters.not_finite_readings += 1;
+                self.last_rates.get(i).copied().unwrap_or(0.0) * duration_s
+            };
+            if lost
+                || flags.intersects(SensorFlags::OVERRANGE | SensorFlags::NOT_FINITE | SensorFlags::EXCLUDED)
+            {
+                flags -= SensorFlags::VALID;
+            }
+            if flags.intersects(SensorFlags::OVERRANGE | SensorFlags::NOT_FINITE) {
+                mask = mask.without(i);
+            }
+            increments.push(increment);
+            self.seen.gyro_biases.push(bias);
+            self.seen.gyro_drifts.push(drift);
+            self.seen.gyro_temperatures_deg_c.push(self.thermal.temperature(calibration, model.channel));
+            out.gyro_flags.push(flags);
+        }
+
+        // Before the substitution: the angle that it restores is a lump, not a rate.
+        let rates: Sensors<f64> = increments.iter().map(|increment| increment / duration_s).collect();
+        self.note_rates(&rates, &out.gyro_flags);
+        out.flags |= self.substitute(calibration, input, &mut increments);
+        count_switch_flags(out.flags, counters);
+        let interpolated = out.flags.contains(TickFlags::INTERPOLATED);
+        let unsettled = TickFlags::INTERPOLATED
+            | TickFlags::ANGLE_RESTORED
+            | TickFlags::SERVO_TRANSIENT
+            | TickFlags::SERVO_UNMEASURED;
+        self.seen.settled = !lost && self.slew.is_none() && !out.flags.intersects(unsettled);
+
+        let orientation = &calibration.gyro_orientation;
+        let axes = &mut self.thermal.gyro_axes;
+        if orientation.sensors() > MIN_SENSORS && !interpolated {
+            let verdict = axes.watch(orientation, mask, &rates);
+            out.gyro_parity = verdict.residuals;
+            out.flags.set(TickFlags::PARITY_EXCEEDED, verdict.exceeded);
+            counters.sensors_excluded += u64::from(verdict.exclude.is_some());
+        }
+        let (angle, trusted) = resolve(axes, orientation, mask, &increments, tick.end_time);
+        let slewed_from = self.slew.as_ref().and_then(|slew| slew.gyro_axes.as_ref());
+        out.delta_angle = crate::unit::slew::axes(angle, slewed_from, mask, &increments, self.slew_share);
+        out.flags.set(TickFlags::ANGLE_INVALID, !trusted);
+    }
+}
+
+impl Corrector {
+    /// What the temperatures and the parity check say of a gyro.
+    fn temperature_flags(
+        &self,
+        calibration: &Calibration,
+        index: usize,
+        model: &GyroModel,
+        time: Timestamp,
+    ) -> SensorFlags {
+        let axes = &self.thermal.gyro_axes;
+        let clamped = self.thermal.gyros.get(index).is_some_and(GyroThermal::clamped);
+        let mut flags = SensorFlags::VALID;
+        flags.set(SensorFlags::CLAMPED_TEMPERATURE, clamped || axes.clamped());
+        let stale = self.thermal.stale(calibration, model.channel, time);
+        flags.set(SensorFlags::STALE_TEMPERATURE, stale);
+        flags.set(SensorFlags::EXCLUDED, axes.is_excluded(index));
+        flags
+    }
+
+    /// Keeps the good rates, and every rate with what was subtracted put back.
+    fn note_rates(&mut self, rates: &Sensors<f64>, flags: &Sensors<SensorFlags>) {
+        for ((last, rate), flags) in self.last_rates.iter_mut().zip(rates).zip(flags) {
+            if flags.contains(SensorFlags::VALID) {
+                *last = *rate;
+            }
+        }
+        let seen = &mut self.seen;
+        let subtracted = seen.gyro_biases.iter().zip(&seen.gyro_drifts).map(|(bias, drift)| bias + drift);
+        seen.gyro_rates.extend(rates.iter().zip(subtracted).map(|(rate, subtracted)| rate + subtracted));
+    }
+
+    /// Bridges a mode switch (models §5).
+    fn substitute(
+        &mut self,
+        calibration: &Calibration,
+        input: TickInput,
+        increments: &mut Sensors<f64>,
+    ) -> TickFlags {
+        match &calibration.reversal {
+            Some(reversal) => self.substitution.tick(reversal, input, increments),
+            // A swap took the substitution away in the middle of a transition.
+            None if !self.substitution.is_settled() => {
+                self.substitution = Substitution::new();
+                TickFlags::SWITCH_UNRESOLVED
+            }
+            None => TickFlags::empty(),
+        }
+    }
+}
+
+/// The terms of Ω that follow temperature, with the signs of the tick's mode and meander (rad/s).
+fn bias(terms: &GyroTerms, tick: &GyroTick) -> f64 {
+    let sign = tick.mode.map_or(1.0, LasingMode::sign);
+    let phase = tick.meander.map_or(1.0, LasingMode::sign);
+    terms.bias + sign * terms.magnetic + phase * terms.meander
+}
+
+/// K(T)·P (rad).
+fn scaled(output: OutputKind, reading: f64, increment_weight: f64, duration_s: f64) -> f64 {
+    match output {
+        OutputKind::Counts => increment_weight * reading,
+        OutputKind::Mean => increment_weight * (reading * duration_s),
+    }
+}
+
+/// Counts what the substitution did.
+fn count_switch_flags(flags: TickFlags, counters: &mut Counters) {
+    counters.ticks_interpolated += u64::from(flags.contains(TickFlags::INTERPOLATED));
+    counters.switches_restored += u64::from(flags.contains(TickFlags::ANGLE_RESTORED));
+    counters.servo_unmeasured += u64::from(flags.contains(TickFlags::SERVO_UNMEASURED));
+    counters.switches_unresolved += u64::from(flags.contains(TickFlags::SWITCH_UNRESOLVED));
+}
