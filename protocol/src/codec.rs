@@ -16,7 +16,7 @@ use serde::de::{DeserializeOwned, Error as _, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 use thiserror::Error;
 
-use crate::version;
+use crate::version::Versions;
 
 /// Longest frame that is decoded, in bytes.
 pub const MAX_FRAME: usize = 1 << 20;
@@ -41,12 +41,31 @@ pub enum Kind {
     Corrected = 4,
     /// [`crate::status::Status`].
     Status = 5,
+    /// [`crate::raw::HealthBatch`].
+    RawHealth = 6,
+    /// [`crate::service_status::ServiceStatus`].
+    ServiceStatus = 7,
+    /// [`crate::reference::Reference`].
+    Reference = 8,
 }
 
 /// A message that has a frame of its own.
 pub trait Message: Serialize + DeserializeOwned {
     /// Its kind.
     const KIND: Kind;
+    /// Versions of its body.
+    const VERSIONS: Versions;
+
+    /// Reads a body of a version that [`Message::VERSIONS`] holds; also gives what is left over behind it.
+    ///
+    /// A message whose older versions have other bodies reads each by its own type and converts.
+    ///
+    /// # Errors
+    /// Where the bytes are no such body.
+    fn read_body(version: u8, body: &[u8]) -> postcard::Result<(Self, &[u8])> {
+        let _ = version;
+        postcard::take_from_bytes(body)
+    }
 
     /// Checks what the types cannot say; called on encoding and after decoding.
     ///
@@ -76,10 +95,12 @@ pub enum CodecError {
         need: u8,
     },
     /// A version that this reader does not know.
-    #[error("message has version {got}, this reader knows {} to {}", version::MIN, version::CURRENT)]
+    #[error("message has version {got}, this reader knows {known}")]
     Version {
         /// The byte found.
         got: u8,
+        /// Versions of this kind that are known.
+        known: Versions,
     },
     /// The bytes changed on their way.
     #[error("checksum is {got:#010x}, the bytes give {need:#010x}")]
@@ -120,6 +141,14 @@ pub enum CodecError {
         /// How many gyros there are.
         need: usize,
     },
+    /// A field with a value that its message cannot carry.
+    #[error("{field} must be {must_be}")]
+    Value {
+        /// Name of the field.
+        field: &'static str,
+        /// What it must be.
+        must_be: &'static str,
+    },
 }
 
 /// Encodes a message into `frame`, whose old contents are dropped and whose capacity is kept.
@@ -129,7 +158,7 @@ pub enum CodecError {
 pub fn encode_into<M: Message>(message: &M, frame: &mut Vec<u8>) -> Result<(), CodecError> {
     message.check()?;
     frame.clear();
-    frame.extend([M::KIND as u8, version::CURRENT]);
+    frame.extend([M::KIND as u8, M::VERSIONS.current]);
     let mut body = postcard::to_extend(message, std::mem::take(frame)).map_err(|_| CodecError::Malformed)?;
     let checksum = crc32fast::hash(&body);
     body.extend(checksum.to_le_bytes());
@@ -159,7 +188,7 @@ pub fn decode<M: Message>(frame: &[u8]) -> Result<M, CodecError> {
     if !(HEADER + CHECKSUM..=MAX_FRAME).contains(&length) {
         return Err(CodecError::Length { length });
     }
-    let Some((&[kind, frame_version], _)) = frame.split_first_chunk() else {
+    let Some((&[kind, version], _)) = frame.split_first_chunk() else {
         return Err(CodecError::Length { length });
     };
     let Some((covered, checksum)) = frame.split_last_chunk::<CHECKSUM>() else {
@@ -168,15 +197,15 @@ pub fn decode<M: Message>(frame: &[u8]) -> Result<M, CodecError> {
     if kind != M::KIND as u8 {
         return Err(CodecError::Kind { got: kind, need: M::KIND as u8 });
     }
-    if !(version::MIN..=version::CURRENT).contains(&frame_version) {
-        return Err(CodecError::Version { got: frame_version });
+    if !M::VERSIONS.contains(version) {
+        return Err(CodecError::Version { got: version, known: M::VERSIONS });
     }
     let (got, need) = (u32::from_le_bytes(*checksum), crc32fast::hash(covered));
     if got != need {
         return Err(CodecError::Checksum { got, need });
     }
     let body = covered.get(HEADER..).unwrap_or_default();
-    let (message, rest) = postcard::take_from_bytes::<M>(body).map_err(|_| CodecError::Malformed)?;
+    let (message, rest) = M::read_body(version, body).map_err(|_| CodecError::Malformed)?;
     if !rest.is_empty() {
         return Err(CodecError::Trailing { count: rest.len() });
     }

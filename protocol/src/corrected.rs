@@ -9,13 +9,15 @@ use serde::{Deserialize, Serialize};
 
 use crate::codec::{CodecError, Kind, MAX_TICKS, Message, bounded};
 use crate::raw::{MAX_CHANNELS, Mode};
+use crate::version::{self, Versions};
 
 /// Which calibration made an output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash, Serialize, Deserialize)]
 pub struct Revision {
     /// Counts the calibrations that this unit has been given; 0 is none.
     pub counter: u64,
-    /// First eight bytes of the SHA-256 of the document's text.
+    /// First eight bytes of the SHA-256 of the document's text; hexadecimal digits in JSON.
+    #[serde(with = "crate::digest::hex")]
     pub digest: [u8; 8],
 }
 
@@ -77,6 +79,7 @@ pub struct CorrectedBatch {
 
 impl Message for CorrectedBatch {
     const KIND: Kind = Kind::Corrected;
+    const VERSIONS: Versions = version::CORRECTED;
 
     fn check(&self) -> Result<(), CodecError> {
         let count = self.ticks.len();

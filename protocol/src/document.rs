@@ -20,42 +20,48 @@
 //! 3. the checks between keys (`check`), then the core's own, on everything that is not a stand-in.
 
 mod check;
+pub(crate) mod common;
 mod convert;
+mod correction_change;
 mod curve;
 mod defects;
+mod difference;
 mod measure;
 mod problem;
 mod read;
-mod reader;
+pub(crate) mod reader;
 mod reference;
-mod schema;
+pub(crate) mod schema;
 mod suggest;
 #[cfg(test)]
 mod tests;
+pub(crate) mod text;
 mod types;
-mod values;
+pub(crate) mod values;
 mod warnings;
 
 use isotherm_correction::calibration::Calibration;
 use sha2::{Digest, Sha256};
-use toml::de::DeTable;
 
+pub use correction_change::{Side, correction_change};
 pub use curve::{
     Curve, Frequency, LagGain, OutputBias, Quantity, RateBias, Relative, ScaleFactor, Shape,
     ThermalAcceleration, ThermalRate,
 };
+pub use difference::difference;
 pub use measure::{Argument, Unit};
 pub use problem::Problem;
 pub use reference::reference;
 pub use schema::schema;
 pub use types::{
     Accel, AccelOrientation, AccelOutput, AccelParity, AccelSensor, Branches, Channel, Created, Document,
-    Filter, Gyro, GyroOrientation, GyroOutput, GyroParity, GyroSensor, Lag, Log, Measure, ModeReversal,
-    Orientation, OrientationThermal, Origin, Residual, Sample, Servo, ServoKind, Temperature, Trend,
+    Drift, Filter, Gyro, GyroOrientation, GyroOutput, GyroParity, GyroSensor, Lag, Log, Measure,
+    ModeReversal, Orientation, OrientationThermal, Origin, Residual, Sample, SelfTest, SelfTestCounter,
+    SelfTestVoltage, Servo, ServoKind, Temperature, Trend,
 };
 
-use problem::Lines;
 use reader::{Reader, Table};
+use text::unplaced;
 
 /// Oldest version of the document's form that is still read.
 ///
@@ -70,9 +76,6 @@ pub const CURRENT_SCHEMA: u32 = 1;
 
 /// Longest document that is read, in bytes.
 pub const MAX_DOCUMENT_BYTES: usize = 1 << 20;
-
-/// What the TOML parser says of a key that is given twice.
-const DUPLICATE_KEY: &str = "duplicate key";
 
 /// A document that holds, and what was made of it.
 #[derive(Debug, Clone, PartialEq)]
@@ -94,29 +97,9 @@ impl Document {
     /// Every [`Problem`], in the order of the text.
     pub fn parse(text: &str, file: Option<&str>) -> Result<Parsed, Vec<Problem>> {
         let mut reader = Reader::new(text, file);
-        if text.len() > MAX_DOCUMENT_BYTES {
-            reader.report_at(0, "", format!("is {} bytes long, may have {MAX_DOCUMENT_BYTES}", text.len()));
+        let Some(root) = reader.root(text, [MIN_SCHEMA, CURRENT_SCHEMA]) else {
             return Err(reader.into_problems().unwrap_or_default());
-        }
-        let (root, errors) = DeTable::parse_recoverable(text);
-        for error in &errors {
-            let span = error.span().unwrap_or(0..0);
-            let message = match error.message() {
-                DUPLICATE_KEY => {
-                    format!("TOML: {DUPLICATE_KEY} `{}`: remove one", reader.excerpt(span.clone()))
-                }
-                other => format!("TOML: {other}"),
-            };
-            reader.report_at(span.start, "", message);
-        }
-        // After a duplicate key (the first one counts) the walk can go on; after any other error of syntax it
-        // would find fault with what the author never wrote.
-        if errors.iter().any(|error| error.message() != DUPLICATE_KEY)
-            || foreign_schema(&mut reader, root.get_ref())
-        {
-            return Err(reader.into_problems().unwrap_or_default());
-        }
-
+        };
         let document = read::document(&mut reader, Table::root(root.get_ref()));
         check::check(&mut reader, &document);
         let compiled = Calibration::new(&document.to_parts());
@@ -142,19 +125,7 @@ impl Document {
     /// # Errors
     /// Every [`Problem`], in the order of the text; the first bytes that are not UTF-8 are the only one.
     pub fn parse_bytes(bytes: &[u8], file: Option<&str>) -> Result<Parsed, Vec<Problem>> {
-        match std::str::from_utf8(bytes) {
-            Ok(text) => Self::parse(text, file),
-            Err(error) => {
-                let valid = error.valid_up_to();
-                let before = bytes
-                    .get(..valid)
-                    .and_then(|before| std::str::from_utf8(before).ok())
-                    .unwrap_or_default();
-                let (line, column) = Lines::new(before).position(valid);
-                let message = format!("is not UTF-8 at byte {valid}: save the document as UTF-8");
-                Err(vec![Problem { line, column, ..unplaced(file, message) }])
-            }
-        }
+        Self::parse(text::utf8(bytes, file)?, file)
     }
 
     /// Writes the document as text that [`Document::parse`] reads back as an equal document.
@@ -164,27 +135,4 @@ impl Document {
     pub fn to_toml(&self) -> Result<String, toml::ser::Error> {
         toml::to_string(self)
     }
-}
-
-/// A problem of the document as a whole.
-fn unplaced(file: Option<&str>, message: String) -> Problem {
-    Problem { file: file.map(Into::into), line: 1, column: 1, key: String::new(), message }
-}
-
-/// Refuses a document of another version before anything else is said about its keys.
-fn foreign_schema(reader: &mut Reader<'_>, root: &DeTable<'_>) -> bool {
-    let Some(value) = root.get("schema") else { return false };
-    let version = value.get_ref().as_integer().map(|integer| integer.as_str().parse::<u32>());
-    let Some(Ok(version)) = version else { return false };
-    let foreign = !(MIN_SCHEMA..=CURRENT_SCHEMA).contains(&version);
-    if foreign {
-        let known = if MIN_SCHEMA == CURRENT_SCHEMA {
-            format!("{CURRENT_SCHEMA}")
-        } else {
-            format!("{MIN_SCHEMA} to {CURRENT_SCHEMA}")
-        };
-        let message = format!("is version {version}; this release reads {known}: nothing else was read");
-        reader.report_at(value.span().start, "schema", message);
-    }
-    foreign
 }

@@ -16,9 +16,25 @@ pub const ALL_RAW: &str = "imu/*/raw/*";
 pub const ALL_CORRECTED: &str = "imu/*/corrected";
 /// Status topics of all units.
 pub const ALL_STATUS: &str = "imu/*/status";
+/// Calibration documents of all units: queries and puts.
+pub const ALL_CALIBRATION: &str = "imu/*/calibration";
+/// Commands to all units.
+pub const ALL_COMMAND: &str = "imu/*/command";
+/// Histories of all units.
+pub const ALL_HISTORY: &str = "imu/*/history";
+/// Rate references of all units.
+pub const ALL_REFERENCE: &str = "imu/*/reference";
+/// Liveliness tokens of all units.
+pub const ALL_UNITS_ALIVE: &str = "imu/*/alive";
+/// Status topics of all service instances.
+pub const ALL_SERVICE_STATUS: &str = "isotherm/*/status";
+/// Liveliness tokens of all service instances.
+pub const ALL_SERVICES_ALIVE: &str = "isotherm/*/alive";
 
-/// First chunk of every key.
+/// First chunk of every key of a unit.
 const ROOT: &str = "imu";
+/// First chunk of every key of a service instance.
+const SERVICE_ROOT: &str = "isotherm";
 
 /// Serial of an instrument: the `{unit}` chunk of a key.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -70,7 +86,7 @@ impl fmt::Display for UnitId {
     }
 }
 
-/// The three raw streams of a unit.
+/// The raw streams of a unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum RawStream {
     /// Gyro ticks.
@@ -79,11 +95,13 @@ pub enum RawStream {
     Accel,
     /// Temperature readings.
     Temperature,
+    /// What the producer reports of itself.
+    Health,
 }
 
 impl RawStream {
     /// All of them.
-    pub const ALL: [Self; 3] = [Self::Gyro, Self::Accel, Self::Temperature];
+    pub const ALL: [Self; 4] = [Self::Gyro, Self::Accel, Self::Temperature, Self::Health];
 
     /// Last chunk of the key.
     #[must_use]
@@ -92,51 +110,81 @@ impl RawStream {
             Self::Gyro => "gyro",
             Self::Accel => "accel",
             Self::Temperature => "temp",
+            Self::Health => "health",
         }
     }
 }
 
-/// Key of a raw stream: `imu/{unit}/raw/{gyro|accel|temp}`.
+/// Key of a raw stream: `imu/{unit}/raw/{gyro|accel|temp|health}`.
 #[must_use]
 pub fn raw(unit: &UnitId, stream: RawStream) -> String {
     format!("{ROOT}/{unit}/raw/{}", stream.chunk())
 }
 
-/// Key of the corrected increments: `imu/{unit}/corrected`.
-#[must_use]
-pub fn corrected(unit: &UnitId) -> String {
-    format!("{ROOT}/{unit}/corrected")
+/// Declares the keys `imu/{unit}/{topic}` once, so that building and parsing cannot drift apart.
+macro_rules! topics {
+    ($($what:literal, $topic:literal, $build:ident, $parse:ident;)+) => {
+        $(
+            #[doc = concat!("Key of ", $what, ": `imu/{unit}/", $topic, "`.")]
+            #[must_use]
+            pub fn $build(unit: &UnitId) -> String {
+                format!(concat!("{}/{}/", $topic), ROOT, unit)
+            }
+
+            #[doc = concat!("Reads the unit of a key of ", $what, " back; `None` where it is none.")]
+            #[must_use]
+            pub fn $parse(key: &str) -> Option<&str> {
+                parse(ROOT, key).filter(|(_, rest)| *rest == $topic).map(|(unit, _)| unit)
+            }
+        )+
+    };
 }
 
-/// Key of the status: `imu/{unit}/status`.
+topics! {
+    "the corrected increments", "corrected", corrected, parse_corrected;
+    "a unit's status", "status", status, parse_status;
+    "the calibration document", "calibration", calibration, parse_calibration;
+    "commands", "command", command, parse_command;
+    "a unit's history", "history", history, parse_history;
+    "rate references", "reference", reference, parse_reference;
+    "a unit's liveliness token", "alive", unit_alive, parse_unit_alive;
+}
+
+/// Key of a service instance's status: `isotherm/{instance}/status`; the instance is its Zenoh id as text.
 #[must_use]
-pub fn status(unit: &UnitId) -> String {
-    format!("{ROOT}/{unit}/status")
+pub fn service_status(instance: &str) -> String {
+    format!("{SERVICE_ROOT}/{instance}/status")
+}
+
+/// Key of a service instance's liveliness token: `isotherm/{instance}/alive`.
+#[must_use]
+pub fn service_alive(instance: &str) -> String {
+    format!("{SERVICE_ROOT}/{instance}/alive")
+}
+
+/// Reads the instance of a service's status key back; `None` where it is none.
+#[must_use]
+pub fn parse_service_status(key: &str) -> Option<&str> {
+    parse(SERVICE_ROOT, key).filter(|(_, rest)| *rest == "status").map(|(instance, _)| instance)
+}
+
+/// Reads the instance of a service's liveliness token back; `None` where it is none.
+#[must_use]
+pub fn parse_service_alive(key: &str) -> Option<&str> {
+    parse(SERVICE_ROOT, key).filter(|(_, rest)| *rest == "alive").map(|(instance, _)| instance)
 }
 
 /// Reads a raw key back; `None` where it is none.
 #[must_use]
 pub fn parse_raw(key: &str) -> Option<(&str, RawStream)> {
-    let (unit, rest) = parse(key)?;
+    let (unit, rest) = parse(ROOT, key)?;
     let stream = rest.strip_prefix("raw/")?;
     RawStream::ALL.into_iter().find(|s| s.chunk() == stream).map(|stream| (unit, stream))
 }
 
-/// Reads the unit of a corrected key back; `None` where it is none.
-#[must_use]
-pub fn parse_corrected(key: &str) -> Option<&str> {
-    parse(key).filter(|(_, rest)| *rest == "corrected").map(|(unit, _)| unit)
-}
-
-/// Reads the unit of a status key back; `None` where it is none.
-#[must_use]
-pub fn parse_status(key: &str) -> Option<&str> {
-    parse(key).filter(|(_, rest)| *rest == "status").map(|(unit, _)| unit)
-}
-
-/// Splits `imu/{unit}/{rest}`.
-fn parse(key: &str) -> Option<(&str, &str)> {
-    key.strip_prefix(ROOT)?.strip_prefix('/')?.split_once('/')
+/// Splits `{root}/{name}/{rest}`.
+fn parse<'a>(root: &str, key: &'a str) -> Option<(&'a str, &'a str)> {
+    key.strip_prefix(root)?.strip_prefix('/')?.split_once('/')
 }
 
 #[cfg(test)]
@@ -150,7 +198,22 @@ mod tests {
             assert_eq!(parse_raw(&raw(&unit, stream)), Some(("ZLG-0042", stream)));
         }
         assert_eq!(parse_corrected(&corrected(&unit)), Some("ZLG-0042"));
-        assert_eq!(parse_status(&status(&unit)), Some("ZLG-0042"));
+        let topics = [
+            (status(&unit), "imu/ZLG-0042/status", parse_status as fn(&str) -> Option<&str>),
+            (calibration(&unit), "imu/ZLG-0042/calibration", parse_calibration),
+            (command(&unit), "imu/ZLG-0042/command", parse_command),
+            (history(&unit), "imu/ZLG-0042/history", parse_history),
+            (reference(&unit), "imu/ZLG-0042/reference", parse_reference),
+            (unit_alive(&unit), "imu/ZLG-0042/alive", parse_unit_alive),
+            (service_status("ZLG-0042"), "isotherm/ZLG-0042/status", parse_service_status),
+            (service_alive("ZLG-0042"), "isotherm/ZLG-0042/alive", parse_service_alive),
+        ];
+        for (key, text, parse) in &topics {
+            assert_eq!((key.as_str(), parse(key)), (*text, Some("ZLG-0042")));
+            // No other key is taken for it.
+            let others = topics.iter().filter(|(other, ..)| other != key);
+            assert!(others.into_iter().all(|(other, ..)| parse(other).is_none()), "{key}");
+        }
         for other in ["", "imu", "imu/x", "imu/x/raw", "imu/x/raw/mag", "imu/x/raw/gyro/y", "gps/x/raw/gyro"]
         {
             assert_eq!(parse_raw(other), None, "{other}");

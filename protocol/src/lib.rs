@@ -5,22 +5,36 @@
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`version`] | the compatibility policy, on its two constants |
+//! | [`version`] | the compatibility policy and the versions of each kind of message |
 //! | [`key`] | every key, built and parsed in one place |
 //! | [`codec`] | frames: kind, version, body, checksum |
-//! | [`raw`] | raw gyro, accelerometer and temperature batches |
+//! | [`digest`] | SHA-256 digests: bytes on the wire, digits in JSON |
+//! | [`raw`] | raw gyro, accelerometer, temperature and health batches |
 //! | [`corrected`] | corrected batches |
+//! | [`mod@reference`] | a known angular rate, for the drift estimator |
 //! | [`status`] | what a unit says of itself |
+//! | [`service_status`] | what a service instance says of itself |
 //! | [`stream`] | frames in, frames out for one unit |
-//! | [`document`] | the calibration document: TOML in, validated calibration out |
+//! | [`control`] | what operators ask of a running unit, and the answers |
+//! | [`history`] | what was done to a unit: the entries of the audit file |
+//! | [`document`] | the calibration document: TOML in, validated calibration out; differences of two |
+//! | [`overlay`] | changes of a document's bias constants, such as a pre-launch calibration's; the one way in for both |
+//! | [`signature`] | who signed a calibration document, and whether it is unchanged |
 //!
 //! `docs/wire.md` describes the bytes for readers in other languages.
 
 pub mod codec;
+pub mod control;
 pub mod corrected;
+pub mod digest;
 pub mod document;
+pub mod history;
 pub mod key;
+pub mod overlay;
 pub mod raw;
+pub mod reference;
+pub mod service_status;
+pub mod signature;
 pub mod status;
 pub mod stream;
 pub mod version;

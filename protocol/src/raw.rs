@@ -1,12 +1,17 @@
 //! Raw batches: what a producer publishes for one unit.
 
+mod health;
+
 use arrayvec::ArrayVec;
 use isotherm_correction::sample as core;
 use isotherm_correction::sample::{ChannelName, MAX_SENSORS, OutputKind};
 use isotherm_correction::units::{Span, Timestamp};
 use serde::{Deserialize, Serialize};
 
+pub use health::{HealthBatch, HealthReading, HealthTick, MAX_HEALTH};
+
 use crate::codec::{CodecError, Kind, MAX_TICKS, Message, bounded};
+use crate::version::{self, Versions};
 
 /// Most temperature channels in one batch.
 pub const MAX_CHANNELS: usize = 16;
@@ -204,6 +209,7 @@ fn check_ticks<'a>(readings: impl ExactSizeIterator<Item = &'a Readings>) -> Res
 
 impl Message for GyroBatch {
     const KIND: Kind = Kind::RawGyro;
+    const VERSIONS: Versions = version::RAW_GYRO;
 
     fn check(&self) -> Result<(), CodecError> {
         check_ticks(self.ticks.iter().map(|tick| &tick.readings))?;
@@ -219,6 +225,7 @@ impl Message for GyroBatch {
 
 impl Message for AccelBatch {
     const KIND: Kind = Kind::RawAccel;
+    const VERSIONS: Versions = version::RAW_ACCEL;
 
     fn check(&self) -> Result<(), CodecError> {
         check_ticks(self.ticks.iter().map(|tick| &tick.readings))
@@ -227,6 +234,7 @@ impl Message for AccelBatch {
 
 impl Message for TemperatureBatch {
     const KIND: Kind = Kind::RawTemperature;
+    const VERSIONS: Versions = version::RAW_TEMPERATURE;
 
     fn check(&self) -> Result<(), CodecError> {
         let count = self.ticks.len();

@@ -3,33 +3,53 @@
 //! The service feeds it from Zenoh, the replay tool from a file. Both therefore give the same corrected ticks, bit
 //! for bit.
 
+mod edge;
+mod label;
+mod revisions;
+mod status;
+#[cfg(test)]
+mod tests;
+
 use std::collections::VecDeque;
 use std::sync::Arc;
 
 use isotherm_correction::calibration::Calibration;
-use isotherm_correction::sample::{AccelTick, CorrectedTick, GyroTick, TemperatureReading};
-use isotherm_correction::unit::{Event, Uncalibrated, Unit, UnitSettings};
+use isotherm_correction::operation::{Command, HealthReading, Refusal, State};
+use isotherm_correction::sample::{AccelTick, CorrectedTick, GyroTick, TemperatureReading, TickFlags};
+use isotherm_correction::unit::{At, Change, Event, Unit, UnitSettings};
+use isotherm_correction::units::Span;
+
+pub use edge::Edge;
+pub use label::Label;
+pub use revisions::InForce;
+use revisions::Revisions;
 
 use crate::codec::{self, CodecError, MAX_TICKS};
 use crate::corrected::{AppliedTemperature, CorrectedBatch, Revision};
 use crate::key::{RawStream, UnitId};
-use crate::raw::{AccelBatch, GyroBatch, TemperatureBatch};
-use crate::status::{ChannelStatus, Counter, State, Status};
+use crate::raw::{AccelBatch, GyroBatch, HealthBatch, TemperatureBatch};
+use crate::reference::Reference;
+use crate::status::{Counter, LastTick};
 
 /// One unit's stream.
 #[derive(Debug)]
 pub struct UnitStream {
     id: UnitId,
     unit: Unit,
-    revision: Revision,
-    /// Revisions whose ticks may still be waiting to be taken; the last is the one in force.
-    digests: VecDeque<Revision>,
+    revisions: Revisions,
     ready: VecDeque<CorrectedTick>,
     bad_frames: u64,
-    last: Option<(i64, u64)>,
+    last: Option<LastTick>,
+    /// Series of the last raw gyro tick.
+    incoming_series: u64,
+    /// Series of the last corrected tick; `None` before the first.
+    series: Option<u64>,
+    /// End of the last pre-launch calibration (ns on the producer's clock).
+    pre_launch_ended_ns: Option<i64>,
     gyro_ticks: Vec<GyroTick>,
     accel_ticks: Vec<AccelTick>,
     readings: Vec<TemperatureReading>,
+    health: Vec<HealthReading>,
 }
 
 impl UnitStream {
@@ -39,23 +59,81 @@ impl UnitStream {
         Self {
             id,
             unit: Unit::new(settings),
-            revision: Revision::default(),
-            digests: VecDeque::from([Revision::default()]),
+            revisions: Revisions::new(0),
             ready: VecDeque::new(),
             bad_frames: 0,
             last: None,
+            incoming_series: 0,
+            series: None,
+            pre_launch_ended_ns: None,
             gyro_ticks: Vec::new(),
             accel_ticks: Vec::new(),
             readings: Vec::new(),
+            health: Vec::new(),
         }
+    }
+
+    /// Lets the revision counter go on behind `highest`, the highest that the unit was ever given; at the start only.
+    #[must_use]
+    pub fn with_revision(mut self, highest: u64) -> Self {
+        self.revisions = Revisions::new(highest);
+        self
+    }
+
+    /// Counter of the next revision.
+    #[must_use]
+    pub fn next_counter(&self) -> u64 {
+        self.revisions.next_counter()
     }
 
     /// Puts a calibration in force from the next tick on; the digest is the head of its document's SHA-256.
     pub fn install(&mut self, calibration: Arc<Calibration>, digest: [u8; 8]) -> Revision {
-        self.revision = Revision { counter: self.revision.counter + 1, digest };
-        self.unit.install(calibration, self.revision.counter);
-        self.digests.push_back(self.revision);
-        self.revision
+        let revision = Revision { counter: self.next_counter(), digest };
+        self.install_as(calibration, revision, Label::default());
+        revision
+    }
+
+    /// Puts a calibration in force from the next tick on, under a stated revision.
+    pub fn install_as(&mut self, calibration: Arc<Calibration>, revision: Revision, label: Label) {
+        let change = Change { calibration, revision: revision.counter, at: At::NextTick, slew: Span::ZERO };
+        self.change(change, revision, label);
+    }
+
+    /// Has a calibration take effect at its tick.
+    ///
+    /// The counter must be above all that were given before ([`UnitStream::next_counter`]). Gives the counter of a change
+    /// that was waiting and is replaced by this one.
+    pub fn schedule(&mut self, change: Change, label: Label) -> Option<u64> {
+        let digest = label.digest.map(|digest| digest.head()).unwrap_or_default();
+        let revision = Revision { counter: change.revision, digest };
+        self.change(change, revision, label)
+    }
+
+    fn change(&mut self, change: Change, revision: Revision, label: Label) -> Option<u64> {
+        self.revisions.give(revision, label, change.slew);
+        let replaced = self.watching_pre_launch(|unit| unit.schedule(change));
+        let in_force = self.unit.calibration().map(|(_, counter)| counter);
+        let pending = self.unit.pending().map(|(counter, _)| counter);
+        self.revisions.drop_replaced(in_force, pending);
+        replaced
+    }
+
+    /// Carries a command out before the next tick; the state that it leads to.
+    ///
+    /// # Errors
+    /// [`Refusal`]: the state is as before.
+    pub fn command(&mut self, command: &Command) -> Result<State, Refusal> {
+        self.watching_pre_launch(|unit| unit.command(command))
+    }
+
+    /// Ends a self-test that gets no ticks with what it has seen: for the owner's clock.
+    pub fn expire_self_test(&mut self) {
+        self.unit.expire_self_test();
+    }
+
+    /// Ends a pre-launch calibration whose stream has ended: it is refused as too short.
+    pub fn end_pre_launch(&mut self) {
+        self.watching_pre_launch(Unit::end_pre_launch);
     }
 
     /// Takes one raw frame.
@@ -69,36 +147,96 @@ impl UnitStream {
     }
 
     fn receive_frame(&mut self, stream: RawStream, frame: &[u8]) -> Result<(), CodecError> {
-        let ready = &mut self.ready;
-        let mut emit = |tick: &CorrectedTick| ready.push_back(tick.clone());
         match stream {
             RawStream::Gyro => {
                 let batch: GyroBatch = codec::decode(frame)?;
-                self.gyro_ticks.clear();
-                self.gyro_ticks.extend(batch.to_core());
-                self.unit.handle(Event::Gyro { output: batch.output(), ticks: &self.gyro_ticks }, &mut emit);
+                let mut ticks = std::mem::take(&mut self.gyro_ticks);
+                ticks.clear();
+                ticks.extend(batch.to_core());
+                self.handle(Event::Gyro { output: batch.output(), ticks: &ticks });
+                self.gyro_ticks = ticks;
             }
             RawStream::Accel => {
                 let batch: AccelBatch = codec::decode(frame)?;
-                self.accel_ticks.clear();
-                self.accel_ticks.extend(batch.to_core());
-                self.unit
-                    .handle(Event::Accel { output: batch.output(), ticks: &self.accel_ticks }, &mut emit);
+                let mut ticks = std::mem::take(&mut self.accel_ticks);
+                ticks.clear();
+                ticks.extend(batch.to_core());
+                self.handle(Event::Accel { output: batch.output(), ticks: &ticks });
+                self.accel_ticks = ticks;
             }
             RawStream::Temperature => {
                 let batch: TemperatureBatch = codec::decode(frame)?;
-                self.readings.clear();
-                self.readings.extend(batch.to_core());
-                self.unit.handle(Event::Temperature(&self.readings), &mut emit);
+                let mut readings = std::mem::take(&mut self.readings);
+                readings.clear();
+                readings.extend(batch.to_core());
+                self.handle(Event::Temperature(&readings));
+                self.readings = readings;
+            }
+            RawStream::Health => {
+                let batch: HealthBatch = codec::decode(frame)?;
+                let mut readings = std::mem::take(&mut self.health);
+                readings.clear();
+                readings.extend(batch.to_core());
+                self.handle(Event::Health(&readings));
+                self.health = readings;
             }
         }
         Ok(())
     }
 
-    /// Takes one event that never was a frame.
+    /// Takes one frame with a rate reference.
+    ///
+    /// # Errors
+    /// [`CodecError`] for a frame that cannot be read: it is counted, and nothing else changes.
+    pub fn receive_reference(&mut self, frame: &[u8]) -> Result<(), CodecError> {
+        let decoded = codec::decode::<Reference>(frame);
+        self.bad_frames += u64::from(decoded.is_err());
+        self.handle(Event::Reference(&decoded?.to_core()));
+        Ok(())
+    }
+
+    /// Takes one event that is no frame, or no longer.
     pub fn handle(&mut self, event: Event<'_>) {
-        let ready = &mut self.ready;
-        self.unit.handle(event, &mut |tick| ready.push_back(tick.clone()));
+        if let Event::Gyro { ticks, .. } = event {
+            self.incoming_series = ticks.last().map_or(self.incoming_series, |tick| tick.series);
+        }
+        let before = (self.unit.calibration().map(|(_, counter)| counter), self.unit.counters().ticks_out);
+        let state = self.unit.state();
+        let Self { unit, ready, revisions, series, incoming_series, .. } = self;
+        unit.handle(event, &mut |tick| {
+            // Only a restart changes the series.
+            if tick.flags.contains(TickFlags::RESTART) || series.is_none() {
+                *series = Some(*incoming_series);
+            }
+            let series = series.unwrap_or_default();
+            revisions.released(tick.revision, |revision| InForce {
+                revision,
+                series,
+                sequence: tick.sequence.saturating_sub(u64::from(tick.ticks.saturating_sub(1))),
+                end_time_ns: tick.end_time.as_ns(),
+            });
+            ready.push_back(tick.clone());
+        });
+        let after = (self.unit.calibration().map(|(_, counter)| counter), self.unit.counters().ticks_out);
+        if before.1 != after.1 {
+            before.0.into_iter().chain(after.0).for_each(|counter| self.revisions.made_ticks(counter));
+        }
+        self.note_pre_launch(state);
+    }
+
+    /// Does something with the unit that may end a pre-launch calibration.
+    fn watching_pre_launch<T>(&mut self, work: impl FnOnce(&mut Unit) -> T) -> T {
+        let state = self.unit.state();
+        let done = work(&mut self.unit);
+        self.note_pre_launch(state);
+        done
+    }
+
+    /// Notes the time where a pre-launch calibration has ended since the unit was in state `before`.
+    fn note_pre_launch(&mut self, before: State) {
+        if before == State::PreLaunchCalibration && self.unit.state() != before {
+            self.pre_launch_ended_ns = self.unit.observation().map(|seen| seen.end_time.as_ns());
+        }
     }
 
     /// Releases everything that waits.
@@ -126,23 +264,26 @@ impl UnitStream {
         let count = self.ready.iter().take(MAX_TICKS).take_while(|tick| tick.revision == counter).count();
         let taken: Vec<_> = self.ready.drain(..count).collect();
         self.note_taken(taken.last());
-        let revision = self.digests.iter().find(|r| r.counter == counter).copied();
         let batch = CorrectedBatch {
             unit: self.id.to_string(),
-            revision: revision.unwrap_or(Revision { counter, ..Revision::default() }),
+            revision: self.revisions.revision(counter),
             temperatures: self.temperatures().collect(),
             ticks: taken.iter().map(Into::into).collect(),
         };
         codec::encode_into(&batch, frame).is_ok()
     }
 
+    /// The first output of each revision, in order and once each; ask after every frame.
+    pub fn take_in_force(&mut self) -> Option<InForce> {
+        self.revisions.take_in_force()
+    }
+
     /// Remembers the last tick taken, and drops revisions of which nothing can be waiting any more.
     fn note_taken(&mut self, last: Option<&CorrectedTick>) {
         let Some(last) = last else { return };
-        self.last = Some((last.end_time.as_ns(), last.sequence));
-        while self.digests.len() > 1 && self.digests.front().is_some_and(|r| r.counter < last.revision) {
-            self.digests.pop_front();
-        }
+        let series = self.series.unwrap_or_default();
+        self.last = Some(LastTick { end_time_ns: last.end_time.as_ns(), sequence: last.sequence, series });
+        self.revisions.taken(last.revision);
     }
 
     fn temperatures(&self) -> impl Iterator<Item = AppliedTemperature> + '_ {
@@ -160,47 +301,12 @@ impl UnitStream {
     /// Every counter of the unit, by name.
     #[must_use]
     pub fn counters(&self) -> Vec<Counter> {
-        let counters = self.unit.counters().iter();
-        let mut counters: Vec<_> =
-            counters.map(|(name, value)| Counter { name: name.to_owned(), value }).collect();
-        counters.push(Counter { name: "bad_frames".to_owned(), value: self.bad_frames });
-        counters
-    }
-
-    /// What the unit says of itself. `added_latency_ns` is median and 99th percentile.
-    #[must_use]
-    pub fn status(
-        &self,
-        service_version: &str,
-        last_fault: Option<&str>,
-        added_latency_ns: [u64; 2],
-    ) -> Status {
-        let [added_latency_p50_ns, added_latency_p99_ns] = added_latency_ns;
-        let state = match (self.unit.calibration(), self.unit.settings().uncalibrated) {
-            (Some(_), _) => State::Running,
-            (None, Uncalibrated::PassThrough) => State::Uncalibrated,
-            (None, Uncalibrated::Hold) => State::Held,
-        };
-        let channels = self.unit.channels().map(|channel| ChannelStatus {
-            channel: channel.name,
-            temperature_deg_c: channel.state.map(|state| state.temperature),
-            rate_deg_c_per_s: channel.state.map(|state| state.rate),
-            stale: channel.stale,
-            warming_up: channel.warming_up,
-        });
-        Status {
-            unit: self.id.to_string(),
-            service_version: service_version.to_owned(),
-            state,
-            revision: self.revision,
-            last_end_time_ns: self.last.map(|(end_time, _)| end_time),
-            last_sequence: self.last.map(|(_, sequence)| sequence),
-            channels: channels.collect(),
-            counters: self.counters(),
-            last_fault: last_fault.map(ToOwned::to_owned),
-            added_latency_p50_ns,
-            added_latency_p99_ns,
-        }
+        let references = self.unit.reference_counters();
+        let references = references.iter().map(|(name, value)| (format!("references_{name}"), value));
+        let counters = self.unit.counters().iter().map(|(name, value)| (name.to_owned(), value));
+        let own = [("bad_frames".to_owned(), self.bad_frames)];
+        let all = counters.chain(references).chain(own);
+        all.map(|(name, value)| Counter { name, value }).collect()
     }
 
     /// Serial of the unit.
@@ -212,7 +318,9 @@ impl UnitStream {
     /// The calibration in force; counter 0 while there is none.
     #[must_use]
     pub fn revision(&self) -> Revision {
-        self.revision
+        self.unit
+            .calibration()
+            .map_or_else(Revision::default, |(_, counter)| self.revisions.revision(counter))
     }
 
     /// The unit's state machine, to look at.

@@ -10,7 +10,7 @@ use isotherm_correction::orientation::ROW_NORM_TOLERANCE;
 
 use super::curve::{Curve, Quantity};
 use super::reader::{Reader, element, join};
-use super::types::{AccelSensor, Branches, Document, Filter, GyroSensor, Orientation};
+use super::types::{AccelSensor, Branches, Document, Filter, GyroSensor, Orientation, SelfTest};
 
 /// Checks everything between keys.
 pub(super) fn check(r: &mut Reader<'_>, document: &Document) {
@@ -30,6 +30,9 @@ pub(super) fn check(r: &mut Reader<'_>, document: &Document) {
         }
         orientation(r, "accel", &section.orientation, section.sensor.len(), channels);
     }
+    if let Some(section) = &document.self_test {
+        self_test_names(r, section);
+    }
 }
 
 /// Reports, and marks what was reported.
@@ -45,6 +48,21 @@ fn names<'n>(r: &mut Reader<'_>, sensors: &str, names: impl Iterator<Item = &'n 
         if let Some(earlier) = seen.insert(name, i) {
             let path = join(&element(sensors, i), "name");
             report(r, &path, format!("is {name:?}, the name of {sensors}[{earlier}] too: names must differ"));
+        }
+    }
+}
+
+/// No two voltages or counters of the self-test have one name: both kinds come in on one topic.
+fn self_test_names(r: &mut Reader<'_>, self_test: &SelfTest) {
+    let voltages = self_test.voltage.iter().map(|voltage| voltage.name.as_str());
+    let counters = self_test.counter.iter().map(|counter| counter.name.as_str());
+    names(r, "self_test.voltage", voltages.clone());
+    names(r, "self_test.counter", counters.clone());
+    for (i, name) in counters.enumerate() {
+        if let Some(earlier) = voltages.clone().position(|voltage| voltage == name) {
+            let path = join(&element("self_test.counter", i), "name");
+            let voltage = element("self_test.voltage", earlier);
+            report(r, &path, format!("is {name:?}, the name of {voltage} too: names must differ"));
         }
     }
 }

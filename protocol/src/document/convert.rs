@@ -4,16 +4,18 @@ use isotherm_correction::calibration::{
     AccelParts, BranchArgument, BranchedParts, CalibrationParts, GyroParts, LagParts, TrendParts,
 };
 use isotherm_correction::channel::{ChannelParts, ThermalFilterParts};
+use isotherm_correction::drift::DriftParts;
+use isotherm_correction::operation::{SelfTestCounter, SelfTestParts, SelfTestVoltage};
 use isotherm_correction::orientation::OrientationParts;
 use isotherm_correction::reversal::ReversalParts;
 use isotherm_correction::sample::{ChannelName, MAX_CHANNEL_NAME, OutputKind};
 use isotherm_correction::servo::{ServoForm, ServoParts};
 
 use super::curve::{Curve, Quantity};
-use super::measure::{ARCSEC, Argument, DEG_PER_H, DEG_PER_S, HOUR};
+use super::measure::{ARCSEC, Argument, DEG_PER_H, DEG_PER_S, DEG_PER_SQRT_H, HOUR};
 use super::types::{
-    AccelOutput, AccelSensor, Branches, Channel, Document, GyroOutput, GyroSensor, Lag, ModeReversal,
-    Orientation, Servo, ServoKind, Temperature, Trend,
+    AccelOutput, AccelSensor, Branches, Channel, Document, Drift, GyroOutput, GyroSensor, Lag, ModeReversal,
+    Orientation, SelfTest, Servo, ServoKind, Temperature, Trend,
 };
 use super::values::HUGE;
 
@@ -77,6 +79,7 @@ impl Document {
                 .map(|thermal| following(&thermal.channels))
                 .unwrap_or_default(),
             reversal: self.mode_reversal.as_ref().map(reversal),
+            self_test: self.self_test.as_ref().map(self_test).unwrap_or_default(),
         }
     }
 
@@ -109,6 +112,7 @@ impl Document {
             lags: sensor.lag.iter().map(lag).collect(),
             trend: sensor.trend.as_ref().map(trend),
             servo: sensor.servo.as_ref().map(servo),
+            drift: sensor.drift.as_ref().map(drift),
         }
     }
 
@@ -144,16 +148,20 @@ fn filter(temperature: &Temperature) -> ThermalFilterParts {
     }
 }
 
-fn channel(channel: &Channel) -> ChannelParts {
+/// A name that is too long was reported by the walk; here it is cut.
+fn name(stated: &str) -> ChannelName {
     let mut name = ChannelName::new();
-    for c in channel.name.chars().take(MAX_CHANNEL_NAME) {
-        // A name that is too long was reported by the walk; here it is cut.
+    for c in stated.chars().take(MAX_CHANNEL_NAME) {
         if name.try_push(c).is_err() {
             break;
         }
     }
+    name
+}
+
+fn channel(channel: &Channel) -> ChannelParts {
     ChannelParts {
-        name,
+        name: name(&channel.name),
         conversion: channel.conversion_deg_c.clone(),
         range_deg_c: channel.range_deg_c,
         spike_limit_deg_c: channel.spike_limit_deg_c,
@@ -210,6 +218,33 @@ fn servo(servo: &Servo) -> ServoParts {
         time_constant_s: servo.time_constant_s,
         rest_frequency: servo.rest_frequency.to_parts(0.0),
         settle_time_constants: servo.settle_time_constants,
+    }
+}
+
+fn drift(drift: &Drift) -> DriftParts {
+    DriftParts {
+        sigma_rad_per_s: drift.sigma_deg_per_h * DEG_PER_H,
+        correlation_time_s: drift.correlation_time_h * HOUR,
+        trend_sigma_rad_per_s2: drift.trend_sigma_deg_per_h2 * DEG_PER_H / HOUR,
+        trend_correlation_time_s: drift.trend_correlation_time_h * HOUR,
+        initial_sigma_rad_per_s: drift.initial_sigma_deg_per_h * DEG_PER_H,
+        angle_random_walk_rad_per_sqrt_s: drift.angle_random_walk_deg_per_sqrt_h * DEG_PER_SQRT_H,
+    }
+}
+
+fn self_test(self_test: &SelfTest) -> SelfTestParts {
+    let voltages = self_test.voltage.iter();
+    let counters = self_test.counter.iter();
+    SelfTestParts {
+        voltages: voltages
+            .map(|voltage| SelfTestVoltage { name: name(&voltage.name), range_v: voltage.range_v })
+            .collect(),
+        counters: counters
+            .map(|counter| SelfTestCounter {
+                name: name(&counter.name),
+                max_increase: f64::from(counter.max_increase),
+            })
+            .collect(),
     }
 }
 

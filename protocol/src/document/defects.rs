@@ -40,6 +40,9 @@ fn path(document: &Document, defect: &Defect) -> String {
         Section::Accel(i) => element("accel.sensor", i),
         Section::AccelOrientation => "accel.orientation".into(),
         Section::Reversal => "mode_reversal".to_owned(),
+        Section::SelfTest => "self_test".to_owned(),
+        Section::SelfTestVoltage(i) => element("self_test.voltage", i),
+        Section::SelfTestCounter(i) => element("self_test.counter", i),
     };
     match key(document, defect) {
         "" => table,
@@ -65,6 +68,14 @@ fn key(document: &Document, defect: &Defect) -> &'static str {
         (Section::GyroOrientation | Section::AccelOrientation, "weight") => "weights",
         (Section::Gyro(_), "trend.coefficients") => "trend.coefficients_deg_per_h",
         (Section::Gyro(_), "trend.interval_s") => "trend.interval_h",
+        (Section::Gyro(_), "sigma_rad_per_s") => "drift.sigma_deg_per_h",
+        (Section::Gyro(_), "correlation_time_s") => "drift.correlation_time_h",
+        (Section::Gyro(_), "trend_sigma_rad_per_s2") => "drift.trend_sigma_deg_per_h2",
+        (Section::Gyro(_), "trend_correlation_time_s") => "drift.trend_correlation_time_h",
+        (Section::Gyro(_), "initial_sigma_rad_per_s") => "drift.initial_sigma_deg_per_h",
+        (Section::Gyro(_), "angle_random_walk_rad_per_sqrt_s") => "drift.angle_random_walk_deg_per_sqrt_h",
+        (Section::SelfTest, "voltages") => "voltage",
+        (Section::SelfTest, "counters") => "counter",
         (Section::Accel(_), "board_ratio") => "board_ratio_error",
         (Section::Accel(_), "input_limit") => "",
         (Section::GyroOrientation | Section::AccelOrientation, "slopes_per_deg_c" | "slopes" | "slope") => {

@@ -8,6 +8,8 @@ pub(super) const DEG_PER_H: f64 = AngularRate::from_deg_per_h(1.0).as_rad_per_s(
 pub(super) const DEG_PER_S: f64 = AngularRate::from_deg_per_s(1.0).as_rad_per_s();
 /// rad in one ″.
 pub(super) const ARCSEC: f64 = Angle::from_arcsec(1.0).as_rad();
+/// rad/√s in one °/√h.
+pub(super) const DEG_PER_SQRT_H: f64 = Angle::from_deg(1.0).as_rad() / 60.0;
 /// One part per million.
 pub(super) const PPM: f64 = 1e-6;
 /// Seconds in an hour.
@@ -122,7 +124,7 @@ impl Argument {
 }
 
 /// Spellings at the end of a key that state its unit, the longest first, with the symbol for readers.
-const KEY_UNITS: [(&str, &str); 21] = [
+const KEY_UNITS: [(&str, &str); 25] = [
     ("_arcsec_per_deg_c", "″/°C"),
     ("_arcsec_per_count", "″/count"),
     ("_counts_per_tick", "counts/tick"),
@@ -130,6 +132,8 @@ const KEY_UNITS: [(&str, &str); 21] = [
     ("_rad_per_rad", "rad/rad"),
     ("_time_constants", "time constants"),
     ("_deg_c_per_s", "°C/s"),
+    ("_deg_per_sqrt_h", "°/√h"),
+    ("_deg_per_h2", "°/h²"),
     ("_deg_per_h", "°/h"),
     ("_deg_per_s", "°/s"),
     ("_m_per_s2", "m/s²"),
@@ -138,9 +142,11 @@ const KEY_UNITS: [(&str, &str); 21] = [
     ("_readings_after", "readings"),
     ("_degree", "degree"),
     ("_deg_c", "°C"),
+    ("_deg", "°"),
     ("_ticks", "ticks"),
     ("_ratio", "1"),
     ("_h", "h"),
+    ("_ns", "ns"),
     ("_s", "s"),
     ("_v", "V"),
     ("_hz", "Hz"),

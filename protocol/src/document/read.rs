@@ -3,17 +3,16 @@
 mod accel;
 mod gyro;
 mod origin;
+mod self_test;
 
 use isotherm_correction::reversal::{
     MAX_FIT_DEGREE, MAX_FIT_READINGS, MAX_PREDICT_DEGREE, MAX_TRANSITION_TICKS,
 };
-use isotherm_correction::sample::{MAX_CHANNEL_NAME, MAX_SENSORS, MIN_SENSORS};
-use toml::de::DeValue;
+use isotherm_correction::sample::{MAX_SENSORS, MIN_SENSORS};
 
+use super::common::{created, name, unit};
 use super::reader::{Reader, Table};
-use super::types::{
-    Channel, Created, Document, Filter, ModeReversal, Orientation, OrientationThermal, Temperature,
-};
+use super::types::{Channel, Document, Filter, ModeReversal, Orientation, OrientationThermal, Temperature};
 use super::values::Limits;
 use super::{CURRENT_SCHEMA, MIN_SCHEMA};
 
@@ -40,32 +39,10 @@ pub(super) fn document(r: &mut Reader<'_>, mut root: Table<'_>) -> Document {
         },
         accel: root.table_opt(r, "accel").map(|table| accel::accel(r, table)),
         mode_reversal: root.table_opt(r, "mode_reversal").map(|table| mode_reversal(r, table)),
+        self_test: root.table_opt(r, "self_test").map(|table| self_test::self_test(r, table)),
     };
     root.finish(r);
     document
-}
-
-fn unit(r: &mut Reader<'_>, root: &mut Table<'_>) -> String {
-    let allowed = |c: char| c.is_ascii_alphanumeric() || "._-".contains(c);
-    root.text(r, "unit", "1 to 64 letters A-Z a-z, digits, '.', '_' or '-'", |text| {
-        (1..=64).contains(&text.len()) && text.chars().all(allowed)
-    })
-}
-
-fn created(r: &mut Reader<'_>, root: &mut Table<'_>) -> Option<Created> {
-    let value = root.take(r, "created")?;
-    let created = match value.get_ref() {
-        DeValue::Datetime(datetime) => Created::new(*datetime),
-        _ => None,
-    };
-    if created.is_none() {
-        r.refuse(
-            "created",
-            value,
-            "a date (2026-11-21), or a date and time with offset (2026-11-21T08:00:00Z), without quotes",
-        );
-    }
-    created
 }
 
 fn temperature(r: &mut Reader<'_>, mut table: Table<'_>) -> Temperature {
@@ -108,17 +85,6 @@ fn channel(r: &mut Reader<'_>, mut table: Table<'_>) -> Channel {
     };
     table.finish(r);
     channel
-}
-
-/// A name of a sensor or channel.
-fn name(r: &mut Reader<'_>, table: &mut Table<'_>, key: &'static str) -> String {
-    let value = name_opt(r, table, key);
-    table.need(r, key, value, String::new())
-}
-
-fn name_opt(r: &mut Reader<'_>, table: &mut Table<'_>, key: &'static str) -> Option<String> {
-    let allowed = |text: &str| (1..=MAX_CHANNEL_NAME).contains(&text.len());
-    table.text_opt(r, key, "a name of 1 to 24 bytes", allowed)
 }
 
 /// Reads an orientation; `parity` reads what is special to gyros or accelerometers.

@@ -15,18 +15,18 @@ use super::problem::{Lines, Problem};
 use super::suggest::closest;
 
 /// Most problems that are listed; a document with more is not worth reading to its end.
-pub(super) const MAX_PROBLEMS: usize = 256;
+pub(crate) const MAX_PROBLEMS: usize = 256;
 /// Elements of an array that can be pointed at; longer arrays are pointed at as a whole.
 const MAX_PLACED_ELEMENTS: usize = 128;
 /// Longest key that is shown in full.
 const LONGEST_KEY: usize = 64;
 
 /// A value and where it stands.
-pub(super) type Value<'d> = Spanned<DeValue<'d>>;
+pub(crate) type Value<'d> = Spanned<DeValue<'d>>;
 
 /// Collects problems while a document is walked.
 #[derive(Debug)]
-pub(super) struct Reader<'t> {
+pub(crate) struct Reader<'t> {
     file: Option<&'t str>,
     lines: Lines<'t>,
     problems: Vec<(usize, Problem)>,
@@ -35,11 +35,11 @@ pub(super) struct Reader<'t> {
     places: BTreeMap<String, usize>,
     /// Every key that the walk asked for, indices left out.
     #[cfg(test)]
-    pub(super) asked: BTreeSet<String>,
+    pub(crate) asked: BTreeSet<String>,
 }
 
 impl<'t> Reader<'t> {
-    pub(super) fn new(text: &'t str, file: Option<&'t str>) -> Self {
+    pub(crate) fn new(text: &'t str, file: Option<&'t str>) -> Self {
         Self {
             file,
             lines: Lines::new(text),
@@ -53,7 +53,7 @@ impl<'t> Reader<'t> {
     }
 
     /// Reports a problem at a byte offset.
-    pub(super) fn report_at(&mut self, offset: usize, key: &str, message: impl Into<String>) {
+    pub(crate) fn report_at(&mut self, offset: usize, key: &str, message: impl Into<String>) {
         if self.is_full() {
             self.unlisted += 1;
         } else {
@@ -63,14 +63,14 @@ impl<'t> Reader<'t> {
     }
 
     /// Reports a problem with what stands at a path, unless the path is marked as damaged.
-    pub(super) fn report(&mut self, path: &str, message: impl Into<String>) {
+    pub(crate) fn report(&mut self, path: &str, message: impl Into<String>) {
         if !self.is_damaged(path) {
             self.report_at(self.place(path), path, message);
         }
     }
 
     /// A problem that is returned instead of collected: a warning.
-    pub(super) fn warning(&self, path: &str, message: impl Into<String>) -> Problem {
+    pub(crate) fn warning(&self, path: &str, message: impl Into<String>) -> Problem {
         self.problem_at(self.place(path), path, message.into())
     }
 
@@ -80,12 +80,12 @@ impl<'t> Reader<'t> {
     }
 
     /// Marks a path: its value is a stand-in.
-    pub(super) fn damage(&mut self, path: &str) {
+    pub(crate) fn damage(&mut self, path: &str) {
         self.damaged.insert(path.into());
     }
 
     /// Whether a path, a part of it or what it belongs to is a stand-in.
-    pub(super) fn is_damaged(&self, path: &str) -> bool {
+    pub(crate) fn is_damaged(&self, path: &str) -> bool {
         let within = |outer: &str, inner: &str| {
             inner.strip_prefix(outer).is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
         };
@@ -93,8 +93,13 @@ impl<'t> Reader<'t> {
     }
 
     /// Whether the value of exactly this path is a stand-in.
-    pub(super) fn is_marked(&self, path: &str) -> bool {
+    pub(crate) fn is_marked(&self, path: &str) -> bool {
         self.damaged.contains(path)
+    }
+
+    /// Line and column of every path that was walked over.
+    pub(crate) fn positions(&self) -> BTreeMap<String, (usize, usize)> {
+        self.places.iter().map(|(path, offset)| (path.clone(), self.lines.position(*offset))).collect()
     }
 
     /// Offset of what stands at a path, or of the nearest thing around it.
@@ -110,7 +115,7 @@ impl<'t> Reader<'t> {
     }
 
     /// All problems in the order of the text; `None` if there is none.
-    pub(super) fn into_problems(mut self) -> Option<Vec<Problem>> {
+    pub(crate) fn into_problems(mut self) -> Option<Vec<Problem>> {
         if self.problems.is_empty() {
             return None;
         }
@@ -135,12 +140,12 @@ impl<'t> Reader<'t> {
     }
 
     /// The source text of a span, shortened to what fits in a message.
-    pub(super) fn excerpt(&self, span: Range<usize>) -> String {
+    pub(crate) fn excerpt(&self, span: Range<usize>) -> String {
         self.lines.excerpt(span)
     }
 
     /// "is …, must be …" for a value of the wrong type or outside its limits.
-    pub(super) fn refuse(&mut self, path: &str, value: &Value<'_>, must_be: &str) {
+    pub(crate) fn refuse(&mut self, path: &str, value: &Value<'_>, must_be: &str) {
         let excerpt = self.lines.excerpt(value.span());
         let type_name = match value.get_ref() {
             DeValue::Table(_) => Some("a table"),
@@ -160,18 +165,18 @@ impl<'t> Reader<'t> {
     }
 
     /// Remembers where a path stands.
-    pub(super) fn note(&mut self, path: &str, value: &Value<'_>) {
+    pub(crate) fn note(&mut self, path: &str, value: &Value<'_>) {
         self.places.insert(path.into(), value.span().start);
     }
 }
 
 /// Path of an element of an array.
-pub(super) fn element(path: &str, index: usize) -> String {
+pub(crate) fn element(path: &str, index: usize) -> String {
     format!("{path}[{index}]")
 }
 
 /// Path of a key in a table.
-pub(super) fn join(path: &str, key: &str) -> String {
+pub(crate) fn join(path: &str, key: &str) -> String {
     let bare = !key.is_empty() && key.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_' || b == b'-');
     let mut key: Cow<'_, str> = if bare { key.into() } else { format!("{key:?}").into() };
     if let Some((end, _)) = key.char_indices().nth(LONGEST_KEY) {
@@ -182,7 +187,7 @@ pub(super) fn join(path: &str, key: &str) -> String {
 
 /// One table of the document and the keys it was asked for.
 #[derive(Debug)]
-pub(super) struct Table<'d> {
+pub(crate) struct Table<'d> {
     /// `None` for a stand-in, about which nothing is reported.
     entries: Option<&'d DeTable<'d>>,
     path: String,
@@ -192,12 +197,12 @@ pub(super) struct Table<'d> {
 
 impl<'d> Table<'d> {
     /// The document itself.
-    pub(super) fn root(entries: &'d DeTable<'d>) -> Self {
+    pub(crate) fn root(entries: &'d DeTable<'d>) -> Self {
         Self { entries: Some(entries), path: String::new(), known: Vec::new(), span: 0..0 }
     }
 
     /// A value as a table, or a stand-in and a problem if it is none.
-    pub(super) fn of(reader: &mut Reader<'_>, path: String, value: &'d Value<'d>) -> Self {
+    pub(crate) fn of(reader: &mut Reader<'_>, path: String, value: &'d Value<'d>) -> Self {
         reader.note(&path, value);
         let entries = value.get_ref().as_table();
         if entries.is_none() {
@@ -207,37 +212,37 @@ impl<'d> Table<'d> {
     }
 
     /// A stand-in for a table that is not there.
-    pub(super) fn stand_in(path: String) -> Self {
+    pub(crate) fn stand_in(path: String) -> Self {
         Self { entries: None, path, known: Vec::new(), span: 0..0 }
     }
 
     /// The same table with nothing to be said about it.
-    pub(super) fn into_stand_in(self) -> Self {
+    pub(crate) fn into_stand_in(self) -> Self {
         Self::stand_in(self.path)
     }
 
     /// Path of the table.
-    pub(super) fn path(&self) -> &str {
+    pub(crate) fn path(&self) -> &str {
         &self.path
     }
 
     /// Path of one of its keys.
-    pub(super) fn path_of(&self, key: &str) -> String {
+    pub(crate) fn path_of(&self, key: &str) -> String {
         join(&self.path, key)
     }
 
     /// Whether a key is there, without taking it.
-    pub(super) fn has(&self, key: &str) -> bool {
+    pub(crate) fn has(&self, key: &str) -> bool {
         self.entries.is_some_and(|entries| entries.contains_key(key))
     }
 
     /// Whether this is a stand-in.
-    pub(super) fn is_stand_in(&self) -> bool {
+    pub(crate) fn is_stand_in(&self) -> bool {
         self.entries.is_none()
     }
 
     /// Takes a key: from here on it is known.
-    pub(super) fn take(
+    pub(crate) fn take(
         &mut self,
         reader: &mut Reader<'_>,
         key: impl Into<Cow<'static, str>>,
@@ -260,7 +265,7 @@ impl<'d> Table<'d> {
     }
 
     /// Insists on a value: `None` is reported as missing and replaced.
-    pub(super) fn need<T>(&self, reader: &mut Reader<'_>, key: &str, value: Option<T>, stand_in: T) -> T {
+    pub(crate) fn need<T>(&self, reader: &mut Reader<'_>, key: &str, value: Option<T>, stand_in: T) -> T {
         value.unwrap_or_else(|| {
             self.missing(reader, key, &format!("is missing: add `{key}`"));
             stand_in
@@ -268,7 +273,7 @@ impl<'d> Table<'d> {
     }
 
     /// Reports that a key is missing.
-    pub(super) fn missing(&self, reader: &mut Reader<'_>, key: &str, message: &str) {
+    pub(crate) fn missing(&self, reader: &mut Reader<'_>, key: &str, message: &str) {
         let path = self.path_of(key);
         if !self.is_stand_in() {
             reader.report_at(self.span.start, &path, message);
@@ -277,7 +282,7 @@ impl<'d> Table<'d> {
     }
 
     /// Takes a key that must not be there, and says why.
-    pub(super) fn forbid(&mut self, reader: &mut Reader<'_>, key: impl Into<Cow<'static, str>>, why: &str) {
+    pub(crate) fn forbid(&mut self, reader: &mut Reader<'_>, key: impl Into<Cow<'static, str>>, why: &str) {
         let key = key.into();
         let path = self.path_of(&key);
         if self.take(reader, key).is_some() {
@@ -286,7 +291,7 @@ impl<'d> Table<'d> {
     }
 
     /// Reports every key that was not asked for.
-    pub(super) fn finish(self, reader: &mut Reader<'_>) {
+    pub(crate) fn finish(self, reader: &mut Reader<'_>) {
         let known = || self.known.iter().map(AsRef::as_ref);
         for key in self.entries.into_iter().flat_map(DeTable::keys) {
             let name = key.get_ref().as_ref();
@@ -309,7 +314,7 @@ impl<'d> Table<'d> {
 }
 
 /// `a[3].b` → `a.b`.
-pub(super) fn without_indices(path: &str) -> String {
+pub(crate) fn without_indices(path: &str) -> String {
     let mut depth = 0;
     path.chars()
         .filter(|c| {

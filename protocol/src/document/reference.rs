@@ -6,19 +6,22 @@ use serde_json::{Map, Value as Json};
 
 use super::measure::unit_of_key;
 use super::schema::schema;
+use crate::overlay::overlay_schema;
 
 /// What stands above the tables.
 const INTRODUCTION: &str = include_str!("introduction.md");
+/// What stands above the overlay's tables.
+const OVERLAY: &str = include_str!("overlay.md");
 /// Head of every table of keys.
 const HEAD: &str =
     "| key | type | unit | range | default | meaning | source |\n|---|---|---|---|---|---|---|\n";
 
-/// The reference of the calibration document, in Markdown.
+/// The reference of the calibration document and of the overlay, in Markdown.
 #[must_use]
 pub fn reference() -> String {
     let schema = schema();
     let mut text = INTRODUCTION.to_owned();
-    let writer = Writer { schema: &schema };
+    let writer = Writer { schema: &schema, of: "" };
     writer.table(&mut text, "", false, &schema);
     text.push_str("\n## Curves\n");
     text.push_str(CURVES);
@@ -27,6 +30,9 @@ pub fn reference() -> String {
             curve(&mut text, name, definition);
         }
     }
+    text.push_str(OVERLAY);
+    let schema = overlay_schema();
+    Writer { schema: &schema, of: "Overlay: " }.table(&mut text, "", false, &schema);
     text
 }
 
@@ -44,6 +50,8 @@ extrapolated, and the output is flagged. The unit of the values is in the key. T
 /// Writes tables of keys.
 struct Writer<'s> {
     schema: &'s Json,
+    /// What the tables belong to, before their names; empty for the document.
+    of: &'static str,
 }
 
 impl<'s> Writer<'s> {
@@ -60,11 +68,12 @@ impl<'s> Writer<'s> {
     fn table(&self, text: &mut String, path: &str, array: bool, node: &'s Json) {
         let Some(properties) = node.get("properties").and_then(Json::as_object) else { return };
         let header = match (path, array) {
-            ("", _) => "Top level".to_owned(),
+            ("", _) if self.of.is_empty() => "Top level".to_owned(),
+            ("", _) => "top level".to_owned(),
             (path, false) => format!("`[{path}]`"),
             (path, true) => format!("`[[{path}]]`"),
         };
-        let _ = write!(text, "\n## {header}\n\n{}\n\n{HEAD}", paragraph(node));
+        let _ = write!(text, "\n## {}{header}\n\n{}\n\n{HEAD}", self.of, paragraph(node));
         self.rows(text, properties, node.get("required"));
         for (key, property) in properties {
             let path = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };

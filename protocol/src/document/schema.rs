@@ -1,5 +1,6 @@
 //! The document's JSON schema, made from its types, for editors.
 
+use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;
 use serde_json::Value as Json;
 
@@ -8,7 +9,12 @@ use super::types::Document;
 /// JSON schema (draft 07) of the document, as published in `config/calibration.schema.json`.
 #[must_use]
 pub fn schema() -> Json {
-    let mut schema = SchemaSettings::draft07().into_generator().into_root_schema_for::<Document>().to_value();
+    of::<Document>()
+}
+
+/// The schema of a type, without what TOML and editors do not know.
+pub(crate) fn of<T: JsonSchema>() -> Json {
+    let mut schema = SchemaSettings::draft07().into_generator().into_root_schema_for::<T>().to_value();
     tidy(&mut schema);
     schema
 }

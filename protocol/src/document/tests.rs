@@ -8,13 +8,13 @@ mod robust;
 use super::{Document, Parsed, Problem};
 
 /// The document that shows every key.
-const FULL: &str = include_str!("../../../config/calibration/example-full.toml");
+pub(super) const FULL: &str = include_str!("../../../config/calibration/example-full.toml");
 /// The same for the keys that exclude others: mean rate, volts, no temperature channels.
-const OTHER: &str = include_str!("tests/other.toml");
+pub(super) const OTHER: &str = include_str!("tests/other.toml");
 
 /// Parses a document that must hold.
 #[track_caller]
-fn accept(text: &str) -> Parsed {
+pub(super) fn accept(text: &str) -> Parsed {
     match Document::parse(text, Some("test.toml")) {
         Ok(parsed) => parsed,
         Err(problems) => panic!("refused:\n{}", listed(&problems)),
@@ -98,6 +98,12 @@ fn units_become_si() {
         }
         other => panic!("{other:?}"),
     }
+    let drift = x.drift.as_ref().unwrap();
+    close(drift.sigma_rad_per_s, rad_per_s(0.0035));
+    close(drift.correlation_time_s, 32400.0);
+    close(drift.trend_sigma_rad_per_s2, rad_per_s(0.00012) / 3600.0);
+    // Over one hour an angle random walk of N °/√h gives N °: over one second a sixtieth of that.
+    close(drift.angle_random_walk_rad_per_sqrt_s, 0.006_f64.to_radians() / 60.0);
     let other = accept(OTHER).document.to_parts();
     close(other.gyros[0].input_limit, 400_f64.to_radians());
 }

@@ -4,14 +4,18 @@
 //! `docs/calibration-document.md`; "Source:" names the paper or section that the term comes from.
 
 mod accel;
+mod drift;
 mod gyro;
 mod origin;
+mod self_test;
 
 pub use accel::{Accel, AccelOrientation, AccelOutput, AccelParity, AccelSensor};
+pub use drift::Drift;
 pub use gyro::{
     Branches, Gyro, GyroOrientation, GyroOutput, GyroParity, GyroSensor, Lag, Servo, ServoKind, Trend,
 };
 pub use origin::{Created, Log, Measure, Origin, Residual, Sample};
+pub use self_test::{SelfTest, SelfTestCounter, SelfTestVoltage};
 
 use isotherm_correction::reversal::ReversalParts;
 use schemars::JsonSchema;
@@ -46,6 +50,9 @@ pub struct Document {
     /// Substitution over a switch of the lasing mode; absent for an instrument without modes. Source: models §5, 003.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mode_reversal: Option<ModeReversal>,
+    /// Limits of the self-test on what the producer reports of itself; absent where it reports nothing. Source: models §7.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub self_test: Option<SelfTest>,
 }
 
 /// Temperature channels and the filter that all of them use.

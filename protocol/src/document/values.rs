@@ -10,11 +10,11 @@ use toml::de::DeValue;
 use super::reader::{Reader, Table, Value, element, without_indices};
 
 /// Largest magnitude of any number: far beyond any instrument, safe to multiply.
-pub(super) const HUGE: f64 = 1e100;
+pub(crate) const HUGE: f64 = 1e100;
 
 /// What a number may be.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Limits {
+pub(crate) enum Limits {
     /// Any finite number.
     Any,
     /// Above zero.
@@ -71,7 +71,7 @@ fn as_number(value: &DeValue<'_>) -> Option<f64> {
 }
 
 /// A value as a number within its limits.
-pub(super) fn number(reader: &mut Reader<'_>, path: &str, value: &Value<'_>, limits: Limits) -> f64 {
+pub(crate) fn number(reader: &mut Reader<'_>, path: &str, value: &Value<'_>, limits: Limits) -> f64 {
     match as_number(value.get_ref()) {
         Some(number) if limits.allow(number) => number,
         _ => {
@@ -111,7 +111,7 @@ fn fixed<const N: usize>(reader: &mut Reader<'_>, path: &str, value: &Value<'_>,
 type Key = Cow<'static, str>;
 
 impl Table<'_> {
-    pub(super) fn number_opt(
+    pub(crate) fn number_opt(
         &mut self,
         r: &mut Reader<'_>,
         key: impl Into<Key>,
@@ -122,13 +122,13 @@ impl Table<'_> {
         self.take(r, key).map(|value| number(r, &path, value, limits))
     }
 
-    pub(super) fn number(&mut self, r: &mut Reader<'_>, key: impl Into<Key>, limits: Limits) -> f64 {
+    pub(crate) fn number(&mut self, r: &mut Reader<'_>, key: impl Into<Key>, limits: Limits) -> f64 {
         let key = key.into();
         let value = self.number_opt(r, key.clone(), limits);
         self.need(r, &key, value, limits.stand_in())
     }
 
-    pub(super) fn whole_opt(
+    pub(crate) fn whole_opt(
         &mut self,
         r: &mut Reader<'_>,
         key: &'static str,
@@ -148,12 +148,12 @@ impl Table<'_> {
         }))
     }
 
-    pub(super) fn whole(&mut self, r: &mut Reader<'_>, key: &'static str, low: u32, high: u32) -> u32 {
+    pub(crate) fn whole(&mut self, r: &mut Reader<'_>, key: &'static str, low: u32, high: u32) -> u32 {
         let value = self.whole_opt(r, key, low, high);
         self.need(r, key, value, low)
     }
 
-    pub(super) fn small_opt(
+    pub(crate) fn small_opt(
         &mut self,
         r: &mut Reader<'_>,
         key: &'static str,
@@ -163,7 +163,7 @@ impl Table<'_> {
         self.whole_opt(r, key, low.into(), high.into()).map(|whole| u8::try_from(whole).unwrap_or(low))
     }
 
-    pub(super) fn text_opt(
+    pub(crate) fn text_opt(
         &mut self,
         r: &mut Reader<'_>,
         key: &'static str,
@@ -178,7 +178,7 @@ impl Table<'_> {
         Some(text.unwrap_or_default().into())
     }
 
-    pub(super) fn text(
+    pub(crate) fn text(
         &mut self,
         r: &mut Reader<'_>,
         key: &'static str,
@@ -189,7 +189,7 @@ impl Table<'_> {
         self.need(r, key, value, String::new())
     }
 
-    pub(super) fn choice<T: Copy>(
+    pub(crate) fn choice<T: Copy>(
         &mut self,
         r: &mut Reader<'_>,
         key: &'static str,
@@ -208,7 +208,7 @@ impl Table<'_> {
         chosen.map(|(_, choice)| *choice)
     }
 
-    pub(super) fn texts(
+    pub(crate) fn texts(
         &mut self,
         r: &mut Reader<'_>,
         key: &'static str,
@@ -227,7 +227,7 @@ impl Table<'_> {
         self.need(r, key, texts, Vec::new())
     }
 
-    pub(super) fn numbers_opt(
+    pub(crate) fn numbers_opt(
         &mut self,
         r: &mut Reader<'_>,
         key: impl Into<Key>,
@@ -240,7 +240,7 @@ impl Table<'_> {
         Some(list(r, &path, value, count, |r, path, value| number(r, path, value, limits)))
     }
 
-    pub(super) fn pair_opt(
+    pub(crate) fn pair_opt(
         &mut self,
         r: &mut Reader<'_>,
         key: impl Into<Key>,
@@ -256,13 +256,39 @@ impl Table<'_> {
         Some(if r.is_damaged(&path) { [limits.stand_in(), limits.stand_in() + 1.0] } else { [low, high] })
     }
 
-    pub(super) fn pair(&mut self, r: &mut Reader<'_>, key: impl Into<Key>, limits: Limits) -> [f64; 2] {
+    /// Exactly `N` numbers in any order.
+    pub(crate) fn fixed_opt<const N: usize>(
+        &mut self,
+        r: &mut Reader<'_>,
+        key: &'static str,
+        limits: Limits,
+    ) -> Option<[f64; N]> {
+        let path = self.path_of(key);
+        self.take(r, key).map(|value| fixed(r, &path, value, limits))
+    }
+
+    /// A time in whole nanoseconds.
+    pub(crate) fn time_ns(&mut self, r: &mut Reader<'_>, key: &'static str) -> i64 {
+        let time = self.take(r, key).map(|value| {
+            let whole = match value.get_ref() {
+                DeValue::Integer(integer) => i64::from_str_radix(integer.as_str(), integer.radix()).ok(),
+                _ => None,
+            };
+            if whole.is_none() {
+                r.refuse(&self.path_of(key), value, "a whole number of nanoseconds from -2^63 to 2^63 - 1");
+            }
+            whole.unwrap_or_default()
+        });
+        self.need(r, key, time, 0)
+    }
+
+    pub(crate) fn pair(&mut self, r: &mut Reader<'_>, key: impl Into<Key>, limits: Limits) -> [f64; 2] {
         let key = key.into();
         let value = self.pair_opt(r, key.clone(), limits);
         self.need(r, &key, value, [0.0, 1.0])
     }
 
-    pub(super) fn rows<const N: usize>(
+    pub(crate) fn rows<const N: usize>(
         &mut self,
         r: &mut Reader<'_>,
         key: impl Into<Key>,
@@ -276,19 +302,19 @@ impl Table<'_> {
         self.need(r, &key, rows, Vec::new())
     }
 
-    pub(super) fn table_opt(&mut self, r: &mut Reader<'_>, key: &'static str) -> Option<Self> {
+    pub(crate) fn table_opt(&mut self, r: &mut Reader<'_>, key: &'static str) -> Option<Self> {
         let path = self.path_of(key);
         self.take(r, key).map(|value| Self::of(r, path, value))
     }
 
-    pub(super) fn table(&mut self, r: &mut Reader<'_>, key: &'static str) -> Self {
+    pub(crate) fn table(&mut self, r: &mut Reader<'_>, key: &'static str) -> Self {
         let table = self.table_opt(r, key);
         let stand_in = Self::stand_in(self.path_of(key));
         self.need(r, key, table, stand_in)
     }
 
     /// The `low` to `high` tables of an array; may be left out only where `low` is 0.
-    pub(super) fn tables(
+    pub(crate) fn tables(
         &mut self,
         r: &mut Reader<'_>,
         key: &'static str,

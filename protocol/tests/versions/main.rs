@@ -4,11 +4,19 @@
 mod laws;
 mod page;
 mod v1;
+mod v2;
 
 use isotherm_protocol::codec::{self, CodecError, Kind};
 use isotherm_protocol::corrected::CorrectedBatch;
-use isotherm_protocol::raw::{AccelBatch, GyroBatch, TemperatureBatch};
-use isotherm_protocol::status::Status;
+use isotherm_protocol::raw::{AccelBatch, GyroBatch, HealthBatch, TemperatureBatch};
+use isotherm_protocol::reference::Reference;
+use isotherm_protocol::service_status::ServiceStatus;
+use isotherm_protocol::status::{self, Status};
+
+/// Name and frame of every vector, in hexadecimal, in the order of the page.
+fn frames() -> impl Iterator<Item = (&'static str, &'static str)> {
+    v1::FRAMES.iter().chain(v2::FRAMES).copied()
+}
 
 /// Bytes written in hexadecimal; spaces and line ends between them, and comments behind `#`, mean nothing.
 fn bytes(hex: &str) -> Vec<u8> {
@@ -32,13 +40,31 @@ fn decode_as(kind: u8, frame: &[u8]) -> Result<serde_json::Value, CodecError> {
         2 => json::<AccelBatch>(frame),
         3 => json::<TemperatureBatch>(frame),
         4 => json::<CorrectedBatch>(frame),
+        5 if frame.get(1) == Some(&1) => {
+            let old = json::<status::v1::Status>(frame);
+            let current = codec::decode::<Status>(frame).err();
+            assert_eq!(old.as_ref().err(), current.as_ref(), "version 1 is read as the current one too");
+            old
+        }
         5 => json::<Status>(frame),
+        6 => json::<HealthBatch>(frame),
+        7 => json::<ServiceStatus>(frame),
+        8 => json::<Reference>(frame),
         _ => panic!("there is no kind {kind}"),
     }
 }
 
 #[test]
 fn the_numbers_of_the_kinds_are_fixed() {
-    let kinds = [Kind::RawGyro, Kind::RawAccel, Kind::RawTemperature, Kind::Corrected, Kind::Status];
-    assert_eq!(kinds.map(|kind| kind as u8), [1, 2, 3, 4, 5]);
+    let kinds = [
+        Kind::RawGyro,
+        Kind::RawAccel,
+        Kind::RawTemperature,
+        Kind::Corrected,
+        Kind::Status,
+        Kind::RawHealth,
+        Kind::ServiceStatus,
+        Kind::Reference,
+    ];
+    assert_eq!(kinds.map(|kind| kind as u8), [1, 2, 3, 4, 5, 6, 7, 8]);
 }

@@ -1,13 +1,21 @@
-//! `docs/wire.md`: its vectors are the frozen ones and decode to what it says; its tables name every flag and counter.
+//! `docs/wire.md`: its vectors are the frozen ones and decode to what it says; its tables name every flag and counter, and its
+//! examples of control messages are understood.
 
 use std::collections::BTreeSet;
 
+use isotherm_correction::drift::ReferenceCounters;
+use isotherm_correction::operation::State;
 use isotherm_correction::sample::{SensorFlags, TickFlags};
 use isotherm_correction::unit::Counters;
-use isotherm_protocol::{codec, key, raw, version};
+use isotherm_protocol::codec::{self, Kind};
+use isotherm_protocol::control::{CommandOrder, CommandReply, Order, SwapReply};
+use isotherm_protocol::history::{AuditEntry, AuditEvent};
+use isotherm_protocol::{key, raw, service_status, status, version};
 
-use super::v1::FRAMES;
-use super::{bytes, decode_as};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use super::{bytes, decode_as, frames};
 
 const PAGE: &str = include_str!("../../../docs/wire.md");
 
@@ -37,7 +45,7 @@ fn refused() -> impl Iterator<Item = (&'static str, u8, Vec<u8>)> {
 #[test]
 fn the_vectors_of_the_page_are_the_frozen_ones() {
     let page: Vec<_> = vectors().map(|(name, hex, _)| (name, bytes(hex))).collect();
-    let frozen: Vec<_> = FRAMES.iter().map(|(name, hex)| (*name, bytes(hex))).collect();
+    let frozen: Vec<_> = frames().map(|(name, hex)| (name, bytes(hex))).collect();
     assert_eq!(page, frozen);
 }
 
@@ -57,8 +65,51 @@ fn the_page_has_frames_that_are_refused() {
         let error = decode_as(kind, &frame).expect_err(name);
         errors.insert(format!("{error:?}").split([' ', '{']).next().unwrap_or_default().to_owned());
     }
-    let all = "Checksum HalfPeriods Kind Length Malformed MixedReadings Ticks Trailing Version";
+    let all = "Checksum HalfPeriods Kind Length Malformed MixedReadings Ticks Trailing Value Version";
     assert_eq!(errors.into_iter().collect::<Vec<_>>().join(" "), all, "every reason has its frame");
+}
+
+/// Every example of a control message under a label, read as `T` and written again, none field lost.
+fn control_examples<T: DeserializeOwned + Serialize>(label: &str) -> Vec<T> {
+    let opening = format!("\n```json {label}\n");
+    let (_, rest) = PAGE.split_once(&opening).unwrap_or_else(|| panic!("{label} has examples"));
+    let (block, _) = rest.split_once("\n```\n").expect("the end of the block");
+    let said = serde_json::Deserializer::from_str(block).into_iter::<serde_json::Value>();
+    let read = said.map(|said| {
+        let said = said.unwrap_or_else(|e| panic!("{label}: {e}"));
+        let read: T = serde_json::from_value(said.clone()).unwrap_or_else(|e| panic!("{label}: {e}"));
+        let written = serde_json::to_value(&read).expect("JSON takes it");
+        for (name, value) in said.as_object().expect("an object") {
+            assert_eq!(written.get(name), Some(value), "{label}: {name}");
+        }
+        read
+    });
+    read.collect()
+}
+
+#[test]
+fn the_examples_of_control_messages_are_understood() {
+    assert_eq!(control_examples::<SwapReply>("swap-reply").len(), 1);
+    let states: Vec<_> = control_examples::<CommandReply>("command-reply").iter().map(|r| r.state).collect();
+    assert_eq!(states, [State::Standby, State::SelfTest]);
+    let orders = control_examples::<CommandOrder>("order");
+    assert!(matches!(&orders[1].order, Order::PreLaunch(order) if !order.install));
+    assert_eq!(orders.len(), 5);
+    let history = control_examples::<AuditEntry>("history");
+    assert!(matches!(
+        history.iter().map(|entry| &entry.event).collect::<Vec<_>>()[..],
+        [AuditEvent::Accepted(_), AuditEvent::InForce(_)]
+    ));
+}
+
+#[test]
+fn the_page_names_every_option_of_a_swap_and_every_command() {
+    for option in ["by", "dry_run", "at_sequence", "at_time_ns", "slew_s", "any_serial", "force"] {
+        assert!(PAGE.contains(&format!("\n| `{option}` | ")), "{option}");
+    }
+    for command in State::ALL.into_iter().flat_map(State::allowed) {
+        assert!(PAGE.contains(&format!("\n| `{command}` | ")), "{command}");
+    }
 }
 
 #[test]
@@ -78,20 +129,51 @@ fn the_page_names_every_counter_of_the_core() {
 }
 
 #[test]
-fn the_page_states_versions_keys_and_limits() {
+fn the_page_names_every_counter_of_the_references() {
+    for (name, _) in ReferenceCounters::default().iter() {
+        assert!(PAGE.contains(&format!("\n| `references_{name}` |")), "{name}");
+    }
+}
+
+#[test]
+fn the_page_states_the_versions_of_every_kind() {
+    for (kind, versions) in [
+        (Kind::RawGyro, version::RAW_GYRO),
+        (Kind::RawAccel, version::RAW_ACCEL),
+        (Kind::RawTemperature, version::RAW_TEMPERATURE),
+        (Kind::Corrected, version::CORRECTED),
+        (Kind::Status, version::STATUS),
+        (Kind::RawHealth, version::RAW_HEALTH),
+        (Kind::ServiceStatus, version::SERVICE_STATUS),
+        (Kind::Reference, version::REFERENCE),
+    ] {
+        let (start, end) =
+            (format!("| {} | ", kind as u8), format!(" | {versions} | {} |", versions.current));
+        let rows = PAGE.lines().filter(|line| line.starts_with(&start) && line.ends_with(&end));
+        assert_eq!(rows.count(), 1, "{kind:?}: a row with {versions}");
+    }
+}
+
+#[test]
+fn the_page_states_keys_and_limits() {
     // As one line: where the page breaks its lines is no matter.
     let words: Vec<_> = PAGE.split_whitespace().collect();
     let page = words.join(" ");
     for text in [
-        format!("This page describes version {}.", version::CURRENT),
-        format!("Versions from {} to {} are read.", version::MIN, version::CURRENT),
         format!("`{}`", key::ALL_RAW),
         format!("`{}`", key::ALL_CORRECTED),
         format!("`{}`", key::ALL_STATUS),
+        format!("`{}`", key::ALL_SERVICE_STATUS),
+        format!("`{}`", key::ALL_UNITS_ALIVE),
+        format!("`{}`", key::ALL_SERVICES_ALIVE),
         format!("1…{} characters", key::MAX_UNIT_ID),
         format!("at most {} bytes", codec::MAX_FRAME),
         format!("1…{} ticks", codec::MAX_TICKS),
         format!("0…{} channels", raw::MAX_CHANNELS),
+        format!("0…{} per tick", raw::MAX_HEALTH),
+        format!("0…{} kinds", status::MAX_FAULTS),
+        format!("0…{} units", service_status::MAX_UNITS),
+        format!("0…{} documents", service_status::MAX_BAD_DOCUMENTS),
     ] {
         assert!(page.contains(&text), "{text}");
     }

@@ -1,11 +1,12 @@
 //! The walk through `[accel]`.
 
+use super::super::common::{name, name_opt};
 use super::super::curve::Curve;
 use super::super::measure::Unit;
 use super::super::reader::{Reader, Table};
 use super::super::types::{Accel, AccelOutput, AccelParity, AccelSensor};
 use super::super::values::Limits;
-use super::{SENSORS, confirm_ticks, name, name_opt, orientation};
+use super::{SENSORS, confirm_ticks, orientation};
 
 /// Each output: its name in the file, its input-limit key and the units of scale factor and bias.
 const OUTPUTS: [(AccelOutput, &str, &str, Unit, Unit); 3] = [

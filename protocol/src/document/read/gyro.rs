@@ -3,12 +3,15 @@
 use isotherm_correction::servo::{SETTLE_RANGE, TIME_CONSTANT_RANGE_S};
 use isotherm_correction::thermal::MAX_LAGS;
 
+use super::super::common::{name, name_opt};
 use super::super::curve::{Curve, Quantity};
 use super::super::measure::Unit;
 use super::super::reader::{Reader, Table};
-use super::super::types::{Branches, Gyro, GyroOutput, GyroParity, GyroSensor, Lag, Servo, ServoKind, Trend};
+use super::super::types::{
+    Branches, Drift, Gyro, GyroOutput, GyroParity, GyroSensor, Lag, Servo, ServoKind, Trend,
+};
 use super::super::values::Limits;
-use super::{SENSORS, confirm_ticks, name, name_opt, orientation};
+use super::{SENSORS, confirm_ticks, orientation};
 
 /// Keys of a gyro that go with one output only.
 const COUNTS_KEYS: [&str; 2] = ["increment_weight_arcsec_per_count", "input_limit_counts_per_tick"];
@@ -51,6 +54,7 @@ fn sensor(r: &mut Reader<'_>, mut table: Table<'_>, output: Option<GyroOutput>) 
         },
         trend: table.table_opt(r, "trend").map(|table| trend(r, table)),
         servo: table.table_opt(r, "servo").map(|table| servo(r, table)),
+        drift: table.table_opt(r, "drift").map(|table| drift(r, table)),
     };
     table.finish(r);
     sensor
@@ -156,6 +160,26 @@ fn servo(r: &mut Reader<'_>, mut table: Table<'_>) -> Servo {
         rest_frequency: Curve::read(r, rest_frequency, Unit::Hz),
         settle_time_constants: settle_time_constants.unwrap_or_else(Servo::default_settling),
     }
+}
+
+/// Limits are round numbers in the document's units, and inside those of the core.
+fn drift(r: &mut Reader<'_>, mut table: Table<'_>) -> Drift {
+    let sigma = Limits::Within(0.0, 20_000.0);
+    let correlation_time = Limits::Within(0.02, 250_000.0);
+    let drift = Drift {
+        sigma_deg_per_h: table.number(r, "sigma_deg_per_h", sigma),
+        correlation_time_h: table.number(r, "correlation_time_h", correlation_time),
+        trend_sigma_deg_per_h2: table.number(r, "trend_sigma_deg_per_h2", Limits::Within(0.0, 70_000.0)),
+        trend_correlation_time_h: table.number(r, "trend_correlation_time_h", correlation_time),
+        initial_sigma_deg_per_h: table.number(r, "initial_sigma_deg_per_h", Limits::Within(1e-6, 20_000.0)),
+        angle_random_walk_deg_per_sqrt_h: table.number(
+            r,
+            "angle_random_walk_deg_per_sqrt_h",
+            Limits::Within(1e-8, 3000.0),
+        ),
+    };
+    table.finish(r);
+    drift
 }
 
 fn within([low, high]: [f64; 2]) -> Limits {

@@ -2,6 +2,7 @@
 
 use toml::de::{DeTable, DeValue};
 
+use super::super::common::sha256;
 use super::super::reader::{Reader, Table, Value, element, join};
 use super::super::types::{Log, Measure, Origin, Residual, Sample};
 use super::super::values::{Limits, number};
@@ -31,11 +32,8 @@ pub(super) fn origin(r: &mut Reader<'_>, mut table: Table<'_>) -> Origin {
 }
 
 fn log(r: &mut Reader<'_>, mut table: Table<'_>) -> Log {
-    let hex = |text: &str| text.len() == 64 && text.bytes().all(|b| matches!(b, b'0'..=b'9' | b'a'..=b'f'));
-    let log = Log {
-        name: table.text(r, "name", "a string", |_| true),
-        sha256: table.text(r, "sha256", "64 lower-case hexadecimal digits", hex),
-    };
+    let log =
+        Log { name: table.text(r, "name", "a string", |_| true), sha256: sha256(r, &mut table, "sha256") };
     table.finish(r);
     log
 }

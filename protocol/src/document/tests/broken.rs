@@ -9,8 +9,8 @@ use super::{FULL, Problem, listed, refuse};
 /// on the line of the problem after the edit, key, part of the message.
 type Case = (&'static str, &'static str, &'static str, &'static str, &'static str, &'static str);
 
-/// The last table of the full document.
-const FULL_TAIL: &str = "[mode_reversal]
+/// The mode reversal of the full document.
+const MODE_REVERSAL: &str = "[mode_reversal]
 transition_ticks = 3
 predict_readings = 4
 predict_degree = 1

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use super::super::{reference, schema};
+use crate::overlay::overlay_schema;
 
 /// Compares a committed file with what the types give; `ISOTHERM_BLESS=1` writes it anew.
 #[track_caller]
@@ -22,6 +23,12 @@ fn compare(path: &str, expected: &str) {
 #[test]
 fn the_schema_is_that_of_the_types() {
     compare("config/calibration.schema.json", &(serde_json::to_string_pretty(&schema()).unwrap() + "\n"));
+}
+
+#[test]
+fn the_schema_of_the_overlay_is_that_of_the_types() {
+    let schema = serde_json::to_string_pretty(&overlay_schema()).unwrap();
+    compare("config/overlay.schema.json", &(schema + "\n"));
 }
 
 #[test]

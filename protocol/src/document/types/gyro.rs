@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::super::curve::{Curve, Frequency, LagGain, RateBias, Relative, ThermalAcceleration, ThermalRate};
-use super::Orientation;
+use super::{Drift, Orientation};
 
 /// The gyros of the unit: `θ = K(T)·P − Ω·Δt`.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -90,6 +90,9 @@ pub struct GyroSensor {
     /// Transient of the perimeter servo after a mode switch; needs `[mode_reversal]`. Source: models §6, 003.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub servo: Option<Servo>,
+    /// What the in-run drift estimator is to expect; it does not run for the gyro where left out. Source: models §7, 002.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub drift: Option<Drift>,
 }
 
 /// One curve per thermal branch, both over the same argument.

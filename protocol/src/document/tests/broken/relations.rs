@@ -1,8 +1,8 @@
 //! Broken between keys: names, units, curves, lists, parts that need each other.
 
-use super::{Case, FULL_TAIL};
+use super::{Case, MODE_REVERSAL};
 
-pub(super) const CASES: [Case; 25] = [
+pub(super) const CASES: [Case; 28] = [
     (
         "two channels of one name",
         "name = \"coil\"",
@@ -157,7 +157,7 @@ pub(super) const CASES: [Case; 25] = [
     ),
     (
         "servo without mode reversal",
-        FULL_TAIL,
+        MODE_REVERSAL,
         "",
         "#:schema",
         "mode_reversal",
@@ -194,6 +194,30 @@ pub(super) const CASES: [Case; 25] = [
         "-1018.9",
         "accel.sensor[1].scale_factor",
         "must not be zero anywhere in its range",
+    ),
+    (
+        "two voltages of one name",
+        "name = \"half-wave y\"",
+        "name = \"half-wave x\"",
+        "name = \"half-wave x\"\nrange_v = [41.0, 55.0]\n\n[[self_test.counter]]",
+        "self_test.voltage[1].name",
+        "the name of self_test.voltage[0] too",
+    ),
+    (
+        "counter with the name of a voltage",
+        "name = \"frame errors\"",
+        "name = \"half-wave y\"",
+        "name = \"half-wave y\"\nmax",
+        "self_test.counter[0].name",
+        "the name of self_test.voltage[1] too",
+    ),
+    (
+        "table for an array of tables",
+        "[[self_test.counter]]",
+        "[self_test.counter]",
+        "[self_test.counter]",
+        "self_test.counter",
+        "must be an array of tables",
     ),
     (
         "degree without readings",

@@ -2,7 +2,7 @@
 
 use super::Case;
 
-pub(super) const CASES: [Case; 25] = [
+pub(super) const CASES: [Case; 31] = [
     ("syntax", "schema = 1", "schema = = 1", "schema = =", "", "TOML: "),
     ("open string", "method = \"joint\"", "method = \"joint", "method =", "", "TOML: invalid basic string"),
     (
@@ -167,5 +167,53 @@ pub(super) const CASES: [Case; 25] = [
         "[125.0",
         "temperature.channel[1].range_deg_c",
         "runs from 125 to -55: the first must be below",
+    ),
+    (
+        "negative sigma of the drift",
+        "sigma_deg_per_h = 0.0035",
+        "sigma_deg_per_h = -0.0035",
+        "= -0.0035",
+        "gyro.sensor[0].drift.sigma_deg_per_h",
+        "is -0.0035, must be a number from 0 to 20000",
+    ),
+    (
+        "drift faster than a reference",
+        "correlation_time_h = 9.0",
+        "correlation_time_h = 0.01",
+        "= 0.01",
+        "gyro.sensor[0].drift.correlation_time_h",
+        "must be a number from 0.02 to 250000",
+    ),
+    (
+        "drift without noise",
+        "angle_random_walk_deg_per_sqrt_h = 0.006",
+        "angle_random_walk_deg_per_sqrt_h = 0.0",
+        "sqrt_h = 0.0\n",
+        "gyro.sensor[0].drift.angle_random_walk_deg_per_sqrt_h",
+        "is 0.0, must be a number from 0.00000001",
+    ),
+    (
+        "drift without its start",
+        "initial_sigma_deg_per_h = 0.05\n",
+        "",
+        "[gyro.sensor.drift]",
+        "gyro.sensor[0].drift.initial_sigma_deg_per_h",
+        "is missing: add `initial_sigma_deg_per_h`",
+    ),
+    (
+        "part of a count",
+        "max_increase = 3",
+        "max_increase = 3.5",
+        "= 3.5",
+        "self_test.counter[0].max_increase",
+        "is 3.5, must be a whole number from 0 to 1000000000",
+    ),
+    (
+        "inverted limits of a voltage",
+        "range_v = [41.0, 55.0]",
+        "range_v = [55.0, 41.0]",
+        "[55.0",
+        "self_test.voltage[0].range_v",
+        "runs from 55 to 41",
     ),
 ];

@@ -1,0 +1,141 @@
+//! Commands to a unit, and the answer.
+
+use isotherm_correction::operation::State;
+use serde::{Deserialize, Serialize};
+
+use super::swap::SwapReply;
+
+/// A command and who gives it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CommandOrder {
+    /// Who asks, for the audit file: at most 64 characters.
+    #[serde(default)]
+    pub by: String,
+    /// What is to be done.
+    #[serde(flatten)]
+    pub order: Order,
+}
+
+/// What a unit can be told to do (models §7).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "command", rename_all = "kebab-case")]
+pub enum Order {
+    /// Publish nothing until further notice; ticks are announced as missing afterwards.
+    Standby,
+    /// Test the instrument; at most 15 s, from standby.
+    SelfTest,
+    /// Determine C0 and B0 of each gyro at rest, from standby.
+    PreLaunch(PreLaunchOrder),
+    /// End self-test or pre-launch calibration; nothing has changed.
+    Abort,
+    /// Publish corrected increments.
+    Run {
+        /// Whether the lasing mode is reversed; left out: as the calibration has it.
+        #[serde(default)]
+        reversal: Option<bool>,
+    },
+    /// The unit is at rest: feed the drift estimator.
+    Rest(PlaceOrder),
+    /// The unit is no longer at rest.
+    EndRest,
+    /// Go back to the calibration before this one, or to a stated revision.
+    Rollback {
+        /// Revision counter to go back to.
+        #[serde(default)]
+        revision: Option<u64>,
+        /// Only say what would happen.
+        #[serde(default)]
+        dry_run: bool,
+    },
+}
+
+/// Where the unit stands and how.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct PlaceOrder {
+    /// Geodetic latitude (°, −90…90).
+    pub latitude_deg: f64,
+    /// Heading of the case's x axis from north (°).
+    pub heading_deg: f64,
+    /// Pitch and roll of the case (°); left out: levelled from the accelerometers.
+    #[serde(default)]
+    pub pitch_roll_deg: Option<[f64; 2]>,
+}
+
+/// A pre-launch calibration; what is left out is as configured.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct PreLaunchOrder {
+    /// Where the unit stands and how.
+    #[serde(flatten)]
+    pub place: PlaceOrder,
+    /// How long to accumulate (s, 60…7200).
+    #[serde(default)]
+    pub duration_s: Option<f64>,
+    /// Put the result in force at once; otherwise it is only stored and told.
+    #[serde(default = "yes")]
+    pub install: bool,
+}
+
+fn yes() -> bool {
+    true
+}
+
+/// The answer to a command.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CommandReply {
+    /// Whether it was carried out, or begun.
+    pub accepted: bool,
+    /// Serial of the unit.
+    pub unit: String,
+    /// The unit's state afterwards.
+    #[serde(with = "state")]
+    pub state: State,
+    /// Why it was refused.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub reason: Option<String>,
+    /// Commands that the unit would take now.
+    pub allowed: Vec<String>,
+    /// What became of a rollback.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub swap: Option<SwapReply>,
+}
+
+/// A state by its name.
+mod state {
+    use isotherm_correction::operation::State;
+    use serde::{Deserialize, Deserializer, Serializer, de::Error};
+
+    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it so")]
+    pub(super) fn serialize<S: Serializer>(state: &State, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(state.name())
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<State, D::Error> {
+        let name = String::deserialize(deserializer)?;
+        State::from_name(&name).ok_or_else(|| D::Error::custom(format!("{name:?} is no state of a unit")))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn orders_are_plain_json() {
+        let place = PlaceOrder { latitude_deg: 55.0, heading_deg: 30.0, pitch_roll_deg: None };
+        let cases = [
+            (r#"{"by":"ann","command":"run","reversal":true}"#, Order::Run { reversal: Some(true) }),
+            (r#"{"command":"standby"}"#, Order::Standby),
+            (
+                r#"{"command":"pre-launch","latitude_deg":55,"heading_deg":30}"#,
+                Order::PreLaunch(PreLaunchOrder { place, duration_s: None, install: true }),
+            ),
+        ];
+        for (json, order) in cases {
+            let read: CommandOrder = serde_json::from_str(json).unwrap_or_else(|e| panic!("{json}: {e}"));
+            assert_eq!(read.order, order);
+            let again = serde_json::from_str(&serde_json::to_string(&read).unwrap_or_default());
+            assert_eq!(again.ok(), Some(read));
+        }
+        assert!(serde_json::from_str::<CommandOrder>(r#"{"command":"explode"}"#).is_err());
+    }
+}

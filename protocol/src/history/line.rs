@@ -1,0 +1,109 @@
+//! An entry as a line of JSON with its checksum.
+//!
+//! The last field of a line is `crc`: the CRC-32 (of zlib and gzip) of the line as it would be without that field, in eight
+//! hexadecimal digits. So a line cut off in mid-write, or with a byte turned over, is known for what it is.
+
+use std::fmt::Write;
+
+use serde::Deserialize;
+use thiserror::Error;
+
+use super::AuditEntry;
+
+/// Longest line, its line feed included.
+pub const MAX_LINE_BYTES: usize = 1 << 17;
+
+/// What stands before the checksum's digits.
+const BEFORE: &str = ",\"crc\":\"";
+/// What stands behind them.
+const BEHIND: &str = "\"}";
+
+/// Why a line is no entry.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum LineError {
+    /// Not UTF-8, or without the checksum at its end: not a line of this kind, or cut off.
+    #[error("does not end in its checksum: cut off, or not an audit line")]
+    Form,
+    /// Longer than any entry.
+    #[error("has {bytes} bytes, may have {MAX_LINE_BYTES}")]
+    Length {
+        /// Its length.
+        bytes: usize,
+    },
+    /// The checksum does not fit: the line was damaged, or written by hand.
+    #[error("checksum is {found}, must be {need:08x}: the line was damaged or edited")]
+    Checksum {
+        /// As it stands in the line.
+        found: String,
+        /// What the line has.
+        need: u32,
+    },
+    /// Whole, yet not understood: written by a newer version.
+    #[error("is not understood, written by a newer version? {words}")]
+    Entry {
+        /// What JSON says.
+        words: String,
+        /// Its number, where it has one.
+        number: Option<u64>,
+    },
+}
+
+/// What every entry of whatever version has.
+#[derive(Deserialize)]
+struct Head {
+    number: u64,
+}
+
+impl AuditEntry {
+    /// The entry as a line, line feed included.
+    ///
+    /// # Errors
+    /// [`LineError::Length`] for an entry that was not [`bounded`](Self::bounded) and is too long.
+    pub fn to_line(&self) -> Result<String, LineError> {
+        let mut line = serde_json::to_string(self)
+            .map_err(|error| LineError::Entry { words: error.to_string(), number: Some(self.number) })?;
+        let crc = crc32fast::hash(line.as_bytes());
+        // The closing brace comes back behind the checksum.
+        line.pop();
+        // Writing to a string cannot fail.
+        let _ = writeln!(line, "{BEFORE}{crc:08x}{BEHIND}");
+        if line.len() > MAX_LINE_BYTES { Err(LineError::Length { bytes: line.len() }) } else { Ok(line) }
+    }
+
+    /// Reads a line, with or without its line feed.
+    ///
+    /// # Errors
+    /// [`LineError`] where it is damaged or not understood.
+    pub fn from_line(line: &[u8]) -> Result<Self, LineError> {
+        let json = checked(line)?;
+        serde_json::from_str(&json).map_err(|error| {
+            let number = serde_json::from_str::<Head>(&json).ok().map(|head| head.number);
+            LineError::Entry { words: error.to_string(), number }
+        })
+    }
+
+    /// Whether a line is whole, by its checksum.
+    #[must_use]
+    pub fn is_whole(line: &[u8]) -> bool {
+        checked(line).is_ok()
+    }
+}
+
+/// The line without its checksum, if that fits.
+fn checked(line: &[u8]) -> Result<String, LineError> {
+    if line.len() > MAX_LINE_BYTES {
+        return Err(LineError::Length { bytes: line.len() });
+    }
+    let line = str::from_utf8(line).map_err(|_| LineError::Form)?;
+    let line = line.strip_suffix('\n').unwrap_or(line);
+    let (body, digits) =
+        line.strip_suffix(BEHIND).and_then(|line| line.rsplit_once(BEFORE)).ok_or(LineError::Form)?;
+    let json = format!("{body}}}");
+    let need = crc32fast::hash(json.as_bytes());
+    if format!("{need:08x}") == digits {
+        Ok(json)
+    } else {
+        Err(LineError::Checksum { found: digits.chars().take(8).collect(), need })
+    }
+}

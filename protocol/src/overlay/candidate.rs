@@ -1,0 +1,99 @@
+//! What may become active: a calibration document, or an overlay on the one in force.
+
+use isotherm_correction::calibration::Calibration;
+
+use super::{Overlay, ParsedOverlay, is_overlay};
+use crate::digest::Digest;
+use crate::document::text::{unplaced, utf8};
+use crate::document::{Document, Parsed, Problem, Side};
+
+/// A calibration that holds, with the text that it is known by.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Candidate {
+    /// What stands in the document; for an overlay, in its base with the changes made.
+    pub document: Document,
+    /// What was made of it.
+    pub calibration: Calibration,
+    /// The text that stands for it: as it came, or written anew for an overlay on its base. The same inputs give the same
+    /// bytes.
+    pub text: String,
+    /// SHA-256 of that text: the digest of the revision.
+    pub digest: [u8; 32],
+    /// SHA-256 of the document that the constants rest on: the base's for an overlay, else `digest`.
+    pub base_digest: [u8; 32],
+    /// The overlay, where it is one.
+    pub overlay: Option<ParsedOverlay>,
+    /// What is doubtful, though valid.
+    pub warnings: Vec<Problem>,
+}
+
+impl Candidate {
+    /// Reads a document of either kind; `file` is the name that problems are to carry, `active_base` the text of the
+    /// document that an overlay may be for.
+    ///
+    /// # Errors
+    /// Every [`Problem`], in the order of the text. An overlay is refused where there is no base, where the base is no
+    /// valid document, or where it does not fit the base.
+    pub fn parse(text: &str, file: Option<&str>, active_base: Option<&str>) -> Result<Self, Vec<Problem>> {
+        if !is_overlay(text) {
+            let parsed = Document::parse(text, file)?;
+            let (digest, warnings) = (parsed.digest, parsed.warnings.clone());
+            return Ok(Self::new(parsed, text.to_owned(), digest, None, warnings));
+        }
+        let overlay = Overlay::parse(text, file)?;
+        let Some(base_text) = active_base else {
+            let message = "is an overlay, but the unit has no document in force: put the document that it is for in \
+                           force first";
+            return Err(vec![overlay.problem(super::OVERLAY_OF, message.to_owned())]);
+        };
+        let base_digest = Digest::of(base_text.as_bytes()).0;
+        let base = Document::parse(base_text, Some("document in force"))?;
+        let document = overlay.apply(&base_digest, &base.document)?;
+        let failed =
+            |error: String| vec![unplaced(file, format!("cannot be written out on its base: {error}"))];
+        let effective = document.to_toml().map_err(|error| failed(error.to_string()))?;
+        // Its lines are nobody's: what is said of it is said of the overlay as a whole.
+        let on_overlay = |problems: Vec<Problem>| -> Vec<Problem> {
+            let place = |problem: Problem| Problem {
+                key: problem.key,
+                ..unplaced(file, format!("on its base: {}", problem.message))
+            };
+            problems.into_iter().map(place).collect()
+        };
+        let parsed = Document::parse(&effective, None).map_err(on_overlay)?;
+        let new = |warning: &Problem| {
+            base.warnings.iter().all(|old| (&old.key, &old.message) != (&warning.key, &warning.message))
+        };
+        let warnings = on_overlay(parsed.warnings.iter().filter(|warning| new(warning)).cloned().collect());
+        Ok(Self::new(parsed, effective, base_digest, Some(overlay), warnings))
+    }
+
+    /// Reads a document of either kind from bytes that may not be UTF-8.
+    ///
+    /// # Errors
+    /// As [`Candidate::parse`]; the first bytes that are not UTF-8 are the only problem.
+    pub fn parse_bytes(
+        bytes: &[u8],
+        file: Option<&str>,
+        active_base: Option<&str>,
+    ) -> Result<Self, Vec<Problem>> {
+        Self::parse(utf8(bytes, file)?, file, active_base)
+    }
+
+    fn new(
+        parsed: Parsed,
+        text: String,
+        base_digest: [u8; 32],
+        overlay: Option<ParsedOverlay>,
+        warnings: Vec<Problem>,
+    ) -> Self {
+        let Parsed { document, calibration, digest, .. } = parsed;
+        Self { document, calibration, text, digest, base_digest, overlay, warnings }
+    }
+
+    /// The candidate as one side of a comparison.
+    #[must_use]
+    pub fn side(&self) -> Side<'_> {
+        Side { document: &self.document, calibration: &self.calibration }
+    }
+}

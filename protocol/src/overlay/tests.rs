@@ -1,0 +1,332 @@
+//! Overlays by themselves, on their base, and as candidates.
+
+use super::*;
+use crate::digest::Digest;
+use crate::document::{Document, Parsed, difference};
+
+const FULL: &str = include_str!("../../../config/calibration/example-full.toml");
+const OVERLAY: &str = "schema = 1
+overlay_of = \"BASE\"
+unit = \"EXAMPLE-0001\"
+created = 2026-11-22T06:10:00Z
+note = \"Hangar 2.\"
+
+[[gyro]]
+name = \"x\"
+static_bias_change_deg_per_h = 0.031
+static_bias_sigma_deg_per_h = 0.004
+magnetic_bias_change_deg_per_h = -0.012
+magnetic_bias_sigma_deg_per_h = 0.005
+
+[[gyro]]
+name = \"y\"
+static_bias_change_deg_per_h = -0.02
+static_bias_sigma_deg_per_h = 0.004
+
+[pre_launch]
+latitude_deg = 55.0
+heading_deg = 90.0
+pitch_roll_deg = [1.5, -0.5]
+duration_s = 600.0
+start_ns = 1000000000
+end_ns = 601000000000
+mean_temperature_deg_c = [31.5, 31.25, 31.0, 30.5]
+";
+
+fn digest(text: &str) -> [u8; 32] {
+    Digest::of(text.as_bytes()).0
+}
+
+fn hex(digest: &[u8; 32]) -> String {
+    Digest::from(*digest).to_string()
+}
+
+/// The overlay for a base.
+fn overlay_of(base: &str) -> String {
+    OVERLAY.replacen("BASE", &hex(&digest(base)), 1)
+}
+
+#[track_caller]
+fn base(text: &str) -> Parsed {
+    Document::parse(text, None).unwrap_or_else(|problems| panic!("{}", listed(&problems)))
+}
+
+fn listed(problems: &[Problem]) -> String {
+    problems.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
+}
+
+#[track_caller]
+fn candidate(text: &str, base: Option<&str>) -> Candidate {
+    Candidate::parse(text, Some("field.toml"), base)
+        .unwrap_or_else(|problems| panic!("{}", listed(&problems)))
+}
+
+#[track_caller]
+fn refuse(text: &str, base: Option<&str>) -> Vec<Problem> {
+    match Candidate::parse(text, Some("field.toml"), base) {
+        Ok(_) => panic!("not refused:\n{text}"),
+        Err(problems) => problems,
+    }
+}
+
+#[test]
+fn the_changes_are_added_to_all_of_a_curve_and_nothing_else_changes() {
+    let text = overlay_of(FULL);
+    let made = candidate(&text, Some(FULL));
+    let changes = difference(&base(FULL).document, &made.document);
+    let words: Vec<_> = changes.iter().map(|change| (change.key.as_str(), change.after.as_deref())).collect();
+    assert_eq!(words[0], ("gyro.sensor[0].static_bias.coefficients_deg_per_h[0]", Some("1.315")));
+    assert_eq!(words[1], ("gyro.sensor[0].magnetic_bias.coefficients_deg_per_h[0]", Some("3.398")));
+    for (i, (knot, before)) in words[2..7].iter().zip([-0.91, -0.62, -0.55, -0.71, -1.02]).enumerate() {
+        assert_eq!(knot.0, format!("gyro.sensor[1].static_bias.knots_deg_per_h[{i}][1]"));
+        let after: f64 = knot.1.unwrap().parse().unwrap();
+        assert!((after - (before - 0.02)).abs() < 1e-15, "{after}");
+    }
+    assert_eq!(words.len(), 2 + 5 + 1 + 2, "{words:?}");
+    assert_eq!(words[7], ("created", Some("2026-11-22T06:10:00Z")));
+    assert!(words[8..].iter().all(|(key, _)| key.starts_with("origin.details.overlays[0].")), "{words:?}");
+}
+
+#[test]
+fn a_bias_that_the_base_leaves_out_becomes_a_constant() {
+    let mut document = base(FULL).document;
+    document.gyro.sensor[0].static_bias = None;
+    document.gyro.sensor[0].magnetic_bias = None;
+    document.origin = None;
+    let bare = document.to_toml().unwrap();
+    let made = candidate(&overlay_of(&bare), Some(&bare)).document;
+    let text = made.to_toml().unwrap();
+    assert!(
+        text.contains("[gyro.sensor.static_bias]\nkind = \"constant\"\nvalue_deg_per_h = 0.031\n"),
+        "{text}"
+    );
+    assert!(
+        text.contains("[gyro.sensor.magnetic_bias]\nkind = \"constant\"\nvalue_deg_per_h = -0.012\n"),
+        "{text}"
+    );
+    assert!(made.origin.unwrap().details.unwrap().contains_key("overlays"));
+}
+
+#[test]
+fn taken_back_it_leaves_the_base_as_it_was() {
+    let text = overlay_of(FULL);
+    let made = candidate(&text, Some(FULL));
+    let reverted = candidate(FULL, Some(&made.text));
+    assert_eq!(reverted.digest, made.base_digest);
+    assert_eq!((reverted.text.as_str(), reverted.overlay), (FULL, None));
+    assert_eq!(difference(&base(FULL).document, &reverted.document), []);
+    assert_eq!(reverted.calibration, base(FULL).calibration);
+
+    // The opposite changes, made to the result, lead back to the numbers, but for the last digit.
+    let opposite = OVERLAY
+        .replacen("change_deg_per_h = 0.031", "change_deg_per_h = -0.031", 1)
+        .replacen("change_deg_per_h = -0.012", "change_deg_per_h = 0.012", 1)
+        .replacen("change_deg_per_h = -0.02\n", "change_deg_per_h = 0.02\n", 1)
+        .replacen("BASE", &hex(&made.digest), 1);
+    let back = candidate(&opposite, Some(&made.text));
+    for change in difference(&base(FULL).document, &back.document) {
+        let number = |text: Option<String>| text.and_then(|text| text.parse::<f64>().ok());
+        if let (Some(before), Some(after)) = (number(change.before), number(change.after)) {
+            assert!((before - after).abs() < 1e-15, "{}", change.key);
+        } else {
+            let about = change.key == "created" || change.key.starts_with("origin.details.overlays[");
+            assert!(about, "{}", change.key);
+        }
+    }
+    let overlays = &back.document.origin.unwrap().details.unwrap()["overlays"];
+    assert_eq!(overlays.as_array().map(Vec::len), Some(2));
+}
+
+#[test]
+fn the_revision_names_base_and_overlay_and_is_the_same_every_time() {
+    let text = overlay_of(FULL);
+    let (made, again) = (candidate(&text, Some(FULL)), candidate(&text, Some(FULL)));
+    assert_eq!(made, again);
+    assert_eq!(made.digest, digest(&made.text));
+    assert_eq!(made.base_digest, digest(FULL));
+    let overlay = made.overlay.as_ref().unwrap();
+    assert_eq!(overlay.digest, digest(&text));
+    assert!(made.text.contains(&hex(&overlay.digest)) && made.text.contains(&hex(&made.base_digest)));
+    // The text that stands for it is a document like any other.
+    let plain = candidate(&made.text, None);
+    assert_eq!(
+        (plain.digest, plain.base_digest, plain.calibration),
+        (made.digest, made.digest, made.calibration)
+    );
+    let other = candidate(&text.replacen("0.031", "0.032", 1), Some(FULL));
+    assert_ne!(other.digest, made.digest);
+}
+
+#[test]
+fn a_wrong_base_is_refused_with_what_to_do() {
+    let text = overlay_of(FULL);
+    let problems = refuse(&text, None);
+    assert_eq!((problems[0].line, problems[0].key.as_str()), (2, "overlay_of"));
+    assert!(problems[0].message.contains("the unit has no document in force: put"), "{}", problems[0]);
+
+    let other = FULL.replacen("# Every key", "# every key", 1);
+    let problems = refuse(&text, Some(&other));
+    assert_eq!(problems.len(), 1, "{}", listed(&problems));
+    let shown = problems[0].to_string();
+    assert!(shown.starts_with("field.toml:2:14: overlay_of: is "), "{shown}");
+    assert!(shown.contains(&hex(&digest(FULL))) && shown.contains(&hex(&digest(&other))), "{shown}");
+    assert!(shown.contains("put the document that the overlay was made for in force first"), "{shown}");
+
+    let problems = refuse(&overlay_of("schema = 1"), Some("schema = 1"));
+    assert!(problems.iter().all(|problem| problem.file.as_deref() == Some("document in force")));
+}
+
+#[test]
+fn what_does_not_fit_the_base_is_told_at_once_with_its_place() {
+    let single_mode = {
+        let mut document = base(FULL).document;
+        document.mode_reversal = None;
+        document.gyro.sensor.iter_mut().for_each(|sensor| {
+            sensor.magnetic_bias = None;
+            sensor.servo = None;
+        });
+        document.to_toml().unwrap()
+    };
+    let text = overlay_of(&single_mode)
+        .replacen("EXAMPLE-0001", "EXAMPLE-0002", 1)
+        .replacen("name = \"y\"", "name = \"yy\"", 1)
+        .replacen(", 30.5]", "]", 1);
+    let problems = refuse(&text, Some(&single_mode));
+    let places: Vec<_> = problems.iter().map(|problem| (problem.line, problem.key.as_str())).collect();
+    assert_eq!(
+        places,
+        [
+            (3, "unit"),
+            (11, "gyro[0].magnetic_bias_change_deg_per_h"),
+            (15, "gyro[1].name"),
+            (26, "pre_launch.mean_temperature_deg_c"),
+        ],
+        "{}",
+        listed(&problems)
+    );
+    assert!(problems[2].message.contains("is no gyro of the document; its gyros are: x, y, z, s"));
+}
+
+/// An overlay that is broken in one place: text to replace, replacement, text on the line of the problem, key, part
+/// of the message.
+type Case = (&'static str, &'static str, &'static str, &'static str, &'static str);
+
+const BROKEN: [Case; 19] = [
+    ("schema = 1", "schema = = 1", "schema", "", "TOML: "),
+    ("schema = 1", "schema = 2", "schema", "schema", "is version 2; this release reads 1"),
+    ("schema = 1\n", "", "overlay_of", "schema", "is missing"),
+    ("\"BASE\"", "\"27FB\"", "overlay_of", "overlay_of", "must be 64 lower-case hexadecimal digits"),
+    ("EXAMPLE-0001", "EXAMPLE/0001", "unit", "unit", "must be 1 to 64 letters"),
+    ("2026-11-22T06:10:00Z", "\"today\"", "created", "created", "without quotes"),
+    ("note =", "colour =", "colour", "colour", "is not a known key"),
+    ("name = \"x\"", "name = \"\"", "name = \"\"", "gyro[0].name", "a name of 1 to 24 bytes"),
+    (
+        "name = \"y\"",
+        "name = \"x\"",
+        "name = \"x\"\nstatic_bias_change_deg_per_h = -0.02",
+        "gyro[1].name",
+        "the name of gyro[0] too",
+    ),
+    (
+        "= 0.031",
+        "= \"0.031\"",
+        "0.031",
+        "gyro[0].static_bias_change_deg_per_h",
+        "must be a number from -100000",
+    ),
+    ("= 0.031", "= nan", "= nan", "gyro[0].static_bias_change_deg_per_h", "is nan"),
+    ("= 0.004", "= -0.004", "= -0.004", "gyro[0].static_bias_sigma_deg_per_h", "must be a number from 0"),
+    (
+        "static_bias_sigma_deg_per_h = 0.004\n",
+        "",
+        "[[gyro]]",
+        "gyro[0].static_bias_sigma_deg_per_h",
+        "is missing",
+    ),
+    (
+        "magnetic_bias_sigma_deg_per_h = 0.005\n",
+        "",
+        "[[gyro]]",
+        "gyro[0].magnetic_bias_sigma_deg_per_h",
+        "magnetic_bias_change_deg_per_h needs it",
+    ),
+    (
+        "static_bias_change_deg_per_h",
+        "static_bias_change",
+        "static_bias_change =",
+        "gyro[0].static_bias_change",
+        "did you mean `static_bias_change_deg_per_h`?",
+    ),
+    (
+        "latitude_deg = 55.0",
+        "latitude_deg = 95.0",
+        "95.0",
+        "pre_launch.latitude_deg",
+        "must be a number from -90 to 90",
+    ),
+    ("[1.5, -0.5]", "[1.5]", "[1.5]", "pre_launch.pitch_roll_deg", "has 1 entries, must have 2"),
+    (
+        "start_ns = 1000000000",
+        "start_ns = 1.5",
+        "start_ns",
+        "pre_launch.start_ns",
+        "a whole number of nanoseconds",
+    ),
+    ("end_ns = 601000000000", "end_ns = 6", "end_ns", "pre_launch.end_ns", "before start_ns"),
+];
+
+#[test]
+fn each_error_is_told_with_its_line_key_and_limit() {
+    for (from, to, at, key, message) in BROKEN {
+        assert!(OVERLAY.contains(from), "{from}");
+        let text = OVERLAY.replacen(from, to, 1).replacen("BASE", &"0f".repeat(32), 1);
+        let problems = Overlay::parse(&text, Some("field.toml")).unwrap_err();
+        let line = text[..text.find(at).unwrap_or_else(|| panic!("{at}"))].matches('\n').count() + 1;
+        let found = problems.iter().any(|p| p.key == key && p.line == line && p.message.contains(message));
+        assert!(found, "no problem at line {line}, {key:?}, {message:?} in\n{}", listed(&problems));
+        assert!(problems.len() <= 2, "one error, but\n{}", listed(&problems));
+        // The one way in says the same, before it looks at any base.
+        assert_eq!(refuse(&text, None).len(), problems.len(), "{key}");
+    }
+}
+
+#[test]
+fn both_kinds_are_told_apart() {
+    assert!(is_overlay(&overlay_of(FULL)));
+    assert!(is_overlay("schema = = 1\noverlay_of = 3\n"));
+    assert!(!is_overlay(FULL));
+    assert!(!is_overlay("[origin.details]\noverlay_of = \"x\"\n"));
+    assert!(!is_overlay(""));
+    let problems = Candidate::parse_bytes(b"overlay_of = \"\xff\"", None, None).unwrap_err();
+    assert!(problems[0].message.contains("is not UTF-8 at byte 14"), "{}", problems[0]);
+}
+
+#[test]
+fn what_is_written_is_read_back() {
+    let text = overlay_of(FULL);
+    let first = Overlay::parse(&text, None).unwrap();
+    let written = first.overlay.to_toml().unwrap();
+    assert_eq!(Overlay::parse(&written, None).unwrap().overlay, first.overlay);
+}
+
+#[test]
+fn one_overlay_after_another_does_what_both_do() {
+    let first = candidate(&overlay_of(FULL), Some(FULL));
+    let second_text = OVERLAY
+        .replacen("= 0.031", "= 0.25", 1)
+        .replacen("name = \"y\"", "name = \"z\"", 1)
+        .replacen("BASE", &hex(&first.digest), 1);
+    let second = candidate(&second_text, Some(&first.text));
+    let (one, two) = (&first.overlay.as_ref().unwrap().overlay, &second.overlay.as_ref().unwrap().overlay);
+    let both = two.after(one);
+    assert_eq!(both.overlay_of, hex(&digest(FULL)));
+    assert_eq!(both.gyro[0].magnetic_bias_sigma_deg_per_h, Some(0.005));
+    let both = candidate(&both.to_toml().unwrap(), Some(FULL));
+    for change in difference(&second.document, &both.document) {
+        let about = change.key.starts_with("origin.details.overlays[");
+        let number = |text: &Option<String>| text.as_ref().and_then(|text| text.parse::<f64>().ok());
+        let dust =
+            number(&change.before).zip(number(&change.after)).is_some_and(|(a, b)| (a - b).abs() < 1e-15);
+        assert!(about || dust, "{}", change.words());
+    }
+}
