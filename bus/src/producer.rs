@@ -8,9 +8,10 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use isotherm_correction::sample::{AccelTick, GyroTick, OutputKind, TemperatureReading};
+use isotherm_correction::units::Timestamp;
 use isotherm_protocol::codec::{self, MAX_TICKS, Message};
 use isotherm_protocol::key::{self, RawStream, UnitId};
-use isotherm_protocol::raw::{AccelBatch, GyroBatch};
+use isotherm_protocol::raw::{AccelBatch, GyroBatch, HealthBatch, HealthReading, HealthTick};
 use zenoh::Session;
 use zenoh::pubsub::{Publisher, Subscriber};
 use zenoh::qos::{CongestionControl, Priority};
@@ -75,6 +76,7 @@ pub struct Producer {
     gyro: Publisher<'static>,
     accel: Publisher<'static>,
     temperature: Publisher<'static>,
+    health: Publisher<'static>,
     gyro_pending: Pending<GyroTick>,
     accel_pending: Pending<AccelTick>,
     temperature_pending: Vec<TemperatureReading>,
@@ -96,14 +98,17 @@ impl Producer {
         options: ProducerOptions,
     ) -> Result<Self, BusError> {
         options.check()?;
-        let publisher = async |stream| {
+        let unheard = async |stream| {
             let key = key::raw(unit, stream);
-            let publisher = session
+            session
                 .declare_publisher(key.clone())
                 .congestion_control(CongestionControl::Block)
                 .priority(Priority::RealTime)
                 .await
-                .map_err(|source| BusError::Declare { key, source })?;
+                .map_err(|source| BusError::Declare { key, source })
+        };
+        let publisher = async |stream| {
+            let publisher = unheard(stream).await?;
             presence::wait_for_subscriber(&publisher, options.match_timeout).await?;
             Ok::<_, BusError>(publisher)
         };
@@ -117,6 +122,8 @@ impl Producer {
             gyro: publisher(RawStream::Gyro).await?,
             accel: publisher(RawStream::Accel).await?,
             temperature: publisher(RawStream::Temperature).await?,
+            // Who listens to ticks need not listen to this.
+            health: unheard(RawStream::Health).await?,
             gyro_pending: Pending::default(),
             accel_pending: Pending::default(),
             temperature_pending: Vec::new(),
@@ -163,6 +170,15 @@ impl Producer {
     pub async fn temperatures(&mut self, readings: &[TemperatureReading]) -> Result<(), BusError> {
         self.temperature_pending.extend_from_slice(readings);
         if self.temperature_pending.len() >= MAX_TICKS { self.flush_temperatures().await } else { Ok(()) }
+    }
+
+    /// Publishes what the instrument reports of itself at a time, at once: readings have no batch to wait for.
+    ///
+    /// # Errors
+    /// As [`Producer::gyro`].
+    pub async fn health(&mut self, time: Timestamp, readings: &[HealthReading]) -> Result<(), BusError> {
+        let tick = HealthTick { time_ns: time.as_ns(), readings: readings.to_vec() };
+        publish(&self.health, &mut self.frame, &HealthBatch { ticks: vec![tick] }).await
     }
 
     /// Publishes everything that was handed over, full batch or not.

@@ -173,7 +173,7 @@ async fn batches_go_out_in_order_and_no_more_than_allowed_is_under_way() {
             let count = match stream {
                 RawStream::Gyro => decode::<GyroBatch>(&bytes).unwrap().ticks.len(),
                 RawStream::Accel => decode::<AccelBatch>(&bytes).unwrap().ticks.len(),
-                RawStream::Temperature => 0,
+                RawStream::Temperature | RawStream::Health => 0,
             };
             sender.send((stream, count)).unwrap();
         })

@@ -4,8 +4,9 @@ use std::time::Duration;
 
 use isotherm_bus::{Consumer, Continuity, Producer, ProducerOptions, SessionOptions, presence};
 use isotherm_correction::sample::GyroTick;
-use isotherm_correction::units::Timestamp;
+use isotherm_correction::units::{Span, Timestamp};
 use isotherm_protocol::key::UnitId;
+use isotherm_protocol::raw::HealthReading;
 use serde::Serialize;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::time::{Instant, timeout};
@@ -16,6 +17,8 @@ use crate::pace::{Pacer, Speed};
 
 /// How long a wait for the service, or for the last ticks, may take without progress.
 const PATIENCE: Duration = Duration::from_secs(10);
+/// How often health readings go out, in event time.
+const HEALTH_INTERVAL: Span = Span::from_ms(1000);
 /// How long a session may take to close.
 const CLOSE_LIMIT: Duration = Duration::from_secs(5);
 
@@ -32,6 +35,8 @@ pub struct PlayOptions {
     pub batch_ticks: usize,
     /// Most gyro ticks sent and not come back; `None` plays without a service that answers.
     pub max_in_flight: Option<u64>,
+    /// What the instrument is to report of itself, once a second of event time; a log has no such readings.
+    pub health: Vec<HealthReading>,
 }
 
 /// What playing came to.
@@ -123,6 +128,7 @@ async fn play_on(
     let mut sent = Sent::default();
     sent.report.unit = options.unit.to_string();
     let mut pacer = Pacer::new(options.speed);
+    let mut health_due = None;
     let begun = Instant::now();
     let mut stop = std::pin::pin!(stop_asked()?);
     for event in events {
@@ -135,6 +141,10 @@ async fn play_on(
                         break;
                     }
                     () = pacer.wait(tick.end_time) => {}
+                }
+                if !options.health.is_empty() && health_due.is_none_or(|due| tick.end_time >= due) {
+                    producer.health(tick.end_time, &options.health).await?;
+                    health_due = Some(tick.end_time + HEALTH_INTERVAL);
                 }
                 sent.note(&tick);
                 producer.gyro(output, tick).await?;

@@ -2,6 +2,8 @@
 
 use clap::Args;
 use isotherm_bus::SessionOptions;
+use isotherm_correction::sample::ChannelName;
+use isotherm_protocol::raw::HealthReading;
 use serde::Serialize;
 
 use super::{LogArgs, Outcome, print, show};
@@ -42,9 +44,20 @@ pub(super) struct PlayArgs {
     /// Do not wait for anything to come back: for listeners other than the service
     #[arg(long, conflicts_with = "in_flight")]
     no_acknowledge: bool,
+    /// What the instrument reports of itself, once a second: a voltage (V) or counter that the document tests
+    #[arg(long, value_name = "NAME=VALUE", value_parser = health_reading)]
+    health: Vec<HealthReading>,
     /// Print the summary as one JSON object
     #[arg(long)]
     json: bool,
+}
+
+/// Reads `half-wave x=48.2`.
+fn health_reading(text: &str) -> Result<HealthReading, String> {
+    let (name, value) = text.split_once('=').ok_or("must be NAME=VALUE")?;
+    let name = ChannelName::from(name).map_err(|_| "the name may have at most 24 bytes")?;
+    let value = value.parse().map_err(|_| format!("{value:?} is no number"))?;
+    Ok(HealthReading { name, value })
 }
 
 /// Everything that the summary says.
@@ -63,6 +76,7 @@ pub(super) fn run(args: PlayArgs) -> Result<Outcome, Error> {
         session: args.session,
         speed: args.speed,
         batch_ticks: usize::from(args.batch),
+        health: args.health,
         max_in_flight: (!args.no_acknowledge).then(|| args.in_flight.unwrap_or(IN_FLIGHT.max(4 * batch))),
     };
     let least = 2 * batch + 256;
