@@ -1,139 +1,129 @@
-//! The calibration documents of a folder.
+//! The calibrations of all units, seen or not: what each is to correct with, and what is to follow at a stated tick.
+//!
+//! The registrar writes here what it has accepted; a unit that appears is given what stands here.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use isotherm_correction::calibration::Calibration;
-use isotherm_protocol::document::{Document, Problem};
+use isotherm_correction::units::Span;
+use isotherm_protocol::control::Schedule;
+use isotherm_protocol::corrected::Revision;
+use isotherm_protocol::digest::Digest;
+use isotherm_protocol::document::Document;
+use isotherm_protocol::history::Source;
 use isotherm_protocol::key::UnitId;
 
-use crate::ServiceError;
-use crate::text::{self, read_bounded};
-
-/// A calibration as it is installed.
+/// A calibration as a unit is given it.
 #[derive(Debug, Clone)]
 pub struct Installable {
+    /// Its number among those of the unit, and the head of the digest.
+    pub revision: Revision,
     /// The compiled calibration.
     pub calibration: Arc<Calibration>,
-    /// First eight bytes of the SHA-256 of the document's text.
-    pub digest: [u8; 8],
-    /// Where it was read; `None` for one that never was a file.
-    pub file: Option<PathBuf>,
+    /// SHA-256 of the document's text; `None` for a calibration that never was one.
+    pub digest: Option<Digest>,
+    /// The document; `None` for a calibration that never was one.
+    pub document: Option<Arc<Document>>,
+    /// SHA-256 of the overlay that was laid over it.
+    pub overlay: Option<Digest>,
+    /// Where it came from; `None` for one that the program itself was started with.
+    pub source: Option<Source>,
 }
 
-/// Calibrations by unit.
+impl Installable {
+    /// A calibration that never was a document.
+    #[must_use]
+    pub fn plain(revision: Revision, calibration: Arc<Calibration>) -> Self {
+        Self { revision, calibration, digest: None, document: None, overlay: None, source: None }
+    }
+}
+
+/// A calibration that is to take the place of another.
+#[derive(Debug, Clone)]
+pub struct Change {
+    /// What is to be in force.
+    pub next: Installable,
+    /// From which tick on.
+    pub at: Schedule,
+    /// Time over which the change is made; zero is at once.
+    pub slew: Span,
+}
+
+/// What one unit corrects with, and what is to follow.
+#[derive(Debug, Clone, Default)]
+pub struct Plan {
+    /// In force from the next tick on, or already.
+    pub current: Option<Installable>,
+    /// To follow at its tick.
+    pub pending: Option<Change>,
+}
+
+impl Plan {
+    /// Takes a change in; what it replaces before it came in force.
+    pub fn change(&mut self, change: Change) -> Option<Change> {
+        let replaced = self.pending.take();
+        if change.at == Schedule::NextTick {
+            self.current = Some(change.next);
+        } else {
+            self.pending = Some(change);
+        }
+        replaced
+    }
+
+    /// What was to follow has come in force.
+    pub fn settle(&mut self) {
+        if let Some(change) = self.pending.take() {
+            self.current = Some(change.next);
+        }
+    }
+
+    /// Revision counter of what is to follow, and when.
+    #[must_use]
+    pub fn waiting(&self) -> Option<(u64, Schedule)> {
+        self.pending.as_ref().map(|change| (change.next.revision.counter, change.at))
+    }
+
+    /// What a unit that knows nothing yet is to be given, in this order.
+    pub fn changes(&self) -> impl Iterator<Item = Change> {
+        let current = self.current.clone();
+        let current = current.map(|next| Change { next, at: Schedule::NextTick, slew: Span::ZERO });
+        current.into_iter().chain(self.pending.clone())
+    }
+}
+
+/// Plans by unit.
 #[derive(Debug, Clone, Default)]
 pub struct Calibrations {
-    by_unit: BTreeMap<UnitId, Installable>,
+    by_unit: BTreeMap<UnitId, Plan>,
 }
 
 impl Calibrations {
-    /// Reads every `*.toml` of a folder, hidden files and sub-folders excepted.
-    ///
-    /// Each document names its unit; the names of the files mean nothing. Where two documents name one unit, neither is
-    /// taken: which of them holds is for the operator to say, not for the order of a directory listing. The second value
-    /// is everything that is wrong, file by file in the order of their names.
-    ///
-    /// # Errors
-    /// [`ServiceError::Read`] where the folder itself cannot be read.
-    pub fn read(folder: &Path) -> Result<(Self, Vec<BadDocument>), ServiceError> {
-        let read = |source| ServiceError::Read { path: folder.to_owned(), source };
-        let mut files = Vec::new();
-        for entry in std::fs::read_dir(folder).map_err(read)? {
-            let path = entry.map_err(read)?.path();
-            let hidden = path.file_name().is_none_or(|name| name.to_string_lossy().starts_with('.'));
-            if !hidden && path.extension().is_some_and(|extension| extension == "toml") && path.is_file() {
-                files.push(path);
-            }
-        }
-        files.sort();
-
-        let mut bad = Vec::new();
-        let mut found: BTreeMap<UnitId, Vec<Installable>> = BTreeMap::new();
-        for file in files {
-            match read_document(&file) {
-                Ok((unit, installable)) => found.entry(unit).or_default().push(installable),
-                Err(problems) => bad.push(BadDocument { file, problems }),
-            }
-        }
-        let mut calibrations = Self::default();
-        for (unit, mut documents) in found {
-            if documents.len() > 1 {
-                bad.extend(rivals(&unit, &documents));
-            } else if let Some(document) = documents.pop() {
-                calibrations.by_unit.insert(unit, document);
-            }
-        }
-        bad.sort_by(|a, b| a.file.cmp(&b.file));
-        Ok((calibrations, bad))
-    }
-
-    /// Adds or replaces the calibration of one unit.
+    /// Adds or replaces the calibration of one unit by one that is no document, as its first revision.
     pub fn insert(&mut self, unit: UnitId, calibration: Arc<Calibration>, digest: [u8; 8]) {
-        self.by_unit.insert(unit, Installable { calibration, digest, file: None });
+        let revision = Revision { counter: 1, digest };
+        let current = Installable::plain(revision, calibration);
+        self.by_unit.insert(unit, Plan { current: Some(current), pending: None });
     }
 
-    /// The calibration of one unit.
+    /// The plan of one unit, to be changed; an empty one is made where there is none.
+    pub fn plan_mut(&mut self, unit: &UnitId) -> &mut Plan {
+        self.by_unit.entry(unit.clone()).or_default()
+    }
+
+    /// The plan of one unit.
     #[must_use]
-    pub fn get(&self, unit: &UnitId) -> Option<&Installable> {
+    pub fn get(&self, unit: &UnitId) -> Option<&Plan> {
         self.by_unit.get(unit)
-    }
-
-    /// How many units have one.
-    #[must_use]
-    pub fn len(&self) -> usize {
-        self.by_unit.len()
-    }
-
-    /// Whether no unit has one.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.by_unit.is_empty()
     }
 
     /// The units that have one.
     pub fn units(&self) -> impl Iterator<Item = &UnitId> {
         self.by_unit.keys()
     }
-}
 
-/// A document that is not taken.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct BadDocument {
-    /// Its file.
-    pub file: PathBuf,
-    /// Everything that is wrong with it.
-    pub problems: Vec<Problem>,
-}
-
-/// Reads one document.
-fn read_document(file: &Path) -> Result<(UnitId, Installable), Vec<Problem>> {
-    let name = file.display().to_string();
-    let whole = |message: String| vec![text::whole(&name, message)];
-    let bytes = read_bounded(file).map_err(|error| whole(format!("cannot be read: {error}")))?;
-    let parsed = Document::parse(text::text(&bytes, &name)?, Some(&name))?;
-    for warning in &parsed.warnings {
-        tracing::warn!("{warning}");
+    /// Units and their plans.
+    pub fn iter(&self) -> impl Iterator<Item = (&UnitId, &Plan)> {
+        self.by_unit.iter()
     }
-    let unit = UnitId::new(&parsed.document.unit).map_err(|error| whole(format!("unit: {error}")))?;
-    let digest = parsed.digest.first_chunk().copied().unwrap_or_default();
-    Ok((unit, Installable { calibration: Arc::new(parsed.calibration), digest, file: Some(file.to_owned()) }))
-}
-
-/// One bad document for each that names the same unit.
-fn rivals(unit: &UnitId, documents: &[Installable]) -> Vec<BadDocument> {
-    let files: Vec<_> = documents.iter().filter_map(|document| document.file.clone()).collect();
-    let rival = |file: &PathBuf| {
-        let others: Vec<_> =
-            files.iter().filter(|other| *other != file).map(|other| other.display().to_string()).collect();
-        let message = format!(
-            "unit {unit} is named by {} too: none of them is taken, remove all but one",
-            others.join(", ")
-        );
-        let name = Some(file.display().to_string());
-        let problem = Problem { file: name, line: 1, column: 1, key: "unit".to_owned(), message };
-        BadDocument { file: file.clone(), problems: vec![problem] }
-    };
-    files.iter().map(rival).collect()
 }

@@ -2,6 +2,7 @@
 
 mod kinds;
 mod rivals;
+mod signer;
 
 use std::path::PathBuf;
 
@@ -9,7 +10,10 @@ use clap::{Args, ValueEnum};
 use isotherm_protocol::document::Problem;
 use serde::Serialize;
 
+pub use signer::Signer;
+
 use crate::exit::Exit;
+use crate::signing::read_trusted_keys;
 use crate::words::{print, say};
 
 /// Arguments of `check`.
@@ -19,8 +23,10 @@ Examples:
   isotherm check config/service.toml config/zenoh/*.json5
   isotherm check config/calibration/*.toml
   isotherm check --json --kind calibration new.toml
+  isotherm check --trusted-keys keys units/*.toml
 
 Every problem goes to stderr as file:line:column: key: message, one line per good file to stdout.
+A calibration document need not be signed, but a signature that does not hold makes it bad.
 Exit codes: 0 all good, 78 a file is bad, 1 a file cannot be read (and none is bad).")]
 pub struct CheckArgs {
     /// Files to validate
@@ -29,6 +35,9 @@ pub struct CheckArgs {
     /// What the files are; without it told by extension and content
     #[arg(long, value_enum)]
     pub kind: Option<FileKind>,
+    /// Folder of public keys (*.pub): say which of them signed each calibration document
+    #[arg(long, value_name = "FOLDER")]
+    pub trusted_keys: Option<PathBuf>,
     /// Print one JSON object on stdout instead
     #[arg(long)]
     pub json: bool,
@@ -78,11 +87,26 @@ pub struct Summary {
     /// SHA-256 of a calibration document, in hexadecimal digits.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub digest: Option<String>,
+    /// Who signed a calibration document.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub signature: Option<Signer>,
 }
 
 /// Validates the files and says what was found.
 pub(crate) fn run(args: &CheckArgs) -> Exit {
-    let mut findings: Vec<_> = args.files.iter().map(|file| kinds::check_file(file, args.kind)).collect();
+    let trusted = match args.trusted_keys.as_deref().map(read_trusted_keys).transpose() {
+        Ok(trusted) => trusted,
+        Err(problems) => {
+            problems.iter().for_each(say);
+            return Exit::BadConfiguration;
+        }
+    };
+    for warning in trusted.iter().flat_map(|(_, warnings)| warnings) {
+        say(format_args!("{warning} (warning)"));
+    }
+    let trusted = trusted.as_ref().map(|(trusted, _)| trusted);
+    let check = |file: &PathBuf| kinds::check_file(file, args.kind, trusted);
+    let mut findings: Vec<_> = args.files.iter().map(check).collect();
     rivals::refuse(&mut findings);
     let text = if args.json {
         let good = findings.iter().all(|finding| finding.good);

@@ -6,9 +6,11 @@ use clap::{Args, CommandFactory, Parser, Subcommand};
 use clap_complete::Shell;
 
 use crate::check::CheckArgs;
+use crate::console::{self, CommandArgs, Console, HistoryArgs, RollbackArgs, StatusArgs, SwapArgs, TopArgs};
 use crate::demo::DemoArgs;
 use crate::exit::Exit;
 use crate::logging::LogArgs;
+use crate::signing::{KeygenArgs, SignArgs};
 use crate::words::{print, say};
 
 /// Corrects the raw increments of inertial units in a stream, over Zenoh
@@ -31,8 +33,25 @@ Exit codes:
 enum Command {
     /// Correct raw topics until stopped
     Serve(ServeArgs),
+    /// Show what units and services are doing, once
+    Status(StatusArgs),
+    /// Show what units are doing, live
+    Top(TopArgs),
+    /// Give a running unit another calibration, after a look at the difference
+    Swap(SwapArgs),
+    /// Go back to an earlier calibration
+    Rollback(RollbackArgs),
+    /// Show what was done to a unit, by whom and when
+    History(HistoryArgs),
+    /// Move a unit from state to state: standby, run, self-test, pre-launch calibration
+    #[command(name = "command")]
+    Give(CommandArgs),
     /// Validate calibration documents, service configurations and Zenoh configurations
     Check(CheckArgs),
+    /// Sign calibration documents
+    Sign(SignArgs),
+    /// Make a pair of keys to sign calibration documents with
+    Keygen(KeygenArgs),
     /// Show simulated units being corrected, with a table and a report
     Demo(DemoArgs),
     /// Print the completions of a shell
@@ -56,10 +75,16 @@ pub struct ServeArgs {
     /// Folder of calibration documents; replaces the configured one
     #[arg(long, value_name = "FOLDER")]
     pub calibrations: Option<PathBuf>,
+    /// Folder for the audit file and every accepted document; replaces the configured one
+    #[arg(long, value_name = "FOLDER")]
+    pub state: Option<PathBuf>,
+    /// Serve metrics and health over HTTP on this address; replaces the configured one
+    #[arg(long, value_name = "ADDRESS:PORT")]
+    pub metrics: Option<std::net::SocketAddr>,
     /// How to reach others; each option given replaces the configured one
     #[command(flatten)]
     pub session: isotherm_bus::SessionOptions,
-    /// When ready, print one line of JSON on stdout: {"ready":true,"locators":[…]}
+    /// When ready, print one line of JSON on stdout: {"ready":true,"locators":[…],"metrics":"http://…"}
     #[arg(long)]
     pub announce: bool,
     /// When ready, write the same line to this file
@@ -78,7 +103,15 @@ pub struct ServeArgs {
 pub fn run() -> Exit {
     match Cli::parse().command {
         Command::Serve(args) => logged(&args.log.clone(), crate::serve::run(args)),
+        Command::Status(args) => operate(Console::Status(args)),
+        Command::Top(args) => operate(Console::Top(args)),
+        Command::Swap(args) => operate(Console::Swap(args)),
+        Command::Rollback(args) => operate(Console::Rollback(args)),
+        Command::History(args) => operate(Console::History(args)),
+        Command::Give(args) => operate(Console::Command(args)),
         Command::Check(args) => crate::check::run(&args),
+        Command::Sign(args) => crate::signing::sign(&args),
+        Command::Keygen(args) => crate::signing::keygen(&args),
         Command::Demo(args) => logged(&LogArgs::quiet(), demo(args)),
         Command::Completions { shell } => {
             let mut script = Vec::new();
@@ -93,6 +126,11 @@ async fn demo(args: DemoArgs) -> Exit {
         say(format_args!("isotherm: {error}"));
         Exit::Failed
     })
+}
+
+/// Runs a command of the operator's side.
+fn operate(console: Console) -> Exit {
+    logged(&LogArgs::silent(), console::run(console))
 }
 
 /// Runs a command that logs and needs a runtime.

@@ -7,6 +7,7 @@ use isotherm_protocol::document::Problem;
 use thiserror::Error;
 
 use crate::exit::Exit;
+use crate::store::StoreError;
 
 /// Why the service did not start, or a command failed.
 #[derive(Debug, Error)]
@@ -37,6 +38,17 @@ pub enum ServiceError {
         /// How many.
         count: usize,
     },
+    /// The state folder cannot be used.
+    #[error(transparent)]
+    State(#[from] StoreError),
+    /// Metrics cannot be served where they are configured.
+    #[error("cannot serve metrics on {address} ([metrics] listen, --metrics): {source}{}", in_use(source))]
+    Metrics {
+        /// The configured address.
+        address: std::net::SocketAddr,
+        /// Why.
+        source: std::io::Error,
+    },
     /// The runtime or a thread cannot be started.
     #[error("cannot start a thread: {0}")]
     Thread(#[source] std::io::Error),
@@ -60,8 +72,17 @@ impl ServiceError {
         match self {
             Self::Configuration(_)
             | Self::BadCalibrations { .. }
+            | Self::Metrics { .. }
             | Self::Bus(BusError::Configuration { .. } | BusError::Option { .. }) => Exit::BadConfiguration,
             _ => Exit::Failed,
         }
+    }
+}
+
+/// What to do about a port that somebody else has.
+fn in_use(error: &std::io::Error) -> &'static str {
+    match error.kind() {
+        std::io::ErrorKind::AddrInUse => "; take another port, or 0 for one of the system's choice",
+        _ => "",
     }
 }

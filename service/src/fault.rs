@@ -1,7 +1,10 @@
-//! Faults of the input and of the service itself: counted by kind, logged once per kind.
+//! Faults of the input and of the service itself: counted by kind; the first of a kind is logged, and then their number.
+
+use std::fmt;
+use std::time::{Duration, Instant, SystemTime};
 
 use isotherm_protocol::codec::CodecError;
-use isotherm_protocol::status::Counter;
+use isotherm_protocol::status::{Counter, Fault};
 
 /// Declares the kinds once, so that kind, counter name and documentation cannot drift apart.
 macro_rules! kinds {
@@ -62,30 +65,93 @@ impl From<&CodecError> for FaultKind {
     }
 }
 
-/// Counts faults and remembers the last one in words.
+/// How long a fault that goes on is counted in silence.
+const SILENCE: Duration = Duration::from_secs(60);
+
+/// What is to be logged of a fault.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Telling {
+    /// The first of its kind, in words.
+    First(String),
+    /// It goes on.
+    Again {
+        /// How many since it was last told of.
+        count: u64,
+        /// How long ago that was.
+        since: Duration,
+    },
+}
+
+impl Telling {
+    /// Whether it is the first of its kind.
+    #[must_use]
+    pub fn is_first(&self) -> bool {
+        matches!(self, Self::First(_))
+    }
+}
+
+impl fmt::Display for Telling {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::First(words) => write!(f, "{words}; further ones are counted only"),
+            Self::Again { count, since } => write!(f, "{count} more in the last {} s", since.as_secs()),
+        }
+    }
+}
+
+/// One kind of fault so far.
+#[derive(Debug, Clone, Default)]
+struct Kind {
+    count: u64,
+    first: String,
+    /// Time of the last one by the service's clock.
+    last: Option<SystemTime>,
+    /// When it was last told of, and how many there were then.
+    told: Option<(Instant, u64)>,
+}
+
+/// Counts faults and remembers the first of each kind in words.
 #[derive(Debug, Clone, Default)]
 pub struct FaultLog {
-    counts: [u64; FaultKind::ALL.len()],
-    last: Option<String>,
+    kinds: [Kind; FaultKind::ALL.len()],
+    last: Option<FaultKind>,
 }
 
 impl FaultLog {
-    /// Counts `count` faults of a kind; `true` for the first of its kind, which is the one to be logged.
-    pub fn note(&mut self, kind: FaultKind, count: u64, words: impl FnOnce() -> String) -> bool {
-        let Some(counter) = self.counts.get_mut(kind as usize) else { return false };
-        let first = *counter == 0;
-        *counter += count;
-        // The words of a repeated fault are not made anew: a flood of bad messages must stay cheap.
-        if first {
-            self.last = Some(words());
-        }
-        first
+    /// Counts `count` faults of a kind; what is to be logged of it: the first one, and while it goes on the number of
+    /// further ones once a minute.
+    pub fn note(&mut self, kind: FaultKind, count: u64, words: impl FnOnce() -> String) -> Option<Telling> {
+        self.note_at(Instant::now(), kind, count, words)
+    }
+
+    fn note_at(
+        &mut self,
+        now: Instant,
+        kind: FaultKind,
+        count: u64,
+        words: impl FnOnce() -> String,
+    ) -> Option<Telling> {
+        let entry = self.kinds.get_mut(kind as usize)?;
+        entry.count += count;
+        entry.last = Some(SystemTime::now());
+        let Some((told, before)) = entry.told else {
+            // The words of a repeated fault are not made anew: a flood of bad messages must stay cheap.
+            entry.first = words();
+            entry.told = Some((now, entry.count));
+            self.last = Some(kind);
+            return Some(Telling::First(entry.first.clone()));
+        };
+        let since = now.saturating_duration_since(told);
+        (since >= SILENCE).then(|| {
+            entry.told = Some((now, entry.count));
+            Telling::Again { count: entry.count - before, since }
+        })
     }
 
     /// How many of a kind.
     #[must_use]
     pub fn count(&self, kind: FaultKind) -> u64 {
-        self.counts.get(kind as usize).copied().unwrap_or(0)
+        self.kinds.get(kind as usize).map_or(0, |kind| kind.count)
     }
 
     /// Messages that were refused, of whatever kind.
@@ -98,7 +164,24 @@ impl FaultLog {
     /// The last fault of a kind not seen before, in words.
     #[must_use]
     pub fn last(&self) -> Option<&str> {
-        self.last.as_deref()
+        let kind = self.kinds.get(self.last? as usize)?;
+        Some(&kind.first)
+    }
+
+    /// The kinds that occurred, each with the first of its kind in words.
+    #[must_use]
+    pub fn faults(&self) -> Vec<Fault> {
+        let occurred = FaultKind::ALL.iter().zip(&self.kinds).filter(|(_, entry)| entry.count > 0);
+        let fault = |(kind, entry): (&FaultKind, &Kind)| {
+            let since = entry.last.and_then(|last| last.duration_since(SystemTime::UNIX_EPOCH).ok());
+            Fault {
+                kind: kind.name().to_owned(),
+                count: entry.count,
+                first: entry.first.clone(),
+                last_unix_ms: since.and_then(|since| i64::try_from(since.as_millis()).ok()).unwrap_or(0),
+            }
+        };
+        occurred.map(fault).collect()
     }
 
     /// The kinds that occurred, as counters.
@@ -115,13 +198,30 @@ mod tests {
     #[test]
     fn a_repeated_fault_is_counted_and_not_repeated() {
         let mut log = FaultLog::default();
-        assert!(log.note(FaultKind::Checksum, 1, || "first".to_owned()));
-        assert!(!log.note(FaultKind::Checksum, 1, || unreachable!()));
-        assert!(log.note(FaultKind::Unpublished, 5, || "second".to_owned()));
+        assert!(
+            log.note(FaultKind::Checksum, 1, || "first".to_owned()).is_some_and(|telling| telling.is_first())
+        );
+        assert_eq!(log.note(FaultKind::Checksum, 1, || unreachable!()), None);
+        assert!(log.note(FaultKind::Unpublished, 5, || "second".to_owned()).is_some());
         assert_eq!((log.count(FaultKind::Checksum), log.refused()), (2, 2));
         assert_eq!(log.last(), Some("second"));
         let counters: Vec<_> = log.counters().map(|counter| (counter.name, counter.value)).collect();
         assert_eq!(counters, [("bad_frames_checksum".to_owned(), 2), ("ticks_unpublished".to_owned(), 5)]);
+        let faults = log.faults();
+        assert_eq!((faults.len(), faults[0].first.as_str(), faults[0].count), (2, "first", 2));
+    }
+
+    #[test]
+    fn a_fault_that_goes_on_is_told_with_its_number_once_a_minute() {
+        let mut log = FaultLog::default();
+        let start = Instant::now();
+        let mut at =
+            |s| log.note_at(start + Duration::from_secs(s), FaultKind::Body, 1, || "words".to_owned());
+        assert!(at(0).is_some());
+        assert!((1..60).all(|s| at(s).is_none()));
+        assert_eq!(at(60), Some(Telling::Again { count: 60, since: SILENCE }));
+        assert!((61..120).all(|s| at(s).is_none()));
+        assert_eq!(at(120).map(|telling| telling.to_string()).as_deref(), Some("60 more in the last 60 s"));
     }
 
     #[test]

@@ -4,18 +4,20 @@ use std::any::Any;
 use std::collections::HashMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use isotherm_protocol::codec::{self, CodecError};
+use isotherm_protocol::control::Schedule;
 use isotherm_protocol::key::{self, RawStream, UnitId};
-use isotherm_protocol::raw::{AccelBatch, GyroBatch, TemperatureBatch};
-use isotherm_protocol::status::Status;
+use isotherm_protocol::raw::{AccelBatch, GyroBatch, HealthBatch, TemperatureBatch};
+use isotherm_protocol::status::{Fault, Status};
 
-use crate::calibrations::Calibrations;
+use crate::calibrations::{Calibrations, Change, Plan};
 use crate::config::Settings;
 use crate::fault::{FaultKind, FaultLog};
+use crate::registrar::Desk;
 use crate::totals::Totals;
-use crate::unit::{Outlet, QuietSettings, UnitActor};
+use crate::unit::{Outlet, Present, QuietSettings, SwapAccount, UnitActor};
 
 /// Makes the outlet of a unit that appears.
 pub type OutletMaker = Box<dyn Fn(&UnitId) -> Result<Outlet, zenoh::Error> + Send + Sync>;
@@ -23,8 +25,11 @@ pub type OutletMaker = Box<dyn Fn(&UnitId) -> Result<Outlet, zenoh::Error> + Sen
 /// All units, and what belongs to none.
 pub struct Intake {
     settings: Settings,
-    calibrations: Calibrations,
+    /// Locked after the units, where both are.
+    calibrations: RwLock<Calibrations>,
     outlets: OutletMaker,
+    /// To whom units tell what only the registrar can write down.
+    desk: Option<Desk>,
     units: RwLock<Units>,
     faults: Mutex<FaultLog>,
 }
@@ -34,8 +39,6 @@ pub struct Intake {
 struct Units {
     // By the serial's text, so that the key of a message finds its unit without an allocation.
     by_serial: HashMap<String, Arc<Mutex<UnitActor>>>,
-    /// How many of them came with a calibration.
-    calibrated: usize,
 }
 
 impl std::fmt::Debug for Intake {
@@ -51,7 +54,20 @@ impl Intake {
     /// An intake without units.
     #[must_use]
     pub fn new(settings: Settings, calibrations: Calibrations, outlets: OutletMaker) -> Self {
-        Self { settings, calibrations, outlets, units: RwLock::default(), faults: Mutex::default() }
+        let calibrations = RwLock::new(calibrations);
+        Self {
+            settings,
+            calibrations,
+            outlets,
+            desk: None,
+            units: RwLock::default(),
+            faults: Mutex::default(),
+        }
+    }
+
+    /// Has every unit that appears tell the registrar what it has to tell.
+    pub(crate) fn reporting_to(self, desk: Desk) -> Self {
+        Self { desk: Some(desk), ..self }
     }
 
     /// Takes one message; whether subscribers of the status should hear of it at once.
@@ -73,30 +89,46 @@ impl Intake {
         actor.is_status_due()
     }
 
+    /// Takes one rate reference; whether subscribers of the status should hear of it at once. It makes no unit.
+    pub fn reference(&self, key: &str, payload: Option<&[u8]>, arrival: Instant) -> bool {
+        let known = key::parse_reference(key).and_then(|serial| self.unit(serial));
+        let Some(unit) = known else {
+            self.fault(FaultKind::UnknownStream, || {
+                format!("{key}: a reference for a unit that has not appeared")
+            });
+            return false;
+        };
+        let Some(frame) = payload else {
+            self.fault(FaultKind::Deletion, || format!("{key}: a deletion means nothing here"));
+            return false;
+        };
+        let mut actor = lock(&unit);
+        guarded(&mut actor, |actor| actor.reference(frame, arrival));
+        actor.is_status_due()
+    }
+
     /// Makes the unit of a message that is its first, unless the message is bad or there are too many.
     fn appear(&self, serial: &str, stream: RawStream, frame: &[u8]) -> Option<Arc<Mutex<UnitActor>>> {
         let id = UnitId::new(serial)
             .map_err(|error| self.fault(FaultKind::BadSerial, || format!("serial {serial:?} {error}")))
             .ok()?;
-        let installable = self.calibrations.get(&id);
+        let calibrated = read(&self.calibrations).get(&id).is_some();
         // Rubbish on a strange serial makes no unit; on a serial with a calibration it is that unit's rubbish.
-        if installable.is_none()
-            && let Err(error) = readable(stream, frame)
-        {
+        if !calibrated && let Err(error) = readable(stream, frame) {
             self.fault(FaultKind::from(&error), || {
                 format!("first message of unit {id}, raw/{}: {error}", stream.chunk())
             });
             return None;
         }
         // Looked at without the right to write first: a flood of strange serials must not hold the others up.
-        if !self.has_place(&read(&self.units), installable.is_some()) {
+        if !self.has_place(&read(&self.units), calibrated) {
             return self.refuse(&id);
         }
         let mut units = self.units.write().unwrap_or_else(PoisonError::into_inner);
         if let Some(unit) = units.by_serial.get(serial) {
             return Some(Arc::clone(unit));
         }
-        if !self.has_place(&units, installable.is_some()) {
+        if !self.has_place(&units, calibrated) {
             return self.refuse(&id);
         }
         let outlet = match (self.outlets)(&id) {
@@ -108,27 +140,43 @@ impl Intake {
                 return None;
             }
         };
-        let unit_settings = self.settings.unit;
-        let pairing_window =
-            std::time::Duration::from_nanos(unit_settings.pairing_window.as_ns().unsigned_abs());
-        let quiet = QuietSettings { tail_flush: self.settings.tail_flush, pairing_window };
-        let mut actor = UnitActor::new(id.clone(), unit_settings, quiet, outlet);
-        if let Some(installable) = installable {
-            let revision = actor.install(Arc::clone(&installable.calibration), installable.digest);
-            tracing::info!(unit = %id, revision = revision.counter, "appeared, calibrated");
+        let mut actor = self.make(&id, outlet);
+        // Read while nobody else may write the units: what is changed behind this finds the unit there.
+        let plan = read(&self.calibrations).get(&id).cloned().unwrap_or_default();
+        for change in plan.changes() {
+            actor.change(change);
+        }
+        if let Some(current) = &plan.current {
+            tracing::info!(unit = %id, revision = current.revision.counter, "appeared, calibrated");
         } else {
-            tracing::warn!(unit = %id, uncalibrated = ?unit_settings.uncalibrated, "appeared, no calibration");
+            tracing::warn!(unit = %id, uncalibrated = ?self.settings.unit.uncalibrated, "appeared, no calibration");
         }
         let unit = Arc::new(Mutex::new(actor));
         units.by_serial.insert(serial.to_owned(), Arc::clone(&unit));
-        units.calibrated += usize::from(installable.is_some());
         Some(unit)
+    }
+
+    /// A unit that knows nothing yet.
+    fn make(&self, id: &UnitId, outlet: Outlet) -> UnitActor {
+        let settings = self.settings.unit;
+        let pairing_window = Duration::from_nanos(settings.pairing_window.as_ns().unsigned_abs());
+        let quiet = QuietSettings { tail_flush: self.settings.tail_flush, pairing_window };
+        let mut actor = UnitActor::new(id.clone(), settings, quiet, outlet);
+        if let Some(desk) = &self.desk {
+            actor.report_to(desk.clone());
+        }
+        actor
     }
 
     /// Whether one more unit may appear; places for units that have a calibration are kept free for them.
     fn has_place(&self, units: &Units, calibrated: bool) -> bool {
-        let kept = if calibrated { 0 } else { self.calibrations.len().saturating_sub(units.calibrated) };
-        units.by_serial.len() + kept < self.settings.max_units
+        let waiting = |calibrations: &Calibrations| {
+            calibrations.units().filter(|unit| !units.by_serial.contains_key(unit.as_str())).count()
+        };
+        let limit = self.settings.max_units;
+        // Most of the time there is room for all of them, whoever has appeared.
+        units.by_serial.len() < limit
+            && (calibrated || units.by_serial.len() + waiting(&read(&self.calibrations)) < limit)
     }
 
     fn refuse<T>(&self, id: &UnitId) -> Option<T> {
@@ -146,11 +194,61 @@ impl Intake {
 
     /// Counts a fault that belongs to no unit, and logs the first of its kind.
     fn fault(&self, kind: FaultKind, words: impl FnOnce() -> String) {
-        let mut faults = lock(&self.faults);
-        if faults.note(kind, 1, words) {
-            let words = faults.last().unwrap_or_default();
-            tracing::warn!(kind = kind.name(), "{words}; further ones are counted only");
+        let telling = lock(&self.faults).note(kind, 1, words);
+        if let Some(telling) = telling {
+            tracing::warn!(kind = kind.name(), "{telling}");
         }
+    }
+
+    /// Faults that belong to no unit.
+    #[must_use]
+    pub fn faults(&self) -> Vec<Fault> {
+        lock(&self.faults).faults()
+    }
+
+    /// Has a unit, seen or not, correct with another calibration from a tick on, and tells it its account of swaps. Gives
+    /// the revision counter of a change that was waiting and is replaced.
+    pub(crate) fn change(&self, unit: &UnitId, change: Change, account: SwapAccount) -> Option<u64> {
+        let before = {
+            let mut calibrations = self.calibrations.write().unwrap_or_else(PoisonError::into_inner);
+            calibrations.plan_mut(unit).change(change.clone())
+        };
+        // Behind the entry above: a unit that appears in between has been given it.
+        match self.with(unit, |actor| {
+            actor.tell_swaps(account);
+            actor.change(change)
+        }) {
+            Some(replaced) => replaced,
+            None => before.map(|change| change.next.revision.counter),
+        }
+    }
+
+    /// Has a unit begin with what it had before the service was restarted.
+    pub(crate) fn restore(&self, unit: &UnitId, plan: Plan) {
+        if plan.changes().next().is_none() {
+            return;
+        }
+        *self.calibrations.write().unwrap_or_else(PoisonError::into_inner).plan_mut(unit) = plan;
+    }
+
+    /// The change that waits for its tick: its revision counter, and when it takes effect.
+    pub(crate) fn waiting(&self, unit: &UnitId) -> Option<(u64, Schedule)> {
+        let seen = self.with(unit, |actor| actor.waiting());
+        let planned = || read(&self.calibrations).get(unit).and_then(Plan::waiting);
+        seen.unwrap_or_else(planned)
+    }
+
+    /// Does something with one unit; `None` where it has not appeared, or the work panicked and the unit was reset.
+    pub(crate) fn with<T>(&self, unit: &UnitId, work: impl FnOnce(&mut UnitActor) -> T) -> Option<T> {
+        let unit = self.unit(unit.as_str())?;
+        let mut actor = lock(&unit);
+        guarded(&mut actor, work)
+    }
+
+    /// What a unit is like at this moment; `None` where it has not appeared.
+    #[must_use]
+    pub fn present(&self, unit: &UnitId) -> Option<Present> {
+        self.with(unit, |actor| actor.present())
     }
 
     /// Does something with every unit, in the order of their serials; a panic costs that unit its memory and no more.
@@ -162,12 +260,10 @@ impl Intake {
         units.iter().filter_map(|(_, unit)| guarded(&mut lock(unit), &mut work)).collect()
     }
 
-    /// Status of one unit.
+    /// Status of one unit; `instance` is the service's name for itself.
     #[must_use]
-    pub fn status(&self, unit: &UnitId) -> Option<Status> {
-        let unit = self.unit(unit.as_str())?;
-        let status = lock(&unit).status();
-        Some(status)
+    pub fn status(&self, unit: &UnitId, instance: &str) -> Option<Status> {
+        self.with(unit, |actor| actor.status(instance))
     }
 
     /// The account so far.
@@ -204,6 +300,7 @@ fn readable(stream: RawStream, frame: &[u8]) -> Result<(), CodecError> {
         RawStream::Gyro => codec::decode::<GyroBatch>(frame).map(drop),
         RawStream::Accel => codec::decode::<AccelBatch>(frame).map(drop),
         RawStream::Temperature => codec::decode::<TemperatureBatch>(frame).map(drop),
+        RawStream::Health => codec::decode::<HealthBatch>(frame).map(drop),
     }
 }
 

@@ -1,34 +1,38 @@
-//! The one thread beside the receive threads: tail flush by the clock, status, answers to queries.
+//! The one thread beside receive threads and registrar: tail flush by the clock, status, answers to status queries.
 //!
 //! It may wait for a unit's lock or for a slow subscriber; the receive threads never wait for it.
 
-use std::collections::HashMap;
+mod instance;
+mod outlets;
+
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use isotherm_protocol::codec;
-use isotherm_protocol::key::{self, UnitId};
-use isotherm_protocol::status::Status;
+use isotherm_protocol::key;
 use zenoh::key_expr::keyexpr;
-use zenoh::pubsub::Publisher;
-use zenoh::qos::{CongestionControl, Priority};
 use zenoh::query::Query;
 use zenoh::{Session, Wait};
 
 use crate::config::Settings;
 use crate::intake::Intake;
+use crate::registrar::Board;
+use instance::Instance;
+use outlets::Outlets;
 
 /// Requests that may wait for the keeper; what comes beyond is refused, which a query notices by its missing reply.
 const WAITING_REQUESTS: usize = 1024;
+/// Interval of the status of units whose progress is followed.
+const PROGRESS_INTERVAL: Duration = Duration::from_millis(500);
 
 /// What the keeper is asked for.
 #[derive(Debug)]
 enum Request {
     /// Some unit's status is due.
     Status,
-    /// Somebody asks for the status of units.
+    /// Somebody asks for the status of units or of the service.
     Query(Query),
     /// Flush every unit, publish its last status, end.
     Stop,
@@ -45,7 +49,7 @@ impl Bell {
         let _ = self.0.try_send(Request::Status);
     }
 
-    /// Somebody asks for the status of units.
+    /// Somebody asks for the status of units or of the service.
     pub(crate) fn query(&self, query: Query) {
         if let Err(TrySendError::Full(_)) = self.0.try_send(Request::Query(query)) {
             tracing::warn!("a status query is refused: {WAITING_REQUESTS} are waiting");
@@ -65,12 +69,18 @@ impl Keeper {
     ///
     /// # Errors
     /// Where the system gives no thread.
-    pub(crate) fn start(session: Session, intake: Arc<Intake>, settings: &Settings) -> std::io::Result<Self> {
+    pub(crate) fn start(
+        session: &Session,
+        intake: Arc<Intake>,
+        board: Arc<Board>,
+        settings: &Settings,
+    ) -> std::io::Result<Self> {
         let (requests, receiver) = sync_channel(WAITING_REQUESTS);
+        let instance = Instance::new(session, settings.digest, board);
         let mut work = Work {
-            session,
+            outlets: Outlets::new(session.clone()),
+            instance,
             intake,
-            publishers: HashMap::new(),
             status_interval: settings.status_interval,
             look_interval: (settings.tail_flush / 4)
                 .clamp(Duration::from_millis(5), Duration::from_millis(100)),
@@ -92,79 +102,99 @@ impl Keeper {
     }
 }
 
+/// Which units' status is published.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Which {
+    /// Where something has changed.
+    Due,
+    /// And where something is in progress.
+    InProgress,
+    /// Every one.
+    All,
+}
+
 /// What the keeper works with.
 struct Work {
-    session: Session,
+    outlets: Outlets,
+    instance: Instance,
     intake: Arc<Intake>,
-    publishers: HashMap<UnitId, Publisher<'static>>,
     status_interval: Duration,
     look_interval: Duration,
 }
 
 impl Work {
     fn run(&mut self, requests: &Receiver<Request>) {
-        let mut next_status = Instant::now() + self.status_interval;
-        let mut next_look = Instant::now() + self.look_interval;
+        let start = Instant::now();
+        let (mut next_status, mut next_progress) = (start + self.status_interval, start + PROGRESS_INTERVAL);
+        let mut next_look = start + self.look_interval;
+        self.publish(Which::All);
         loop {
             let wait = next_status.min(next_look).saturating_duration_since(Instant::now());
             match requests.recv_timeout(wait) {
-                Ok(Request::Status) => self.publish_status(false),
+                Ok(Request::Status) => self.publish(Which::Due),
                 Ok(Request::Query(query)) => self.answer(&query),
                 Ok(Request::Stop) | Err(RecvTimeoutError::Disconnected) => break,
                 Err(RecvTimeoutError::Timeout) => {}
             }
             let now = Instant::now();
             if now >= next_look {
-                self.intake.each_unit(|actor| actor.flush_if_quiet(now));
+                self.intake.each_unit(|actor| actor.tend(now));
+                self.publish(Which::Due);
                 next_look = now + self.look_interval;
             }
             if now >= next_status {
-                self.publish_status(true);
+                self.intake.each_unit(|actor| actor.measure_rates(now));
+                self.publish(Which::All);
                 next_status = now + self.status_interval;
+                next_progress = now + PROGRESS_INTERVAL;
+            } else if now >= next_progress {
+                self.publish(Which::InProgress);
+                next_progress = now + PROGRESS_INTERVAL;
             }
         }
         self.intake.each_unit(crate::unit::UnitActor::flush);
-        self.publish_status(true);
+        self.publish(Which::All);
     }
 
-    /// Publishes the status of the units for which it is due, or of all.
-    fn publish_status(&mut self, all: bool) {
+    /// Publishes the status of units, and the service's own where it has changed or all are asked for.
+    fn publish(&mut self, which: Which) {
+        let instance = self.instance.name();
         let due = self.intake.each_unit(|actor| {
-            (actor.take_status_due() || all).then(|| (actor.id().clone(), actor.status()))
+            let progress = which == Which::InProgress && actor.is_in_progress();
+            let publish = actor.take_status_due() || which == Which::All || progress;
+            publish.then(|| (actor.id().clone(), actor.status(instance)))
         });
         for (unit, status) in due.into_iter().flatten() {
-            if let Err(error) = self.publish(&unit, &status) {
-                tracing::warn!(%unit, "cannot publish the status: {error}");
+            if let Err(error) = self.outlets.unit(&unit, &status) {
+                tracing::warn!(%unit, "cannot publish the status: {}", isotherm_bus::words(&error));
             }
         }
-    }
-
-    fn publish(&mut self, unit: &UnitId, status: &Status) -> Result<(), zenoh::Error> {
-        if !self.publishers.contains_key(unit) {
-            let publisher = self
-                .session
-                .declare_publisher(key::status(unit))
-                .congestion_control(CongestionControl::Drop)
-                .priority(Priority::DataLow)
-                .wait()?;
-            self.publishers.insert(unit.clone(), publisher);
+        if let Some(status) = self.instance.status(&self.intake, which == Which::All)
+            && let Err(error) = self.outlets.service(&status)
+        {
+            tracing::warn!("cannot publish the service's status: {}", isotherm_bus::words(&error));
         }
-        let Some(publisher) = self.publishers.get(unit) else { return Ok(()) };
-        publisher.put(codec::encode(status)?).wait()
     }
 
-    /// Replies with the status of every unit that the query's key takes in.
-    fn answer(&self, query: &Query) {
+    /// Replies with the status of every unit that the query's key takes in, and of the service itself.
+    fn answer(&mut self, query: &Query) {
+        let instance = self.instance.name();
+        let asked = |key: &str| keyexpr::new(key).is_ok_and(|key| query.key_expr().intersects(key));
         let statuses = self.intake.each_unit(|actor| {
             let key = key::status(actor.id());
-            let asked = keyexpr::new(&key).is_ok_and(|key| query.key_expr().intersects(key));
-            asked.then(|| (key, actor.status()))
+            asked(&key).then(|| (key, codec::encode(&actor.status(instance))))
         });
-        for (key, status) in statuses.into_iter().flatten() {
-            let replied =
-                codec::encode(&status).map_err(Into::into).and_then(|frame| query.reply(key, frame).wait());
-            if let Err(error) = replied {
-                tracing::warn!("cannot answer a status query: {error}");
+        let mut replies: Vec<_> = statuses.into_iter().flatten().collect();
+        let key = key::service_status(instance);
+        if asked(&key)
+            && let Some(status) = self.instance.status(&self.intake, true)
+        {
+            replies.push((key, codec::encode(&status)));
+        }
+        for (key, frame) in replies {
+            let sent = frame.map_err(Into::into).and_then(|frame| query.reply(key, frame).wait());
+            if let Err(error) = sent {
+                tracing::warn!("cannot answer a status query: {}", isotherm_bus::words(&error));
             }
         }
     }

@@ -1,5 +1,7 @@
 //! A histogram of latencies with a bounded relative error.
 
+use isotherm_protocol::status::LatencyBucket;
+
 /// Sub-buckets per power of two: a bucket is at most 1/16 of its lower bound wide.
 const SUB_BUCKETS: u64 = 1 << SUB_BITS;
 /// log₂ of it.
@@ -12,12 +14,13 @@ const BUCKETS: usize = ((u64::BITS - SUB_BITS + 1) as usize) << SUB_BITS;
 pub struct Histogram {
     counts: Box<[u64]>,
     total: u64,
+    sum: u64,
     largest: u64,
 }
 
 impl Default for Histogram {
     fn default() -> Self {
-        Self { counts: vec![0; BUCKETS].into_boxed_slice(), total: 0, largest: 0 }
+        Self { counts: vec![0; BUCKETS].into_boxed_slice(), total: 0, sum: 0, largest: 0 }
     }
 }
 
@@ -28,6 +31,7 @@ impl Histogram {
             *count += 1;
         }
         self.total += 1;
+        self.sum = self.sum.saturating_add(ns);
         self.largest = self.largest.max(ns);
     }
 
@@ -35,6 +39,21 @@ impl Histogram {
     #[must_use]
     pub fn total(&self) -> u64 {
         self.total
+    }
+
+    /// Sum of all that were counted (ns).
+    #[must_use]
+    pub fn sum_ns(&self) -> u64 {
+        self.sum
+    }
+
+    /// The buckets in which something was counted, by their largest latency.
+    #[must_use]
+    pub fn buckets(&self) -> Vec<LatencyBucket> {
+        let counted = self.counts.iter().enumerate().filter(|(_, count)| **count > 0);
+        counted
+            .map(|(index, count)| LatencyBucket { up_to_ns: upper_bound(index as u64), count: *count })
+            .collect()
     }
 
     /// The latency (ns) that the share `share` (0…1) of all counted ones does not exceed; 0 where nothing was counted.
@@ -108,7 +127,7 @@ mod tests {
             let got = histogram.quantile(share);
             assert!(got >= exact && got <= exact + exact / 16, "{share}: {got}");
         }
-        assert_eq!(histogram.total(), 1000);
+        assert_eq!((histogram.total(), histogram.sum_ns()), (1000, 500_500_000));
         histogram.record(u64::MAX);
         assert_eq!(histogram.quantile(1.0), u64::MAX);
     }

@@ -8,22 +8,31 @@
 //! |---|---|
 //! | [`cli`] | the commands |
 //! | [`config`] | the service configuration, checked |
-//! | [`calibrations`] | the calibration documents of a folder |
+//! | [`calibrations`] | what each unit is to correct with |
+//! | [`watch`] | the calibration folder as it changes |
 //! | [`service`] | start and stop of the whole |
 //! | [`intake`] | what the receive threads do |
 //! | [`mod@unit`] | one unit's part |
+//! | `registrar` | the one path of every swap, and commands |
+//! | `keeper` | status, and what only a clock can do |
+//! | `metrics` | metrics and health over HTTP |
+//! | [`store`] | what is remembered over a restart: audit file, documents |
 //! | [`fault`], [`latency`], [`totals`] | what is counted |
+//! | [`console`] | the operator's side: commands that talk to a running service |
 //! | [`check`] | validation of calibration documents and configurations |
+//! | [`signing`] | keys, signed documents and who is trusted, as files |
 //! | [`report`], [`demo`] | the demonstration and its report |
 //!
 //! How a message travels: Zenoh's receive thread calls [`intake::Intake::receive`], which finds the unit, locks it, has
 //! it corrected and publishes what came out, all before it returns. A second thread, the keeper, does what only a clock
-//! can: it flushes the tail of a stream that has stopped, and publishes status.
+//! can: it flushes the tail of a stream that has stopped, and publishes status. A third one, the registrar, takes
+//! calibrations and commands, whoever gives them, writes them down and hands them to the units.
 
 pub mod calibrations;
 pub mod check;
 pub mod cli;
 pub mod config;
+pub mod console;
 pub mod demo;
 mod error;
 pub mod exit;
@@ -32,12 +41,17 @@ pub mod intake;
 mod keeper;
 pub mod latency;
 mod logging;
+mod metrics;
+mod registrar;
 pub mod report;
 mod serve;
 pub mod service;
+pub mod signing;
+pub mod store;
 mod text;
 pub mod totals;
 pub mod unit;
+pub mod watch;
 mod words;
 
 pub use config::Settings;

@@ -36,6 +36,12 @@ impl LogArgs {
         Self { log_format: LogFormat::Human, log_level }
     }
 
+    /// Nothing, unless the environment says otherwise: for commands that say themselves what went wrong.
+    pub(crate) fn silent() -> Self {
+        let log_level = std::env::var("ISOTHERM_LOG").unwrap_or_else(|_| "off,zenoh=off".to_owned());
+        Self { log_format: LogFormat::Human, log_level }
+    }
+
     /// Starts logging; a second start in one process changes nothing.
     ///
     /// # Errors
@@ -53,6 +59,8 @@ impl LogArgs {
         let builder = tracing_subscriber::fmt()
             .with_env_filter(filter)
             .with_writer(std::io::stderr)
+            // It would be told on stderr itself, with a panic: a full disk must not stop the service for its log.
+            .log_internal_errors(false)
             .with_ansi(std::io::stderr().is_terminal());
         // An error means that somebody in this process logs already.
         let _ = match self.log_format {

@@ -1,6 +1,7 @@
 //! The `serve` command: from arguments to a running service, and from a signal to its end.
 
 use std::io::Write;
+use std::net::SocketAddr;
 use std::path::Path;
 
 use tokio::signal::unix::{SignalKind, signal};
@@ -50,6 +51,12 @@ fn settings(args: &ServeArgs) -> Result<Settings, ServiceError> {
     if let Some(folder) = &args.calibrations {
         settings.calibrations = Some(folder.clone());
     }
+    if let Some(folder) = &args.state {
+        settings.state = Some(folder.clone());
+    }
+    if args.metrics.is_some() {
+        settings.metrics.listen = args.metrics;
+    }
     let (configured, given) = (&mut settings.session, &args.session);
     if given.config.is_some() {
         configured.config.clone_from(&given.config);
@@ -86,7 +93,7 @@ async fn serve(args: ServeArgs) -> Result<Option<Totals>, ServiceError> {
     let locators = isotherm_bus::locators(&session);
     let service = crate::start(settings, session).await?;
     tracing::info!(version = env!("CARGO_PKG_VERSION"), locators = locators.join(" "), "ready");
-    announce(&args, &locators)?;
+    announce(&args, &locators, service.metrics())?;
 
     let name = stop_asked().await;
     tracing::info!(signal = name, "stopping");
@@ -97,8 +104,12 @@ async fn serve(args: ServeArgs) -> Result<Option<Totals>, ServiceError> {
 }
 
 /// Tells scripts that the service is ready and where.
-fn announce(args: &ServeArgs, locators: &[String]) -> Result<(), ServiceError> {
-    let line = serde_json::json!({ "ready": true, "locators": locators }).to_string();
+fn announce(args: &ServeArgs, locators: &[String], metrics: Option<SocketAddr>) -> Result<(), ServiceError> {
+    let mut ready = serde_json::json!({ "ready": true, "locators": locators });
+    if let Some(address) = metrics {
+        ready["metrics"] = format!("http://{address}").into();
+    }
+    let line = ready.to_string();
     if args.announce {
         let mut stdout = std::io::stdout().lock();
         // Nobody reading is nobody waiting.

@@ -1,23 +1,26 @@
 //! The service as a whole: start it on a session, stop it within its time.
 
-use std::sync::Arc;
-use std::time::Instant;
+mod declare;
 
-use isotherm_protocol::key::{self, UnitId};
+use std::net::SocketAddr;
+use std::path::Path;
+use std::sync::Arc;
+
+use isotherm_protocol::key::UnitId;
 use isotherm_protocol::status::Status;
-use zenoh::pubsub::Subscriber;
-use zenoh::qos::{CongestionControl, Priority};
-use zenoh::query::Queryable;
-use zenoh::sample::{Locality, SampleKind};
-use zenoh::{Session, Wait};
+use zenoh::Session;
 
 use crate::ServiceError;
 use crate::calibrations::Calibrations;
 use crate::config::Settings;
-use crate::intake::{Intake, OutletMaker};
+use crate::intake::Intake;
 use crate::keeper::Keeper;
+use crate::metrics::{Endpoint, Source, Taken};
+use crate::registrar::{Found, Opening, Registrar, Work};
+use crate::store::Store;
 use crate::totals::Totals;
-use crate::unit::Outlet;
+use crate::watch::{WatchSettings, Watcher};
+use declare::Declared;
 
 /// A service at work. Dropping it without [`RunningService::stop`] ends it without flushing.
 #[derive(Debug)]
@@ -25,89 +28,100 @@ pub struct RunningService {
     session: Session,
     settings: Settings,
     intake: Arc<Intake>,
-    subscriber: Subscriber<()>,
-    queryable: Queryable<()>,
+    watcher: Option<Watcher>,
+    declared: Declared,
     keeper: Keeper,
+    registrar: Registrar,
+    metrics: Option<Endpoint>,
 }
 
-/// Starts the service on a session, with the calibrations of the configured folder.
+/// Starts the service on a session, with the last good sets of the state folder and the documents of the configured one.
 ///
 /// Every problem of every bad calibration document is logged.
 ///
 /// # Errors
-/// [`ServiceError::Read`] where the folder cannot be read, [`ServiceError::BadCalibrations`] where a document is bad and
-/// `strict_start` is set, [`ServiceError::Declare`] and [`ServiceError::Thread`].
+/// [`ServiceError::State`] where the state folder cannot be used; with `strict_start` [`ServiceError::Read`] where the
+/// folder of calibrations cannot be read and [`ServiceError::BadCalibrations`] where a document is bad;
+/// [`ServiceError::Metrics`] where the configured address cannot be had; [`ServiceError::Declare`] and
+/// [`ServiceError::Thread`].
 pub async fn start(settings: Settings, session: Session) -> Result<RunningService, ServiceError> {
-    let calibrations = load_calibrations(&settings)?;
-    start_with(settings, calibrations, session).await
+    start_with(settings, Calibrations::default(), session).await
 }
 
-/// Starts the service on a session, with calibrations that need not be files.
+/// Starts the service on a session, with calibrations that need not be documents beside those that are.
 ///
 /// # Errors
-/// [`ServiceError::Declare`] and [`ServiceError::Thread`].
+/// As [`start`].
 pub async fn start_with(
     settings: Settings,
     calibrations: Calibrations,
     session: Session,
 ) -> Result<RunningService, ServiceError> {
-    let outlets = outlets(session.clone(), settings.congestion);
-    let intake = Arc::new(Intake::new(settings.clone(), calibrations, outlets));
+    let metrics = Taken::bind(&settings.metrics).await?;
+    let store = open_store(settings.state.as_deref())?;
+    let opening = Opening::new();
+    let desk = opening.desk();
+    let outlets = declare::outlets(session.clone(), settings.congestion);
+    let intake = Intake::new(settings.clone(), calibrations.clone(), outlets).reporting_to(desk.clone());
+    let intake = Arc::new(intake);
+
+    let mut work = Work::new(&settings, Arc::clone(&intake), store);
+    work.take_over(&calibrations);
+    work.restore();
+    let found = read_folder(&mut work, &settings)?;
+    let board = work.board();
+    let source = Source::new(&settings, Arc::clone(&intake), Arc::clone(&board), session.zid().to_string());
+    let registrar = Registrar::start(opening, work).map_err(ServiceError::Thread)?;
     let keeper =
-        Keeper::start(session.clone(), Arc::clone(&intake), &settings).map_err(ServiceError::Thread)?;
-
-    let (bell, receiving) = (keeper.bell(), Arc::clone(&intake));
-    let subscriber = session
-        .declare_subscriber(key::ALL_RAW)
-        .allowed_origin(Locality::Remote)
-        .callback(move |sample| {
-            let arrival = Instant::now();
-            let bytes = sample.payload().to_bytes();
-            let frame = (sample.kind() == SampleKind::Put).then_some(&*bytes);
-            if receiving.receive(sample.key_expr().as_str(), frame, arrival) {
-                bell.status_due();
-            }
-        })
-        .await
-        .map_err(|source| ServiceError::Declare { key: key::ALL_RAW, source })?;
-
-    // The subscription first: where the queryable answers, the service receives.
-    let bell = keeper.bell();
-    let queryable = session
-        .declare_queryable(key::ALL_STATUS)
-        .callback(move |query| bell.query(query))
-        .await
-        .map_err(|source| ServiceError::Declare { key: key::ALL_STATUS, source })?;
-    Ok(RunningService { session, settings, intake, subscriber, queryable, keeper })
+        Keeper::start(&session, Arc::clone(&intake), board, &settings).map_err(ServiceError::Thread)?;
+    let watcher = match &settings.calibrations {
+        Some(folder) => {
+            let (watch, desk) = (watch_settings(&settings), desk.clone());
+            let watcher = Watcher::start(folder, watch, found, move |event| desk.folder(event));
+            Some(watcher.map_err(ServiceError::Thread)?)
+        }
+        None => None,
+    };
+    let declared = Declared::new(&session, &intake, &keeper.bell(), &desk).await?;
+    let metrics = metrics.map(|taken| taken.serve(source)).transpose().map_err(ServiceError::Thread)?;
+    Ok(RunningService { session, settings, intake, watcher, declared, keeper, registrar, metrics })
 }
 
-/// Reads the configured folder and logs what is wrong in it.
-fn load_calibrations(settings: &Settings) -> Result<Calibrations, ServiceError> {
-    let Some(folder) = &settings.calibrations else { return Ok(Calibrations::default()) };
-    let (calibrations, bad) = Calibrations::read(folder)?;
-    for problem in bad.iter().flat_map(|document| &document.problems) {
-        tracing::error!("{problem}");
+/// Opens the state folder, or its stand-in.
+fn open_store(folder: Option<&Path>) -> Result<Store, ServiceError> {
+    let Some(folder) = folder else {
+        tracing::warn!(
+            "no state folder is configured (`state`): swaps, and what was done to a unit, are forgotten at the end"
+        );
+        return Ok(Store::in_memory());
+    };
+    let (store, opened) = Store::open(folder)?;
+    for warning in opened.warnings() {
+        tracing::warn!("{warning}");
     }
-    if settings.strict_start && !bad.is_empty() {
-        return Err(ServiceError::BadCalibrations { count: bad.len() });
-    }
-    let units: Vec<_> = calibrations.units().map(UnitId::as_str).collect();
-    tracing::info!(folder = %folder.display(), units = units.join(" "), bad_documents = bad.len(), "calibrations read");
-    Ok(calibrations)
+    tracing::info!(folder = %folder.display(), entries = opened.entries, "state folder opened");
+    Ok(store)
 }
 
-/// One declared publisher per unit, at one priority, so that its batches stay in order.
-fn outlets(session: Session, congestion: CongestionControl) -> OutletMaker {
-    Box::new(move |unit| {
-        let publisher = session
-            .declare_publisher(key::corrected(unit))
-            .congestion_control(congestion)
-            .priority(Priority::RealTime)
-            .express(false)
-            .wait()?;
-        let outlet: Outlet = Box::new(move |frame| publisher.put(frame).wait());
-        Ok(outlet)
-    })
+/// Reads the configured folder; a bad one is survived, unless a strict start is asked for.
+fn read_folder(work: &mut Work, settings: &Settings) -> Result<Found, ServiceError> {
+    let Some(folder) = &settings.calibrations else { return Ok(Found::new()) };
+    match work.read_folder() {
+        Ok((_, bad)) if settings.strict_start && bad > 0 => Err(ServiceError::BadCalibrations { count: bad }),
+        Ok((found, _)) => Ok(found),
+        // Without a state folder there is nothing to go on with.
+        Err(source) if settings.strict_start || settings.state.is_none() => {
+            Err(ServiceError::Read { path: folder.clone(), source })
+        }
+        Err(error) => {
+            work.miss_folder(&error);
+            Ok(Found::new())
+        }
+    }
+}
+
+fn watch_settings(settings: &Settings) -> WatchSettings {
+    WatchSettings { settle: settings.folder.settle, poll: settings.folder.poll, ..WatchSettings::default() }
 }
 
 impl RunningService {
@@ -115,14 +129,17 @@ impl RunningService {
     ///
     /// The session given to [`start`] is closed for whoever else holds it.
     pub async fn stop(self) -> Totals {
-        let Self { session, settings, intake, subscriber, queryable, keeper } = self;
+        let Self { session, settings, intake, watcher, declared, keeper, registrar, metrics } = self;
+        metrics.iter().for_each(Endpoint::stopping);
         let deadline = tokio::time::Instant::now() + settings.stop_timeout;
-        // Each of these may wait: a callback for a slow subscriber, the keeper for a callback.
+        // Each of these may wait: a callback for a slow subscriber, the keeper for a callback, the registrar for a disk.
         let flush = tokio::task::spawn_blocking(move || {
-            let received = subscriber.undeclare().wait_callbacks().wait();
-            let answered = queryable.undeclare().wait();
+            let received = declared.undeclare();
             let kept = keeper.stop();
-            received.is_ok() && answered.is_ok() && kept
+            let watched = watcher.is_none_or(Watcher::stop);
+            // Last of all: the first ticks of a calibration may have come with the flush.
+            let registered = registrar.stop();
+            received && kept && watched && registered
         });
         let flushed = matches!(tokio::time::timeout_at(deadline, flush).await, Ok(Ok(true)));
         if !flushed {
@@ -133,6 +150,9 @@ impl RunningService {
         if let Err(error) = &closed {
             tracing::error!("{error}");
         }
+        if let Some(metrics) = metrics {
+            metrics.end().await;
+        }
         Totals { stopped_in_time: flushed && closed.is_ok(), ..intake.totals() }
     }
 
@@ -142,10 +162,16 @@ impl RunningService {
         &self.session
     }
 
+    /// Where metrics and health are served, if they are.
+    #[must_use]
+    pub fn metrics(&self) -> Option<SocketAddr> {
+        self.metrics.as_ref().map(Endpoint::address)
+    }
+
     /// Status of one unit; `None` where it has not appeared.
     #[must_use]
     pub fn status(&self, unit: &UnitId) -> Option<Status> {
-        self.intake.status(unit)
+        self.intake.status(unit, &self.session.zid().to_string())
     }
 
     /// The account so far.

@@ -1,23 +1,33 @@
 //! One unit's part of the service: its stream, its calibration, its faults and its outlet.
 
+mod account;
+mod present;
 mod quiet;
+mod rates;
+mod tell;
 
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
-use isotherm_correction::calibration::Calibration;
-use isotherm_correction::unit::UnitSettings;
-use isotherm_protocol::corrected::Revision;
+use isotherm_correction::operation::{Command, Refusal, State};
+use isotherm_correction::unit::{self, At, Uncalibrated, UnitSettings};
+use isotherm_correction::units::Timestamp;
+use isotherm_protocol::codec::CodecError;
+use isotherm_protocol::control::Schedule;
 use isotherm_protocol::key::{RawStream, UnitId};
-use isotherm_protocol::status::{Counter, Status};
-use isotherm_protocol::stream::UnitStream;
+use isotherm_protocol::status::{self, Counter, Output};
+use isotherm_protocol::stream::{Label, UnitStream};
 
-use crate::calibrations::Installable;
+use crate::calibrations::{Change, Installable, Plan};
 use crate::fault::{FaultKind, FaultLog};
 use crate::latency::Histogram;
-use crate::totals::UnitTotals;
+use crate::registrar::{Desk, Notice};
 use quiet::Quiet;
+use rates::Rates;
+use tell::Teller;
 
+pub(crate) use account::SwapAccount;
+pub use present::Present;
 pub use quiet::QuietSettings;
 
 /// Where corrected frames go; `Err` is an output that could not be published.
@@ -27,16 +37,25 @@ pub type Outlet = Box<dyn FnMut(Vec<u8>) -> Result<(), zenoh::Error> + Send>;
 /// accelerometer ticks too.
 const REFUSALS: [&str; 5] =
     ["gyro_late", "gyro_implausible", "wrong_sensor_count", "wrong_output_kind", "bad_duration"];
+/// How long a self-test may take by the clock: one that gets no ticks ends with what it has seen.
+const LONGEST_SELF_TEST: Duration = Duration::from_secs(14);
+/// How long the gyro topic may be silent before a pre-launch calibration gets no more ticks.
+const LONGEST_SILENCE: Duration = Duration::from_secs(10);
 
 /// One unit: frames in, frames out, everything counted. Knows nothing of sessions and threads.
 pub struct UnitActor {
     stream: UnitStream,
-    installed: Option<Installable>,
+    plan: Plan,
     outlet: Outlet,
     frame: Vec<u8>,
     faults: FaultLog,
     latency: Histogram,
     quiet: Quiet,
+    rates: Rates,
+    teller: Teller,
+    account: SwapAccount,
+    /// When a self-test began by the clock.
+    self_test_since: Option<Instant>,
     /// Counters of streams that were given up after an alarm.
     before_reset: Vec<Counter>,
     status_due: bool,
@@ -57,51 +76,115 @@ impl UnitActor {
     pub fn new(id: UnitId, settings: UnitSettings, quiet: QuietSettings, outlet: Outlet) -> Self {
         Self {
             stream: UnitStream::new(id, settings),
-            installed: None,
+            plan: Plan::default(),
             outlet,
             frame: Vec::new(),
             faults: FaultLog::default(),
             latency: Histogram::default(),
             quiet: Quiet::new(quiet),
+            rates: Rates::new(Instant::now()),
+            teller: Teller::default(),
+            account: SwapAccount::default(),
+            self_test_since: None,
             before_reset: Vec::new(),
             status_due: true,
         }
     }
 
-    /// Puts a calibration in force from the next tick on: the only way by which a unit ever gets one.
-    pub fn install(&mut self, calibration: Arc<Calibration>, digest: [u8; 8]) -> Revision {
-        self.installed = Some(Installable { calibration: Arc::clone(&calibration), digest, file: None });
+    /// To whom the unit tells what only the registrar can write down.
+    pub(crate) fn report_to(&mut self, desk: Desk) {
+        self.teller.report_to(desk);
+    }
+
+    /// Has a calibration take effect at its tick: the only way by which a unit ever gets one. Gives the revision counter of
+    /// a change that was waiting and is replaced. A revision that the unit was given already is passed over.
+    pub fn change(&mut self, change: Change) -> Option<u64> {
+        if change.next.revision.counter < self.stream.next_counter() {
+            return None;
+        }
+        let replaced = give(&mut self.stream, &change);
+        self.plan.change(change);
         self.status_due = true;
-        self.stream.install(calibration, digest)
+        replaced
+    }
+
+    /// Carries a command out before the next tick; the state that it leads to.
+    ///
+    /// # Errors
+    /// [`Refusal`]: the state is as before.
+    pub fn command(&mut self, command: &Command) -> Result<State, Refusal> {
+        let done = self.stream.command(command);
+        // A self-test without a calibration changes no state, and yet has a report.
+        self.status_due |= done.is_ok();
+        self.look();
+        done
     }
 
     /// Takes one raw frame that arrived at `arrival`, and publishes what it released.
     pub fn receive(&mut self, stream: RawStream, frame: &[u8], arrival: Instant) {
-        let first_output = self.stream.ready().is_empty() && self.latency.total() == 0;
         if stream == RawStream::Gyro {
             self.quiet.heard(arrival);
         }
-        if let Err(error) = self.stream.receive(stream, frame) {
-            self.fault(FaultKind::from(&error), 1, || format!("raw/{}: {error}", stream.chunk()));
+        let taken = self.stream.receive(stream, frame);
+        self.taken(taken, &format_args!("raw/{}", stream.chunk()), arrival);
+    }
+
+    /// Takes one frame with a rate reference that arrived at `arrival`.
+    pub fn reference(&mut self, frame: &[u8], arrival: Instant) {
+        let taken = self.stream.receive_reference(frame);
+        self.taken(taken, &"reference", arrival);
+    }
+
+    /// Publishes what a frame has released, or counts what is wrong with it.
+    fn taken(&mut self, taken: Result<(), CodecError>, topic: &dyn std::fmt::Display, arrival: Instant) {
+        self.rates.message();
+        if let Err(error) = taken {
+            self.fault(FaultKind::from(&error), 1, || format!("{topic}: {error}"));
             return;
         }
+        let first_output = self.latency.total() == 0;
         if self.publish() {
             self.latency.record(u64::try_from(arrival.elapsed().as_nanos()).unwrap_or(u64::MAX));
             self.status_due |= first_output;
         }
+        self.look();
     }
 
-    /// Releases and publishes what waits inside, if the gyro topic has been silent for long enough.
-    pub fn flush_if_quiet(&mut self, now: Instant) {
+    /// Looks for what has changed with the last event.
+    fn look(&mut self) {
+        if self.plan.pending.is_some() && self.stream.unit().pending().is_none() {
+            self.plan.settle();
+        }
+        if self.teller.look(&mut self.stream) {
+            self.status_due = true;
+            self.self_test_since = (self.stream.unit().state() == State::SelfTest).then(Instant::now);
+        }
+    }
+
+    /// Does what only a clock can: releases what waits in a stream that has stopped, ends what gets no more ticks.
+    pub fn tend(&mut self, now: Instant) {
         if self.stream.is_waiting() && self.quiet.is_over(now) {
             self.flush();
         }
+        if self.self_test_since.is_some_and(|since| now.saturating_duration_since(since) > LONGEST_SELF_TEST)
+        {
+            self.stream.expire_self_test();
+            self.look();
+        }
+        if self.stream.unit().state() == State::PreLaunchCalibration
+            && self.quiet.is_silent_for(now, LONGEST_SILENCE)
+        {
+            self.stream.end_pre_launch();
+            self.look();
+        }
+        self.teller.tell(&self.stream);
     }
 
     /// Releases and publishes what waits inside.
     pub fn flush(&mut self) {
         self.stream.flush();
         self.publish();
+        self.look();
     }
 
     /// Publishes every corrected tick that is ready; whether there was one.
@@ -123,60 +206,68 @@ impl UnitActor {
             }
             if taken == 0 {
                 // Not to be reached: the stream says that ticks are ready and gives none. Rather lose them than loop.
-                let lost = self.stream.take_ready().len() as u64;
-                self.fault(FaultKind::Unpublished, lost, || {
-                    "corrected: the stream does not give its ticks".to_owned()
-                });
+                self.reset("the stream holds ticks back");
             }
         }
         published
     }
 
-    /// Counts a fault, and logs the first of its kind.
+    /// Counts a fault, and logs the first of its kind; of those that follow, their number once a minute.
     fn fault(&mut self, kind: FaultKind, count: u64, words: impl FnOnce() -> String) {
-        if self.faults.note(kind, count, words) {
-            self.status_due = true;
-            let words = self.faults.last().unwrap_or_default();
-            tracing::warn!(unit = %self.stream.id(), kind = kind.name(), "{words}; further ones are counted only");
-        }
+        let Some(telling) = self.faults.note(kind, count, words) else { return };
+        self.status_due |= telling.is_first();
+        tracing::warn!(unit = %self.stream.id(), kind = kind.name(), "{telling}");
     }
 
     /// Gives the unit's memory up after an event thought impossible: counted as an alarm, always logged.
     ///
-    /// The calibration stays in force under the revision that it had.
+    /// Calibration, revision and state stay; a self-test or pre-launch calibration is given up.
     pub fn reset(&mut self, cause: &str) {
         let id = self.stream.id().clone();
         tracing::error!(unit = %id, "alarm: {cause}; the unit starts anew");
         self.before_reset = self.counters();
-        let revision = self.stream.revision();
+        let state = self.stream.unit().state();
         self.stream = UnitStream::new(id, *self.stream.unit().settings());
-        if let Some(Installable { calibration, digest, .. }) = &self.installed {
-            while self.stream.revision().counter < revision.counter {
-                self.stream.install(Arc::clone(calibration), *digest);
-            }
+        let plan = self.plan.clone();
+        for change in plan.changes() {
+            give(&mut self.stream, &change);
         }
-        self.faults.note(FaultKind::Alarm, 1, || format!("alarm: {cause}"));
+        let back = match state {
+            _ if self.stream.unit().state() == state => None,
+            State::RunningWithReversal => Some(Command::Run { reversal: Some(true) }),
+            State::RunningWithoutReversal => Some(Command::Run { reversal: Some(false) }),
+            State::Standby | State::SelfTest | State::PreLaunchCalibration => Some(Command::Standby),
+        };
+        if let Some(Err(refusal)) = back.map(|command| self.stream.command(&command)) {
+            tracing::error!(unit = %self.stream.id(), "the state is not {state} any more: {refusal}");
+        }
+        let words = format!("alarm: {cause}");
+        self.faults.note(FaultKind::Alarm, 1, || words);
         self.status_due = true;
+        self.look();
     }
 
-    /// Counters of the stream, those before a reset included.
-    fn counters(&self) -> Vec<Counter> {
-        let mut counters = self.stream.counters();
-        for counter in &mut counters {
-            let before = self.before_reset.iter().find(|before| before.name == counter.name);
-            counter.value += before.map_or(0, |before| before.value);
-        }
-        counters
+    /// What is left to tell when the registrar ends.
+    pub(crate) fn take_untold(&mut self) -> Vec<Notice> {
+        self.teller.take_untold()
     }
 
-    /// What the unit says of itself.
+    /// What the unit is like at this moment.
     #[must_use]
-    pub fn status(&self) -> Status {
-        let latency = [self.latency.quantile(0.5), self.latency.quantile(0.99)];
-        let mut status = self.stream.status(env!("CARGO_PKG_VERSION"), self.faults.last(), latency);
-        status.counters = self.counters();
-        status.counters.extend(self.faults.counters());
-        status
+    pub fn present(&self) -> Present {
+        Present::of(self.stream.unit())
+    }
+
+    /// The change that waits for its tick: its revision counter, and when it takes effect.
+    #[must_use]
+    pub fn waiting(&self) -> Option<(u64, Schedule)> {
+        self.plan.waiting()
+    }
+
+    /// Sequence number of the last tick that was corrected under the calibration in force.
+    #[must_use]
+    pub fn last_sequence(&self) -> Option<u64> {
+        self.stream.unit().observation().map(|seen| seen.sequence)
     }
 
     /// Whether something happened that subscribers of the status should hear of at once; asking settles it.
@@ -190,31 +281,56 @@ impl UnitActor {
         self.status_due
     }
 
-    /// The account of the unit since the service started.
+    /// What the unit is doing, and what becomes of its ticks.
     #[must_use]
-    pub fn totals(&self) -> UnitTotals {
-        let counters = self.counters();
-        let value = |name: &str| {
-            counters.iter().find(|counter| counter.name == name).map_or(0, |counter| counter.value)
+    pub fn doing(&self) -> (status::State, Output) {
+        let unit = self.stream.unit();
+        let output = match (unit.calibration(), unit.settings().uncalibrated) {
+            (Some(_), _) => Output::Calibrated,
+            (None, Uncalibrated::PassThrough) => Output::PassThrough,
+            (None, Uncalibrated::Hold) => Output::Held,
         };
-        UnitTotals {
-            ticks_in: value("gyro_ticks_in"),
-            ticks_out: value("ticks_out"),
-            gaps: value("gaps"),
-            ticks_missed: value("ticks_missed"),
-            ticks_refused: REFUSALS.iter().map(|name| value(name)).sum(),
-            bad: self.faults.refused(),
-            unpublished: self.faults.count(FaultKind::Unpublished),
-            alarms: self.faults.count(FaultKind::Alarm),
-            added_latency_p50_ns: self.latency.quantile(0.5),
-            added_latency_p99_ns: self.latency.quantile(0.99),
-        }
+        (unit.state().into(), output)
+    }
+
+    /// Whether something goes on whose progress should be seen more often than once a status interval.
+    #[must_use]
+    pub fn is_in_progress(&self) -> bool {
+        matches!(self.stream.unit().state(), State::SelfTest | State::PreLaunchCalibration)
     }
 
     /// Serial of the unit.
     #[must_use]
     pub fn id(&self) -> &UnitId {
         self.stream.id()
+    }
+}
+
+/// Hands a change to a stream.
+fn give(stream: &mut UnitStream, change: &Change) -> Option<u64> {
+    let Change { next, at, slew } = change;
+    let label = label(next);
+    let at = match at {
+        Schedule::NextTick => At::NextTick,
+        Schedule::Sequence(sequence) => At::Sequence(*sequence),
+        Schedule::TimeNs(time_ns) => At::Time(Timestamp::from_ns(*time_ns)),
+    };
+    let calibration = Arc::clone(&next.calibration);
+    if label.digest.is_none() {
+        stream.install_as(calibration, next.revision, label);
+        return None;
+    }
+    stream.schedule(unit::Change { calibration, revision: next.revision.counter, at, slew: *slew }, label)
+}
+
+/// What the status says of a calibration.
+fn label(next: &Installable) -> Label {
+    let source = next.source.as_ref().map(ToString::to_string).unwrap_or_default();
+    match (&next.document, next.digest) {
+        (Some(document), Some(digest)) => {
+            Label { overlay: next.overlay, ..Label::of(document, digest, source) }
+        }
+        (_, digest) => Label { digest, source, overlay: next.overlay, ..Label::default() },
     }
 }
 

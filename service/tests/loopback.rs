@@ -11,7 +11,7 @@ use isotherm_protocol::codec::{decode, encode};
 use isotherm_protocol::corrected::CorrectedBatch;
 use isotherm_protocol::key::{self, RawStream, UnitId};
 use isotherm_protocol::raw::GyroBatch;
-use isotherm_protocol::status::{State, Status};
+use isotherm_protocol::status::{Output, Status};
 use isotherm_service::{RunningService, Settings, start};
 use zenoh::Session;
 use zenoh::qos::CongestionControl;
@@ -126,8 +126,8 @@ async fn calibrated_units_run_and_others_pass_through() {
         }
     }
     let status = service.status(&calibrated).unwrap();
-    assert_eq!((status.state, &status.revision.digest[..]), (State::Running, &parsed.digest[..8]));
-    assert_eq!(service.status(&strange).unwrap().state, State::Uncalibrated);
+    assert_eq!((status.output, &status.revision().digest[..]), (Output::Calibrated, &parsed.digest[..8]));
+    assert_eq!(service.status(&strange).unwrap().output, Output::PassThrough);
     assert!(!service.stop().await.lost());
 }
 
@@ -221,15 +221,12 @@ async fn status_is_published_answered_and_says_what_happened() {
     // Until the interval has passed once more, so that the counters are those after the last tick.
     let published = loop {
         let status = tokio::time::timeout(LIMIT, statuses.recv()).await.expect("in time").unwrap();
-        if status.last_sequence == Some(29) {
+        if status.last_tick.is_some_and(|tick| tick.sequence == 29) {
             break status;
         }
     };
-    assert_eq!((published.unit.as_str(), published.state), ("STATUS", State::Uncalibrated));
-    assert!(
-        published.added_latency_p50_ns > 0
-            && published.added_latency_p99_ns >= published.added_latency_p50_ns
-    );
+    assert_eq!((published.unit.as_str(), published.output), ("STATUS", Output::PassThrough));
+    assert!(published.latency.p50_ns > 0 && published.latency.p99_ns >= published.latency.p50_ns);
 
     let late = connected(&locators).await;
     presence::wait_for_service(&late, LIMIT).await.unwrap();

@@ -30,6 +30,7 @@ fn the_service_configuration_shows_the_defaults() {
     let defaults = Settings {
         calibrations: settings.calibrations.clone(),
         session: settings.session.clone(),
+        digest: settings.digest,
         ..Settings::default()
     };
     assert_eq!(settings, defaults);

@@ -3,8 +3,10 @@
 use std::path::Path;
 
 use isotherm_protocol::document::{Channel, Document, Parsed, Problem};
+use isotherm_protocol::signature::TrustedKeys;
 use toml::de::DeTable;
 
+use super::signer::signer;
 use super::{FileKind, Finding, Summary};
 use crate::config::Settings;
 use crate::text::{read_bounded, text, whole};
@@ -18,8 +20,8 @@ const NO_KEYS: &str = "holds no keys: say with --kind what it is meant to be";
 /// Longest message of the JSON5 parser that is passed on; long enough for Zenoh's lists of known keys.
 const MAX_MESSAGE_CHARS: usize = 1000;
 
-/// Checks one file.
-pub(super) fn check_file(path: &Path, forced: Option<FileKind>) -> Finding {
+/// Checks one file; with the keys that are trusted, if who signed it is to be verified.
+pub(super) fn check_file(path: &Path, forced: Option<FileKind>, trusted: Option<&TrustedKeys>) -> Finding {
     let file = path.display().to_string();
     let bytes = match read_bounded(path) {
         Ok(bytes) => bytes,
@@ -37,7 +39,7 @@ pub(super) fn check_file(path: &Path, forced: Option<FileKind>) -> Finding {
     };
     let kind = forced.or_else(|| recognise(path, &bytes));
     let checked = text(&bytes, &file).and_then(|text| match kind {
-        Some(FileKind::Calibration) => check_calibration(text, &file),
+        Some(FileKind::Calibration) => check_calibration(text, &file, trusted),
         Some(FileKind::Service) => check_service(text, path),
         Some(FileKind::Zenoh) => check_zenoh(text, &file),
         None => Err(vec![whole(&file, NO_KEYS.to_owned())]),
@@ -70,18 +72,27 @@ fn recognise(path: &Path, bytes: &[u8]) -> Option<FileKind> {
     }
 }
 
-fn check_calibration(text: &str, file: &str) -> Checked {
-    let Parsed { document, calibration, digest, warnings } = Document::parse(text, Some(file))?;
+fn check_calibration(text: &str, file: &str, trusted: Option<&TrustedKeys>) -> Checked {
+    let signer = signer(text, trusted).map_err(|error| error.problem(Some(file)));
+    let (parsed, signer) = match (Document::parse(text, Some(file)), signer) {
+        (Ok(parsed), Ok(signer)) => (parsed, signer),
+        (Ok(_), Err(problem)) => return Err(vec![problem]),
+        // The signature's line is the last.
+        (Err(problems), signer) => return Err(problems.into_iter().chain(signer.err()).collect()),
+    };
+    let Parsed { document, calibration, digest, warnings } = parsed;
     let digest = digest.iter().fold(String::new(), |text, byte| text + &format!("{byte:02x}"));
     let words = format!(
-        "calibration of unit {}: {} gyros, {} accelerometers, {}, sha256 {}",
+        "calibration of unit {}: {} gyros, {} accelerometers, {}, sha256 {}{}",
         document.unit,
         calibration.gyro_count(),
         calibration.accel_count(),
         temperatures(&document.temperature.channel),
         digest.get(..16).unwrap_or_default(),
+        signer.as_ref().map_or_else(String::new, |signer| format!(", {signer}")),
     );
-    Ok((Summary { summary: words, unit: Some(document.unit), digest: Some(digest) }, warnings))
+    let (unit, digest) = (Some(document.unit), Some(digest));
+    Ok((Summary { summary: words, unit, digest, signature: signer }, warnings))
 }
 
 /// The range over all temperature channels, e.g. `-55…85 °C in 3 channels`.
@@ -103,7 +114,7 @@ fn check_service(text: &str, path: &Path) -> Checked {
         .map_or_else(|| "none".to_owned(), |folder| folder.display().to_string());
     let words =
         format!("service configuration: calibrations {calibrations}, at most {} units", settings.max_units);
-    Ok((Summary { summary: words, unit: None, digest: None }, Vec::new()))
+    Ok((Summary { summary: words, unit: None, digest: None, signature: None }, Vec::new()))
 }
 
 fn check_zenoh(text: &str, file: &str) -> Checked {
@@ -116,7 +127,7 @@ fn check_zenoh(text: &str, file: &str) -> Checked {
                 value("listen/endpoints"),
                 value("connect/endpoints")
             );
-            Ok((Summary { summary: words, unit: None, digest: None }, Vec::new()))
+            Ok((Summary { summary: words, unit: None, digest: None, signature: None }, Vec::new()))
         }
         Err(error) => {
             let message = isotherm_bus::words(&error);

@@ -1,3 +1,6 @@
+use isotherm_correction::prelaunch::PreLaunchLimits;
+use isotherm_correction::units::{AngularRate, SpecificForce};
+
 use super::*;
 
 fn parse(text: &str) -> Result<Settings, Vec<String>> {
@@ -27,6 +30,30 @@ fn every_key_arrives_where_it_belongs() {
         status_interval_ms = 200
         stop_timeout_ms = 1_500
         congestion = "block"
+        state = "state/of/this"
+        initial_state = "standby"
+        drift_estimate = "subtract"
+        reference_delay_ms = 200
+        folder = { settle_ms = 20, poll_s = 0.5 }
+        metrics = { listen = "0.0.0.0:9464", allow_remote = true }
+        [swap]
+        max_age_days = 10
+        age = "refuse"
+        outside_range = "refuse"
+        max_jump_deg_per_h = 3600
+        max_jump_mg = 0.5
+        jump = "warn"
+        old_schema = "refuse"
+        slew_ms = 1500
+        require_signature = true
+        trusted_keys = "units"
+        [pre_launch]
+        duration_s = 300
+        max_static_change_deg_per_h = 3600
+        max_magnetic_change_deg_per_h = 7200
+        max_imbalance = 0.5
+        min_time_per_mode_s = 30
+        min_good_share = 0.25
         [navigation]
         ticks = 4
         coning_sculling = true
@@ -39,23 +66,54 @@ fn every_key_arrives_where_it_belongs() {
     let expected = Settings {
         calibrations: Some(folder.path().join("units")),
         strict_start: true,
+        folder: FolderSettings { settle: Duration::from_millis(20), poll: Duration::from_millis(500) },
+        state: Some(folder.path().join("state/of/this")),
+        swap: SwapSettings {
+            max_age: Some(Duration::from_secs(864_000)),
+            age: Severity::Refuse,
+            outside_range: Severity::Refuse,
+            max_jump_rad_per_s: Some(AngularRate::from_deg_per_h(3600.0).as_rad_per_s()),
+            max_jump_m_per_s2: Some(SpecificForce::from_g(5e-4).as_m_per_s2()),
+            jump: Severity::Warn,
+            old_schema: Severity::Refuse,
+            slew: Span::from_ms(1500),
+            require_signature: true,
+            trusted_keys: Some(folder.path().join("units")),
+        },
         max_units: 3,
+        pre_launch: PreLaunchSettings {
+            duration: Span::from_s(300.0),
+            place: None,
+            limits: PreLaunchLimits {
+                static_bias_change_rad_per_s: AngularRate::from_deg_per_h(3600.0).as_rad_per_s(),
+                magnetic_bias_change_rad_per_s: AngularRate::from_deg_per_h(7200.0).as_rad_per_s(),
+                mode_imbalance: 0.5,
+                time_per_mode: Span::from_s(30.0),
+                good_share: 0.25,
+                ..PreLaunchLimits::default()
+            },
+        },
         unit: UnitSettings {
             pairing_window: Span::from_ms(20),
             temperature_delay: Span::ZERO,
             uncalibrated: Uncalibrated::Hold,
+            in_standby: true,
+            subtract_drift: true,
+            reference_delay: Span::from_ms(200),
             navigation: NavigationStep::new(4, true).unwrap(),
         },
         tail_flush: Duration::from_millis(250),
         status_interval: Duration::from_millis(200),
         stop_timeout: Duration::from_millis(1500),
         congestion: CongestionControl::Block,
+        metrics: MetricsSettings { listen: Some("0.0.0.0:9464".parse().unwrap()), allow_remote: true },
         session: SessionOptions {
             config: Some(folder.path().join("z.json5")),
             connect: vec!["tcp/127.0.0.1:1".to_owned()],
             listen: vec!["tcp/127.0.0.1:0".to_owned()],
             namespace: Some("site/a".to_owned()),
         },
+        digest: None,
     };
     assert_eq!(Settings::parse(text, &folder.path().join("service.toml")), Ok(expected));
 }
@@ -80,6 +138,14 @@ fn each_problem_names_its_place_its_value_and_its_limit() {
         ),
         ("strict_start = 1", "1:16: strict_start: is 1, must be true or false"),
         ("uncalibrated = \"drop\"", "1:16: uncalibrated: is \"drop\", must be \"pass-through\" or \"hold\""),
+        ("initial_state = \"off\"", "1:17: initial_state: is \"off\", must be \"running\" or \"standby\""),
+        ("[swap]\nage = \"no\"", "2:7: swap.age: is \"no\", must be \"warn\" or \"refuse\""),
+        ("[swap]\nmax_jump_mg = -1", "2:15: swap.max_jump_mg: is -1, must be a number from 0 to 1000000"),
+        ("[folder]\npoll_s = nan", "2:10: folder.poll_s: is nan, must be a number from 0.1 to 600"),
+        (
+            "[swap]\nrequire_signature = true",
+            "1:1: swap: require_signature is set: trusted_keys must name the folder of the public keys",
+        ),
         ("congestion = true", "1:14: congestion: is true, must be \"drop\" or \"block\""),
         ("navigation = 4", "1:14: navigation: is 4, must be a table"),
         (
@@ -106,6 +172,12 @@ fn each_problem_names_its_place_its_value_and_its_limit() {
     for (text, expected) in cases {
         assert_eq!(parse(text), Err(vec![format!("service.toml:{expected}")]), "{text}");
     }
+}
+
+#[test]
+fn with_a_state_folder_the_folder_of_documents_may_be_missing() {
+    let settings = parse("calibrations = \"no/such\"\nstate = \"state\"").unwrap();
+    assert_eq!(settings.calibrations, Some(PathBuf::from("no/such")));
 }
 
 #[test]

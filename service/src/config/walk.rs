@@ -84,8 +84,13 @@ impl<'d> Table<'d> {
         self.entries.and_then(|entries| entries.get(key))
     }
 
+    /// Whether a key is there, right or wrong.
+    pub(super) fn has(&self, key: &str) -> bool {
+        self.entries.is_some_and(|entries| entries.contains_key(key))
+    }
+
     /// Takes a value; one that `convert` does not like is reported.
-    fn value<T>(
+    pub(super) fn value<T>(
         &mut self,
         walk: &mut Walk<'_>,
         key: &'static str,
@@ -114,6 +119,24 @@ impl<'d> Table<'d> {
         self.value(walk, key, &format!("a whole number from {min} to {max}"), |value| {
             let integer = value.as_integer()?;
             let number = u32::from_str_radix(integer.as_str(), integer.radix()).ok()?;
+            (min..=max).contains(&number).then_some(number)
+        })
+    }
+
+    /// Takes a number; a whole one will do.
+    pub(super) fn number(
+        &mut self,
+        walk: &mut Walk<'_>,
+        key: &'static str,
+        min: f64,
+        max: f64,
+    ) -> Option<f64> {
+        self.value(walk, key, &format!("a number from {min} to {max}"), |value| {
+            let number: f64 = match value {
+                DeValue::Float(float) => float.as_str().parse().ok()?,
+                DeValue::Integer(integer) if integer.radix() == 10 => integer.as_str().parse().ok()?,
+                _ => return None,
+            };
             (min..=max).contains(&number).then_some(number)
         })
     }
@@ -166,6 +189,16 @@ impl<'d> Table<'d> {
                 None
             }
         }
+    }
+
+    /// Takes a path of which nothing need exist yet; relative ones count from `folder`.
+    pub(super) fn new_path(
+        &mut self,
+        walk: &mut Walk<'_>,
+        key: &'static str,
+        folder: &Path,
+    ) -> Option<PathBuf> {
+        self.string(walk, key).map(|text| folder.join(text))
     }
 
     /// Takes a table; an empty one stands in where there is none.

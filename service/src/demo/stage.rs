@@ -59,7 +59,7 @@ impl Stage {
                 .status(member)
                 .await
                 .map_err(|reason| DemoError::Status { unit: member.id.to_string(), reason })?;
-            latencies.push([status.added_latency_p50_ns, status.added_latency_p99_ns]);
+            latencies.push([status.latency.p50_ns, status.latency.p99_ns]);
         }
         Ok(latencies)
     }

@@ -89,6 +89,6 @@ fn a_panic_costs_one_unit_its_memory_and_nothing_else() {
     let totals = intake.totals();
     let account = |serial: &str| (totals.units[serial].ticks_in, totals.units[serial].alarms);
     assert_eq!((account("A"), account("B")), ((2, 1), (2, 0)));
-    let status = intake.status(&UnitId::new("A").unwrap()).unwrap();
+    let status = intake.status(&UnitId::new("A").unwrap(), "test").unwrap();
     assert!(status.last_fault.unwrap().contains("on purpose"));
 }

@@ -45,6 +45,11 @@ impl Quiet {
         self.last = Some(now);
     }
 
+    /// Whether nothing was heard for longer than a stated time; not before the first message.
+    pub(super) fn is_silent_for(&self, now: Instant, longest: Duration) -> bool {
+        self.last.is_some_and(|last| now.saturating_duration_since(last) > longest)
+    }
+
     /// Whether the stream has been silent for long enough to be called stopped.
     pub(super) fn is_over(&self, now: Instant) -> bool {
         let shortest =

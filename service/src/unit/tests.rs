@@ -1,14 +1,17 @@
 use std::sync::Mutex;
 use std::time::Duration;
 
+use isotherm_correction::calibration::Calibration;
 use isotherm_correction::sample::{AccelTick, GyroTick, OutputKind};
 use isotherm_correction::units::{Span, Timestamp};
 use isotherm_protocol::codec::{decode, encode};
-use isotherm_protocol::corrected::CorrectedBatch;
+use isotherm_protocol::corrected::{CorrectedBatch, Revision};
+use isotherm_protocol::digest::Digest;
 use isotherm_protocol::document::Document;
 use isotherm_protocol::raw::{AccelBatch, GyroBatch};
 
 use super::*;
+use crate::UnitTotals;
 
 /// Frames of a tick: three gyros or three accelerometers, ticks of 5 ms.
 fn frames(sequence: u64) -> [(RawStream, Vec<u8>); 2] {
@@ -53,6 +56,14 @@ fn example() -> (Arc<Calibration>, [u8; 8]) {
     (Arc::new(parsed.calibration), *parsed.digest.first_chunk().unwrap())
 }
 
+/// Gives a unit a calibration from the next tick on, as the next revision.
+fn install(actor: &mut UnitActor, calibration: Arc<Calibration>, digest: [u8; 8]) -> Revision {
+    let revision = Revision { counter: actor.stream.next_counter(), digest };
+    let next = Installable::plain(revision, calibration);
+    actor.change(Change { next, at: Schedule::NextTick, slew: Span::ZERO });
+    revision
+}
+
 #[test]
 fn each_tick_goes_out_with_the_frame_that_completes_it() {
     let sink = Sink::default();
@@ -84,7 +95,7 @@ fn a_bad_frame_is_counted_by_its_kind_and_changes_nothing_else() {
         second.receive(stream, &frame, Instant::now());
     }
     assert_eq!(*clean.0.lock().unwrap(), *dirty.0.lock().unwrap());
-    let status = second.status();
+    let status = second.status("test");
     for (name, value) in
         [("bad_frames", 120), ("bad_frames_length", 40), ("bad_frames_checksum", 40), ("bad_frames_kind", 40)]
     {
@@ -103,7 +114,7 @@ fn an_outlet_that_fails_costs_its_ticks_and_they_are_counted() {
         actor.receive(stream, &frame, Instant::now());
     }
     assert_eq!((actor.totals().ticks_in, actor.totals().unpublished), (20, 20));
-    assert_eq!(actor.status().last_fault.as_deref(), Some("corrected: closed"));
+    assert_eq!(actor.status("test").last_fault.as_deref(), Some("corrected: closed"));
 }
 
 #[test]
@@ -113,9 +124,9 @@ fn what_waits_goes_out_when_the_stream_has_stopped_and_not_before() {
     let start = Instant::now();
     let [_, (stream, frame)] = frames(0);
     actor.receive(stream, &frame, start);
-    actor.flush_if_quiet(start + Duration::from_millis(900));
+    actor.tend(start + Duration::from_millis(900));
     assert_eq!(sink.sequences(), [0; 0], "the accelerometer tick may still come");
-    actor.flush_if_quiet(start + Duration::from_secs(1));
+    actor.tend(start + Duration::from_secs(1));
     assert_eq!(sink.sequences(), [0]);
 }
 
@@ -124,8 +135,8 @@ fn a_reset_keeps_the_calibration_its_revision_and_the_counts() {
     let sink = Sink::default();
     let mut actor = actor(sink.outlet());
     let (calibration, digest) = example();
-    actor.install(Arc::clone(&calibration), digest);
-    let revision = actor.install(calibration, digest);
+    install(&mut actor, Arc::clone(&calibration), digest);
+    let revision = install(&mut actor, calibration, digest);
     assert_eq!((revision.counter, revision.digest), (2, digest));
     for (stream, frame) in (0..3).flat_map(frames) {
         actor.receive(stream, &frame, Instant::now());
@@ -134,10 +145,41 @@ fn a_reset_keeps_the_calibration_its_revision_and_the_counts() {
     actor.take_status_due();
     actor.reset("a test says so");
     assert!(actor.take_status_due());
-    assert_eq!(actor.status().revision, revision);
+    assert_eq!(actor.status("test").revision(), revision);
     assert_eq!(UnitTotals { alarms: 1, ..before }, actor.totals());
     for (stream, frame) in (3..5).flat_map(frames) {
         actor.receive(stream, &frame, Instant::now());
     }
     assert_eq!(actor.totals().ticks_in, before.ticks_in + 2);
+}
+
+#[test]
+fn a_reset_keeps_a_change_that_waits_and_the_state() {
+    let sink = Sink::default();
+    let mut actor = actor(sink.outlet());
+    let (calibration, digest) = example();
+    install(&mut actor, Arc::clone(&calibration), digest);
+    actor.command(&Command::Standby).unwrap();
+    let revision = Revision { counter: 2, digest: [9; 8] };
+    let next = Installable { digest: Some(Digest([9; 32])), ..Installable::plain(revision, calibration) };
+    actor.change(Change { next, at: Schedule::Sequence(70), slew: Span::ZERO });
+    actor.reset("a test says so");
+    assert_eq!(actor.waiting(), Some((2, Schedule::Sequence(70))));
+    let present = actor.present();
+    assert_eq!((present.state, present.revision, present.pending), (State::Standby, 1, Some(2)));
+}
+
+#[test]
+fn a_revision_that_was_given_already_is_passed_over() {
+    let sink = Sink::default();
+    let mut actor = actor(sink.outlet());
+    let (calibration, digest) = example();
+    let revision = Revision { counter: 4, digest };
+    let change =
+        Change { next: Installable::plain(revision, calibration), at: Schedule::NextTick, slew: Span::ZERO };
+    actor.change(change.clone());
+    actor.take_status_due();
+    assert_eq!(actor.change(change), None);
+    assert!(!actor.is_status_due());
+    assert_eq!(actor.present().revision, 4);
 }

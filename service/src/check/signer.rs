@@ -1,0 +1,55 @@
+//! Who signed a calibration document.
+
+use std::fmt;
+
+use isotherm_protocol::signature::{KeyId, SignatureError, TrustedKeys, Verdict, find, verify};
+use serde::Serialize;
+
+/// What is known of who signed a document.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[serde(tag = "state", rename_all = "lowercase")]
+pub enum Signer {
+    /// Nobody did.
+    Unsigned,
+    /// It has a signature, and no trusted keys were given to verify it with.
+    Unverified {
+        /// The key that the signature names.
+        key_id: KeyId,
+    },
+    /// A trusted key did, and the document is unchanged.
+    Signed {
+        /// The key.
+        key_id: KeyId,
+        /// The name under which it is trusted.
+        name: String,
+    },
+}
+
+impl fmt::Display for Signer {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Unsigned => f.write_str("unsigned"),
+            Self::Unverified { key_id } => {
+                write!(f, "signed by key {key_id}, not verified (--trusted-keys says with what)")
+            }
+            Self::Signed { key_id, name } => write!(f, "signed by {name} ({key_id})"),
+        }
+    }
+}
+
+/// Who signed a document; nothing is said of one without a signature where no keys were given.
+///
+/// # Errors
+/// A signature that does not hold, or is not in its form.
+pub(super) fn signer(text: &str, trusted: Option<&TrustedKeys>) -> Result<Option<Signer>, SignatureError> {
+    let Some(trusted) = trusted else {
+        let found = find(text)?;
+        return Ok(found.map(|signature| Signer::Unverified { key_id: signature.key_id() }));
+    };
+    verify(text, trusted).map(|verdict| {
+        Some(match verdict {
+            Verdict::Unsigned => Signer::Unsigned,
+            Verdict::Signed { key_id, name } => Signer::Signed { key_id, name },
+        })
+    })
+}

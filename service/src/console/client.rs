@@ -1,0 +1,213 @@
+//! A session to ask a service on.
+
+use std::path::Path;
+use std::time::Duration;
+
+use clap::Args;
+use isotherm_bus::{BusError, SessionOptions};
+use isotherm_protocol::codec::{self, Message};
+use isotherm_protocol::key::{self, UnitId};
+use isotherm_protocol::service_status::ServiceStatus;
+use isotherm_protocol::status::Status;
+use serde::de::DeserializeOwned;
+use tokio::time::{Instant, timeout_at};
+use zenoh::Session;
+use zenoh::query::{ConsolidationMode, QueryTarget};
+
+use super::ConsoleError;
+use crate::text::read_bounded;
+
+/// Where the service listens as shipped (`config/zenoh/peer.json5`).
+const SHIPPED_LOCATOR: &str = "tcp/127.0.0.1:7447";
+
+/// How to reach the service.
+#[derive(Debug, Clone, Args)]
+pub struct ClientArgs {
+    /// How to reach the service; without any of these: tcp/127.0.0.1:7447
+    #[command(flatten)]
+    pub session: SessionOptions,
+    /// How long to wait for an answer (s)
+    #[arg(long, value_name = "SECONDS", default_value = "5", value_parser = seconds)]
+    pub timeout: Duration,
+}
+
+/// Reads a time to wait: 0.1 to 3600 s.
+fn seconds(text: &str) -> Result<Duration, String> {
+    let seconds: f64 = text.parse().map_err(|_| "must be a number of seconds".to_owned())?;
+    if (0.1..=3600.0).contains(&seconds) {
+        Ok(Duration::from_secs_f64(seconds))
+    } else {
+        Err("must be from 0.1 to 3600".to_owned())
+    }
+}
+
+/// A session to ask on.
+#[derive(Debug)]
+pub(super) struct Client {
+    pub(super) session: Session,
+    pub(super) timeout: Duration,
+    tried: Vec<String>,
+}
+
+impl Client {
+    /// Opens the session.
+    pub(super) async fn open(args: &ClientArgs) -> Result<Self, ConsoleError> {
+        let mut options = args.session.clone();
+        if options.connect.is_empty() && options.config.is_none() {
+            options.connect = vec![SHIPPED_LOCATOR.to_owned()];
+        }
+        let tried = match (&options.config, options.connect.as_slice()) {
+            (Some(config), []) => vec![config.display().to_string()],
+            (_, connect) => connect.to_vec(),
+        };
+        // A task of its own: opening may hold its thread, and a timeout on the same one would not be heard.
+        let opening = tokio::spawn(async move { isotherm_bus::open(&options).await });
+        match tokio::time::timeout(args.timeout, opening).await {
+            Ok(Ok(Ok(session))) => Ok(Self { session, timeout: args.timeout, tried }),
+            Ok(Ok(Err(source))) => Err(ConsoleError::Bus { source, tried }),
+            Ok(Err(_)) | Err(_) => {
+                let key = key::ALL_STATUS.to_owned();
+                Err(ConsoleError::NoAnswer { key, waited: args.timeout, tried })
+            }
+        }
+    }
+
+    /// Ends the session.
+    pub(super) async fn close(self) {
+        // Nothing of it is of any more use; what hangs is left to the end of the process.
+        let _ = isotherm_bus::close(self.session, Duration::from_secs(1)).await;
+    }
+
+    /// Something that could not be declared.
+    pub(super) fn declare(&self, key: &str) -> impl Fn(zenoh::Error) -> ConsoleError + '_ {
+        let key = key.to_owned();
+        move |source| ConsoleError::Bus {
+            source: BusError::Declare { key: key.clone(), source },
+            tried: self.tried.clone(),
+        }
+    }
+
+    fn no_answer(&self, key: &str) -> ConsoleError {
+        ConsoleError::NoAnswer { key: key.to_owned(), waited: self.timeout, tried: self.tried.clone() }
+    }
+
+    /// Every answer to a question, once somebody is there to answer it.
+    pub(super) async fn answers(
+        &self,
+        key: &str,
+        parameters: &str,
+        payload: Option<&[u8]>,
+    ) -> Result<Vec<Vec<u8>>, ConsoleError> {
+        let deadline = Instant::now() + self.timeout;
+        let declare = self.declare(key);
+        let querier = self
+            .session
+            .declare_querier(key.to_owned())
+            .target(QueryTarget::All)
+            .consolidation(ConsolidationMode::None)
+            .timeout(self.timeout)
+            .await
+            .map_err(&declare)?;
+        let listener = querier.matching_listener().await.map_err(&declare)?;
+        let mut matching = querier.matching_status().await.map_err(&declare)?.matching();
+        while !matching {
+            let status = timeout_at(deadline, listener.recv_async()).await;
+            let Ok(Ok(status)) = status else { return Err(self.no_answer(key)) };
+            matching = status.matching();
+        }
+        let mut get = querier.get().parameters(parameters);
+        if let Some(payload) = payload {
+            get = get.payload(payload);
+        }
+        let replies = get.await.map_err(&declare)?;
+        let mut answers = Vec::new();
+        loop {
+            match timeout_at(deadline, replies.recv_async()).await {
+                Ok(Ok(reply)) => match reply.into_result() {
+                    Ok(sample) => answers.push(sample.payload().to_bytes().into_owned()),
+                    Err(error) => {
+                        let words = String::from_utf8_lossy(&error.payload().to_bytes()).into_owned();
+                        return Err(ConsoleError::Refused(words));
+                    }
+                },
+                Err(_) if answers.is_empty() => return Err(self.no_answer(key)),
+                // The end of the answers, or of the time for them.
+                Ok(Err(_)) | Err(_) => return Ok(answers),
+            }
+        }
+    }
+
+    /// The first answer to a question, as text.
+    pub(super) async fn text(
+        &self,
+        key: &str,
+        parameters: &str,
+        payload: Option<&[u8]>,
+    ) -> Result<String, ConsoleError> {
+        let first = self.answers(key, parameters, payload).await?.into_iter().next();
+        let bytes = first.ok_or_else(|| self.no_answer(key))?;
+        String::from_utf8(bytes)
+            .map_err(|error| ConsoleError::Answer { key: key.to_owned(), reason: error.to_string() })
+    }
+
+    /// The first answer to a question, from JSON.
+    pub(super) async fn json<T: DeserializeOwned>(
+        &self,
+        key: &str,
+        parameters: &str,
+        payload: Option<&[u8]>,
+    ) -> Result<T, ConsoleError> {
+        let text = self.text(key, parameters, payload).await?;
+        serde_json::from_str(&text)
+            .map_err(|error| ConsoleError::Answer { key: key.to_owned(), reason: error.to_string() })
+    }
+
+    /// Every answer to a question, from frames; frames of another version are passed over with a word.
+    async fn frames<M: Message>(&self, key: &str) -> Result<Vec<M>, ConsoleError> {
+        let answers = self.answers(key, "", None).await?;
+        answers
+            .iter()
+            .map(|frame| {
+                codec::decode(frame)
+                    .map_err(|error| ConsoleError::Answer { key: key.to_owned(), reason: error.to_string() })
+            })
+            .collect()
+    }
+
+    /// Status of every unit, in the order of their serials.
+    pub(super) async fn statuses(&self) -> Result<Vec<Status>, ConsoleError> {
+        let mut statuses: Vec<Status> = self.frames(key::ALL_STATUS).await?;
+        statuses.sort_by(|a, b| (&a.unit, &a.instance).cmp(&(&b.unit, &b.instance)));
+        Ok(statuses)
+    }
+
+    /// Status of every service instance.
+    pub(super) async fn services(&self) -> Result<Vec<ServiceStatus>, ConsoleError> {
+        let mut services: Vec<ServiceStatus> = self.frames(key::ALL_SERVICE_STATUS).await?;
+        services.sort_by(|a, b| a.instance.cmp(&b.instance));
+        Ok(services)
+    }
+
+    /// Status of one unit; `None` where it has not appeared.
+    pub(super) async fn status(&self, unit: &UnitId) -> Result<Option<Status>, ConsoleError> {
+        Ok(self.statuses().await?.into_iter().find(|status| status.unit == unit.as_str()))
+    }
+}
+
+/// The serial that was given.
+pub(super) fn unit(serial: &str) -> Result<UnitId, ConsoleError> {
+    UnitId::new(serial).map_err(|source| ConsoleError::Serial { serial: serial.to_owned(), source })
+}
+
+/// Reads a file, or standard input where it is `-`, no further than a document may be long.
+pub(super) fn read(path: &Path) -> Result<Vec<u8>, ConsoleError> {
+    let path = if path.as_os_str() == "-" { Path::new("/dev/stdin") } else { path };
+    read_bounded(path).map_err(|source| ConsoleError::Read { path: path.to_owned(), source })
+}
+
+/// Who asks: what was said, or the name of the user.
+pub(super) fn by(given: Option<&str>) -> String {
+    let user = || std::env::var("USER").or_else(|_| std::env::var("LOGNAME")).unwrap_or_default();
+    let by = given.map_or_else(user, ToOwned::to_owned);
+    by.chars().filter(|c| !c.is_control()).take(isotherm_protocol::control::MAX_BY).collect()
+}

@@ -1,0 +1,114 @@
+//! What can keep an operator's command from being carried out.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use isotherm_bus::BusError;
+use isotherm_protocol::key::UnitIdError;
+use thiserror::Error;
+
+use crate::exit::Exit;
+
+/// Why an operator's command failed.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum ConsoleError {
+    /// The session cannot be opened, or something cannot be declared on it.
+    #[error("{source}{hint}", hint = hint(tried))]
+    Bus {
+        /// What the session says.
+        source: BusError,
+        /// Where it was to connect.
+        tried: Vec<String>,
+    },
+    /// Nobody answers on a key.
+    #[error(
+        "no service answers on {key} within {}.{} s (connected to {}): is it running there, and under the same namespace?",
+        waited.as_secs(), waited.subsec_millis() / 100, tried.join(", ")
+    )]
+    NoAnswer {
+        /// The key.
+        key: String,
+        /// How long it was waited for.
+        waited: Duration,
+        /// Where the session was connected to.
+        tried: Vec<String>,
+    },
+    /// The service is there, the unit is not.
+    #[error("the service knows no unit {unit}; it has {}", known(units))]
+    NoUnit {
+        /// The serial asked for.
+        unit: String,
+        /// The serials that it knows.
+        units: Vec<String>,
+    },
+    /// The service answers with an error.
+    #[error("the service says: {0}")]
+    Refused(String),
+    /// An answer is not understood.
+    #[error("the answer on {key} is not understood: {reason}; is the service of another version?")]
+    Answer {
+        /// The key.
+        key: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// A file cannot be read.
+    #[error("cannot read {path}: {source}", path = path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// A serial is none.
+    #[error("unit {serial:?} {source}")]
+    Serial {
+        /// What was given.
+        serial: String,
+        /// What is wrong with it.
+        source: UnitIdError,
+    },
+    /// There is nobody to ask, and `--yes` was not given.
+    #[error(
+        "standard input is no terminal: give --yes to go on without a question, or --dry-run to look only"
+    )]
+    Unasked,
+    /// Asked, and answered with no.
+    #[error("nothing was changed")]
+    Declined,
+    /// A terminal is needed.
+    #[error("standard output is no terminal: `isotherm status` prints the same once, `--json` for programs")]
+    NoTerminal,
+    /// The terminal does not do what it is told.
+    #[error("the terminal cannot be used: {0}")]
+    Terminal(#[source] std::io::Error),
+    /// It was interrupted.
+    #[error("interrupted")]
+    Interrupted,
+    /// What was waited for did not happen.
+    #[error("{0}")]
+    TimedOut(String),
+}
+
+impl ConsoleError {
+    /// The exit code that this error stands for.
+    pub(crate) fn exit(&self) -> Exit {
+        match self {
+            Self::Serial { .. } | Self::Unasked | Self::NoTerminal => Exit::Usage,
+            Self::Bus { source: BusError::Configuration { .. } | BusError::Option { .. }, .. } => {
+                Exit::BadConfiguration
+            }
+            _ => Exit::Failed,
+        }
+    }
+}
+
+/// What to do where a session does not come about.
+fn hint(tried: &[String]) -> String {
+    format!(" (tried {}; --connect says where the service listens)", tried.join(", "))
+}
+
+fn known(units: &[String]) -> String {
+    if units.is_empty() { "none yet".to_owned() } else { units.join(", ") }
+}

@@ -1,0 +1,142 @@
+//! `history`: what was done to a unit, by whom, when, from where.
+
+use clap::Args;
+use isotherm_protocol::control::Schedule;
+use isotherm_protocol::history::{AuditEntry, AuditEvent, Source};
+use isotherm_protocol::key;
+
+use super::client::{self, Client, ClientArgs};
+use super::{ConsoleError, show};
+use crate::exit::Exit;
+use crate::words::print;
+
+/// Most entries that are asked for.
+const MOST_ENTRIES: u32 = 10_000;
+
+/// Longest text in a cell.
+const LONGEST_CELL: usize = 72;
+
+/// Arguments of `history`.
+#[derive(Debug, Clone, Args)]
+#[command(after_help = "\
+Examples:
+  isotherm history ZLG-0001
+  isotherm history ZLG-0001 --all --limit 100
+  isotherm history ZLG-0001 --json | jq '.[0]'")]
+pub struct HistoryArgs {
+    /// Serial of the unit
+    pub unit: String,
+    /// Most entries, the newest first
+    #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_ENTRIES)))]
+    pub limit: u32,
+    /// Show refusals, commands and first ticks too, not only calibrations
+    #[arg(long)]
+    pub all: bool,
+    /// Print the entries as JSON on stdout
+    #[arg(long)]
+    pub json: bool,
+    /// How to reach the service
+    #[command(flatten)]
+    pub client: ClientArgs,
+}
+
+/// Prints a unit's history.
+pub(super) async fn run(args: &HistoryArgs) -> Result<Exit, ConsoleError> {
+    let unit = client::unit(&args.unit)?;
+    let client = Client::open(&args.client).await?;
+    // Calibrations stand among the other entries, how far apart nobody knows.
+    let parameters = format!("limit={}", if args.all { args.limit } else { MOST_ENTRIES });
+    let mut entries: Vec<AuditEntry> = client.json(&key::history(&unit), &parameters, None).await?;
+    client.close().await;
+    entries.sort_by_key(|entry| std::cmp::Reverse(entry.number));
+    entries.retain(|entry| args.all || matches!(entry.event, AuditEvent::Accepted(_)));
+    entries.truncate(args.limit as usize);
+    let text = if args.json {
+        serde_json::to_string_pretty(&entries).unwrap_or_default() + "\n"
+    } else if entries.is_empty() {
+        format!("{unit}: nothing has been done to it\n")
+    } else {
+        let header = ["no.", "time (UTC)", "what", "revision", "digest", "by", "from", "changes"];
+        show::table(header, entries.iter().map(row).collect(), header.len()).to_string() + "\n"
+    };
+    Ok(print(&text, Exit::Ok))
+}
+
+/// One line of the table.
+fn row(entry: &AuditEntry) -> Vec<String> {
+    let AuditEntry { number, time, by, event, .. } = entry;
+    let head = |digest: &dyn std::fmt::Display| digest.to_string().chars().take(12).collect::<String>();
+    let [revision, digest, from, changes] = match event {
+        AuditEvent::Accepted(accepted) => [
+            accepted.revision.to_string(),
+            head(&accepted.digest),
+            source(&accepted.source),
+            effect(accepted.schedule, accepted.slew_ms, &accepted.changed),
+        ],
+        AuditEvent::InForce(first) => [
+            first.revision.to_string(),
+            String::new(),
+            String::new(),
+            format!("from tick {} on", first.first_sequence),
+        ],
+        AuditEvent::Withdrawn(withdrawal) => {
+            [withdrawal.revision.to_string(), String::new(), String::new(), event.to_string()]
+        }
+        AuditEvent::Refused(refused) => [
+            String::new(),
+            head(&refused.digest),
+            source(&refused.source),
+            format!(
+                "{}: {}",
+                show::count(usize::try_from(refused.count).unwrap_or(usize::MAX), "problem"),
+                refused.problems.first().map_or("", String::as_str)
+            ),
+        ],
+        AuditEvent::Command(command) => [
+            String::new(),
+            String::new(),
+            String::new(),
+            format!("{} → {}", command.command, command.reason.as_deref().unwrap_or(&command.state_after)),
+        ],
+        _ => [String::new(), String::new(), String::new(), event.to_string()],
+    };
+    // To the second; the JSON has the rest.
+    let time: String = time.to_string().replace('T', " ").chars().take(19).collect();
+    let cut = |text: &str| show::cut(text, LONGEST_CELL);
+    vec![
+        number.to_string(),
+        time,
+        event.name().to_owned(),
+        revision,
+        digest,
+        cut(by),
+        cut(&from),
+        cut(&changes),
+    ]
+}
+
+/// When it took effect and what changed, short.
+fn effect(schedule: Schedule, slew_ms: u64, changed: &[String]) -> String {
+    let mut words = match changed {
+        [] => "first document, or no entry changed".to_owned(),
+        [one] => one.clone(),
+        [first, rest @ ..] => format!("{first}, and {} more", rest.len()),
+    };
+    #[expect(clippy::cast_precision_loss, reason = "at most an hour")]
+    let seconds = slew_ms as f64 / 1000.0;
+    if schedule != Schedule::NextTick || slew_ms > 0 {
+        words = format!("{words} ({})", show::schedule(schedule, seconds));
+    }
+    words
+}
+
+/// Where a calibration came from, in words.
+fn source(source: &Source) -> String {
+    match source {
+        Source::Folder { path } => path.clone(),
+        Source::Start { path } => format!("{path} (at start)"),
+        Source::Bus => "bus".to_owned(),
+        Source::Rollback { to } => format!("rollback to {to}"),
+        Source::PreLaunch => "pre-launch".to_owned(),
+    }
+}

@@ -1,0 +1,105 @@
+//! What operators see of units and services, as lines: pure, so that `status`, `top` and tests show the same.
+//!
+//! | module | holds |
+//! |---|---|
+//! | `remark` | what is to be noticed of a unit, and how grave it is |
+//! | `units`, `services` | one line a unit, one a service instance |
+//! | `sheet` | everything of one unit |
+//! | `grid`, `figure`, `tone`, `chart` | columns, numbers, colours, bars |
+
+mod chart;
+mod figure;
+mod grid;
+mod remark;
+#[cfg(test)]
+pub(crate) mod samples;
+mod services;
+mod sheet;
+#[cfg(test)]
+mod tests;
+pub(crate) mod tone;
+mod units;
+
+use std::time::{Duration, Instant};
+
+use isotherm_correction::sample::ChannelName;
+use isotherm_protocol::status::Status;
+
+pub(crate) use figure::fit;
+pub(crate) use remark::{Level, state_word};
+pub(crate) use services::{services, tally};
+pub(crate) use sheet::sheet;
+pub(crate) use units::{channel_in_view, units};
+
+/// A unit: its status, and what only an onlooker knows.
+#[derive(Debug, Clone)]
+pub(crate) struct Unit<'a> {
+    /// Its last status.
+    pub(crate) status: &'a Status,
+    /// How long ago that came.
+    pub(crate) age: Duration,
+    /// How long nobody has answered for the unit; `None` while it is there.
+    pub(crate) gone: Option<Duration>,
+    /// The present time by the service's clock (ms since 1970-01-01 UTC).
+    pub(crate) now_unix_ms: i64,
+    /// What has changed of late; all zero where nobody has looked for long enough.
+    pub(crate) lately: Lately,
+    /// Temperatures as they were, oldest first; empty where nobody has looked.
+    pub(crate) past: &'a [Past],
+}
+
+impl<'a> Unit<'a> {
+    /// A unit of which only the status is known, and that it has just come.
+    pub(crate) fn now(status: &'a Status, now_unix_ms: i64) -> Self {
+        let (age, lately) = (Duration::ZERO, Lately::default());
+        Self { status, age, gone: None, now_unix_ms, lately, past: &[] }
+    }
+
+    /// What is to be noticed, the gravest first.
+    pub(crate) fn remarks(&self) -> Vec<remark::Remark> {
+        remark::remarks(self)
+    }
+
+    /// How it is, taken all together.
+    pub(crate) fn level(&self) -> Level {
+        remark::level(self, &self.remarks())
+    }
+}
+
+/// By how much counters grew over the last minute.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct Lately {
+    /// Gaps announced.
+    pub(crate) gaps: u64,
+    /// Ticks that had been taken before.
+    pub(crate) duplicates: u64,
+    /// Ticks and readings that came too late.
+    pub(crate) late: u64,
+    /// Frames refused.
+    pub(crate) bad: u64,
+    /// Raw ticks come, the unit is running, and for ten seconds nothing has gone out.
+    pub(crate) stuck: bool,
+}
+
+/// Every channel at one time.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Past {
+    /// When it was seen.
+    pub(crate) at: Instant,
+    /// Name, temperature (°C), rate (°C/s).
+    pub(crate) channels: Vec<(ChannelName, f64, f64)>,
+}
+
+/// Counters that stand in one column.
+pub(crate) fn duplicates(status: &Status) -> u64 {
+    total(status, &["gyro_duplicates", "accel_duplicates"])
+}
+
+/// As [`duplicates`], of what came too late.
+pub(crate) fn late(status: &Status) -> u64 {
+    total(status, &["gyro_late", "accel_late", "temperature_late", "references_late"])
+}
+
+fn total(status: &Status, names: &[&str]) -> u64 {
+    names.iter().fold(0, |total, name| total.saturating_add(status.counter(name)))
+}

@@ -1,0 +1,103 @@
+//! What comes over the session: statuses, and who is there.
+
+use isotherm_protocol::codec::{self, Message};
+use isotherm_protocol::key;
+use isotherm_protocol::service_status::ServiceStatus;
+use isotherm_protocol::status::Status;
+use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
+use zenoh::pubsub::Subscriber;
+use zenoh::sample::{Sample, SampleKind};
+
+use crate::console::ConsoleError;
+use crate::console::client::Client;
+use crate::console::status::or_none;
+
+/// Something new.
+#[derive(Debug)]
+pub(super) enum News {
+    /// The status of a unit.
+    Unit(Box<Status>),
+    /// The status of a service instance.
+    Service(Box<ServiceStatus>),
+    /// A unit of this serial has come (`true`) or gone.
+    UnitAlive(String, bool),
+    /// So has a service instance.
+    ServiceAlive(String, bool),
+    /// A status that is not understood.
+    NotUnderstood,
+}
+
+/// News as they come.
+#[derive(Debug)]
+pub(super) struct Feed {
+    news: UnboundedReceiver<News>,
+    // Dropping them ends the subscriptions.
+    _subscribers: [Subscriber<()>; 4],
+}
+
+impl Feed {
+    /// Subscribes, and asks for what was said before.
+    pub(super) async fn start(client: &Client) -> Result<Self, ConsoleError> {
+        let (sender, news) = unbounded_channel();
+        let units = frames(client, key::ALL_STATUS, &sender, |status| News::Unit(Box::new(status))).await?;
+        let services =
+            frames(client, key::ALL_SERVICE_STATUS, &sender, |status| News::Service(Box::new(status)))
+                .await?;
+        let units_alive =
+            tokens(client, key::ALL_UNITS_ALIVE, &sender, key::parse_unit_alive, News::UnitAlive).await?;
+        let services_alive =
+            tokens(client, key::ALL_SERVICES_ALIVE, &sender, key::parse_service_alive, News::ServiceAlive)
+                .await?;
+        // Asked after the subscriptions, so that nothing is missed between the two.
+        let (statuses, instances) = tokio::join!(client.statuses(), client.services());
+        // The receiver is here.
+        or_none(instances)?.into_iter().for_each(|status| drop(sender.send(News::Service(Box::new(status)))));
+        statuses?.into_iter().for_each(|status| drop(sender.send(News::Unit(Box::new(status)))));
+        Ok(Self { news, _subscribers: [units, services, units_alive, services_alive] })
+    }
+
+    /// The next news; `None` once the session is gone.
+    pub(super) async fn next(&mut self) -> Option<News> {
+        self.news.recv().await
+    }
+
+    /// News that have come already.
+    pub(super) fn next_now(&mut self) -> Option<News> {
+        self.news.try_recv().ok()
+    }
+}
+
+/// Subscribes to frames.
+async fn frames<M: Message + 'static>(
+    client: &Client,
+    key: &str,
+    sender: &UnboundedSender<News>,
+    news: fn(M) -> News,
+) -> Result<Subscriber<()>, ConsoleError> {
+    let sender = sender.clone();
+    let told = move |sample: Sample| {
+        let frame = codec::decode(&sample.payload().to_bytes());
+        // The receiver may be gone already.
+        drop(sender.send(frame.map_or(News::NotUnderstood, news)));
+    };
+    client.session.declare_subscriber(key.to_owned()).callback(told).await.map_err(client.declare(key))
+}
+
+/// Subscribes to tokens: those that stand are told of first.
+async fn tokens(
+    client: &Client,
+    key: &str,
+    sender: &UnboundedSender<News>,
+    parse: fn(&str) -> Option<&str>,
+    news: fn(String, bool) -> News,
+) -> Result<Subscriber<()>, ConsoleError> {
+    let sender = sender.clone();
+    let told = move |sample: Sample| {
+        if let Some(name) = parse(sample.key_expr().as_str()) {
+            drop(sender.send(news(name.to_owned(), sample.kind() == SampleKind::Put)));
+        }
+    };
+    let liveliness = client.session.liveliness();
+    let subscriber = liveliness.declare_subscriber(key.to_owned()).history(true).callback(told);
+    subscriber.await.map_err(client.declare(key))
+}

@@ -1,0 +1,74 @@
+//! What the service says of itself.
+
+use std::sync::Arc;
+use std::time::{Instant, SystemTime};
+
+use isotherm_protocol::digest::Digest;
+use isotherm_protocol::service_status::{MAX_UNITS, ServiceStatus, UnitSummary};
+use isotherm_protocol::status::MAX_FAULTS;
+use zenoh::Session;
+
+use crate::intake::Intake;
+use crate::registrar::Board;
+
+/// This instance of the service.
+pub(super) struct Instance {
+    name: String,
+    started: (Instant, i64),
+    settings_digest: Option<Digest>,
+    board: Arc<Board>,
+    /// What was said last, as far as a change of it is news.
+    said: Option<ServiceStatus>,
+}
+
+impl Instance {
+    pub(super) fn new(session: &Session, settings_digest: Option<Digest>, board: Arc<Board>) -> Self {
+        let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+        let started_unix_ms = i64::try_from(since.as_millis()).unwrap_or(i64::MAX);
+        Self {
+            name: session.zid().to_string(),
+            started: (Instant::now(), started_unix_ms),
+            settings_digest,
+            board,
+            said: None,
+        }
+    }
+
+    /// Its Zenoh id as text.
+    pub(super) fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Its status, where something has changed since the last time, or `always`.
+    pub(super) fn status(&mut self, intake: &Intake, always: bool) -> Option<ServiceStatus> {
+        let posted = self.board.read();
+        let mut units = intake.each_unit(|actor| {
+            let (state, output) = actor.doing();
+            UnitSummary { unit: actor.id().to_string(), state, output }
+        });
+        units.truncate(MAX_UNITS);
+        let mut faults = intake.faults();
+        faults.truncate(MAX_FAULTS);
+        let news = ServiceStatus {
+            instance: self.name.clone(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            pid: Some(std::process::id()),
+            started_unix_ms: self.started.1,
+            uptime_s: 0.0,
+            units,
+            calibrations: posted.folder,
+            bad_documents: posted.bad_documents,
+            store: posted.store,
+            faults: Vec::new(),
+            settings_digest: self.settings_digest,
+            swaps_accepted: posted.accepted,
+            swaps_refused: posted.refused,
+        };
+        if !always && self.said.as_ref() == Some(&news) {
+            return None;
+        }
+        self.said = Some(news.clone());
+        // Time and faults go on all the time: no news by themselves.
+        Some(ServiceStatus { uptime_s: self.started.0.elapsed().as_secs_f64(), faults, ..news })
+    }
+}

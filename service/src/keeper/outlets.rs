@@ -1,0 +1,61 @@
+//! Publishers of the statuses, and the liveliness tokens of units.
+
+use std::collections::HashMap;
+
+use isotherm_protocol::codec;
+use isotherm_protocol::key::{self, UnitId};
+use isotherm_protocol::service_status::ServiceStatus;
+use isotherm_protocol::status::Status;
+use zenoh::liveliness::LivelinessToken;
+use zenoh::pubsub::Publisher;
+use zenoh::qos::{CongestionControl, Priority};
+use zenoh::{Session, Wait};
+
+/// Where statuses go.
+pub(super) struct Outlets {
+    session: Session,
+    units: HashMap<UnitId, UnitOutlet>,
+    service: Option<Publisher<'static>>,
+}
+
+/// A unit's status topic, and the token that says that somebody looks after the unit.
+struct UnitOutlet {
+    status: Publisher<'static>,
+    _alive: LivelinessToken,
+}
+
+impl Outlets {
+    pub(super) fn new(session: Session) -> Self {
+        Self { session, units: HashMap::new(), service: None }
+    }
+
+    /// Publishes a unit's status; with its first one the unit is alive.
+    pub(super) fn unit(&mut self, unit: &UnitId, status: &Status) -> Result<(), zenoh::Error> {
+        if !self.units.contains_key(unit) {
+            let outlet = UnitOutlet {
+                status: publisher(&self.session, key::status(unit))?,
+                _alive: self.session.liveliness().declare_token(key::unit_alive(unit)).wait()?,
+            };
+            self.units.insert(unit.clone(), outlet);
+        }
+        let Some(outlet) = self.units.get(unit) else { return Ok(()) };
+        outlet.status.put(codec::encode(status)?).wait()
+    }
+
+    /// Publishes the service's own status.
+    pub(super) fn service(&mut self, status: &ServiceStatus) -> Result<(), zenoh::Error> {
+        if self.service.is_none() {
+            self.service = Some(publisher(&self.session, key::service_status(&status.instance))?);
+        }
+        let Some(publisher) = &self.service else { return Ok(()) };
+        publisher.put(codec::encode(status)?).wait()
+    }
+}
+
+fn publisher(session: &Session, key: String) -> Result<Publisher<'static>, zenoh::Error> {
+    session
+        .declare_publisher(key)
+        .congestion_control(CongestionControl::Drop)
+        .priority(Priority::DataLow)
+        .wait()
+}

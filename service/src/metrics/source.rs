@@ -1,0 +1,194 @@
+//! What is looked at: one look at every unit, and at what the service knows of itself.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use isotherm_protocol::service_status::UnitSummary;
+use isotherm_protocol::status::{Fault, Output, State, Status};
+use serde::Serialize;
+
+use super::health::{HeldBack, Kind, Reason, Seen, Watch};
+use crate::config::Settings;
+use crate::intake::Intake;
+use crate::registrar::{Board, Posted};
+use crate::unit::UnitActor;
+
+/// Where a look is taken from.
+#[derive(Debug)]
+pub(crate) struct Source {
+    intake: Arc<Intake>,
+    board: Arc<Board>,
+    instance: String,
+    started: Instant,
+    state_folder: Option<PathBuf>,
+    held_back: HeldBack,
+}
+
+/// One look at everything.
+#[derive(Debug)]
+pub(super) struct Look {
+    /// The service's name for itself.
+    pub(super) instance: String,
+    /// Time since its start (s).
+    pub(super) uptime_s: f64,
+    /// Whether nothing speaks against its health.
+    pub(super) healthy: bool,
+    /// Faults that belong to no unit.
+    pub(super) faults: Vec<Fault>,
+    /// What the registrar has posted.
+    pub(super) posted: Posted,
+    /// Whether the state folder can be written; `None` where none is configured.
+    pub(super) state_folder_writable: Option<bool>,
+    /// The units, in the order of their serials.
+    pub(super) units: Vec<UnitLook>,
+}
+
+/// One unit in it.
+#[derive(Debug)]
+pub(super) struct UnitLook {
+    /// What it says of itself.
+    pub(super) status: Status,
+    /// Sum of the latencies that its histogram counts (ns).
+    pub(super) latency_sum_ns: u64,
+    /// Whether raw ticks come and no corrected ones go out.
+    pub(super) stalled: bool,
+}
+
+/// The verdict on the service's health.
+#[derive(Debug, Serialize)]
+pub(super) struct Verdict {
+    /// "ok", or "unhealthy".
+    pub(super) status: &'static str,
+    /// What speaks against its health.
+    pub(super) reasons: Vec<Reason>,
+    /// The service's name for itself.
+    pub(super) instance: String,
+    /// Its version.
+    pub(super) version: &'static str,
+    /// Time since its start (s).
+    pub(super) uptime_s: f64,
+    /// The units, in the order of their serials.
+    pub(super) units: Vec<UnitSummary>,
+}
+
+impl Verdict {
+    /// Whether nothing speaks against the service's health.
+    pub(super) fn is_healthy(&self) -> bool {
+        self.reasons.is_empty()
+    }
+}
+
+impl Source {
+    /// A service whose units are in `intake`; `instance` is its name for itself.
+    pub(crate) fn new(settings: &Settings, intake: Arc<Intake>, board: Arc<Board>, instance: String) -> Self {
+        let window = settings.unit.pairing_window.as_ns().unsigned_abs();
+        Self {
+            intake,
+            board,
+            instance,
+            started: Instant::now(),
+            state_folder: settings.state.clone(),
+            held_back: HeldBack {
+                ticks: settings.unit.navigation.ticks().into(),
+                window: Duration::from_nanos(window),
+            },
+        }
+    }
+
+    /// Looks at the units for stalls and alarms.
+    pub(super) fn watch_units(&self, watch: &mut Watch) {
+        let units = self.intake.each_unit(|actor| (actor.id().clone(), seen(actor)));
+        let now = Instant::now();
+        for (unit, seen) in &units {
+            watch.see(now, unit.as_str(), *seen);
+        }
+    }
+
+    /// Looks at everything.
+    pub(super) fn look(&self, watch: &mut Watch, stopping: bool) -> Look {
+        let units = self
+            .intake
+            .each_unit(|actor| (seen(actor), actor.status(&self.instance), actor.latency_sum_ns()));
+        let now = Instant::now();
+        let units = units.into_iter().map(|(seen, status, latency_sum_ns)| {
+            watch.see(now, &status.unit, seen);
+            let stalled = watch.stall(now, &status.unit, self.held_back).is_some();
+            UnitLook { status, latency_sum_ns, stalled }
+        });
+        let units = units.collect();
+        Look {
+            instance: self.instance.clone(),
+            uptime_s: self.started.elapsed().as_secs_f64(),
+            healthy: self.reasons(now, watch, stopping).is_empty(),
+            faults: self.intake.faults(),
+            posted: self.board.read(),
+            state_folder_writable: self.state_folder(now, watch).map(|tried| tried.is_ok()),
+            units,
+        }
+    }
+
+    /// Judges the service's health.
+    pub(super) fn judge(&self, watch: &mut Watch, stopping: bool) -> Verdict {
+        self.watch_units(watch);
+        let units = self.intake.each_unit(|actor| {
+            let (state, output) = actor.doing();
+            UnitSummary { unit: actor.id().to_string(), state, output }
+        });
+        self.verdict(self.reasons(Instant::now(), watch, stopping), units)
+    }
+
+    /// The verdict where the units could not be looked at in time.
+    pub(super) fn too_busy(&self, limit: Duration) -> Verdict {
+        let limit_s = limit.as_secs_f64();
+        let words = format!(
+            "units or state folder could not be looked at within {limit_s} s: something holds them up"
+        );
+        self.verdict(vec![Reason { kind: Kind::Busy, unit: None, words }], Vec::new())
+    }
+
+    fn verdict(&self, reasons: Vec<Reason>, units: Vec<UnitSummary>) -> Verdict {
+        Verdict {
+            status: if reasons.is_empty() { "ok" } else { "unhealthy" },
+            reasons,
+            instance: self.instance.clone(),
+            version: env!("CARGO_PKG_VERSION"),
+            uptime_s: self.started.elapsed().as_secs_f64(),
+            units,
+        }
+    }
+
+    /// What speaks against the service's health.
+    fn reasons(&self, now: Instant, watch: &mut Watch, stopping: bool) -> Vec<Reason> {
+        let words = "the service is stopping".to_owned();
+        let stopping = stopping.then_some(Reason { kind: Kind::Stopping, unit: None, words });
+        let state_folder = self.state_folder(now, watch).and_then(Result::err);
+        stopping.into_iter().chain(state_folder).chain(watch.reasons(now, self.held_back)).collect()
+    }
+
+    /// Whether the state folder can be written; `None` where none is configured.
+    fn state_folder(&self, now: Instant, watch: &mut Watch) -> Option<Result<(), Reason>> {
+        let folder = self.state_folder.as_deref()?;
+        let reason = |error| {
+            let words = format!(
+                "the state folder {} cannot be written: {error}; until it can, every swap is refused",
+                folder.display()
+            );
+            Reason { kind: Kind::StateFolder, unit: None, words }
+        };
+        Some(watch.state_folder.is_writable(now, folder).map_err(reason))
+    }
+}
+
+/// What the watch is told of a unit.
+fn seen(actor: &UnitActor) -> Seen {
+    let totals = actor.totals();
+    let (state, output) = actor.doing();
+    let runs = matches!(state, State::RunningWithReversal | State::RunningWithoutReversal);
+    Seen {
+        came: totals.ticks_in + totals.bad,
+        went: totals.ticks_out.saturating_sub(totals.unpublished),
+        alarms: totals.alarms,
+        runs: runs && output != Output::Held,
+    }
+}

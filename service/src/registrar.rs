@@ -1,0 +1,112 @@
+//! The one path by which a unit gets another calibration, whoever asks: folder, bus, rollback, pre-launch calibration.
+//!
+//! A thread of its own owns the state folder, what each unit was given and what the folder of documents holds. It parses,
+//! judges, writes to disk and only then touches a unit, for as long as a pointer takes. Receive threads ask and go on:
+//! where too much is waiting the asker is told so.
+//!
+//! | module | holds |
+//! |---|---|
+//! | `desk` | how to ask, without waiting |
+//! | `work` | the thread |
+//! | `order` | what a swap is asked for with |
+//! | `admit` | text in; verdict, problems and warnings out |
+//! | `policy` | age, temperature range, jump, schema version |
+//! | `compare` | what a swap changes |
+//! | `swap` | a verdict carried out: stored, written down, handed to the unit |
+//! | `record` | what a unit was given |
+//! | `refusals` | refused documents, written down once |
+//! | `start` | what holds when the service starts |
+//! | `folder` | documents of the folder, and two that name one unit |
+//! | `rollback` | back to an earlier revision |
+//! | `command` | commands to a unit |
+//! | `notice` | what units have to tell |
+//! | `pre_launch` | the result of a pre-launch calibration as an overlay |
+//! | `answer` | queries and their replies |
+//! | `board` | what the service's own status shows |
+
+mod admit;
+mod answer;
+mod board;
+mod command;
+mod compare;
+mod desk;
+mod folder;
+mod notice;
+mod order;
+mod policy;
+mod pre_launch;
+mod record;
+mod refusals;
+mod rollback;
+mod start;
+mod swap;
+mod work;
+
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::thread::JoinHandle;
+
+pub(crate) use board::{Board, Posted};
+pub(crate) use desk::{Desk, Notice, PreLaunchEnd};
+
+use desk::Request;
+pub(crate) use start::Found;
+pub(crate) use work::Work;
+
+/// Requests that may wait for the registrar.
+const WAITING_REQUESTS: usize = 256;
+
+/// The way to a registrar that has not started yet, so that units can be told of it before.
+#[derive(Debug)]
+pub(crate) struct Opening {
+    requests: SyncSender<Request>,
+    receiver: Receiver<Request>,
+}
+
+impl Opening {
+    /// A way with nothing on it.
+    pub(crate) fn new() -> Self {
+        let (requests, receiver) = sync_channel(WAITING_REQUESTS);
+        Self { requests, receiver }
+    }
+
+    /// Where to ask.
+    pub(crate) fn desk(&self) -> Desk {
+        Desk::new(self.requests.clone())
+    }
+}
+
+/// The running registrar. Dropped without [`Registrar::stop`] it ends by itself after what waits.
+#[derive(Debug)]
+pub(crate) struct Registrar {
+    requests: SyncSender<Request>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Registrar {
+    /// Starts it.
+    ///
+    /// # Errors
+    /// Where the system gives no thread.
+    pub(crate) fn start(opening: Opening, work: Work) -> std::io::Result<Self> {
+        let Opening { requests, receiver } = opening;
+        let thread = std::thread::Builder::new()
+            .name("isotherm-registrar".to_owned())
+            .spawn(move || work.run(receiver))?;
+        Ok(Self { requests, thread: Some(thread) })
+    }
+
+    /// Has it finish what waits and ends it; whether it ended in order.
+    pub(crate) fn stop(mut self) -> bool {
+        let asked = self.requests.send(Request::Stop).is_ok();
+        asked & self.thread.take().is_some_and(|thread| thread.join().is_ok())
+    }
+}
+
+impl Drop for Registrar {
+    fn drop(&mut self) {
+        if self.thread.is_some() {
+            // Units hold a way to it for as long as it holds them: nothing else would ever end it.
+            let _ = self.requests.try_send(Request::Stop);
+        }
+    }
+}

@@ -1,0 +1,138 @@
+//! Text in, verdict out: everything that is wrong with a document, and everything that is doubtful, at once.
+
+use isotherm_protocol::control::Difference;
+use isotherm_protocol::document::Problem;
+use isotherm_protocol::key::UnitId;
+use isotherm_protocol::overlay::{Candidate, Overlay};
+use isotherm_protocol::signature::{self, TrustedKeys};
+
+use super::compare::compare;
+use super::order::Order;
+use super::policy;
+use super::record::Record;
+use super::work::Work;
+use crate::config::SwapSettings;
+use crate::signing::read_trusted_keys;
+use crate::text;
+
+/// What was found out about an order. Nothing has changed yet.
+#[derive(Debug)]
+pub(super) struct Verdict {
+    /// Whom it is for: as asked, else as the document says; `None` where it says nothing that can be used.
+    pub(super) unit: Option<UnitId>,
+    /// What would be put in force; `None` where the text is no valid document.
+    pub(super) candidate: Option<Candidate>,
+    /// Everything that speaks against it.
+    pub(super) problems: Vec<Problem>,
+    /// What is doubtful.
+    pub(super) warnings: Vec<Problem>,
+    /// What it changes; `None` where one of the two documents is missing.
+    pub(super) difference: Option<Difference>,
+}
+
+impl Work {
+    /// Judges an order.
+    pub(super) fn admit(&self, order: &Order<'_>) -> Verdict {
+        let text = match text::text(order.bytes, order.name) {
+            Ok(text) => text,
+            Err(problems) => return refused(order.unit.clone(), problems),
+        };
+        let (mut problems, mut warnings) = (Vec::new(), Vec::new());
+        if order.needs_signature() {
+            check_signature(&self.swap, text, order.name, &mut problems, &mut warnings);
+        }
+        let named = order.unit.clone().or_else(|| unit_of(text));
+        let record = named.as_ref().and_then(|unit| self.records.get(unit));
+        let candidate = match Candidate::parse(text, Some(order.name), base_for(text, record)) {
+            Ok(candidate) => candidate,
+            Err(found) => {
+                problems.extend(found);
+                return Verdict { warnings, ..refused(named, problems) };
+            }
+        };
+        warnings.extend(candidate.warnings.iter().cloned());
+        let unit = match (order.unit.clone(), UnitId::new(&candidate.document.unit)) {
+            (Some(unit), _) | (None, Ok(unit)) => unit,
+            // Not to be reached: a document's unit has been checked.
+            (None, Err(error)) => {
+                problems.push(text::whole(order.name, format!("unit: {error}")));
+                return Verdict { warnings, ..refused(None, problems) };
+            }
+        };
+        if candidate.document.unit != unit.as_str() {
+            let other = &candidate.document.unit;
+            let message = if order.options.any_serial {
+                format!("is \"{other}\": taken for unit {unit} all the same, as asked (any_serial)")
+            } else {
+                format!(
+                    "is \"{other}\", but the document was meant for unit {unit}: send it to {other}, correct the serial, \
+                     or say so explicitly (any_serial)"
+                )
+            };
+            let verdict = if order.options.any_serial { &mut warnings } else { &mut problems };
+            verdict.push(policy::at_key(text, order.name, "unit", message));
+        }
+        let present = self.intake.present(&unit);
+        let waiting = self.intake.waiting(&unit).map(|(revision, _)| revision);
+        let active = record.and_then(|record| record.in_force(waiting));
+        let judged =
+            policy::judge(&self.swap, &candidate, active, present.as_ref(), std::time::SystemTime::now());
+        for doubt in judged {
+            let lenient = order.is_own() || order.options.force;
+            let problem = policy::at_key(text, order.name, doubt.key, doubt.message(lenient));
+            if doubt.refuses && !lenient { problems.push(problem) } else { warnings.push(problem) }
+        }
+        let difference = active.and_then(|active| compare(active, &candidate, present.as_ref()));
+        Verdict { unit: Some(unit), candidate: Some(candidate), problems, warnings, difference }
+    }
+}
+
+/// A verdict on what could not be read.
+fn refused(unit: Option<UnitId>, problems: Vec<Problem>) -> Verdict {
+    Verdict { unit, candidate: None, problems, warnings: Vec::new(), difference: None }
+}
+
+/// The unit that a text names, whatever else is wrong with it.
+pub(super) fn unit_of(text: &str) -> Option<UnitId> {
+    let (root, _) = toml::de::DeTable::parse_recoverable(text);
+    UnitId::new(root.get_ref().get("unit")?.get_ref().as_str()?).ok()
+}
+
+/// The document that an overlay may lie on.
+fn base_for<'r>(text: &str, record: Option<&'r Record>) -> Option<&'r str> {
+    let written = record?.written()?;
+    let named = Overlay::parse(text, None).map(|parsed| parsed.overlay.overlay_of).unwrap_or_default();
+    Some(written.base(&named))
+}
+
+/// Verifies the signature as far as the configuration asks for one.
+fn check_signature(
+    settings: &SwapSettings,
+    text: &str,
+    name: &str,
+    problems: &mut Vec<Problem>,
+    warnings: &mut Vec<Problem>,
+) {
+    let Some(folder) = &settings.trusted_keys else { return };
+    let verdict = if settings.require_signature { problems } else { &mut *warnings };
+    // Read at each swap: a key that was added or taken away counts at once.
+    let (keys, doubts) = match read_trusted_keys(folder) {
+        Ok(read) => read,
+        Err(found) => {
+            verdict.extend(found);
+            (TrustedKeys::default(), Vec::new())
+        }
+    };
+    match signature::verify(text, &keys) {
+        Ok(signature::Verdict::Signed { .. }) => {}
+        Ok(signature::Verdict::Unsigned) if !settings.require_signature => {}
+        Ok(signature::Verdict::Unsigned) => verdict.push(text::whole(
+            name,
+            "is not signed, and require_signature is set: sign it (`isotherm sign`) with a key whose .pub file is in the \
+             folder of trusted keys"
+                .to_owned(),
+        )),
+        Err(error) => verdict.push(error.problem(Some(name))),
+    }
+    warnings.extend(doubts);
+}

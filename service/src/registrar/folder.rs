@@ -1,0 +1,217 @@
+//! Documents of the watched folder: each names its unit, and two that name one unit are rivals.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use isotherm_protocol::control::{SwapOptions, SwapOutcome};
+use isotherm_protocol::digest::Digest;
+use isotherm_protocol::document::{Document, Problem};
+use isotherm_protocol::history::{AuditEvent, CarriedFile, Source};
+use isotherm_protocol::key::UnitId;
+use isotherm_protocol::overlay;
+
+use super::admit::unit_of;
+use super::order::Order;
+use super::work::Work;
+use crate::text;
+use crate::watch::{FolderEvent, read_document};
+
+/// What is known of the folder.
+#[derive(Debug, Default)]
+pub(super) struct Folder {
+    path: Option<PathBuf>,
+    files: BTreeMap<PathBuf, File>,
+    gone: Option<String>,
+}
+
+/// What is known of a file.
+#[derive(Debug, Default)]
+struct File {
+    /// Unit that a valid document in it names.
+    unit: Option<UnitId>,
+    /// Unit that it names or named, valid or not.
+    hint: Option<UnitId>,
+    /// Why it is not taken.
+    problems: Vec<Problem>,
+    /// Whether that is only because of a rival.
+    rival: bool,
+}
+
+impl Folder {
+    pub(super) fn new(path: Option<&Path>) -> Self {
+        Self { path: path.map(Path::to_owned), ..Self::default() }
+    }
+
+    pub(super) fn path(&self) -> Option<&Path> {
+        self.path.as_deref()
+    }
+
+    /// Why the folder cannot be read.
+    pub(super) fn gone(&self) -> Option<&str> {
+        self.gone.as_deref()
+    }
+
+    /// Files that are not taken, and why.
+    pub(super) fn bad(&self) -> impl Iterator<Item = (&Path, &[Problem])> {
+        let bad = self.files.iter().filter(|(_, file)| !file.problems.is_empty());
+        bad.map(|(path, file)| (&**path, &*file.problems))
+    }
+
+    /// Files whose documents name a unit.
+    fn naming(&self, unit: &UnitId) -> Vec<PathBuf> {
+        let naming = self.files.iter().filter(|(_, file)| file.unit.as_ref() == Some(unit));
+        naming.map(|(path, _)| path.clone()).collect()
+    }
+
+    /// Enters a file that cannot be read.
+    pub(super) fn unreadable(&mut self, path: &Path, problem: Problem) {
+        self.files.entry(path.to_owned()).or_default().problems = vec![problem];
+    }
+
+    /// The folder cannot be read.
+    pub(super) fn miss(&mut self, reason: String) {
+        self.gone = Some(reason);
+    }
+
+    /// Enters a file's content; the unit that it named before.
+    pub(super) fn enter(&mut self, path: &Path, bytes: &[u8]) -> Option<UnitId> {
+        let file = self.files.entry(path.to_owned()).or_default();
+        let text = std::str::from_utf8(bytes).ok();
+        let parsed = text.and_then(|text| Document::parse(text, None).ok());
+        let unit = parsed.and_then(|parsed| UnitId::new(&parsed.document.unit).ok());
+        file.hint = text.and_then(unit_of).or_else(|| file.hint.take());
+        std::mem::replace(&mut file.unit, unit)
+    }
+}
+
+impl Work {
+    /// Takes what the watcher tells.
+    pub(super) fn folder_event(&mut self, event: FolderEvent) {
+        match event {
+            FolderEvent::Changed { file, bytes, .. } => {
+                let before = self.folder.enter(&file, &bytes);
+                self.take_file(&file, &bytes, false);
+                self.look_for_survivor(before.as_ref());
+            }
+            FolderEvent::Unreadable { file, reason } => {
+                let problem = text::whole(&file.display().to_string(), format!("cannot be read: {reason}"));
+                tracing::error!("{problem}; what is in force stays in force");
+                self.folder.unreadable(&file, problem);
+            }
+            FolderEvent::Removed { file } => {
+                let before = self.folder.files.remove(&file).and_then(|file| file.unit);
+                let unit = before.as_ref().map(ToString::to_string).unwrap_or_default();
+                tracing::warn!(unit, "{} is gone; what is in force stays in force", file.display());
+                self.look_for_survivor(before.as_ref());
+            }
+            FolderEvent::FolderGone { reason } => {
+                let path = self.folder.path.as_deref().unwrap_or(Path::new("")).display();
+                tracing::error!("{path} cannot be read: {reason}; what is in force stays in force");
+                self.folder.miss(reason);
+            }
+            FolderEvent::FolderBack => {
+                tracing::info!("the folder of calibrations can be read again");
+                self.folder.gone = None;
+            }
+        }
+    }
+
+    /// Takes a file that was entered; `at_start` where the service has just started. Whether it is in order.
+    pub(super) fn take_file(&mut self, path: &Path, bytes: &[u8], at_start: bool) -> bool {
+        let unit = self.folder.files.get(path).and_then(|file| file.unit.clone());
+        let naming = unit.map(|unit| (self.folder.naming(&unit), unit));
+        if let Some((files, unit)) = naming.filter(|(files, _)| files.len() > 1) {
+            self.refuse_rivals(&unit, &files);
+            return false;
+        }
+        let problems = self.swap_file(path, bytes, at_start);
+        let good = problems.is_empty();
+        if let Some(file) = self.folder.files.get_mut(path) {
+            file.problems = problems;
+            file.rival = false;
+        }
+        good
+    }
+
+    /// Takes the document of a file through the path of every swap; what was wrong with it.
+    fn swap_file(&mut self, path: &Path, bytes: &[u8], at_start: bool) -> Vec<Problem> {
+        let name = path.display().to_string();
+        if std::str::from_utf8(bytes).is_ok_and(overlay::is_overlay) {
+            let message =
+                "is an overlay: this folder is for whole documents; put it in force with `isotherm swap`";
+            let problem = text::whole(&name, message.to_owned());
+            tracing::error!("{problem}");
+            return vec![problem];
+        }
+        let known =
+            self.folder.files.get(path).and_then(|file| file.unit.clone().or_else(|| file.hint.clone()));
+        let source = known_source(path, at_start);
+        let digest = Digest::of(bytes);
+        let seen = source.file().and_then(|path| self.store.seen_in_folder(path));
+        let has_active = known
+            .as_ref()
+            .is_some_and(|unit| self.records.get(unit).is_some_and(|record| record.active.is_some()));
+        if at_start && has_active && seen == Some(digest) {
+            // Seen before the restart: what was accepted since then, from wherever, holds.
+            return Vec::new();
+        }
+        let carried = source.file().map(|path| CarriedFile { path: path.to_owned(), digest });
+        let options = SwapOptions::default();
+        let reply =
+            self.swap(&Order { unit: known.clone(), bytes, name: &name, source, overlay: None, options });
+        if let Some(carried) =
+            carried.filter(|_| reply.outcome == SwapOutcome::Unchanged && seen != Some(digest))
+        {
+            // Not to be taken for a change after the next restart, when something else may be in force.
+            let event = AuditEvent::CarriedFile(carried);
+            if let Err(error) = self.append(None, "", event) {
+                tracing::error!("{name} is not in the audit file as seen: {error}");
+            }
+        }
+        reply.problems
+    }
+
+    /// Tells of files that name one unit: none of them is taken, for which of them holds is for the operator to say.
+    fn refuse_rivals(&mut self, unit: &UnitId, files: &[PathBuf]) {
+        for path in files {
+            let others = files.iter().filter(|other| *other != path);
+            let others: Vec<_> = others.map(|other| other.display().to_string()).collect();
+            let message = format!(
+                "unit {unit} is named by {} too: none of them is taken, remove all but one; what is in force stays in \
+                 force",
+                others.join(", ")
+            );
+            let file = Some(path.display().to_string());
+            let problem = Problem { file, line: 1, column: 1, key: "unit".to_owned(), message };
+            let Some(entry) = self.folder.files.get_mut(path) else { continue };
+            if entry.problems.first() != Some(&problem) {
+                tracing::error!(%unit, "{problem}");
+            }
+            entry.problems = vec![problem];
+            entry.rival = true;
+        }
+    }
+
+    /// Takes the one file that is left of several that named a unit.
+    fn look_for_survivor(&mut self, unit: Option<&UnitId>) {
+        let naming = unit.map(|unit| self.folder.naming(unit)).unwrap_or_default();
+        let [path] = &*naming else { return };
+        if !self.folder.files.get(path).is_some_and(|file| file.rival) {
+            return;
+        }
+        match read_document(path) {
+            Ok(bytes) => {
+                self.folder.enter(path, &bytes);
+                self.take_file(path, &bytes, false);
+            }
+            // Something is becoming of it, and the watcher is going to tell what.
+            Err(error) => tracing::warn!("{} cannot be read: {error}", path.display()),
+        }
+    }
+}
+
+/// A file as a source: by its absolute path, so that it is the same one after a start from another folder.
+fn known_source(path: &Path, at_start: bool) -> Source {
+    let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned()).display().to_string();
+    if at_start { Source::Start { path } } else { Source::Folder { path } }
+}

@@ -1,0 +1,186 @@
+//! What holds when the service starts: the last good sets of the state folder, then what has become of the documents since.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use isotherm_correction::units::Span;
+use isotherm_protocol::control::Schedule;
+use isotherm_protocol::corrected::Revision;
+use isotherm_protocol::digest::Digest;
+use isotherm_protocol::document::{Document, Problem};
+use isotherm_protocol::history::GoodSet;
+use isotherm_protocol::key::UnitId;
+use isotherm_protocol::overlay::Overlay;
+
+use super::record::{Active, Layers, Record, Written};
+use super::work::Work;
+use crate::calibrations::{Calibrations, Change, Installable, Plan};
+use crate::store::Store;
+use crate::text;
+use crate::watch::{Known, documents_in, read_document};
+
+/// What was found of each file of the folder, for its watcher.
+pub(crate) type Found = std::collections::BTreeMap<std::path::PathBuf, Known>;
+
+impl Work {
+    /// Takes over calibrations that the program itself was started with.
+    pub(crate) fn take_over(&mut self, calibrations: &Calibrations) {
+        for (unit, plan) in calibrations.iter() {
+            let Some(current) = &plan.current else { continue };
+            let active = Active {
+                revision: current.revision.counter,
+                calibration: Arc::clone(&current.calibration),
+                written: None,
+            };
+            let counter = active.revision;
+            self.records.insert(unit.clone(), Record { counter, active: Some(active), ..Record::default() });
+        }
+    }
+
+    /// Puts the last good set of every unit of the state folder in force again, under its old revision.
+    pub(crate) fn restore(&mut self) {
+        let units: Vec<_> = self.store.units().cloned().collect();
+        for unit in units {
+            let mut record = Record { counter: self.store.highest_revision(&unit), ..Record::default() };
+            let mut plan = Plan::default();
+            let sets: Vec<_> = self.store.good_sets(&unit).cloned().collect();
+            for set in sets {
+                let written = match written(&self.store, &set) {
+                    Ok(written) => written,
+                    Err(problems) => {
+                        for problem in problems {
+                            tracing::error!(%unit, revision = set.revision, "cannot be put in force again: {problem}");
+                        }
+                        continue;
+                    }
+                };
+                let (written, calibration) = written;
+                let next = installable(&set, &written, &calibration);
+                record.active.get_or_insert(Active {
+                    revision: set.revision,
+                    calibration,
+                    written: Some(written),
+                });
+                // One that still waited for its tick goes on waiting, over the one before.
+                if !set.in_force && set.schedule != Schedule::NextTick && plan.pending.is_none() {
+                    let slew =
+                        Span::from_ns(i64::try_from(set.slew_ms).unwrap_or(0).saturating_mul(1_000_000));
+                    plan.pending = Some(Change { next, at: set.schedule, slew });
+                } else {
+                    plan.current = Some(next);
+                    break;
+                }
+            }
+            if let Some(active) = &record.active {
+                tracing::info!(%unit, revision = active.revision, "last good calibration restored");
+            }
+            self.intake.restore(&unit, plan);
+            self.records.insert(unit, record);
+        }
+    }
+
+    /// Takes what stands in the folder as far as it has changed since it was last seen. The second value is how many
+    /// documents are not taken.
+    ///
+    /// # Errors
+    /// Where the folder itself cannot be read.
+    pub(crate) fn read_folder(&mut self) -> std::io::Result<(Found, usize)> {
+        let mut found = Found::new();
+        let Some(folder) = self.folder.path().map(Path::to_owned) else { return Ok((found, 0)) };
+        let mut contents = Vec::new();
+        let mut bad = 0;
+        for file in documents_in(&folder)? {
+            match read_document(&file) {
+                Ok(bytes) => {
+                    found.insert(file.clone(), Known::Content(Digest::of(&bytes).0));
+                    self.folder.enter(&file, &bytes);
+                    contents.push((file, bytes));
+                }
+                Err(error) => {
+                    let problem =
+                        text::whole(&file.display().to_string(), format!("cannot be read: {error}"));
+                    tracing::error!("{problem}");
+                    self.folder.unreadable(&file, problem);
+                    found.insert(file, Known::Unreadable);
+                    bad += 1;
+                }
+            }
+        }
+        // All of them are entered by now: rivals know of each other.
+        for (file, bytes) in &contents {
+            bad += usize::from(!self.take_file(file, bytes, true));
+        }
+        self.miss_documents();
+        let units: Vec<_> = self.records.keys().map(UnitId::as_str).collect();
+        tracing::info!(
+            folder = %folder.display(), units = units.join(" "), bad_documents = bad, "calibrations read"
+        );
+        Ok((found, bad))
+    }
+
+    /// Goes on without a folder that cannot be read, with what the state folder has.
+    pub(crate) fn miss_folder(&mut self, error: &std::io::Error) {
+        tracing::error!(
+            "the folder of calibrations cannot be read: {error}; the last good sets are in force, and it is taken when it \
+             is back"
+        );
+        self.folder.miss(error.to_string());
+    }
+
+    /// Warns of units whose document has gone from the folder.
+    fn miss_documents(&self) {
+        for (unit, record) in &self.records {
+            let set = self.store.last_good(unit);
+            let file = set.and_then(|set| set.source.file()).filter(|file| !Path::new(file).exists());
+            if let (Some(file), Some(active)) = (file, &record.active) {
+                tracing::warn!(
+                    %unit, revision = active.revision, "{file} is gone; what it held is the last good set and is in force"
+                );
+            }
+        }
+    }
+}
+
+/// Document, text and calibration of a good set.
+pub(super) fn written(
+    store: &Store,
+    set: &GoodSet,
+) -> Result<(Written, Arc<isotherm_correction::calibration::Calibration>), Vec<Problem>> {
+    let name = format!("document {}", set.digest);
+    let problem = |message: String| vec![text::whole(&name, message)];
+    let bytes = store.document(&set.digest).map_err(|error| problem(error.to_string()))?;
+    let bytes = bytes.ok_or_else(|| problem("is not in the state folder any more".to_owned()))?;
+    let document_text = text::text(&bytes, &name)?;
+    let parsed = Document::parse(document_text, Some(&name))?;
+    let written = Written {
+        digest: set.digest,
+        document: Arc::new(parsed.document),
+        text: document_text.into(),
+        layers: set.overlay.and_then(|overlay| layers(store, overlay)),
+    };
+    Ok((written, Arc::new(parsed.calibration)))
+}
+
+/// What a document with an overlay was made from; `None` where that is not kept any more.
+pub(super) fn layers(store: &Store, digest: Digest) -> Option<Layers> {
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).ok();
+    let overlay = store.overlay(&digest).ok().flatten().and_then(text)?;
+    let overlay = Overlay::parse(&overlay, None).ok()?.overlay;
+    let base = store.document(&overlay.overlay_of.parse().ok()?).ok().flatten().and_then(text)?;
+    Some(Layers { base: base.into(), overlay, digest })
+}
+
+fn installable(
+    set: &GoodSet,
+    written: &Written,
+    calibration: &Arc<isotherm_correction::calibration::Calibration>,
+) -> Installable {
+    Installable {
+        revision: Revision { counter: set.revision, digest: set.digest.head() },
+        calibration: Arc::clone(calibration),
+        digest: Some(set.digest),
+        document: Some(Arc::clone(&written.document)),
+        overlay: set.overlay,
+        source: Some(set.source.clone()),
+    }
+}

@@ -1,0 +1,116 @@
+//! What the service declares on its session: publishers of units, subscribers, queryables, the token of its life.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use isotherm_protocol::key;
+use zenoh::liveliness::LivelinessToken;
+use zenoh::pubsub::Subscriber;
+use zenoh::qos::{CongestionControl, Priority};
+use zenoh::query::{Query, Queryable};
+use zenoh::sample::{Locality, Sample, SampleKind};
+use zenoh::{Session, Wait};
+
+use crate::ServiceError;
+use crate::intake::{Intake, OutletMaker};
+use crate::keeper::Bell;
+use crate::registrar::Desk;
+use crate::unit::Outlet;
+
+/// Everything that receives.
+#[derive(Debug)]
+pub(super) struct Declared {
+    subscribers: Vec<Subscriber<()>>,
+    queryables: Vec<Queryable<()>>,
+    _alive: LivelinessToken,
+}
+
+impl Declared {
+    /// Declares it; the queryable of the status last of all: where it answers, the service receives.
+    pub(super) async fn new(
+        session: &Session,
+        intake: &Arc<Intake>,
+        bell: &Bell,
+        desk: &Desk,
+    ) -> Result<Self, ServiceError> {
+        let raw = take(intake, bell, Intake::receive);
+        let reference = take(intake, bell, Intake::reference);
+        let put = desk.clone();
+        let subscribers = vec![
+            subscribe(session, key::ALL_RAW, raw).await?,
+            subscribe(session, key::ALL_REFERENCE, reference).await?,
+            subscribe(session, key::ALL_CALIBRATION, move |sample| put.put(sample)).await?,
+        ];
+        let alive = key::service_alive(&session.zid().to_string());
+        let token = session.liveliness().declare_token(alive).await;
+        let token = token.map_err(|source| ServiceError::Declare { key: key::ALL_SERVICES_ALIVE, source })?;
+        let [calibration, command, history] = [(); 3].map(|()| desk.clone());
+        let [unit, service] = [(); 2].map(|()| bell.clone());
+        let queryables = vec![
+            answer(session, key::ALL_CALIBRATION, move |query| calibration.calibration(query)).await?,
+            answer(session, key::ALL_COMMAND, move |query| command.command(query)).await?,
+            answer(session, key::ALL_HISTORY, move |query| history.history(query)).await?,
+            answer(session, key::ALL_SERVICE_STATUS, move |query| service.query(query)).await?,
+            answer(session, key::ALL_STATUS, move |query| unit.query(query)).await?,
+        ];
+        Ok(Self { subscribers, queryables, _alive: token })
+    }
+
+    /// Ends it, and waits for what is being received; whether that went well.
+    pub(super) fn undeclare(self) -> bool {
+        let Self { subscribers, queryables, .. } = self;
+        // Every one of them, whatever became of the others.
+        let received = subscribers.into_iter().map(|it| it.undeclare().wait_callbacks().wait().is_ok());
+        let received = received.fold(true, |all, one| all & one);
+        queryables.into_iter().map(|it| it.undeclare().wait().is_ok()).fold(received, |all, one| all & one)
+    }
+}
+
+/// One declared publisher per unit, at one priority, so that its batches stay in order.
+pub(super) fn outlets(session: Session, congestion: CongestionControl) -> OutletMaker {
+    Box::new(move |unit| {
+        let publisher = session
+            .declare_publisher(key::corrected(unit))
+            .congestion_control(congestion)
+            .priority(Priority::RealTime)
+            .express(false)
+            .wait()?;
+        let outlet: Outlet = Box::new(move |frame| publisher.put(frame).wait());
+        Ok(outlet)
+    })
+}
+
+/// What the receive thread does with a message: all of it.
+fn take(
+    intake: &Arc<Intake>,
+    bell: &Bell,
+    receive: fn(&Intake, &str, Option<&[u8]>, Instant) -> bool,
+) -> impl Fn(Sample) + Send + Sync + 'static {
+    let (intake, bell) = (Arc::clone(intake), bell.clone());
+    move |sample| {
+        let arrival = Instant::now();
+        let bytes = sample.payload().to_bytes();
+        let frame = (sample.kind() == SampleKind::Put).then_some(&*bytes);
+        if receive(&intake, sample.key_expr().as_str(), frame, arrival) {
+            bell.status_due();
+        }
+    }
+}
+
+async fn subscribe(
+    session: &Session,
+    key: &'static str,
+    callback: impl Fn(Sample) + Send + Sync + 'static,
+) -> Result<Subscriber<()>, ServiceError> {
+    let subscriber = session.declare_subscriber(key).allowed_origin(Locality::Remote).callback(callback);
+    subscriber.await.map_err(|source| ServiceError::Declare { key, source })
+}
+
+async fn answer(
+    session: &Session,
+    key: &'static str,
+    callback: impl Fn(Query) + Send + Sync + 'static,
+) -> Result<Queryable<()>, ServiceError> {
+    let queryable = session.declare_queryable(key).callback(callback);
+    queryable.await.map_err(|source| ServiceError::Declare { key, source })
+}

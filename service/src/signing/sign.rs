@@ -1,0 +1,201 @@
+//! The `sign` command.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use isotherm_protocol::document::{Document, Problem};
+use isotherm_protocol::signature::{self, Existing, KeyId, PrivateKey, Wrong};
+use serde::Serialize;
+
+use super::{files, private_key};
+use crate::exit::Exit;
+use crate::text::{read_bounded, text};
+use crate::words::{print, say};
+
+/// Arguments of `sign`.
+#[derive(Debug, Clone, Args)]
+#[command(after_help = "\
+Examples:
+  isotherm sign ZLG-0001.toml --key bench-2.key
+  isotherm sign ZLG-0001.toml --key bench-2.key --output signed/ZLG-0001.toml
+  isotherm sign --replace units/*.toml --key bench-2.key
+
+A document is validated first. If one of several is bad, none is signed. The signature is one more line of the file, so
+the document's digest, and with it the revision that outputs name, is another one than before.
+Exit codes: 0 all signed, 78 a document or the key is bad, 1 a file is signed already, or cannot be read or written.")]
+pub struct SignArgs {
+    /// Calibration documents to sign
+    #[arg(required = true, value_name = "FILE")]
+    pub files: Vec<PathBuf>,
+    /// The private key, as `isotherm keygen` or `openssl genpkey -algorithm ed25519` writes it
+    #[arg(long, value_name = "FILE")]
+    pub key: PathBuf,
+    /// Write the signed document here and leave the original as it is; for a single document
+    #[arg(long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// Replace a signature that is there already, whether it holds or not
+    #[arg(long)]
+    pub replace: bool,
+    /// Print one JSON object on stdout instead
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// What became of one file.
+#[derive(Debug, Serialize)]
+struct Outcome {
+    /// The document.
+    file: String,
+    /// Where the signed one is, or was to be.
+    output: String,
+    signed: bool,
+    /// The unit that it names, where it is good.
+    unit: Option<String>,
+    /// SHA-256 of the signed text, where the document is good.
+    digest: Option<String>,
+    /// What kept a good document from being signed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    failure: Option<String>,
+    problems: Vec<Problem>,
+    warnings: Vec<Problem>,
+}
+
+/// Signs the files and says what became of each.
+pub(crate) fn run(args: &SignArgs) -> Exit {
+    if args.output.is_some() && args.files.len() > 1 {
+        say("isotherm: --output names one file, so one document can be given with it");
+        return Exit::Usage;
+    }
+    let key = match private_key::read(&args.key) {
+        Ok((key, warning)) => {
+            if let Some(warning) = warning {
+                say(format_args!("{warning} (warning)"));
+            }
+            key
+        }
+        Err((problem, exit)) => {
+            say(problem);
+            return exit;
+        }
+    };
+    let existing = if args.replace { Existing::Replace } else { Existing::Refuse };
+    let mut prepared: Vec<_> = args
+        .files
+        .iter()
+        .map(|file| prepare(file, args.output.as_deref().unwrap_or(file), &key, existing))
+        .collect();
+    if prepared.iter().all(|(_, text)| text.is_some()) {
+        for (outcome, text) in &mut prepared {
+            write(outcome, text.as_deref().unwrap_or_default());
+        }
+    }
+    let outcomes: Vec<_> = prepared.into_iter().map(|(outcome, _)| outcome).collect();
+    report(&outcomes, key.public().id(), args.json)
+}
+
+/// Validates one document and signs its text, without writing it yet.
+fn prepare(file: &Path, output: &Path, key: &PrivateKey, existing: Existing) -> (Outcome, Option<String>) {
+    let mut outcome = Outcome {
+        file: file.display().to_string(),
+        output: output.display().to_string(),
+        signed: false,
+        unit: None,
+        digest: None,
+        failure: None,
+        problems: Vec::new(),
+        warnings: Vec::new(),
+    };
+    let bytes = match read_bounded(file) {
+        Ok(bytes) => bytes,
+        Err(error) => {
+            outcome.failure = Some(format!("cannot be read: {error}"));
+            return (outcome, None);
+        }
+    };
+    let text = match text(&bytes, &outcome.file) {
+        Ok(text) => text,
+        Err(problems) => {
+            outcome.problems = problems;
+            return (outcome, None);
+        }
+    };
+    let signed = match signature::sign(text, key, existing) {
+        Ok(signed) => Some(signed),
+        Err(error) => {
+            if matches!(error.wrong, Wrong::Signed { .. }) {
+                outcome.failure = Some(error.wrong.to_string());
+            } else {
+                outcome.problems.push(error.problem(Some(&outcome.file)));
+            }
+            None
+        }
+    };
+    // As it will be read: the line of the signature counts towards the longest length.
+    match Document::parse(signed.as_deref().unwrap_or(text), Some(&outcome.file)) {
+        Ok(parsed) => {
+            outcome.warnings = parsed.warnings;
+            outcome.unit = Some(parsed.document.unit);
+            outcome.digest = signed.as_ref().map(|_| hex(&parsed.digest));
+        }
+        Err(problems) => outcome.problems.extend(problems),
+    }
+    let is_good = outcome.problems.is_empty();
+    (outcome, signed.filter(|_| is_good))
+}
+
+fn write(outcome: &mut Outcome, text: &str) {
+    match files::replace(Path::new(&outcome.output), text) {
+        Ok(()) => outcome.signed = true,
+        Err(error) => outcome.failure = Some(format!("cannot write {}: {error}", outcome.output)),
+    }
+}
+
+fn report(outcomes: &[Outcome], key_id: KeyId, json: bool) -> Exit {
+    let exit = verdict(outcomes);
+    if json {
+        let signed = exit == Exit::Ok;
+        let report = serde_json::json!({ "signed": signed, "key_id": key_id, "files": outcomes });
+        return print(&(serde_json::to_string_pretty(&report).unwrap_or_default() + "\n"), exit);
+    }
+    let text: String = outcomes.iter().map(|outcome| in_words(outcome, key_id)).collect();
+    if outcomes.len() > 1 && outcomes.iter().all(|outcome| !outcome.signed) {
+        say("isotherm: none of the documents was signed");
+    }
+    print(&text, exit)
+}
+
+/// Problems to stderr; the line for stdout, where the file was signed.
+fn in_words(outcome: &Outcome, key_id: KeyId) -> String {
+    if let Some(failure) = &outcome.failure {
+        say(format_args!("{}: {failure}", outcome.file));
+    }
+    for problem in &outcome.problems {
+        say(problem);
+    }
+    for warning in &outcome.warnings {
+        say(format_args!("{warning} (warning)"));
+    }
+    if !outcome.signed {
+        return String::new();
+    }
+    format!(
+        "{}: calibration of unit {}, signed by key {key_id}, sha256 {}\n",
+        outcome.output,
+        outcome.unit.as_deref().unwrap_or_default(),
+        outcome.digest.as_deref().and_then(|digest| digest.get(..16)).unwrap_or_default()
+    )
+}
+
+fn verdict(outcomes: &[Outcome]) -> Exit {
+    if outcomes.iter().any(|outcome| !outcome.problems.is_empty()) {
+        Exit::BadConfiguration
+    } else if outcomes.iter().all(|outcome| outcome.signed) {
+        Exit::Ok
+    } else {
+        Exit::Failed
+    }
+}
+
+fn hex(digest: &[u8]) -> String {
+    digest.iter().fold(String::new(), |text, byte| text + &format!("{byte:02x}"))
+}

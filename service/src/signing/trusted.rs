@@ -1,0 +1,85 @@
+//! The folder of trusted keys.
+
+use std::ffi::OsStr;
+use std::os::unix::fs::PermissionsExt;
+use std::path::{Path, PathBuf};
+
+use isotherm_protocol::document::Problem;
+use isotherm_protocol::signature::{PublicKey, TrustedKeys};
+
+use crate::text::{read_bounded, text, whole};
+
+/// Longest name of a signer, in characters.
+const LONGEST_NAME: usize = 64;
+/// Whether everybody may write.
+const WORLD_WRITABLE: u32 = 0o002;
+
+/// Reads every `*.pub` of a folder, hidden files and sub-folders excepted; a key is trusted under its file's name without
+/// the ending. The second value is what is doubtful, file by file in the order of their names.
+///
+/// # Errors
+/// One problem for each file that is no key, or a key that is there twice; one for a folder that cannot be read. With a
+/// bad file among them no key is taken: a key that silently did not count would have its signer's documents refused.
+pub fn read_trusted_keys(folder: &Path) -> Result<(TrustedKeys, Vec<Problem>), Vec<Problem>> {
+    let name = folder.display().to_string();
+    let files = key_files(folder).map_err(|error| vec![whole(&name, format!("cannot be read: {error}"))])?;
+    let mut trusted = TrustedKeys::default();
+    let (mut problems, mut warnings) = (Vec::new(), Vec::new());
+    warnings.extend(open_to_all(folder));
+    for path in files {
+        let file = path.display().to_string();
+        let added = read_key(&path).and_then(|(name, key)| {
+            trusted.insert(&name, key).map_err(|rival| format!("{rival}, in {}", folder.display()))
+        });
+        if let Err(message) = added {
+            problems.push(whole(&file, message));
+        }
+        warnings.extend(open_to_all(&path));
+    }
+    if problems.is_empty() { Ok((trusted, warnings)) } else { Err(problems) }
+}
+
+fn key_files(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(folder)? {
+        let path = entry?.path();
+        let hidden = path.file_name().is_none_or(|name| name.to_string_lossy().starts_with('.'));
+        if !hidden && path.extension().is_some_and(|extension| extension == "pub") && !path.is_dir() {
+            files.push(path);
+        }
+    }
+    files.sort();
+    Ok(files)
+}
+
+/// One key and its name, or what is wrong with it.
+fn read_key(path: &Path) -> Result<(String, PublicKey), String> {
+    let cannot = |error: std::io::Error| format!("cannot be read: {error}");
+    // Opening a pipe would wait for somebody who writes.
+    if !std::fs::metadata(path).map_err(cannot)?.is_file() {
+        return Err("is not a regular file".to_owned());
+    }
+    let bytes = read_bounded(path).map_err(cannot)?;
+    let text =
+        text(&bytes, "").map_err(|_| "is no text, so it is no PEM key: is it the right file?".to_owned())?;
+    let key = PublicKey::from_pem(text).map_err(|error| error.to_string())?;
+    let name = path.file_stem().and_then(OsStr::to_str).unwrap_or_default();
+    if name.chars().count() > LONGEST_NAME || name.chars().any(char::is_control) || name.is_empty() {
+        return Err(format!(
+            "has a name that cannot be shown: the signer is called by it, so it must be 1 to {LONGEST_NAME} \
+             printable characters before `.pub`"
+        ));
+    }
+    Ok((name.to_owned(), key))
+}
+
+/// Says so where everybody can change who is trusted.
+fn open_to_all(path: &Path) -> Option<Problem> {
+    let mode = std::fs::metadata(path).ok()?.permissions().mode() & 0o777;
+    (mode & WORLD_WRITABLE != 0).then(|| {
+        let file = path.display().to_string();
+        let message =
+            format!("says who is trusted, but everybody may write to it (mode {mode:o}): `chmod o-w {file}`");
+        whole(&file, message)
+    })
+}

@@ -1,0 +1,123 @@
+//! Documents by their digest, in a folder or in memory.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+use isotherm_protocol::digest::Digest;
+use isotherm_protocol::document::MAX_DOCUMENT_BYTES;
+
+use super::{StoreError, durable};
+use crate::text::read_bounded;
+
+/// Most bytes of documents that are kept in memory; beyond it the oldest go.
+const MAX_MEMORY_BYTES: usize = 64 * MAX_DOCUMENT_BYTES;
+
+/// Documents by the SHA-256 of their bytes.
+#[derive(Debug)]
+pub(super) enum Shelf {
+    /// One file each, `<sha256>.toml`.
+    Folder(PathBuf),
+    /// Gone with the process.
+    Memory(Memory),
+}
+
+/// Documents in memory.
+#[derive(Debug, Default)]
+pub(super) struct Memory {
+    by_digest: BTreeMap<Digest, Vec<u8>>,
+    /// The oldest first.
+    order: VecDeque<Digest>,
+    bytes: usize,
+}
+
+impl Shelf {
+    /// The shelf in a folder, which is made if missing.
+    ///
+    /// # Errors
+    /// [`StoreError::Folder`] where it cannot be made or written to.
+    pub(super) fn open(folder: PathBuf) -> Result<Self, StoreError> {
+        match durable::make_folder(&folder).and_then(|()| durable::sweep(&folder)) {
+            Ok(()) => Ok(Self::Folder(folder)),
+            Err(source) => Err(StoreError::Folder { path: folder, source }),
+        }
+    }
+
+    /// An empty shelf in memory.
+    pub(super) fn in_memory() -> Self {
+        Self::Memory(Memory::default())
+    }
+
+    /// Keeps a document. One that is there already is left alone, one that was damaged since is written anew.
+    ///
+    /// # Errors
+    /// [`StoreError::TooLong`], or [`StoreError::Write`].
+    pub(super) fn put(&mut self, bytes: &[u8]) -> Result<Digest, StoreError> {
+        if bytes.len() > MAX_DOCUMENT_BYTES {
+            return Err(StoreError::TooLong { bytes: bytes.len() });
+        }
+        let digest = Digest::of(bytes);
+        let kept = matches!(self.get(&digest), Ok(Some(_)));
+        match self {
+            Self::Folder(folder) => {
+                let name = name(&digest);
+                // A process that ended right after it wrote the file may not have made its name last.
+                let put =
+                    if kept { durable::sync_folder(folder) } else { durable::write(folder, &name, bytes) };
+                put.map_err(StoreError::write(&folder.join(name)))?;
+            }
+            Self::Memory(_) if kept => {}
+            Self::Memory(memory) => memory.put(digest, bytes),
+        }
+        Ok(digest)
+    }
+
+    /// The document of a digest, checked against it; `None` where it is not kept.
+    ///
+    /// # Errors
+    /// [`StoreError::Read`], or [`StoreError::Corrupt`].
+    pub(super) fn get(&self, digest: &Digest) -> Result<Option<Vec<u8>>, StoreError> {
+        match self {
+            Self::Folder(folder) => read(&folder.join(name(digest)), digest),
+            Self::Memory(memory) => Ok(memory.by_digest.get(digest).cloned()),
+        }
+    }
+
+    /// Whether a document is kept; its bytes are not looked at.
+    pub(super) fn holds(&self, digest: &Digest) -> bool {
+        match self {
+            Self::Folder(folder) => folder.join(name(digest)).is_file(),
+            Self::Memory(memory) => memory.by_digest.contains_key(digest),
+        }
+    }
+}
+
+impl Memory {
+    fn put(&mut self, digest: Digest, bytes: &[u8]) {
+        self.bytes += bytes.len();
+        self.by_digest.insert(digest, bytes.to_vec());
+        self.order.push_back(digest);
+        while self.bytes > MAX_MEMORY_BYTES {
+            let Some(oldest) = self.order.pop_front() else { return };
+            self.bytes -= self.by_digest.remove(&oldest).map_or(0, |bytes| bytes.len());
+        }
+    }
+}
+
+/// Name of a document's file.
+fn name(digest: &Digest) -> String {
+    format!("{digest}.toml")
+}
+
+/// Reads a document's file and checks it.
+fn read(path: &Path, digest: &Digest) -> Result<Option<Vec<u8>>, StoreError> {
+    let bytes = match read_bounded(path) {
+        Ok(bytes) => bytes,
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
+        Err(source) => return Err(StoreError::Read { path: path.to_owned(), source }),
+    };
+    match Digest::of(&bytes) {
+        found if found == *digest => Ok(Some(bytes)),
+        found => Err(StoreError::Corrupt { path: path.to_owned(), found }),
+    }
+}

@@ -1,0 +1,84 @@
+//! What a unit has to tell: looked for after every frame, kept until it is taken.
+
+use std::collections::VecDeque;
+
+use isotherm_correction::operation::State;
+use isotherm_correction::prelaunch::Outcome;
+use isotherm_correction::unit::PreLaunchView;
+use isotherm_protocol::stream::UnitStream;
+
+use crate::registrar::{Desk, Notice, PreLaunchEnd};
+
+/// Watches a stream for what the registrar and the readers of the status should hear of.
+#[derive(Debug, Default)]
+pub(super) struct Teller {
+    desk: Option<Desk>,
+    /// Not taken yet: the registrar had too much waiting.
+    untold: VecDeque<Notice>,
+    state: Option<State>,
+    revision: u64,
+    /// End of the last tick before a pre-launch calibration began (ns on the producer's clock).
+    pre_launch_start_ns: Option<i64>,
+}
+
+impl Teller {
+    /// To whom notices go.
+    pub(super) fn report_to(&mut self, desk: Desk) {
+        self.desk = Some(desk);
+    }
+
+    /// Looks at the stream; whether state or revision are others than at the last look.
+    pub(super) fn look(&mut self, stream: &mut UnitStream) -> bool {
+        while let Some(first) = stream.take_in_force() {
+            self.untold.push_back(Notice::InForce(first));
+        }
+        let (state, revision) =
+            (stream.unit().state(), stream.unit().calibration().map_or(0, |(_, counter)| counter));
+        let changed = self.state != Some(state) || self.revision != revision;
+        if changed {
+            let end_ns = stream.unit().observation().map(|seen| seen.end_time.as_ns());
+            if state == State::PreLaunchCalibration {
+                self.pre_launch_start_ns = end_ns;
+            } else if self.state == Some(State::PreLaunchCalibration) {
+                self.pre_launch_ended(stream, end_ns);
+            }
+            (self.state, self.revision) = (Some(state), revision);
+        }
+        self.tell(stream);
+        changed
+    }
+
+    /// Notes what a pre-launch calibration led to; one that was given up leaves nothing.
+    fn pre_launch_ended(&mut self, stream: &UnitStream, end_ns: Option<i64>) {
+        let outcome: Option<Outcome> = match stream.unit().pre_launch() {
+            Some(PreLaunchView::Ended(outcome)) => Some(outcome.clone()),
+            Some(PreLaunchView::Aborted | PreLaunchView::Running(_)) | None => None,
+        };
+        let end_ns = end_ns.unwrap_or_default();
+        self.untold.push_back(Notice::PreLaunch(PreLaunchEnd {
+            outcome,
+            revision: self.revision,
+            start_ns: self.pre_launch_start_ns.unwrap_or(end_ns),
+            end_ns,
+        }));
+    }
+
+    /// Hands over what is untold, as far as it is taken.
+    pub(super) fn tell(&mut self, stream: &UnitStream) {
+        let Some(desk) = &self.desk else {
+            self.untold.clear();
+            return;
+        };
+        while let Some(notice) = self.untold.pop_front() {
+            if let Err(notice) = desk.notice(stream.id(), notice) {
+                self.untold.push_front(notice);
+                return;
+            }
+        }
+    }
+
+    /// What is untold, for a registrar that is about to end.
+    pub(super) fn take_untold(&mut self) -> Vec<Notice> {
+        self.untold.drain(..).collect()
+    }
+}

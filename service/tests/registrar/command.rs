@@ -1,0 +1,105 @@
+//! Commands over the bus: states, refusals, what is written down.
+
+use isotherm_correction::operation::State;
+use isotherm_protocol::control::SwapOptions;
+use isotherm_protocol::history::{AuditEvent, CommandRecord};
+use isotherm_service::Settings;
+
+use crate::stand::{Folders, Stand, UNIT, assert_accepted, document};
+
+#[tokio::test(flavor = "multi_thread")]
+async fn commands_move_a_unit_from_state_to_state_and_are_written_down() {
+    let folders = Folders::new();
+    let mut stand = Stand::start(folders.settings()).await;
+    assert_accepted(&stand.swap(UNIT, &document(UNIT, 1.0), &SwapOptions::default()).await, 1);
+    stand.revisions(UNIT, 20).await;
+
+    let reply = stand.command(UNIT, r#"{"command":"standby","by":"ann"}"#).await;
+    assert!(reply.accepted);
+    assert_eq!(reply.state, State::Standby);
+    assert!(reply.allowed.contains(&"pre-launch".to_owned()));
+    stand.send(UNIT, 20).await;
+    let reply = stand.command(UNIT, r#"{"command":"run","reversal":true}"#).await;
+    assert!(!reply.accepted && reply.reason.unwrap().contains("mode_reversal"));
+    assert_eq!(reply.state, State::Standby);
+    let reply = stand.command(UNIT, r#"{"command":"run"}"#).await;
+    assert_eq!(reply.state, State::RunningWithoutReversal);
+    let reply = stand.command(UNIT, r#"{"command":"self-test"}"#).await;
+    assert!(!reply.accepted && reply.reason.unwrap().contains("possible now: run, standby"));
+    let reply = stand.command(UNIT, r#"{"command":"rest","latitude_deg":95,"heading_deg":0}"#).await;
+    assert!(!reply.accepted && reply.reason.unwrap().contains("latitude is 95°"));
+
+    // The ticks that were held back are announced by the first that goes out.
+    let out = stand.run_unit(UNIT, 20).await;
+    assert_eq!(out.iter().map(|(_, tick)| tick.missed).sum::<u64>() + out.len() as u64, 40);
+    let records: Vec<CommandRecord> = stand
+        .history(UNIT)
+        .await
+        .into_iter()
+        .filter_map(|entry| {
+            let AuditEvent::Command(record) = entry.event else { return None };
+            Some(record)
+        })
+        .collect();
+    let told: Vec<_> = records.iter().map(|record| (record.command.as_str(), record.accepted)).collect();
+    assert_eq!(
+        told,
+        [
+            ("standby", true),
+            ("run with mode reversal", false),
+            ("run", true),
+            ("self-test", false),
+            ("rest at latitude 95°, heading 0°, levelled", false)
+        ]
+    );
+    assert_eq!(
+        (records[0].state_before.as_str(), records[0].last_sequence),
+        ("running without mode reversal", Some(19))
+    );
+    stand.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_unit_may_begin_in_standby_and_a_self_test_has_its_report() {
+    let folders = Folders::new();
+    let mut settings = folders.settings();
+    settings.unit.in_standby = true;
+    let mut stand = Stand::start(settings).await;
+    assert_accepted(&stand.swap(UNIT, &document(UNIT, 1.0), &SwapOptions::default()).await, 1);
+    stand.send(UNIT, 20).await;
+    while stand.service.totals().unit(&crate::stand::unit_id(UNIT)).ticks_in < 20 {
+        tokio::task::yield_now().await;
+    }
+    let reply = stand.command(UNIT, r#"{"command":"self-test"}"#).await;
+    assert_eq!(reply.state, State::SelfTest);
+    // Ten seconds of event time.
+    stand.send(UNIT, 2100).await;
+    let report = loop {
+        if let Some(report) = stand.status(UNIT).self_test {
+            break report;
+        }
+        tokio::task::yield_now().await;
+    };
+    assert!(report.items.iter().any(|item| item.name == "gyro x"), "{report:#?}");
+    assert!(report.items.iter().any(|item| item.name == "calibration" && item.passed), "{report:#?}");
+    assert_eq!(stand.command(UNIT, r#"{"command":"abort"}"#).await.state, State::Standby);
+    stand.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_self_test_without_ticks_is_ended_by_the_clock() {
+    let folders = Folders::new();
+    let settings = Settings { state: None, ..folders.settings() };
+    let mut stand = Stand::start(settings).await;
+    assert_accepted(&stand.swap(UNIT, &document(UNIT, 1.0), &SwapOptions::default()).await, 1);
+    stand.revisions(UNIT, 20).await;
+    stand.command(UNIT, r#"{"command":"standby"}"#).await;
+    let started = std::time::Instant::now();
+    assert_eq!(stand.command(UNIT, r#"{"command":"self-test"}"#).await.state, State::SelfTest);
+    while stand.status(UNIT).self_test.is_none() {
+        assert!(started.elapsed().as_secs() < 15, "a report within 15 s");
+        tokio::time::sleep(std::time::Duration::from_millis(50)).await;
+    }
+    assert!(!stand.status(UNIT).self_test.unwrap().passed, "no gyro was alive");
+    stand.stop().await;
+}

@@ -1,0 +1,18 @@
+//! Swaps and commands on a running service: whichever way they come in, over real sessions and folders.
+
+#![expect(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "a test may panic, its helpers included"
+)]
+
+mod bus;
+mod command;
+mod folder;
+mod instance;
+mod policy;
+mod pre_launch;
+mod restart;
+mod schedule;
+mod stand;
