@@ -1,14 +1,14 @@
-"""The wire messages of docs/wire.md, version 1, decoded and encoded in plain Python.
+"""The wire messages of docs/wire.md, decoded and encoded in plain Python.
 
 It rests on that page alone: the tables below have the order, the types and the limits of the page's tables.
-A message is a dict with the page's field names; a `readings` is {"Counts": [...]} or {"Means": [...]}.
+A message is a dict with the page's field names; a `readings` is {"Counts": [...]} or {"Means": [...]}; an enum without
+content is the name that the page gives it in quotes, a digest is hexadecimal digits.
 """
 
+import math
 import struct
 import zlib
 
-MIN_VERSION = 1
-CURRENT_VERSION = 1
 MAX_FRAME = 1 << 20
 MAX_TICKS = 4096
 
@@ -166,6 +166,22 @@ class Array:
             self.item.write(out, item)
 
 
+class Digest:
+    """A fixed number of bytes, here as hexadecimal digits."""
+
+    def __init__(self, count):
+        self.count = count
+
+    def read(self, cursor):
+        return cursor.take(self.count).hex()
+
+    def write(self, out, value):
+        data = bytes.fromhex(value)
+        if len(data) != self.count:
+            raise ValueError(f"{value} has not {self.count} bytes")
+        out += data
+
+
 class Option:
     """0 for none (None here); 1, then the value."""
 
@@ -187,8 +203,8 @@ class Option:
 class Enum:
     """The variant's number (u32), then the variant's content, where it has any."""
 
-    def __init__(self, **variants):
-        self.variants = list(variants.items())
+    def __init__(self, *names, **variants):
+        self.variants = [(name, None) for name in names] + list(variants.items())
 
     def read(self, cursor):
         number = U32.read(cursor)
@@ -226,7 +242,7 @@ U16, U32, U64, I32, I64 = Uint(16), Uint(32), Uint(64), Sint(32), Sint(64)
 CHANNEL_NAME = Text(24)
 MODE = Enum(Plus=None, Minus=None)
 READINGS = Enum(Counts=Seq(I32, 8), Means=Seq(F64(), 8))
-REVISION = Struct(counter=U64, digest=Array(Byte(), 8))
+REVISION = Struct(counter=U64, digest=Digest(8))
 
 GYRO_BATCH = Struct(
     first_sequence=U64,
@@ -279,7 +295,20 @@ CORRECTED_BATCH = Struct(
     ),
 )
 
-STATUS = Struct(
+HEALTH_BATCH = Struct(
+    ticks=Seq(Struct(time_ns=I64, readings=Seq(Struct(name=CHANNEL_NAME, value=F64()), 64)), MAX_TICKS),
+)
+
+REFERENCE_BODY = Struct(
+    start_ns=I64,
+    end_ns=I64,
+    angular_rate_rad_per_s=Array(F64(), 3),
+    sigma_rad_per_s=F64(),
+)
+
+COUNTER = Struct(name=Text(), value=U64)
+
+STATUS_1 = Struct(
     unit=Text(),
     service_version=Text(),
     state=Enum(Uncalibrated=None, Held=None, Running=None),
@@ -296,25 +325,197 @@ STATUS = Struct(
         ),
         256,
     ),
-    counters=Seq(Struct(name=Text(), value=U64), 256),
+    counters=Seq(COUNTER, 256),
     last_fault=Option(Text()),
     added_latency_p50_ns=U64,
     added_latency_p99_ns=U64,
 )
 
-RAW_GYRO, RAW_ACCEL, RAW_TEMPERATURE, CORRECTED, STATUS_KIND = 1, 2, 3, 4, 5
+STATE = Enum(
+    "standby",
+    "self-test",
+    "pre-launch calibration",
+    "running with mode reversal",
+    "running without mode reversal",
+)
+OUTPUT = Enum("calibrated", "pass-through", "held")
+FAULT = Struct(kind=Text(), count=U64, first=Text(), last_unix_ms=I64)
+PRE_LAUNCH_MODES = Seq(
+    Struct(mode=Option(MODE), ticks=U64, time_s=F64(), mean_temperature_deg_c=Option(F64())),
+    3,
+)
+CONSTANTS = Struct(
+    gyro=Text(),
+    static_bias_change_rad_per_s=F64(),
+    static_bias_sigma_rad_per_s=F64(),
+    magnetic_bias_change_rad_per_s=Option(F64()),
+    magnetic_bias_sigma_rad_per_s=Option(F64()),
+    earth_rate_rad_per_s=F64(),
+    modes=PRE_LAUNCH_MODES,
+)
+
+STATUS_2 = Struct(
+    unit=Text(),
+    instance=Text(),
+    version=Text(),
+    state=STATE,
+    output=OUTPUT,
+    calibration=Option(
+        Struct(
+            revision=REVISION,
+            digest=Option(Digest(32)),
+            created_unix_s=Option(I64),
+            age_s=Option(I64),
+            source=Text(),
+            overlay=Option(Digest(32)),
+        )
+    ),
+    pending=Option(
+        Struct(
+            revision=REVISION,
+            digest=Option(Digest(32)),
+            source=Text(),
+            schedule=Enum("next-tick", **{"sequence": U64, "time-ns": I64}),
+            slew_s=F64(),
+        )
+    ),
+    swaps=Struct(accepted=U64, refused=U64, last_refusal=Option(Text())),
+    last_tick=Option(Struct(end_time_ns=I64, sequence=U64, series=U64)),
+    channels=Seq(
+        Struct(
+            name=CHANNEL_NAME,
+            temperature_deg_c=Option(F64()),
+            rate_deg_c_per_s=Option(F64()),
+            stale=Bool(),
+            warming_up=Bool(),
+            calibrated_range_deg_c=Option(Array(F64(), 2)),
+            place=Option(Enum("below", "inside", "above")),
+        ),
+        256,
+    ),
+    sensors=Seq(
+        Struct(
+            name=Text(),
+            kind=Enum("gyro", "accel"),
+            flags=Byte(),
+            ticks=U64,
+            invalid=U64,
+            overrange=U64,
+            not_finite=U64,
+            clamped=U64,
+            stale=U64,
+            excluded=U64,
+        ),
+        16,
+    ),
+    input_rates=Struct(
+        gyro_ticks_per_s=F64(),
+        accel_ticks_per_s=F64(),
+        temperature_readings_per_s=F64(),
+        messages_per_s=F64(),
+    ),
+    applied=Option(Struct(angular_rate_rad_per_s=Array(F64(), 3), specific_force_m_per_s2=Array(F64(), 3))),
+    drift=Seq(
+        Struct(
+            gyro=Text(),
+            rate_rad_per_s=F64(),
+            sigma_rad_per_s=F64(),
+            trend_rad_per_s2=F64(),
+            updates=U64,
+            refused=U64,
+            mean_nis=Option(F64()),
+            last_update_ns=Option(I64),
+            subtracted=Bool(),
+        ),
+        16,
+    ),
+    rest=Option(Enum("learning", "still", moved=Text())),
+    self_test=Option(
+        Struct(
+            passed=Bool(),
+            ended_ns=Option(I64),
+            length_s=F64(),
+            items=Seq(
+                Struct(
+                    name=Text(),
+                    value=Option(F64()),
+                    at_least=Option(F64()),
+                    at_most=Option(F64()),
+                    unit_of_measure=Text(),
+                    passed=Bool(),
+                ),
+                256,
+            ),
+        )
+    ),
+    pre_launch=Option(
+        Struct(
+            elapsed_s=F64(),
+            duration_s=F64(),
+            gyros=Seq(Struct(name=Text(), modes=PRE_LAUNCH_MODES, sigma_rad_per_s=Option(F64())), 8),
+        )
+    ),
+    pre_launch_outcome=Option(
+        Struct(
+            ended_ns=Option(I64),
+            verdict=Enum(accepted=Seq(CONSTANTS, 8), refused=Seq(Text(), 64), aborted=None),
+            overlay=Option(Digest(32)),
+        )
+    ),
+    counters=Seq(COUNTER, 256),
+    faults=Seq(FAULT, 32),
+    last_fault=Option(Text()),
+    latency=Struct(
+        p50_ns=U64,
+        p99_ns=U64,
+        p999_ns=U64,
+        max_ns=U64,
+        buckets=Seq(Struct(up_to_ns=U64, count=U64), 1024),
+    ),
+)
+
+SERVICE_STATUS_BODY = Struct(
+    instance=Text(),
+    version=Text(),
+    pid=Option(U32),
+    started_unix_ms=I64,
+    uptime_s=F64(),
+    units=Seq(Struct(unit=Text(), state=STATE, output=OUTPUT), 4096),
+    calibrations=Option(
+        Struct(path=Text(), state=Enum("watching", "polling", "gone"), reason=Option(Text())),
+    ),
+    bad_documents=Seq(Struct(file=Text(), problem=Text(), problems=U64), 64),
+    store=Option(Struct(path=Text(), audit_entries=U64)),
+    faults=Seq(FAULT, 32),
+    settings_digest=Option(Digest(32)),
+    swaps_accepted=U64,
+    swaps_refused=U64,
+)
+
+RAW_GYRO, RAW_ACCEL, RAW_TEMPERATURE, CORRECTED, STATUS, RAW_HEALTH, SERVICE_STATUS, REFERENCE = range(1, 9)
+# By kind, then by version; the highest version is the one that is written.
 BODIES = {
-    RAW_GYRO: GYRO_BATCH,
-    RAW_ACCEL: ACCEL_BATCH,
-    RAW_TEMPERATURE: TEMPERATURE_BATCH,
-    CORRECTED: CORRECTED_BATCH,
-    STATUS_KIND: STATUS,
+    RAW_GYRO: {1: GYRO_BATCH},
+    RAW_ACCEL: {1: ACCEL_BATCH},
+    RAW_TEMPERATURE: {1: TEMPERATURE_BATCH},
+    CORRECTED: {1: CORRECTED_BATCH},
+    STATUS: {1: STATUS_1, 2: STATUS_2},
+    RAW_HEALTH: {1: HEALTH_BATCH},
+    SERVICE_STATUS: {1: SERVICE_STATUS_BODY},
+    REFERENCE: {1: REFERENCE_BODY},
 }
 
 
 def check(kind, message):
     """What the types cannot say."""
-    if kind == STATUS_KIND:
+    if kind in (STATUS, SERVICE_STATUS):
+        return
+    if kind == REFERENCE:
+        rates, sigma = message["angular_rate_rad_per_s"], message["sigma_rad_per_s"]
+        if message["end_ns"] <= message["start_ns"]:
+            raise Refused("a reference ends before it starts")
+        if not all(math.isfinite(value) for value in [*rates, sigma]) or sigma < 0:
+            raise Refused("a reference has a rate or sigma that cannot be")
         return
     ticks = message["ticks"]
     if not 1 <= len(ticks) <= MAX_TICKS:
@@ -337,22 +538,24 @@ def decode(frame, kind):
         raise Refused(f"a frame has {len(frame)} bytes")
     if frame[0] != kind:
         raise Refused(f"kind is {frame[0]}, expected {kind}")
-    if not MIN_VERSION <= frame[1] <= CURRENT_VERSION:
-        raise Refused(f"version {frame[1]} is not known")
+    body = BODIES[kind].get(frame[1])
+    if body is None:
+        raise Refused(f"version {frame[1]} of kind {kind} is not known")
     if zlib.crc32(frame[:-4]) != int.from_bytes(frame[-4:], "little"):
         raise Refused("the checksum does not fit")
     cursor = Cursor(frame[2:-4])
-    message = BODIES[kind].read(cursor)
+    message = body.read(cursor)
     if cursor.at < len(cursor.data):
         raise Refused(f"{len(cursor.data) - cursor.at} bytes are left over")
     check(kind, message)
     return message
 
 
-def encode(message, kind):
-    """The frame of a message."""
+def encode(message, kind, version=None):
+    """The frame of a message, in the current version where none is stated."""
     check(kind, message)
-    frame = bytearray([kind, CURRENT_VERSION])
-    BODIES[kind].write(frame, message)
+    version = version or max(BODIES[kind])
+    frame = bytearray([kind, version])
+    BODIES[kind][version].write(frame, message)
     frame += zlib.crc32(frame).to_bytes(4, "little")
     return bytes(frame)

@@ -5,6 +5,8 @@ use std::sync::Arc;
 use isotherm_correction::calibration::{AccelParts, Calibration, CalibrationParts, GyroParts};
 use isotherm_correction::channel::{ChannelParts, ThermalFilterParts};
 use isotherm_correction::curve::CurveParts;
+use isotherm_correction::drift::DriftParts;
+use isotherm_correction::operation::SelfTestParts;
 use isotherm_correction::orientation::OrientationParts;
 use isotherm_correction::reversal::ReversalParts;
 use isotherm_correction::sample::{ChannelName, OutputKind};
@@ -37,6 +39,7 @@ pub fn plain_gyro() -> GyroParts {
         lags: Vec::new(),
         trend: None,
         servo: None,
+        drift: None,
     }
 }
 
@@ -106,6 +109,7 @@ pub fn identity() -> CalibrationParts {
         accel_orientation: Some(orientation(&ALONG_CASE_AXES)),
         accel_orientation_channels: vec![0],
         reversal: None,
+        self_test: SelfTestParts::default(),
     }
 }
 
@@ -133,4 +137,17 @@ pub const MAGNETIC_BIAS_RAD_PER_S: f64 = 10.0 * std::f64::consts::PI / 180.0 / 3
 #[must_use]
 pub fn compile(parts: &CalibrationParts) -> Arc<Calibration> {
     Arc::new(Calibration::new(parts).expect("the fixture is sound"))
+}
+
+/// A drift so lively that the estimator follows every reference.
+#[must_use]
+pub const fn lively_drift() -> DriftParts {
+    DriftParts {
+        sigma_rad_per_s: 1e-2,
+        correlation_time_s: 600.0,
+        trend_sigma_rad_per_s2: 1e-6,
+        trend_correlation_time_s: 3600.0,
+        initial_sigma_rad_per_s: 0.1,
+        angle_random_walk_rad_per_sqrt_s: 1e-6,
+    }
 }

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use isotherm_correction::calibration::Calibration;
+use isotherm_correction::drift::Reference;
 use isotherm_correction::sample::{AccelTick, CorrectedTick, GyroTick, OutputKind, TemperatureReading};
 use isotherm_correction::unit::{Event, Unit, UnitSettings};
 
@@ -15,6 +16,8 @@ pub enum Owned {
     Accel(Vec<AccelTick>),
     /// Temperature readings.
     Temperature(Vec<TemperatureReading>),
+    /// The true rate of the case over a span.
+    Reference(Reference),
 }
 
 /// A unit with a calibration.
@@ -32,6 +35,7 @@ pub fn hand(unit: &mut Unit, event: &Owned, out: &mut Vec<CorrectedTick>) {
         Owned::Gyro(ticks) => unit.handle(Event::Gyro { output: OutputKind::Mean, ticks }, &mut emit),
         Owned::Accel(ticks) => unit.handle(Event::Accel { output: OutputKind::Mean, ticks }, &mut emit),
         Owned::Temperature(readings) => unit.handle(Event::Temperature(readings), &mut emit),
+        Owned::Reference(reference) => unit.handle(Event::Reference(reference), &mut emit),
     }
 }
 

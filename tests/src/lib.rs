@@ -2,13 +2,20 @@
 //!
 //! The tests themselves are in `tests/tests/`.
 
-#![expect(clippy::expect_used, reason = "a fixture that does not hold ends the test that asked for it")]
+#![expect(
+    clippy::expect_used,
+    clippy::panic,
+    reason = "a fixture that does not hold ends the test that asked for it"
+)]
 
 pub mod bench;
 pub mod calibrations;
 pub mod data;
+pub mod dice;
 pub mod drive;
 pub mod logs;
+pub mod operator;
+pub mod player;
 pub mod process;
 pub mod simulated;
 pub mod streams;

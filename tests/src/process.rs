@@ -22,6 +22,16 @@ pub fn program(name: &str) -> PathBuf {
         // The whole workspace, so that the dependencies have the features that they have under test.
         cargo.args(["build", "--quiet", "--workspace", "--bins"]);
         cargo.arg("--target-dir").arg(target).current_dir(crate::data::root());
+        // What `cargo test` says of this package would look like a change to build scripts that ask for it, such as that of
+        // `ring`: it would be built anew each time, and all of Zenoh with it.
+        for (name, _) in std::env::vars_os() {
+            if name
+                .to_str()
+                .is_some_and(|name| name.starts_with("CARGO_PKG_") || name.starts_with("CARGO_MANIFEST_"))
+            {
+                cargo.env_remove(name);
+            }
+        }
         if folder.ends_with("release") {
             cargo.arg("--release");
         }
@@ -84,6 +94,11 @@ impl Service {
         let ready: serde_json::Value = serde_json::from_str(&line).expect("one line of JSON");
         let locator = ready["locators"][0].as_str().expect("a locator").to_owned();
         Self { child, locator }
+    }
+
+    /// Ends it as a crash would, in the middle of whatever it does.
+    pub fn kill(self) {
+        drop(self);
     }
 
     /// Asks it to stop as an operator would; how it ended and what it said of its totals.

@@ -70,6 +70,7 @@ pub(crate) fn bare_gyro(index: usize, name: &str) -> GyroSensor {
         lag: Vec::new(),
         trend: None,
         servo: None,
+        drift: None,
     }
 }
 

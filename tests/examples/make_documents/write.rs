@@ -78,6 +78,7 @@ pub(crate) fn document(unit: &str) -> Document {
         },
         accel: None,
         mode_reversal: None,
+        self_test: None,
     }
 }
 

@@ -4,11 +4,13 @@
 use std::sync::Arc;
 
 use isotherm_correction::calibration::{BranchArgument, BranchedParts, Calibration, LagParts};
+use isotherm_correction::drift::Reference;
 use isotherm_correction::sample::{AccelTick, CorrectedTick, GyroTick, TickFlags};
+use isotherm_correction::unit::{Unit, UnitSettings};
 use isotherm_correction::units::{Span, Timestamp};
-use isotherm_tests::calibrations::{compile, constant, identity, polynomial};
+use isotherm_tests::calibrations::{compile, constant, identity, lively_drift, polynomial};
 use isotherm_tests::drive::{self, Owned};
-use isotherm_tests::streams::{accel, gyro, temperature};
+use isotherm_tests::streams::{accel, end_of, gyro, temperature};
 use proptest::prelude::*;
 
 const TICKS: u64 = 2000;
@@ -168,4 +170,40 @@ fn i2_ticks_that_still_wait_take_nothing_from_the_series_behind_them() {
     let missing = out.iter().filter(|tick| tick.flags.contains(TickFlags::ACCELEROMETER_MISSING));
     assert_eq!(missing.map(|tick| tick.sequence).collect::<Vec<_>>(), [1009]);
     assert_eq!(out.len(), 20);
+}
+
+#[test]
+fn i2_a_subtracted_drift_depends_on_the_references_and_their_own_time() {
+    let mut parts = identity();
+    for gyro in &mut parts.gyros {
+        gyro.drift = Some(lively_drift());
+    }
+    let calibration = compile(&parts);
+    let references: Vec<_> = (1..8)
+        .map(|k| (200 * k, [1e-3, -2e-3, 5e-4].map(|rate| rate * f64::from(u32::try_from(k).unwrap()))))
+        .map(|(last, angular_rate)| {
+            (last, Reference { start: end_of(last - 200), end: end_of(last), angular_rate, sigma: 1e-6 })
+        })
+        .collect();
+    // Each reference arrives some ticks after its span, by less than the delay of 1 s.
+    let run = |batch: u64, lateness: u64| {
+        let settings = UnitSettings { subtract_drift: true, ..UnitSettings::default() };
+        let mut unit = Unit::new(settings);
+        unit.install(Arc::clone(&calibration), 1);
+        let mut events = Vec::new();
+        for first in (0..TICKS).step_by(usize::try_from(batch).unwrap()) {
+            let range = first..first + batch;
+            let due = references.iter().filter(|(last, _)| range.contains(&(last + lateness)));
+            events.extend(due.map(|(_, reference)| Owned::Reference(*reference)));
+            events.push(Owned::Accel(range.clone().map(|k| accel(k, &[0.1; 3])).collect()));
+            events.push(Owned::Gyro(range.map(|k| gyro(k, &[0.01; 3])).collect()));
+        }
+        drive::run(&mut unit, &events)
+    };
+    let reference = run(1, 1);
+    let [first, last] = [&reference[0], &reference[reference.len() - 1]].map(|tick| tick.delta_angle[0]);
+    assert!((first - last).abs() > 1e-6, "the drift is felt: {first} and {last}");
+    for (batch, lateness) in [(1, 120), (8, 1), (50, 60), (100, 90)] {
+        assert!(run(batch, lateness) == reference, "batches of {batch}, {lateness} ticks late");
+    }
 }

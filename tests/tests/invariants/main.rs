@@ -9,7 +9,9 @@
 
 mod i1_each_tick_once;
 mod i2_timing_does_not_matter;
+mod i3_schedule;
 mod i3_swap;
 mod i5_mode_switch;
 mod i7_broken_input;
 mod laws;
+mod states;
