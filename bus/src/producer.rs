@@ -1,6 +1,5 @@
 //! Publishing raw batches in the order that the service needs, without outrunning it.
 
-mod assemble;
 mod in_flight;
 
 use std::sync::Arc;
@@ -9,15 +8,14 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use isotherm_correction::sample::{AccelTick, GyroTick, OutputKind, TemperatureReading};
 use isotherm_correction::units::Timestamp;
-use isotherm_protocol::codec::{self, MAX_TICKS, Message};
+use isotherm_protocol::codec::{self, MAX_TICKS};
 use isotherm_protocol::key::{self, RawStream, UnitId};
-use isotherm_protocol::raw::{AccelBatch, GyroBatch, HealthBatch, HealthReading, HealthTick};
+use isotherm_protocol::raw::{BatchError, Batcher, HealthBatch, HealthReading, HealthTick, RawFrame};
 use zenoh::Session;
 use zenoh::pubsub::{Publisher, Subscriber};
 use zenoh::qos::{CongestionControl, Priority};
 
 use crate::{BusError, presence};
-use assemble::{Pending, temperature_batches};
 use in_flight::InFlight;
 
 /// How a producer publishes.
@@ -77,10 +75,7 @@ pub struct Producer {
     accel: Publisher<'static>,
     temperature: Publisher<'static>,
     health: Publisher<'static>,
-    gyro_pending: Pending<GyroTick>,
-    accel_pending: Pending<AccelTick>,
-    temperature_pending: Vec<TemperatureReading>,
-    frame: Vec<u8>,
+    batcher: Batcher,
     sent: u64,
     /// Number of this producer's run.
     series: u64,
@@ -124,10 +119,7 @@ impl Producer {
             temperature: publisher(RawStream::Temperature).await?,
             // Who listens to ticks need not listen to this.
             health: unheard(RawStream::Health).await?,
-            gyro_pending: Pending::default(),
-            accel_pending: Pending::default(),
-            temperature_pending: Vec::new(),
-            frame: Vec::new(),
+            batcher: Batcher::new(options.batch_ticks),
             sent: 0,
             series: new_series(),
             in_flight,
@@ -142,11 +134,8 @@ impl Producer {
     /// [`BusError::NotCounts`], [`BusError::Encode`], [`BusError::Put`], [`BusError::NoAcknowledgement`].
     pub async fn gyro(&mut self, output: OutputKind, mut tick: GyroTick) -> Result<(), BusError> {
         tick.series = self.series;
-        if !self.gyro_pending.continues(output, tick.sequence, tick.readings.len()) {
-            self.flush().await?;
-        }
-        self.gyro_pending.push(output, tick);
-        if self.gyro_pending.len() >= self.options.batch_ticks { self.flush().await } else { Ok(()) }
+        let taken = self.batcher.gyro(output, tick);
+        self.publish_ready(taken).await
     }
 
     /// Takes one accelerometer tick.
@@ -154,13 +143,8 @@ impl Producer {
     /// # Errors
     /// As [`Producer::gyro`].
     pub async fn accel(&mut self, output: OutputKind, tick: AccelTick) -> Result<(), BusError> {
-        if !self.accel_pending.continues(output, tick.sequence, tick.readings.len())
-            || self.accel_pending.len() == MAX_TICKS
-        {
-            self.flush_accel().await?;
-        }
-        self.accel_pending.push(output, tick);
-        Ok(())
+        let taken = self.batcher.accel(output, tick);
+        self.publish_ready(taken).await
     }
 
     /// Takes temperature readings.
@@ -168,8 +152,8 @@ impl Producer {
     /// # Errors
     /// As [`Producer::gyro`].
     pub async fn temperatures(&mut self, readings: &[TemperatureReading]) -> Result<(), BusError> {
-        self.temperature_pending.extend_from_slice(readings);
-        if self.temperature_pending.len() >= MAX_TICKS { self.flush_temperatures().await } else { Ok(()) }
+        let taken = readings.iter().try_for_each(|reading| self.batcher.temperature(*reading));
+        self.publish_ready(taken).await
     }
 
     /// Publishes what the instrument reports of itself at a time, at once: readings have no batch to wait for.
@@ -178,7 +162,10 @@ impl Producer {
     /// As [`Producer::gyro`].
     pub async fn health(&mut self, time: Timestamp, readings: &[HealthReading]) -> Result<(), BusError> {
         let tick = HealthTick { time_ns: time.as_ns(), readings: readings.to_vec() };
-        publish(&self.health, &mut self.frame, &HealthBatch { ticks: vec![tick] }).await
+        let frame = codec::encode(&HealthBatch { ticks: vec![tick] });
+        let frame =
+            frame.map_err(|source| BusError::Encode { key: self.health.key_expr().to_string(), source })?;
+        publish(&self.health, frame).await
     }
 
     /// Publishes everything that was handed over, full batch or not.
@@ -186,9 +173,8 @@ impl Producer {
     /// # Errors
     /// As [`Producer::gyro`].
     pub async fn flush(&mut self) -> Result<(), BusError> {
-        self.flush_temperatures().await?;
-        self.flush_accel().await?;
-        self.flush_gyro().await
+        let flushed = self.batcher.flush();
+        self.publish_ready(flushed).await
     }
 
     /// Waits until every tick sent has come back, at most the acknowledge timeout without progress.
@@ -214,41 +200,34 @@ impl Producer {
         self.in_flight.as_ref().map_or(0, |(in_flight, _)| in_flight.ticks())
     }
 
-    async fn flush_temperatures(&mut self) -> Result<(), BusError> {
-        for batch in temperature_batches(&self.temperature_pending) {
-            publish(&self.temperature, &mut self.frame, &batch).await?;
+    /// Publishes the frames that are ready, and then tells what was wrong with a tick.
+    async fn publish_ready(&mut self, taken: Result<(), BatchError>) -> Result<(), BusError> {
+        while let Some(RawFrame { stream, frame, first_sequence, ticks, .. }) = self.batcher.next_frame() {
+            match stream {
+                RawStream::Gyro => {
+                    self.gyro_frame(frame, first_sequence, ticks).await?;
+                }
+                RawStream::Accel => publish(&self.accel, frame).await?,
+                RawStream::Temperature => publish(&self.temperature, frame).await?,
+                RawStream::Health => publish(&self.health, frame).await?,
+            }
         }
-        self.temperature_pending.clear();
-        Ok(())
+        taken.map_err(|error| match error {
+            BatchError::NotCounts { sequence } => BusError::NotCounts { unit: self.unit.clone(), sequence },
+            BatchError::Codec(source) => {
+                BusError::Encode { key: key::raw(&self.unit, RawStream::Gyro), source }
+            }
+        })
     }
 
-    async fn flush_accel(&mut self) -> Result<(), BusError> {
-        let Some(output) = self.accel_pending.output() else {
-            return Ok(());
-        };
-        let ticks = self.accel_pending.take();
-        for part in ticks.chunks(self.options.batch_ticks) {
-            let batch =
-                AccelBatch::from_core(output, part).ok_or_else(|| self.not_counts(part[0].sequence))?;
-            publish(&self.accel, &mut self.frame, &batch).await?;
-        }
-        Ok(())
-    }
-
-    async fn flush_gyro(&mut self) -> Result<(), BusError> {
-        let Some(output) = self.gyro_pending.output() else {
-            return Ok(());
-        };
-        let ticks = self.gyro_pending.take();
-        let (first, count) = (ticks[0].sequence, ticks.len() as u64);
-        let batch = GyroBatch::from_core(output, &ticks).ok_or_else(|| self.not_counts(first))?;
+    async fn gyro_frame(&mut self, frame: Vec<u8>, first: u64, count: u64) -> Result<(), BusError> {
         if let Some(limit) = self.options.max_in_flight {
             self.wait_below(limit.saturating_add(1).saturating_sub(count)).await?;
         }
         if let Some((in_flight, _)) = &self.in_flight {
             in_flight.sent(first, count);
         }
-        publish(&self.gyro, &mut self.frame, &batch).await?;
+        publish(&self.gyro, frame).await?;
         self.sent += count;
         Ok(())
     }
@@ -266,10 +245,6 @@ impl Producer {
             }
         })
     }
-
-    fn not_counts(&self, sequence: u64) -> BusError {
-        BusError::NotCounts { unit: self.unit.clone(), sequence }
-    }
 }
 
 /// A number that no producer of the unit had before: the time of the start, which reaches no corrected increment, and a
@@ -281,13 +256,8 @@ fn new_series() -> u64 {
     ns.wrapping_add(COUNT.fetch_add(1, Ordering::Relaxed))
 }
 
-/// Encodes and publishes one batch.
-async fn publish<M: Message>(
-    publisher: &Publisher<'_>,
-    frame: &mut Vec<u8>,
-    batch: &M,
-) -> Result<(), BusError> {
-    let key = || publisher.key_expr().to_string();
-    codec::encode_into(batch, frame).map_err(|source| BusError::Encode { key: key(), source })?;
-    publisher.put(std::mem::take(frame)).await.map_err(|source| BusError::Put { key: key(), source })
+/// Publishes one frame.
+async fn publish(publisher: &Publisher<'_>, frame: Vec<u8>) -> Result<(), BusError> {
+    let put = publisher.put(frame).await;
+    put.map_err(|source| BusError::Put { key: publisher.key_expr().to_string(), source })
 }

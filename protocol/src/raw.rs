@@ -1,5 +1,6 @@
 //! Raw batches: what a producer publishes for one unit.
 
+mod batcher;
 mod health;
 
 use arrayvec::ArrayVec;
@@ -8,6 +9,7 @@ use isotherm_correction::sample::{ChannelName, MAX_SENSORS, OutputKind};
 use isotherm_correction::units::{Span, Timestamp};
 use serde::{Deserialize, Serialize};
 
+pub use batcher::{BatchError, Batcher, RawFrame};
 pub use health::{HealthBatch, HealthReading, HealthTick, MAX_HEALTH};
 
 use crate::codec::{CodecError, Kind, MAX_TICKS, Message, bounded};

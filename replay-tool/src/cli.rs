@@ -13,8 +13,8 @@ use clap::{Args, CommandFactory, Parser, Subcommand};
 use isotherm_correction::units::Span;
 
 use crate::error::Error;
-use crate::log::{LogReader, Window};
-use crate::mapping::Mapping;
+use isotherm_log::mapping::Mapping;
+use isotherm_log::text::{LogReader, Window};
 
 /// Plays recorded logs into the service, corrects them offline, simulates new ones.
 #[derive(Debug, Parser)]

@@ -12,8 +12,8 @@ use tokio::signal::unix::{SignalKind, signal};
 use tokio::time::{Instant, timeout};
 
 use crate::error::Error;
-use crate::log::{LogError, LogEvent};
 use crate::pace::{Pacer, Speed};
+use isotherm_log::text::{LogError, LogEvent};
 
 /// How long a wait for the service, or for the last ticks, may take without progress.
 const PATIENCE: Duration = Duration::from_secs(10);

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use crate::log::Progress;
+use isotherm_log::progress::Progress;
 
 /// Events between two looks at the bar.
 const STRIDE: u32 = 1024;

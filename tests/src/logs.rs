@@ -7,9 +7,9 @@ use std::sync::Arc;
 use isotherm_correction::calibration::Calibration;
 use isotherm_correction::sample::CorrectedTick;
 use isotherm_correction::unit::Event;
-use isotherm_replay_tool::error::Error;
-use isotherm_replay_tool::log::{LogEvent, LogReader};
-use isotherm_replay_tool::mapping::Mapping;
+use isotherm_log::error::Error;
+use isotherm_log::mapping::Mapping;
+use isotherm_log::text::{LogEvent, LogReader};
 
 use crate::data::root;
 use crate::drive;

@@ -11,12 +11,12 @@ use serde::Serialize;
 
 use super::{LogArgs, Outcome, print, show};
 use crate::error::Error;
-use crate::file::refuse_overwriting;
-use crate::log::ReadReport;
-use crate::offline::{Offline, load_calibration};
 use crate::output::{Format, Output, write_frame, write_header, write_tick};
 use crate::progress::Bar;
 use crate::summary::{Summary, Sums};
+use isotherm_log::file::refuse_overwriting;
+use isotherm_log::offline::{Offline, load_calibration};
+use isotherm_log::text::ReadReport;
 
 /// Outputs that are written together.
 const BLOCK: usize = 512;

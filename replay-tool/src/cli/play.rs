@@ -8,11 +8,11 @@ use serde::Serialize;
 
 use super::{LogArgs, Outcome, print, show};
 use crate::error::Error;
-use crate::log::ReadReport;
-use crate::offline::unit_id;
 use crate::pace::Speed;
 use crate::play::{PlayOptions, PlayReport, play};
 use crate::progress::Bar;
+use isotherm_log::offline::unit_id;
+use isotherm_log::text::ReadReport;
 
 /// Gyro ticks that may be under way where nothing else is said.
 const IN_FLIGHT: u64 = 4096;

@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use comfy_table::{CellAlignment, Table, presets};
 use serde::Serialize;
 
-use crate::log::ReadReport;
+use isotherm_log::text::ReadReport;
 
 /// A table of two columns, figures to the right.
 pub(super) fn table(rows: &[(&str, String)]) -> String {

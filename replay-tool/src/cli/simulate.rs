@@ -12,9 +12,9 @@ use serde::Serialize;
 
 use super::{Outcome, print, seconds, show};
 use crate::error::Error;
-use crate::file::{read_small_text, refuse_overwriting};
 use crate::progress::Bar;
 use crate::simulated::{Columns, LogWriter, write_truth, write_truth_header};
+use isotherm_log::file::{read_small_text, refuse_overwriting};
 
 /// Simulate a log, with the mapping that reads it back beside it
 #[derive(Debug, Args)]
@@ -137,7 +137,8 @@ impl SimulateArgs {
 fn load(path: &Path) -> Result<Scenario, Error> {
     let text = read_small_text(path, "read the scenario")?;
     toml::from_str(&text).map_err(|error| {
-        let (line, column) = error.span().map_or((1, 1), |span| crate::mapping::place(&text, span.start));
+        let (line, column) =
+            error.span().map_or((1, 1), |span| isotherm_log::mapping::place(&text, span.start));
         Error::Scenario(vec![format!("{}:{line}:{column}: {}", path.display(), error.message())])
     })
 }

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use isotherm_correction::sample::OutputKind;
-use isotherm_replay_tool::log::{LogEvent, LogReader};
-use isotherm_replay_tool::mapping::Mapping;
+use isotherm_log::mapping::Mapping;
+use isotherm_log::text::{LogEvent, LogReader};
 
 /// The folder of the real logs: `ISOTHERM_DATA`, or `../shared/data` beside the workspace.
 fn data(log: &str) -> Option<PathBuf> {

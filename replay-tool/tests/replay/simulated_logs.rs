@@ -3,8 +3,8 @@
 use std::io::Write;
 
 use isotherm_correction::sample::{GyroTick, LasingMode};
-use isotherm_replay_tool::log::{LogEvent, LogReader};
-use isotherm_replay_tool::mapping::Mapping;
+use isotherm_log::mapping::Mapping;
+use isotherm_log::text::{LogEvent, LogReader};
 use isotherm_replay_tool::simulated::{Columns, LogWriter};
 use isotherm_simulator::{Scenario, Simulation, presets};
 

@@ -9,7 +9,7 @@ use sha2::{Digest, Sha256};
 use crate::write::Failure;
 
 /// A log's events.
-pub(crate) use isotherm_replay_tool::log::LogEvent;
+pub(crate) use isotherm_log::text::LogEvent;
 
 /// Reads a log.
 ///

@@ -15,7 +15,7 @@ mod window;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::AtomicU64;
 
 use isotherm_correction::sample::{AccelTick, GyroTick, OutputKind, TemperatureReading};
 use isotherm_correction::units::Timestamp;
@@ -23,6 +23,7 @@ use serde::Serialize;
 
 use crate::error::Error;
 use crate::mapping::Mapping;
+use crate::progress::Progress;
 use file::FileReader;
 
 pub use error::{LogError, LogFault, Reason};
@@ -110,29 +111,6 @@ impl ReadReport {
     }
 }
 
-/// How far a log has been read; cheap to clone and to ask from another thread.
-#[derive(Debug, Clone)]
-pub struct Progress {
-    /// Bytes read of all files, compressed where they are.
-    read: Arc<AtomicU64>,
-    /// Bytes of all files.
-    total: u64,
-}
-
-impl Progress {
-    /// Bytes read so far.
-    #[must_use]
-    pub fn read(&self) -> u64 {
-        self.read.load(Ordering::Relaxed)
-    }
-
-    /// Bytes there are.
-    #[must_use]
-    pub fn total(&self) -> u64 {
-        self.total
-    }
-}
-
 /// Reads a log's events in time order; at equal time temperature, accelerometers, gyros.
 ///
 /// After an error there are no further events.
@@ -166,7 +144,7 @@ impl LogReader {
             total += size;
             files.push((FileReader::new(path, source, mapping)?, None));
         }
-        Ok(Self { files, paths, progress: Progress { read, total }, primed: false, failed: false })
+        Ok(Self { files, paths, progress: Progress::new(read, total), primed: false, failed: false })
     }
 
     /// Its files.

@@ -17,7 +17,7 @@ use isotherm_correction::sample::{ChannelName, OutputKind};
 use isotherm_correction::units::Span;
 
 pub use problem::Problem;
-pub(crate) use problem::place;
+pub use problem::place;
 
 use crate::error::Error;
 use crate::file::read_small_text;

@@ -12,7 +12,7 @@ use isotherm_protocol::stream::UnitStream;
 
 use crate::error::Error;
 use crate::file::read_small;
-use crate::log::LogEvent;
+use crate::text::LogEvent;
 
 /// A calibration document that was read from a file.
 #[derive(Debug, Clone)]

@@ -34,7 +34,8 @@ impl fmt::Display for Problem {
 }
 
 /// Line and column, both from 1, of a byte in a text.
-pub(crate) fn place(text: &str, byte: usize) -> (usize, usize) {
+#[must_use]
+pub fn place(text: &str, byte: usize) -> (usize, usize) {
     let before = text.get(..byte).unwrap_or(text);
     let start = before.rfind('\n').map_or(0, |at| at + 1);
     let line = before.bytes().filter(|&b| b == b'\n').count() + 1;

@@ -9,7 +9,10 @@ use isotherm_protocol::document::MAX_DOCUMENT_BYTES;
 use crate::error::Error;
 
 /// Reads a mapping, calibration document or scenario; a log given in its place must not fill the memory.
-pub(crate) fn read_small(path: &Path, action: &'static str) -> Result<Vec<u8>, Error> {
+///
+/// # Errors
+/// [`Error::File`].
+pub fn read_small(path: &Path, action: &'static str) -> Result<Vec<u8>, Error> {
     let failed = |source| Error::file(path, action, source);
     let mut bytes = Vec::new();
     let file = File::open(path).map_err(failed)?;
@@ -22,7 +25,10 @@ pub(crate) fn read_small(path: &Path, action: &'static str) -> Result<Vec<u8>, E
 }
 
 /// The same as text.
-pub(crate) fn read_small_text(path: &Path, action: &'static str) -> Result<String, Error> {
+///
+/// # Errors
+/// [`Error::File`], also where it is not UTF-8.
+pub fn read_small_text(path: &Path, action: &'static str) -> Result<String, Error> {
     String::from_utf8(read_small(path, action)?).map_err(|error| {
         let words = format!("not UTF-8 at byte {}: is it the right file?", error.utf8_error().valid_up_to());
         Error::file(path, action, io::Error::other(words))
@@ -30,7 +36,10 @@ pub(crate) fn read_small_text(path: &Path, action: &'static str) -> Result<Strin
 }
 
 /// Refuses an output that is one of the other files of the command, before anything is written.
-pub(crate) fn refuse_overwriting(out: &Path, others: &[&Path]) -> Result<(), Error> {
+///
+/// # Errors
+/// [`Error::Usage`].
+pub fn refuse_overwriting(out: &Path, others: &[&Path]) -> Result<(), Error> {
     // Of two files that do not exist yet, one is the other where their names are. Devices may be given twice.
     let resolved = |path: &Path| canonicalize(path).or_else(|_| absolute(path)).ok();
     let same = |other: &&&Path| resolved(out).is_some_and(|out| resolved(other) == Some(out));
@@ -42,6 +51,13 @@ pub(crate) fn refuse_overwriting(out: &Path, others: &[&Path]) -> Result<(), Err
         ))),
         _ => Ok(()),
     }
+}
+
+/// Whether a file begins with these bytes; what cannot be read does not.
+pub(crate) fn begins_with(path: &Path, magic: &[u8]) -> bool {
+    let mut start = Vec::with_capacity(magic.len());
+    let read = File::open(path).and_then(|file| file.take(magic.len() as u64).read_to_end(&mut start));
+    read.is_ok() && start == magic
 }
 
 #[cfg(test)]

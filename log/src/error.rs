@@ -1,0 +1,79 @@
+//! Everything that can be wrong with a log, or with what it is read by.
+
+use std::io;
+use std::path::Path;
+
+use isotherm_protocol::key::{UnitId, UnitIdError};
+use isotherm_protocol::raw::BatchError;
+use thiserror::Error;
+
+use crate::mapping::Problem;
+use crate::text::LogError;
+
+/// Why a log, a mapping or a calibration document cannot be used.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A file that cannot be opened, read or written.
+    #[error("{path}: cannot {action}: {source}")]
+    File {
+        /// The file.
+        path: String,
+        /// What was tried.
+        action: &'static str,
+        /// Why it failed.
+        source: io::Error,
+    },
+    /// A mapping with problems.
+    #[error("{}", lines(.0))]
+    Mapping(Vec<Problem>),
+    /// A calibration document with problems, one per line.
+    #[error("{}", .0.join("\n"))]
+    Calibration(Vec<String>),
+    /// A log that cannot be read on.
+    #[error(transparent)]
+    Log(#[from] LogError),
+    /// A serial that cannot be one.
+    #[error("unit {serial:?} {source}")]
+    Unit {
+        /// The serial.
+        serial: String,
+        /// Why.
+        source: UnitIdError,
+    },
+    /// A tick of a text log that no frame can carry.
+    #[error("unit {unit}: {source}")]
+    Batch {
+        /// The unit.
+        unit: UnitId,
+        /// Why.
+        source: BatchError,
+    },
+    /// What was given does not go together.
+    #[error("{0}")]
+    Usage(String),
+}
+
+impl Error {
+    /// A file that could not be used.
+    #[must_use]
+    pub fn file(path: &Path, action: &'static str, source: io::Error) -> Self {
+        Self::File { path: path.display().to_string(), action, source }
+    }
+
+    /// The exit code of a program that ends with it: 1 failed, 2 usage, 78 bad mapping or calibration document.
+    #[must_use]
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Usage(_) | Self::Unit { .. } => 2,
+            Self::Mapping(_) | Self::Calibration(_) => 78,
+            _ => 1,
+        }
+    }
+}
+
+/// One line per problem.
+fn lines(problems: &[Problem]) -> String {
+    let lines: Vec<_> = problems.iter().map(ToString::to_string).collect();
+    lines.join("\n")
+}

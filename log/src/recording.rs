@@ -1,0 +1,58 @@
+//! Recordings: MCAP files that hold every message as it was on the bus.
+//!
+//! | in the file | is |
+//! |---|---|
+//! | channel | a key, without namespace; encoding [`MESSAGE_ENCODING`], metadata `unit` where it has one |
+//! | schema | kind of the frame, by name (`isotherm/raw_gyro`); encoding [`SCHEMA_ENCODING`], whose text says where the bytes are described |
+//! | log time | when it was received (ns since 1970-01-01 UTC) |
+//! | publish time | end of its last tick on the producer's clock (ns); the log time where it has none |
+//! | attachment | calibration documents by digest, the service's configuration |
+//! | metadata | [`METADATA`]: versions, when and how it was recorded, counts at its end |
+//!
+//! Chunks end by size and by time, so that what a kill can cost is bounded. A file is read to the last whole chunk.
+
+mod reader;
+mod schema;
+mod writer;
+
+#[cfg(test)]
+mod tests;
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+pub use reader::{RecordingReader, RecordingReport};
+pub use writer::{RecordingOptions, RecordingWriter};
+
+/// Encoding of the messages: frames of `docs/wire.md`.
+pub const MESSAGE_ENCODING: &str = "isotherm";
+/// Encoding of the schemas: plain words.
+pub const SCHEMA_ENCODING: &str = "isotherm-wire";
+/// Name of the metadata records that the recorder writes.
+pub const METADATA: &str = "isotherm";
+/// What every MCAP file begins with.
+pub const MAGIC: &[u8] = mcap::MAGIC;
+
+/// A file inside a recording.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Attachment {
+    /// Its name.
+    pub name: String,
+    /// Its media type.
+    pub media_type: String,
+    /// When it was attached (ns since 1970-01-01 UTC).
+    pub attached_ns: u64,
+    /// What it holds.
+    #[serde(skip)]
+    pub bytes: Vec<u8>,
+}
+
+/// A record of names and values inside a recording.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Metadata {
+    /// Its name.
+    pub name: String,
+    /// What it says.
+    pub values: BTreeMap<String, String>,
+}

@@ -1,0 +1,245 @@
+//! Reading a recording from front to back, in constant memory.
+
+use std::collections::HashMap;
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use mcap::McapError;
+use mcap::records::Record;
+use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use serde::Serialize;
+
+use super::{Attachment, MESSAGE_ENCODING, Metadata};
+use crate::error::Error;
+use crate::message::{Message, Topic};
+
+/// Longest record (bytes): chunks beyond this are not of a recorder.
+const LONGEST_RECORD: usize = 1 << 28;
+
+/// What reading a recording came to.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
+pub struct RecordingReport {
+    /// Messages read.
+    pub messages: u64,
+    /// Messages of channels that are no frames of the wire, passed over.
+    pub foreign_messages: u64,
+    /// Why reading stopped before the end of a file, if it did; what was whole before it has been read.
+    pub cut_short: Option<String>,
+}
+
+impl RecordingReport {
+    /// Whether anything of the log was lost.
+    #[must_use]
+    pub fn lost_data(&self) -> bool {
+        self.cut_short.is_some()
+    }
+}
+
+/// Reads the messages of one or several recordings, one after the other, as they were written.
+///
+/// A file that ends in the middle, as after a kill, is read to its last whole chunk; the report says so.
+pub struct RecordingReader {
+    /// Files still to be opened, the next one last.
+    waiting: Vec<PathBuf>,
+    current: Option<Opened>,
+    read: Arc<AtomicU64>,
+    report: RecordingReport,
+    attachments: Vec<Attachment>,
+    metadata: Vec<Metadata>,
+}
+
+/// A file that is being read.
+struct Opened {
+    path: PathBuf,
+    file: File,
+    reader: LinearReader,
+    /// Topics by channel; `None` for channels of something else.
+    topics: HashMap<u16, Option<Topic>>,
+    /// The last whole file's end has been seen.
+    ended: bool,
+}
+
+impl std::fmt::Debug for RecordingReader {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("RecordingReader").field("report", &self.report).finish_non_exhaustive()
+    }
+}
+
+impl RecordingReader {
+    /// Opens recordings, to be read in this order; `read` counts their bytes as they are read.
+    ///
+    /// # Errors
+    /// [`Error::File`] where the first cannot be opened or is no MCAP file.
+    pub fn open(paths: &[PathBuf], read: Arc<AtomicU64>) -> Result<Self, Error> {
+        let mut reader = Self {
+            waiting: paths.iter().rev().cloned().collect(),
+            current: None,
+            read,
+            report: RecordingReport::default(),
+            attachments: Vec::new(),
+            metadata: Vec::new(),
+        };
+        reader.advance()?;
+        Ok(reader)
+    }
+
+    /// What reading came to so far.
+    #[must_use]
+    pub fn report(&self) -> &RecordingReport {
+        &self.report
+    }
+
+    /// Files inside the recordings that were come across and not taken yet.
+    pub fn take_attachments(&mut self) -> Vec<Attachment> {
+        std::mem::take(&mut self.attachments)
+    }
+
+    /// Records of names and values, likewise.
+    pub fn take_metadata(&mut self) -> Vec<Metadata> {
+        std::mem::take(&mut self.metadata)
+    }
+
+    /// The next message; `None` behind the last.
+    ///
+    /// # Errors
+    /// [`Error::File`] where a file cannot be opened or read. A file that is cut short is no error: see [`RecordingReport::cut_short`].
+    pub fn next_message(&mut self) -> Result<Option<Message>, Error> {
+        loop {
+            let Some(opened) = &mut self.current else { return Ok(None) };
+            match opened.next(&self.read) {
+                Ok(Some(Found::Message(Some(message)))) => {
+                    self.report.messages += 1;
+                    return Ok(Some(message));
+                }
+                Ok(Some(Found::Message(None))) => self.report.foreign_messages += 1,
+                Ok(Some(Found::Attachment(attachment))) => self.attachments.push(attachment),
+                Ok(Some(Found::Metadata(metadata))) => self.metadata.push(metadata),
+                Ok(None) => self.advance()?,
+                Err(Stop::Io(source)) => return Err(Error::file(&opened.path, "read the recording", source)),
+                Err(Stop::Damaged(words)) => {
+                    let words = format!("{}: {words}", opened.path.display());
+                    self.report.cut_short.get_or_insert(words);
+                    self.advance()?;
+                }
+            }
+        }
+    }
+
+    /// Goes on to the next file.
+    fn advance(&mut self) -> Result<(), Error> {
+        self.current = self.waiting.pop().map(Opened::open).transpose()?;
+        Ok(())
+    }
+}
+
+/// One record that is of use.
+enum Found {
+    /// A message; `None` for one of something else.
+    Message(Option<Message>),
+    Attachment(Attachment),
+    Metadata(Metadata),
+}
+
+/// Why a file is read no further.
+enum Stop {
+    Io(io::Error),
+    Damaged(String),
+}
+
+impl Opened {
+    fn open(path: PathBuf) -> Result<Self, Error> {
+        let failed = |source| Error::file(&path, "open the recording", source);
+        let mut file = File::open(&path).map_err(failed)?;
+        let mut magic = [0; 8];
+        let length = read_up_to(&mut file, &mut magic).map_err(failed)?;
+        if magic.get(..length) != Some(super::MAGIC) {
+            return Err(failed(io::Error::other("it does not begin as an MCAP file")));
+        }
+        let options = LinearReaderOptions::default()
+            .with_skip_start_magic(true)
+            .with_prevalidate_chunk_crcs(true)
+            .with_record_length_limit(LONGEST_RECORD);
+        let reader = LinearReader::new_with_options(options);
+        Ok(Self { path, file, reader, topics: HashMap::new(), ended: false })
+    }
+
+    /// The next record that is of use; `None` at the end.
+    fn next(&mut self, read: &AtomicU64) -> Result<Option<Found>, Stop> {
+        loop {
+            let Some(event) = self.reader.next_event() else {
+                // The library is content where a file ends between two records.
+                return if self.ended {
+                    Ok(None)
+                } else {
+                    Err(Stop::Damaged("ends without its summary".to_owned()))
+                };
+            };
+            match event.map_err(stop)? {
+                LinearReadEvent::ReadRequest(need) => {
+                    let count = self.file.read(self.reader.insert(need.max(1 << 16))).map_err(Stop::Io)?;
+                    read.fetch_add(count as u64, Ordering::Relaxed);
+                    self.reader.notify_read(count);
+                }
+                LinearReadEvent::Record { opcode, data } => {
+                    let record = mcap::parse_record(opcode, data).map_err(stop)?;
+                    if let Some(found) = take(record, &mut self.topics, &mut self.ended) {
+                        return Ok(Some(found));
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Takes what is of use in a record.
+fn take(record: Record<'_>, topics: &mut HashMap<u16, Option<Topic>>, ended: &mut bool) -> Option<Found> {
+    match record {
+        Record::Channel(channel) => {
+            let ours = channel.message_encoding == MESSAGE_ENCODING;
+            topics.insert(channel.id, ours.then(|| Topic::of(&channel.topic)));
+            None
+        }
+        Record::Message { header, data } => {
+            let topic = topics.get(&header.channel_id).cloned().flatten();
+            let frame = |topic| Message { topic, received_ns: header.log_time, frame: data.into_owned() };
+            Some(Found::Message(topic.map(frame)))
+        }
+        Record::Attachment { header, data, .. } => Some(Found::Attachment(Attachment {
+            name: header.name,
+            media_type: header.media_type,
+            attached_ns: header.log_time,
+            bytes: data.into_owned(),
+        })),
+        Record::Metadata(metadata) => {
+            Some(Found::Metadata(Metadata { name: metadata.name, values: metadata.metadata }))
+        }
+        Record::DataEnd(_) => {
+            *ended = true;
+            None
+        }
+        _ => None,
+    }
+}
+
+fn stop(error: McapError) -> Stop {
+    match error {
+        McapError::Io(source) => Stop::Io(source),
+        McapError::UnexpectedEof => Stop::Damaged("ends in the middle".to_owned()),
+        other => Stop::Damaged(format!("is damaged from here on: {other}")),
+    }
+}
+
+/// Reads until the buffer is full or the file is over.
+fn read_up_to(file: &mut File, buffer: &mut [u8]) -> io::Result<usize> {
+    let mut length = 0;
+    while length < buffer.len() {
+        match file.read(&mut buffer[length..])? {
+            0 => break,
+            count => length += count,
+        }
+    }
+    Ok(length)
+}

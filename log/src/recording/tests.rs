@@ -1,0 +1,102 @@
+//! Recordings written and read back, whole and cut.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+
+use isotherm_correction::sample::ChannelName;
+use isotherm_protocol::codec;
+use isotherm_protocol::key::{RawStream, UnitId};
+use isotherm_protocol::raw::{TemperatureBatch, TemperatureTick};
+
+use super::*;
+use crate::error::Error;
+use crate::message::{Message, Topic};
+
+fn message(serial: &str, time_ns: i64, received_ns: u64) -> Message {
+    let channels = [ChannelName::from("board").unwrap()].into_iter().collect();
+    let ticks = vec![TemperatureTick { time_ns, raw: [25.0].into_iter().collect() }];
+    let topic = Topic::Raw(UnitId::new(serial).unwrap(), RawStream::Temperature);
+    Message { topic, received_ns, frame: codec::encode(&TemperatureBatch { channels, ticks }).unwrap() }
+}
+
+fn read(paths: &[&Path]) -> (Vec<Message>, RecordingReader) {
+    let paths: Vec<_> = paths.iter().map(|path| path.to_path_buf()).collect();
+    let mut reader = RecordingReader::open(&paths, Arc::default()).unwrap();
+    let mut messages = Vec::new();
+    while let Some(message) = reader.next_message().unwrap() {
+        messages.push(message);
+    }
+    (messages, reader)
+}
+
+/// Messages of two units, on their way into a small-chunked recording.
+fn messages() -> Vec<Message> {
+    (0..500)
+        .map(|n| message(["A-1", "B-2"][usize::from(n % 3 == 0)], n * 5_000_000, 7_000 + n as u64))
+        .collect()
+}
+
+fn write(path: &Path, messages: &[Message]) {
+    let options = RecordingOptions { chunk_bytes: 2000, ..RecordingOptions::default() };
+    let mut writer = RecordingWriter::create(path, options).unwrap();
+    let document = Attachment {
+        name: "a.toml".to_owned(),
+        media_type: "application/toml".to_owned(),
+        attached_ns: 5,
+        bytes: b"unit = 1".to_vec(),
+    };
+    writer.attach(&document).unwrap();
+    messages.iter().for_each(|message| writer.write(message).unwrap());
+    let values = BTreeMap::from([("version".to_owned(), "1".to_owned())]);
+    writer.metadata(&Metadata { name: METADATA.to_owned(), values }).unwrap();
+    writer.finish().unwrap();
+}
+
+#[test]
+fn what_was_written_is_read_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mcap");
+    write(&path, &messages());
+    let (back, mut reader) = read(&[&path]);
+    assert_eq!(back, messages());
+    assert_eq!(reader.report(), &RecordingReport { messages: 500, ..RecordingReport::default() });
+    assert_eq!(reader.take_attachments()[0].bytes, b"unit = 1");
+    assert_eq!(reader.take_metadata()[0].values["version"], "1");
+    assert!(RecordingWriter::create(&path, RecordingOptions::default()).is_err(), "nothing is written over");
+}
+
+#[test]
+fn a_file_cut_anywhere_is_read_to_its_last_whole_chunk() {
+    let folder = tempfile::tempdir().unwrap();
+    let (whole, cut, other) =
+        (folder.path().join("a.mcap"), folder.path().join("cut.mcap"), folder.path().join("b.mcap"));
+    write(&whole, &messages());
+    write(&other, &messages()[..10]);
+    let bytes = std::fs::read(&whole).unwrap();
+    let mut most = 0;
+    for length in (8..bytes.len()).step_by(97) {
+        std::fs::write(&cut, &bytes[..length]).unwrap();
+        let (back, reader) = read(&[&cut, &other]);
+        let report = reader.report().clone();
+        let (first, rest) = back.split_at(back.len() - 10);
+        assert_eq!(rest, &messages()[..10], "the next file is read all the same");
+        assert!(messages().starts_with(first), "{length}");
+        assert!(first.len() >= most, "more bytes, no fewer messages: {length}");
+        most = first.len();
+        let words = report.cut_short.unwrap_or_default();
+        assert!(words.contains("cut.mcap") || first.len() == 500, "{length}: {words}");
+    }
+    assert_eq!(most, 500);
+}
+
+#[test]
+fn what_is_no_recording_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("x.mcap");
+    for bytes in [b"".as_slice(), b"\x89MCAP", b"sequence,end_time_ns\n"] {
+        std::fs::write(&path, bytes).unwrap();
+        let error = RecordingReader::open(std::slice::from_ref(&path), Arc::default()).unwrap_err();
+        assert!(matches!(error, Error::File { .. }) && error.to_string().contains("MCAP"), "{error}");
+    }
+}

@@ -1,0 +1,169 @@
+//! A log of either kind as messages: recordings as they are, text logs put into batches.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::AtomicU64;
+
+use isotherm_protocol::key::UnitId;
+use isotherm_protocol::raw::{Batcher, RawFrame};
+use serde::Serialize;
+
+use crate::error::Error;
+use crate::file::begins_with;
+use crate::mapping::Mapping;
+use crate::message::{Message, Topic};
+use crate::progress::Progress;
+use crate::recording::{self, RecordingReader, RecordingReport};
+use crate::text::{LogEvent, LogReader, ReadReport};
+
+/// Whether a file is a recording; what cannot be read is not.
+#[must_use]
+pub fn is_recording(path: &Path) -> bool {
+    begins_with(path, recording::MAGIC)
+}
+
+/// How the text logs of a command are read.
+#[derive(Debug, Clone, Copy)]
+pub struct TextOptions<'a> {
+    /// Which column is what.
+    pub mapping: &'a Mapping,
+    /// The unit that the log is of.
+    pub unit: &'a UnitId,
+    /// Gyro ticks in one batch (1…4096).
+    pub batch_ticks: usize,
+}
+
+/// A log, read message by message in constant memory.
+#[derive(Debug)]
+pub struct Log {
+    source: Source,
+    progress: Progress,
+}
+
+#[derive(Debug)]
+enum Source {
+    Recording(Box<RecordingReader>),
+    Text(Box<TextLog>),
+}
+
+/// What reading a log came to.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[serde(untagged)]
+pub enum LogReport {
+    /// Of recordings.
+    Recording(RecordingReport),
+    /// Of a text log.
+    Text(ReadReport),
+}
+
+impl LogReport {
+    /// Whether anything of the log was lost.
+    #[must_use]
+    pub fn lost_data(&self) -> bool {
+        match self {
+            Self::Recording(report) => report.lost_data(),
+            Self::Text(report) => report.lost_data(),
+        }
+    }
+}
+
+impl Log {
+    /// Opens recordings, to be read one behind the other.
+    ///
+    /// # Errors
+    /// [`Error::File`].
+    pub fn recordings(paths: &[PathBuf]) -> Result<Self, Error> {
+        let mut total = 0;
+        for path in paths {
+            let length = std::fs::metadata(path).map(|metadata| metadata.len());
+            total += length.map_err(|source| Error::file(path, "open the recording", source))?;
+        }
+        let read = Arc::new(AtomicU64::new(0));
+        let reader = RecordingReader::open(paths, Arc::clone(&read))?;
+        Ok(Self { source: Source::Recording(Box::new(reader)), progress: Progress::new(read, total) })
+    }
+
+    /// Opens a text log.
+    ///
+    /// # Errors
+    /// As [`LogReader::open`].
+    pub fn text(paths: &[PathBuf], options: TextOptions<'_>) -> Result<Self, Error> {
+        let events = LogReader::open(options.mapping, paths)?;
+        let progress = events.progress();
+        let unit = options.unit.clone();
+        let text = TextLog { events, unit, batcher: Batcher::new(options.batch_ticks), over: false };
+        Ok(Self { source: Source::Text(Box::new(text)), progress })
+    }
+
+    /// The next message; `None` behind the last.
+    ///
+    /// # Errors
+    /// [`Error::File`] and [`Error::Log`].
+    pub fn next_message(&mut self) -> Result<Option<Message>, Error> {
+        match &mut self.source {
+            Source::Recording(reader) => reader.next_message(),
+            Source::Text(text) => text.next_message(),
+        }
+    }
+
+    /// How far it has been read.
+    #[must_use]
+    pub fn progress(&self) -> Progress {
+        self.progress.clone()
+    }
+
+    /// What reading came to so far.
+    #[must_use]
+    pub fn report(&self) -> LogReport {
+        match &self.source {
+            Source::Recording(reader) => LogReport::Recording(reader.report().clone()),
+            Source::Text(text) => LogReport::Text(text.events.report()),
+        }
+    }
+
+    /// The recordings behind it, for what they hold beside messages; `None` for a text log.
+    pub fn recording(&mut self) -> Option<&mut RecordingReader> {
+        match &mut self.source {
+            Source::Recording(reader) => Some(reader),
+            Source::Text(_) => None,
+        }
+    }
+}
+
+/// A text log, put into batches.
+#[derive(Debug)]
+struct TextLog {
+    events: LogReader,
+    unit: UnitId,
+    batcher: Batcher,
+    over: bool,
+}
+
+impl TextLog {
+    fn next_message(&mut self) -> Result<Option<Message>, Error> {
+        loop {
+            if let Some(frame) = self.batcher.next_frame() {
+                return Ok(Some(self.message(frame)));
+            }
+            if self.over {
+                return Ok(None);
+            }
+            let taken = match self.events.next().transpose()? {
+                Some(LogEvent::Gyro { output, tick }) => self.batcher.gyro(output, tick),
+                Some(LogEvent::Accel { output, tick }) => self.batcher.accel(output, tick),
+                Some(LogEvent::Temperature(reading)) => self.batcher.temperature(reading),
+                None => {
+                    self.over = true;
+                    self.batcher.flush()
+                }
+            };
+            taken.map_err(|source| Error::Batch { unit: self.unit.clone(), source })?;
+        }
+    }
+
+    fn message(&self, frame: RawFrame) -> Message {
+        let RawFrame { stream, frame, time, .. } = frame;
+        let received_ns = u64::try_from(time.as_ns()).unwrap_or(0);
+        Message { topic: Topic::Raw(self.unit.clone(), stream), received_ns, frame }
+    }
+}
