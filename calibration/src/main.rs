@@ -1,0 +1,7 @@
+//! `isotherm-calibrate`.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    isotherm_calibration::cli::main()
+}
