@@ -96,6 +96,14 @@ pub enum BusError {
         /// How long was waited.
         waited: Duration,
     },
+    /// The service has gone while it was needed.
+    #[error(
+        "the service is gone: the last of the tokens {key} has ended; it has stopped, or the connection to it is lost"
+    )]
+    ServiceGone {
+        /// Key expression of the tokens.
+        key: String,
+    },
     /// Nothing comes back on the corrected topic.
     #[error(
         "unit {unit}: nothing came back on {key} for {waited:?} while {in_flight} ticks were under way; the service may hold \

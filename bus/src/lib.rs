@@ -10,7 +10,8 @@
 //! | module | holds |
 //! |---|---|
 //! | [`session`] | options, open, locators, close |
-//! | [`producer`] | raw batches out, bounded by what comes back |
+//! | [`producer`] | raw ticks of a unit out, in batches |
+//! | [`outlet`] | raw frames of a unit out, bounded by what comes back; the account of it |
 //! | [`consumer`] | corrected batches in |
 //! | [`continuity`] | the rule by which a consumer notices a lost tick |
 //! | [`presence`] | waiting until the service is there |
@@ -18,6 +19,7 @@
 pub mod consumer;
 pub mod continuity;
 mod error;
+pub mod outlet;
 pub mod presence;
 pub mod producer;
 pub mod session;
@@ -25,5 +27,6 @@ pub mod session;
 pub use consumer::Consumer;
 pub use continuity::Continuity;
 pub use error::{BusError, words};
+pub use outlet::{Outlet, OutletOptions};
 pub use producer::{Producer, ProducerOptions};
 pub use session::{SessionOptions, close, locators, open};

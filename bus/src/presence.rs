@@ -1,12 +1,18 @@
 //! Waiting until something is there, by state and with a limit.
 
+use std::collections::BTreeSet;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use isotherm_protocol::key;
+use isotherm_protocol::codec;
+use isotherm_protocol::key::{self, UnitId};
+use isotherm_protocol::status::Status;
+use tokio::sync::Notify;
 use tokio::time::{Instant, timeout_at};
 use zenoh::Session;
-use zenoh::pubsub::Publisher;
+use zenoh::pubsub::{Publisher, Subscriber};
 use zenoh::query::{ConsolidationMode, QueryTarget};
+use zenoh::sample::{Sample, SampleKind};
 
 use crate::BusError;
 
@@ -18,13 +24,24 @@ use crate::BusError;
 /// # Errors
 /// [`BusError::NoService`] after `limit`, [`BusError::Declare`].
 pub async fn wait_for_service(session: &Session, limit: Duration) -> Result<(), BusError> {
-    let key = key::ALL_STATUS;
+    wait_for_answer(session, key::ALL_STATUS, limit).await
+}
+
+/// The same, on the status topic of one unit, which need not exist yet.
+///
+/// # Errors
+/// As [`wait_for_service`].
+pub async fn wait_for_service_of(session: &Session, unit: &UnitId, limit: Duration) -> Result<(), BusError> {
+    wait_for_answer(session, &key::status(unit), limit).await
+}
+
+async fn wait_for_answer(session: &Session, key: &str, limit: Duration) -> Result<(), BusError> {
     let declare = |source| BusError::Declare { key: key.to_owned(), source };
     let missing = || BusError::NoService { key: key.to_owned(), waited: limit };
     let deadline = Instant::now() + limit;
 
     let querier = session
-        .declare_querier(key)
+        .declare_querier(key.to_owned())
         .target(QueryTarget::All)
         .consolidation(ConsolidationMode::None)
         .timeout(limit)
@@ -47,6 +64,73 @@ pub async fn wait_for_service(session: &Session, limit: Duration) -> Result<(), 
             Ok(Ok(_)) => {}
             Ok(Err(_)) => return Ok(()),
             Err(_) => return Err(missing()),
+        }
+    }
+}
+
+/// The status of a unit, as the service that has it answers; `None` where none answers in time.
+pub async fn status(session: &Session, unit: &UnitId, limit: Duration) -> Option<Status> {
+    let replies = session.get(key::status(unit)).timeout(limit).await.ok()?;
+    while let Ok(reply) = replies.recv_async().await {
+        if let Ok(sample) = reply.into_result()
+            && let Ok(status) = codec::decode(&sample.payload().to_bytes())
+        {
+            return Some(status);
+        }
+    }
+    None
+}
+
+/// Watches by their tokens which service instances are there.
+#[derive(Debug)]
+pub struct ServiceWatch {
+    alive: Arc<Alive>,
+    // Dropping it ends the watch.
+    _subscriber: Subscriber<()>,
+}
+
+/// Instances that are there.
+#[derive(Debug, Default)]
+struct Alive {
+    instances: Mutex<BTreeSet<String>>,
+    /// Told when the last one has gone.
+    gone: Notify,
+}
+
+impl ServiceWatch {
+    /// Begins the watch.
+    ///
+    /// # Errors
+    /// [`BusError::Declare`].
+    pub async fn declare(session: &Session) -> Result<Self, BusError> {
+        let alive = Arc::new(Alive::default());
+        let told = Arc::clone(&alive);
+        let key = key::ALL_SERVICES_ALIVE;
+        let liveliness = session.liveliness();
+        let subscriber = liveliness.declare_subscriber(key).history(true).callback(move |sample| {
+            told.tell(&sample);
+        });
+        let subscriber =
+            subscriber.await.map_err(|source| BusError::Declare { key: key.to_owned(), source })?;
+        Ok(Self { alive, _subscriber: subscriber })
+    }
+
+    /// Ends when an instance was there and none is any more: it has ended, or the connection to it.
+    pub async fn gone(&self) {
+        // A permit is kept where the last one goes before anybody waits.
+        self.alive.gone.notified().await;
+    }
+}
+
+impl Alive {
+    fn tell(&self, sample: &Sample) {
+        let key = sample.key_expr().as_str();
+        let Some(instance) = key::parse_service_alive(key) else { return };
+        let mut instances = self.instances.lock().unwrap_or_else(PoisonError::into_inner);
+        if sample.kind() == SampleKind::Put {
+            instances.insert(instance.to_owned());
+        } else if instances.remove(instance) && instances.is_empty() {
+            self.gone.notify_one();
         }
     }
 }

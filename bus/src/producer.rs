@@ -1,22 +1,16 @@
 //! Publishing raw batches in the order that the service needs, without outrunning it.
 
-mod in_flight;
-
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::Duration;
 
 use isotherm_correction::sample::{AccelTick, GyroTick, OutputKind, TemperatureReading};
 use isotherm_correction::units::Timestamp;
 use isotherm_protocol::codec::{self, MAX_TICKS};
-use isotherm_protocol::key::{self, RawStream, UnitId};
+use isotherm_protocol::key::{self, Input, RawStream, UnitId};
 use isotherm_protocol::raw::{BatchError, Batcher, HealthBatch, HealthReading, HealthTick, RawFrame};
 use zenoh::Session;
-use zenoh::pubsub::{Publisher, Subscriber};
-use zenoh::qos::{CongestionControl, Priority};
 
-use crate::{BusError, presence};
-use in_flight::InFlight;
+use crate::BusError;
+use crate::outlet::{GyroTicks, Outlet, OutletOptions, least_in_flight, new_series};
 
 /// How a producer publishes.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -52,7 +46,7 @@ impl ProducerOptions {
         if !(1..=MAX_TICKS as u64).contains(&batch) {
             return Err(BusError::Range { option: "batch_ticks", got: batch, min: 1, max: MAX_TICKS as u64 });
         }
-        let min = 2 * batch + 256;
+        let min = least_in_flight(batch);
         match self.max_in_flight {
             Some(got) if got < min => {
                 Err(BusError::Range { option: "max_in_flight", got, min, max: u64::MAX })
@@ -69,17 +63,11 @@ impl ProducerOptions {
 /// out first. Congestion blocks: nothing is dropped on the way out.
 #[derive(Debug)]
 pub struct Producer {
-    unit: UnitId,
-    options: ProducerOptions,
-    gyro: Publisher<'static>,
-    accel: Publisher<'static>,
-    temperature: Publisher<'static>,
-    health: Publisher<'static>,
+    outlet: Outlet,
     batcher: Batcher,
     sent: u64,
     /// Number of this producer's run.
     series: u64,
-    in_flight: Option<(Arc<InFlight>, Subscriber<()>)>,
 }
 
 impl Producer {
@@ -93,38 +81,13 @@ impl Producer {
         options: ProducerOptions,
     ) -> Result<Self, BusError> {
         options.check()?;
-        let unheard = async |stream| {
-            let key = key::raw(unit, stream);
-            session
-                .declare_publisher(key.clone())
-                .congestion_control(CongestionControl::Block)
-                .priority(Priority::RealTime)
-                .await
-                .map_err(|source| BusError::Declare { key, source })
-        };
-        let publisher = async |stream| {
-            let publisher = unheard(stream).await?;
-            presence::wait_for_subscriber(&publisher, options.match_timeout).await?;
-            Ok::<_, BusError>(publisher)
-        };
-        let in_flight = if options.max_in_flight.is_some() {
-            Some(InFlight::declare(session, unit).await?)
-        } else {
-            None
-        };
-        Ok(Self {
-            unit: unit.clone(),
-            gyro: publisher(RawStream::Gyro).await?,
-            accel: publisher(RawStream::Accel).await?,
-            temperature: publisher(RawStream::Temperature).await?,
-            // Who listens to ticks need not listen to this.
-            health: unheard(RawStream::Health).await?,
-            batcher: Batcher::new(options.batch_ticks),
-            sent: 0,
-            series: new_series(),
-            in_flight,
-            options,
-        })
+        let ProducerOptions { batch_ticks, max_in_flight, match_timeout, acknowledge_timeout } = options;
+        let options = OutletOptions { max_in_flight, match_timeout, acknowledge_timeout };
+        let mut outlet = Outlet::declare(session, unit, options).await?;
+        for stream in RawStream::ALL {
+            outlet.open(Input::Raw(stream)).await?;
+        }
+        Ok(Self { outlet, batcher: Batcher::new(batch_ticks), sent: 0, series: new_series() })
     }
 
     /// Takes one gyro tick. It is sent in this producer's own series: what another one of the same unit sent before, in
@@ -162,10 +125,11 @@ impl Producer {
     /// As [`Producer::gyro`].
     pub async fn health(&mut self, time: Timestamp, readings: &[HealthReading]) -> Result<(), BusError> {
         let tick = HealthTick { time_ns: time.as_ns(), readings: readings.to_vec() };
-        let frame = codec::encode(&HealthBatch { ticks: vec![tick] });
-        let frame =
-            frame.map_err(|source| BusError::Encode { key: self.health.key_expr().to_string(), source })?;
-        publish(&self.health, frame).await
+        let frame = codec::encode(&HealthBatch { ticks: vec![tick] }).map_err(|source| BusError::Encode {
+            key: key::raw(self.outlet.unit(), RawStream::Health),
+            source,
+        })?;
+        self.outlet.publish(Input::Raw(RawStream::Health), frame).await
     }
 
     /// Publishes everything that was handed over, full batch or not.
@@ -185,7 +149,7 @@ impl Producer {
     /// # Errors
     /// [`BusError::NoAcknowledgement`].
     pub async fn drain(&mut self) -> Result<(), BusError> {
-        self.wait_below(1).await
+        self.outlet.drain().await
     }
 
     /// Gyro ticks published so far.
@@ -197,67 +161,24 @@ impl Producer {
     /// Gyro ticks published and not come back; 0 without `max_in_flight`.
     #[must_use]
     pub fn in_flight(&self) -> u64 {
-        self.in_flight.as_ref().map_or(0, |(in_flight, _)| in_flight.ticks())
+        self.outlet.in_flight()
     }
 
     /// Publishes the frames that are ready, and then tells what was wrong with a tick.
     async fn publish_ready(&mut self, taken: Result<(), BatchError>) -> Result<(), BusError> {
         while let Some(RawFrame { stream, frame, first_sequence, ticks, .. }) = self.batcher.next_frame() {
-            match stream {
-                RawStream::Gyro => {
-                    self.gyro_frame(frame, first_sequence, ticks).await?;
-                }
-                RawStream::Accel => publish(&self.accel, frame).await?,
-                RawStream::Temperature => publish(&self.temperature, frame).await?,
-                RawStream::Health => publish(&self.health, frame).await?,
+            if stream == RawStream::Gyro {
+                let ticks = GyroTicks { series: self.series, first: first_sequence, count: ticks };
+                self.outlet.publish_gyro(frame, ticks).await?;
+                self.sent += ticks.count;
+            } else {
+                self.outlet.publish(Input::Raw(stream), frame).await?;
             }
         }
+        let unit = self.outlet.unit();
         taken.map_err(|error| match error {
-            BatchError::NotCounts { sequence } => BusError::NotCounts { unit: self.unit.clone(), sequence },
-            BatchError::Codec(source) => {
-                BusError::Encode { key: key::raw(&self.unit, RawStream::Gyro), source }
-            }
+            BatchError::NotCounts { sequence } => BusError::NotCounts { unit: unit.clone(), sequence },
+            BatchError::Codec(source) => BusError::Encode { key: key::raw(unit, RawStream::Gyro), source },
         })
     }
-
-    async fn gyro_frame(&mut self, frame: Vec<u8>, first: u64, count: u64) -> Result<(), BusError> {
-        if let Some(limit) = self.options.max_in_flight {
-            self.wait_below(limit.saturating_add(1).saturating_sub(count)).await?;
-        }
-        if let Some((in_flight, _)) = &self.in_flight {
-            in_flight.sent(first, count);
-        }
-        publish(&self.gyro, frame).await?;
-        self.sent += count;
-        Ok(())
-    }
-
-    async fn wait_below(&self, limit: u64) -> Result<(), BusError> {
-        let Some((in_flight, _)) = &self.in_flight else {
-            return Ok(());
-        };
-        in_flight.wait_below(limit, self.options.acknowledge_timeout).await.map_err(|in_flight| {
-            BusError::NoAcknowledgement {
-                unit: self.unit.clone(),
-                key: key::corrected(&self.unit),
-                waited: self.options.acknowledge_timeout,
-                in_flight,
-            }
-        })
-    }
-}
-
-/// A number that no producer of the unit had before: the time of the start, which reaches no corrected increment, and a
-/// count of the producers of this process.
-fn new_series() -> u64 {
-    static COUNT: AtomicU64 = AtomicU64::new(0);
-    let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-    let ns = u64::try_from(now.as_nanos()).unwrap_or(u64::MAX);
-    ns.wrapping_add(COUNT.fetch_add(1, Ordering::Relaxed))
-}
-
-/// Publishes one frame.
-async fn publish(publisher: &Publisher<'_>, frame: Vec<u8>) -> Result<(), BusError> {
-    let put = publisher.put(frame).await;
-    put.map_err(|source| BusError::Put { key: publisher.key_expr().to_string(), source })
 }

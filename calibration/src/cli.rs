@@ -1,5 +1,8 @@
 //! The command line: arguments in, exit code out.
 
+mod drift;
+mod impact;
+
 use std::io::{self, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -28,6 +31,8 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Drift(drift::DriftArgs),
+    Impact(impact::ImpactArgs),
     /// Print a completion script for a shell
     #[command(after_help = "Example:\n  isotherm-calibrate completions bash > isotherm-calibrate.bash")]
     Completions {
@@ -92,6 +97,8 @@ impl LogArgs {
 /// Runs the command that the arguments name.
 fn run(cli: Cli) -> Result<(), Error> {
     match cli.command {
+        Command::Drift(args) => args.run(),
+        Command::Impact(args) => args.run(),
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), "isotherm-calibrate", &mut script);

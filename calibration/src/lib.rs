@@ -7,9 +7,15 @@
 //! |---|---|
 //! | [`series`] | a log as columns: ticks, readings, temperatures of one unit |
 //! | [`provenance`] | where the numbers of a document come from |
+//! | [`drift`], [`allan`], [`spectrum`] | noise and drift of a static log |
+//! | [`impact`] | what a drift that is left means for navigation |
 //! | [`error`], [`cli`] | what can go wrong; the command line |
 
+pub mod allan;
 pub mod cli;
+pub mod drift;
 pub mod error;
+pub mod impact;
 pub mod provenance;
 pub mod series;
+pub mod spectrum;

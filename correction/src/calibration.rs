@@ -18,6 +18,8 @@ mod tests;
 
 use alloc::vec::Vec;
 
+use serde::{Deserialize, Serialize};
+
 pub use check::MAX_SELF_TEST_READINGS;
 pub use defect::{Defect, DefectKind, Section};
 pub use parts::{
@@ -34,7 +36,7 @@ use crate::sample::OutputKind;
 use crate::thermal::{AccelModel, GyroModel};
 
 /// A validated coefficient set; immutable, shared by pointer.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Calibration {
     pub(crate) filter: ThermalFilter,
     pub(crate) channels: Vec<Channel>,

@@ -7,6 +7,8 @@
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;
 
+use serde::{Deserialize, Serialize};
+
 use crate::sample::ChannelName;
 use crate::units::{Span, Timestamp};
 
@@ -33,7 +35,7 @@ pub struct ThermalFilterParts {
 }
 
 /// The compiled filter.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ThermalFilter {
     pub(crate) grid_step: Span,
     pub(crate) smoothing_points: usize,
@@ -82,7 +84,7 @@ pub(crate) fn grid_points(length_s: f64, step_s: f64) -> usize {
 }
 
 /// One channel of a calibration.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ChannelParts {
     /// Name, as on the raw temperature topic.
     pub name: ChannelName,
@@ -95,7 +97,7 @@ pub struct ChannelParts {
 }
 
 /// A compiled channel: it is its parts, once checked.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Channel(pub(crate) ChannelParts);
 
 impl Channel {
@@ -118,7 +120,7 @@ impl Channel {
 }
 
 /// Temperature and its derivatives at a grid point.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct ThermalState {
     /// T̄ (°C).
     pub temperature: f64,
@@ -142,7 +144,7 @@ pub enum Verdict {
 }
 
 /// Memory of one channel.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct ChannelMemory {
     /// Last readings within the sensor's range, spikes included, so that a lasting step is believed after three.
     recent: VecDeque<f64>,

@@ -7,6 +7,7 @@
 use alloc::vec::Vec;
 
 use arrayvec::ArrayVec;
+use serde::{Deserialize, Serialize};
 
 /// Most coefficients of a polynomial: degree 9.
 pub const MAX_COEFFICIENTS: usize = 10;
@@ -107,14 +108,14 @@ pub struct Evaluated {
 }
 
 /// One stretch of a table or spline: `Σ c_k·(x − from)^k` up to the next stretch's start.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 struct Piece {
     from: f64,
     coefficients: [f64; 4],
 }
 
 /// Compiled form.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 enum Form {
     /// Reference and coefficients in ascending order.
     Polynomial(f64, ArrayVec<f64, MAX_COEFFICIENTS>),
@@ -123,7 +124,7 @@ enum Form {
 }
 
 /// A validated curve, ready to evaluate without allocation.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Curve {
     form: Form,
     range: [f64; 2],

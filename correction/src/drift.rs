@@ -31,6 +31,8 @@ mod ring;
 
 use alloc::vec::Vec;
 
+use serde::{Deserialize, Serialize};
+
 pub use estimator::{DriftEstimator, DriftSettings};
 pub use filter::{BELIEF_LIMIT, BELIEF_REFUSALS, GATE_SIGMAS, INNOVATIONS_KEPT, MEAN_NIS_BOUNDS};
 pub use gyro::{DriftEstimate, SUBTRACTION_RAMP};
@@ -53,7 +55,7 @@ pub const INITIAL_SIGMA_RANGE_RAD_PER_S: [f64; 2] = [1e-12, 0.1];
 pub const ANGLE_RANDOM_WALK_RANGE_RAD_PER_SQRT_S: [f64; 2] = [1e-12, 1.0];
 
 /// The drift of one gyro as the calibration document states it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct DriftParts {
     /// σ: stationary sigma of the first-order Markov part (rad/s, 0…0.1).
     pub sigma_rad_per_s: f64,
@@ -88,7 +90,7 @@ pub enum DriftError {
 }
 
 /// A validated drift of one gyro.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct DriftModel {
     parts: DriftParts,
 }

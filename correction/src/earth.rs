@@ -16,6 +16,7 @@
 
 use alloc::vec::Vec;
 
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::units::{Angle, AngularRate, STANDARD_GRAVITY_M_PER_S2};
@@ -30,7 +31,7 @@ pub const LEVELLING_TOLERANCE: f64 = 0.02;
 const SMALLEST_COSINE: f64 = 0.02;
 
 /// How the case stands.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Tilt {
     /// Known beforehand.
     Given {
@@ -44,7 +45,7 @@ pub enum Tilt {
 }
 
 /// Where a unit at rest is and how it stands.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Place {
     latitude_rad: f64,
     heading_rad: f64,

@@ -29,6 +29,8 @@
 //! | [`prelaunch`] | pre-launch calibration at rest: C0 and B0 of each gyro |
 //! | [`drift`] | in-run drift estimator |
 //! | [`mod@unit`] | the state machine that puts them together |
+//!
+//! A [`unit::Unit`] can be written down and read back with serde, all of its memory: it goes on as if nothing had been.
 #![no_std]
 
 extern crate alloc;
@@ -50,3 +52,4 @@ pub mod servo;
 pub mod thermal;
 pub mod unit;
 pub mod units;
+mod written;

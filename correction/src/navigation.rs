@@ -17,6 +17,8 @@
 //! terms both are plain sums of the ticks' own increments. The preceding increment is carried from step to step
 //! and dropped at a gap.
 
+use serde::{Deserialize, Serialize};
+
 use crate::sample::{CorrectedTick, SensorFlags, Sensors, TickFlags};
 use crate::units::Span;
 
@@ -41,7 +43,7 @@ pub enum NavigationError {
 }
 
 /// How ticks are summed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct NavigationStep {
     ticks: u16,
     coning_sculling: bool,
@@ -81,7 +83,7 @@ impl NavigationStep {
 }
 
 /// The step that is being summed.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct StepSum {
     /// Plain sums and flags so far; `None` between steps.
     open: Option<CorrectedTick>,

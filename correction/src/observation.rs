@@ -1,12 +1,14 @@
 //! One tick as the corrector saw it: what self-test, pre-launch calibration and drift estimator rest on.
 
+use serde::{Deserialize, Serialize};
+
 use crate::sample::{LasingMode, SensorFlags, Sensors, TickFlags};
 use crate::units::{Span, Timestamp};
 
 /// One tick after its correction, taken apart again.
 ///
 /// The corrector fills one and the same `Observation` tick after tick; nothing is allocated.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Observation {
     /// Sequence number of the tick.
     pub sequence: u64,

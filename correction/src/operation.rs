@@ -15,6 +15,8 @@ mod self_test;
 use alloc::vec::Vec;
 use core::fmt;
 
+use serde::{Deserialize, Serialize};
+
 pub use self_test::{
     CheckItem, CheckResult, HealthReading, SelfTest, SelfTestCounter, SelfTestParts, SelfTestReport,
     SelfTestVoltage,
@@ -24,7 +26,7 @@ use crate::earth::Place;
 use crate::prelaunch::{PreLaunchError, PreLaunchSettings};
 
 /// What a unit is doing.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum State {
     /// Nothing goes out.
     Standby,
@@ -72,12 +74,12 @@ impl State {
         matches!(self, Self::RunningWithReversal | Self::RunningWithoutReversal)
     }
 
-    /// Commands that this state takes, by name.
+    /// Commands that this state takes, by name. A rollback is a change of calibration, which every state takes.
     #[must_use]
     pub const fn allowed(self) -> &'static [&'static str] {
         match self {
             Self::Standby => &["standby", "run", "self-test", "pre-launch", "rest", "end-rest", "rollback"],
-            Self::SelfTest | Self::PreLaunchCalibration => &["abort"],
+            Self::SelfTest | Self::PreLaunchCalibration => &["abort", "rollback"],
             Self::RunningWithReversal | Self::RunningWithoutReversal => {
                 &["run", "standby", "rest", "end-rest", "rollback"]
             }
@@ -92,7 +94,7 @@ impl fmt::Display for State {
 }
 
 /// What a unit is told to do; it takes effect at the next tick.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Command {
     /// Hold everything back.
     Standby,

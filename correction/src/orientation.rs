@@ -14,6 +14,8 @@ mod parts;
 
 use alloc::vec::Vec;
 
+use serde::{Deserialize, Serialize};
+
 use linear::{Rows, condition_number, orthonormal_columns};
 
 pub use parity::{ISOLATION_RATIO, ParityCheck, ParityVerdict};
@@ -24,7 +26,7 @@ pub use parts::{
 use crate::sample::{MAX_SENSORS, MIN_SENSORS, Sensors};
 
 /// Which sensors of a kind take part: bit i for sensor i.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 pub struct SensorMask(u8);
 
 impl SensorMask {
@@ -69,7 +71,7 @@ impl SensorMask {
 }
 
 /// A validated orientation.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Orientation {
     reference_deg_c: f64,
     range_deg_c: [f64; 2],
@@ -249,7 +251,7 @@ fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
 }
 
 /// A compiled C(T)⁺: three rows of one coefficient per sensor.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Inverse {
     matrix: [[f64; MAX_SENSORS]; 3],
     mask: SensorMask,

@@ -30,6 +30,8 @@ mod settings;
 
 use alloc::vec::Vec;
 
+use serde::{Deserialize, Serialize};
+
 use gyro::GyroRun;
 pub use outcome::{
     BiasConstant, ByMode, GyroConstants, GyroProgress, ModeTotals, Outcome, PreLaunchProgress, Refusal,
@@ -48,7 +50,7 @@ use crate::units::{Span, Timestamp};
 ///
 /// It belongs to the calibration that it was made with: where another one is installed, drop it. Dropping it leaves no
 /// trace. Nothing is allocated per tick.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct PreLaunch {
     settings: PreLaunchSettings,
     place: Place,

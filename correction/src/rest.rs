@@ -27,6 +27,8 @@ mod window;
 
 use core::fmt;
 
+use serde::{Deserialize, Serialize};
+
 pub use limits::{RestLimits, RestLimitsError};
 use track::{Finding, Scale, Track};
 use window::Window;
@@ -38,7 +40,7 @@ use crate::thermal::AccelModel;
 use crate::units::{Angle, AngularRate, SpecificForce, Timestamp};
 
 /// Kinds of motion, each with the unit of measure of its value and limit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Motion {
     /// Turned within one or two seconds (rad).
     Turn,
@@ -59,7 +61,7 @@ pub enum Motion {
 }
 
 /// A motion that was seen.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Moved {
     /// What it was.
     pub what: Motion,
@@ -101,7 +103,7 @@ impl fmt::Display for Moved {
 }
 
 /// What is known of the unit.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Rest {
     /// Too little has been seen: half a minute of each lasing mode is needed.
     Learning,
@@ -112,7 +114,7 @@ pub enum Rest {
 }
 
 /// Watches one unit. Allocates when it is made, not per tick.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct RestMonitor {
     limits: RestLimits,
     rate_scale: Scale,

@@ -17,6 +17,7 @@ mod history;
 mod parts;
 
 use arrayvec::ArrayVec;
+use serde::{Deserialize, Serialize};
 
 use fit::{Fit, Points};
 use history::{History, Reading, mid_time_s};
@@ -52,7 +53,7 @@ pub struct TickInput {
 }
 
 /// An interpolated tick that has been published and waits for the two-sided fit.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct LostTick {
     end_time: Timestamp,
     duration: Span,
@@ -66,7 +67,7 @@ struct LostTick {
 type Window<'a> = ArrayVec<(f64, &'a Reading), { MAX_FIT_READINGS as usize }>;
 
 /// Memory of the substitution of one unit: all gyros switch together.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct Substitution {
     /// Good readings, uncorrected.
     history: History,

@@ -2,6 +2,7 @@
 
 use arrayvec::{ArrayString, ArrayVec};
 use bitflags::bitflags;
+use serde::{Deserialize, Serialize};
 
 use crate::units::{Span, Timestamp};
 
@@ -20,7 +21,7 @@ pub type Sensors<T> = ArrayVec<T, MAX_SENSORS>;
 pub type ChannelName = ArrayString<MAX_CHANNEL_NAME>;
 
 /// What a raw reading stands for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum OutputKind {
     /// Counts accumulated over the tick (dimensionless, whole numbers).
     Counts,
@@ -29,7 +30,7 @@ pub enum OutputKind {
 }
 
 /// Which of the two opposite circular polarisations the laser runs on: the sign of the magnetic bias.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum LasingMode {
     /// Magnetic bias enters with sign +1.
     Plus,
@@ -58,7 +59,7 @@ impl LasingMode {
 }
 
 /// Counts of one tick, split by half period of the dither.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct HalfPeriodCounts {
     /// Counts in the positive half period, with the sign of rotation.
     pub positive: i32,
@@ -67,7 +68,7 @@ pub struct HalfPeriodCounts {
 }
 
 /// One raw tick of all gyros of a unit.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct GyroTick {
     /// Producer's number of this tick, one more than the last tick's.
     pub sequence: u64,
@@ -90,7 +91,7 @@ pub struct GyroTick {
 }
 
 /// One raw tick of all accelerometers of a unit.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct AccelTick {
     /// Producer's number of this tick, one more than the last tick's.
     pub sequence: u64,
@@ -103,7 +104,7 @@ pub struct AccelTick {
 }
 
 /// One reading of one temperature channel.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct TemperatureReading {
     /// Name of the channel.
     pub channel: ChannelName,
@@ -115,7 +116,7 @@ pub struct TemperatureReading {
 
 bitflags! {
     /// What is to be known of one sensor in one corrected tick.
-    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
     pub struct SensorFlags: u8 {
         /// The sensor's reading took part in this tick's increments as it stands.
         const VALID = 1;
@@ -134,7 +135,7 @@ bitflags! {
 
 bitflags! {
     /// What is to be known of one corrected tick as a whole.
-    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
     pub struct TickFlags: u16 {
         /// The increments are predicted over a mode switch (models §5, step 2).
         const INTERPOLATED = 1;
@@ -168,7 +169,7 @@ bitflags! {
 }
 
 /// One corrected tick (or navigation step) in case axes.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct CorrectedTick {
     /// Sequence number of the raw gyro tick; of the last one where several are summed.
     pub sequence: u64,

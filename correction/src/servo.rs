@@ -23,6 +23,8 @@
 
 use alloc::vec::Vec;
 
+use serde::{Deserialize, Serialize};
+
 use crate::curve::{Curve, CurveError, CurveParts};
 use crate::sample::{HalfPeriodCounts, MAX_SENSORS};
 use crate::units::{Span, Timestamp};
@@ -38,7 +40,7 @@ pub const DEFAULT_SETTLE_TIME_CONSTANTS: f64 = 8.0;
 const REACH_TICKS: f64 = 16.0;
 
 /// Where `f_i` comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum ServoForm {
     /// From the half-period counts of each tick.
     Measured,
@@ -81,7 +83,7 @@ pub enum ServoError {
 }
 
 /// A validated servo of one gyro.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Servo {
     form: ServoForm,
     time_constant_s: f64,
@@ -168,7 +170,7 @@ impl Transient {
 }
 
 /// Memory of the transients of one unit: all gyros switch together, each has its own `f_1`.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct ServoMemory {
     /// A transition is running: its ticks carry nothing.
     switching: bool,

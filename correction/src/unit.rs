@@ -26,6 +26,8 @@ mod view;
 
 use alloc::sync::Arc;
 
+use serde::{Deserialize, Serialize};
+
 use accel_intake::{AccelIntake, Match};
 pub use at_rest::AtRest;
 pub use change::{At, Change};
@@ -47,7 +49,7 @@ use crate::sample::{AccelTick, CorrectedTick, GyroTick, OutputKind, TemperatureR
 use crate::units::{Span, Timestamp};
 
 /// What a unit does without a calibration.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Uncalibrated {
     /// The first three raw gyro and accelerometer readings go out as they are, unscaled and flagged: neither radians
     /// nor metres per second.
@@ -57,7 +59,7 @@ pub enum Uncalibrated {
 }
 
 /// Settings of a unit that are not part of its calibration.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct UnitSettings {
     /// How long, in event time, a gyro tick waits for its accelerometer tick or a missing neighbour.
     pub pairing_window: Span,
@@ -117,15 +119,16 @@ pub enum Event<'a> {
 }
 
 /// A calibration in force, with the memory that belongs to it.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 struct Active {
+    #[serde(with = "crate::written::shared")]
     calibration: Arc<Calibration>,
     corrector: Corrector,
     revision: u64,
 }
 
 /// One unit.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 pub struct Unit {
     settings: UnitSettings,
     active: Option<Active>,

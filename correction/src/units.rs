@@ -6,6 +6,8 @@
 
 use core::ops::{Add, Sub};
 
+use serde::{Deserialize, Serialize};
+
 /// π/180 (rad per °).
 const RAD_PER_DEG: f64 = core::f64::consts::PI / 180.0;
 /// rad/s in one °/h.
@@ -78,7 +80,7 @@ quantity! {
 /// A span of event time in nanoseconds, never negative.
 ///
 /// Range: 0…2⁶³−1 ns (292 years); construction from seconds saturates.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
 #[repr(transparent)]
 pub struct Span(i64);
 
@@ -128,7 +130,7 @@ impl Span {
 /// An instant on the producer's own clock: nanoseconds since that clock's epoch.
 ///
 /// Arithmetic saturates, so that no time stamp, however broken, can stop a unit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
 #[repr(transparent)]
 pub struct Timestamp(i64);
 

@@ -10,17 +10,36 @@
 //! | [`recording`] | MCAP files with every message as it was on the bus |
 //! | [`message`] | one message and its topic |
 //! | [`source`] | a log of either kind as messages |
+//! | [`convert`] | a log in another form: its contents, its raw streams as rows |
+//! | [`ros2`], [`parquet`] | ROS 2 bags; Parquet files |
+//! | [`part`] | some of its units, some of its time |
+//! | [`schedule`] | when its messages are to go out again |
+//! | [`faults`] | delay, loss, duplication and reordering on purpose, from a seed |
 //! | [`progress`] | how far a log has been read |
+//! | [`replica`] | a unit's stream, made again from frames and journal |
 //! | [`offline`] | a log through the service's state machine |
+//! | [`diff`] | two corrected logs compared |
+//! | [`info`] | what a log holds, in figures |
+//! | [`plot`] | a log, or two, as a page to look at; pages for other reports |
 //! | [`file`] | small files read whole, outputs that must not fall on inputs |
 //! | [`error`] | what can go wrong |
 
+pub mod convert;
+pub mod diff;
 pub mod error;
+pub mod faults;
 pub mod file;
+pub mod info;
 pub mod mapping;
 pub mod message;
 pub mod offline;
+pub mod parquet;
+pub mod part;
+pub mod plot;
 pub mod progress;
 pub mod recording;
+pub mod replica;
+pub mod ros2;
+pub mod schedule;
 pub mod source;
 pub mod text;

@@ -1,4 +1,16 @@
 //! Offline correction: a log through the same stream that the service uses.
+//!
+//! | file | holds |
+//! |---|---|
+//! | [`Offline`] | a text log's events, one by one |
+//! | [`correct`], [`UnitPlan`] | the units of a recording, all at once |
+//! | [`rows`] | corrected ticks as a file |
+//! | [`sums`] | their figures |
+
+mod parallel;
+pub mod rows;
+pub mod sums;
+mod unit;
 
 use std::path::Path;
 use std::slice;
@@ -9,6 +21,9 @@ use isotherm_correction::unit::{Event, UnitSettings};
 use isotherm_protocol::document::{Document, Problem};
 use isotherm_protocol::key::UnitId;
 use isotherm_protocol::stream::UnitStream;
+
+pub use parallel::{Made, RunOptions, correct};
+pub use unit::{Basis, Form, Output, UnitPlan, UnitReport};
 
 use crate::error::Error;
 use crate::file::read_small;

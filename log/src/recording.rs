@@ -7,11 +7,17 @@
 //! | log time | when it was received (ns since 1970-01-01 UTC) |
 //! | publish time | end of its last tick on the producer's clock (ns); the log time where it has none |
 //! | attachment | calibration documents by digest, the service's configuration |
-//! | metadata | [`METADATA`]: versions, when and how it was recorded, counts at its end |
+//! | metadata | [`METADATA`]: versions, when and how it was recorded, counts at its end; [`CHANNELS`]: keys by channel |
 //!
-//! Chunks end by size and by time, so that what a kill can cost is bounded. A file is read to the last whole chunk.
+//! Chunks end by size and by time, so that what a kill can cost is bounded. A file is read to the last whole chunk;
+//! [`recover()`] gets back what stands behind a damaged one too.
 
+mod documents;
+mod ending;
+mod place;
 mod reader;
+mod record;
+pub mod recover;
 mod schema;
 mod writer;
 
@@ -22,7 +28,10 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+pub use documents::{Documents, JournalAccount};
+pub use place::is_being_written;
 pub use reader::{RecordingReader, RecordingReport};
+pub use recover::recover;
 pub use writer::{RecordingOptions, RecordingWriter};
 
 /// Encoding of the messages: frames of `docs/wire.md`.
@@ -31,6 +40,9 @@ pub const MESSAGE_ENCODING: &str = "isotherm";
 pub const SCHEMA_ENCODING: &str = "isotherm-wire";
 /// Name of the metadata records that the recorder writes.
 pub const METADATA: &str = "isotherm";
+/// Name of the metadata records that say which channel is which key: once more, for a file that has lost the chunk with the
+/// channel's own record, and its summary.
+pub const CHANNELS: &str = "isotherm-channels";
 /// What every MCAP file begins with.
 pub const MAGIC: &[u8] = mcap::MAGIC;
 

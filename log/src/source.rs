@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 
+use isotherm_correction::units::Span;
 use isotherm_protocol::key::UnitId;
 use isotherm_protocol::raw::{Batcher, RawFrame};
 use serde::Serialize;
@@ -14,7 +15,7 @@ use crate::mapping::Mapping;
 use crate::message::{Message, Topic};
 use crate::progress::Progress;
 use crate::recording::{self, RecordingReader, RecordingReport};
-use crate::text::{LogEvent, LogReader, ReadReport};
+use crate::text::{LogEvent, LogReader, ReadReport, Window};
 
 /// Whether a file is a recording; what cannot be read is not.
 #[must_use]
@@ -31,6 +32,10 @@ pub struct TextOptions<'a> {
     pub unit: &'a UnitId,
     /// Gyro ticks in one batch (1…4096).
     pub batch_ticks: usize,
+    /// Begin this long after the log's beginning.
+    pub start: Span,
+    /// Take this much of it; `None` is to the end.
+    pub duration: Option<Span>,
 }
 
 /// A log, read message by message in constant memory.
@@ -90,6 +95,7 @@ impl Log {
     pub fn text(paths: &[PathBuf], options: TextOptions<'_>) -> Result<Self, Error> {
         let events = LogReader::open(options.mapping, paths)?;
         let progress = events.progress();
+        let events = Window::new(events, options.start, options.duration);
         let unit = options.unit.clone();
         let text = TextLog { events, unit, batcher: Batcher::new(options.batch_ticks), over: false };
         Ok(Self { source: Source::Text(Box::new(text)), progress })
@@ -117,7 +123,7 @@ impl Log {
     pub fn report(&self) -> LogReport {
         match &self.source {
             Source::Recording(reader) => LogReport::Recording(reader.report().clone()),
-            Source::Text(text) => LogReport::Text(text.events.report()),
+            Source::Text(text) => LogReport::Text(text.events.inner().report()),
         }
     }
 
@@ -133,7 +139,7 @@ impl Log {
 /// A text log, put into batches.
 #[derive(Debug)]
 struct TextLog {
-    events: LogReader,
+    events: Window<LogReader>,
     unit: UnitId,
     batcher: Batcher,
     over: bool,

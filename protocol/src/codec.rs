@@ -47,6 +47,8 @@ pub enum Kind {
     ServiceStatus = 7,
     /// [`crate::reference::Reference`].
     Reference = 8,
+    /// [`crate::journal::JournalPart`].
+    Journal = 9,
 }
 
 /// A message that has a frame of its own.

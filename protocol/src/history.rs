@@ -57,7 +57,7 @@ pub enum AuditEvent {
     Command(CommandRecord),
     /// First in a new file: what holds for a unit by the files before it.
     CarriedUnit(CarriedUnit),
-    /// First in a new file: what was last seen in a file of the watched folder.
+    /// What was last seen in a file of the watched folder, where no other entry says so; and first in a new file.
     CarriedFile(CarriedFile),
 }
 
@@ -170,6 +170,9 @@ pub struct Refusal {
     pub problems: Vec<String>,
     /// How many there were.
     pub count: u64,
+    /// Whether all that speaks against it is that another file of the folder names its unit too.
+    #[serde(skip_serializing_if = "std::ops::Not::not", default)]
+    pub rival: bool,
 }
 
 /// A command and what became of it.
@@ -207,6 +210,9 @@ pub struct CarriedFile {
     pub path: String,
     /// SHA-256 of its bytes, accepted or refused.
     pub digest: Digest,
+    /// Whether that was refused; otherwise it is what the folder says for the unit of the entry.
+    #[serde(skip_serializing_if = "std::ops::Not::not", default)]
+    pub refused: bool,
 }
 
 /// A calibration that was accepted and not withdrawn.

@@ -5,6 +5,7 @@
 use std::fmt;
 use std::sync::Arc;
 
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 /// Longest serial, in bytes.
@@ -22,12 +23,16 @@ pub const ALL_CALIBRATION: &str = "imu/*/calibration";
 pub const ALL_COMMAND: &str = "imu/*/command";
 /// Histories of all units.
 pub const ALL_HISTORY: &str = "imu/*/history";
+/// Journals of all units.
+pub const ALL_JOURNALS: &str = "imu/*/journal";
 /// Rate references of all units.
 pub const ALL_REFERENCE: &str = "imu/*/reference";
 /// Liveliness tokens of all units.
 pub const ALL_UNITS_ALIVE: &str = "imu/*/alive";
 /// Status topics of all service instances.
 pub const ALL_SERVICE_STATUS: &str = "isotherm/*/status";
+/// Effective configurations of all service instances.
+pub const ALL_CONFIGURATIONS: &str = "isotherm/*/configuration";
 /// Liveliness tokens of all service instances.
 pub const ALL_SERVICES_ALIVE: &str = "isotherm/*/alive";
 
@@ -37,7 +42,8 @@ const ROOT: &str = "imu";
 const SERVICE_ROOT: &str = "isotherm";
 
 /// Serial of an instrument: the `{unit}` chunk of a key.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
 pub struct UnitId(Arc<str>);
 
 /// Why a text cannot be a serial.
@@ -80,6 +86,20 @@ impl UnitId {
     }
 }
 
+impl TryFrom<String> for UnitId {
+    type Error = UnitIdError;
+
+    fn try_from(serial: String) -> Result<Self, UnitIdError> {
+        Self::new(&serial)
+    }
+}
+
+impl From<UnitId> for String {
+    fn from(unit: UnitId) -> Self {
+        unit.to_string()
+    }
+}
+
 impl fmt::Display for UnitId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.0)
@@ -87,7 +107,7 @@ impl fmt::Display for UnitId {
 }
 
 /// The raw streams of a unit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum RawStream {
     /// Gyro ticks.
     Gyro,
@@ -113,6 +133,54 @@ impl RawStream {
             Self::Health => "health",
         }
     }
+}
+
+/// What comes in for a unit: its raw streams, and its rate references.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Input {
+    /// A raw stream.
+    Raw(RawStream),
+    /// Rate references.
+    Reference,
+}
+
+impl Input {
+    /// All of them, in the order of [`Input::index`].
+    pub const ALL: [Self; 5] = [
+        Self::Raw(RawStream::Gyro),
+        Self::Raw(RawStream::Accel),
+        Self::Raw(RawStream::Temperature),
+        Self::Raw(RawStream::Health),
+        Self::Reference,
+    ];
+
+    /// Its place in a list of five: gyro, accelerometer, temperature, health, reference.
+    #[must_use]
+    pub const fn index(self) -> usize {
+        match self {
+            Self::Raw(RawStream::Gyro) => 0,
+            Self::Raw(RawStream::Accel) => 1,
+            Self::Raw(RawStream::Temperature) => 2,
+            Self::Raw(RawStream::Health) => 3,
+            Self::Reference => 4,
+        }
+    }
+}
+
+/// Key of an input: of a raw stream, or of the rate references.
+#[must_use]
+pub fn input(unit: &UnitId, input: Input) -> String {
+    match input {
+        Input::Raw(stream) => raw(unit, stream),
+        Input::Reference => reference(unit),
+    }
+}
+
+/// Reads the key of an input back; `None` where it is none.
+#[must_use]
+pub fn parse_input(key: &str) -> Option<(&str, Input)> {
+    let raw = || parse_raw(key).map(|(unit, stream)| (unit, Input::Raw(stream)));
+    raw().or_else(|| parse_reference(key).map(|unit| (unit, Input::Reference)))
 }
 
 /// Key of a raw stream: `imu/{unit}/raw/{gyro|accel|temp|health}`.
@@ -146,6 +214,7 @@ topics! {
     "the calibration document", "calibration", calibration, parse_calibration;
     "commands", "command", command, parse_command;
     "a unit's history", "history", history, parse_history;
+    "a unit's journal", "journal", journal, parse_journal;
     "rate references", "reference", reference, parse_reference;
     "a unit's liveliness token", "alive", unit_alive, parse_unit_alive;
 }
@@ -154,6 +223,12 @@ topics! {
 #[must_use]
 pub fn service_status(instance: &str) -> String {
     format!("{SERVICE_ROOT}/{instance}/status")
+}
+
+/// Key of a service instance's effective configuration: `isotherm/{instance}/configuration`.
+#[must_use]
+pub fn configuration(instance: &str) -> String {
+    format!("{SERVICE_ROOT}/{instance}/configuration")
 }
 
 /// Key of a service instance's liveliness token: `isotherm/{instance}/alive`.
@@ -166,6 +241,12 @@ pub fn service_alive(instance: &str) -> String {
 #[must_use]
 pub fn parse_service_status(key: &str) -> Option<&str> {
     parse(SERVICE_ROOT, key).filter(|(_, rest)| *rest == "status").map(|(instance, _)| instance)
+}
+
+/// Reads the instance of the key of a service's configuration back; `None` where it is none.
+#[must_use]
+pub fn parse_configuration(key: &str) -> Option<&str> {
+    parse(SERVICE_ROOT, key).filter(|(_, rest)| *rest == "configuration").map(|(instance, _)| instance)
 }
 
 /// Reads the instance of a service's liveliness token back; `None` where it is none.
@@ -197,6 +278,10 @@ mod tests {
         for stream in RawStream::ALL {
             assert_eq!(parse_raw(&raw(&unit, stream)), Some(("ZLG-0042", stream)));
         }
+        for (index, each) in Input::ALL.into_iter().enumerate() {
+            assert_eq!(parse_input(&input(&unit, each)), Some(("ZLG-0042", each)));
+            assert_eq!(each.index(), index);
+        }
         assert_eq!(parse_corrected(&corrected(&unit)), Some("ZLG-0042"));
         let topics = [
             (status(&unit), "imu/ZLG-0042/status", parse_status as fn(&str) -> Option<&str>),
@@ -204,8 +289,10 @@ mod tests {
             (command(&unit), "imu/ZLG-0042/command", parse_command),
             (history(&unit), "imu/ZLG-0042/history", parse_history),
             (reference(&unit), "imu/ZLG-0042/reference", parse_reference),
+            (journal(&unit), "imu/ZLG-0042/journal", parse_journal),
             (unit_alive(&unit), "imu/ZLG-0042/alive", parse_unit_alive),
             (service_status("ZLG-0042"), "isotherm/ZLG-0042/status", parse_service_status),
+            (configuration("ZLG-0042"), "isotherm/ZLG-0042/configuration", parse_configuration),
             (service_alive("ZLG-0042"), "isotherm/ZLG-0042/alive", parse_service_alive),
         ];
         for (key, text, parse) in &topics {

@@ -16,9 +16,11 @@
 //! | [`service_status`] | what a service instance says of itself |
 //! | [`stream`] | frames in, frames out for one unit |
 //! | [`control`] | what operators ask of a running unit, and the answers |
+//! | [`journal`] | what acts on a unit's stream beside its frames, so that a log alone is enough to correct it again |
 //! | [`history`] | what was done to a unit: the entries of the audit file |
 //! | [`document`] | the calibration document: TOML in, validated calibration out; differences of two |
 //! | [`overlay`] | changes of a document's bias constants, such as a pre-launch calibration's; the one way in for both |
+//! | [`escape`] | text of others shown to people, without line breaks and marks of direction |
 //! | [`signature`] | who signed a calibration document, and whether it is unchanged |
 //!
 //! `docs/wire.md` describes the bytes for readers in other languages.
@@ -28,7 +30,9 @@ pub mod control;
 pub mod corrected;
 pub mod digest;
 pub mod document;
+pub mod escape;
 pub mod history;
+pub mod journal;
 pub mod key;
 pub mod overlay;
 pub mod raw;

@@ -3,8 +3,11 @@
 //! The service feeds it from Zenoh, the replay tool from a file. Both therefore give the same corrected ticks, bit
 //! for bit.
 
+mod carry_out;
 mod edge;
+mod heard;
 mod label;
+mod memory;
 mod revisions;
 mod status;
 #[cfg(test)]
@@ -18,23 +21,31 @@ use isotherm_correction::operation::{Command, HealthReading, Refusal, State};
 use isotherm_correction::sample::{AccelTick, CorrectedTick, GyroTick, TemperatureReading, TickFlags};
 use isotherm_correction::unit::{At, Change, Event, Unit, UnitSettings};
 use isotherm_correction::units::Span;
+use serde::{Deserialize, Serialize};
 
+pub use carry_out::JournalError;
 pub use edge::Edge;
+pub use heard::Heard;
 pub use label::Label;
+pub use memory::{MEMORY_VERSION, MemoryError};
 pub use revisions::InForce;
 use revisions::Revisions;
 
 use crate::codec::{self, CodecError, MAX_TICKS};
 use crate::corrected::{AppliedTemperature, CorrectedBatch, Revision};
-use crate::key::{RawStream, UnitId};
+use crate::key::{Input, RawStream, UnitId};
 use crate::raw::{AccelBatch, GyroBatch, HealthBatch, TemperatureBatch};
 use crate::reference::Reference;
 use crate::status::{Counter, LastTick};
 
 /// One unit's stream.
-#[derive(Debug)]
+///
+/// [`UnitStream::memory`] writes all of it down; what is read back goes on to the same bits.
+#[derive(Debug, Serialize, Deserialize)]
 pub struct UnitStream {
     id: UnitId,
+    /// By [`Input::index`].
+    heard: [Heard; Input::ALL.len()],
     unit: Unit,
     revisions: Revisions,
     ready: VecDeque<CorrectedTick>,
@@ -46,9 +57,14 @@ pub struct UnitStream {
     series: Option<u64>,
     /// End of the last pre-launch calibration (ns on the producer's clock).
     pre_launch_ended_ns: Option<i64>,
+    // Room to work in, not memory.
+    #[serde(skip)]
     gyro_ticks: Vec<GyroTick>,
+    #[serde(skip)]
     accel_ticks: Vec<AccelTick>,
+    #[serde(skip)]
     readings: Vec<TemperatureReading>,
+    #[serde(skip)]
     health: Vec<HealthReading>,
 }
 
@@ -58,6 +74,7 @@ impl UnitStream {
     pub fn new(id: UnitId, settings: UnitSettings) -> Self {
         Self {
             id,
+            heard: [Heard::default(); Input::ALL.len()],
             unit: Unit::new(settings),
             revisions: Revisions::new(0),
             ready: VecDeque::new(),
@@ -136,11 +153,23 @@ impl UnitStream {
         self.watching_pre_launch(Unit::end_pre_launch);
     }
 
+    /// Takes one frame of any input.
+    ///
+    /// # Errors
+    /// [`CodecError`] for a frame that cannot be read: it is counted, and nothing else changes.
+    pub fn take(&mut self, input: Input, frame: &[u8]) -> Result<(), CodecError> {
+        match input {
+            Input::Raw(stream) => self.receive(stream, frame),
+            Input::Reference => self.receive_reference(frame),
+        }
+    }
+
     /// Takes one raw frame.
     ///
     /// # Errors
     /// [`CodecError`] for a frame that cannot be read: it is counted, and nothing else changes.
     pub fn receive(&mut self, stream: RawStream, frame: &[u8]) -> Result<(), CodecError> {
+        self.note_heard(Input::Raw(stream), frame);
         let received = self.receive_frame(stream, frame);
         self.bad_frames += u64::from(received.is_err());
         received
@@ -189,6 +218,7 @@ impl UnitStream {
     /// # Errors
     /// [`CodecError`] for a frame that cannot be read: it is counted, and nothing else changes.
     pub fn receive_reference(&mut self, frame: &[u8]) -> Result<(), CodecError> {
+        self.note_heard(Input::Reference, frame);
         let decoded = codec::decode::<Reference>(frame);
         self.bad_frames += u64::from(decoded.is_err());
         self.handle(Event::Reference(&decoded?.to_core()));

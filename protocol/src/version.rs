@@ -49,3 +49,5 @@ pub const RAW_HEALTH: Versions = Versions { min: 1, current: 1 };
 pub const SERVICE_STATUS: Versions = Versions { min: 1, current: 1 };
 /// Of the rate reference.
 pub const REFERENCE: Versions = Versions { min: 1, current: 1 };
+/// Of the parts of a journal entry, and of the entry in them.
+pub const JOURNAL: Versions = Versions { min: 1, current: 1 };

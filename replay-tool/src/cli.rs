@@ -1,20 +1,26 @@
 //! The command line: arguments in, exit code out.
 
+mod convert;
 mod correct;
+mod diff;
+mod info;
+mod log_args;
 mod play;
+mod plot;
+mod record;
+mod recover;
 mod show;
 mod simulate;
+mod step;
 
 use std::io::{self, Write};
-use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Args, CommandFactory, Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use isotherm_correction::units::Span;
 
 use crate::error::Error;
-use isotherm_log::mapping::Mapping;
-use isotherm_log::text::{LogReader, Window};
+use log_args::LogArgs;
 
 /// Plays recorded logs into the service, corrects them offline, simulates new ones.
 #[derive(Debug, Parser)]
@@ -30,8 +36,15 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Record(record::RecordArgs),
+    Recover(recover::RecoverArgs),
     Play(play::PlayArgs),
     Correct(correct::CorrectArgs),
+    Diff(diff::DiffArgs),
+    Step(step::StepArgs),
+    Info(info::InfoArgs),
+    Plot(plot::PlotArgs),
+    Convert(convert::ConvertArgs),
     Simulate(simulate::SimulateArgs),
     /// Print a completion script for a shell
     #[command(after_help = "Example:\n  isotherm-replay completions bash > isotherm-replay.bash")]
@@ -39,31 +52,6 @@ enum Command {
         /// The shell
         shell: clap_complete::Shell,
     },
-}
-
-/// Which log, and which part of it.
-#[derive(Debug, Args)]
-struct LogArgs {
-    /// Files of the log in the order of the mapping, or the folder that has them
-    #[arg(required = true, value_name = "LOG")]
-    log: Vec<PathBuf>,
-    /// Column mapping (TOML); ready ones are in config/mappings
-    #[arg(long, short, value_name = "FILE")]
-    mapping: PathBuf,
-    /// Begin this long after the log's beginning (s)
-    #[arg(long, value_name = "SECONDS", default_value = "0", value_parser = seconds)]
-    start: Span,
-    /// Take this much of the log (s); without it, all
-    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
-    duration: Option<Span>,
-}
-
-impl LogArgs {
-    /// Opens the log's part.
-    fn open(&self) -> Result<Window<LogReader>, Error> {
-        let mapping = Mapping::load(&self.mapping)?;
-        Ok(Window::new(LogReader::open(&mapping, &self.log)?, self.start, self.duration))
-    }
 }
 
 /// Reads seconds.
@@ -81,13 +69,22 @@ enum Outcome {
     Complete,
     /// Something was lost on the way, and said so.
     DataLoss,
+    /// What was compared is not the same, and it is said where.
+    Different,
 }
 
 /// Runs the command that the arguments name.
 fn run(cli: Cli) -> Result<Outcome, Error> {
     match cli.command {
-        Command::Play(args) => play::run(args),
+        Command::Record(args) => record::run(&args),
+        Command::Recover(args) => recover::run(&args),
+        Command::Play(args) => play::run(&args),
         Command::Correct(args) => correct::run(&args),
+        Command::Diff(args) => diff::run(&args),
+        Command::Step(args) => step::run(&args),
+        Command::Info(args) => info::run(&args),
+        Command::Plot(args) => plot::run(&args),
+        Command::Convert(args) => convert::run(&args),
         Command::Simulate(args) => simulate::run(&args),
         Command::Completions { shell } => {
             let mut script = Vec::new();
@@ -113,6 +110,7 @@ pub fn main() -> ExitCode {
     match run(Cli::parse()) {
         Ok(Outcome::Complete) => ExitCode::SUCCESS,
         Ok(Outcome::DataLoss) => ExitCode::from(3),
+        Ok(Outcome::Different) => ExitCode::from(1),
         Err(error) => {
             let _ = writeln!(io::stderr(), "isotherm-replay: {error}");
             ExitCode::from(error.exit_code())

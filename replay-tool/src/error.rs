@@ -32,6 +32,12 @@ pub enum Error {
     /// Zenoh.
     #[error(transparent)]
     Bus(#[from] BusError),
+    /// No service where one is needed.
+    #[error("{words}")]
+    NoService {
+        /// What was waited for, and what else could be done.
+        words: String,
+    },
     /// The asynchronous runtime does not start.
     #[error("cannot start the runtime: {source}")]
     Runtime {

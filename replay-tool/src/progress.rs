@@ -9,6 +9,8 @@ use isotherm_log::progress::Progress;
 
 /// Events between two looks at the bar.
 const STRIDE: u32 = 1024;
+/// Steps of a bar over a share.
+const SHARES: u64 = 100_000;
 
 /// A bar over the bytes of a log, or over ticks.
 #[derive(Debug)]
@@ -34,6 +36,26 @@ impl Bar {
     pub fn over_ticks(ticks: u64) -> Self {
         let bar = bar(ticks, "{bar:30} {percent:>3} %  {pos} of {len} ticks  {eta} left");
         Self { drawn: bar, progress: None, since: 0 }
+    }
+
+    /// A bar over a share of something, from 0 to 1.
+    #[must_use]
+    pub fn over_share() -> Self {
+        let bar = bar(SHARES, "{bar:30} {percent:>3} %  {msg}  {eta} left");
+        Self { drawn: bar, progress: None, since: 0 }
+    }
+
+    /// Shows a share, at once.
+    pub fn share(&mut self, share: f64, message: String) {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "held between 0 and 1")]
+        let position = (share.clamp(0.0, 1.0) * SHARES as f64) as u64;
+        self.drawn.set_position(position);
+        self.drawn.set_message(message);
+    }
+
+    /// Does something to the terminal while the bar is away.
+    pub fn beside(&self, work: impl FnOnce()) {
+        self.drawn.suspend(work);
     }
 
     /// One event is done; `message` is asked for only now and then.

@@ -25,6 +25,8 @@ pub struct Installable {
     pub digest: Option<Digest>,
     /// The document; `None` for a calibration that never was one.
     pub document: Option<Arc<Document>>,
+    /// The text that it was compiled from, for the journal; `None` for a calibration that never was a document.
+    pub text: Option<Arc<str>>,
     /// SHA-256 of the overlay that was laid over it.
     pub overlay: Option<Digest>,
     /// Where it came from; `None` for one that the program itself was started with.
@@ -35,7 +37,7 @@ impl Installable {
     /// A calibration that never was a document.
     #[must_use]
     pub fn plain(revision: Revision, calibration: Arc<Calibration>) -> Self {
-        Self { revision, calibration, digest: None, document: None, overlay: None, source: None }
+        Self { revision, calibration, digest: None, document: None, text: None, overlay: None, source: None }
     }
 }
 

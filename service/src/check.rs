@@ -8,6 +8,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use isotherm_protocol::document::Problem;
+use isotherm_protocol::escape::escaped;
 use serde::Serialize;
 
 pub use signer::Signer;
@@ -122,7 +123,7 @@ pub(crate) fn run(args: &CheckArgs) -> Exit {
 /// Problems to stderr; the line for stdout, where the file is good.
 fn in_words(finding: &Finding) -> String {
     if let Some(reason) = &finding.unreadable {
-        say(format_args!("{}: cannot be read: {reason}", finding.file));
+        say(format_args!("{}: cannot be read: {reason}", escaped(&finding.file)));
     }
     for problem in &finding.problems {
         say(problem);
@@ -131,7 +132,9 @@ fn in_words(finding: &Finding) -> String {
         say(format_args!("{warning} (warning)"));
     }
     let summary = finding.summary.as_ref();
-    summary.map_or_else(String::new, |summary| format!("{}: {}\n", finding.file, summary.summary))
+    summary.map_or_else(String::new, |summary| {
+        format!("{}: {}\n", escaped(&finding.file), escaped(&summary.summary))
+    })
 }
 
 fn verdict(findings: &[Finding]) -> Exit {

@@ -2,6 +2,7 @@
 //!
 //! `config/service.toml` documents every key with its default. Relative paths count from the configuration file.
 
+mod effective;
 mod metrics;
 mod operation;
 mod swap;

@@ -4,6 +4,7 @@ use std::fmt;
 use std::time::{Duration, Instant, SystemTime};
 
 use isotherm_protocol::codec::CodecError;
+use isotherm_protocol::escape::shown;
 use isotherm_protocol::status::{Counter, Fault};
 
 /// Declares the kinds once, so that kind, counter name and documentation cannot drift apart.
@@ -49,6 +50,8 @@ kinds! {
     TooManyUnits = "units_refused",
     /// Corrected ticks that could not be published.
     Unpublished = "ticks_unpublished",
+    /// Entries of the unit's journal that could not be published.
+    JournalUnpublished = "journal_entries_unpublished",
     /// An event thought impossible inside one unit's processing; the unit was reset.
     Alarm = "alarms",
 }
@@ -136,7 +139,8 @@ impl FaultLog {
         entry.last = Some(SystemTime::now());
         let Some((told, before)) = entry.told else {
             // The words of a repeated fault are not made anew: a flood of bad messages must stay cheap.
-            entry.first = words();
+            // Words may quote what came in.
+            entry.first = shown(&words());
             entry.told = Some((now, entry.count));
             self.last = Some(kind);
             return Some(Telling::First(entry.first.clone()));
@@ -189,6 +193,13 @@ impl FaultLog {
         let occurred = FaultKind::ALL.iter().filter(|kind| self.count(**kind) > 0);
         occurred.map(|kind| Counter { name: kind.name().to_owned(), value: self.count(*kind) })
     }
+}
+
+/// A fault that is there now and stays until somebody does something about it.
+pub(crate) fn standing(kind: &str, count: u64, words: String) -> Fault {
+    let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+    let last_unix_ms = i64::try_from(since.as_millis()).unwrap_or(i64::MAX);
+    Fault { kind: kind.to_owned(), count, first: words, last_unix_ms }
 }
 
 #[cfg(test)]

@@ -17,7 +17,7 @@ use crate::config::Settings;
 use crate::fault::{FaultKind, FaultLog};
 use crate::registrar::Desk;
 use crate::totals::Totals;
-use crate::unit::{Outlet, Present, QuietSettings, SwapAccount, UnitActor};
+use crate::unit::{Journal, Outlet, Present, QuietSettings, SwapAccount, UnitActor};
 
 /// Makes the outlet of a unit that appears.
 pub type OutletMaker = Box<dyn Fn(&UnitId) -> Result<Outlet, zenoh::Error> + Send + Sync>;
@@ -30,6 +30,8 @@ pub struct Intake {
     outlets: OutletMaker,
     /// To whom units tell what only the registrar can write down.
     desk: Option<Desk>,
+    /// Where the journals of units go.
+    journal: Option<Journal>,
     units: RwLock<Units>,
     faults: Mutex<FaultLog>,
 }
@@ -60,6 +62,7 @@ impl Intake {
             calibrations,
             outlets,
             desk: None,
+            journal: None,
             units: RwLock::default(),
             faults: Mutex::default(),
         }
@@ -68,6 +71,12 @@ impl Intake {
     /// Has every unit that appears tell the registrar what it has to tell.
     pub(crate) fn reporting_to(self, desk: Desk) -> Self {
         Self { desk: Some(desk), ..self }
+    }
+
+    /// Has every unit that appears keep a journal.
+    #[must_use]
+    pub fn journaling_to(self, journal: Journal) -> Self {
+        Self { journal: Some(journal), ..self }
     }
 
     /// Takes one message; whether subscribers of the status should hear of it at once.
@@ -164,6 +173,9 @@ impl Intake {
         let mut actor = UnitActor::new(id.clone(), settings, quiet, outlet);
         if let Some(desk) = &self.desk {
             actor.report_to(desk.clone());
+        }
+        if let Some(journal) = &self.journal {
+            actor.journal_to(journal.clone());
         }
         actor
     }

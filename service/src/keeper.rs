@@ -1,7 +1,8 @@
-//! The one thread beside receive threads and registrar: tail flush by the clock, status, answers to status queries.
+//! The one thread beside receive threads and registrar: tail flush by the clock, status, answers to queries.
 //!
 //! It may wait for a unit's lock or for a slow subscriber; the receive threads never wait for it.
 
+mod answer;
 mod instance;
 mod outlets;
 
@@ -10,11 +11,8 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use isotherm_protocol::codec;
-use isotherm_protocol::key;
-use zenoh::key_expr::keyexpr;
+use zenoh::Session;
 use zenoh::query::Query;
-use zenoh::{Session, Wait};
 
 use crate::config::Settings;
 use crate::intake::Intake;
@@ -27,13 +25,24 @@ const WAITING_REQUESTS: usize = 1024;
 /// Interval of the status of units whose progress is followed.
 const PROGRESS_INTERVAL: Duration = Duration::from_millis(500);
 
+/// What somebody asks of the service, by the queryable that heard it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Asked {
+    /// Status of units or of the service.
+    Status,
+    /// Memory of units.
+    Memory,
+    /// Configuration of the service.
+    Configuration,
+}
+
 /// What the keeper is asked for.
 #[derive(Debug)]
 enum Request {
     /// Some unit's status is due.
     Status,
-    /// Somebody asks for the status of units or of the service.
-    Query(Query),
+    /// Somebody asks.
+    Query(Asked, Query),
     /// Flush every unit, publish its last status, end.
     Stop,
 }
@@ -49,10 +58,10 @@ impl Bell {
         let _ = self.0.try_send(Request::Status);
     }
 
-    /// Somebody asks for the status of units or of the service.
-    pub(crate) fn query(&self, query: Query) {
-        if let Err(TrySendError::Full(_)) = self.0.try_send(Request::Query(query)) {
-            tracing::warn!("a status query is refused: {WAITING_REQUESTS} are waiting");
+    /// Somebody asks.
+    pub(crate) fn ask(&self, asked: Asked, query: Query) {
+        if let Err(TrySendError::Full(_)) = self.0.try_send(Request::Query(asked, query)) {
+            tracing::warn!(?asked, "a query is refused: {WAITING_REQUESTS} are waiting");
         }
     }
 }
@@ -80,6 +89,7 @@ impl Keeper {
         let mut work = Work {
             outlets: Outlets::new(session.clone()),
             instance,
+            configuration: settings.to_toml(),
             intake,
             status_interval: settings.status_interval,
             look_interval: (settings.tail_flush / 4)
@@ -117,6 +127,8 @@ enum Which {
 struct Work {
     outlets: Outlets,
     instance: Instance,
+    /// Effective configuration of the service.
+    configuration: String,
     intake: Arc<Intake>,
     status_interval: Duration,
     look_interval: Duration,
@@ -132,7 +144,7 @@ impl Work {
             let wait = next_status.min(next_look).saturating_duration_since(Instant::now());
             match requests.recv_timeout(wait) {
                 Ok(Request::Status) => self.publish(Which::Due),
-                Ok(Request::Query(query)) => self.answer(&query),
+                Ok(Request::Query(asked, query)) => self.answer(asked, &query),
                 Ok(Request::Stop) | Err(RecvTimeoutError::Disconnected) => break,
                 Err(RecvTimeoutError::Timeout) => {}
             }
@@ -173,29 +185,6 @@ impl Work {
             && let Err(error) = self.outlets.service(&status)
         {
             tracing::warn!("cannot publish the service's status: {}", isotherm_bus::words(&error));
-        }
-    }
-
-    /// Replies with the status of every unit that the query's key takes in, and of the service itself.
-    fn answer(&mut self, query: &Query) {
-        let instance = self.instance.name();
-        let asked = |key: &str| keyexpr::new(key).is_ok_and(|key| query.key_expr().intersects(key));
-        let statuses = self.intake.each_unit(|actor| {
-            let key = key::status(actor.id());
-            asked(&key).then(|| (key, codec::encode(&actor.status(instance))))
-        });
-        let mut replies: Vec<_> = statuses.into_iter().flatten().collect();
-        let key = key::service_status(instance);
-        if asked(&key)
-            && let Some(status) = self.instance.status(&self.intake, true)
-        {
-            replies.push((key, codec::encode(&status)));
-        }
-        for (key, frame) in replies {
-            let sent = frame.map_err(Into::into).and_then(|frame| query.reply(key, frame).wait());
-            if let Err(error) = sent {
-                tracing::warn!("cannot answer a status query: {}", isotherm_bus::words(&error));
-            }
         }
     }
 }

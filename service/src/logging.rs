@@ -1,13 +1,34 @@
 //! Structured logs on stderr.
 
-use std::io::IsTerminal;
+use std::io::{self, IsTerminal, Write};
 
 use clap::{Args, ValueEnum};
 use tracing_subscriber::EnvFilter;
 
+use crate::words::coloured;
+
 /// Zenoh warns of every peer without gossip, which here is how peers are meant to be.
 const QUIET_ZENOH: &str =
     "zenoh=warn,zenoh_transport=warn,zenoh_link_commons=warn,zenoh::net::routing::hat::peer=error";
+
+/// Standard error, for events: each is one line, whatever is in it. What a file name or a document has of line breaks,
+/// control characters and marks of direction is shown by its code.
+struct Lines;
+
+impl Write for Lines {
+    fn write(&mut self, event: &[u8]) -> io::Result<usize> {
+        let text = String::from_utf8_lossy(event);
+        let (text, end) = text.strip_suffix('\n').map_or((&*text, ""), |line| (line, "\n"));
+        // An event comes as a whole; of its line breaks only the last is its own.
+        let line = coloured(text).replace('\n', "\\n").replace('\t', "\\t") + end;
+        io::stderr().write_all(line.as_bytes())?;
+        Ok(event.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        io::stderr().flush()
+    }
+}
 
 /// How the log is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -58,10 +79,10 @@ impl LogArgs {
         })?;
         let builder = tracing_subscriber::fmt()
             .with_env_filter(filter)
-            .with_writer(std::io::stderr)
+            .with_writer(|| Lines)
             // It would be told on stderr itself, with a panic: a full disk must not stop the service for its log.
             .log_internal_errors(false)
-            .with_ansi(std::io::stderr().is_terminal());
+            .with_ansi(io::stderr().is_terminal());
         // An error means that somebody in this process logs already.
         let _ = match self.log_format {
             LogFormat::Human => builder.with_target(false).try_init(),

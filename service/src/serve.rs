@@ -6,11 +6,16 @@ use std::path::Path;
 
 use tokio::signal::unix::{SignalKind, signal};
 
+use crate::calibrations::Calibrations;
 use crate::cli::ServeArgs;
 use crate::config::Settings;
 use crate::exit::Exit;
+use crate::service::{open_store, start_on};
 use crate::words::{print, say};
 use crate::{ServiceError, Totals};
+
+/// SIGXFSZ, sent where a write would make a file longer than the process may (`ulimit -f`, `LimitFSIZE=`).
+const FILE_TOO_LONG: SignalKind = SignalKind::from_raw(25);
 
 /// Serves until a signal comes.
 pub(crate) async fn run(args: ServeArgs) -> Exit {
@@ -78,6 +83,8 @@ async fn serve(args: ServeArgs) -> Result<Option<Totals>, ServiceError> {
     let settings = settings(&args)?;
     let mut interrupt = signal(SignalKind::interrupt()).map_err(ServiceError::Thread)?;
     let mut terminate = signal(SignalKind::terminate()).map_err(ServiceError::Thread)?;
+    // Caught, it no longer ends the process: the write fails, and is told as on a full disk.
+    let _file_too_long = signal(FILE_TOO_LONG).map_err(ServiceError::Thread)?;
     let mut stop_asked = async || {
         tokio::select! {
             _ = interrupt.recv() => "SIGINT",
@@ -85,13 +92,14 @@ async fn serve(args: ServeArgs) -> Result<Option<Totals>, ServiceError> {
         }
     };
 
+    let state = open_store(settings.state.as_deref())?;
     let session = tokio::select! {
         session = isotherm_bus::open(&settings.session) => session?,
         // Still looking for a router, perhaps: there is nothing to flush.
         _ = stop_asked() => return Ok(Some(Totals { stopped_in_time: true, ..Totals::default() })),
     };
     let locators = isotherm_bus::locators(&session);
-    let service = crate::start(settings, session).await?;
+    let service = start_on(settings, Calibrations::default(), state, session).await?;
     tracing::info!(version = env!("CARGO_PKG_VERSION"), locators = locators.join(" "), "ready");
     announce(&args, &locators, service.metrics())?;
 

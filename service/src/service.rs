@@ -17,8 +17,10 @@ use crate::intake::Intake;
 use crate::keeper::Keeper;
 use crate::metrics::{Endpoint, Source, Taken};
 use crate::registrar::{Found, Opening, Registrar, Work};
-use crate::store::Store;
+use crate::signing::read_trusted_keys;
+use crate::store::{Opened, Store};
 use crate::totals::Totals;
+use crate::unit::UnitActor;
 use crate::watch::{WatchSettings, Watcher};
 use declare::Declared;
 
@@ -57,15 +59,27 @@ pub async fn start_with(
     calibrations: Calibrations,
     session: Session,
 ) -> Result<RunningService, ServiceError> {
+    let state = open_store(settings.state.as_deref())?;
+    start_on(settings, calibrations, state, session).await
+}
+
+/// Starts the service with a state folder that is open already, and what it was found like.
+pub(crate) async fn start_on(
+    settings: Settings,
+    calibrations: Calibrations,
+    (store, opened): (Store, Opened),
+    session: Session,
+) -> Result<RunningService, ServiceError> {
+    tell_keys(&settings);
     let metrics = Taken::bind(&settings.metrics).await?;
-    let store = open_store(settings.state.as_deref())?;
     let opening = Opening::new();
     let desk = opening.desk();
     let outlets = declare::outlets(session.clone(), settings.congestion);
     let intake = Intake::new(settings.clone(), calibrations.clone(), outlets).reporting_to(desk.clone());
+    let intake = intake.journaling_to(declare::journal(session.clone(), settings.congestion));
     let intake = Arc::new(intake);
 
-    let mut work = Work::new(&settings, Arc::clone(&intake), store);
+    let mut work = Work::new(&settings, Arc::clone(&intake), store, &opened);
     work.take_over(&calibrations);
     work.restore();
     let found = read_folder(&mut work, &settings)?;
@@ -88,19 +102,42 @@ pub async fn start_with(
 }
 
 /// Opens the state folder, or its stand-in.
-fn open_store(folder: Option<&Path>) -> Result<Store, ServiceError> {
+///
+/// Before any port is taken: who starts a service twice is to read that it runs already, not that a port is taken.
+pub(crate) fn open_store(folder: Option<&Path>) -> Result<(Store, Opened), ServiceError> {
     let Some(folder) = folder else {
         tracing::warn!(
             "no state folder is configured (`state`): swaps, and what was done to a unit, are forgotten at the end"
         );
-        return Ok(Store::in_memory());
+        return Ok((Store::in_memory(), Opened::default()));
     };
     let (store, opened) = Store::open(folder)?;
     for warning in opened.warnings() {
         tracing::warn!("{warning}");
     }
+    for loss in opened.losses() {
+        tracing::error!("{loss}");
+    }
     tracing::info!(folder = %folder.display(), entries = opened.entries, "state folder opened");
-    Ok(store)
+    Ok((store, opened))
+}
+
+/// Says what is wrong with the folder of trusted keys: it is read again at each swap, and now is the time to mend it.
+fn tell_keys(settings: &Settings) {
+    let Some(folder) = &settings.swap.trusted_keys else { return };
+    match read_trusted_keys(folder) {
+        Ok((_, warnings)) => {
+            for warning in &warnings {
+                tracing::warn!("{warning}");
+            }
+        }
+        Err(problems) => {
+            for problem in &problems {
+                tracing::error!("{problem}");
+            }
+            tracing::error!(folder = %folder.display(), "no key is trusted until every *.pub file is one");
+        }
+    }
 }
 
 /// Reads the configured folder; a bad one is survived, unless a strict start is asked for.
@@ -133,12 +170,14 @@ impl RunningService {
         metrics.iter().for_each(Endpoint::stopping);
         let deadline = tokio::time::Instant::now() + settings.stop_timeout;
         // Each of these may wait: a callback for a slow subscriber, the keeper for a callback, the registrar for a disk.
+        let units = Arc::clone(&intake);
         let flush = tokio::task::spawn_blocking(move || {
             let received = declared.undeclare();
             let kept = keeper.stop();
             let watched = watcher.is_none_or(Watcher::stop);
             // Last of all: the first ticks of a calibration may have come with the flush.
             let registered = registrar.stop();
+            units.each_unit(UnitActor::end);
             received && kept && watched && registered
         });
         let flushed = matches!(tokio::time::timeout_at(deadline, flush).await, Ok(Ok(true)));

@@ -8,6 +8,7 @@
 //! | `audit.torn-<n>` | last lines that a crash has cut in mid-write |
 //! | `documents/<sha256>.toml` | every calibration document that was accepted |
 //! | `overlays/<sha256>.toml` | every result of a pre-launch calibration |
+//! | `revisions.json` | a number that no revision goes beyond, should the audit file be lost |
 //!
 //! What a function has written is on the disk when it returns; a crash at whatever moment leaves whole documents and whole
 //! lines. Everything here waits for the disk, so that it must never be called from a receive thread. A service without a
@@ -17,14 +18,16 @@ mod durable;
 mod error;
 mod history;
 mod index;
+mod keep;
 mod lock;
 mod log;
+mod mark;
 mod opened;
 mod scan;
 mod shelf;
 
 pub use error::StoreError;
-pub use opened::{Damage, Opened, Torn};
+pub use opened::{Damage, Emptied, LostRevision, Opened, Torn};
 
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -37,6 +40,7 @@ use isotherm_protocol::key::UnitId;
 use index::Index;
 use lock::Lock;
 use log::{Found, Log};
+use mark::Mark;
 use shelf::Shelf;
 
 /// How long an audit file becomes before a new one is begun (bytes).
@@ -62,7 +66,7 @@ pub struct Store {
 /// Where the entries go.
 #[derive(Debug)]
 enum Journal {
-    Folder { path: PathBuf, log: Log, _lock: Lock },
+    Folder { path: PathBuf, log: Log, lock: Lock, mark: Mark },
     Memory(VecDeque<AuditEntry>),
 }
 
@@ -77,6 +81,7 @@ impl Store {
         durable::make_folder(folder).map_err(unusable)?;
         // Taken before anything else is touched: the files may be another instance's.
         let lock = Lock::take(folder)?;
+        let being_begun_anew = log::was_being_begun_anew(folder);
         durable::sweep(folder).map_err(unusable)?;
         let documents = Shelf::open(folder.join("documents"))?;
         let overlays = Shelf::open(folder.join("overlays"))?;
@@ -90,11 +95,35 @@ impl Store {
                 index.apply(&entry);
             }
             // Whatever stood there had a number.
-            Found::Skipped { number } => {
+            Found::Skipped { number, acceptance } => {
                 next_number = next_number.max(number.unwrap_or(next_number).saturating_add(1));
+                if let Some((unit, revision)) = acceptance {
+                    index.lose(&unit, revision);
+                }
             }
         })?;
-        let journal = Journal::Folder { path: folder.to_owned(), log, _lock: lock };
+        let mut mark = Mark::read(folder);
+        let unmarked = |source| StoreError::Write { path: folder.to_owned(), source };
+        let has_older = log.is_empty_behind_a_full_one()? && !being_begun_anew;
+        let kept = documents.count();
+        if has_older || (opened.entries == 0 && kept > 0) {
+            mark.lose(folder).map_err(unmarked)?;
+            let (folder, floor) = (folder.to_owned(), mark.floor);
+            opened.emptied = Some(Emptied { folder, documents: kept, has_older, floor });
+        } else if index.highest() > 0 {
+            mark.reserve(folder, index.highest()).map_err(unmarked)?;
+        }
+        index.floor = mark.floor;
+        // A calibration that never was a document is in force without an acceptance: that alone is no loss.
+        if opened.damaged > 0 {
+            let lost = index.lost().map(|(unit, revision)| LostRevision {
+                unit: unit.to_string(),
+                revision,
+                in_its_place: index.sets(unit).next_back().map(|set| set.revision),
+            });
+            opened.lost = lost.collect();
+        }
+        let journal = Journal::Folder { path: folder.to_owned(), log, lock, mark };
         let full_bytes = FULL_BYTES;
         Ok((Self { journal, documents, overlays, index, next_number, full_bytes, stuck: false }, opened))
     }
@@ -125,8 +154,9 @@ impl Store {
     /// Keeps a calibration document and gives its digest; one that is kept already is left as it is.
     ///
     /// # Errors
-    /// [`StoreError::TooLong`], or [`StoreError::Write`].
+    /// [`StoreError::TooLong`], [`StoreError::Lost`] or [`StoreError::Write`].
     pub fn put_document(&mut self, bytes: &[u8]) -> Result<Digest, StoreError> {
+        self.check_held()?;
         self.documents.put(bytes)
     }
 
@@ -135,6 +165,7 @@ impl Store {
     /// # Errors
     /// The same.
     pub fn put_overlay(&mut self, bytes: &[u8]) -> Result<Digest, StoreError> {
+        self.check_held()?;
         self.overlays.put(bytes)
     }
 
@@ -158,7 +189,7 @@ impl Store {
     /// bounds. Entries of a unit come in the order of their revisions.
     ///
     /// # Errors
-    /// [`StoreError::NotStored`] for an accepted calibration whose document or overlay was not put before; otherwise
+    /// [`StoreError::Lost`]; [`StoreError::NotStored`] for an accepted calibration whose document or overlay was not put before; otherwise
     /// [`StoreError::Write`] or [`StoreError::Read`]. Nothing is written then, and a later entry may go well.
     pub fn append(
         &mut self,
@@ -167,8 +198,14 @@ impl Store {
         by: &str,
         event: AuditEvent,
     ) -> Result<u64, StoreError> {
+        self.check_held()?;
         self.check_stored(&event)?;
         self.begin_anew_if_due(time)?;
+        if let (AuditEvent::Accepted(accepted), Journal::Folder { path, mark, .. }) =
+            (&event, &mut self.journal)
+        {
+            mark.reserve(path, accepted.revision).map_err(StoreError::write(path))?;
+        }
         let entry = entry(self.next_number, time, unit, by, event);
         match &mut self.journal {
             Journal::Folder { log, .. } => log.append(&entry.to_line()?)?,
@@ -190,42 +227,6 @@ impl Store {
         let document = Some(accepted.digest).filter(|digest| !self.documents.holds(digest));
         let overlay = accepted.overlay.filter(|digest| !self.overlays.holds(digest));
         document.or(overlay).map_or(Ok(()), |digest| Err(StoreError::NotStored { digest }))
-    }
-
-    /// Begins a new audit file where this one is full, empty behind a full one, or no longer ours.
-    fn begin_anew_if_due(&mut self, time: SystemTime) -> Result<(), StoreError> {
-        let Journal::Folder { log, path, .. } = &mut self.journal else { return Ok(()) };
-        let taken_away = log.changed_by_others()?;
-        if taken_away {
-            tracing::warn!("the audit file in {} was changed by others: a new one is begun", path.display());
-        }
-        let full = log.grown() >= self.full_bytes;
-        let lacks_carried = log.is_empty() && !self.index.is_empty();
-        if !(taken_away || full || lacks_carried) {
-            return Ok(());
-        }
-        let mut number = self.next_number;
-        let mut lines = String::new();
-        for (unit, event) in self.index.carried() {
-            lines.push_str(&entry(number, time, unit, "", event).to_line()?);
-            number = number.saturating_add(1);
-        }
-        match log.begin_anew(self.next_number.saturating_sub(1), &lines) {
-            Ok(()) => {
-                self.next_number = number;
-                self.stuck = false;
-                Ok(())
-            }
-            // A full file goes on being written to, rather than refuse what it still has room for.
-            Err(error) if full && !taken_away => {
-                if !self.stuck {
-                    tracing::warn!("the audit file is full and no new one can be begun: {error}");
-                }
-                self.stuck = true;
-                Ok(())
-            }
-            Err(error) => Err(error),
-        }
     }
 
     /// Units that were ever given a calibration.
@@ -264,10 +265,35 @@ impl Store {
         self.index.highest_revision(unit)
     }
 
-    /// Digest of what was last seen in a file of the watched folder, accepted or refused: the same again is no swap.
+    /// Digest of what was last seen in a file of the watched folder, accepted or refused.
     #[must_use]
     pub fn seen_in_folder(&self, path: &str) -> Option<Digest> {
         self.index.seen(path)
+    }
+
+    /// Digest of what was last refused in a file of the watched folder, where nothing else was seen in it since.
+    #[must_use]
+    pub fn refused_in_folder(&self, path: &str) -> Option<Digest> {
+        self.index.refused(path)
+    }
+
+    /// Digest of what was last refused in a file of the watched folder because of another one that names its unit.
+    #[must_use]
+    pub fn rival_in_folder(&self, path: &str) -> Option<Digest> {
+        self.index.rival(path)
+    }
+
+    /// Digest of what the watched folder said for a unit last and was taken, under whatever name: the same again, under
+    /// whatever name, is no swap.
+    #[must_use]
+    pub fn said_by_folder(&self, unit: &UnitId) -> Option<Digest> {
+        self.index.said_by_folder(unit)
+    }
+
+    /// The file that a document is kept in; `None` where there is no state folder.
+    #[must_use]
+    pub fn document_file(&self, digest: &Digest) -> Option<PathBuf> {
+        self.documents.file(digest)
     }
 
     /// The newest entries of a unit, or of all, the oldest of them first: at most `limit`, and no more than 10 000. They are

@@ -4,16 +4,17 @@ mod account;
 mod present;
 mod quiet;
 mod rates;
+mod scribe;
 mod tell;
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use isotherm_correction::operation::{Command, Refusal, State};
-use isotherm_correction::unit::{self, At, Uncalibrated, UnitSettings};
-use isotherm_correction::units::Timestamp;
+use isotherm_correction::unit::{self, Uncalibrated, UnitSettings};
 use isotherm_protocol::codec::CodecError;
 use isotherm_protocol::control::Schedule;
+use isotherm_protocol::journal::JournalEvent;
 use isotherm_protocol::key::{RawStream, UnitId};
 use isotherm_protocol::status::{self, Counter, Output};
 use isotherm_protocol::stream::{Label, UnitStream};
@@ -24,11 +25,13 @@ use crate::latency::Histogram;
 use crate::registrar::{Desk, Notice};
 use quiet::Quiet;
 use rates::Rates;
+use scribe::Scribe;
 use tell::Teller;
 
 pub(crate) use account::SwapAccount;
 pub use present::Present;
 pub use quiet::QuietSettings;
+pub use scribe::{Journal, JournalOutlet};
 
 /// Where corrected frames go; `Err` is an output that could not be published.
 pub type Outlet = Box<dyn FnMut(Vec<u8>) -> Result<(), zenoh::Error> + Send>;
@@ -53,6 +56,7 @@ pub struct UnitActor {
     quiet: Quiet,
     rates: Rates,
     teller: Teller,
+    scribe: Scribe,
     account: SwapAccount,
     /// When a self-test began by the clock.
     self_test_since: Option<Instant>,
@@ -84,6 +88,7 @@ impl UnitActor {
             quiet: Quiet::new(quiet),
             rates: Rates::new(Instant::now()),
             teller: Teller::default(),
+            scribe: Scribe::default(),
             account: SwapAccount::default(),
             self_test_since: None,
             before_reset: Vec::new(),
@@ -102,9 +107,27 @@ impl UnitActor {
         if change.next.revision.counter < self.stream.next_counter() {
             return None;
         }
-        let replaced = give(&mut self.stream, &change);
+        let replaced = self.give(&change);
         self.plan.change(change);
         self.status_due = true;
+        // It may have given up what went on.
+        self.look();
+        replaced
+    }
+
+    /// Hands a change to the stream.
+    fn give(&mut self, change: &Change) -> Option<u64> {
+        let Change { next, at, slew } = change;
+        let label = label(next);
+        let (calibration, revision) = (Arc::clone(&next.calibration), next.revision);
+        let replaced = if label.digest.is_none() {
+            self.stream.install_as(calibration, revision, label);
+            None
+        } else {
+            let (at, slew) = ((*at).into(), *slew);
+            self.stream.schedule(unit::Change { calibration, revision: revision.counter, at, slew }, label)
+        };
+        self.journal(|_| scribe::changed(change));
         replaced
     }
 
@@ -114,6 +137,7 @@ impl UnitActor {
     /// [`Refusal`]: the state is as before.
     pub fn command(&mut self, command: &Command) -> Result<State, Refusal> {
         let done = self.stream.command(command);
+        self.journal(|_| scribe::commanded(command, &done));
         // A self-test without a calibration changes no state, and yet has a report.
         self.status_due |= done.is_ok();
         self.look();
@@ -169,12 +193,14 @@ impl UnitActor {
         if self.self_test_since.is_some_and(|since| now.saturating_duration_since(since) > LONGEST_SELF_TEST)
         {
             self.stream.expire_self_test();
+            self.journal(|_| JournalEvent::SelfTestExpired);
             self.look();
         }
         if self.stream.unit().state() == State::PreLaunchCalibration
             && self.quiet.is_silent_for(now, LONGEST_SILENCE)
         {
             self.stream.end_pre_launch();
+            self.journal(|_| JournalEvent::PreLaunchEnded);
             self.look();
         }
         self.teller.tell(&self.stream);
@@ -182,7 +208,11 @@ impl UnitActor {
 
     /// Releases and publishes what waits inside.
     pub fn flush(&mut self) {
+        let waited = self.stream.is_waiting();
         self.stream.flush();
+        if waited {
+            self.journal(|_| JournalEvent::Flushed);
+        }
         self.publish();
         self.look();
     }
@@ -227,10 +257,11 @@ impl UnitActor {
         tracing::error!(unit = %id, "alarm: {cause}; the unit starts anew");
         self.before_reset = self.counters();
         let state = self.stream.unit().state();
-        self.stream = UnitStream::new(id, *self.stream.unit().settings());
+        self.stream.begin_anew(*self.stream.unit().settings(), 0);
+        self.journal(scribe::began);
         let plan = self.plan.clone();
         for change in plan.changes() {
-            give(&mut self.stream, &change);
+            self.give(&change);
         }
         let back = match state {
             _ if self.stream.unit().state() == state => None,
@@ -238,7 +269,12 @@ impl UnitActor {
             State::RunningWithoutReversal => Some(Command::Run { reversal: Some(false) }),
             State::Standby | State::SelfTest | State::PreLaunchCalibration => Some(Command::Standby),
         };
-        if let Some(Err(refusal)) = back.map(|command| self.stream.command(&command)) {
+        let given = back.map(|command| {
+            let done = self.stream.command(&command);
+            self.journal(|_| scribe::commanded(&command, &done));
+            done
+        });
+        if let Some(Err(refusal)) = given {
             tracing::error!(unit = %self.stream.id(), "the state is not {state} any more: {refusal}");
         }
         let words = format!("alarm: {cause}");
@@ -304,23 +340,6 @@ impl UnitActor {
     pub fn id(&self) -> &UnitId {
         self.stream.id()
     }
-}
-
-/// Hands a change to a stream.
-fn give(stream: &mut UnitStream, change: &Change) -> Option<u64> {
-    let Change { next, at, slew } = change;
-    let label = label(next);
-    let at = match at {
-        Schedule::NextTick => At::NextTick,
-        Schedule::Sequence(sequence) => At::Sequence(*sequence),
-        Schedule::TimeNs(time_ns) => At::Time(Timestamp::from_ns(*time_ns)),
-    };
-    let calibration = Arc::clone(&next.calibration);
-    if label.digest.is_none() {
-        stream.install_as(calibration, next.revision, label);
-        return None;
-    }
-    stream.schedule(unit::Change { calibration, revision: next.revision.counter, at, slew: *slew }, label)
 }
 
 /// What the status says of a calibration.

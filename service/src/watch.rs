@@ -71,6 +71,13 @@ pub enum FolderEvent {
     },
     /// The folder can be read again; what has become of its files follows.
     FolderBack,
+    /// The system grants no events of the folder: changes are found by the poll alone. Told once per reason.
+    Deaf {
+        /// Why.
+        reason: String,
+    },
+    /// Events come again.
+    Hearing,
 }
 
 impl fmt::Debug for FolderEvent {
@@ -84,6 +91,8 @@ impl fmt::Debug for FolderEvent {
             Self::Removed { file } => write!(f, "Removed({})", file.display()),
             Self::FolderGone { reason } => write!(f, "FolderGone({reason})"),
             Self::FolderBack => f.write_str("FolderBack"),
+            Self::Deaf { reason } => write!(f, "Deaf({reason})"),
+            Self::Hearing => f.write_str("Hearing"),
         }
     }
 }

@@ -3,17 +3,50 @@
 use std::fmt::Display;
 use std::io::{self, ErrorKind, Write};
 
+use isotherm_protocol::escape::{escaped, escaped_lines};
+
 use crate::exit::Exit;
+
+/// What begins a change of colour, and ends it: "ESC [ 1;31 m".
+const COLOUR: (&str, char) = ("\u{1b}[", 'm');
+
+/// Lines whose colours stay, and whose other control characters are shown by their codes.
+pub(crate) fn coloured(text: &str) -> String {
+    let mut shown = String::with_capacity(text.len());
+    let mut rest = text;
+    while let Some((before, after)) = rest.split_once(COLOUR.0) {
+        shown.push_str(&escaped_lines(before));
+        let colour = after.split_once(COLOUR.1);
+        let colour = colour.filter(|(code, _)| code.chars().all(|c| c.is_ascii_digit() || c == ';'));
+        if let Some((code, behind)) = colour {
+            shown.extend([COLOUR.0, code, "m"]);
+            rest = behind;
+        } else {
+            shown.push_str(&escaped(COLOUR.0));
+            rest = after;
+        }
+    }
+    shown.push_str(&escaped_lines(rest));
+    shown
+}
 
 /// Says a line on stderr; where stderr is gone or full, the exit code tells the rest.
 pub(crate) fn say(line: impl Display) {
-    let _ = writeln!(io::stderr(), "{line}");
+    let _ = writeln!(io::stderr(), "{}", escaped(&line.to_string()));
+}
+
+/// Says several lines on stderr.
+pub(crate) fn say_lines(lines: impl Display) {
+    let _ = writeln!(io::stderr(), "{}", escaped_lines(&lines.to_string()));
 }
 
 /// Prints a result on stdout and gives the exit code: `exit`, or [`Exit::Failed`] where it cannot be written.
 ///
+/// Colours stay; other control characters, but for line breaks and tabs, are shown by their codes.
+///
 /// A reader that has closed its end of the pipe, as `head` does, has what it wanted.
 pub(crate) fn print(text: &str, exit: Exit) -> Exit {
+    let text = coloured(text);
     let mut stdout = io::stdout().lock();
     match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => {
@@ -21,5 +54,16 @@ pub(crate) fn print(text: &str, exit: Exit) -> Exit {
             if exit == Exit::Ok { Exit::Failed } else { exit }
         }
         _ => exit,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn colours_stay_and_other_control_characters_are_shown() {
+        let text = "\u{1b}[1;31mred\u{1b}[0m\n\u{1b}[2Jgone\u{7}\u{202e}\u{1b}[";
+        assert_eq!(coloured(text), "\u{1b}[1;31mred\u{1b}[0m\n\\u001b[2Jgone\\u0007\\u202e\\u001b[");
     }
 }

@@ -371,3 +371,56 @@ fn every_bad_file_among_the_trusted_keys_is_named() {
     assert_eq!(code, Some(78));
     assert!(err.starts_with("missing:1:1: cannot be read: "), "{err}");
 }
+
+#[test]
+fn a_private_key_among_the_trusted_ones_is_told_by_check_and_at_the_start() {
+    let place = Place::with_signer("bench");
+    std::fs::copy(place.path("bench.key"), place.path("trusted").join("bench.pem")).unwrap();
+    std::fs::create_dir(place.path("units")).unwrap();
+    place.write("units/bad.toml", "schema = 1\n");
+    let config = "calibrations = \"units\"\nstrict_start = true\n[swap]\ntrusted_keys = \"trusted\"\n";
+    place.write("service.toml", config);
+    let told = |output: &Output, end: &str| {
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        let line = stderr.lines().find(|line| line.contains("bench.pem:1:1: holds a private key"));
+        assert!(line.is_some_and(|line| line.ends_with(end)), "{stderr}");
+    };
+    let output = place.run(&["check", "service.toml"]);
+    assert_eq!(output.status.code(), Some(0));
+    told(&output, "(warning)");
+    told(&place.run(&["check", "--trusted-keys", "trusted", "unit.toml"]), "(warning)");
+    // The bad document ends it, behind what it says of the keys.
+    let output = place.run(&["serve", "--config", "service.toml", "--listen", "tcp/127.0.0.1:0"]);
+    assert_eq!(output.status.code(), Some(78));
+    told(&output, "could read it");
+
+    // In the place of a public one it makes the folder bad.
+    std::fs::rename(place.path("trusted/bench.pem"), place.path("trusted/other.pub")).unwrap();
+    let output = place.run(&["check", "service.toml"]);
+    assert_eq!(output.status.code(), Some(78));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("other.pub:1:1: "), "{output:?}");
+    let output = place.run(&["serve", "--config", "service.toml", "--listen", "tcp/127.0.0.1:0"]);
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert!(stderr.contains("other.pub:1:1: ") && stderr.contains("no key is trusted"), "{stderr}");
+}
+
+#[test]
+fn a_file_name_forges_no_line_and_turns_no_text_round() {
+    let place = Place::new();
+    std::fs::create_dir(place.path("units")).unwrap();
+    let name = "units/a\nERROR forged\u{202e}lmot.toml";
+    place.write(name, "schema = 1\nnote = \"x\"\n");
+    place.write("service.toml", "calibrations = \"units\"\nstrict_start = true\n");
+    for format in ["human", "json"] {
+        let serve =
+            ["serve", "--config", "service.toml", "--listen", "tcp/127.0.0.1:0", "--log-format", format];
+        for arguments in [&serve[..], &["check", "--kind", "calibration", name]] {
+            let output = place.run(arguments);
+            assert_eq!(output.status.code(), Some(78), "{output:?}");
+            // In JSON a backslash is two.
+            let stderr = String::from_utf8(output.stderr).unwrap().replace("\\\\", "\\");
+            assert!(stderr.contains("\\nERROR forged\\u202elmot.toml"), "{stderr}");
+            assert!(!stderr.contains('\u{202e}') && !stderr.contains("\nERROR forged"), "{stderr}");
+        }
+    }
+}

@@ -492,7 +492,10 @@ SERVICE_STATUS_BODY = Struct(
     swaps_refused=U64,
 )
 
-RAW_GYRO, RAW_ACCEL, RAW_TEMPERATURE, CORRECTED, STATUS, RAW_HEALTH, SERVICE_STATUS, REFERENCE = range(1, 9)
+# The entry in the parts is left as bytes.
+JOURNAL_PART = Struct(unit=Text(), instance=Text(), number=U64, part=U32, parts=U32, bytes=Seq(Byte(), 512 << 10))
+
+RAW_GYRO, RAW_ACCEL, RAW_TEMPERATURE, CORRECTED, STATUS, RAW_HEALTH, SERVICE_STATUS, REFERENCE, JOURNAL = range(1, 10)
 # By kind, then by version; the highest version is the one that is written.
 BODIES = {
     RAW_GYRO: {1: GYRO_BATCH},
@@ -503,12 +506,17 @@ BODIES = {
     RAW_HEALTH: {1: HEALTH_BATCH},
     SERVICE_STATUS: {1: SERVICE_STATUS_BODY},
     REFERENCE: {1: REFERENCE_BODY},
+    JOURNAL: {1: JOURNAL_PART},
 }
 
 
 def check(kind, message):
     """What the types cannot say."""
     if kind in (STATUS, SERVICE_STATUS):
+        return
+    if kind == JOURNAL:
+        if not 1 <= message["parts"] <= 64 or message["part"] >= message["parts"] or not message["bytes"]:
+            raise Refused("a part of a journal entry that cannot be")
         return
     if kind == REFERENCE:
         rates, sigma = message["angular_rate_rad_per_s"], message["sigma_rad_per_s"]

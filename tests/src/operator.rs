@@ -125,9 +125,12 @@ impl Operator {
     /// Where it does not within the limit.
     pub async fn until<T>(&self, unit: &str, mut said: impl FnMut(&Status) -> Option<T>) -> T {
         let deadline = tokio::time::Instant::now() + LIMIT;
+        let key = key::status(&id(unit));
         loop {
-            let status = self.status(unit).await;
-            if let Some(said) = said(&status) {
+            // Nobody answers for a unit that has not appeared yet.
+            let frame = self.ask(&key, None).await.ok();
+            let status: Option<Status> = frame.map(|frame| codec::decode(&frame).expect("a status"));
+            if let Some(said) = status.as_ref().and_then(&mut said) {
                 return said;
             }
             assert!(tokio::time::Instant::now() < deadline, "not within {LIMIT:?}: {status:#?}");

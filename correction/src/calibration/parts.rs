@@ -2,6 +2,8 @@
 
 use alloc::vec::Vec;
 
+use serde::{Deserialize, Serialize};
+
 use crate::channel::{ChannelParts, ThermalFilterParts};
 use crate::curve::CurveParts;
 use crate::drift::DriftParts;
@@ -73,7 +75,7 @@ pub struct GyroParts {
 }
 
 /// The argument of a branched coefficient.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum BranchArgument {
     /// Smoothed temperature T̄ (°C).
     Temperature,

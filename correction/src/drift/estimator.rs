@@ -2,6 +2,8 @@
 
 use alloc::vec::Vec;
 
+use serde::{Deserialize, Serialize};
+
 use super::DriftModel;
 use super::filter::{Measured, Verdict};
 use super::gyro::{DriftEstimate, GyroDrift, grid_cell};
@@ -12,7 +14,7 @@ use crate::sample::{SensorFlags, Sensors};
 use crate::units::{Span, Timestamp};
 
 /// Settings of an estimator that are not part of the calibration.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct DriftSettings {
     /// A reference takes effect for ticks that end after its span plus this.
     pub delay: Span,
@@ -25,7 +27,7 @@ pub struct DriftSettings {
 /// Everything is a function of the ticks, the references and their own time: a reference takes effect at the first tick
 /// that ends after the end of its span plus a fixed delay (and after the 0.25 s cell in which the span ends). What arrives
 /// later still is counted and applies from the next tick on.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DriftEstimator {
     /// In the order of the calibration, `None` for a gyro without a stated drift; empty where none states one.
     gyros: Vec<Option<GyroDrift>>,

@@ -1,6 +1,7 @@
 //! Kalman filter of one gyro's drift over (ε0, ε1, χ), with a gate against wrong references.
 
 use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
+use serde::{Deserialize, Serialize};
 
 use super::moments::Step;
 use super::{DriftModel, DriftParts};
@@ -23,8 +24,9 @@ pub const MEAN_NIS_BOUNDS: [f64; 2] = [0.6747, 1.3883];
 const FINEST: f64 = 1e-10;
 
 /// The last normalised innovations squared.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Innovations {
+    #[serde(with = "crate::written::array")]
     squares: [f64; INNOVATIONS_KEPT],
     next: usize,
     kept: usize,
@@ -52,7 +54,7 @@ impl Innovations {
 }
 
 /// Refusals in a row that agree with each other.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 struct Refusals {
     count: u32,
     innovation: f64,
@@ -93,7 +95,7 @@ pub(super) struct Predicted {
 }
 
 /// The filter of one gyro.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Filter {
     model: DriftModel,
     /// Time of state and covariance; `None` before the first tick.

@@ -1,5 +1,7 @@
 //! One gyro of the estimator: its filter, its readings, and what is subtracted from it.
 
+use serde::{Deserialize, Serialize};
+
 use super::DriftModel;
 use super::filter::{Filter, Predicted};
 use super::ring::Ring;
@@ -40,14 +42,14 @@ pub struct DriftEstimate {
 }
 
 /// The prediction on its way from one grid point to the next.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct Line {
     from: f64,
     step: f64,
 }
 
 /// One gyro.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct GyroDrift {
     pub(super) filter: Filter,
     pub(super) ring: Ring,

@@ -3,6 +3,7 @@
 use core::cmp::Ordering;
 
 use arrayvec::ArrayVec;
+use serde::{Deserialize, Serialize};
 
 use crate::units::{Span, Timestamp};
 
@@ -19,7 +20,7 @@ const LARGEST_RATE_RAD_PER_S: f64 = 1e3;
 const LARGEST_SIGMA_RAD_PER_S: f64 = 1.0;
 
 /// A span over which the true rate of the case is known.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Reference {
     /// Start of the span on the producer's clock.
     pub start: Timestamp,
@@ -33,7 +34,7 @@ pub struct Reference {
 }
 
 /// Why a reference was refused.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum ReferenceRefusal {
     /// No gyro of the calibration in force states a drift: there is nothing to feed.
@@ -79,7 +80,7 @@ pub enum ReferenceRefusal {
 }
 
 /// What became of the references of a unit; they only ever grow.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct ReferenceCounters {
     /// References received from outside or made at rest.
     pub received: u64,
@@ -177,7 +178,7 @@ impl Reference {
 }
 
 /// References that wait for the first tick which is to feel them, the earliest first.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Waiting {
     references: ArrayVec<Reference, MAX_WAITING_REFERENCES>,
 }

@@ -1,5 +1,7 @@
 //! References made at rest: whole minutes of event time over which the unit stood still.
 
+use serde::{Deserialize, Serialize};
+
 use super::Reference;
 use crate::units::{Span, Timestamp};
 
@@ -13,7 +15,7 @@ pub const REST_CONFIRMATION: Span = Span::from_ms(60_000);
 const LONGEST_GAP: Span = Span::from_ms(1_000);
 
 /// Watches for whole minutes at rest.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct RestFeeder {
     /// Start of the first tick of the present rest.
     since: Option<Timestamp>,

@@ -12,6 +12,8 @@
 
 use alloc::vec::Vec;
 
+use serde::{Deserialize, Serialize};
+
 use super::Reference;
 use crate::units::{Span, Timestamp};
 
@@ -23,7 +25,7 @@ pub const RING_CELLS: usize = 512;
 pub const LARGEST_UNOBSERVED_SHARE: f64 = 0.02;
 
 /// One cell: the angle gained in it, and for how much of it there were good readings.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct Cell {
     angle_rad: f64,
     observed_s: f64,
@@ -54,7 +56,7 @@ pub(super) enum NoMean {
 }
 
 /// The cells of one gyro.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Ring {
     cells: Vec<Cell>,
     /// Number of the newest cell, counted from the clock's epoch.

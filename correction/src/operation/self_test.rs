@@ -6,6 +6,8 @@
 
 use alloc::vec::Vec;
 
+use serde::{Deserialize, Serialize};
+
 use crate::calibration::Calibration;
 use crate::observation::Observation;
 use crate::sample::{ChannelName, MAX_SENSORS, SensorFlags, Sensors};
@@ -15,7 +17,7 @@ use crate::units::{Span, Timestamp};
 const ALIVE_PERCENT: [f64; 2] = [95.0, 100.0];
 
 /// A voltage that the producer reports, such as the half-wave voltage of a gyro's mode control.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SelfTestVoltage {
     /// Name on the raw health topic.
     pub name: ChannelName,
@@ -24,7 +26,7 @@ pub struct SelfTestVoltage {
 }
 
 /// A counter that the producer reports, such as one of its own errors.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SelfTestCounter {
     /// Name on the raw health topic.
     pub name: ChannelName,
@@ -33,7 +35,7 @@ pub struct SelfTestCounter {
 }
 
 /// What the producer's own readings must be.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct SelfTestParts {
     /// Voltages, with their limits.
     pub voltages: Vec<SelfTestVoltage>,
@@ -53,7 +55,7 @@ pub struct HealthReading {
 }
 
 /// What is checked.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum CheckItem {
     /// A calibration is in force; its value is the revision counter.
     Calibration,
@@ -70,7 +72,7 @@ pub enum CheckItem {
 }
 
 /// One check with its measured value and limits.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct CheckResult {
     /// What was checked.
     pub item: CheckItem,
@@ -83,7 +85,7 @@ pub struct CheckResult {
 }
 
 /// Result of a self-test.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SelfTestReport {
     /// End of its last tick; `None` where no tick came.
     pub ended: Option<Timestamp>,
@@ -108,7 +110,7 @@ impl SelfTestReport {
 }
 
 /// Whether one sensor moves.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 struct Liveness {
     last: f64,
     since: Timestamp,
@@ -133,7 +135,7 @@ impl Liveness {
 }
 
 /// First, last and worst of what the producer reported under one name.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct Reported {
     first: f64,
     last: f64,
@@ -141,7 +143,7 @@ struct Reported {
 }
 
 /// A self-test that is running.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct SelfTest {
     start: Option<Timestamp>,
     end: Timestamp,

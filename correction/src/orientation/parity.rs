@@ -1,6 +1,7 @@
 //! Parity residuals of a redundant set, and the sensor that explains them.
 
 use arrayvec::ArrayVec;
+use serde::{Deserialize, Serialize};
 
 use super::linear::{orthonormal_columns, parity_rows};
 use super::{Orientation, SensorMask, masked};
@@ -26,7 +27,7 @@ pub struct ParityVerdict {
 }
 
 /// Memory of the parity check of one kind of sensor.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ParityCheck {
     compiled: Option<Compiled>,
     /// Who is suspected, and for how many ticks in a row.
@@ -34,7 +35,7 @@ pub struct ParityCheck {
 }
 
 /// The parity matrix of one set of sensors at one temperature.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Compiled {
     mask: SensorMask,
     temperature_deg_c: f64,

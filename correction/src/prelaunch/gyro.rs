@@ -1,11 +1,13 @@
 //! What one gyro gathers: rate beyond the modelled bias, temperature and noise, per lasing mode.
 
+use serde::{Deserialize, Serialize};
+
 use super::outcome::{ByMode, ModeTotals};
 use super::scatter::Scatter;
 use crate::sample::LasingMode;
 
 /// Good ticks of one mode.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 pub(super) struct Gathered {
     ticks: u64,
     time_s: f64,
@@ -37,7 +39,7 @@ impl Gathered {
 }
 
 /// One gyro.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub(super) struct GyroRun {
     /// What one count is worth (rad); zero for a mean output.
     count_rad: f64,

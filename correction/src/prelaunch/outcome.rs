@@ -3,12 +3,14 @@
 use alloc::vec::Vec;
 use core::fmt;
 
+use serde::{Deserialize, Serialize};
+
 use crate::rest::Moved;
 use crate::sample::{LasingMode, Sensors};
 use crate::units::{AngularRate, Span};
 
 /// One value per lasing mode, and one for an instrument without modes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct ByMode<T> {
     /// Instrument without modes.
     pub without: T,
@@ -44,7 +46,7 @@ impl<T> ByMode<T> {
 }
 
 /// Good ticks of one gyro in one mode.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct ModeTotals {
     /// How many.
     pub ticks: u64,
@@ -77,7 +79,7 @@ pub struct PreLaunchProgress {
 }
 
 /// What came of it.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Outcome {
     /// New constants, one set per gyro.
     Accepted(Vec<GyroConstants>),
@@ -86,7 +88,7 @@ pub enum Outcome {
 }
 
 /// Change of the constants of one gyro: what is to be *added* to the terms that the calibration states.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct GyroConstants {
     /// ΔC0: static bias (rad/s).
     pub static_bias_change_rad_per_s: f64,
@@ -103,7 +105,7 @@ pub struct GyroConstants {
 }
 
 /// One of the two constants of a gyro.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum BiasConstant {
     /// C0, of the static bias.
     Static,
@@ -112,7 +114,7 @@ pub enum BiasConstant {
 }
 
 /// Why the old constants stay.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Refusal {
     /// The unit moved.

@@ -12,6 +12,8 @@
 //! slow drift gives little. Counts do not disturb it either: their remainder, which the plain scatter of short means would
 //! take for noise of the rate, is averaged out in the mean of the angle over a cell.
 
+use serde::{Deserialize, Serialize};
+
 use crate::sample::LasingMode;
 
 /// τ (s).
@@ -22,7 +24,7 @@ const CORRELATION: f64 = 1.0 + 2.0 * (1.0 / 9.0 + 1.0 / 36.0);
 const FEWEST: f64 = 8.0;
 
 /// Running second differences.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 pub(super) struct Scatter {
     mode: Option<LasingMode>,
     /// Angle since the mode began (rad).

@@ -2,6 +2,7 @@
 
 use alloc::vec::Vec;
 
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::calibration::Calibration;
@@ -15,7 +16,7 @@ pub const DURATION_RANGE_S: [f64; 2] = [30.0, 86_400.0];
 const SHORTEST_MODE_S: f64 = 30.0;
 
 /// A pre-launch calibration as it is asked for.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PreLaunchSettings {
     /// How long it takes, in event time (30 s…24 h); default 10 min.
     pub duration: Span,
@@ -32,7 +33,7 @@ impl Default for PreLaunchSettings {
 }
 
 /// What leads to a refusal.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PreLaunchLimits {
     /// Largest change of C0, the constant of the static bias (rad/s, above 0); default 1 °/h.
     pub static_bias_change_rad_per_s: f64,

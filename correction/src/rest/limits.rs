@@ -2,6 +2,7 @@
 
 use alloc::vec::Vec;
 
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::units::{Angle, AngularRate, SpecificForce};
@@ -11,7 +12,7 @@ const SIGMAS_RANGE: [f64; 2] = [3.0, 100.0];
 
 /// Limits of a [`RestMonitor`](super::RestMonitor). Each is the least that counts as motion where the unit's own noise
 /// is smaller.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct RestLimits {
     /// Angle gathered within a second beyond the mean rate (rad, above 0); default 15″.
     pub turn_rad: f64,

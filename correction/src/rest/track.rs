@@ -4,6 +4,7 @@ use alloc::vec::Vec;
 use core::f64::consts::SQRT_2;
 
 use arrayvec::ArrayVec;
+use serde::{Deserialize, Serialize};
 
 /// Windows from which the first picture of the noise is taken.
 const LEARNING: usize = 30;
@@ -49,7 +50,7 @@ impl Finding {
 }
 
 /// Limits of one kind of window, for what is gathered in a second.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub(super) struct Scale {
     floor: f64,
     ceiling: f64,
@@ -86,7 +87,7 @@ impl Scale {
 }
 
 /// Means of windows in the order in which they came.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Track {
     /// The last windows; the oldest is overwritten once there are [`RECENT`].
     recent: Vec<[f64; 3]>,

@@ -1,5 +1,7 @@
 //! A window of about a second: mean and scatter of a vector.
 
+use serde::{Deserialize, Serialize};
+
 use crate::units::Span;
 
 /// Length of a full window (s).
@@ -8,7 +10,7 @@ pub(super) const WINDOW_S: f64 = 1.0;
 const SCATTER_TICKS: f64 = 5.0;
 
 /// An open window. Components are those of the case axes.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 pub(super) struct Window {
     ticks: f64,
     duration_s: f64,

@@ -1,5 +1,7 @@
 //! The last good readings, as rates against their mid-tick times.
 
+use serde::{Deserialize, Serialize};
+
 use crate::sample::MAX_SENSORS;
 use crate::units::{Span, Timestamp};
 
@@ -12,7 +14,7 @@ pub(super) fn mid_time_s(end_time: Timestamp, duration: Span, origin: Timestamp)
 }
 
 /// One good tick of all sensors.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub(super) struct Reading {
     end_time: Timestamp,
     /// Measured duration, above zero.
@@ -50,8 +52,9 @@ impl Reading {
 }
 
 /// A ring of the newest readings.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct History {
+    #[serde(with = "crate::written::array")]
     ring: [Reading; KEPT],
     /// Where the next reading goes, below [`KEPT`].
     next: usize,

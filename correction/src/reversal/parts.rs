@@ -2,6 +2,8 @@
 
 use alloc::vec::Vec;
 
+use serde::{Deserialize, Serialize};
+
 /// Most ticks of one transition.
 pub const MAX_TRANSITION_TICKS: u8 = 3;
 /// Most readings of one fit on either side of the switch.
@@ -12,7 +14,7 @@ pub const MAX_PREDICT_DEGREE: u8 = 2;
 pub const MAX_FIT_DEGREE: u8 = 3;
 
 /// The substitution as the calibration document states it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ReversalParts {
     /// n: ticks that carry nothing, the commanded one included (1…3).
     pub transition_ticks: u8,
@@ -71,7 +73,7 @@ pub enum ReversalError {
 }
 
 /// A validated substitution.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Reversal {
     pub(super) parts: ReversalParts,
 }

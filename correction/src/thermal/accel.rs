@@ -1,5 +1,7 @@
 //! An accelerometer's terms (models §3): `f = (U − S(T))·r(T_board)/K(T)`.
 
+use serde::{Deserialize, Serialize};
+
 use super::ramp::Follower;
 use crate::calibration::AccelParts;
 use crate::channel::ThermalFilter;
@@ -7,7 +9,7 @@ use crate::curve::{Curve, CurveError, CurveParts};
 use crate::units::{Span, Timestamp};
 
 /// An accelerometer, compiled.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct AccelModel {
     pub(crate) channel: Option<usize>,
     pub(crate) board_channel: Option<usize>,
@@ -43,7 +45,7 @@ impl AccelModel {
 }
 
 /// Values of an accelerometer's thermal terms.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct AccelTerms {
     /// S (output units).
     pub bias: f64,
@@ -64,7 +66,7 @@ impl AccelTerms {
 /// Memory of one accelerometer's thermal terms.
 ///
 /// Sensor and board follow channels of their own, so each has its own ramp.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct AccelThermal {
     /// S (output units) and 1/K (m/s² per output unit).
     sensor: Follower<2>,

@@ -1,6 +1,7 @@
 //! A gyro's terms (models §2): θ = K(T)·P − Ω·Δt with Ω a sum of named terms.
 
 use arrayvec::ArrayVec;
+use serde::{Deserialize, Serialize};
 
 use alloc::vec::Vec;
 
@@ -15,7 +16,7 @@ use crate::units::{Span, Timestamp};
 pub const MAX_LAGS: usize = 8;
 
 /// A gyro, compiled.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GyroModel {
     pub(crate) channel: Option<usize>,
     pub(crate) increment_weight: f64,
@@ -141,7 +142,7 @@ impl GyroModel {
 }
 
 /// A coefficient with one curve per thermal branch.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Branched {
     argument: BranchArgument,
     run_up: Curve,
@@ -167,7 +168,7 @@ impl Branched {
 }
 
 /// One thermal lag, compiled for the filter's grid step.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Lag {
     /// e^(−step/τ).
     decay: f64,
@@ -177,7 +178,7 @@ pub(crate) struct Lag {
 }
 
 /// Polynomial of the time since turn-on, held outside its interval.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TrendModel {
     coefficients: ArrayVec<f64, 3>,
     interval_s: [f64; 2],
@@ -200,7 +201,7 @@ impl TrendModel {
 }
 
 /// Values of a gyro's thermal terms, in the order of the ramp.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct GyroTerms {
     /// K(T): angle per count (rad), or rad per rad.
     pub increment_weight: f64,
@@ -213,7 +214,7 @@ pub struct GyroTerms {
 }
 
 /// Memory of one gyro's thermal terms.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct GyroThermal {
     /// Increment weight, bias, magnetic and slow-meander term, in the order of [`GyroTerms`].
     terms: Follower<4>,

@@ -1,13 +1,17 @@
 //! Values that move on a straight line from one to the next.
 
+use serde::{Deserialize, Serialize};
+
 use crate::units::{Span, Timestamp};
 
 /// `N` values on their way from one thermal evaluation to the next.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Ramp<const N: usize> {
     start: Timestamp,
     per_second: f64,
+    #[serde(with = "crate::written::array")]
     from: [f64; N],
+    #[serde(with = "crate::written::array")]
     step: [f64; N],
 }
 
@@ -60,7 +64,7 @@ impl<const N: usize> Ramp<N> {
 }
 
 /// A ramp that is turned after each evaluation of the terms it carries.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Follower<const N: usize> {
     ramp: Ramp<N>,
     clamped: bool,

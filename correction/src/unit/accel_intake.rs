@@ -2,6 +2,8 @@
 
 use alloc::collections::VecDeque;
 
+use serde::{Deserialize, Serialize};
+
 use super::counters::Counters;
 use super::gyro_intake::MAX_DURATION;
 use crate::sample::{AccelTick, GyroTick, OutputKind};
@@ -20,7 +22,7 @@ pub(super) enum Match {
 }
 
 /// A tick that waits for its gyro tick.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 struct Pending {
     tick: AccelTick,
     output: OutputKind,
@@ -29,7 +31,7 @@ struct Pending {
 }
 
 /// Memory of the accelerometer stream.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, Serialize, Deserialize)]
 pub(super) struct AccelIntake {
     pending: VecDeque<Pending>,
     /// Ticks that came after their time, since the last gyro tick: where the next one starts a new series, they are

@@ -1,5 +1,7 @@
 //! A unit that its operator says is at rest: its own readings tell its drift.
 
+use serde::{Deserialize, Serialize};
+
 use crate::calibration::Calibration;
 use crate::drift::{Reference, RestFeeder};
 use crate::earth::Place;
@@ -7,7 +9,7 @@ use crate::observation::Observation;
 use crate::rest::{Rest, RestLimits, RestMonitor};
 
 /// Rest at a place.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 pub struct AtRest {
     place: Place,
     monitor: RestMonitor,

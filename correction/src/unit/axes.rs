@@ -1,11 +1,13 @@
 //! Input axes to case axes, following temperature on a straight line.
 
+use serde::{Deserialize, Serialize};
+
 use crate::orientation::{Inverse, Orientation, ParityCheck, ParityVerdict, SensorMask};
 use crate::thermal::Ramp;
 use crate::units::{Span, Timestamp};
 
 /// Memory of one kind of sensor's orientation.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Axes {
     /// Temperature that the orientation follows (°C); `share` of its way is the share between the inverses.
     temperature: Ramp<1>,

@@ -2,12 +2,14 @@
 
 use alloc::sync::Arc;
 
+use serde::{Deserialize, Serialize};
+
 use crate::calibration::Calibration;
 use crate::sample::GyroTick;
 use crate::units::{Span, Timestamp};
 
 /// When a change takes effect; always before a tick, and at the latest when the producer restarts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum At {
     /// The next tick that is corrected.
     #[default]
@@ -30,9 +32,10 @@ impl At {
 }
 
 /// A change of calibration.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Change {
     /// The calibration.
+    #[serde(with = "crate::written::shared")]
     pub calibration: Arc<Calibration>,
     /// Revision counter that its ticks carry.
     pub revision: u64,

@@ -8,6 +8,8 @@ mod gyros;
 
 use alloc::sync::Arc;
 
+use serde::{Deserialize, Serialize};
+
 use super::axes::Axes;
 use super::counters::Counters;
 use super::gyro_intake::Released;
@@ -33,7 +35,7 @@ pub struct Applied {
 }
 
 /// Running state of one unit under one calibration.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Corrector {
     pub(super) drift: DriftEstimator,
     pub(super) seen: Observation,

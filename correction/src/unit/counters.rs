@@ -1,10 +1,12 @@
 //! What a unit has counted since it appeared.
 
+use serde::{Deserialize, Serialize};
+
 /// Declares the counters once, so that field, name and documentation cannot drift apart.
 macro_rules! counters {
     ($($(#[$doc:meta])* $name:ident,)+) => {
         /// Counters of one unit; they only ever grow.
-        #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
         pub struct Counters {
             $($(#[$doc])* pub $name: u64,)+
         }

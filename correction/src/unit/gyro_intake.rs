@@ -6,6 +6,8 @@
 use alloc::collections::VecDeque;
 use core::cmp::Ordering;
 
+use serde::{Deserialize, Serialize};
+
 use super::counters::Counters;
 use crate::sample::{GyroTick, OutputKind};
 use crate::units::{Span, Timestamp};
@@ -23,7 +25,7 @@ const BELIEVED_AFTER: u32 = 8;
 const OLD_BELIEVED_AFTER: u32 = 256;
 
 /// A tick that waits for its release.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 struct Pending {
     tick: GyroTick,
     output: OutputKind,
@@ -54,7 +56,7 @@ pub(super) struct Released {
 }
 
 /// A jump of sequence or time that is not believed yet.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct Jump {
     sequence: u64,
     end_time: Timestamp,
@@ -63,14 +65,14 @@ struct Jump {
 }
 
 /// The newest tick that was admitted.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct Newest {
     sequence: u64,
     end_time: Timestamp,
 }
 
 /// Memory of the gyro stream.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, Serialize, Deserialize)]
 pub(super) struct GyroIntake {
     pending: VecDeque<Pending>,
     /// Ticks admitted from the present batch.
@@ -292,6 +294,11 @@ impl GyroIntake {
         self.released = kept | 1;
         self.last = Some(tick.sequence);
         Some(Released { tick, output, missed, restart })
+    }
+
+    /// How many ticks wait.
+    pub(super) fn len(&self) -> usize {
+        self.pending.len()
     }
 
     /// Whether any tick waits.

@@ -1,9 +1,11 @@
 //! How each sensor has been doing.
 
+use serde::{Deserialize, Serialize};
+
 use crate::sample::SensorFlags;
 
 /// Account of one sensor since its unit got a calibration with as many sensors.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct SensorHealth {
     /// Flags at the last tick.
     pub flags: SensorFlags,

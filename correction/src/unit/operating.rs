@@ -2,6 +2,8 @@
 
 use alloc::boxed::Box;
 
+use serde::{Deserialize, Serialize};
+
 use super::at_rest::AtRest;
 use crate::calibration::Calibration;
 use crate::drift::Reference;
@@ -25,7 +27,7 @@ pub enum PreLaunchView<'a> {
 }
 
 /// State of one unit and what belongs to it.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Operating {
     state: State,
     /// Whether somebody chose it; until then it follows the calibration.

@@ -1,12 +1,14 @@
 //! A swap that is made over a stated time: away from the terms that were in use, which stand still, to the new ones.
 
+use serde::{Deserialize, Serialize};
+
 use crate::orientation::{Inverse, SensorMask};
 use crate::sample::Sensors;
 use crate::thermal::{AccelTerms, GyroTerms};
 use crate::units::{Span, Timestamp};
 
 /// What was in use when the swap took effect.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Slew {
     /// End of the last tick under the old calibration.
     pub(super) start: Timestamp,

@@ -3,6 +3,8 @@
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;
 
+use serde::{Deserialize, Serialize};
+
 use super::axes::Axes;
 use super::counters::Counters;
 use crate::calibration::Calibration;
@@ -29,7 +31,7 @@ pub struct ChannelReport {
 }
 
 /// Readings that wait for the first tick which is to feel them.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, Serialize, Deserialize)]
 pub(super) struct Waiting {
     readings: VecDeque<TemperatureReading>,
 }
@@ -60,7 +62,7 @@ impl Waiting {
 }
 
 /// Memory of everything that follows temperature; made for one calibration.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 pub(super) struct ThermalMemory {
     channels: Vec<ChannelMemory>,
     updated: Vec<Option<Timestamp>>,

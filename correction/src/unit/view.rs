@@ -41,6 +41,12 @@ impl Unit {
         !self.gyros.is_empty() || !self.steps.is_empty()
     }
 
+    /// Gyro ticks that wait for their accelerometer tick or a missing neighbour.
+    #[must_use]
+    pub fn waiting_ticks(&self) -> usize {
+        self.gyros.len()
+    }
+
     /// The settings it was made with.
     #[must_use]
     pub fn settings(&self) -> &UnitSettings {

@@ -36,8 +36,9 @@ const ACCEL_UNITS: [Unit; 7] = [
     ("raw", (1.0, false)),
     ("raw_per_tick", (1.0, true)),
 ];
-/// Units of a temperature reading, with what is added to it.
-const TEMPERATURE_UNITS: &[(&str, f64)] = &[("deg_c", 0.0), ("kelvin", -273.15), ("volt", 0.0), ("raw", 0.0)];
+/// Units of a temperature reading, with what is added to it: −0 leaves every reading as it is, to the sign of a zero.
+const TEMPERATURE_UNITS: &[(&str, f64)] =
+    &[("deg_c", -0.0), ("kelvin", -273.15), ("volt", -0.0), ("raw", -0.0)];
 
 /// Reads a `gyro` table.
 pub(super) fn gyro(section: Section<'_, '_>) -> Option<GyroMapping> {

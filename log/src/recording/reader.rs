@@ -12,12 +12,10 @@ use mcap::records::Record;
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use serde::Serialize;
 
-use super::{Attachment, MESSAGE_ENCODING, Metadata};
+use super::record::{LONGEST_RECORD, parse};
+use super::{Attachment, CHANNELS, MESSAGE_ENCODING, Metadata};
 use crate::error::Error;
 use crate::message::{Message, Topic};
-
-/// Longest record (bytes): chunks beyond this are not of a recorder.
-const LONGEST_RECORD: usize = 1 << 28;
 
 /// What reading a recording came to.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
@@ -184,7 +182,7 @@ impl Opened {
                     self.reader.notify_read(count);
                 }
                 LinearReadEvent::Record { opcode, data } => {
-                    let record = mcap::parse_record(opcode, data).map_err(stop)?;
+                    let record = parse(opcode, data).map_err(stop)?;
                     if let Some(found) = take(record, &mut self.topics, &mut self.ended) {
                         return Ok(Some(found));
                     }
@@ -213,6 +211,8 @@ fn take(record: Record<'_>, topics: &mut HashMap<u16, Option<Topic>>, ended: &mu
             attached_ns: header.log_time,
             bytes: data.into_owned(),
         })),
+        // These are for a file that is to be recovered.
+        Record::Metadata(metadata) if metadata.name == CHANNELS => None,
         Record::Metadata(metadata) => {
             Some(Found::Metadata(Metadata { name: metadata.name, values: metadata.metadata }))
         }
@@ -228,7 +228,9 @@ fn stop(error: McapError) -> Stop {
     match error {
         McapError::Io(source) => Stop::Io(source),
         McapError::UnexpectedEof => Stop::Damaged("ends in the middle".to_owned()),
-        other => Stop::Damaged(format!("is damaged from here on: {other}")),
+        other => Stop::Damaged(format!(
+            "is damaged from here on: {other}; `isotherm-replay recover` gets back what is whole behind it"
+        )),
     }
 }
 

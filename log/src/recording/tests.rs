@@ -100,3 +100,56 @@ fn what_is_no_recording_is_refused() {
         assert!(matches!(error, Error::File { .. }) && error.to_string().contains("MCAP"), "{error}");
     }
 }
+
+#[test]
+fn what_is_flushed_is_whole_and_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mcap");
+    let mut writer = RecordingWriter::create(&path, RecordingOptions::default()).unwrap();
+    for (number, message) in messages().iter().take(10).enumerate() {
+        writer.write(message).unwrap();
+        assert_eq!(writer.waiting(), number as u64 + 1);
+    }
+    let (before, _) = read(&[&path]);
+    assert!(before.is_empty());
+    writer.flush().unwrap();
+    assert_eq!((writer.waiting(), writer.length()), (0, std::fs::metadata(&path).unwrap().len()));
+    let (after, _) = read(&[&path]);
+    assert_eq!(after, messages()[..10]);
+}
+
+#[test]
+fn a_file_that_is_being_written_is_nobody_elses() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mcap");
+    let overwrite = RecordingOptions { overwrite: true, ..RecordingOptions::default() };
+    let mut writer = RecordingWriter::create(&path, RecordingOptions::default()).unwrap();
+    writer.write(&messages()[0]).unwrap();
+    assert!(is_being_written(&path));
+    let error = RecordingWriter::create(&path, overwrite).unwrap_err().to_string();
+    assert!(error.contains("being written"), "{error}");
+    writer.finish().unwrap();
+    assert!(!is_being_written(&path));
+    assert_eq!(read(&[&path]).0.len(), 1);
+    RecordingWriter::create(&path, overwrite).unwrap().finish().unwrap();
+    assert_eq!(read(&[&path]).0.len(), 0);
+}
+
+#[test]
+fn a_file_given_up_ends_behind_what_was_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mcap");
+    let mut writer = RecordingWriter::create(&path, RecordingOptions::default()).unwrap();
+    let (first, rest) = (&messages()[..10], &messages()[10..]);
+    first.iter().for_each(|message| writer.write(message).unwrap());
+    writer.flush().unwrap();
+    rest.iter().for_each(|message| writer.write(message).unwrap());
+    let values = BTreeMap::from([("why".to_owned(), "full".to_owned())]);
+    writer.abandon(&Metadata { name: METADATA.to_owned(), values });
+    let (back, mut reader) = read(&[&path]);
+    assert_eq!((back.as_slice(), reader.report().cut_short.as_deref()), (first, None));
+    assert_eq!(reader.take_metadata()[0].values["why"], "full");
+    // Others read it too.
+    let bytes = std::fs::read(&path).unwrap();
+    assert_eq!(mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap).count(), 10);
+}

@@ -2,18 +2,21 @@
 
 use std::collections::{BTreeMap, HashMap};
 use std::fs::File;
-use std::io::{self, BufWriter, Seek, Write};
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use mcap::records::MessageHeader;
 use mcap::{Compression, McapError, WriteOptions, Writer};
 
-use super::{Attachment, MESSAGE_ENCODING, Metadata, SCHEMA_ENCODING, schema};
+use super::{Attachment, CHANNELS, MESSAGE_ENCODING, Metadata, SCHEMA_ENCODING, ending, place, schema};
 use crate::error::Error;
 use crate::message::{Message, Topic};
 
 /// Largest sum of messages in one chunk, before compression (bytes).
 const CHUNK_BYTES: u64 = 1 << 20;
+/// What a message takes in a chunk beside its frame (bytes).
+const MESSAGE_BYTES: u64 = 31;
 
 /// How a recording is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -22,11 +25,29 @@ pub struct RecordingOptions {
     pub compress: bool,
     /// A chunk ends when it holds more than this, before compression (bytes).
     pub chunk_bytes: u64,
+    /// Whether a file that is there already is written over; one that is being written never is.
+    pub overwrite: bool,
 }
 
 impl Default for RecordingOptions {
     fn default() -> Self {
-        Self { compress: true, chunk_bytes: CHUNK_BYTES }
+        Self { compress: true, chunk_bytes: CHUNK_BYTES, overwrite: false }
+    }
+}
+
+impl RecordingOptions {
+    /// The same for the library that writes.
+    pub(super) fn to_library(self) -> WriteOptions {
+        WriteOptions::new()
+            .profile("isotherm")
+            .library(concat!("isotherm ", env!("CARGO_PKG_VERSION")))
+            .compression(self.compress.then_some(Compression::Zstd))
+            // A recorder has one thread to write with; the others are for the work that it records.
+            .compression_threads(0)
+            // Chunks end where this writer says, so that it knows what is whole; they are written in one go, so that a kill
+            // leaves a shorter file, and no half chunk with a header that was to be filled in later.
+            .chunk_size(None)
+            .disable_seeking(true)
     }
 }
 
@@ -39,11 +60,23 @@ struct Channel {
 }
 
 /// A recording that is being written.
+///
+/// It holds a lock on its file as long as it lives.
 pub struct RecordingWriter {
-    writer: Writer<BufWriter<File>>,
+    writer: Writer<BufWriter<Arc<File>>>,
+    file: Arc<File>,
     path: PathBuf,
+    chunk_bytes: u64,
     // Looked up by topic, never gone through: its order reaches nothing.
     channels: HashMap<Topic, Channel>,
+    /// Channels that no record beside the chunks names yet, by number.
+    unnamed: BTreeMap<String, String>,
+    /// Messages of the chunk that is being written.
+    waiting: u64,
+    /// Their bytes.
+    waiting_bytes: u64,
+    /// Up to here everything is whole and with the operating system (bytes).
+    whole: u64,
 }
 
 impl std::fmt::Debug for RecordingWriter {
@@ -53,20 +86,30 @@ impl std::fmt::Debug for RecordingWriter {
 }
 
 impl RecordingWriter {
-    /// Creates the file; one that is there already is not written over.
+    /// Creates the file.
     ///
     /// # Errors
-    /// [`Error::File`].
+    /// [`Error::File`], also where it is there already, or is being written by somebody else.
     pub fn create(path: &Path, options: RecordingOptions) -> Result<Self, Error> {
-        let file =
-            File::create_new(path).map_err(|source| Error::file(path, "create the recording", source))?;
-        let options = WriteOptions::new()
-            .profile("isotherm")
-            .library(concat!("isotherm ", env!("CARGO_PKG_VERSION")))
-            .compression(options.compress.then_some(Compression::Zstd))
-            .chunk_size(Some(options.chunk_bytes));
-        let writer = options.create(BufWriter::new(file)).map_err(|source| failed(path, source))?;
-        Ok(Self { writer, path: path.to_owned(), channels: HashMap::new() })
+        let file = Arc::new(place::create(path, options.overwrite)?);
+        let mut writer = options
+            .to_library()
+            .create(BufWriter::new(Arc::clone(&file)))
+            .map_err(|source| failed(path, source))?;
+        writer.flush().map_err(|source| failed(path, source))?;
+        let mut writer = Self {
+            writer,
+            file,
+            path: path.to_owned(),
+            chunk_bytes: options.chunk_bytes,
+            channels: HashMap::new(),
+            unnamed: BTreeMap::new(),
+            waiting: 0,
+            waiting_bytes: 0,
+            whole: 0,
+        };
+        writer.note_whole()?;
+        Ok(writer)
     }
 
     /// Where it is written to.
@@ -81,16 +124,29 @@ impl RecordingWriter {
         self.channels.get(topic).map_or(0, |channel| channel.messages)
     }
 
+    /// Messages of the chunk that is being written: what a kill would cost now.
+    #[must_use]
+    pub fn waiting(&self) -> u64 {
+        self.waiting
+    }
+
+    /// Length of the file so far, the chunk that is being written left out (bytes).
+    #[must_use]
+    pub fn length(&self) -> u64 {
+        self.whole
+    }
+
     /// Writes one message. Its publish time is the time on the producer's clock, where it has one.
     ///
     /// # Errors
-    /// [`Error::File`]; nothing can be written behind it.
+    /// [`Error::File`]; nothing can be written behind it: see [`RecordingWriter::abandon`].
     pub fn write(&mut self, message: &Message) -> Result<(), Error> {
         let Message { topic, received_ns, frame } = message;
         let channel = match self.channels.get_mut(topic) {
             Some(channel) => channel,
             None => {
                 let id = declare(&mut self.writer, topic).map_err(|source| failed(&self.path, source))?;
+                self.unnamed.insert(id.to_string(), topic.key());
                 self.channels.entry(topic.clone()).or_insert(Channel { id, messages: 0 })
             }
         };
@@ -104,14 +160,17 @@ impl RecordingWriter {
         };
         self.writer.write_to_known_channel(&header, frame).map_err(|source| failed(&self.path, source))?;
         channel.messages += 1;
-        Ok(())
+        self.waiting += 1;
+        self.waiting_bytes += frame.len() as u64 + MESSAGE_BYTES;
+        if self.waiting_bytes > self.chunk_bytes { self.flush() } else { Ok(()) }
     }
 
-    /// Puts a file into the recording.
+    /// Puts a file into the recording; ends the chunk.
     ///
     /// # Errors
     /// As [`RecordingWriter::write`].
     pub fn attach(&mut self, attachment: &Attachment) -> Result<(), Error> {
+        self.flush()?;
         let Attachment { name, media_type, attached_ns, bytes } = attachment;
         let attachment = mcap::Attachment {
             log_time: *attached_ns,
@@ -120,17 +179,19 @@ impl RecordingWriter {
             media_type: media_type.clone(),
             data: bytes.as_slice().into(),
         };
-        self.writer.attach(&attachment).map_err(|source| failed(&self.path, source))
+        let attached = self.writer.attach(&attachment).and_then(|()| self.writer.flush());
+        attached.map_err(|source| failed(&self.path, source))?;
+        self.note_whole()
     }
 
-    /// Writes a record of names and values.
+    /// Writes a record of names and values; ends the chunk.
     ///
     /// # Errors
     /// As [`RecordingWriter::write`].
     pub fn metadata(&mut self, metadata: &Metadata) -> Result<(), Error> {
-        let metadata =
-            mcap::records::Metadata { name: metadata.name.clone(), metadata: metadata.values.clone() };
-        self.writer.write_metadata(&metadata).map_err(|source| failed(&self.path, source))
+        self.flush()?;
+        self.put_metadata(metadata.name.clone(), metadata.values.clone())?;
+        self.note_whole()
     }
 
     /// Ends the chunk and hands everything to the operating system: a kill costs nothing written before it.
@@ -138,42 +199,78 @@ impl RecordingWriter {
     /// # Errors
     /// As [`RecordingWriter::write`].
     pub fn flush(&mut self) -> Result<(), Error> {
-        self.writer.flush().map_err(|source| failed(&self.path, source))
-    }
-
-    /// Length of the file so far, the chunk that is being written left out (bytes).
-    ///
-    /// # Errors
-    /// [`Error::File`].
-    pub fn length(&self) -> Result<u64, Error> {
-        let length = std::fs::metadata(&self.path).map(|metadata| metadata.len());
-        length.map_err(|source| Error::file(&self.path, "look at the recording", source))
+        if self.waiting == 0 {
+            return Ok(());
+        }
+        self.writer.flush().map_err(|source| failed(&self.path, source))?;
+        (self.waiting, self.waiting_bytes) = (0, 0);
+        self.note_whole()?;
+        if !self.unnamed.is_empty() {
+            // A channel stands in its first chunk and in the summary: with these records, a recording that was cut short
+            // and lost that chunk is still to be read.
+            let channels = std::mem::take(&mut self.unnamed);
+            self.put_metadata(CHANNELS.to_owned(), channels)?;
+            self.note_whole()?;
+        }
+        Ok(())
     }
 
     /// Ends the file with its summary, on the disk.
     ///
     /// # Errors
-    /// As [`RecordingWriter::write`].
+    /// As [`RecordingWriter::write`]; what was whole before is kept.
     pub fn finish(mut self) -> Result<(), Error> {
-        self.writer.finish().map_err(|source| failed(&self.path, source))?;
-        let path = self.path;
-        let failed = |source| Error::file(&path, "write the recording", source);
-        let mut buffered = self.writer.into_inner();
-        buffered.flush().map_err(failed)?;
-        buffered.seek(io::SeekFrom::End(0)).map_err(failed)?;
-        buffered.get_ref().sync_all().map_err(failed)
+        let path = self.path.clone();
+        let finished = self.flush().and_then(|()| {
+            let finished = self.writer.finish().map_err(|source| failed(&path, source));
+            finished.map(|_summary| ())
+        });
+        let Self { writer, file, whole, .. } = self;
+        let mut buffered = writer.into_inner();
+        let finished = finished.and_then(|()| {
+            let synced = buffered.flush().and_then(|()| file.sync_all());
+            synced.map_err(|source| Error::file(&path, "write the recording", source))
+        });
+        if finished.is_err() {
+            // Nothing more of what waits in memory: it would land behind the cut.
+            let _ = buffered.into_parts();
+            let _ = ending::write(&file, whole, None);
+        }
+        finished
+    }
+
+    /// Gives the file up after an error: cuts it behind the last thing that was whole and ends it there, with a record of why
+    /// where there is room for it. Without room it has no end, and is read all the same.
+    pub fn abandon(self, why: &Metadata) {
+        let Self { writer, file, whole, .. } = self;
+        let _ = writer.into_inner().into_parts();
+        let _ = ending::write(&file, whole, Some(why));
+    }
+
+    fn put_metadata(&mut self, name: String, values: BTreeMap<String, String>) -> Result<(), Error> {
+        let metadata = mcap::records::Metadata { name, metadata: values };
+        let put = self.writer.write_metadata(&metadata).and_then(|()| self.writer.flush());
+        put.map_err(|source| failed(&self.path, source))
+    }
+
+    fn note_whole(&mut self) -> Result<(), Error> {
+        let metadata = self.file.metadata();
+        let failed = |source| Error::file(&self.path, "look at the recording", source);
+        self.whole = metadata.map_err(failed)?.len();
+        Ok(())
     }
 }
 
 /// Enters a topic with its schema.
-fn declare(writer: &mut Writer<BufWriter<File>>, topic: &Topic) -> Result<u16, McapError> {
+pub(super) fn declare(writer: &mut Writer<BufWriter<Arc<File>>>, topic: &Topic) -> Result<u16, McapError> {
     let schema = writer.add_schema(schema::name(topic), SCHEMA_ENCODING, schema::words(topic).as_bytes())?;
     let unit = topic.unit().map(|unit| ("unit".to_owned(), unit.to_string()));
     let metadata: BTreeMap<_, _> = unit.into_iter().collect();
     writer.add_channel(schema, &topic.key(), MESSAGE_ENCODING, &metadata)
 }
 
-fn failed(path: &Path, source: McapError) -> Error {
+/// An error of the library as one of this crate.
+pub(super) fn failed(path: &Path, source: McapError) -> Error {
     let source = match source {
         McapError::Io(source) => source,
         other => io::Error::other(other),

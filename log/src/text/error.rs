@@ -39,6 +39,16 @@ pub enum Reason {
         /// It is the last line and has no line end.
         cut: bool,
     },
+    /// The row goes on behind the last column.
+    #[error("is too much, {} has only {columns} columns{}", if *.named { "the header" } else { "the first row" }, if *.commas { ": decimal commas between commas cannot be told apart" } else { "" })]
+    TooManyCells {
+        /// How many columns there are.
+        columns: usize,
+        /// The header says so; else the first row.
+        named: bool,
+        /// The delimiter is a comma.
+        commas: bool,
+    },
     /// Nothing in the cell.
     #[error("is empty")]
     Empty,
@@ -65,6 +75,16 @@ pub enum Reason {
     TimeNotIncreasing {
         /// Time of the row before (ns).
         previous_ns: i64,
+    },
+    /// A step of time that no tick spans, where the mapping knows of no gaps.
+    #[error(
+        "is {step} s after the row before it, {ticks} nominal ticks: for a log with gaps, set gap_after_ticks in [file.time]"
+    )]
+    Gap {
+        /// The step (s).
+        step: f64,
+        /// The same in nominal ticks.
+        ticks: u64,
     },
     /// A state that the mapping does not name.
     #[error("must be {plus:?} or {minus:?}")]

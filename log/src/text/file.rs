@@ -9,10 +9,13 @@ use super::assemble::{Assembler, Parts};
 use super::cells::{Cell, OpenQuote, split};
 use super::error::{LogError, LogFault, Reason};
 use super::input::{LONGEST_LINE, Line, Lines, Source};
-use super::resolve::{Columns, resolve};
+use super::resolve::{Columns, TickCells, resolve};
 use super::row::{Fault, Row};
 use super::{LogEvent, ReadReport};
-use crate::mapping::{FileMapping, Layout, OnBadRow, TimeMapping};
+use crate::mapping::{Delimiter, FileMapping, Layout, OnBadRow, TimeMapping};
+
+/// Most nominal ticks between two rows of a log without gaps.
+const LONGEST_STEP: u64 = 10;
 
 /// Reads one file.
 #[derive(Debug)]
@@ -39,6 +42,10 @@ pub(super) struct FileReader {
     rows: i64,
     /// Stamp of the last good row.
     last_stamp: Option<i64>,
+    /// Rows since then that could not be read.
+    bad_since: u64,
+    /// Columns of the header, or of the first row.
+    width: Option<usize>,
     /// There are no further rows.
     ended: bool,
     /// What reading came to so far.
@@ -60,6 +67,8 @@ impl FileReader {
             readings: Vec::new(),
             rows: 0,
             last_stamp: None,
+            bad_since: 0,
+            width: None,
             ended: false,
             report: ReadReport::default(),
         };
@@ -83,6 +92,7 @@ impl FileReader {
             let line = self.lines.line();
             let names = self.cells.iter().map(|cell| line.get(cell.start..cell.end).unwrap_or_default());
             self.header = names.map(|name| String::from_utf8_lossy(name).into_owned()).collect();
+            self.width = Some(self.cells.len());
         }
         Ok(())
     }
@@ -146,7 +156,7 @@ impl FileReader {
                 self.report.dropped_rows += 1;
                 return Ok(());
             }
-            Ok(true) => self.split().and_then(|()| self.parts(&mut stamp)),
+            Ok(true) => self.split().and_then(|()| self.check_width()).and_then(|()| self.parts(&mut stamp)),
             Err(fault) => Err(fault),
         };
         self.rows += 1;
@@ -155,6 +165,7 @@ impl FileReader {
                 self.report.rows += 1;
                 self.report.unterminated_last_line |= !self.lines.terminated();
                 self.last_stamp = Some(parts.stamp);
+                self.bad_since = 0;
                 self.assembler.take(parts, &self.readings, &self.columns);
                 Ok(())
             }
@@ -166,6 +177,7 @@ impl FileReader {
     #[cold]
     fn bad_row(&mut self, fault: Fault, stamp: Option<i64>) -> Result<(), LogError> {
         let cut_short = matches!(fault.reason, Reason::CutShort);
+        let a_gap = matches!(fault.reason, Reason::Gap { .. });
         let skippable = cut_short || fault.reason.concerns_one_row();
         let error = self.error(fault);
         if self.layout.on_bad_row == OnBadRow::Refuse || !skippable {
@@ -178,6 +190,11 @@ impl FileReader {
             return Ok(());
         }
         self.report.skipped_rows += 1;
+        self.bad_since += 1;
+        if a_gap {
+            // The rows behind it follow it, not what is before it.
+            self.last_stamp = stamp;
+        }
         self.assembler.skip(stamp, &self.columns);
         Ok(())
     }
@@ -186,6 +203,32 @@ impl FileReader {
     fn end(&mut self) {
         self.assembler.end(&self.columns);
         self.ended = true;
+    }
+
+    /// Refuses a row that goes on behind the last column: what its cells are is anybody's guess.
+    fn check_width(&mut self) -> Result<(), Fault> {
+        let columns = *self.width.get_or_insert(self.cells.len());
+        let line = self.lines.line();
+        let filled = |cell: &Cell| line.get(cell.start..cell.end).is_some_and(|text| !text.is_empty());
+        let Some(surplus) = self.cells.iter().skip(columns).position(filled) else { return Ok(()) };
+        let commas = self.layout.delimiter == Delimiter::Character(b',');
+        let reason = Reason::TooManyCells { columns, named: self.layout.header, commas };
+        Err(Fault { cell: Some(columns + surplus), reason })
+    }
+
+    /// The step of time to a row, where it is longer than any tick can be and the mapping knows of no gaps.
+    fn gap(&self, now: i64) -> Option<Reason> {
+        let tick = self.time.tick?.as_ns();
+        let counted = |ticks: &TickCells| ticks.sequence.is_none();
+        let gyro = self.columns.gyro.as_ref().map(|gyro| &gyro.ticks);
+        let numbered_by_rows = gyro.or(self.columns.accel.as_ref()).is_some_and(counted);
+        let step = Span::from_ns(now.saturating_sub(self.last_stamp?));
+        let most = i64::try_from(LONGEST_STEP + self.bad_since).unwrap_or(i64::MAX);
+        let gap = self.time.gap_after_ticks.is_none()
+            && numbered_by_rows
+            && tick > 0
+            && step.as_ns() > tick.saturating_mul(most);
+        gap.then(|| Reason::Gap { step: step.as_s(), ticks: (step.as_ns() / tick).unsigned_abs() })
     }
 
     /// Reads all cells of the row that are used; `stamp` is set as soon as it is known to be good.
@@ -208,6 +251,9 @@ impl FileReader {
             self.time.origin_ns.saturating_add(tick.saturating_mul(self.rows + 1))
         };
         *stamp = Some(now);
+        if let (Some(cell), Some(reason)) = (self.columns.stamps, self.gap(now)) {
+            return Err(Fault { cell: Some(cell.cell), reason });
+        }
         let gyro = match &self.columns.gyro {
             Some(cells) => match row.readings(&cells.ticks)? {
                 Some(readings) => Some((readings, row.states(cells)?)),

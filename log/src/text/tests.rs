@@ -130,6 +130,12 @@ fn broken_rows_are_refused_with_line_column_cell_and_value() {
         ("time goes back", "9,1,7,20\n", 2, 1, 1, "10000000 ns"),
         ("bad temperature", "20,1,7,warm\n", 2, 8, 4, "\"warm\" is not a number"),
         ("an open quote", "20,\"1,7,20\n", 2, 4, 2, "opens a quote"),
+        ("decimal commas between commas", "20,1,5,7,20\n", 2, 10, 5, "decimal commas between commas"),
+        ("a gap that nobody announced", "2010,1,7,20\n", 2, 1, 1, "2 s after the row before it, 200 nominal"),
+        ("a step of eleven ticks", "120,1,7,20\n", 2, 1, 1, "11 nominal ticks"),
+        ("line ends of Windows", "20,x,7,20\r\n", 2, 4, 2, "\"x\" is not a number"),
+        ("no cell at all", ",,,\n", 2, 1, 1, "is empty"),
+        ("bytes that are no text", "20,\u{b5},7,20\n", 2, 4, 2, "is not a number"),
     ];
     for (name, row, line, column, cell, message) in table {
         let delimiter = if row.contains(';') { "semicolon" } else { "comma" };
@@ -156,6 +162,48 @@ fn files_that_are_no_such_log_are_refused() {
     assert!(error(&named, b"\xff\xfex\0\n\0").to_string().contains("UTF-16"));
     assert!(error(&named, b"x\n1.5\n").to_string().contains("column 1 \"x\": \"1.5\" is not a whole number"));
     assert!(error(&named, &vec![b'1'; (1 << 20) + 5]).to_string().contains("longer than 1048576 bytes"));
+}
+
+#[test]
+fn surplus_cells_are_refused_unless_they_are_empty() {
+    let header = mapping("delimiter = \"comma\"\nheader = true", STAMPS);
+    let (events, _) = read(&header, b"t,x,y,T\n10,1,7,20,\n20,2,7,20, ,\n");
+    assert_eq!(gyro(&events).len(), 2);
+    let fault = error(&header, b"t,x,y,T\n10,1,7,20,\n20,2,7,20,,5\n");
+    assert_eq!((fault.line, fault.column), (3, 12), "{fault}");
+    assert!(
+        fault.to_string().contains("column 6: \"5\" is too much, the header has only 4 columns"),
+        "{fault}"
+    );
+    let spaces = mapping("delimiter = \"whitespace\"", STAMPS);
+    let fault = error(&spaces, b"10 1 7 20\n20 1 7 20 9\n");
+    assert!(fault.to_string().contains("the first row has only 4 columns"), "{fault}");
+}
+
+#[test]
+fn a_gap_is_read_where_the_mapping_or_the_log_knows_of_it() {
+    let bytes = b"10,1,7,20\n20,2,7,20\n2020,3,7,20\n2030,4,7,20\n";
+    let gaps = mapping("delimiter = \"comma\"", &format!("{STAMPS}\ngap_after_ticks = 1.5"));
+    assert_eq!(
+        gyro(&read(&gaps, bytes).0),
+        [(0, 10, 10, 1.0), (1, 20, 10, 2.0), (201, 2020, 10, 3.0), (202, 2030, 10, 4.0)]
+    );
+    // Passed over, the rows behind it are in order again.
+    let skip = mapping("delimiter = \"comma\"\non_bad_row = \"skip\"", STAMPS);
+    let (events, report) = read(&skip, bytes);
+    assert_eq!(gyro(&events), [(0, 10, 10, 1.0), (1, 20, 10, 2.0), (3, 2030, 10, 4.0)]);
+    assert_eq!(report.skipped_rows, 1);
+    // Rows that could not be read explain a step.
+    let bad = "?,1,7,20\n".repeat(12);
+    let (events, report) = read(&skip, format!("10,1,7,20\n{bad}140,2,7,20\n").as_bytes());
+    assert_eq!((gyro(&events).len(), report.skipped_rows), (2, 12));
+    // A log that numbers its ticks tells of its gaps itself.
+    let mut numbered = mapping("delimiter = \"comma\"", STAMPS);
+    numbered.files[0].gyro.as_mut().unwrap().ticks.sequence = Some(crate::mapping::Column::Index(3));
+    numbered.files[0].temperatures.clear();
+    let (events, _) = read(&numbered, b"10,1,7,5\n20,2,7,6\n2020,3,7,206\n");
+    let sequences: Vec<_> = gyro(&events).iter().map(|tick| tick.0).collect();
+    assert_eq!(sequences, [5, 6, 206]);
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! Entries in words, and texts cut to what an entry may hold.
 
+use std::borrow::Cow;
 use std::fmt;
 
 use super::{
@@ -7,6 +8,7 @@ use super::{
 };
 use crate::control::{MAX_BY, Schedule};
 use crate::digest::Digest;
+use crate::escape::escaped;
 
 /// Longest line of what has changed, in characters.
 const MAX_CHANGE: usize = 160;
@@ -79,10 +81,10 @@ impl AuditEvent {
     }
 }
 
-/// Cuts a text to a number of characters, the last an ellipsis, and puts a space in the place of control characters.
+/// Cuts a text to a number of characters, the last an ellipsis, and shows control characters by their codes.
 fn clip(text: &mut String, longest: usize) {
-    if text.chars().any(char::is_control) {
-        *text = text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
+    if let Cow::Owned(shown) = escaped(text) {
+        *text = shown;
     }
     if text.chars().count() > longest {
         *text = text.chars().take(longest.saturating_sub(1)).chain(['…']).collect();
@@ -143,7 +145,8 @@ impl fmt::Display for AuditEvent {
                 }
             },
             Self::CarriedFile(carried) => {
-                write!(f, "carried over: {} was seen as {}", carried.path, Short(carried.digest))
+                let refused = if carried.refused { ", refused" } else { "" };
+                write!(f, "{} was seen as {}{refused}", carried.path, Short(carried.digest))
             }
         }
     }

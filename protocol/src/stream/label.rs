@@ -2,13 +2,14 @@
 
 use std::time::{Duration, SystemTime};
 
+use serde::{Deserialize, Serialize};
 use toml::value::{Datetime, Offset};
 
 use crate::digest::Digest;
 use crate::document::{Created, Document};
 
 /// What is known of a calibration beside its numbers; changes nothing.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Label {
     /// SHA-256 of the document's text; `None` where only the head that stands in the revision is known.
     pub digest: Option<Digest>,

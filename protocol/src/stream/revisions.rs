@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 
 use isotherm_correction::units::Span;
+use serde::{Deserialize, Serialize};
 
 use super::Label;
 use crate::corrected::Revision;
@@ -11,7 +12,7 @@ use crate::corrected::Revision;
 const MAX_IN_FORCE: usize = 64;
 
 /// A revision with its first output.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct InForce {
     /// The revision.
     pub revision: Revision,
@@ -24,7 +25,7 @@ pub struct InForce {
 }
 
 /// A calibration that was given to the unit.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Given {
     pub(super) revision: Revision,
     pub(super) label: Label,
@@ -35,7 +36,7 @@ pub(super) struct Given {
 }
 
 /// The revision in force, one that waits for its tick, and those whose ticks have not been taken yet.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Revisions {
     /// In the order in which they were given.
     given: VecDeque<Given>,

@@ -5,9 +5,11 @@ mod laws;
 mod page;
 mod v1;
 mod v2;
+mod v3;
 
 use isotherm_protocol::codec::{self, CodecError, Kind};
 use isotherm_protocol::corrected::CorrectedBatch;
+use isotherm_protocol::journal::JournalPart;
 use isotherm_protocol::raw::{AccelBatch, GyroBatch, HealthBatch, TemperatureBatch};
 use isotherm_protocol::reference::Reference;
 use isotherm_protocol::service_status::ServiceStatus;
@@ -15,7 +17,7 @@ use isotherm_protocol::status::{self, Status};
 
 /// Name and frame of every vector, in hexadecimal, in the order of the page.
 fn frames() -> impl Iterator<Item = (&'static str, &'static str)> {
-    v1::FRAMES.iter().chain(v2::FRAMES).copied()
+    v1::FRAMES.iter().chain(v2::FRAMES).chain(v3::FRAMES).copied()
 }
 
 /// Bytes written in hexadecimal; spaces and line ends between them, and comments behind `#`, mean nothing.
@@ -50,6 +52,7 @@ fn decode_as(kind: u8, frame: &[u8]) -> Result<serde_json::Value, CodecError> {
         6 => json::<HealthBatch>(frame),
         7 => json::<ServiceStatus>(frame),
         8 => json::<Reference>(frame),
+        9 => json::<JournalPart>(frame),
         _ => panic!("there is no kind {kind}"),
     }
 }
@@ -65,6 +68,7 @@ fn the_numbers_of_the_kinds_are_fixed() {
         Kind::RawHealth,
         Kind::ServiceStatus,
         Kind::Reference,
+        Kind::Journal,
     ];
-    assert_eq!(kinds.map(|kind| kind as u8), [1, 2, 3, 4, 5, 6, 7, 8]);
+    assert_eq!(kinds.map(|kind| kind as u8), [1, 2, 3, 4, 5, 6, 7, 8, 9]);
 }

@@ -10,7 +10,7 @@ use isotherm_correction::unit::Counters;
 use isotherm_protocol::codec::{self, Kind};
 use isotherm_protocol::control::{CommandOrder, CommandReply, Order, SwapReply};
 use isotherm_protocol::history::{AuditEntry, AuditEvent};
-use isotherm_protocol::{key, raw, service_status, status, version};
+use isotherm_protocol::{journal, key, raw, service_status, status, version};
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -146,6 +146,7 @@ fn the_page_states_the_versions_of_every_kind() {
         (Kind::RawHealth, version::RAW_HEALTH),
         (Kind::ServiceStatus, version::SERVICE_STATUS),
         (Kind::Reference, version::REFERENCE),
+        (Kind::Journal, version::JOURNAL),
     ] {
         let (start, end) =
             (format!("| {} | ", kind as u8), format!(" | {versions} | {} |", versions.current));
@@ -164,6 +165,8 @@ fn the_page_states_keys_and_limits() {
         format!("`{}`", key::ALL_CORRECTED),
         format!("`{}`", key::ALL_STATUS),
         format!("`{}`", key::ALL_SERVICE_STATUS),
+        format!("`{}`", key::ALL_JOURNALS),
+        format!("`{}`", key::ALL_CONFIGURATIONS),
         format!("`{}`", key::ALL_UNITS_ALIVE),
         format!("`{}`", key::ALL_SERVICES_ALIVE),
         format!("1…{} characters", key::MAX_UNIT_ID),
@@ -174,6 +177,8 @@ fn the_page_states_keys_and_limits() {
         format!("0…{} kinds", status::MAX_FAULTS),
         format!("0…{} units", service_status::MAX_UNITS),
         format!("0…{} documents", service_status::MAX_BAD_DOCUMENTS),
+        format!("1…{} parts", journal::MAX_PARTS),
+        format!("1…{} bytes of the entry", journal::MAX_PART_BYTES),
     ] {
         assert!(page.contains(&text), "{text}");
     }

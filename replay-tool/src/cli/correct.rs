@@ -1,178 +1,106 @@
 //! `isotherm-replay correct`.
 
-use std::io::{self, Write};
-use std::path::{Path, PathBuf};
+mod recording;
+mod report;
+mod sink;
+mod text;
+
+use std::path::PathBuf;
 
 use clap::Args;
 use isotherm_correction::navigation::NavigationStep;
 use isotherm_correction::unit::UnitSettings;
 use isotherm_correction::units::Span;
-use serde::Serialize;
 
-use super::{LogArgs, Outcome, print, show};
+use super::{LogArgs, Outcome};
 use crate::error::Error;
-use crate::output::{Format, Output, write_frame, write_header, write_tick};
-use crate::progress::Bar;
-use crate::summary::{Summary, Sums};
-use isotherm_log::file::refuse_overwriting;
-use isotherm_log::offline::{Offline, load_calibration};
-use isotherm_log::text::ReadReport;
-
-/// Outputs that are written together.
-const BLOCK: usize = 512;
+use crate::output::Format;
 
 /// Correct a log offline, through the state machine of the service
 #[derive(Debug, Args)]
 #[command(after_help = "Example, in two steps:\n  \
     isotherm-replay simulate --preset mems-chamber --duration 60 --out mems.csv\n  \
     isotherm-replay correct mems.csv --mapping mems.mapping.toml --calibration config/calibration/MEMS-0001.toml --out corrected.csv\n\n\
-    The CSV's columns are named with their units; its numbers read back to the bit.")]
+    The CSV's columns are named with their units; its numbers read back to the bit.\n\n\
+    A recording is corrected by its own journal, all units at once: each with the calibrations, swaps and commands that it had \
+    in the service, at the same ticks: `isotherm-replay correct session.mcap`. Where it has the corrected ticks of the service \
+    too, they are compared to the bit.\n\n\
+    Exit code 3: recorder and service did not have the same, corrected and published ticks differ, or a part of the log could \
+    not be read.")]
 pub(super) struct CorrectArgs {
     #[command(flatten)]
     log: LogArgs,
-    /// Calibration document (TOML)
+    /// Calibration document (TOML), in force from the beginning. Of a text log the one that it is corrected with; of a
+    /// recording, in the place of the one that the unit it names began with; may be given several times, one for each unit
     #[arg(long, short, value_name = "FILE")]
-    calibration: PathBuf,
-    /// Where the corrected ticks go; - is standard output; without it, only the summary is printed
-    #[arg(long, short, value_name = "FILE")]
+    calibration: Vec<PathBuf>,
+    /// Where the corrected ticks go: a file for one unit, - for standard output; a folder (ending in /) for a file of each unit;
+    /// FILE.mcap for a recording of all units. Without it, only the summary is printed
+    #[arg(long, short, value_name = "PATH")]
     out: Option<PathBuf>,
-    /// How they are written
-    #[arg(long, value_enum, default_value_t)]
-    format: Format,
-    /// How long a gyro tick waits for its accelerometer tick, in the log's time (ms), as the service's
-    #[arg(long, value_name = "MS", default_value_t = 50)]
-    pairing_window_ms: u32,
-    /// A temperature reading takes effect for ticks that end this long after it (ms), as the service's
-    #[arg(long, value_name = "MS", default_value_t = 50)]
-    temperature_delay_ms: u32,
-    /// Ticks that are summed to one navigation step (1…1000), as the service's
-    #[arg(long, value_name = "TICKS", default_value_t = 1)]
-    navigation_ticks: u16,
+    /// How they are written, other than to FILE.mcap; csv without it
+    #[arg(long, value_enum)]
+    format: Option<Format>,
+    /// How long a gyro tick waits for its accelerometer tick, in the log's time (ms), as the service's; 50 without it. A
+    /// recording's journal has this and the next three
+    #[arg(long, value_name = "MS")]
+    pairing_window_ms: Option<u32>,
+    /// A temperature reading takes effect for ticks that end this long after it (ms), as the service's; 50 without it
+    #[arg(long, value_name = "MS")]
+    temperature_delay_ms: Option<u32>,
+    /// Ticks that are summed to one navigation step (1…1000), as the service's; 1 without it
+    #[arg(long, value_name = "TICKS")]
+    navigation_ticks: Option<u16>,
     /// Apply coning and sculling terms to navigation steps, as the service's
     #[arg(long)]
     coning_sculling: bool,
+    /// Leave out the swaps in a recording's journal: what is in force at the beginning stays
+    #[arg(long)]
+    ignore_swaps: bool,
+    /// Correct a recording as if it had no journal: by --calibration alone
+    #[arg(long, requires = "calibration", conflicts_with = "ignore_swaps")]
+    ignore_journal: bool,
+    /// Compare with the corrected ticks in a recording, though something is other than in the service
+    #[arg(long, conflicts_with = "no_compare")]
+    compare: bool,
+    /// Do not compare with the corrected ticks in a recording
+    #[arg(long)]
+    no_compare: bool,
+    /// Threads that correct the units of a recording; as many as there are cores without it
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
     /// Print the summary as one JSON object
     #[arg(long)]
     json: bool,
 }
 
-/// Everything that the summary says.
-#[derive(Debug, Serialize)]
-struct Report<'a> {
-    unit: &'a str,
-    calibration_digest: String,
-    #[serde(flatten)]
-    summary: &'a Summary,
-    counters: std::collections::BTreeMap<String, u64>,
-    log: &'a ReadReport,
-}
-
 impl CorrectArgs {
-    /// The unit's settings.
+    /// The unit's settings, where no journal has them.
     fn settings(&self) -> Result<UnitSettings, Error> {
-        let navigation = NavigationStep::new(self.navigation_ticks, self.coning_sculling)
+        let default = UnitSettings::default();
+        let navigation = NavigationStep::new(self.navigation_ticks.unwrap_or(1), self.coning_sculling)
             .map_err(|error| Error::Usage(format!("--navigation-ticks: {error}")))?;
         Ok(UnitSettings {
-            pairing_window: Span::from_ms(self.pairing_window_ms),
-            temperature_delay: Span::from_ms(self.temperature_delay_ms),
+            pairing_window: self.pairing_window_ms.map_or(default.pairing_window, Span::from_ms),
+            temperature_delay: self.temperature_delay_ms.map_or(default.temperature_delay, Span::from_ms),
             navigation,
-            ..UnitSettings::default()
+            ..default
         })
+    }
+
+    /// The first setting that was given.
+    fn given_setting(&self) -> Option<&'static str> {
+        let given = [
+            ("--pairing-window-ms", self.pairing_window_ms.is_some()),
+            ("--temperature-delay-ms", self.temperature_delay_ms.is_some()),
+            ("--navigation-ticks", self.navigation_ticks.is_some()),
+            ("--coning-sculling", self.coning_sculling),
+        ];
+        given.into_iter().find_map(|(name, given)| given.then_some(name))
     }
 }
 
 /// Runs the command.
 pub(super) fn run(args: &CorrectArgs) -> Result<Outcome, Error> {
-    let settings = args.settings()?;
-    let loaded = load_calibration(&args.calibration)?;
-    for warning in &loaded.warnings {
-        show::warn(&warning.to_string());
-    }
-    let mut events = args.log.open()?;
-    if let Some(out) = &args.out {
-        let inputs = events.inner().paths().iter().chain([&args.log.mapping, &args.calibration]);
-        refuse_overwriting(out, &inputs.map(PathBuf::as_path).collect::<Vec<_>>())?;
-    }
-    let mut output = args.out.as_deref().map(Output::create).transpose()?;
-    if let Some(output) = output.as_mut().filter(|_| args.format == Format::Csv) {
-        output.write(|writer| write_header(writer))?;
-    }
-    let mut unit = Offline::new(&loaded, settings);
-    let mut sums = Sums::default();
-    let mut bar = Bar::over_log(events.inner().progress());
-    for event in &mut events {
-        unit.handle(&event?);
-        if unit.ready() >= BLOCK {
-            take(&mut unit, &mut sums, output.as_mut(), args.format)?;
-        }
-        bar.step(|| format!("{} ticks", sums.ticks()));
-    }
-    unit.finish();
-    take(&mut unit, &mut sums, output.as_mut(), args.format)?;
-    output.map(Output::finish).transpose()?;
-    bar.finish();
-
-    for trouble in unit.troubles() {
-        show::warn(&trouble);
-    }
-    let (summary, log) = (sums.summary(), events.inner().report());
-    let digest = format!("{:016x}", u64::from_be_bytes(loaded.digest));
-    let report = Report {
-        unit: loaded.unit.as_str(),
-        calibration_digest: digest,
-        summary: &summary,
-        counters: unit.counters().into_iter().collect(),
-        log: &log,
-    };
-    let text = if args.json { show::json(&report) } else { human(&report) };
-    if args.out.as_deref() == Some(Path::new("-")) {
-        let _ = io::stderr().write_all(text.as_bytes());
-    } else {
-        print(text.as_bytes())?;
-    }
-    Ok(if log.lost_data() || unit.refused() > 0 { Outcome::DataLoss } else { Outcome::Complete })
-}
-
-/// Takes what is ready, sums it up and writes it.
-fn take(
-    unit: &mut Offline,
-    sums: &mut Sums,
-    output: Option<&mut Output>,
-    format: Format,
-) -> Result<(), Error> {
-    unit.peek().for_each(|tick| sums.add(tick));
-    match (output, format) {
-        (None, _) => unit.take().clear(),
-        (Some(output), Format::Csv) => {
-            let ticks = unit.take();
-            output.write(|writer| ticks.iter().try_for_each(|tick| write_tick(writer, tick)))?;
-        }
-        (Some(output), Format::Wire) => {
-            let mut frame = Vec::new();
-            while unit.next_frame(&mut frame) {
-                output.write(|writer| write_frame(writer, &frame))?;
-            }
-        }
-    }
-    Ok(())
-}
-
-/// The summary as tables.
-fn human(report: &Report<'_>) -> String {
-    let summary = report.summary;
-    let mut rows = vec![
-        ("unit", report.unit.to_owned()),
-        ("ticks", summary.ticks.to_string()),
-        ("outputs", summary.outputs.to_string()),
-        ("gaps", summary.gaps.to_string()),
-        ("missing ticks", summary.missed_ticks.to_string()),
-        ("duration (s)", format!("{:.3}", summary.duration_s)),
-    ];
-    let flags = summary.flags.iter().chain(&summary.sensor_flags);
-    rows.extend(flags.map(|(flag, count)| (*flag, count.to_string())));
-    let means = [
-        ("mean rate (°/h)", summary.mean_rate_deg_per_h, 4),
-        ("mean specific force (m/s²)", summary.mean_specific_force_m_per_s2, 6),
-    ];
-    show::table(&rows) + &show::axes(&means) + &show::reading(report.log)
+    if args.log.is_recording()? { recording::run(args) } else { text::run(args) }
 }

@@ -1,55 +1,122 @@
 //! `isotherm-replay play`.
 
+mod screen;
+mod tables;
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
 use clap::Args;
 use isotherm_bus::SessionOptions;
+use isotherm_bus::outlet::least_in_flight;
 use isotherm_correction::sample::ChannelName;
-use isotherm_protocol::raw::HealthReading;
+use isotherm_correction::units::Span;
+use isotherm_log::faults::FaultOptions;
+use isotherm_log::schedule::Clock;
+use isotherm_log::source::LogReport;
+use isotherm_protocol::key::UnitId;
+use isotherm_protocol::raw::{HealthReading, MAX_HEALTH};
 use serde::Serialize;
+use zenoh::key_expr::OwnedKeyExpr;
 
-use super::{LogArgs, Outcome, print, show};
+use super::{LogArgs, Outcome, print, seconds, show};
 use crate::error::Error;
+use crate::keyboard::Keyboard;
 use crate::pace::Speed;
-use crate::play::{PlayOptions, PlayReport, play};
-use crate::progress::Bar;
-use isotherm_log::offline::unit_id;
-use isotherm_log::text::ReadReport;
+use crate::play::{Acknowledge, PlayOptions, PlayReport, play};
+use screen::Screen;
 
-/// Gyro ticks that may be under way where nothing else is said.
-const IN_FLIGHT: u64 = 4096;
+/// Most copies of a unit.
+const MAX_COPIES: u32 = 999;
 
-/// Play a log to the raw topics of a unit
+/// Play a log to the raw topics of its units
 #[derive(Debug, Args)]
 #[command(after_help = "Example, with `isotherm serve --listen tcp/127.0.0.1:7447` running:\n  \
     isotherm-replay simulate --preset mems-chamber --duration 60 --out mems.csv\n  \
-    isotherm-replay play mems.csv --mapping mems.mapping.toml --unit MEMS-0001 --connect tcp/127.0.0.1:7447 --speed max\n\n\
+    isotherm-replay play mems.csv --mapping mems.mapping.toml --unit MEMS-0001 --connect tcp/127.0.0.1:7447 --speed max\n  \
+    isotherm-replay play mems.csv -m mems.mapping.toml -u MEMS --connect tcp/127.0.0.1:7447 --speed max --batch 10 \
+    --copies 20 --seed 1 --loss 0.01 --duplicate 0.01 --reorder 0.01\n\n\
     At any speed, ticks are sent no further ahead of what comes back corrected than --in-flight, so that none is lost.\n\
-    Exit code 3: ticks were lost, or rows of the log could not be read.")]
+    Keys, where input and standard error are a terminal: space pauses and goes on; n or → (paused) plays up to the next gyro\n\
+    batch; + and - double and halve the speed; ← and → or [ and ] go 10 s back and on; q ends in order, Ctrl-C at once.\n\
+    Exit code 3: ticks were lost, or rows or chunks of the log could not be read.")]
 pub(super) struct PlayArgs {
     #[command(flatten)]
     log: LogArgs,
-    /// Serial of the unit that the log is played as
-    #[arg(long, short, value_name = "SERIAL")]
-    unit: String,
     #[command(flatten)]
     session: SessionOptions,
     /// Times as fast as recorded, or max: as fast as the service keeps up without losing a tick
     #[arg(long, value_name = "N|max", default_value = "1")]
     speed: Speed,
-    /// Gyro ticks in one message
-    #[arg(long, value_name = "TICKS", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=4096))]
-    batch: u16,
-    /// Most gyro ticks sent and not come back; at least 2 × batch + 256
+    /// Whose clock sets the pace of a recording: of its producers, or of its reception [default: receive; text logs: event]
+    #[arg(long, value_enum)]
+    clock: Option<ClockArg>,
+    /// Play the log again and again, or so many times
+    #[arg(long = "loop", value_name = "N", num_args = 0..=1, require_equals = true, default_missing_value = "0")]
+    passes: Option<u64>,
+    /// Take only messages of these keys, e.g. 'imu/*/raw/gyro'; may be given several times
+    #[arg(long, value_name = "KEY", value_parser = key_expression)]
+    topic: Vec<OwnedKeyExpr>,
+    /// Play a unit of the log under another serial; may be given several times
+    #[arg(long = "as", value_name = "OLD=NEW", value_parser = renaming)]
+    names: Vec<(UnitId, UnitId)>,
+    /// Play each unit as so many: SERIAL-001, SERIAL-002 and so on
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_COPIES)))]
+    copies: Option<u32>,
+    /// Delay messages by up to this (ms of the log's time), keeping their order
+    #[arg(long, value_name = "MS", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=3_600_000))]
+    jitter_ms: u32,
+    /// Leave out this share of the messages (0 to 1)
+    #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = share)]
+    loss: f64,
+    /// Send this share of the messages twice (0 to 1)
+    #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = share)]
+    duplicate: f64,
+    /// Send this share of the messages behind one to four later ones of their key (0 to 1)
+    #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = share)]
+    reorder: f64,
+    /// Where the chance of the four comes from: the same for the same seed and serial
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    seed: u64,
+    /// Number of the first series, in place of one that no player had before: for runs that are equal to the byte
+    #[arg(long, value_name = "N")]
+    series: Option<u64>,
+    /// Gyro ticks in one message of a text log (1 to 4096) [default: 1]; recordings keep theirs
+    #[arg(long, value_name = "TICKS", value_parser = clap::value_parser!(u16).range(1..=4096))]
+    batch: Option<u16>,
+    /// Most gyro ticks of a unit sent and not come back; at least 2 × batch + 256 [default: 16384 shared among the units, at most
+    /// 4096 each]
     #[arg(long, value_name = "TICKS")]
     in_flight: Option<u64>,
     /// Do not wait for anything to come back: for listeners other than the service
     #[arg(long, conflicts_with = "in_flight")]
     no_acknowledge: bool,
-    /// What the instrument reports of itself, once a second: a voltage (V) or counter that the document tests
+    /// How long to wait for service and subscribers, and for what comes back (s)
+    #[arg(long, value_name = "SECONDS", default_value = "10", value_parser = seconds)]
+    wait: Span,
+    /// What the instrument of a text log reports of itself, once a second: a voltage (V) or counter that the document tests
     #[arg(long, value_name = "NAME=VALUE", value_parser = health_reading)]
     health: Vec<HealthReading>,
     /// Print the summary as one JSON object
     #[arg(long)]
     json: bool,
+}
+
+/// Whose clock sets the pace.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum ClockArg {
+    /// The producers': the ends of ticks
+    Event,
+    /// The recorder's: the moments of reception
+    Receive,
+}
+
+/// Everything that the summary says.
+#[derive(Debug, Serialize)]
+struct Report<'a> {
+    #[serde(flatten)]
+    play: &'a PlayReport,
+    log: &'a LogReport,
 }
 
 /// Reads `half-wave x=48.2`.
@@ -60,81 +127,118 @@ fn health_reading(text: &str) -> Result<HealthReading, String> {
     Ok(HealthReading { name, value })
 }
 
-/// Everything that the summary says.
-#[derive(Debug, Serialize)]
-struct Report<'a> {
-    #[serde(flatten)]
-    play: &'a PlayReport,
-    log: &'a ReadReport,
+/// Reads `OLD=NEW`.
+fn renaming(text: &str) -> Result<(UnitId, UnitId), String> {
+    let (old, new) = text.split_once('=').ok_or("must be OLD=NEW")?;
+    let unit = |serial: &str| UnitId::new(serial).map_err(|error| format!("{serial:?} {error}"));
+    Ok((unit(old)?, unit(new)?))
+}
+
+/// Reads a key expression.
+fn key_expression(text: &str) -> Result<OwnedKeyExpr, String> {
+    OwnedKeyExpr::new(text).map_err(|error| isotherm_bus::words(&error))
+}
+
+/// Reads a share.
+fn share(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(share) if (0.0..=1.0).contains(&share) => Ok(share),
+        _ => Err("must be a number from 0 to 1".into()),
+    }
+}
+
+impl PlayArgs {
+    /// What is played, and how.
+    fn options(&self) -> Result<PlayOptions, Error> {
+        let text = !self.log.is_recording()?;
+        let batch = self.batch(text)?;
+        if self.health.len() > MAX_HEALTH {
+            let given = self.health.len();
+            return Err(Error::Usage(format!("--health is given {given} times, may be {MAX_HEALTH} times")));
+        }
+        let mut names = BTreeMap::new();
+        for (old, new) in &self.names {
+            if names.insert(old.clone(), new.clone()).is_some() {
+                return Err(Error::Usage(format!("--as names {old} twice")));
+            }
+        }
+        Ok(PlayOptions {
+            files: self.log.files(usize::from(batch), None)?,
+            part: self.log.part()?,
+            topics: self.topic.clone(),
+            clock: match self.clock {
+                Some(ClockArg::Event) => Clock::Event,
+                Some(ClockArg::Receive) | None => Clock::Receive,
+            },
+            speed: self.speed,
+            passes: match self.passes {
+                Some(0) => None,
+                passes => Some(passes.unwrap_or(1)),
+            },
+            names,
+            copies: self.copies,
+            faults: FaultOptions {
+                jitter_ns: u64::from(self.jitter_ms) * 1_000_000,
+                loss: self.loss,
+                duplicate: self.duplicate,
+                reorder: self.reorder,
+            },
+            seed: self.seed,
+            series: self.series,
+            health: self.health.clone(),
+            session: self.session.clone(),
+            wait: Duration::from_nanos(self.wait.as_ns().unsigned_abs()),
+            acknowledge: self.acknowledge(batch)?,
+        })
+    }
+
+    /// Gyro ticks in a batch of a text log; refuses what is not for recordings, or not for text logs.
+    fn batch(&self, text: bool) -> Result<u16, Error> {
+        let refused = match (text, self.clock, self.batch, self.health.is_empty()) {
+            (true, Some(ClockArg::Receive), ..) => {
+                "--clock receive is for recordings: a text log does not say when it was received"
+            }
+            (false, _, Some(_), _) => "--batch is for text logs: a recording keeps its batches",
+            (false, _, _, false) => "--health is for text logs: a recording has its own health readings",
+            _ => return Ok(self.batch.unwrap_or(1)),
+        };
+        Err(Error::Usage(refused.to_owned()))
+    }
+
+    fn acknowledge(&self, batch: u16) -> Result<Acknowledge, Error> {
+        let least = least_in_flight(u64::from(batch));
+        match self.in_flight {
+            Some(in_flight) if in_flight < least => Err(Error::Usage(format!(
+                "--in-flight is {in_flight}, must be at least {least} with --batch {batch}"
+            ))),
+            in_flight if !self.no_acknowledge => Ok(Acknowledge::Bounded(in_flight)),
+            _ => Ok(Acknowledge::No),
+        }
+    }
 }
 
 /// Runs the command.
-pub(super) fn run(args: PlayArgs) -> Result<Outcome, Error> {
-    let batch = u64::from(args.batch);
-    let options = PlayOptions {
-        unit: unit_id(&args.unit)?,
-        session: args.session,
-        speed: args.speed,
-        batch_ticks: usize::from(args.batch),
-        health: args.health,
-        max_in_flight: (!args.no_acknowledge).then(|| args.in_flight.unwrap_or(IN_FLIGHT.max(4 * batch))),
-    };
-    let least = 2 * batch + 256;
-    if let Some(in_flight) = args.in_flight.filter(|in_flight| *in_flight < least) {
-        return Err(Error::Usage(format!(
-            "--in-flight is {in_flight}, must be at least {least} with --batch {batch}"
-        )));
-    }
-    let mut events = args.log.open()?;
-    let mut bar = Bar::over_log(events.inner().progress());
+pub(super) fn run(args: &PlayArgs) -> Result<Outcome, Error> {
+    let options = args.options()?;
+    // A log that cannot be read is said before a session is opened.
+    drop(options.files.open(&options.part)?);
     let runtime = tokio::runtime::Runtime::new().map_err(|source| Error::Runtime { source })?;
-    let played = runtime.block_on(play(&mut events, &options, |report| {
-        let speed = if report.elapsed_s > 0.0 { report.log_s / report.elapsed_s } else { 0.0 };
-        bar.step(|| format!("{} ticks  {speed:.1}×", report.ticks_sent));
-    }));
-    bar.finish();
-    let (play, log) = (played?, events.inner().report());
+    let (sender, commands) = tokio::sync::mpsc::unbounded_channel();
+    let keyboard = Keyboard::listen(sender);
+    let screen = Screen::new(keyboard.is_some());
+    let played = runtime.block_on(play(&options, commands, &screen));
+    screen.finish();
+    drop(keyboard);
+    // What Zenoh may still do is not waited for.
+    runtime.shutdown_background();
+    let (play, log) = played?;
+    for warning in tables::warnings(&play) {
+        show::warn(&warning);
+    }
     let report = Report { play: &play, log: &log };
-    if play.ticks_uncalibrated.is_some_and(|ticks| ticks > 0) {
-        show::warn(&format!(
-            "{} has no calibration in the service: its readings came back unscaled",
-            play.unit
-        ));
-    }
-    if play.restarts.is_some_and(|restarts| restarts > 0)
-        || play.ticks_duplicated.is_some_and(|ticks| ticks > 0)
-    {
-        show::warn(&format!(
-            "somebody else plays {}, or more than one service answers: what came back is not sure to be what was sent",
-            play.unit
-        ));
-    }
-    print(if args.json { show::json(&report) } else { human(&report) }.as_bytes())?;
+    print(if args.json { show::json(&report) } else { tables::human(&report, &options) }.as_bytes())?;
     if play.stopped {
         return Err(Error::Stopped);
     }
     Ok(if play.lost_data() || log.lost_data() { Outcome::DataLoss } else { Outcome::Complete })
-}
-
-/// The summary as a table.
-fn human(report: &Report<'_>) -> String {
-    let play = report.play;
-    let back = |ticks: Option<u64>| ticks.map_or("not asked for".to_owned(), |ticks| ticks.to_string());
-    let rows = [
-        ("unit", play.unit.clone()),
-        ("gyro ticks sent", play.ticks_sent.to_string()),
-        ("accelerometer ticks sent", play.accel_ticks_sent.to_string()),
-        ("temperature readings sent", play.temperature_readings_sent.to_string()),
-        ("came back", back(play.ticks_acknowledged)),
-        ("of these uncalibrated", back(play.ticks_uncalibrated)),
-        ("lost", back(play.ticks_lost)),
-        ("duplicated", back(play.ticks_duplicated)),
-        ("announced missing", back(play.ticks_announced_missing)),
-        ("missing in the log", play.log_gaps.to_string()),
-        ("time in the log (s)", format!("{:.3}", play.log_s)),
-        ("time taken (s)", format!("{:.3}", play.elapsed_s)),
-        ("actual speed", format!("{:.2}×", play.actual_speed)),
-        ("most behind schedule (ms)", format!("{:.3}", play.latest_s * 1e3)),
-    ];
-    show::table(&rows) + &show::reading(report.log)
 }

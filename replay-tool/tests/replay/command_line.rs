@@ -4,19 +4,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Output;
 
-use crate::common::{replay, root};
-
-/// Standard output as text.
-fn stdout(output: &Output) -> String {
-    String::from_utf8(output.stdout.clone()).unwrap()
-}
-
-/// Checks the exit code and that the errors name what is wrong.
-fn check(output: &Output, code: i32, errors: &str) {
-    let text = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(code), "{text}");
-    assert!(text.contains(errors), "{text}");
-}
+use crate::common::{check, replay, root, stdout};
 
 /// A folder with a simulated log of ten seconds.
 fn simulated() -> tempfile::TempDir {
@@ -186,25 +174,6 @@ fn playing_needs_a_service_unless_told_otherwise() {
         &["play", "mems.csv", "-m", "mems.mapping.toml", "-u", "MEMS-0001", "--connect", "tcp/127.0.0.1:1"],
     );
     assert_eq!(output.status.code(), Some(1), "{}", String::from_utf8_lossy(&output.stderr));
-}
-
-#[test]
-fn examples_of_the_help_without_a_service_work_as_printed() {
-    let folder = tempfile::tempdir().unwrap();
-    // The examples name files of the project by their paths from its root.
-    fs::create_dir_all(folder.path().join("config/calibration")).unwrap();
-    fs::copy(calibration(), folder.path().join("config/calibration/MEMS-0001.toml")).unwrap();
-    for command in ["simulate", "correct", "completions"] {
-        let help = stdout(&replay(folder.path(), &[command, "--help"]));
-        let examples = help.lines().filter_map(|line| line.trim().strip_prefix("isotherm-replay "));
-        let mut found = 0;
-        for example in examples.filter(|example| example.starts_with(|c: char| c.is_ascii_lowercase())) {
-            let args: Vec<_> = example.split(" > ").next().unwrap().split_whitespace().collect();
-            check(&replay(folder.path(), &args), 0, "");
-            found += 1;
-        }
-        assert!(found > 0, "{command} has no example:\n{help}");
-    }
 }
 
 #[test]

@@ -17,3 +17,15 @@ pub(crate) fn mapping(name: &str) -> PathBuf {
 pub(crate) fn replay(folder: &Path, args: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_isotherm-replay")).current_dir(folder).args(args).output().unwrap()
 }
+
+/// Standard output as text.
+pub(crate) fn stdout(output: &Output) -> String {
+    String::from_utf8(output.stdout.clone()).unwrap()
+}
+
+/// Checks the exit code and that the errors name what is wrong.
+pub(crate) fn check(output: &Output, code: i32, errors: &str) {
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(code), "{text}");
+    assert!(text.contains(errors), "{text}");
+}

@@ -9,5 +9,11 @@
 
 mod command_line;
 mod common;
+mod conversions;
+mod correct_diff_step;
+mod examples;
+mod info_plot;
+mod python_recordings;
 mod real_logs;
 mod simulated_logs;
+mod text_logs;

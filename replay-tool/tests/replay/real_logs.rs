@@ -7,7 +7,7 @@ use isotherm_log::mapping::Mapping;
 use isotherm_log::text::{LogEvent, LogReader};
 
 /// The folder of the real logs: `ISOTHERM_DATA`, or `../shared/data` beside the workspace.
-fn data(log: &str) -> Option<PathBuf> {
+pub(crate) fn data(log: &str) -> Option<PathBuf> {
     let folder = std::env::var_os("ISOTHERM_DATA")
         .map_or_else(|| crate::common::root().join("../shared/data"), PathBuf::from);
     let path = folder.join(log);

@@ -9,6 +9,7 @@ use toml::de::DeTable;
 use super::signer::signer;
 use super::{FileKind, Finding, Summary};
 use crate::config::Settings;
+use crate::signing::read_trusted_keys;
 use crate::text::{read_bounded, text, whole};
 
 /// Top-level keys that only a calibration document has.
@@ -108,13 +109,16 @@ fn temperatures(channels: &[Channel]) -> String {
 
 fn check_service(text: &str, path: &Path) -> Checked {
     let settings = Settings::parse(text, path)?;
+    // What the service would say of its keys at the start.
+    let keys = settings.swap.trusted_keys.as_deref().map(read_trusted_keys).transpose()?;
+    let warnings = keys.map_or_else(Vec::new, |(_, warnings)| warnings);
     let calibrations = settings
         .calibrations
         .as_deref()
         .map_or_else(|| "none".to_owned(), |folder| folder.display().to_string());
     let words =
         format!("service configuration: calibrations {calibrations}, at most {} units", settings.max_units);
-    Ok((Summary { summary: words, unit: None, digest: None, signature: None }, Vec::new()))
+    Ok((Summary { summary: words, unit: None, digest: None, signature: None }, warnings))
 }
 
 fn check_zenoh(text: &str, file: &str) -> Checked {

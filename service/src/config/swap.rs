@@ -59,7 +59,7 @@ impl Default for SwapSettings {
 }
 
 /// Seconds of a day.
-const DAY_S: u64 = 86_400;
+pub(super) const DAY_S: u64 = 86_400;
 
 impl SwapSettings {
     /// Reads `[swap]`.

@@ -6,6 +6,7 @@ use std::time::Duration;
 use clap::Args;
 use isotherm_bus::{BusError, SessionOptions};
 use isotherm_protocol::codec::{self, Message};
+use isotherm_protocol::escape::is_unfit;
 use isotherm_protocol::key::{self, UnitId};
 use isotherm_protocol::service_status::ServiceStatus;
 use isotherm_protocol::status::Status;
@@ -207,7 +208,15 @@ pub(super) fn read(path: &Path) -> Result<Vec<u8>, ConsoleError> {
 
 /// Who asks: what was said, or the name of the user.
 pub(super) fn by(given: Option<&str>) -> String {
-    let user = || std::env::var("USER").or_else(|_| std::env::var("LOGNAME")).unwrap_or_default();
     let by = given.map_or_else(user, ToOwned::to_owned);
-    by.chars().filter(|c| !c.is_control()).take(isotherm_protocol::control::MAX_BY).collect()
+    by.chars().filter(|c| !is_unfit(*c)).take(isotherm_protocol::control::MAX_BY).collect()
+}
+
+/// Name of the user: as the session says, else as the system knows it, as for a job of cron; its number where the system
+/// has no name for it, as in a container.
+fn user() -> String {
+    let said = ["USER", "LOGNAME"].into_iter().filter_map(|name| std::env::var(name).ok());
+    let said = said.map(|name| name.trim().to_owned()).find(|name| !name.is_empty());
+    let known = || uzers::get_current_username().map(|name| name.to_string_lossy().into_owned());
+    said.or_else(known).unwrap_or_else(|| format!("uid {}", uzers::get_current_uid()))
 }

@@ -23,15 +23,15 @@ pub enum ConsoleError {
     },
     /// Nobody answers on a key.
     #[error(
-        "no service answers on {key} within {}.{} s (connected to {}): is it running there, and under the same namespace?",
-        waited.as_secs(), waited.subsec_millis() / 100, tried.join(", ")
+        "no service answers on {key} within {}.{} s: is it running there, and under the same namespace?{}",
+        waited.as_secs(), waited.subsec_millis() / 100, hint(tried)
     )]
     NoAnswer {
         /// The key.
         key: String,
         /// How long it was waited for.
         waited: Duration,
-        /// Where the session was connected to.
+        /// Where it was looked for.
         tried: Vec<String>,
     },
     /// The service is there, the unit is not.

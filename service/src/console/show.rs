@@ -5,6 +5,7 @@ use std::fmt::Write;
 use comfy_table::{CellAlignment, Table, TableComponent, presets};
 use isotherm_protocol::control::{CorrectionChange, Difference, Schedule};
 use isotherm_protocol::document::Problem;
+use isotherm_protocol::escape::escaped;
 
 /// A table with a line under its header; columns from `right` on are aligned to the right.
 pub(super) fn table<const N: usize>(header: [&str; N], rows: Vec<Vec<String>>, right: usize) -> Table {
@@ -31,9 +32,14 @@ pub(super) fn count(number: usize, what: &str) -> String {
     format!("{number} {what}{}", if number == 1 { "" } else { "s" })
 }
 
-/// A problem under the name that the operator gave the file.
-pub(super) fn problem(problem: &Problem, name: &str) -> String {
-    Problem { file: Some(name.to_owned()), ..problem.clone() }.to_string()
+/// A problem under the name that the operator gave the file; without one, under the service's own. What is no matter of a
+/// file is told without a place.
+pub(super) fn problem(problem: &Problem, name: Option<&str>) -> String {
+    if problem.file.is_none() {
+        return escaped(&problem.message).into_owned();
+    }
+    let file = name.map(ToOwned::to_owned).or_else(|| problem.file.clone());
+    Problem { file, ..problem.clone() }.to_string()
 }
 
 /// A text cut to what fits in a column.

@@ -14,7 +14,7 @@ use super::client::{self, Client, ClientArgs};
 use super::follow::Follow;
 use super::show;
 use crate::exit::Exit;
-use crate::words::{print, say};
+use crate::words::{print, say, say_lines};
 
 /// Arguments of `swap`.
 #[derive(Debug, Clone, Args)]
@@ -140,20 +140,21 @@ pub(super) async fn run(args: &SwapArgs) -> Result<Exit, ConsoleError> {
     }
     let wish = Wish::Document { text: client::read(&args.file)?, options };
     let name = args.file.display().to_string();
-    change(&args.unit, &wish, &name, &args.consent, &args.client).await
+    change(&args.unit, &wish, Some(&name), &args.consent, &args.client).await
 }
 
 /// Goes back to an earlier calibration.
 pub(super) async fn rollback(args: &RollbackArgs) -> Result<Exit, ConsoleError> {
     let wish = Wish::Rollback { revision: args.to, by: client::by(args.consent.by.as_deref()) };
-    change(&args.unit, &wish, "the stored document", &args.consent, &args.client).await
+    // The service names the file that it keeps the document in.
+    change(&args.unit, &wish, None, &args.consent, &args.client).await
 }
 
 /// Shows what would change, asks, has it changed, and waits until it is.
 async fn change(
     serial: &str,
     wish: &Wish,
-    name: &str,
+    name: Option<&str>,
     consent: &Consent,
     client: &ClientArgs,
 ) -> Result<Exit, ConsoleError> {
@@ -180,7 +181,7 @@ async fn change(
 }
 
 /// Says on stderr what a reply holds beside its outcome.
-fn tell(reply: &SwapReply, name: &str) {
+fn tell(reply: &SwapReply, name: Option<&str>) {
     for problem in &reply.problems {
         say(show::problem(problem, name));
     }
@@ -190,7 +191,7 @@ fn tell(reply: &SwapReply, name: &str) {
     if let Some(difference) = &reply.difference
         && reply.outcome != SwapOutcome::Unchanged
     {
-        say(show::difference(difference));
+        say_lines(show::difference(difference));
     }
 }
 

@@ -8,8 +8,9 @@ use isotherm_protocol::service_status::{MAX_UNITS, ServiceStatus, UnitSummary};
 use isotherm_protocol::status::MAX_FAULTS;
 use zenoh::Session;
 
+use crate::fault::standing;
 use crate::intake::Intake;
-use crate::registrar::Board;
+use crate::registrar::{Board, Standing};
 
 /// This instance of the service.
 pub(super) struct Instance {
@@ -19,6 +20,7 @@ pub(super) struct Instance {
     board: Arc<Board>,
     /// What was said last, as far as a change of it is news.
     said: Option<ServiceStatus>,
+    problems: Vec<Standing>,
 }
 
 impl Instance {
@@ -31,6 +33,7 @@ impl Instance {
             settings_digest,
             board,
             said: None,
+            problems: Vec::new(),
         }
     }
 
@@ -47,8 +50,6 @@ impl Instance {
             UnitSummary { unit: actor.id().to_string(), state, output }
         });
         units.truncate(MAX_UNITS);
-        let mut faults = intake.faults();
-        faults.truncate(MAX_FAULTS);
         let news = ServiceStatus {
             instance: self.name.clone(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -64,10 +65,15 @@ impl Instance {
             swaps_accepted: posted.accepted,
             swaps_refused: posted.refused,
         };
-        if !always && self.said.as_ref() == Some(&news) {
+        if !always && self.said.as_ref() == Some(&news) && self.problems == posted.problems {
             return None;
         }
         self.said = Some(news.clone());
+        let mut faults: Vec<_> =
+            posted.problems.iter().map(|it| standing(it.kind, it.count, it.words.clone())).collect();
+        faults.extend(intake.faults());
+        faults.truncate(MAX_FAULTS);
+        self.problems = posted.problems;
         // Time and faults go on all the time: no news by themselves.
         Some(ServiceStatus { uptime_s: self.started.0.elapsed().as_secs_f64(), faults, ..news })
     }

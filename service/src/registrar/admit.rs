@@ -1,5 +1,6 @@
 //! Text in, verdict out: everything that is wrong with a document, and everything that is doubtful, at once.
 
+use isotherm_correction::operation::State;
 use isotherm_protocol::control::Difference;
 use isotherm_protocol::document::Problem;
 use isotherm_protocol::key::UnitId;
@@ -46,6 +47,7 @@ impl Work {
         let candidate = match Candidate::parse(text, Some(order.name), base_for(text, record)) {
             Ok(candidate) => candidate,
             Err(found) => {
+                problems.extend(other_serial(order, text));
                 problems.extend(found);
                 return Verdict { warnings, ..refused(named, problems) };
             }
@@ -59,20 +61,15 @@ impl Work {
                 return Verdict { warnings, ..refused(None, problems) };
             }
         };
-        if candidate.document.unit != unit.as_str() {
+        if candidate.document.unit != unit.as_str() && order.options.any_serial {
             let other = &candidate.document.unit;
-            let message = if order.options.any_serial {
-                format!("is \"{other}\": taken for unit {unit} all the same, as asked (any_serial)")
-            } else {
-                format!(
-                    "is \"{other}\", but the document was meant for unit {unit}: send it to {other}, correct the serial, \
-                     or say so explicitly (any_serial)"
-                )
-            };
-            let verdict = if order.options.any_serial { &mut warnings } else { &mut problems };
-            verdict.push(policy::at_key(text, order.name, "unit", message));
+            let message =
+                format!("is \"{other}\": taken for unit {unit} all the same, as asked (any_serial)");
+            warnings.push(policy::at_key(text, order.name, "unit", message));
         }
+        problems.extend(other_serial(order, text));
         let present = self.intake.present(&unit);
+        warnings.extend(present.as_ref().and_then(|present| interrupts(order, present.state)));
         let waiting = self.intake.waiting(&unit).map(|(revision, _)| revision);
         let active = record.and_then(|record| record.in_force(waiting));
         let judged =
@@ -85,6 +82,27 @@ impl Work {
         let difference = active.and_then(|active| compare(active, &candidate, present.as_ref()));
         Verdict { unit: Some(unit), candidate: Some(candidate), problems, warnings, difference }
     }
+}
+
+/// That a document names another unit than it is meant for, whatever else is wrong with it.
+fn other_serial(order: &Order<'_>, text: &str) -> Option<Problem> {
+    let (unit, other) = (order.unit.as_ref()?, unit_of(text)?);
+    let message = format!(
+        "is \"{other}\", but the document was meant for unit {unit}: send it to {other}, correct the serial, or say so \
+         explicitly (any_serial)"
+    );
+    let wrong = other != *unit && !order.options.any_serial;
+    wrong.then(|| policy::at_key(text, order.name, "unit", message))
+}
+
+/// What a change of the calibration does to what the unit is at.
+fn interrupts(order: &Order<'_>, state: State) -> Option<Problem> {
+    let words = match state {
+        State::PreLaunchCalibration => "the unit is in pre-launch calibration, which is given up with this",
+        State::SelfTest => "the unit is in self-test, which begins anew with this",
+        State::Standby | State::RunningWithReversal | State::RunningWithoutReversal => return None,
+    };
+    Some(text::whole(order.name, words.to_owned()))
 }
 
 /// A verdict on what could not be read.
@@ -106,7 +124,7 @@ fn base_for<'r>(text: &str, record: Option<&'r Record>) -> Option<&'r str> {
 }
 
 /// Verifies the signature as far as the configuration asks for one.
-fn check_signature(
+pub(super) fn check_signature(
     settings: &SwapSettings,
     text: &str,
     name: &str,

@@ -2,10 +2,12 @@
 
 use std::sync::{Mutex, PoisonError};
 
+use isotherm_protocol::escape::shown;
 use isotherm_protocol::service_status::{
     BadDocument, FolderState, FolderStatus, MAX_BAD_DOCUMENTS, StoreStatus,
 };
 
+use super::start::first_of;
 use super::work::Work;
 
 /// The present state of folder, store and swaps.
@@ -17,10 +19,23 @@ pub(crate) struct Posted {
     pub(crate) bad_documents: Vec<BadDocument>,
     /// State folder; `None` where nothing survives the service.
     pub(crate) store: Option<StoreStatus>,
+    /// What is wrong until somebody does something about it.
+    pub(crate) problems: Vec<Standing>,
     /// Calibrations accepted since the start.
     pub(crate) accepted: u64,
     /// Calibrations refused since the start.
     pub(crate) refused: u64,
+}
+
+/// Something that is wrong until somebody does something about it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Standing {
+    /// Its kind, as in a fault of the status.
+    pub(crate) kind: &'static str,
+    /// How many units or things it concerns.
+    pub(crate) count: u64,
+    /// It in words.
+    pub(crate) words: String,
 }
 
 /// Where the registrar posts it, and anybody looks at it.
@@ -37,13 +52,15 @@ impl Board {
 impl Work {
     /// Posts the present state.
     pub(super) fn show(&self) {
-        let folder = self.folder.path().map(|path| FolderStatus {
-            path: path.display().to_string(),
-            state: if self.folder.gone().is_some() { FolderState::Gone } else { FolderState::Watching },
-            reason: self.folder.gone().map(ToOwned::to_owned),
-        });
+        let (state, reason) = match (self.folder.gone(), self.folder.deaf()) {
+            (Some(reason), _) => (FolderState::Gone, Some(reason.to_owned())),
+            (None, Some(reason)) => (FolderState::Polling, Some(reason.to_owned())),
+            (None, None) => (FolderState::Watching, None),
+        };
+        let folder =
+            self.folder.path().map(|path| FolderStatus { path: shown(&path.display()), state, reason });
         let bad = self.folder.bad().take(MAX_BAD_DOCUMENTS).map(|(file, problems)| BadDocument {
-            file: file.display().to_string(),
+            file: shown(&file.display()),
             problem: problems.first().map(ToString::to_string).unwrap_or_default(),
             problems: problems.len() as u64,
         });
@@ -53,10 +70,41 @@ impl Work {
             store: self
                 .store
                 .folder()
-                .map(|path| StoreStatus { path: path.display().to_string(), audit_entries: self.entries }),
+                .map(|path| StoreStatus { path: shown(&path.display()), audit_entries: self.entries }),
+            problems: self.problems(),
             accepted: self.records.values().map(|record| record.accepted).sum(),
             refused: self.refusals.count(),
         };
         *self.board.0.lock().unwrap_or_else(PoisonError::into_inner) = posted;
+    }
+
+    /// What is wrong until somebody does something about it.
+    fn problems(&self) -> Vec<Standing> {
+        let lost = self.lost.iter().map(|words| Standing {
+            kind: "state_folder",
+            count: 1,
+            words: format!("swaps are refused, nothing can be written down: {words}"),
+        });
+        let losses = self.losses.first().map(|(_, words)| Standing {
+            kind: "audit_file",
+            count: self.losses.len() as u64,
+            words: words.clone(),
+        });
+        let untrusted: Vec<_> = self
+            .records
+            .iter()
+            .filter(|(_, record)| record.untrusted.is_some())
+            .map(|(unit, _)| unit)
+            .collect();
+        let count = untrusted.len() as u64;
+        let untrusted = (count > 0).then(|| Standing {
+            kind: "untrusted_calibration",
+            count,
+            words: format!(
+                "in force again without a signature that is trusted today: {}; `isotherm status UNIT` says what to do",
+                first_of(untrusted.into_iter())
+            ),
+        });
+        lost.chain(losses).chain(untrusted).collect()
     }
 }

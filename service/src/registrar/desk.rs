@@ -45,6 +45,8 @@ pub(crate) enum Notice {
 pub(crate) struct PreLaunchEnd {
     /// What came of it; `None` where it was given up.
     pub(crate) outcome: Option<Outcome>,
+    /// What it was given up for, where no command did it.
+    pub(crate) given_up: Option<String>,
     /// Revision counter of the calibration that it was made with.
     pub(crate) revision: u64,
     /// When it began (ns on the producer's clock).

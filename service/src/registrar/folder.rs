@@ -1,4 +1,14 @@
 //! Documents of the watched folder: each names its unit, and two that name one unit are rivals.
+//!
+//! What is a swap, and what is none: the folder *says* one document for a unit, the content of the one file that names it.
+//! It is a swap when the folder says another content than it said last. The name of the file does not matter: a file that is
+//! touched, renamed, moved away and back, or left over of two rivals says nothing new, and what came in over the bus since
+//! then stays in force. A text that is put back after another one was taken is something new, as any other text is. What
+//! was refused was never said, so that a mistake that is taken back changes nothing. What the folder said last stands in
+//! the audit file (`Store::said_by_folder`), so that all of this holds over a restart too.
+//!
+//! A refused document is told at every start for as long as it is there. A unit that has a calibration is not given it by
+//! a restart, though it would pass now: the restart may only have forgotten the temperature that spoke against it.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -6,6 +16,7 @@ use std::path::{Path, PathBuf};
 use isotherm_protocol::control::{SwapOptions, SwapOutcome};
 use isotherm_protocol::digest::Digest;
 use isotherm_protocol::document::{Document, Problem};
+use isotherm_protocol::escape::shown;
 use isotherm_protocol::history::{AuditEvent, CarriedFile, Source};
 use isotherm_protocol::key::UnitId;
 use isotherm_protocol::overlay;
@@ -22,6 +33,7 @@ pub(super) struct Folder {
     path: Option<PathBuf>,
     files: BTreeMap<PathBuf, File>,
     gone: Option<String>,
+    deaf: Option<String>,
 }
 
 /// What is known of a file.
@@ -31,6 +43,8 @@ struct File {
     unit: Option<UnitId>,
     /// Unit that it names or named, valid or not.
     hint: Option<UnitId>,
+    /// SHA-256 of its content; `None` where it cannot be read.
+    digest: Option<Digest>,
     /// Why it is not taken.
     problems: Vec<Problem>,
     /// Whether that is only because of a rival.
@@ -51,6 +65,16 @@ impl Folder {
         self.gone.as_deref()
     }
 
+    /// Why changes are found by the poll alone.
+    pub(super) fn deaf(&self) -> Option<&str> {
+        self.deaf.as_deref()
+    }
+
+    /// Whether a file has this content.
+    pub(super) fn holds(&self, digest: &Digest) -> bool {
+        self.files.values().any(|file| file.digest.as_ref() == Some(digest))
+    }
+
     /// Files that are not taken, and why.
     pub(super) fn bad(&self) -> impl Iterator<Item = (&Path, &[Problem])> {
         let bad = self.files.iter().filter(|(_, file)| !file.problems.is_empty());
@@ -65,7 +89,8 @@ impl Folder {
 
     /// Enters a file that cannot be read.
     pub(super) fn unreadable(&mut self, path: &Path, problem: Problem) {
-        self.files.entry(path.to_owned()).or_default().problems = vec![problem];
+        let file = self.files.entry(path.to_owned()).or_default();
+        (file.problems, file.digest) = (vec![problem], None);
     }
 
     /// The folder cannot be read.
@@ -76,6 +101,7 @@ impl Folder {
     /// Enters a file's content; the unit that it named before.
     pub(super) fn enter(&mut self, path: &Path, bytes: &[u8]) -> Option<UnitId> {
         let file = self.files.entry(path.to_owned()).or_default();
+        file.digest = Some(Digest::of(bytes));
         let text = std::str::from_utf8(bytes).ok();
         let parsed = text.and_then(|text| Document::parse(text, None).ok());
         let unit = parsed.and_then(|parsed| UnitId::new(&parsed.document.unit).ok());
@@ -113,6 +139,9 @@ impl Work {
                 tracing::info!("the folder of calibrations can be read again");
                 self.folder.gone = None;
             }
+            // Told by the watcher, who knows how long its polls are apart.
+            FolderEvent::Deaf { reason } => self.folder.deaf = Some(reason),
+            FolderEvent::Hearing => self.folder.deaf = None,
         }
     }
 
@@ -121,7 +150,7 @@ impl Work {
         let unit = self.folder.files.get(path).and_then(|file| file.unit.clone());
         let naming = unit.map(|unit| (self.folder.naming(&unit), unit));
         if let Some((files, unit)) = naming.filter(|(files, _)| files.len() > 1) {
-            self.refuse_rivals(&unit, &files);
+            self.refuse_rivals(&unit, &files, at_start);
             return false;
         }
         let problems = self.swap_file(path, bytes, at_start);
@@ -143,36 +172,58 @@ impl Work {
             tracing::error!("{problem}");
             return vec![problem];
         }
-        let known =
-            self.folder.files.get(path).and_then(|file| file.unit.clone().or_else(|| file.hint.clone()));
-        let source = known_source(path, at_start);
+        let file = self.folder.files.get(path);
+        let valid = file.and_then(|file| file.unit.clone());
+        let known = valid.clone().or_else(|| file.and_then(|file| file.hint.clone()));
         let digest = Digest::of(bytes);
-        let seen = source.file().and_then(|path| self.store.seen_in_folder(path));
-        let has_active = known
-            .as_ref()
-            .is_some_and(|unit| self.records.get(unit).is_some_and(|record| record.active.is_some()));
-        if at_start && has_active && seen == Some(digest) {
-            // Seen before the restart: what was accepted since then, from wherever, holds.
+        let active = |unit: &UnitId| self.records.get(unit).and_then(|record| record.active.as_ref());
+        let said = valid.as_ref().filter(|unit| active(unit).is_some());
+        if let Some(unit) = said.filter(|unit| self.store.said_by_folder(unit) == Some(digest)) {
+            if !at_start {
+                tracing::info!(%unit, "{name} holds what the folder said before: what is in force stays in force");
+            }
             return Vec::new();
         }
-        let carried = source.file().map(|path| CarriedFile { path: path.to_owned(), digest });
+        let source = known_source(path, at_start);
+        let refused = source.file().and_then(|path| self.store.refused_in_folder(path)) == Some(digest);
+        let other_in_force = known
+            .as_ref()
+            .and_then(active)
+            .is_some_and(|active| active.written.as_ref().is_none_or(|written| written.digest != digest));
         let options = SwapOptions::default();
-        let reply =
-            self.swap(&Order { unit: known.clone(), bytes, name: &name, source, overlay: None, options });
-        if let Some(carried) =
-            carried.filter(|_| reply.outcome == SwapOutcome::Unchanged && seen != Some(digest))
-        {
-            // Not to be taken for a change after the next restart, when something else may be in force.
-            let event = AuditEvent::CarriedFile(carried);
-            if let Err(error) = self.append(None, "", event) {
+        let order = Order { unit: known.clone(), bytes, name: &name, source, overlay: None, options };
+        if at_start && refused && other_in_force {
+            return self.judge_again(&order);
+        }
+        let reply = self.swap(&order);
+        if let (SwapOutcome::Unchanged, Some(path)) = (reply.outcome, order.source.file()) {
+            // Not to be taken for a change later, when something else may be in force.
+            let event =
+                AuditEvent::CarriedFile(CarriedFile { path: path.to_owned(), digest, refused: false });
+            if let Err(error) = self.append(known.as_ref(), "", event) {
                 tracing::error!("{name} is not in the audit file as seen: {error}");
             }
         }
         reply.problems
     }
 
+    /// Says again what is wrong with a document that was refused before the service was restarted, and written down then.
+    fn judge_again(&self, order: &Order<'_>) -> Vec<Problem> {
+        let mut problems = self.admit(order).problems;
+        if problems.is_empty() {
+            let message = "was refused when it was put there, and a restart does not take it though it would pass now: put \
+                           it in force with `isotherm swap`, or write another document there";
+            problems.push(text::whole(order.name, message.to_owned()));
+        }
+        let unit = order.unit.as_ref().map(ToString::to_string).unwrap_or_default();
+        for problem in &problems {
+            tracing::error!(unit, "refused: {problem}; what is in force stays in force");
+        }
+        problems
+    }
+
     /// Tells of files that name one unit: none of them is taken, for which of them holds is for the operator to say.
-    fn refuse_rivals(&mut self, unit: &UnitId, files: &[PathBuf]) {
+    fn refuse_rivals(&mut self, unit: &UnitId, files: &[PathBuf], at_start: bool) {
         for path in files {
             let others = files.iter().filter(|other| *other != path);
             let others: Vec<_> = others.map(|other| other.display().to_string()).collect();
@@ -187,8 +238,10 @@ impl Work {
             if entry.problems.first() != Some(&problem) {
                 tracing::error!(%unit, "{problem}");
             }
-            entry.problems = vec![problem];
+            entry.problems = vec![problem.clone()];
             entry.rival = true;
+            let digest = entry.digest.unwrap_or(Digest([0; 32]));
+            self.note_rival(unit, known_source(path, at_start), digest, &problem);
         }
     }
 
@@ -210,8 +263,9 @@ impl Work {
     }
 }
 
-/// A file as a source: by its absolute path, so that it is the same one after a start from another folder.
+/// A file as a source: by its absolute path, so that it is the same one after a start from another folder, and as the audit
+/// file has it.
 fn known_source(path: &Path, at_start: bool) -> Source {
-    let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned()).display().to_string();
+    let path = shown(&std::path::absolute(path).unwrap_or_else(|_| path.to_owned()).display());
     if at_start { Source::Start { path } } else { Source::Folder { path } }
 }

@@ -21,8 +21,13 @@ use super::work::Work;
 impl Work {
     /// Takes the end of a pre-launch calibration, whatever it came to.
     pub(super) fn pre_launch_ended(&mut self, unit: &UnitId, end: &PreLaunchEnd) {
-        // The abort is in the audit file as a command, the swap that ended it as a swap; the next one may have begun.
-        let Some(outcome) = &end.outcome else { return };
+        let Some(outcome) = &end.outcome else {
+            // An abort is in the audit file as a command.
+            if let Some(reason) = &end.given_up {
+                self.note_given_up(unit, reason);
+            }
+            return;
+        };
         let Some(record) = self.records.get_mut(unit) else { return };
         let Some(run) = record.pre_launch.take() else { return };
         let came_to = match outcome {
@@ -41,16 +46,30 @@ impl Work {
                 tracing::warn!(%unit, "pre-launch calibration refused, nothing has changed: {reason}");
             }
         }
+        let accepted = came_to.is_ok();
+        self.write_end(unit, &run.by, accepted, came_to.unwrap_or_else(|reason| reason));
+    }
+
+    /// Tells and writes down that it was given up, and not by a command.
+    fn note_given_up(&mut self, unit: &UnitId, reason: &str) {
+        tracing::warn!(%unit, "pre-launch calibration given up, the constants stay: {reason}");
+        // Left in its place: the next one may have begun.
+        let run = self.records.get(unit).and_then(|record| record.pre_launch.as_ref());
+        let by = run.map(|run| run.by.clone()).unwrap_or_default();
+        self.write_end(unit, &by, false, format!("given up: {reason}"));
+    }
+
+    fn write_end(&mut self, unit: &UnitId, by: &str, accepted: bool, reason: String) {
         let state_after = self.intake.present(unit).map_or(State::Standby, |present| present.state);
         let record = CommandRecord {
             command: "pre-launch ended".to_owned(),
-            accepted: came_to.is_ok(),
-            reason: Some(came_to.unwrap_or_else(|reason| reason)),
+            accepted,
+            reason: Some(reason),
             state_before: State::PreLaunchCalibration.to_string(),
             state_after: state_after.to_string(),
             last_sequence: self.intake.with(unit, |actor| actor.last_sequence()).flatten(),
         };
-        if let Err(error) = self.append(Some(unit), &run.by, AuditEvent::Command(record)) {
+        if let Err(error) = self.append(Some(unit), by, AuditEvent::Command(record)) {
             tracing::error!(%unit, "the pre-launch calibration is not in the audit file: {error}");
         }
     }

@@ -30,6 +30,8 @@ pub(super) struct Record {
     pub(super) pre_launch: Option<PreLaunchRun>,
     /// The overlay that the last one was stored as.
     pub(super) overlay: Option<Digest>,
+    /// Why what was put in force again at the start would be refused today, for want of a signature.
+    pub(super) untrusted: Option<String>,
 }
 
 /// An accepted calibration with its text.
@@ -63,6 +65,8 @@ pub(super) struct Layers {
     pub(super) base: Arc<str>,
     /// The overlay.
     pub(super) overlay: Overlay,
+    /// Its text, as it came.
+    pub(super) text: Arc<str>,
     /// SHA-256 of the overlay's text.
     pub(super) digest: Digest,
 }
@@ -84,7 +88,7 @@ impl Record {
     pub(super) fn account(&self) -> SwapAccount {
         let (accepted, refused) = (self.accepted, self.refused);
         let swaps = Swaps { accepted, refused, last_refusal: self.last_refusal.clone() };
-        SwapAccount { swaps, overlay: self.overlay }
+        SwapAccount { swaps, overlay: self.overlay, problem: self.untrusted.clone() }
     }
 }
 

@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use isotherm_protocol::control::MAX_BY;
 use isotherm_protocol::digest::Digest;
+use isotherm_protocol::document::Problem;
 use isotherm_protocol::history::{AuditEvent, MAX_PROBLEMS, Refusal, Source};
 use isotherm_protocol::key::UnitId;
 
@@ -75,15 +76,36 @@ impl Work {
         for problem in &verdict.problems {
             tracing::error!(unit = shown, source = %order.source, "refused: {problem}");
         }
+        // Told at every start, written down once.
+        let at_start = matches!(order.source, Source::Start { .. });
+        let before = order.source.file().and_then(|path| self.store.refused_in_folder(path));
+        if at_start && before == Some(digest) {
+            return;
+        }
         let event = AuditEvent::Refused(Refusal {
             source: order.source.clone(),
             digest,
             problems: verdict.problems.iter().take(MAX_PROBLEMS).map(ToString::to_string).collect(),
             count: verdict.problems.len() as u64,
+            rival: false,
         });
         let by: String = order.options.by.chars().take(MAX_BY).collect();
         if let Err(error) = self.append(unit, &by, event) {
             tracing::error!(unit = shown, "the refusal is not in the audit file: {error}");
+        }
+    }
+
+    /// Writes down, once, that a file is refused because another one names its unit too.
+    pub(super) fn note_rival(&mut self, unit: &UnitId, source: Source, digest: Digest, problem: &Problem) {
+        let before = source.file().and_then(|path| self.store.rival_in_folder(path));
+        let told = matches!(source, Source::Start { .. }) && before == Some(digest);
+        if told || !self.refusals.is_news(Instant::now(), (Some(unit.clone()), source.clone(), digest)) {
+            return;
+        }
+        let problems = vec![problem.to_string()];
+        let event = AuditEvent::Refused(Refusal { source, digest, problems, count: 1, rival: true });
+        if let Err(error) = self.append(Some(unit), "", event) {
+            tracing::error!(%unit, "the refusal is not in the audit file: {error}");
         }
     }
 

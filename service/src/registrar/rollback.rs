@@ -1,6 +1,7 @@
 //! Back to an earlier revision: a swap like any other, with a document that was accepted before.
 
 use isotherm_protocol::control::{Schedule, SwapOptions, SwapOutcome, SwapReply};
+use isotherm_protocol::document::Problem;
 use isotherm_protocol::history::Source;
 use isotherm_protocol::key::UnitId;
 
@@ -31,7 +32,10 @@ impl Work {
         self.swap(&Order {
             unit: Some(unit.clone()),
             bytes: &bytes,
-            name: &format!("revision {}", set.revision),
+            name: &self.store.document_file(&set.digest).map_or_else(
+                || format!("document of revision {}", set.revision),
+                |file| file.display().to_string(),
+            ),
             source: Source::Rollback { to: set.revision },
             overlay: set.overlay,
             options,
@@ -47,7 +51,19 @@ impl Work {
             Some(to) => {
                 format!("revision {to} is not one of unit {unit}; its latest are {}", revisions.join(", "))
             }
-            None => format!("unit {unit} was never given another document than the present one"),
+            None if self
+                .store
+                .good_sets(unit)
+                .zip(self.store.good_sets(unit).skip(1))
+                .all(|(a, b)| a.corrects_as(b)) =>
+            {
+                format!("unit {unit} was never given another document than the present one")
+            }
+            None => format!(
+                "nothing is kept of unit {unit} before what was gone back to: to go forth again, name a revision; its \
+                 latest are {}",
+                revisions.join(", ")
+            ),
         }
     }
 
@@ -61,7 +77,8 @@ impl Work {
             digest: written.map(|written| written.digest.to_string()).unwrap_or_default(),
             schedule: Schedule::NextTick,
             slew_s: 0.0,
-            problems: vec![text::whole("rollback", message)],
+            // No matter of a file.
+            problems: vec![Problem { file: None, ..text::whole("", message) }],
             warnings: Vec::new(),
             difference: None,
         }

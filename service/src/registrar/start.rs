@@ -12,12 +12,16 @@ use isotherm_protocol::history::GoodSet;
 use isotherm_protocol::key::UnitId;
 use isotherm_protocol::overlay::Overlay;
 
+use super::admit::check_signature;
 use super::record::{Active, Layers, Record, Written};
 use super::work::Work;
 use crate::calibrations::{Calibrations, Change, Installable, Plan};
 use crate::store::Store;
 use crate::text;
 use crate::watch::{Known, documents_in, read_document};
+
+/// How many units a line of the log names.
+const NAMED: usize = 8;
 
 /// What was found of each file of the folder, for its watcher.
 pub(crate) type Found = std::collections::BTreeMap<std::path::PathBuf, Known>;
@@ -56,6 +60,9 @@ impl Work {
                 };
                 let (written, calibration) = written;
                 let next = installable(&set, &written, &calibration);
+                if record.active.is_none() {
+                    record.untrusted = self.distrust(&unit, set.revision, &written);
+                }
                 record.active.get_or_insert(Active {
                     revision: set.revision,
                     calibration,
@@ -111,9 +118,9 @@ impl Work {
             bad += usize::from(!self.take_file(file, bytes, true));
         }
         self.miss_documents();
-        let units: Vec<_> = self.records.keys().map(UnitId::as_str).collect();
         tracing::info!(
-            folder = %folder.display(), units = units.join(" "), bad_documents = bad, "calibrations read"
+            folder = %folder.display(), count = self.records.len(), units = first_of(self.records.keys()),
+            bad_documents = bad, "calibrations read"
         );
         Ok((found, bad))
     }
@@ -127,10 +134,32 @@ impl Work {
         self.folder.miss(error.to_string());
     }
 
+    /// Why a calibration that is put in force again would be refused today for want of a signature, where signatures are
+    /// asked for. It is put in force all the same: a unit does not lose its calibration by a key that was taken away.
+    ///
+    /// What an overlay lies on is what was signed; the overlay may be the service's own.
+    fn distrust(&self, unit: &UnitId, revision: u64, written: &Written) -> Option<String> {
+        if !self.swap.require_signature {
+            return None;
+        }
+        let signed = written.layers.as_ref().map_or(&written.text, |layers| &layers.base);
+        let name = format!("revision {revision}");
+        let (mut problems, mut warnings) = (Vec::new(), Vec::new());
+        check_signature(&self.swap, signed, &name, &mut problems, &mut warnings);
+        let first = problems.first()?;
+        let words = format!(
+            "revision {revision} is in force again, and would be refused today: {}; it stays in force, put a document in \
+             its place that a trusted key has signed (`isotherm swap`)",
+            first.message
+        );
+        tracing::error!(%unit, revision, "{words}");
+        Some(words)
+    }
+
     /// Warns of units whose document has gone from the folder.
     fn miss_documents(&self) {
         for (unit, record) in &self.records {
-            let set = self.store.last_good(unit);
+            let set = self.store.last_good(unit).filter(|set| !self.folder.holds(&set.digest));
             let file = set.and_then(|set| set.source.file()).filter(|file| !Path::new(file).exists());
             if let (Some(file), Some(active)) = (file, &record.active) {
                 tracing::warn!(
@@ -141,12 +170,21 @@ impl Work {
     }
 }
 
+/// The first few units, and how many more there are.
+pub(super) fn first_of<'u>(units: impl ExactSizeIterator<Item = &'u UnitId>) -> String {
+    let beyond = units.len().saturating_sub(NAMED);
+    let named: Vec<_> = units.take(NAMED).map(UnitId::as_str).collect();
+    let more = if beyond > 0 { format!(" and {beyond} more") } else { String::new() };
+    named.join(" ") + &more
+}
+
 /// Document, text and calibration of a good set.
 pub(super) fn written(
     store: &Store,
     set: &GoodSet,
 ) -> Result<(Written, Arc<isotherm_correction::calibration::Calibration>), Vec<Problem>> {
-    let name = format!("document {}", set.digest);
+    let file = store.document_file(&set.digest);
+    let name = file.map_or_else(|| format!("document {}", set.digest), |file| file.display().to_string());
     let problem = |message: String| vec![text::whole(&name, message)];
     let bytes = store.document(&set.digest).map_err(|error| problem(error.to_string()))?;
     let bytes = bytes.ok_or_else(|| problem("is not in the state folder any more".to_owned()))?;
@@ -165,9 +203,9 @@ pub(super) fn written(
 pub(super) fn layers(store: &Store, digest: Digest) -> Option<Layers> {
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).ok();
     let overlay = store.overlay(&digest).ok().flatten().and_then(text)?;
-    let overlay = Overlay::parse(&overlay, None).ok()?.overlay;
+    let (text_of, overlay) = (overlay.as_str().into(), Overlay::parse(&overlay, None).ok()?.overlay);
     let base = store.document(&overlay.overlay_of.parse().ok()?).ok().flatten().and_then(text)?;
-    Some(Layers { base: base.into(), overlay, digest })
+    Some(Layers { base: base.into(), overlay, text: text_of, digest })
 }
 
 fn installable(
@@ -180,6 +218,7 @@ fn installable(
         calibration: Arc::clone(calibration),
         digest: Some(set.digest),
         document: Some(Arc::clone(&written.document)),
+        text: Some(Arc::clone(&written.text)),
         overlay: set.overlay,
         source: Some(set.source.clone()),
     }

@@ -54,6 +54,9 @@ impl Work {
             return reply(self, SwapOutcome::Refused, verdict);
         }
         if self.is_unchanged(unit, candidate, order.options.schedule) {
+            if order.needs_signature() && !order.options.dry_run {
+                self.trust(unit);
+            }
             return reply(self, SwapOutcome::Unchanged, verdict);
         }
         if order.options.dry_run {
@@ -66,8 +69,9 @@ impl Work {
                 reply(self, SwapOutcome::Accepted, verdict)
             }
             Err(error) => {
-                tracing::error!(%unit, "a swap is refused: {error}");
-                let problems = vec![text::whole(order.name, format!("nothing has changed: {error}"))];
+                tracing::error!(%unit, "a swap is refused, it cannot be written down: {error}");
+                let message = format!("the swap cannot be written down, nothing has changed: {error}");
+                let problems = vec![text::whole(order.name, message)];
                 let verdict = Verdict { problems, ..verdict };
                 self.count_refusal(&verdict);
                 reply(self, SwapOutcome::Refused, verdict)
@@ -107,9 +111,11 @@ impl Work {
                 let digest = self.store.put_overlay(order.bytes)?;
                 let overlay = parsed.overlay.clone();
                 let below = self.records.get(unit).and_then(Record::written);
+                let text = String::from_utf8_lossy(order.bytes).into();
                 below.map(|below| Layers {
                     base: Arc::clone(below.base(&overlay.overlay_of)),
                     overlay,
+                    text,
                     digest,
                 })
             }
@@ -137,8 +143,8 @@ impl Work {
         let revision = Revision { counter: highest + 1, digest: digest.head() };
         let (document, calibration) =
             (Arc::new(candidate.document.clone()), Arc::new(candidate.calibration.clone()));
-        let text = candidate.text.as_str().into();
-        let written = Written { digest, document: Arc::clone(&document), text, layers };
+        let text: Arc<str> = candidate.text.as_str().into();
+        let written = Written { digest, document: Arc::clone(&document), text: Arc::clone(&text), layers };
         let active = Active {
             revision: revision.counter,
             calibration: Arc::clone(&calibration),
@@ -148,13 +154,17 @@ impl Work {
         let record = self.records.entry(unit.clone()).or_default();
         record.before = before.filter(|_| order.options.schedule != Schedule::NextTick);
         (record.counter, record.active) = (revision.counter, Some(active));
+        // A rollback to an overlaid document asks for no signature either; a document under it was asked for one.
+        record.untrusted = None;
         record.accepted += 1;
+        self.losses.retain(|(concerned, _)| concerned.as_ref() != Some(unit));
         let source = Some(order.source.clone());
         let next = Installable {
             revision,
             calibration,
             digest: Some(digest),
             document: Some(document),
+            text: Some(text),
             overlay,
             source,
         };
@@ -169,6 +179,17 @@ impl Work {
             self.note_withdrawn(unit, replaced, Withdrawn::Superseded { by_revision: counter });
         }
         Ok(())
+    }
+
+    /// What is in force has passed every check of today.
+    fn trust(&mut self, unit: &UnitId) {
+        let Some(record) = self.records.get_mut(unit).filter(|record| record.untrusted.is_some()) else {
+            return;
+        };
+        record.untrusted = None;
+        let account = record.account();
+        self.intake.with(unit, |actor| actor.tell_swaps(account));
+        tracing::info!(%unit, "the calibration in force is signed by a trusted key");
     }
 
     /// Writes down that an accepted revision never came in force.

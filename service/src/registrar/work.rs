@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
-use std::sync::mpsc::Receiver;
-use std::time::SystemTime;
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
+use std::time::{Duration, SystemTime};
 
 use isotherm_correction::prelaunch::PreLaunchSettings;
 use isotherm_protocol::history::AuditEvent;
@@ -17,7 +17,7 @@ use super::record::Record;
 use super::refusals::Refusals;
 use crate::config::{Settings, SwapSettings};
 use crate::intake::Intake;
-use crate::store::{Store, StoreError};
+use crate::store::{Opened, Store, StoreError};
 
 /// What the registrar works with.
 #[derive(Debug)]
@@ -33,11 +33,18 @@ pub(crate) struct Work {
     pub(super) folder: Folder,
     pub(super) refusals: Refusals,
     pub(super) board: Arc<Board>,
+    /// Why nothing can be written down.
+    pub(super) lost: Option<String>,
+    /// What the state folder had lost when it was opened, with the unit that it concerns.
+    pub(super) losses: Vec<(Option<UnitId>, String)>,
 }
+
+/// How often the state folder is looked at where nothing is asked for.
+const LOOK_INTERVAL: Duration = Duration::from_secs(1);
 
 impl Work {
     /// A registrar that knows nothing yet; [`Work::restore`] and [`Work::read_folder`] tell it what holds.
-    pub(crate) fn new(settings: &Settings, intake: Arc<Intake>, store: Store) -> Self {
+    pub(crate) fn new(settings: &Settings, intake: Arc<Intake>, store: Store, opened: &Opened) -> Self {
         let last = store.history(None, 1).unwrap_or_default();
         Self {
             entries: last.last().map_or(0, |entry| entry.number),
@@ -50,6 +57,8 @@ impl Work {
             folder: Folder::new(settings.calibrations.as_deref()),
             refusals: Refusals::default(),
             board: Arc::default(),
+            lost: None,
+            losses: losses(opened),
         }
     }
 
@@ -61,12 +70,20 @@ impl Work {
     /// Works until it is told to stop, and then finishes what units still have to tell.
     pub(super) fn run(mut self, requests: Receiver<Request>) {
         self.show();
-        for request in &requests {
-            if matches!(request, Request::Stop) {
-                break;
-            }
+        loop {
+            let request = match requests.recv_timeout(LOOK_INTERVAL) {
+                Ok(Request::Stop) | Err(RecvTimeoutError::Disconnected) => break,
+                Ok(request) => Some(request),
+                Err(RecvTimeoutError::Timeout) => None,
+            };
             // Unwind safety: what is kept is changed only after everything that could go wrong has gone well.
-            if catch_unwind(AssertUnwindSafe(|| self.take(request))).is_err() {
+            let work = AssertUnwindSafe(|| {
+                self.keep_store();
+                if let Some(request) = request {
+                    self.take(request);
+                }
+            });
+            if catch_unwind(work).is_err() {
                 tracing::error!(
                     "alarm: a swap, command or question was given up by a panic; what is in force stays"
                 );
@@ -79,6 +96,37 @@ impl Work {
         for (unit, notices) in untold {
             for notice in notices {
                 self.note(&unit, notice);
+            }
+        }
+    }
+
+    /// Sees to it that what is written down is found again, and tells where it is not.
+    fn keep_store(&mut self) {
+        let actives = self.records.values().flat_map(|record| [&record.active, &record.before]).flatten();
+        let written = actives.filter_map(|active| active.written.as_ref());
+        let layers = written.clone().filter_map(|written| written.layers.as_ref());
+        let bases = layers.clone().map(|layers| layers.base.as_bytes());
+        let documents = written.map(|written| written.text.as_bytes()).chain(bases);
+        let overlays = layers.map(|layers| layers.text.as_bytes());
+        match self.store.keep(SystemTime::now(), documents, overlays) {
+            Ok(false) => {
+                if self.lost.take().is_some() {
+                    tracing::info!("the state folder is back: swaps are taken again");
+                }
+            }
+            Ok(true) => {
+                self.lost = None;
+                tracing::warn!(
+                    "the state folder was removed and another one is in its place: everything that holds was written down \
+                     in it anew; documents and entries before that are in the old one"
+                );
+            }
+            Err(error) => {
+                let words = error.to_string();
+                if self.lost.as_ref() != Some(&words) {
+                    tracing::error!("swaps are refused, nothing can be written down: {words}");
+                }
+                self.lost = Some(words);
             }
         }
     }
@@ -109,4 +157,10 @@ impl Work {
         self.entries = self.store.append(SystemTime::now(), unit, by, event)?;
         Ok(())
     }
+}
+
+/// What was lost, in words, with the unit that it concerns.
+fn losses(opened: &Opened) -> Vec<(Option<UnitId>, String)> {
+    let lost = opened.lost.iter().map(|lost| (UnitId::new(&lost.unit).ok(), lost.to_string()));
+    lost.chain(opened.emptied.iter().map(|emptied| (None, emptied.to_string()))).collect()
 }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use isotherm_protocol::key;
+use isotherm_protocol::key::{self, UnitId};
 use zenoh::liveliness::LivelinessToken;
 use zenoh::pubsub::Subscriber;
 use zenoh::qos::{CongestionControl, Priority};
@@ -13,9 +13,9 @@ use zenoh::{Session, Wait};
 
 use crate::ServiceError;
 use crate::intake::{Intake, OutletMaker};
-use crate::keeper::Bell;
+use crate::keeper::{Asked, Bell};
 use crate::registrar::Desk;
-use crate::unit::Outlet;
+use crate::unit::{Journal, Outlet};
 
 /// Everything that receives.
 #[derive(Debug)]
@@ -45,13 +45,18 @@ impl Declared {
         let token = session.liveliness().declare_token(alive).await;
         let token = token.map_err(|source| ServiceError::Declare { key: key::ALL_SERVICES_ALIVE, source })?;
         let [calibration, command, history] = [(); 3].map(|()| desk.clone());
-        let [unit, service] = [(); 2].map(|()| bell.clone());
+        let ask = |asked| {
+            let bell = bell.clone();
+            move |query| bell.ask(asked, query)
+        };
         let queryables = vec![
             answer(session, key::ALL_CALIBRATION, move |query| calibration.calibration(query)).await?,
             answer(session, key::ALL_COMMAND, move |query| command.command(query)).await?,
             answer(session, key::ALL_HISTORY, move |query| history.history(query)).await?,
-            answer(session, key::ALL_SERVICE_STATUS, move |query| service.query(query)).await?,
-            answer(session, key::ALL_STATUS, move |query| unit.query(query)).await?,
+            answer(session, key::ALL_CONFIGURATIONS, ask(Asked::Configuration)).await?,
+            answer(session, key::ALL_JOURNALS, ask(Asked::Memory)).await?,
+            answer(session, key::ALL_SERVICE_STATUS, ask(Asked::Status)).await?,
+            answer(session, key::ALL_STATUS, ask(Asked::Status)).await?,
         ];
         Ok(Self { subscribers, queryables, _alive: token })
     }
@@ -78,6 +83,20 @@ pub(super) fn outlets(session: Session, congestion: CongestionControl) -> Outlet
         let outlet: Outlet = Box::new(move |frame| publisher.put(frame).wait());
         Ok(outlet)
     })
+}
+
+/// The journals of this instance: entries are few, so that a publisher for each unit would cost more than it saves.
+pub(super) fn journal(session: Session, congestion: CongestionControl) -> Journal {
+    let instance = session.zid().to_string().into();
+    let outlet = Arc::new(move |unit: &UnitId, frame: Vec<u8>| {
+        session
+            .put(key::journal(unit), frame)
+            .congestion_control(congestion)
+            .priority(Priority::RealTime)
+            .express(false)
+            .wait()
+    });
+    Journal { instance, outlet }
 }
 
 /// What the receive thread does with a message: all of it.

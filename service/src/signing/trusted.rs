@@ -11,6 +11,8 @@ use crate::text::{read_bounded, text, whole};
 
 /// Longest name of a signer, in characters.
 const LONGEST_NAME: usize = 64;
+/// How the first line of a private key ends, whatever its form.
+const PRIVATE: &[u8] = b"PRIVATE KEY-----";
 /// Whether everybody may write.
 const WORLD_WRITABLE: u32 = 0o002;
 
@@ -36,7 +38,33 @@ pub fn read_trusted_keys(folder: &Path) -> Result<(TrustedKeys, Vec<Problem>), V
         }
         warnings.extend(open_to_all(&path));
     }
+    warnings.extend(
+        private_keys(folder).map_err(|error| vec![whole(&name, format!("cannot be read: {error}"))])?,
+    );
     if problems.is_empty() { Ok((trusted, warnings)) } else { Err(problems) }
+}
+
+/// Says so where a private key lies among the public ones, under whatever name: whoever may read the folder can sign. One
+/// in a `*.pub` is told as a bad key.
+fn private_keys(folder: &Path) -> std::io::Result<Vec<Problem>> {
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(folder)? {
+        let path = entry?.path();
+        let public = path.extension().is_some_and(|extension| extension == "pub");
+        // Opening a pipe would wait for somebody who writes.
+        if public || !std::fs::metadata(&path).is_ok_and(|metadata| metadata.is_file()) {
+            continue;
+        }
+        let bytes = read_bounded(&path).unwrap_or_default();
+        if bytes.windows(PRIVATE.len()).any(|window| window == PRIVATE) {
+            let message = "holds a private key, in the folder that says who is trusted: whoever can read it can sign \
+                           documents in its owner's name. Move it away from this machine, and make a new key if others \
+                           could read it";
+            found.push(whole(&path.display().to_string(), message.to_owned()));
+        }
+    }
+    found.sort_by(|a, b| a.file.cmp(&b.file));
+    Ok(found)
 }
 
 fn key_files(folder: &Path) -> std::io::Result<Vec<PathBuf>> {

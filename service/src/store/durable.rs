@@ -50,6 +50,11 @@ pub(super) fn make_folder(folder: &Path) -> io::Result<()> {
     }
 }
 
+/// Whether a crash has left this file half-written.
+pub(super) fn is_half_written(folder: &Path, name: &str) -> bool {
+    folder.join(format!("{TEMPORARY}{name}")).exists()
+}
+
 /// Removes what a crash has left half-written.
 pub(super) fn sweep(folder: &Path) -> io::Result<()> {
     for entry in std::fs::read_dir(folder)? {

@@ -34,6 +34,18 @@ pub enum StoreError {
         /// Who holds it, as its lock file says: "process 4711, started 2026-11-21T08:00:00.000Z".
         holder: String,
     },
+    /// It was removed, or another folder is in its place, while the service runs.
+    #[error(
+        "the state folder {path} is not the one any more that the service has opened: {reason}; put it back, or make an \
+         empty folder there that the service may write to, and what holds is written down anew",
+        path = path.display()
+    )]
+    Lost {
+        /// Where it was.
+        path: PathBuf,
+        /// What is there now.
+        reason: String,
+    },
     /// A file of it cannot be read.
     #[error("cannot read {path}: {source}", path = path.display())]
     Read {

@@ -17,8 +17,22 @@ const MAX_FILES: usize = 4096;
 #[derive(Debug, Default)]
 pub(super) struct Index {
     units: BTreeMap<UnitId, OfUnit>,
-    /// Digest last seen in each file of the watched folder, with the number of the entry that says so.
-    files: BTreeMap<String, (u64, Digest)>,
+    /// What was last seen in each file of the watched folder.
+    files: BTreeMap<String, Seen>,
+    /// What was refused as a rival; not carried over, it would only be told once more.
+    rivals: BTreeMap<String, Digest>,
+    /// Revisions up to this one were given by an audit file that is lost.
+    pub(super) floor: u64,
+}
+
+/// What was last seen in a file of the watched folder.
+#[derive(Debug, Clone)]
+struct Seen {
+    /// Number of the entry that says so.
+    number: u64,
+    digest: Digest,
+    unit: Option<UnitId>,
+    refused: bool,
 }
 
 /// What holds for one unit.
@@ -27,6 +41,10 @@ struct OfUnit {
     highest_revision: u64,
     /// In the order of their revisions.
     sets: VecDeque<GoodSet>,
+    /// What the watched folder said for it last and was taken.
+    folder: Option<Digest>,
+    /// Highest revision that was given and whose acceptance cannot be read.
+    lost: Option<u64>,
 }
 
 impl Index {
@@ -35,9 +53,16 @@ impl Index {
         let unit = entry.unit.as_deref().and_then(|unit| UnitId::new(unit).ok());
         match &entry.event {
             AuditEvent::Accepted(accepted) => {
-                self.see(entry.number, &accepted.source, accepted.digest);
+                let file = accepted.source.file();
+                if let Some(path) = file {
+                    self.see(path, Seen::of(entry.number, accepted.digest, unit.clone(), false));
+                }
                 let Some(unit) = unit else { return };
                 let of_unit = self.units.entry(unit).or_default();
+                if file.is_some() {
+                    of_unit.folder = Some(accepted.digest);
+                }
+                of_unit.lost = of_unit.lost.filter(|lost| *lost > accepted.revision);
                 of_unit.highest_revision = of_unit.highest_revision.max(accepted.revision);
                 of_unit.sets.push_back(GoodSet::new(accepted, entry.time));
                 if of_unit.sets.len() > MAX_SETS {
@@ -48,36 +73,57 @@ impl Index {
                 let Some(of_unit) = unit.map(|unit| self.units.entry(unit).or_default()) else { return };
                 // The line of its acceptance may have been damaged: the number is taken all the same.
                 of_unit.highest_revision = of_unit.highest_revision.max(first.revision);
-                if let Some(set) = of_unit.sets.iter_mut().rfind(|set| set.revision == first.revision) {
-                    set.in_force = true;
+                match of_unit.sets.iter_mut().rfind(|set| set.revision == first.revision) {
+                    Some(set) => set.in_force = true,
+                    None => of_unit.lose(first.revision),
                 }
             }
             AuditEvent::Withdrawn(withdrawal) => {
                 if let Some(of_unit) = unit.and_then(|unit| self.units.get_mut(&unit)) {
                     of_unit.sets.retain(|set| set.revision != withdrawal.revision);
+                    of_unit.lost = of_unit.lost.filter(|lost| *lost != withdrawal.revision);
                 }
             }
-            AuditEvent::Refused(refused) => self.see(entry.number, &refused.source, refused.digest),
+            // A rival may be good: it is judged when it is the only one.
+            AuditEvent::Refused(refused) => {
+                let Some(path) = refused.source.file() else { return };
+                if !refused.rival {
+                    self.see(path, Seen::of(entry.number, refused.digest, unit, true));
+                } else if self.rivals.len() < MAX_FILES {
+                    self.rivals.insert(path.to_owned(), refused.digest);
+                }
+            }
             AuditEvent::CarriedUnit(carried) => {
                 let Some(unit) = unit else { return };
                 self.units.entry(unit).or_default().carry(carried);
             }
-            AuditEvent::CarriedFile(carried) => self.see_file(entry.number, &carried.path, carried.digest),
+            AuditEvent::CarriedFile(carried) => {
+                if let Some(unit) = unit.clone().filter(|_| !carried.refused) {
+                    self.units.entry(unit).or_default().folder = Some(carried.digest);
+                }
+                self.see(&carried.path, Seen::of(entry.number, carried.digest, unit, carried.refused));
+            }
             _ => {}
         }
     }
 
-    /// Remembers what a file of the watched folder held.
-    fn see(&mut self, number: u64, source: &Source, digest: Digest) {
-        if let Some(path) = source.file() {
-            self.see_file(number, path, digest);
-        }
+    /// The line of a revision's acceptance cannot be read.
+    pub(super) fn lose(&mut self, unit: &UnitId, revision: u64) {
+        let of_unit = self.units.entry(unit.clone()).or_default();
+        of_unit.highest_revision = of_unit.highest_revision.max(revision);
+        of_unit.lose(revision);
     }
 
-    fn see_file(&mut self, number: u64, path: &str, digest: Digest) {
-        self.files.insert(path.to_owned(), (number, digest));
+    /// Units whose newest acceptance cannot be read, with its revision.
+    pub(super) fn lost(&self) -> impl Iterator<Item = (&UnitId, u64)> {
+        self.units.iter().filter_map(|(unit, of_unit)| Some((unit, of_unit.lost?)))
+    }
+
+    /// Remembers what a file of the watched folder held.
+    fn see(&mut self, path: &str, seen: Seen) {
+        self.files.insert(path.to_owned(), seen);
         if self.files.len() > MAX_FILES {
-            let oldest = self.files.iter().min_by_key(|(_, (number, _))| *number);
+            let oldest = self.files.iter().min_by_key(|(_, seen)| seen.number);
             if let Some(oldest) = oldest.map(|(path, _)| path.clone()) {
                 self.files.remove(&oldest);
             }
@@ -101,12 +147,32 @@ impl Index {
 
     /// Highest revision counter that a unit was given; 0 where none.
     pub(super) fn highest_revision(&self, unit: &UnitId) -> u64 {
-        self.units.get(unit).map_or(0, |of_unit| of_unit.highest_revision)
+        self.units.get(unit).map_or(0, |of_unit| of_unit.highest_revision).max(self.floor)
+    }
+
+    /// Highest revision counter of all units.
+    pub(super) fn highest(&self) -> u64 {
+        self.units.values().map(|of_unit| of_unit.highest_revision).max().unwrap_or(0)
     }
 
     /// Digest last seen in a file of the watched folder.
     pub(super) fn seen(&self, path: &str) -> Option<Digest> {
-        self.files.get(path).map(|(_, digest)| *digest)
+        self.files.get(path).map(|seen| seen.digest)
+    }
+
+    /// Digest last refused in a file of the watched folder, where nothing else was seen in it since.
+    pub(super) fn refused(&self, path: &str) -> Option<Digest> {
+        self.files.get(path).filter(|seen| seen.refused).map(|seen| seen.digest)
+    }
+
+    /// Digest last refused in a file of the watched folder because of a rival.
+    pub(super) fn rival(&self, path: &str) -> Option<Digest> {
+        self.rivals.get(path).copied()
+    }
+
+    /// What the watched folder said for a unit last and was taken.
+    pub(super) fn said_by_folder(&self, unit: &UnitId) -> Option<Digest> {
+        self.units.get(unit)?.folder
     }
 
     /// The set that a rollback goes to: the newest before the last one that corrects otherwise. Rollbacks are followed to
@@ -136,10 +202,20 @@ impl Index {
             let carried = CarriedUnit { highest_revision: of_unit.highest_revision, sets };
             (Some(unit), AuditEvent::CarriedUnit(carried))
         });
-        let files = self.files.iter().map(|(path, (_, digest))| {
-            (None, AuditEvent::CarriedFile(CarriedFile { path: path.clone(), digest: *digest }))
+        // The newest last: it is what the folder says for its unit.
+        let mut files: Vec<_> = self.files.iter().collect();
+        files.sort_by_key(|(_, seen)| seen.number);
+        let files = files.into_iter().map(|(path, seen)| {
+            let carried = CarriedFile { path: path.clone(), digest: seen.digest, refused: seen.refused };
+            (seen.unit.as_ref(), AuditEvent::CarriedFile(carried))
         });
         units.chain(files)
+    }
+}
+
+impl Seen {
+    fn of(number: u64, digest: Digest, unit: Option<UnitId>, refused: bool) -> Self {
+        Self { number, digest, unit, refused }
     }
 }
 
@@ -150,5 +226,13 @@ impl OfUnit {
         let first = carried.sets.first().map_or(0, |set| set.revision);
         self.sets.retain(|set| set.revision < first);
         self.sets.extend(carried.sets.iter().cloned());
+        let from_folder = carried.sets.iter().rfind(|set| set.source.file().is_some());
+        self.folder = from_folder.map(|set| set.digest).or(self.folder);
+        self.lost = None;
+    }
+
+    fn lose(&mut self, revision: u64) {
+        let last = self.sets.back().map_or(0, |set| set.revision);
+        self.lost = Some(revision).filter(|revision| *revision > last).max(self.lost);
     }
 }

@@ -2,6 +2,7 @@
 
 use std::fs::{File, TryLockError};
 use std::io::{Read, Write};
+use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 use std::time::SystemTime;
 
@@ -21,6 +22,13 @@ pub(super) struct Lock {
 }
 
 impl Lock {
+    /// Whether what is called so in the folder is this lock: not where the folder was removed or replaced.
+    pub(super) fn is_in(&self, folder: &Path) -> bool {
+        let identity = |found: std::fs::Metadata| (found.dev(), found.ino());
+        let (own, found) = (self.file.metadata(), std::fs::metadata(folder.join(NAME)));
+        own.is_ok_and(|own| found.is_ok_and(|found| identity(own) == identity(found)))
+    }
+
     /// Takes it. What an earlier holder left in the file means nothing: the system knows whether it lives.
     ///
     /// # Errors

@@ -6,6 +6,7 @@ use std::io::{self, ErrorKind, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use isotherm_protocol::history::{AuditEntry, LineError};
+use isotherm_protocol::key::UnitId;
 
 use super::opened::{Damage, Opened, Torn};
 use super::{StoreError, durable, scan};
@@ -22,6 +23,8 @@ pub(super) enum Found {
     Skipped {
         /// The number that the entry has, where that much can be read.
         number: Option<u64>,
+        /// The unit and the revision, where it looks like an acceptance.
+        acceptance: Option<(UnitId, u64)>,
     },
 }
 
@@ -91,6 +94,11 @@ impl Log {
         }
         durable::sync_folder(folder).map_err(StoreError::write(folder))?;
         Ok(Self { folder: folder.to_owned(), path, sink: Box::new(file), length, carried: 0, unclean: false })
+    }
+
+    /// Whether a full file was put aside, and the present one has nothing.
+    pub(super) fn is_empty_behind_a_full_one(&self) -> Result<bool, StoreError> {
+        Ok(self.is_empty() && last_full_file(&self.folder)?.is_some())
     }
 
     /// Appends a line, which is on the disk when this returns. Where it fails, nothing of the line stays.
@@ -225,11 +233,28 @@ fn read(
             Err(error) => {
                 opened.damage(Damage { file: path.to_owned(), line, words: error.to_string() });
                 let number = if let LineError::Entry { number, .. } = error { number } else { None };
-                visit(Found::Skipped { number });
+                visit(Found::Skipped { number, acceptance: acceptance_in(bytes) });
             }
         }
     });
     Ok((extent.map_err(StoreError::read(path))?, rest_is_whole))
+}
+
+/// Unit and revision of a damaged line, where enough of it is there to see that it was an acceptance.
+fn acceptance_in(line: &[u8]) -> Option<(UnitId, u64)> {
+    let line = String::from_utf8_lossy(line);
+    // No text of an entry can hold these: a quotation mark within a text has a backslash before it.
+    let (_, unit) = line.split_once("\"unit\":\"").filter(|_| line.contains("\"event\":\"accepted\""))?;
+    let (unit, rest) = unit.split_once('"')?;
+    let (_, revision) = rest.split_once("\"revision\":")?;
+    let digits: String = revision.chars().take_while(char::is_ascii_digit).collect();
+    Some((UnitId::new(unit).ok()?, digits.parse().ok()?))
+}
+
+/// Whether a crash came between putting a full file aside and beginning a new one: then there is no file to write to, and
+/// nothing is lost. To be asked before half-written files are swept away.
+pub(super) fn was_being_begun_anew(folder: &Path) -> bool {
+    durable::is_half_written(folder, NAME)
 }
 
 /// Adds the line feed that is missing.

@@ -17,6 +17,34 @@ pub struct Opened {
     pub damages: Vec<Damage>,
     /// What became of a last line that was not written to its end.
     pub torn: Option<Torn>,
+    /// Units whose newest acceptance is among the damaged lines.
+    pub lost: Vec<LostRevision>,
+    /// The audit file is empty, and was not always.
+    pub emptied: Option<Emptied>,
+}
+
+/// A revision that was accepted, and cannot be put in force again because its line is damaged.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LostRevision {
+    /// Serial of the unit.
+    pub unit: String,
+    /// The revision.
+    pub revision: u64,
+    /// The revision that holds in its place; `None` where there is none.
+    pub in_its_place: Option<u64>,
+}
+
+/// An audit file without entries beside documents that were accepted.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Emptied {
+    /// The state folder.
+    pub folder: PathBuf,
+    /// How many documents are kept.
+    pub documents: usize,
+    /// Whether an older audit file is there, so that older sets hold.
+    pub has_older: bool,
+    /// Revisions up to this one are not given again; 0 where nothing is known of them.
+    pub floor: u64,
 }
 
 /// A line that was skipped; it stays in its file as it is.
@@ -52,7 +80,13 @@ impl Opened {
         }
     }
 
-    /// Everything that an operator should know, a line each; none after a clean stop.
+    /// What was lost, in words: an older calibration may be in force than the operator knows of, or none.
+    pub fn losses(&self) -> impl Iterator<Item = String> {
+        let lost = self.lost.iter().map(ToString::to_string);
+        lost.chain(self.emptied.iter().map(ToString::to_string))
+    }
+
+    /// Everything else that an operator should know, a line each; none after a clean stop.
     pub fn warnings(&self) -> impl Iterator<Item = String> {
         let damages = self.damages.iter().map(ToString::to_string);
         let beyond = self.damaged.saturating_sub(self.damages.len() as u64);
@@ -62,9 +96,55 @@ impl Opened {
     }
 }
 
+impl fmt::Display for LostRevision {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { unit, revision, in_its_place } = self;
+        write!(
+            f,
+            "unit {unit}: revision {revision} was accepted, but its line of the audit file is damaged: "
+        )?;
+        match in_its_place {
+            Some(older) => write!(f, "revision {older}, an older one, is in force in its place")?,
+            None => f.write_str("there is no older one to be put in force in its place")?,
+        }
+        f.write_str("; put the newer document in force again with `isotherm swap`")
+    }
+}
+
+impl fmt::Display for Emptied {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { folder, documents, has_older, floor } = self;
+        let folder = folder.display();
+        write!(
+            f,
+            "the audit file of {folder} is empty, though {documents} document{} kept beside it: the history is lost, was \
+             it emptied or removed? ",
+            if *documents == 1 { " is" } else { "s are" }
+        )?;
+        f.write_str(if *has_older {
+            "The sets of the audit file before it are in force, which are older ones; "
+        } else {
+            "What was in force is not known any more, units begin with the folder of calibrations; "
+        })?;
+        write!(
+            f,
+            "look at every unit, and put back what is missing with `isotherm swap` ({folder}/documents has it). "
+        )?;
+        match floor {
+            0 => f.write_str("Revisions begin at 1 again"),
+            floor => write!(
+                f,
+                "Revisions go on from {}, so that no number is given twice",
+                floor.saturating_add(1)
+            ),
+        }
+    }
+}
+
 impl fmt::Display for Damage {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}:{}: {}; the line is skipped", self.file.display(), self.line, self.words)
+        write!(f, "{}:{}: {}; the line is skipped", self.file.display(), self.line, self.words)?;
+        f.write_str(", and if it was an acceptance, the one before it holds")
     }
 }
 

@@ -83,6 +83,22 @@ impl Shelf {
         }
     }
 
+    /// The file that a document is kept in; `None` for one in memory.
+    pub(super) fn file(&self, digest: &Digest) -> Option<PathBuf> {
+        match self {
+            Self::Folder(folder) => Some(folder.join(name(digest))),
+            Self::Memory(_) => None,
+        }
+    }
+
+    /// How many documents are kept in the folder; 0 for one in memory, or where that cannot be said.
+    pub(super) fn count(&self) -> usize {
+        let Self::Folder(folder) = self else { return 0 };
+        let is_document =
+            |entry: &std::fs::DirEntry| entry.path().extension().is_some_and(|extension| extension == "toml");
+        std::fs::read_dir(folder).map_or(0, |entries| entries.flatten().filter(is_document).count())
+    }
+
     /// Whether a document is kept; its bytes are not looked at.
     pub(super) fn holds(&self, digest: &Digest) -> bool {
         match self {

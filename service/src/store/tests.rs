@@ -44,6 +44,7 @@ fn accepted(revision: u64, digest: Digest, source: Source) -> AuditEvent {
 
 fn refused(path: &str, text: &str) -> AuditEvent {
     AuditEvent::Refused(Refusal {
+        rival: false,
         source: Source::Folder { path: path.to_owned() },
         digest: Digest::of(text.as_bytes()),
         problems: vec!["1:1: bad".to_owned()],

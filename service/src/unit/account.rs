@@ -3,11 +3,11 @@
 use std::time::{Instant, SystemTime};
 
 use isotherm_protocol::digest::Digest;
-use isotherm_protocol::status::{Counter, Latency, Status, Swaps};
+use isotherm_protocol::status::{Counter, Latency, MAX_FAULTS, PreLaunchVerdict, Status, Swaps};
 use isotherm_protocol::stream::Edge;
 
 use super::{REFUSALS, UnitActor};
-use crate::fault::FaultKind;
+use crate::fault::{FaultKind, standing};
 use crate::totals::UnitTotals;
 
 /// What the registrar tells a unit of its swaps, for its status.
@@ -17,6 +17,8 @@ pub(crate) struct SwapAccount {
     pub(crate) swaps: Swaps,
     /// Overlay that the last pre-launch calibration was stored as.
     pub(crate) overlay: Option<Digest>,
+    /// What is wrong with the calibration in force, in words; `None` where nothing is.
+    pub(crate) problem: Option<String>,
 }
 
 impl UnitActor {
@@ -61,6 +63,16 @@ impl UnitActor {
         });
         status.counters = self.counters();
         status.counters.extend(self.faults.counters());
+        if let Some(problem) = &self.account.problem {
+            status.faults.truncate(MAX_FAULTS - 1);
+            status.faults.push(standing("untrusted_calibration", 1, problem.clone()));
+        }
+        // The core knows that it was given up, not what for.
+        if let (Some(outcome), Some(reason)) = (&mut status.pre_launch_outcome, self.teller.given_up())
+            && outcome.verdict == PreLaunchVerdict::Aborted
+        {
+            outcome.verdict = PreLaunchVerdict::Refused(vec![format!("given up: {reason}")]);
+        }
         status
     }
 

@@ -19,6 +19,8 @@ pub(super) struct Teller {
     revision: u64,
     /// End of the last tick before a pre-launch calibration began (ns on the producer's clock).
     pre_launch_start_ns: Option<i64>,
+    /// What the last pre-launch calibration was given up for, where no command did it.
+    given_up: Option<String>,
 }
 
 impl Teller {
@@ -39,8 +41,9 @@ impl Teller {
             let end_ns = stream.unit().observation().map(|seen| seen.end_time.as_ns());
             if state == State::PreLaunchCalibration {
                 self.pre_launch_start_ns = end_ns;
+                self.given_up = None;
             } else if self.state == Some(State::PreLaunchCalibration) {
-                self.pre_launch_ended(stream, end_ns);
+                self.pre_launch_ended(stream, revision, end_ns);
             }
             (self.state, self.revision) = (Some(state), revision);
         }
@@ -48,15 +51,25 @@ impl Teller {
         changed
     }
 
-    /// Notes what a pre-launch calibration led to; one that was given up leaves nothing.
-    fn pre_launch_ended(&mut self, stream: &UnitStream, end_ns: Option<i64>) {
+    /// Notes what a pre-launch calibration led to, or what it was given up for; `revision` is what is in force now.
+    fn pre_launch_ended(&mut self, stream: &UnitStream, revision: u64, end_ns: Option<i64>) {
         let outcome: Option<Outcome> = match stream.unit().pre_launch() {
             Some(PreLaunchView::Ended(outcome)) => Some(outcome.clone()),
-            Some(PreLaunchView::Aborted | PreLaunchView::Running(_)) | None => None,
+            Some(PreLaunchView::Aborted | PreLaunchView::Running(_)) if self.revision != revision => {
+                self.given_up = Some(format!("a swap of the calibration (revision {revision})"));
+                None
+            }
+            // By a command, which is written down as such.
+            Some(PreLaunchView::Aborted | PreLaunchView::Running(_)) => None,
+            None => {
+                self.given_up = Some("the unit started anew after an alarm".to_owned());
+                None
+            }
         };
         let end_ns = end_ns.unwrap_or_default();
         self.untold.push_back(Notice::PreLaunch(PreLaunchEnd {
             outcome,
+            given_up: self.given_up.clone(),
             revision: self.revision,
             start_ns: self.pre_launch_start_ns.unwrap_or(end_ns),
             end_ns,
@@ -75,6 +88,11 @@ impl Teller {
                 return;
             }
         }
+    }
+
+    /// What the last pre-launch calibration was given up for, where no command did it.
+    pub(super) fn given_up(&self) -> Option<&str> {
+        self.given_up.as_deref()
     }
 
     /// What is untold, for a registrar that is about to end.

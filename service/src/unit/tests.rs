@@ -13,6 +13,8 @@ use isotherm_protocol::raw::{AccelBatch, GyroBatch};
 use super::*;
 use crate::UnitTotals;
 
+mod journal;
+
 /// Frames of a tick: three gyros or three accelerometers, ticks of 5 ms.
 fn frames(sequence: u64) -> [(RawStream, Vec<u8>); 2] {
     let end_time = Timestamp::from_ns(i64::try_from(sequence + 1).unwrap() * 5_000_000);

@@ -41,6 +41,11 @@ impl Ears {
         self.listener.is_none()
     }
 
+    /// Why there are no events, as it was logged.
+    pub(super) fn complaint(&self) -> Option<&str> {
+        self.complaint.as_deref()
+    }
+
     /// The watch has ended.
     pub(super) fn deafen(&mut self) {
         self.listener = None;

@@ -95,7 +95,17 @@ impl Scene {
         FolderEvent::Removed { file: self.path(name) }
     }
 
+    /// What is told of files and folder next.
     fn next(&self) -> FolderEvent {
+        loop {
+            match self.next_of_all() {
+                FolderEvent::Deaf { .. } | FolderEvent::Hearing => {}
+                told => return told,
+            }
+        }
+    }
+
+    fn next_of_all(&self) -> FolderEvent {
         self.told.recv_timeout(Duration::from_secs(10)).expect("an event within its time")
     }
 

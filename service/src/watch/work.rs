@@ -24,6 +24,8 @@ pub(super) struct Work<S> {
     ledger: Ledger,
     sink: S,
     outage: Option<Outage>,
+    /// Why no events come, as it was told.
+    deaf: Option<String>,
     /// A look that an event, or the start, asked for.
     asked: Option<Instant>,
     last_look: Instant,
@@ -54,6 +56,7 @@ impl<S: Fn(FolderEvent)> Work<S> {
             ledger,
             sink,
             outage: None,
+            deaf: None,
             asked: Some(now),
             last_look: now,
             next_poll: now + settings.poll,
@@ -106,6 +109,7 @@ impl<S: Fn(FolderEvent)> Work<S> {
             // Before the look, so that what happens after it is heard.
             ears.tend();
         }
+        self.tell_ears();
         self.asked = None;
         match documents_in(&self.folder) {
             Ok(files) => {
@@ -122,6 +126,16 @@ impl<S: Fn(FolderEvent)> Work<S> {
         if polling {
             self.next_poll = self.last_look + self.settings.poll;
         }
+    }
+
+    /// Tells whether events come, where that has changed.
+    fn tell_ears(&mut self) {
+        let deaf = self.ears.as_ref().and_then(Ears::complaint);
+        if deaf == self.deaf.as_deref() {
+            return;
+        }
+        self.deaf = deaf.map(ToOwned::to_owned);
+        (self.sink)(self.deaf.clone().map_or(FolderEvent::Hearing, |reason| FolderEvent::Deaf { reason }));
     }
 
     /// The folder cannot be read.

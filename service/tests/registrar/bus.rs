@@ -171,3 +171,14 @@ async fn what_cannot_be_understood_is_answered_with_the_reason() {
     assert!(error.contains("cannot be read"), "{error}");
     stand.stop().await;
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_wrong_serial_is_told_with_everything_else_that_is_wrong() {
+    let folders = Folders::new();
+    let stand = Stand::start(folders.settings()).await;
+    let bad = document("ZLG-8", 1.0).replace("assumed_deg_c = 25.0", "assumed_deg_c = \"warm\"");
+    let reply = stand.swap(UNIT, &bad, &by_ann()).await;
+    assert_refused(&reply, &[":2:8: unit: ", "ZLG-8", "any_serial"]);
+    assert_refused(&reply, &["temperature.assumed_deg_c"]);
+    stand.stop().await;
+}

@@ -9,7 +9,7 @@ use isotherm_protocol::service_status::ServiceStatus;
 use crate::stand::{Folders, LIMIT, Stand, UNIT, assert_accepted, document};
 
 /// Waits until the service's own status says something.
-async fn until_service(stand: &Stand, said: impl Fn(&ServiceStatus) -> bool) -> ServiceStatus {
+pub(crate) async fn until_service(stand: &Stand, said: impl Fn(&ServiceStatus) -> bool) -> ServiceStatus {
     let deadline = tokio::time::Instant::now() + LIMIT;
     loop {
         let replies = stand.session.get("isotherm/*/status").await.unwrap();

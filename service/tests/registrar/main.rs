@@ -7,12 +7,16 @@
     reason = "a test may panic, its helpers included"
 )]
 
+mod at_start;
 mod bus;
 mod command;
+mod console;
 mod folder;
 mod instance;
+mod losses;
 mod policy;
 mod pre_launch;
 mod restart;
+mod said;
 mod schedule;
 mod stand;

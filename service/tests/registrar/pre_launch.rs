@@ -159,3 +159,44 @@ async fn an_aborted_or_refused_one_changes_nothing() {
     assert_eq!(stand.status(UNIT).calibration.unwrap().revision.counter, 1);
     stand.stop().await;
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_swap_gives_it_up_and_status_log_and_audit_file_say_so() {
+    let folders = Folders::new();
+    let mut stand = stand(&folders).await;
+    for (revision, by_rollback) in [(2, false), (3, true)] {
+        assert!(stand.command(UNIT, &order(true)).await.accepted);
+        send(&mut stand, 3000).await;
+        let reply = if by_rollback {
+            stand.command(UNIT, r#"{"command":"rollback"}"#).await.swap.expect("a rollback is a swap")
+        } else {
+            stand.swap(UNIT, &document(UNIT, 2.0), &SwapOptions::default()).await
+        };
+        assert_accepted(&reply, revision);
+        assert!(
+            reply.warnings.iter().any(|warning| warning.message.contains("is given up with this")),
+            "{reply:#?}"
+        );
+        let reason = format!("given up: a swap of the calibration (revision {revision})");
+        let status = stand.status(UNIT);
+        assert_eq!(status.state, isotherm_protocol::status::State::Standby);
+        let outcome = status.pre_launch_outcome.unwrap();
+        assert_eq!(outcome.verdict, PreLaunchVerdict::Refused(vec![reason.clone()]));
+        let record = ended(&stand, usize::from(by_rollback)).await;
+        assert_eq!((record.accepted, record.reason), (false, Some(reason)));
+        assert_eq!(record.state_after, "standby");
+    }
+    // The next one is not taken for it.
+    assert!(stand.command(UNIT, &order(true)).await.accepted);
+    assert_eq!(stand.command(UNIT, r#"{"command":"abort"}"#).await.state, State::Standby);
+    assert_eq!(stand.status(UNIT).pre_launch_outcome.unwrap().verdict, PreLaunchVerdict::Aborted);
+
+    // A self-test begins anew, by a swap and by a rollback alike.
+    assert!(stand.command(UNIT, r#"{"command":"self-test"}"#).await.accepted);
+    send(&mut stand, 100).await;
+    assert_accepted(&stand.swap(UNIT, &document(UNIT, 5.0), &SwapOptions::default()).await, 4);
+    let reply = stand.command(UNIT, r#"{"command":"rollback"}"#).await;
+    assert_eq!((reply.accepted, reply.state), (true, State::SelfTest), "{reply:#?}");
+    assert_accepted(&reply.swap.unwrap(), 5);
+    stand.stop().await;
+}

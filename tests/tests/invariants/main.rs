@@ -8,6 +8,7 @@
 )]
 
 mod i1_each_tick_once;
+mod i2_memory;
 mod i2_timing_does_not_matter;
 mod i3_schedule;
 mod i3_swap;

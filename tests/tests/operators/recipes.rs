@@ -6,20 +6,23 @@
 mod page;
 mod shell;
 
+use std::time::Instant;
+
 use isotherm_tests::data::root;
 
 use page::{Page, differs};
 use shell::Shell;
 
 #[test]
-#[ignore = "three minutes of real time, and one recipe depends on the machine's pace: run it after a change of the page"]
 fn every_recipe_of_the_operations_page_does_what_the_page_shows() {
     let file = root().join("docs/operations.md");
     let mut page = Page::read(&file);
     let mut shell = Shell::start();
     let mut wrong = Vec::new();
     for recipe in &mut page.recipes {
+        let begun = Instant::now();
         let came = shell.run(&recipe.commands);
+        println!("line {}: {:.1} s", recipe.line, begun.elapsed().as_secs_f64());
         let Some(shown) = &mut recipe.shown else { continue };
         if let Some(why) = differs(shown, &came) {
             wrong.push(format!("line {}: {why}\n--- shown\n{shown}--- came\n{came}", recipe.line));

@@ -118,7 +118,7 @@ fn words(unit: &UnitId, outcome: &PreLaunchOutcome) -> String {
             for reason in reasons {
                 say(format_args!("isotherm: {reason}"));
             }
-            format!("{unit}: pre-launch calibration refused; the constants are as before")
+            format!("{unit}: pre-launch calibration refused; it has changed nothing")
         }
         PreLaunchVerdict::Aborted => {
             format!("{unit}: pre-launch calibration aborted; the constants are as before")

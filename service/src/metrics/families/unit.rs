@@ -294,7 +294,14 @@ fn concerns_units(kind: FaultKind) -> bool {
     use FaultKind as K;
 
     match kind {
-        K::Length | K::Kind | K::Version | K::Checksum | K::Body | K::Unpublished | K::Alarm => true,
+        K::Length
+        | K::Kind
+        | K::Version
+        | K::Checksum
+        | K::Body
+        | K::Unpublished
+        | K::JournalUnpublished
+        | K::Alarm => true,
         K::UnknownStream | K::BadSerial | K::Deletion | K::TooManyUnits => false,
     }
 }

@@ -108,17 +108,25 @@ fn fits(shown: &str, line: &str) -> bool {
     rest.is_empty() || (dots && (last.is_empty() || line.ends_with(last)))
 }
 
-/// A line without what differs from run to run: the width of columns, long numbers, digests, times.
+/// A line without what differs from run to run: the width of columns, long numbers, digests, dates, times that something
+/// took or has lasted.
 fn plain(line: &str) -> String {
-    let mut plain = String::new();
+    let mut words: Vec<String> = Vec::new();
     for word in line.split_whitespace().filter(|word| !word.chars().all(|c| "─█▏▎▍▌▋▊▉".contains(c)))
     {
-        if !plain.is_empty() {
-            plain.push(' ');
+        let end = word.trim_end_matches([',', ';', '.', ':', ')']);
+        let number = |word: &String| word.bytes().all(|byte| byte.is_ascii_digit() || byte == b'#');
+        if ["ns", "µs", "ms", "s", "min", "h", "d"].contains(&end)
+            && let Some(time) = words.last_mut().filter(|word| number(word))
+        {
+            *time = format!("#time{}", &word[end.len()..]);
+        } else {
+            let mut plain = String::new();
+            numberless(word, &mut plain);
+            words.push(plain);
         }
-        numberless(word, &mut plain);
     }
-    plain
+    words.join(" ")
 }
 
 /// Writes a word with `#` in the place of a digest, and of every number that is long enough to differ.
@@ -166,6 +174,8 @@ mod tests {
             assert!(differs(shown, &came.replace(from, to)).is_some(), "{to:?}");
         }
         assert!(differs("", "something\n").is_some() && differs("something\n", "").is_some());
+        assert_eq!(differs("up 1 s  7 units\n", "up 24 min  7 units\n"), None);
+        assert!(differs("up 1 s  7 units\n", "up 24 min  8 units\n").is_some());
         assert_eq!(differs("a … z\n", "a b z\n"), None);
         assert!(differs("a … z\n", "a b\n").is_some());
     }

@@ -1,7 +1,6 @@
 //! A shell that is given one block after the other.
 
 use std::io::{BufRead, BufReader, Read, Write};
-use std::net::TcpListener;
 use std::os::unix::process::CommandExt;
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
@@ -10,13 +9,16 @@ use std::time::Duration;
 use isotherm_tests::data::root;
 use isotherm_tests::process::program;
 use tempfile::TempDir;
+use tokio::net::TcpSocket;
 
 /// The longest that one block may take.
 const BLOCK_LIMIT: Duration = Duration::from_secs(90);
 /// Ends a block, in front of its exit code.
 const END: &str = "@@ end of block: ";
-/// Ports that the page uses.
-const PORTS: [&str; 2] = ["7447", "9464"];
+/// Where the services of the page listen.
+const ADDRESSES: [&str; 2] = ["127.0.0.1:7447", "127.0.0.1:9464"];
+/// What the recipes need beside the project's programs and what every system has.
+const TOOLS: [&str; 3] = ["bash", "curl", "prlimit"];
 /// What the page calls the folder that it works in; as long as the name of a temporary one, so that tables keep their form.
 const FOLDER: &str = "/home/ann/bench";
 
@@ -26,12 +28,18 @@ pub(super) struct Shell {
     stdin: ChildStdin,
     lines: Receiver<String>,
     folder: TempDir,
-    /// Ports that stand for those of the page.
-    ports: [String; 2],
+    /// Addresses that stand for those of the page.
+    addresses: [String; 2],
+    /// What keeps them from everybody else.
+    _held: [TcpSocket; 2],
 }
 
 impl Shell {
     pub(super) fn start() -> Self {
+        for tool in TOOLS {
+            let there = Command::new(tool).arg("--version").stdout(Stdio::null()).status();
+            assert!(there.is_ok_and(|status| status.success()), "the recipes need {tool}");
+        }
         let folder = tempfile::tempdir().unwrap();
         let copied = Command::new("cp").arg("-r").arg(root().join("config")).arg(folder.path()).status();
         assert!(copied.is_ok_and(|status| status.success()), "config/ is copied");
@@ -43,6 +51,8 @@ impl Shell {
             .env("PATH", format!("{}:{path}", programs.display()))
             .env("USER", "ann")
             .env("HOME", folder.path())
+            .env("LC_ALL", "C.UTF-8")
+            .env("no_proxy", "*")
             .env_remove("ISOTHERM_LOG")
             // A group of its own, so that what it leaves running can be ended with it.
             .process_group(0)
@@ -61,10 +71,9 @@ impl Shell {
                 }
             }
         });
-        // Both held until both are known, so that they differ.
-        let listeners = [0, 0].map(|port| TcpListener::bind(("127.0.0.1", port)).unwrap());
-        let ports = listeners.map(|listener| listener.local_addr().unwrap().port().to_string());
-        let mut shell = Self { child, stdin, lines, folder, ports };
+        let held = [(); 2].map(|()| hold());
+        let addresses = held.each_ref().map(|socket| socket.local_addr().unwrap().to_string());
+        let mut shell = Self { child, stdin, lines, folder, addresses, _held: held };
         shell.run("exec 2>&1\n");
         shell
     }
@@ -72,8 +81,8 @@ impl Shell {
     /// Runs a block, which must end well; what came out, in the words of the page.
     pub(super) fn run(&mut self, commands: &str) -> String {
         let mut block = commands.to_owned();
-        for (of_page, port) in PORTS.iter().zip(&self.ports) {
-            block = block.replace(of_page, port);
+        for (of_page, here) in ADDRESSES.iter().zip(&self.addresses) {
+            block = block.replace(of_page, here);
         }
         writeln!(self.stdin, "{block}\nprintf '{END}%s\\n' $?").unwrap();
         let mut came = String::new();
@@ -88,8 +97,8 @@ impl Shell {
             came.push_str(&line);
             came.push('\n');
         }
-        for (of_page, port) in PORTS.iter().zip(&self.ports) {
-            came = came.replace(port.as_str(), of_page);
+        for (of_page, here) in ADDRESSES.iter().zip(&self.addresses) {
+            came = came.replace(here.as_str(), of_page);
         }
         came.replace(self.folder.path().to_str().unwrap(), FOLDER)
     }
@@ -106,6 +115,15 @@ impl Drop for Shell {
         let _ = Command::new("kill").args(["-9", "--", &group]).stderr(Stdio::null()).status();
         let _ = self.child.wait();
     }
+}
+
+/// A loopback address that is nobody else's: bound and never listened on, its port is given to none who asks the system for
+/// one, while a service that names it may listen there, and again after a restart.
+fn hold() -> TcpSocket {
+    let socket = TcpSocket::new_v4().unwrap();
+    socket.set_reuseaddr(true).unwrap();
+    socket.bind(([127, 0, 0, 1], 0).into()).unwrap();
+    socket
 }
 
 /// Lines of whatever bytes come.

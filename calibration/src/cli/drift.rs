@@ -1,0 +1,274 @@
+//! `isotherm-calibrate drift`.
+
+use std::fs::OpenOptions;
+use std::io::{self, IsTerminal, Write};
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use isotherm_log::diff::is_csv;
+use isotherm_log::file::{read_small_text, refuse_overwriting};
+use isotherm_log::offline::load_calibration;
+use isotherm_log::progress::Progress;
+use isotherm_protocol::document::{Created, Document};
+use serde_json::json;
+
+use super::{LogArgs, print};
+use crate::drift::analysis::{Wanted, analyse};
+use crate::drift::columns::{Columns, Kind};
+use crate::drift::page::page;
+use crate::drift::parameters::{Parameters, put};
+use crate::drift::pieces::Grid;
+use crate::drift::report::Report;
+use crate::drift::trend::FIT_H;
+use crate::error::Error;
+use crate::provenance::{TOOL, command_line, origin};
+use crate::series::Series;
+
+/// Line that lets editors check a document.
+const SCHEMA_LINE: &str = "#:schema ../calibration.schema.json\n\n";
+/// Messages between two looks at the progress.
+const STRIDE: u32 = 64;
+
+/// Noise and drift of a log at rest: Allan deviation, Markov drift, trend, spectrum, estimator parameters
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+    isotherm-calibrate drift static.mcap --html drift.html\n  \
+    isotherm-calibrate drift rlg-static.imu.gz --mapping config/mappings/rlg-static.toml --increment-weight 0.1\n  \
+    isotherm-calibrate drift static.mcap --document unit.toml --out unit-drift.toml\n\n\
+    With --document the log is corrected first, by the service's own code, and what is analysed is what the calibration leaves. \
+    Rates are in °/h, N in °/√h, K in °/h/√h, R in °/h², Q in ″.")]
+pub(super) struct DriftArgs {
+    #[command(flatten)]
+    log: LogArgs,
+    /// Look at the accelerometers instead of the gyros
+    #[arg(long)]
+    accelerometers: bool,
+    /// The log holds corrected ticks, as isotherm-replay correct writes them (its CSV is known by itself)
+    #[arg(long, conflicts_with_all = ["document", "increment_weight"])]
+    corrected: bool,
+    /// Angle that one count of a gyro stands for (″), where the readings are counts and there is no document
+    #[arg(long, value_name = "ARCSEC", conflicts_with = "document")]
+    increment_weight: Option<f64>,
+    /// Calibration document (TOML): the log is corrected with it first
+    #[arg(long, short, value_name = "DOC")]
+    document: Option<PathBuf>,
+    /// Write the document with what the estimator is to expect of its gyros
+    #[arg(long, short, value_name = "NEW", requires = "document", conflicts_with = "accelerometers")]
+    out: Option<PathBuf>,
+    /// Write over a file that is there
+    #[arg(long)]
+    overwrite: bool,
+    /// Date that the new document states (YYYY-MM-DD); that of the old one without it
+    #[arg(long, value_name = "DATE", requires = "out")]
+    created: Option<String>,
+    /// Sigma of the constant part when the estimator starts (°/h), where you know it from several starts
+    #[arg(long, value_name = "DEG_PER_H")]
+    initial_sigma: Option<f64>,
+    /// Distance of the averaging times
+    #[arg(long, value_enum, default_value_t = Taus::Octave)]
+    taus: Taus,
+    /// Hours that the trend is fitted to before it is extrapolated
+    #[arg(long, value_name = "HOURS", default_value_t = FIT_H)]
+    fit_hours: f64,
+    /// Write the report with its diagrams as one HTML file
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
+    /// Print everything as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// Distance of averaging times.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Taus {
+    /// 1, 2, 4, 8… ticks
+    Octave,
+    /// 1, 10, 100… ticks
+    Decade,
+}
+
+/// A bar over a log's bytes, on a terminal only.
+pub(super) struct Bar {
+    drawn: ProgressBar,
+    progress: Option<Progress>,
+    since: u32,
+}
+
+impl Bar {
+    pub(super) fn new(progress: Option<Progress>) -> Self {
+        let target =
+            if io::stderr().is_terminal() { ProgressDrawTarget::stderr_with_hz(5) } else { ProgressDrawTarget::hidden() };
+        let drawn = ProgressBar::with_draw_target(progress.as_ref().map(Progress::total), target);
+        let template = if progress.is_some() { "{bar:30} {percent:>3} %  reading  {eta} left" } else { "{spinner} {msg}" };
+        if let Ok(style) = ProgressStyle::with_template(template) {
+            drawn.set_style(style);
+        }
+        Self { drawn, progress, since: 0 }
+    }
+
+    pub(super) fn step(&mut self) {
+        self.since += 1;
+        if self.since >= STRIDE {
+            self.since = 0;
+            match &self.progress {
+                Some(progress) => self.drawn.set_position(progress.read()),
+                None => self.drawn.tick(),
+            }
+        }
+    }
+
+    pub(super) fn finish(&self) {
+        self.drawn.finish_and_clear();
+    }
+}
+
+impl DriftArgs {
+    /// Does what the command says.
+    pub(super) fn run(&self) -> Result<(), Error> {
+        self.check()?;
+        let columns = self.columns()?;
+        let (unit, kind, corrected) = (columns.unit.to_string(), columns.kind, columns.corrected);
+        let grid = Grid::of(columns)?;
+        let bar = Bar::new(None);
+        bar.drawn.set_message("Allan deviations, drift, spectrum");
+        bar.drawn.tick();
+        let factor = if self.taus == Taus::Decade { 10 } else { 2 };
+        let sensors = analyse(&grid, Wanted { factor, fit_h: self.fit_hours });
+        bar.finish();
+        let mut parameters = Vec::new();
+        if kind == Kind::Rate {
+            let of = |sensor: &crate::drift::analysis::Analysis| {
+                (sensor.name.clone(), Parameters::of(sensor, self.initial_sigma))
+            };
+            parameters.extend(sensors.iter().map(of));
+        }
+        let report = Report {
+            unit,
+            kind,
+            corrected,
+            tick_s: grid.tick_s,
+            ticks: grid.ticks,
+            length_h: grid.length_h(),
+            notes: grid.notes,
+            refused: grid.refused,
+            sensors,
+            parameters,
+        };
+        if let (Some(document), Some(out)) = (&self.document, &self.out) {
+            self.write_document(document, out, &report)?;
+        }
+        if let Some(html) = &self.html {
+            write_file(html, page(&report).as_bytes(), true)?;
+        }
+        if self.json {
+            print(format!("{}\n", report.to_json()).as_bytes())?;
+        } else {
+            print(report.to_text().as_bytes())?;
+        }
+        if report.refused.is_empty() { Ok(()) } else { Err(Error::Refused(report.refused)) }
+    }
+
+    /// What the arguments must hold before anything is read.
+    fn check(&self) -> Result<(), Error> {
+        let positive = [
+            ("--increment-weight", self.increment_weight.map(f64::abs)),
+            ("--initial-sigma", self.initial_sigma),
+            ("--fit-hours", Some(self.fit_hours)),
+        ];
+        for (name, value) in positive {
+            if let Some(value) = value.filter(|value| !(value.is_finite() && *value > 0.0)) {
+                return Err(Error::Usage(format!("{name} is {value}, must be a number above 0")));
+            }
+        }
+        let inputs: Vec<&Path> = self.log.log.iter().chain(&self.document).map(PathBuf::as_path).collect();
+        for out in self.out.iter().chain(&self.html) {
+            refuse_overwriting(out, &inputs)?;
+        }
+        match &self.out {
+            Some(out) if out.exists() && !self.overwrite => {
+                Err(Error::Usage(format!("{} is there already: give another name, or --overwrite", out.display())))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn columns(&self) -> Result<Columns, Error> {
+        let kind = if self.accelerometers { Kind::Force } else { Kind::Rate };
+        let unit = self.log.serial()?;
+        if self.corrected || self.log.log.iter().any(|path| is_csv(path)) {
+            let mut bar = Bar::new(None);
+            let columns = Columns::of_corrected(&self.log.log, unit.as_ref(), kind, || bar.step());
+            bar.finish();
+            return columns;
+        }
+        let mut log = self.log.open()?;
+        let mut bar = Bar::new(Some(log.progress()));
+        if let Some(document) = &self.document {
+            let loaded = load_calibration(document)?;
+            // A text log names no unit of its own: it is taken to be the document's.
+            let unit = unit.filter(|_| log.recording().is_some());
+            let columns = Columns::corrected_by(&mut log, &loaded, unit.as_ref(), kind, || bar.step());
+            bar.finish();
+            return columns;
+        }
+        let series = Series::read(&mut log, unit.as_ref(), |_| bar.step());
+        bar.finish();
+        let series = series?;
+        if self.accelerometers { Columns::of_accelerometers(series) } else { Columns::of_gyros(series, self.increment_weight) }
+    }
+
+    /// Puts the parameters into a document and writes it, after its own reader has taken it.
+    fn write_document(&self, path: &Path, out: &Path, report: &Report) -> Result<(), Error> {
+        let text = read_small_text(path, "read the calibration document")?;
+        let problems = |problems: Vec<isotherm_protocol::document::Problem>| {
+            problems.iter().map(ToString::to_string).collect::<Vec<_>>()
+        };
+        let parsed = Document::parse(&text, Some(&path.display().to_string()))
+            .map_err(|found| isotherm_log::error::Error::Calibration(problems(found)))?;
+        let mut document = parsed.document;
+        // What the document says of the constant part holds, unless something else was stated.
+        put(&mut document, &report.parameters, self.initial_sigma.is_none())?;
+        if let Some(created) = &self.created {
+            let date = created.parse().ok().and_then(Created::new);
+            document.created = Some(date.ok_or_else(|| {
+                Error::Usage(format!("--created is {created:?}, must be a date such as 2026-11-22"))
+            })?);
+        }
+        let of_log = origin(&self.log.log, &command_line())?;
+        let mut whole = document.origin.take().unwrap_or_default();
+        let mut details = whole.details.take().unwrap_or_default();
+        let notes: Vec<String> = report
+            .parameters
+            .iter()
+            .flat_map(|(name, found)| found.notes.iter().map(move |note| format!("gyro {name}: {note}")))
+            .collect();
+        let log: Vec<_> = of_log.log.iter().map(|log| json!({ "name": log.name, "sha256": log.sha256 })).collect();
+        let about = json!({
+            "tool": TOOL,
+            "command": of_log.command,
+            "method": "restricted maximum likelihood of a first-order Markov drift; N from the overlapping Allan variance",
+            "length_h": report.length_h,
+            "verdict": report.verdict(),
+            "notes": notes,
+            "log": log,
+        });
+        let about = toml::Value::try_from(about).map_err(|error| Error::Document(vec![error.to_string()]))?;
+        details.insert("drift".to_owned(), about);
+        whole.details = Some(details);
+        document.origin = Some(whole);
+        let body = document.to_toml().map_err(|error| Error::Document(vec![error.to_string()]))?;
+        let text = format!("{SCHEMA_LINE}{body}");
+        Document::parse(&text, Some(&out.display().to_string())).map_err(|found| Error::Document(problems(found)))?;
+        write_file(out, text.as_bytes(), self.overwrite)
+    }
+}
+
+/// Writes a file; one that is there only where that is allowed.
+pub(super) fn write_file(path: &Path, bytes: &[u8], overwrite: bool) -> Result<(), Error> {
+    let mut options = OpenOptions::new();
+    options.write(true);
+    if overwrite { options.create(true).truncate(true) } else { options.create_new(true) };
+    let written = options.open(path).and_then(|mut file| file.write_all(bytes));
+    written.map_err(|source| Error::file(path, "write", source))
+}

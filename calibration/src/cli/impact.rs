@@ -1,0 +1,310 @@
+//! `isotherm-calibrate impact`.
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use isotherm_correction::drift::DriftParts;
+use isotherm_correction::units::AngularRate;
+use isotherm_log::diff::is_csv;
+use isotherm_log::file::{read_small_text, refuse_overwriting};
+use isotherm_log::offline::load_calibration;
+use isotherm_protocol::document::Document;
+
+use super::drift::{Bar, write_file};
+use super::{LogArgs, print};
+use crate::drift::HOUR_S;
+use crate::drift::columns::{Columns, Kind};
+use crate::error::Error;
+use crate::impact::ins::{GREATEST_LATITUDE_DEG, TURN_RATIO};
+use crate::impact::logged;
+use crate::impact::monte_carlo::{Voyages, sail_all};
+use crate::impact::report::{Report, Row};
+use crate::impact::scenario::{CARES, Drift, Voyage};
+
+/// Seeds where nobody says.
+const SEEDS: u32 = 50;
+/// Most hours of either part.
+const MOST_HOURS: f64 = 1000.0;
+/// Sizes of the gyros in tables 1 and 2 of 002, for a drift without a document: σ, τ, σ1, τ1, constant part, N.
+const SIZES_DEG_H: [f64; 6] = [0.0034, 9.5, 0.000_08, 140.0, 0.05, 0.001];
+
+/// What a drift means for navigation: heading and position of a platform system over two days on its own
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+    isotherm-calibrate impact --trend 0.00008 --html impact.html\n  \
+    isotherm-calibrate impact --document unit-drift.toml --seeds 100\n  \
+    isotherm-calibrate impact corrected.mcap --calibration-hours 21\n\n\
+    The system is calibrated, then goes on alone; its level platform turns about the vertical at four times the Earth's rate. \
+    Each drift is sailed three times: held at its last value, and with the service's own drift estimator without and with \
+    the state of the trend.")]
+pub(super) struct ImpactArgs {
+    /// A log at rest: corrected ticks (CSV, .mcap), or raw ones with --document
+    #[arg(value_name = "LOG")]
+    log: Vec<PathBuf>,
+    /// Column mapping of a raw text log (TOML)
+    #[arg(long, short, value_name = "FILE", requires = "document")]
+    mapping: Option<PathBuf>,
+    /// The unit, where a recording has several
+    #[arg(long, short, value_name = "SERIAL")]
+    unit: Option<String>,
+    /// Calibration document (TOML) that says what the estimator is to expect; a raw log is corrected with it
+    #[arg(long, short, value_name = "DOC")]
+    document: Option<PathBuf>,
+    /// Straight trend from the calibration's beginning (°/h²)
+    #[arg(long, value_name = "DEG_PER_H2", alias = "trend-deg-per-h2", allow_hyphen_values = true, conflicts_with = "log")]
+    trend: Option<f64>,
+    /// Constant that appears at departure, as after a shock (°/h)
+    #[arg(long, value_name = "DEG_PER_H", alias = "constant-deg-per-h", allow_hyphen_values = true, conflicts_with_all = ["log", "seeds"])]
+    constant: Option<f64>,
+    /// Gyro that has the trend or the constant
+    #[arg(long, value_enum, default_value_t = Gyro::Each)]
+    gyro: Gyro,
+    /// Sail many times with drifts from as many seeds, of the size that the document states; --trend comes on top
+    #[arg(long, value_name = "NUMBER", conflicts_with = "log", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    seeds: Option<u32>,
+    /// The first seed
+    #[arg(long, value_name = "SEED", default_value_t = 1)]
+    seed: u64,
+    /// Latitude (°)
+    #[arg(long, value_name = "DEG", default_value_t = 60.0, allow_hyphen_values = true)]
+    latitude: f64,
+    /// Hours on its own
+    #[arg(long, value_name = "HOURS", default_value_t = 48.0)]
+    hours: f64,
+    /// Hours of calibration before
+    #[arg(long, value_name = "HOURS", default_value_t = 21.0)]
+    calibration_hours: f64,
+    /// Rate of the platform about the vertical, over the Earth's
+    #[arg(long, value_name = "RATIO", default_value_t = TURN_RATIO, allow_hyphen_values = true)]
+    turn_ratio: f64,
+    /// Standard error of the rate that the calibration knows, per minute (°/h)
+    #[arg(long, value_name = "DEG_PER_H", default_value_t = 0.01)]
+    reference_sigma: f64,
+    /// The velocity log does not keep the level gyros observable
+    #[arg(long)]
+    no_log_aid: bool,
+    /// Write the report with its diagrams as one HTML file
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
+    /// Print everything as one JSON object, with the curves
+    #[arg(long)]
+    json: bool,
+}
+
+/// A gyro of the platform.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Gyro {
+    /// Level
+    X,
+    /// Level
+    Y,
+    /// Azimuth
+    Z,
+    /// Each by itself
+    Each,
+    /// All at once
+    All,
+}
+
+/// A case: which gyros have the drift, in words.
+struct Case {
+    name: String,
+    share: [f64; 3],
+}
+
+impl ImpactArgs {
+    /// Does what the command says.
+    pub(super) fn run(&self) -> Result<(), Error> {
+        let mut voyage = self.voyage()?;
+        let parts = self.parts()?;
+        let report = if !self.log.is_empty() {
+            self.sail_log(&mut voyage, &parts)?
+        } else if self.seeds.is_some() || (self.trend.is_none() && self.constant.is_none() && self.document.is_some()) {
+            self.sail_seeds(&voyage, &parts)?
+        } else if self.trend.is_some() || self.constant.is_some() {
+            self.sail_stated(&voyage, &parts)?
+        } else {
+            let words = "say which drift: a LOG, --document DOC, --trend DEG_PER_H2 or --constant DEG_PER_H";
+            return Err(Error::Usage(words.to_owned()));
+        };
+        if let Some(html) = &self.html {
+            write_file(html, report.to_html().as_bytes(), true)?;
+        }
+        if self.json { print(format!("{}\n", report.to_json()).as_bytes()) } else { print(report.to_text().as_bytes()) }
+    }
+
+    /// Checks the numbers.
+    fn voyage(&self) -> Result<Voyage, Error> {
+        let limits = [
+            ("--latitude", self.latitude, [-GREATEST_LATITUDE_DEG, GREATEST_LATITUDE_DEG]),
+            ("--hours", self.hours, [0.5, MOST_HOURS]),
+            ("--calibration-hours", self.calibration_hours, [0.5, MOST_HOURS]),
+            ("--turn-ratio", self.turn_ratio, [-1000.0, 1000.0]),
+            ("--reference-sigma", self.reference_sigma, [0.0, 1000.0]),
+            ("--trend", self.trend.unwrap_or(0.0), [-100.0, 100.0]),
+            ("--constant", self.constant.unwrap_or(0.0), [-1000.0, 1000.0]),
+        ];
+        for (name, value, [low, high]) in limits {
+            // False for NaN too.
+            if !(low..=high).contains(&value) {
+                return Err(Error::Usage(format!("{name} is {value}, must be from {low} to {high}")));
+            }
+        }
+        let inputs: Vec<&Path> = self.log.iter().chain(&self.document).map(PathBuf::as_path).collect();
+        if let Some(html) = &self.html {
+            refuse_overwriting(html, &inputs)?;
+        }
+        Ok(Voyage {
+            latitude_deg: self.latitude,
+            turn_ratio: self.turn_ratio,
+            calibration_h: self.calibration_hours,
+            hours: self.hours,
+            log_aids_level: !self.no_log_aid,
+            reference_sigma_rad_per_s: AngularRate::from_deg_per_h(self.reference_sigma).as_rad_per_s(),
+        })
+    }
+
+    /// What the estimator is to expect: the document's, or gyros of the size of 002's.
+    fn parts(&self) -> Result<[DriftParts; 3], Error> {
+        let Some(path) = &self.document else { return Ok([sizes(); 3]) };
+        let text = read_small_text(path, "read the calibration document")?;
+        let parsed = Document::parse(&text, Some(&path.display().to_string())).map_err(|problems| {
+            isotherm_log::error::Error::Calibration(problems.iter().map(ToString::to_string).collect())
+        })?;
+        let parts = parsed.document.to_parts();
+        let stated: Vec<DriftParts> = parts.gyros.iter().filter_map(|gyro| gyro.drift).collect();
+        <[DriftParts; 3]>::try_from(stated).map_err(|stated| {
+            Error::Refused(vec![format!(
+                "{} states a drift for {} gyros, the platform has three: isotherm-calibrate drift --document puts them in",
+                path.display(),
+                stated.len()
+            )])
+        })
+    }
+
+    fn cases(&self) -> Vec<Case> {
+        let of = |name: &str, share| Case { name: name.to_owned(), share };
+        let (x, y) = (of("level gyro x", [1.0, 0.0, 0.0]), of("level gyro y", [0.0, 1.0, 0.0]));
+        let z = of("azimuth gyro z", [0.0, 0.0, 1.0]);
+        match self.gyro {
+            Gyro::X => vec![x],
+            Gyro::Y => vec![y],
+            Gyro::Z => vec![z],
+            Gyro::Each => vec![x, y, z],
+            Gyro::All => vec![of("all gyros", [1.0; 3])],
+        }
+    }
+
+    /// A drift without noise: what comes out is what the drift adds to all other errors.
+    fn sail_stated(&self, voyage: &Voyage, parts: &[DriftParts; 3]) -> Result<Report, Error> {
+        let (trend, constant) = (self.trend.unwrap_or(0.0), self.constant.unwrap_or(0.0));
+        let rate = |tick: usize| {
+            #[expect(clippy::cast_precision_loss, reason = "ticks of some weeks")]
+            let hours = (tick as f64 + 0.5) * crate::impact::estimate::TICK_S / HOUR_S;
+            let after = if tick < voyage.calibration_ticks() { 0.0 } else { constant };
+            AngularRate::from_deg_per_h(trend * hours + after).as_rad_per_s()
+        };
+        let ramp: Vec<f64> = (0..voyage.ticks()).map(rate).collect();
+        let mut rows = Vec::new();
+        for case in self.cases() {
+            let truth: Vec<[f64; 3]> = ramp.iter().map(|rate| case.share.map(|share| share * rate)).collect();
+            let held = truth.get(voyage.calibration_ticks().saturating_sub(1)).copied().unwrap_or_default();
+            let drift = Drift { measured: truth.clone(), truth, held };
+            for care in CARES {
+                let course = voyage.sail(care, &drift, parts)?;
+                rows.push(Row { case: case.name.clone(), course, spread: None });
+            }
+        }
+        let source = match (self.trend, self.constant) {
+            (Some(trend), None) => format!("A trend of {trend} °/h² and nothing else"),
+            (None, Some(constant)) => format!("A constant of {constant} °/h from departure on"),
+            _ => format!("A trend of {trend} °/h² and a constant of {constant} °/h from departure on"),
+        };
+        let notes = vec![
+            "Without noise: what the drift adds to every other error. 002 has 1460 m, 2850 m and 0.14′, 0.28′ for trends of 0.00008 \
+             and 0.00016 °/h² of the azimuth gyro, and less than 20 m for a level one, whose drift its filter follows through the \
+             velocity log; it does not say at what latitude."
+                .to_owned(),
+        ];
+        Ok(Report { voyage: *voyage, source, seeds: 0, rows, notes })
+    }
+
+    fn sail_seeds(&self, voyage: &Voyage, parts: &[DriftParts; 3]) -> Result<Report, Error> {
+        let count = self.seeds.unwrap_or(SEEDS);
+        let seeds: Vec<u64> = (0..count).map(|index| self.seed.wrapping_add(u64::from(index))).collect();
+        let slope = AngularRate::from_deg_per_h(self.trend.unwrap_or(0.0)).as_rad_per_s() / HOUR_S;
+        let on_top = match self.gyro {
+            Gyro::X => [slope, 0.0, 0.0],
+            Gyro::Y => [0.0, slope, 0.0],
+            Gyro::Z => [0.0, 0.0, slope],
+            Gyro::Each | Gyro::All => [slope; 3],
+        };
+        let bar = Bar::new(None);
+        let sailed = sail_all(voyage, parts, on_top, &seeds);
+        bar.finish();
+        let Voyages { first, spread } = sailed?;
+        let rows = first.into_iter().zip(spread);
+        let rows = rows.map(|(course, spread)| Row { case: "all gyros".to_owned(), course, spread: Some(spread) });
+        let trend = self.trend.map(|trend| format!(", with a trend of {trend} °/h² on top")).unwrap_or_default();
+        let from = self.document.as_ref().map_or_else(
+            || "gyros of the size of tables 1 and 2 of 002".to_owned(),
+            |path| format!("gyros as {} states them", path.display()),
+        );
+        let source = format!("Drifts of {count} seeds from {}, {from}{trend}", self.seed);
+        let notes = vec!["Figures are the middle of all seeds, and what 95 % of them stay below.".to_owned()];
+        Ok(Report { voyage: *voyage, source, seeds: seeds.len(), rows: rows.collect(), notes })
+    }
+
+    fn sail_log(&self, voyage: &mut Voyage, parts: &[DriftParts; 3]) -> Result<Report, Error> {
+        let columns = self.columns()?;
+        let (drift, mut notes) = logged::drift(&columns, voyage)?;
+        notes.push(
+            "Taken as a platform's gyros x and y level, z up or down. The mean over the calibration, Earth's rate included, is taken \
+             out; what is held is the mean of its last hour."
+                .to_owned(),
+        );
+        let mut rows = Vec::new();
+        for care in CARES {
+            rows.push(Row { case: "as logged".to_owned(), course: voyage.sail(care, &drift, parts)?, spread: None });
+        }
+        let source = format!("The log of unit {}", columns.unit);
+        Ok(Report { voyage: *voyage, source, seeds: 0, rows, notes })
+    }
+
+    fn columns(&self) -> Result<Columns, Error> {
+        let args = LogArgs { log: self.log.clone(), mapping: self.mapping.clone(), unit: self.unit.clone() };
+        let unit = args.serial()?;
+        let raw = self.mapping.is_some();
+        if !raw && (self.log.iter().all(|path| is_csv(path)) || self.document.is_none()) {
+            let mut bar = Bar::new(None);
+            let columns = Columns::of_corrected(&self.log, unit.as_ref(), Kind::Rate, || bar.step());
+            bar.finish();
+            return columns;
+        }
+        let Some(document) = &self.document else {
+            return Err(Error::Usage("a raw log needs --document, to be corrected with".to_owned()));
+        };
+        let loaded = load_calibration(document)?;
+        let mut log = args.open()?;
+        let mut bar = Bar::new(Some(log.progress()));
+        let unit = unit.filter(|_| log.recording().is_some());
+        let columns = Columns::corrected_by(&mut log, &loaded, unit.as_ref(), Kind::Rate, || bar.step());
+        bar.finish();
+        columns
+    }
+}
+
+/// Gyros of the size of 002's.
+fn sizes() -> DriftParts {
+    let [sigma, time_h, trend, trend_time_h, initial, walk] = SIZES_DEG_H;
+    let rate = |deg_per_h: f64| AngularRate::from_deg_per_h(deg_per_h).as_rad_per_s();
+    DriftParts {
+        sigma_rad_per_s: rate(sigma),
+        correlation_time_s: time_h * HOUR_S,
+        trend_sigma_rad_per_s2: rate(trend) / HOUR_S,
+        trend_correlation_time_s: trend_time_h * HOUR_S,
+        initial_sigma_rad_per_s: rate(initial),
+        // 1 °/√h is 1 °/h over √(1/h).
+        angle_random_walk_rad_per_sqrt_s: rate(walk) * HOUR_S.sqrt(),
+    }
+}

@@ -1,0 +1,264 @@
+//! A static log as columns of one kind of reading, ready for analysis.
+
+use std::path::PathBuf;
+
+use isotherm_correction::sample::{CorrectedTick, OutputKind, SensorFlags};
+use isotherm_correction::unit::UnitSettings;
+use isotherm_log::diff::CorrectedLog;
+use isotherm_log::message::Topic;
+use isotherm_log::offline::Loaded;
+use isotherm_log::source::Log;
+use isotherm_protocol::key::UnitId;
+use isotherm_protocol::stream::UnitStream;
+
+use super::DEG_PER_H_IN_RAD_PER_S;
+use crate::error::Error;
+use crate::series::{Series, Ticks};
+
+/// What a column measures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// Angular rate (°/h).
+    Rate,
+    /// Specific force (m/s²), or the accelerometer's output (V) where the log has that.
+    Force,
+}
+
+/// Readings of several sensors at the same ticks.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Columns {
+    /// The unit.
+    pub unit: UnitId,
+    /// What they measure.
+    pub kind: Kind,
+    /// Names of the sensors or axes.
+    pub names: Vec<String>,
+    /// Whether they are along the case axes, after a correction.
+    pub corrected: bool,
+    /// Ends of the ticks (ns on the producer's clock).
+    pub end_ns: Vec<i64>,
+    /// Readings by sensor; what is no good reading is no number.
+    pub values: Vec<Vec<f64>>,
+    /// What is to be said of the reading.
+    pub notes: Vec<String>,
+}
+
+/// Names of the case axes.
+const AXES: [&str; 3] = ["x", "y", "z"];
+/// ″ per count and s in °/h: 1 ″/s is 1 °/h.
+const DEG_PER_H_IN_ARCSEC_PER_S: f64 = 1.0;
+
+impl Columns {
+    /// From raw gyro ticks; counts need the angle that one stands for (″).
+    ///
+    /// # Errors
+    /// [`Error::Refused`] where there are no ticks, or counts without a weight.
+    pub fn of_gyros(series: Series, increment_weight_arcsec: Option<f64>) -> Result<Self, Error> {
+        let Series { unit, gyros, .. } = series;
+        let scale = match (gyros.output, increment_weight_arcsec) {
+            (None, _) => return Err(nothing("gyro ticks", "--accelerometers looks at the accelerometers")),
+            (Some(OutputKind::Counts), None) => {
+                return Err(Error::Refused(vec![
+                    "the gyro readings are counts: give the angle that one stands for with --increment-weight ARCSEC, or \
+                     a calibration document with --document"
+                        .to_owned(),
+                ]));
+            }
+            (Some(OutputKind::Counts), Some(weight)) => Scale::PerSecond(weight * DEG_PER_H_IN_ARCSEC_PER_S),
+            (Some(OutputKind::Mean), _) => Scale::Mean(DEG_PER_H_IN_RAD_PER_S),
+        };
+        Ok(Self::build(unit, Kind::Rate, gyros, scale))
+    }
+
+    /// From raw accelerometer ticks; counts become counts per second.
+    ///
+    /// # Errors
+    /// [`Error::Refused`] where there are none.
+    pub fn of_accelerometers(series: Series) -> Result<Self, Error> {
+        let Series { unit, accels, .. } = series;
+        let scale = match accels.output {
+            None => return Err(nothing("accelerometer ticks", "leave --accelerometers out to look at the gyros")),
+            Some(OutputKind::Counts) => {
+                return Err(Error::Refused(vec![
+                    "the accelerometer readings are counts: give a calibration document with --document".to_owned(),
+                ]));
+            }
+            Some(OutputKind::Mean) => Scale::Mean(1.0),
+        };
+        let mut columns = Self::build(unit, Kind::Force, accels, scale);
+        columns.notes.push(
+            "The readings are the accelerometers' mean outputs as the log has them. Where they are volts, m/s² stands for V; \
+             --document makes specific force of them."
+                .to_owned(),
+        );
+        Ok(columns)
+    }
+
+    fn build(unit: UnitId, kind: Kind, ticks: Ticks, scale: Scale) -> Self {
+        let Ticks { end_ns, duration_s, readings, .. } = ticks;
+        let names = (0..readings.len()).map(|index| name(index, readings.len())).collect();
+        let values = readings.into_iter().map(|mut column| {
+            match scale {
+                Scale::Mean(factor) => column.iter_mut().for_each(|reading| *reading *= factor),
+                Scale::PerSecond(factor) => {
+                    column.iter_mut().zip(&duration_s).for_each(|(reading, duration)| *reading *= factor / duration);
+                }
+            }
+            column
+        });
+        let values = values.collect();
+        Self { unit, kind, names, corrected: false, end_ns, values, notes: Vec::new() }
+    }
+
+    /// From the log of a unit, corrected with a document by the same stream as the service's.
+    ///
+    /// # Errors
+    /// [`Error::Refused`] where nothing comes out, [`Error::Log`].
+    pub fn corrected_by(
+        log: &mut Log,
+        loaded: &Loaded,
+        unit: Option<&UnitId>,
+        kind: Kind,
+        mut progress: impl FnMut(),
+    ) -> Result<Self, Error> {
+        let mut columns = Self::empty(loaded.unit.clone(), kind);
+        let mut stream = UnitStream::new(loaded.unit.clone(), UnitSettings::default());
+        stream.install(loaded.calibration.clone(), loaded.digest);
+        let mut found: Option<UnitId> = unit.cloned();
+        while let Some(message) = log.next_message()? {
+            let Topic::Raw(serial, input) = &message.topic else { continue };
+            if unit.is_some_and(|unit| unit != serial) {
+                continue;
+            }
+            let first = found.get_or_insert_with(|| serial.clone());
+            if first != serial {
+                return Err(Error::Refused(vec![format!(
+                    "the log is of several units ({first}, {serial}): choose one with --unit"
+                )]));
+            }
+            // A frame that cannot be read is counted by the stream, and its ticks are a gap.
+            let _ = stream.receive(*input, &message.frame);
+            stream.take_ready().iter().for_each(|tick| columns.push(tick));
+            progress();
+        }
+        stream.flush();
+        stream.take_ready().iter().for_each(|tick| columns.push(tick));
+        if let Some(found) = found.filter(|found| *found != loaded.unit) {
+            columns.notes.push(format!("The log is of unit {found}, the document for {}.", loaded.unit));
+        }
+        columns.finish()
+    }
+
+    /// From a log of corrected ticks, as `isotherm-replay correct` writes it.
+    ///
+    /// # Errors
+    /// [`Error::Refused`] where it has none, or of several units; [`Error::Log`].
+    pub fn of_corrected(
+        paths: &[PathBuf],
+        unit: Option<&UnitId>,
+        kind: Kind,
+        mut progress: impl FnMut(),
+    ) -> Result<Self, Error> {
+        let unnamed = isotherm_log::offline::unit_id("UNIT")?;
+        let units = unit.cloned().into_iter().collect();
+        let mut columns: Option<Self> = None;
+        for path in paths {
+            let mut log = CorrectedLog::open(path, &units, &unnamed)?;
+            while let Some(ticks) = log.next_ticks()? {
+                let columns = columns.get_or_insert_with(|| Self::empty(ticks.unit.clone(), kind));
+                if columns.unit != ticks.unit {
+                    let (first, second) = (&columns.unit, &ticks.unit);
+                    return Err(Error::Refused(vec![format!(
+                        "the log is of several units ({first}, {second}): choose one with --unit"
+                    )]));
+                }
+                ticks.ticks.iter().for_each(|tick| columns.push(&tick.tick));
+                progress();
+            }
+        }
+        match columns {
+            Some(columns) => columns.finish(),
+            None => Err(nothing("corrected ticks", "isotherm-replay correct makes them of a raw log")),
+        }
+    }
+
+    fn empty(unit: UnitId, kind: Kind) -> Self {
+        Self {
+            unit,
+            kind,
+            names: AXES.map(str::to_owned).to_vec(),
+            corrected: true,
+            end_ns: Vec::new(),
+            values: vec![Vec::new(); AXES.len()],
+            notes: Vec::new(),
+        }
+    }
+
+    /// Takes a corrected tick.
+    fn push(&mut self, tick: &CorrectedTick) {
+        let (increments, flags, factor) = match self.kind {
+            Kind::Rate => (&tick.delta_angle, &tick.gyro_flags, DEG_PER_H_IN_RAD_PER_S),
+            Kind::Force => (&tick.delta_velocity, &tick.accel_flags, 1.0),
+        };
+        let good = !flags.is_empty() && flags.iter().all(|flags| flags.contains(SensorFlags::VALID));
+        let duration_s = tick.duration.as_s();
+        self.end_ns.push(tick.end_time.as_ns());
+        for (column, increment) in self.values.iter_mut().zip(increments) {
+            column.push(if good { increment * factor / duration_s } else { f64::NAN });
+        }
+    }
+
+    fn finish(self) -> Result<Self, Error> {
+        if self.end_ns.is_empty() {
+            return Err(nothing("ticks that could be corrected", "is the document for this unit, and the mapping right?"));
+        }
+        Ok(self)
+    }
+
+    /// Symbol of the readings' unit of measure.
+    #[must_use]
+    pub fn measure(&self) -> &'static str {
+        self.kind.measure()
+    }
+}
+
+impl Kind {
+    /// Symbol of the unit of measure.
+    #[must_use]
+    pub const fn measure(self) -> &'static str {
+        match self {
+            Self::Rate => "°/h",
+            Self::Force => "m/s²",
+        }
+    }
+
+    /// What a sensor of the kind is called.
+    #[must_use]
+    pub const fn sensor(self) -> &'static str {
+        match self {
+            Self::Rate => "gyro",
+            Self::Force => "accelerometer",
+        }
+    }
+}
+
+/// How readings become rates.
+#[derive(Debug, Clone, Copy)]
+enum Scale {
+    /// Means: times this.
+    Mean(f64),
+    /// Counts: times this over the tick's duration.
+    PerSecond(f64),
+}
+
+/// x, y, z for three sensors, numbers from 1 for more.
+fn name(index: usize, of: usize) -> String {
+    match AXES.get(index).filter(|_| of == AXES.len()) {
+        Some(axis) => (*axis).to_owned(),
+        None => (index + 1).to_string(),
+    }
+}
+
+fn nothing(what: &str, advice: &str) -> Error {
+    Error::Refused(vec![format!("the log has no {what}: {advice}")])
+}

@@ -1,0 +1,169 @@
+//! What the in-run estimator is to expect of a gyro: `[gyro.sensor.drift]` out of an analysis.
+
+use isotherm_protocol::document::{Document, Drift};
+
+use super::analysis::Analysis;
+use super::markov::{Estimate, Fit};
+use crate::allan::{Coefficient, Term};
+use crate::error::Error;
+
+/// How long a trend's rate holds where the log does not say: 002's extrapolation errs by 30 % over the 50 h behind the
+/// fit, and e^(−50/140) = 0.7.
+pub const TREND_CORRELATION_TIME_H: f64 = 140.0;
+/// A trend counts from so many standard errors on.
+pub const TREND_SIGMAS: f64 = 2.0;
+/// The constant part where nobody states it, in standard deviations of the slow part.
+const CONSTANT_SIGMAS: f64 = 10.0;
+/// Ranges that a document allows.
+const TIME_RANGE_H: [f64; 2] = [0.02, 250_000.0];
+const INITIAL_RANGE: [f64; 2] = [1e-6, 20_000.0];
+const WALK_RANGE: [f64; 2] = [1e-8, 3000.0];
+/// An input axis within this cosine of a case axis has that axis' drift: 14°.
+const SMALLEST_COSINE: f64 = 0.97;
+
+/// Parameters of one gyro, and where each comes from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Parameters {
+    /// As a document states them.
+    pub drift: Drift,
+    /// What is to be said of them.
+    pub notes: Vec<String>,
+}
+
+impl Parameters {
+    /// Of a gyro; `initial_sigma` (°/h) of the constant part where it is known.
+    #[must_use]
+    pub fn of(analysis: &Analysis, initial_sigma: Option<f64>) -> Self {
+        let mut notes = Vec::new();
+        let length_h = analysis.slow.length_h();
+        let fit = analysis.markov.as_ref().map(|(fit, _)| fit);
+        let part = fit.and_then(|fit| Some((fit.sigma?, fit.correlation_time_h?)));
+        let (sigma, time_h) = match part {
+            Some((sigma, time)) => {
+                if time.value > length_h / 3.0 {
+                    notes.push(format!(
+                        "the correlation time of {:.1} h rests on a log of {length_h:.1} h: three times as much is needed to \
+                         tell it from a trend",
+                        time.value
+                    ));
+                }
+                (sigma.value, time.value)
+            }
+            None => {
+                notes.push("no slow drift stands out of the white noise: sigma is 0".to_owned());
+                (0.0, length_h)
+            }
+        };
+        let trend = trend(analysis);
+        let (trend_sigma, trend_time_h) = match trend {
+            Trend::Seen { slope, holds_h } => (slope.abs(), holds_h),
+            Trend::NotSeen { error } => {
+                notes.push(format!("no trend is seen; one of up to {:.2e} °/h² would not be", TREND_SIGMAS * error));
+                (0.0, TREND_CORRELATION_TIME_H)
+            }
+        };
+        let walk = analysis.noise.as_ref().map(|noise| noise.of_term(Term::AngleRandomWalk));
+        if let Some(Coefficient::NotObservable { .. }) = walk {
+            notes.push("angle random walk is not observable: its upper limit stands in its place".to_owned());
+        }
+        let walk = walk.map_or(analysis.deviation, Coefficient::value_or_limit) / 60.0;
+        let initial = initial_sigma.unwrap_or_else(|| {
+            notes.push(format!(
+                "one log at rest cannot tell the constant part from the Earth's rate: initial_sigma is {CONSTANT_SIGMAS} \
+                 standard deviations of the slow part; state what you know with --initial-sigma"
+            ));
+            CONSTANT_SIGMAS * analysis.slow_deviation
+        });
+        let within = |value: f64, [low, high]: [f64; 2]| digits(value.clamp(low, high));
+        let drift = Drift {
+            sigma_deg_per_h: digits(sigma),
+            correlation_time_h: within(time_h, TIME_RANGE_H),
+            trend_sigma_deg_per_h2: digits(trend_sigma),
+            trend_correlation_time_h: within(trend_time_h, TIME_RANGE_H),
+            initial_sigma_deg_per_h: within(initial, INITIAL_RANGE),
+            angle_random_walk_deg_per_sqrt_h: within(walk, WALK_RANGE),
+        };
+        Self { drift, notes }
+    }
+
+    /// As it stands in a document.
+    ///
+    /// # Errors
+    /// [`Error::Document`] where the serialiser refuses it; not to be reached.
+    pub fn to_toml(&self, name: &str) -> Result<String, Error> {
+        let body = toml::to_string(&self.drift).map_err(|error| Error::Document(vec![error.to_string()]))?;
+        Ok(format!("# gyro {name}\n[gyro.sensor.drift]\n{body}"))
+    }
+}
+
+/// What the log says of the trend.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Trend {
+    /// There is one.
+    Seen {
+        /// Slope (readings per h).
+        slope: f64,
+        /// How long it holds (h), from its bend where that is seen.
+        holds_h: f64,
+    },
+    /// There is none that stands out of drift and noise.
+    NotSeen {
+        /// Standard error of the slope.
+        error: f64,
+    },
+}
+
+/// What an analysis says of the trend, under the drift and noise that it found.
+#[must_use]
+pub fn trend(analysis: &Analysis) -> Trend {
+    let straight = analysis.markov.as_ref().and_then(|(fit, _)| fit.power(1));
+    let (slope, error) = straight.unwrap_or((0.0, f64::INFINITY));
+    if slope.abs() <= TREND_SIGMAS * error {
+        return Trend::NotSeen { error };
+    }
+    // A bend of c2·t² changes the slope by 2·c2 per hour.
+    let bend = analysis.second_order.as_ref().and_then(|fit| fit.power(2));
+    let bent = bend.filter(|(bend, error)| bend.abs() > TREND_SIGMAS * error);
+    let holds_h = bent.map_or(TREND_CORRELATION_TIME_H, |(bend, _)| (slope / (2.0 * bend)).abs());
+    Trend::Seen { slope, holds_h }
+}
+
+/// σ and τ of a fit, where there are any.
+#[must_use]
+pub fn markov(fit: Option<&Fit>) -> Option<(Estimate, Estimate)> {
+    fit.and_then(|fit| fit.sigma.zip(fit.correlation_time_h))
+}
+
+/// Four significant digits: a log knows no more.
+fn digits(value: f64) -> f64 {
+    format!("{value:.3e}").parse().unwrap_or(value)
+}
+
+/// Puts parameters along the case axes into a document. What it states of the constant part stays where that is asked for.
+///
+/// # Errors
+/// [`Error::Refused`] where an input axis lies along no case axis, or there is another number of sensors.
+pub fn put(document: &mut Document, parameters: &[(String, Parameters)], keep_initial: bool) -> Result<(), Error> {
+    let rows = &document.gyro.orientation.rows;
+    let mut reasons = Vec::new();
+    for (index, sensor) in document.gyro.sensor.iter_mut().enumerate() {
+        let row = rows.get(index).copied().unwrap_or_default();
+        let along = ["x", "y", "z"].into_iter().zip(row).find(|(_, cosine)| cosine.abs() >= SMALLEST_COSINE);
+        let Some((axis, _)) = along else {
+            reasons.push(format!(
+                "gyro {} of the document lies along no case axis ({row:?}), so its own drift cannot be told from corrected \
+                 rates: analyse the raw readings (without --document) and put the printed table in by hand",
+                sensor.name
+            ));
+            continue;
+        };
+        if let Some((_, found)) = parameters.iter().find(|(name, _)| name == axis) {
+            let mut drift = found.drift.clone();
+            if let Some(before) = sensor.drift.as_ref().filter(|_| keep_initial) {
+                drift.initial_sigma_deg_per_h = before.initial_sigma_deg_per_h;
+            }
+            sensor.drift = Some(drift);
+        }
+    }
+    if reasons.is_empty() { Ok(()) } else { Err(Error::Refused(reasons)) }
+}

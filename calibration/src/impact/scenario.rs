@@ -1,0 +1,169 @@
+//! One voyage: calibration with all rates known, then hours on its own.
+
+use isotherm_correction::drift::DriftParts;
+
+use super::estimate::{Aiding, TICK_S, residual, without_trend};
+use super::ins::{Errors, Ins};
+use crate::error::Error;
+
+/// Ticks in one step of the error equations, and its length (s).
+const STEP_TICKS: usize = 6;
+const STEP_S: f64 = 60.0;
+/// Steps between two points of a curve.
+const POINT_STEPS: usize = 10;
+
+/// Where and how long.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Voyage {
+    /// Latitude (°).
+    pub latitude_deg: f64,
+    /// Rate of the platform over the Earth's.
+    pub turn_ratio: f64,
+    /// Hours of calibration.
+    pub calibration_h: f64,
+    /// Hours on its own.
+    pub hours: f64,
+    /// Whether the level gyros stay observable through the velocity log.
+    pub log_aids_level: bool,
+    /// Standard error of a reference of a minute (rad/s).
+    pub reference_sigma_rad_per_s: f64,
+}
+
+/// A drift of the gyros x, y, z, tick by tick (rad/s).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Drift {
+    /// As it is.
+    pub truth: Vec<[f64; 3]>,
+    /// As the estimator sees it, with the noise of gyros and references.
+    pub measured: Vec<[f64; 3]>,
+    /// What is known of it at the end of the calibration by plain averaging.
+    pub held: [f64; 3],
+}
+
+/// What is done about the drift.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Care {
+    /// Its value at the end of the calibration is subtracted from then on.
+    Held,
+    /// The estimator without the state of the trend.
+    WithoutTrend,
+    /// The estimator with it.
+    WithTrend,
+}
+
+/// All of them, in the order of the tables.
+pub const CARES: [Care; 3] = [Care::Held, Care::WithoutTrend, Care::WithTrend];
+
+impl Care {
+    /// In words.
+    #[must_use]
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::Held => "held at its last value",
+            Self::WithoutTrend => "estimator without trend state",
+            Self::WithTrend => "estimator with trend state",
+        }
+    }
+}
+
+/// What came of one care.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Course {
+    /// What was done.
+    pub care: Care,
+    /// Hours on its own, and the errors then.
+    pub points: Vec<(f64, Errors)>,
+    /// Drift that was left, at the same times (rad/s).
+    pub left: Vec<[f64; 3]>,
+}
+
+/// The figures of a course.
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]
+pub struct Figures {
+    /// Radial position error at the end (m).
+    pub radial_at_end_m: f64,
+    /// The largest on the way (m).
+    pub radial_largest_m: f64,
+    /// Heading error at the end (′).
+    pub heading_at_end_arcmin: f64,
+    /// The largest on the way (′).
+    pub heading_largest_arcmin: f64,
+}
+
+impl Course {
+    /// Its figures.
+    #[must_use]
+    pub fn figures(&self) -> Figures {
+        let end = self.points.last().map(|point| point.1).unwrap_or_default();
+        let largest = |of: &dyn Fn(&Errors) -> f64| self.points.iter().map(|point| of(&point.1)).fold(0.0, f64::max);
+        Figures {
+            radial_at_end_m: end.radial_m(),
+            radial_largest_m: largest(&Errors::radial_m),
+            heading_at_end_arcmin: end.heading_arcmin().abs(),
+            heading_largest_arcmin: largest(&|errors| errors.heading_arcmin().abs()),
+        }
+    }
+}
+
+impl Voyage {
+    /// Ticks of the calibration.
+    #[must_use]
+    pub fn calibration_ticks(&self) -> usize {
+        ticks(self.calibration_h)
+    }
+
+    /// Ticks of all.
+    #[must_use]
+    pub fn ticks(&self) -> usize {
+        self.calibration_ticks() + ticks(self.hours)
+    }
+
+    /// What comes of a drift (tick by tick from the calibration's beginning) under one care.
+    ///
+    /// # Errors
+    /// [`Error::Refused`]: everything that is wrong with the parts.
+    pub fn sail(&self, care: Care, drift: &Drift, parts: &[DriftParts; 3]) -> Result<Course, Error> {
+        let departure = self.calibration_ticks();
+        let left = match care {
+            Care::Held => {
+                let held = drift.held;
+                let less = |drift: &[f64; 3]| [drift[0] - held[0], drift[1] - held[1], drift[2] - held[2]];
+                drift.truth.iter().map(less).collect()
+            }
+            Care::WithoutTrend | Care::WithTrend => {
+                let aiding = Aiding {
+                    calibration_ticks: departure,
+                    level_afterwards: self.log_aids_level,
+                    reference_sigma_rad_per_s: self.reference_sigma_rad_per_s,
+                };
+                let parts = if care == Care::WithTrend { *parts } else { parts.each_ref().map(without_trend) };
+                residual(&drift.truth, &drift.measured, &parts, &aiding).map_err(Error::Refused)?
+            }
+        };
+        let alone = left.get(departure..).unwrap_or(&[]);
+        let step_s = STEP_S;
+        let mut ins = Ins::new(self.latitude_deg, self.turn_ratio, step_s);
+        let (mut points, mut kept) = (Vec::new(), Vec::new());
+        let mut hours = 0.0;
+        for (index, step) in alone.chunks_exact(STEP_TICKS).enumerate() {
+            let mut mean = [0.0; 3];
+            for drift in step {
+                mean.iter_mut().zip(drift).for_each(|(sum, drift)| *sum += drift * TICK_S / STEP_S);
+            }
+            ins.step(mean);
+            hours += step_s / 3600.0;
+            if (index + 1) % POINT_STEPS == 0 {
+                points.push((hours, ins.errors()));
+                kept.push(mean);
+            }
+        }
+        Ok(Course { care, points, left: kept })
+    }
+}
+
+/// Ticks of so many hours, whole steps of the error equations.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "hours are checked to be few")]
+fn ticks(hours: f64) -> usize {
+    let minutes = (hours * 60.0).round().max(0.0) as usize;
+    minutes * STEP_TICKS
+}

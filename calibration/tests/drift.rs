@@ -1,0 +1,259 @@
+//! `drift`: known noise in, its coefficients out; real logs; refusals; what goes into a document.
+
+mod drift_generator;
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use drift_generator::{Markov, Normal, recording};
+use isotherm_calibration::allan::deviation::lengths;
+use isotherm_calibration::allan::{Coefficient, Estimator, NoiseFit, Phase, Term};
+use isotherm_calibration::drift::markov::Fit;
+use isotherm_calibration::drift::slow::Slow;
+use isotherm_protocol::document::Document;
+use serde_json::Value;
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+fn calibrate(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_isotherm-calibrate")).args(arguments).output().unwrap()
+}
+
+fn json(arguments: &[&str]) -> Value {
+    let output = calibrate(arguments);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+fn fit(readings: &[f64], tick_s: f64) -> NoiseFit {
+    let phase = Phase::new([readings], 0.0);
+    let variances = lengths(readings.len(), 2).into_iter();
+    let variances: Vec<_> = variances.filter_map(|m| phase.variance(Estimator::Overlapping, m)).collect();
+    NoiseFit::of(&variances, tick_s).unwrap()
+}
+
+/// Seeds of a coefficient that is inside its stated interval, and how many there were.
+fn inside(found: &[NoiseFit], term: Term, truth: f64) -> (usize, usize) {
+    let seen = found.iter().filter_map(|fit| match fit.of_term(term) {
+        Coefficient::Observed { interval: [low, high], .. } => Some((*low..=*high).contains(&truth)),
+        Coefficient::NotObservable { .. } => None,
+    });
+    let seen: Vec<bool> = seen.collect();
+    (seen.iter().filter(|inside| **inside).count(), seen.len())
+}
+
+#[test]
+fn noise_coefficients_are_recovered_within_their_confidence() {
+    const SEEDS: u64 = 40;
+    const TICK_S: f64 = 0.01;
+    let (n, b, k) = (0.3, 0.3, 0.05);
+    let found: Vec<NoiseFit> = (0..SEEDS)
+        .map(|seed| {
+            let mut normal = Normal::new(seed);
+            let white = normal.white(1 << 16, n / TICK_S.sqrt());
+            let flicker = normal.flicker(1 << 16, b);
+            let walk = normal.random_walk(1 << 16, k * TICK_S.sqrt());
+            let sum: Vec<f64> = white.iter().zip(&flicker).zip(&walk).map(|((w, f), r)| w + f + r).collect();
+            fit(&sum, TICK_S)
+        })
+        .collect();
+    for (term, truth) in [(Term::AngleRandomWalk, n), (Term::BiasInstability, b), (Term::RateRandomWalk, k)] {
+        let (inside, seen) = inside(&found, term, truth);
+        println!("{}: inside {inside} of {seen} seen, {SEEDS} seeds", term.symbol());
+        // N is never missed; B and K hide behind each other in a few seeds, and then there is a limit.
+        assert!(seen * 10 >= SEEDS as usize * 7, "{}: seen in {seen}", term.symbol());
+        assert!(inside * 100 >= seen * 85, "{}: {inside} of {seen}", term.symbol());
+    }
+}
+
+#[test]
+fn what_is_not_there_is_not_observable() {
+    const SEEDS: u64 = 30;
+    let (mut wrong, mut limits) = (0, 0);
+    for seed in 100..100 + SEEDS {
+        let mut normal = Normal::new(seed);
+        let found = fit(&normal.white(1 << 15, 1.0), 1.0);
+        for term in [Term::Quantization, Term::BiasInstability, Term::RateRandomWalk, Term::RateRamp] {
+            match found.of_term(term) {
+                Coefficient::Observed { .. } => wrong += 1,
+                Coefficient::NotObservable { below } => limits += usize::from(below.is_finite() && *below >= 0.0),
+            }
+        }
+    }
+    println!("{wrong} of {} false", 4 * SEEDS);
+    assert!(wrong * 10 <= 4 * SEEDS as usize, "{wrong} coefficients out of nothing");
+    assert_eq!(wrong + limits, 4 * SEEDS as usize);
+    // A ramp is one.
+    let mut normal = Normal::new(7);
+    let ramp: Vec<f64> = normal.white(1 << 14, 1.0).iter().enumerate().map(|(t, w)| w + 1e-3 * t as f64).collect();
+    let Coefficient::Observed { value, .. } = *fit(&ramp, 1.0).of_term(Term::RateRamp) else { panic!("no ramp") };
+    assert!((value / 1e-3 - 1.0).abs() < 0.02, "{value}");
+}
+
+#[test]
+fn sigma_and_correlation_time_of_table_1_are_recovered() {
+    // Gyros of table 1: σ (°/h) and the middle of the correlation times (h); logs of 72 h, as 002's, with a trend and white
+    // noise of 0.002 °/√h over bins of 506 s.
+    let gyros = [(0.0040, 7.0), (0.0030, 7.5), (0.0035, 9.5), (0.0046, 11.0), (0.0029, 10.0), (0.0026, 10.0)];
+    const SEEDS: u64 = 24;
+    let (mut pulls, mut bounded) = (0, 0);
+    for (gyro, (sigma, tau)) in gyros.into_iter().enumerate() {
+        let (mut sigmas, mut taus) = (Vec::new(), Vec::new());
+        for seed in 0..SEEDS {
+            let slow = markov_log(sigma, tau, 8e-5, 72.0, seed * 10 + gyro as u64, &[]);
+            let (fit, _) = Fit::with_daily_lines(&slow, 1).unwrap();
+            let (Some(s), Some(t)) = (fit.sigma, fit.correlation_time_h) else { panic!("no drift seen") };
+            for (estimate, truth) in [(s, sigma), (t, tau)] {
+                if let Some([low, high]) = estimate.interval {
+                    bounded += 1;
+                    pulls += usize::from((low..=high).contains(&truth));
+                }
+            }
+            sigmas.push(s.value);
+            taus.push(t.value);
+        }
+        let middle = |values: &mut Vec<f64>| {
+            values.sort_by(f64::total_cmp);
+            values[values.len() / 2]
+        };
+        let (s, t) = (middle(&mut sigmas), middle(&mut taus));
+        println!("σ {sigma} → {s:.4}, τ {tau} → {t:.1}");
+        // Eight correlation times: one log's σ errs by a third; the middle of many must not.
+        assert!((s / sigma - 1.0).abs() < 0.25, "{s} {sigma}");
+        assert!((t / tau - 1.0).abs() < 0.5, "{t} {tau}");
+    }
+    println!("{pulls} of {bounded} inside their intervals");
+    assert!(bounded > 240 && pulls * 100 >= bounded * 85, "{pulls} of {bounded}");
+}
+
+/// Bins of a log of a Markov drift with a trend (per h), white noise and daily lines.
+fn markov_log(sigma: f64, tau_h: f64, trend: f64, length_h: f64, seed: u64, lines: &[(f64, f64)]) -> Slow {
+    let mut normal = Normal::new(seed);
+    let width_h = length_h / 512.0;
+    // Eight ticks in a bin.
+    let mut markov = Markov::new(&mut normal, sigma, width_h / 8.0 / tau_h);
+    let mut readings = Vec::new();
+    for k in 0..4096 {
+        let t = (f64::from(k) + 0.5) * width_h / 8.0;
+        let wave: f64 = lines.iter().map(|(a, period)| a * (std::f64::consts::TAU * t / period).sin()).sum();
+        let white = 0.002 / (width_h / 8.0).sqrt() * normal.next();
+        readings.push(9.0 + trend * t + wave + markov.next(&mut normal) + white);
+    }
+    Slow::of(&[(0, &readings)], 4096, width_h / 8.0 * 3600.0)
+}
+
+#[test]
+fn lines_of_the_hall_are_told_and_left_out_of_the_drift() {
+    const SEEDS: u64 = 20;
+    let (mut found, mut false_alarms, mut sigmas) = (0, 0, Vec::new());
+    for seed in 0..SEEDS {
+        let with = markov_log(0.0035, 9.5, 0.0, 240.0, seed, &[(0.006, 24.0), (0.004, 8.0)]);
+        let (fit, lines) = Fit::with_daily_lines(&with, 1).unwrap();
+        found += lines.iter().filter(|line| line.stands_out()).count();
+        sigmas.push(fit.sigma.unwrap().value);
+        let (_, lines) = Fit::with_daily_lines(&markov_log(0.0035, 9.5, 0.0, 240.0, seed, &[]), 1).unwrap();
+        assert_eq!(lines.len(), 2, "both are looked for");
+        false_alarms += lines.iter().filter(|line| line.stands_out()).count();
+    }
+    sigmas.sort_by(f64::total_cmp);
+    println!("{found} of {} found, {false_alarms} false", 2 * SEEDS);
+    assert!(found * 10 >= 2 * SEEDS as usize * 9, "{found}");
+    assert!(false_alarms <= 1, "{false_alarms}");
+    assert!((sigmas[10] / 0.0035 - 1.0).abs() < 0.2, "the lines do not count as drift: {}", sigmas[10]);
+}
+
+#[test]
+fn a_recording_is_analysed_and_its_parameters_go_into_a_document() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    // Ten hours at 1 Hz, N 0.01 °/√h, of a unit whose document is at hand.
+    let mut normal = Normal::new(3);
+    let rate = 0.01 * 60.0;
+    let column = |normal: &mut Normal, mean: f64| {
+        normal.white(36_000, rate).into_iter().map(|w| w + mean).collect::<Vec<_>>()
+    };
+    let columns = [column(&mut normal, 9.0), column(&mut normal, -3.0), column(&mut normal, 12.0)];
+    recording(Path::new(&path("static.mcap")), "FOG-0001", &columns, 1_000_000_000, |_| true);
+    let raw = json(&["drift", &path("static.mcap"), "--json", "--html", &path("drift.html")]);
+    for (sensor, mean) in raw["sensors"].as_array().unwrap().iter().zip([9.0, -3.0, 12.0]) {
+        assert!((sensor["mean"].as_f64().unwrap() - mean).abs() < 0.02);
+        let [low, high] = [0, 1].map(|end| sensor["noise"]["N"]["interval"][end].as_f64().unwrap());
+        assert!(low < 0.0102 && 0.0098 < high && high / low < 1.1, "{low} {high}");
+        assert!((sensor["drift"]["angle_random_walk_deg_per_sqrt_h"].as_f64().unwrap() / 0.01 - 1.0).abs() < 0.05);
+    }
+    let html = std::fs::read_to_string(path("drift.html")).unwrap();
+    assert!(html.contains("Allan deviation") && html.contains(raw["verdict"].as_str().unwrap()));
+
+    let document = root().join("config/calibration/FOG-0001.toml").display().to_string();
+    let arguments = ["drift", &path("static.mcap"), "--document", &document, "--out", &path("new.toml"), "--json"];
+    let corrected = json(&arguments);
+    assert_eq!(corrected["corrected"], true);
+    let text = std::fs::read_to_string(path("new.toml")).unwrap();
+    let new = Document::parse(&text, None).unwrap().document;
+    for (sensor, analysed) in new.gyro.sensor.iter().zip(corrected["sensors"].as_array().unwrap()) {
+        let drift = sensor.drift.as_ref().unwrap();
+        assert_eq!(drift.angle_random_walk_deg_per_sqrt_h, analysed["drift"]["angle_random_walk_deg_per_sqrt_h"]);
+        assert!((drift.angle_random_walk_deg_per_sqrt_h / 0.01 - 1.0).abs() < 0.05, "{drift:?}");
+    }
+    let details = new.origin.unwrap().details.unwrap();
+    assert_eq!(details["drift"]["log"][0]["name"].as_str(), Some("static.mcap"));
+    // Never over a file that is there, unless told so.
+    let again = calibrate(&arguments);
+    assert_eq!(again.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&again.stderr).contains("--overwrite"));
+}
+
+#[test]
+fn what_a_log_does_not_allow_is_refused_in_words() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let mut normal = Normal::new(5);
+    let good = normal.white(2000, 1.0);
+    let constant = vec![0.0; 2000];
+    let mut bad = good.clone();
+    bad.iter_mut().step_by(10).for_each(|reading| *reading = f64::NAN);
+    let write = |name: &str, columns: &[Vec<f64>; 3], keep: &dyn Fn(usize) -> bool| {
+        recording(Path::new(&path(name)), "U-1", columns, 10_000_000, keep);
+    };
+    let refusal = |arguments: &[&str]| {
+        let output = calibrate(arguments);
+        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    write("dead.mcap", &[good.clone(), constant.clone(), bad], &|_| true);
+    let (code, words) = refusal(&["drift", &path("dead.mcap")]);
+    assert_eq!(code, Some(1));
+    assert!(words.contains("gyro y: every reading is 0: the sensor is dead") && words.contains("gyro z: 200 of 2000"), "{words}");
+    write("short.mcap", &[good.clone(), good.clone(), good.clone()], &|index| index < 50);
+    let (code, words) = refusal(&["drift", &path("short.mcap")]);
+    assert!(code == Some(1) && words.contains("the log has 50 ticks, at least 64"), "{words}");
+    let (code, words) = refusal(&["drift", &path("short.mcap"), "--accelerometers"]);
+    assert!(code == Some(1) && words.contains("no accelerometer ticks"), "{words}");
+    write("gaps.mcap", &[good.clone(), good.clone(), good], &|index| !(500..700).contains(&index));
+    let gaps = json(&["drift", &path("gaps.mcap"), "--json"]);
+    assert!(gaps["notes"][0].as_str().unwrap().contains("1 gaps (200 ticks"), "{}", gaps["notes"]);
+    assert!(gaps["sensors"][0]["allan"].as_array().unwrap().len() > 6);
+    let (code, words) = refusal(&["drift", &path("gaps.mcap"), "--fit-hours", "0"]);
+    assert!(code == Some(2) && words.contains("--fit-hours is 0"), "{words}");
+}
+
+#[test]
+fn with_data_the_laser_gyro_log_has_its_mean_rates_and_noise() {
+    let folder = std::env::var_os("ISOTHERM_DATA").map_or_else(|| root().join("../shared/data"), PathBuf::from);
+    let log = folder.join("rlg-static/rlg-static.imu.gz").display().to_string();
+    if !Path::new(&log).exists() {
+        println!("skipped: no data at {log}");
+        return;
+    }
+    let mapping = root().join("config/mappings/rlg-static.toml").display().to_string();
+    let counts = calibrate(&["drift", &log, "--mapping", &mapping]);
+    assert_eq!(counts.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&counts.stderr).contains("--increment-weight"));
+    let report = json(&["drift", &log, "--mapping", &mapping, "--increment-weight", "0.1", "--json"]);
+    for (sensor, mean) in report["sensors"].as_array().unwrap().iter().zip([-12.265, 0.474, 8.354]) {
+        // The known answers are of the first 1800 s of 1847.
+        assert!((sensor["mean"].as_f64().unwrap() - mean).abs() < 0.02, "{}", sensor["mean"]);
+        assert!(sensor["noise"]["Q"]["value"].as_f64().is_some() || sensor["noise"]["N"]["value"].as_f64().is_some());
+    }
+}

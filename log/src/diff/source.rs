@@ -1,0 +1,244 @@
+//! Corrected logs, read tick by tick: recordings, and the CSV and wire files of `correct`.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Read};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use isotherm_protocol::codec::{self, MAX_FRAME};
+use isotherm_protocol::corrected::CorrectedBatch;
+use isotherm_protocol::journal::{Joiner, JournalEvent};
+use isotherm_protocol::key::UnitId;
+
+use super::tick::LogTick;
+use crate::error::Error;
+use crate::file::begins_with;
+use crate::message::{Message, Topic};
+use crate::offline::rows::{HEADER, read_tick};
+use crate::offline::unit_id;
+use crate::part::{LogFiles, Messages, Part};
+use crate::progress::Progress;
+use crate::recording::RecordingReport;
+use crate::replica::{entry_words, join};
+use crate::source::{LogReport, is_recording};
+
+/// Rows of a CSV that are read together.
+const ROWS: usize = 512;
+/// Longest row (bytes).
+const LONGEST_ROW: u64 = 1 << 16;
+
+/// Ticks of one unit, in order.
+#[derive(Debug)]
+pub struct Ticks {
+    /// The unit.
+    pub unit: UnitId,
+    /// Its ticks.
+    pub ticks: Vec<LogTick>,
+}
+
+/// A log of corrected ticks.
+#[derive(Debug)]
+pub struct CorrectedLog {
+    path: PathBuf,
+    source: Source,
+    progress: Progress,
+}
+
+#[derive(Debug)]
+enum Source {
+    Recording(Box<Recording>),
+    Csv { lines: BufReader<Counted>, unit: UnitId, line: u64 },
+    Wire { bytes: BufReader<Counted>, units: BTreeSet<UnitId>, frame: Vec<u8> },
+}
+
+#[derive(Debug)]
+struct Recording {
+    messages: Messages,
+    joiner: Joiner,
+    /// What happened since the last tick of a unit.
+    events: BTreeMap<UnitId, String>,
+    ready: VecDeque<Ticks>,
+}
+
+/// A file whose bytes are counted as they are read.
+#[derive(Debug)]
+struct Counted {
+    file: File,
+    read: Arc<AtomicU64>,
+}
+
+impl Read for Counted {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let count = self.file.read(buffer)?;
+        self.read.fetch_add(count as u64, Ordering::Relaxed);
+        Ok(count)
+    }
+}
+
+/// Whether a file is a CSV of corrected ticks, which does not say of which unit it is.
+#[must_use]
+pub fn is_csv(path: &Path) -> bool {
+    begins_with(path, HEADER.as_bytes())
+}
+
+impl CorrectedLog {
+    /// Opens a log: of `units`, all of a recording's where there are none; a CSV is of the first of them, or of `unnamed`.
+    ///
+    /// # Errors
+    /// [`Error::File`] where it cannot be opened.
+    pub fn open(path: &Path, units: &BTreeSet<UnitId>, unnamed: &UnitId) -> Result<Self, Error> {
+        let failed = |source| Error::file(path, "open the corrected log", source);
+        if is_recording(path) {
+            let part = Part { units: units.clone(), ..Part::default() };
+            let messages = LogFiles::Recordings(vec![path.to_owned()]).open(&part)?;
+            let progress = messages.progress();
+            let recording = Recording {
+                messages,
+                joiner: Joiner::new(),
+                events: BTreeMap::new(),
+                ready: VecDeque::new(),
+            };
+            return Ok(Self {
+                path: path.to_owned(),
+                source: Source::Recording(Box::new(recording)),
+                progress,
+            });
+        }
+        let csv = is_csv(path);
+        let file = File::open(path).map_err(failed)?;
+        let length = file.metadata().map_err(failed)?.len();
+        let read = Arc::new(AtomicU64::new(0));
+        let progress = Progress::new(Arc::clone(&read), length);
+        let bytes = BufReader::with_capacity(1 << 16, Counted { file, read });
+        let source = if csv {
+            Source::Csv { lines: bytes, unit: units.first().unwrap_or(unnamed).clone(), line: 0 }
+        } else {
+            Source::Wire { bytes, units: units.clone(), frame: Vec::new() }
+        };
+        Ok(Self { path: path.to_owned(), source, progress })
+    }
+
+    /// The next ticks; `None` behind the last.
+    ///
+    /// # Errors
+    /// [`Error::File`], also where the file is no corrected log.
+    pub fn next_ticks(&mut self) -> Result<Option<Ticks>, Error> {
+        let path = &self.path;
+        let failed = |source| Error::file(path, "read the corrected log", source);
+        match &mut self.source {
+            Source::Recording(recording) => recording.next_ticks(),
+            Source::Csv { lines, unit, line } => {
+                let ticks = read_rows(lines, line).map_err(failed)?;
+                Ok((!ticks.is_empty()).then(|| Ticks { unit: unit.clone(), ticks }))
+            }
+            Source::Wire { bytes, units, frame } => loop {
+                let Some(batch) = read_frame(bytes, frame).map_err(failed)? else { return Ok(None) };
+                let ticks = ticks_of(&batch)?;
+                if units.is_empty() || units.contains(&ticks.unit) {
+                    return Ok(Some(ticks));
+                }
+            },
+        }
+    }
+
+    /// How far it has been read.
+    #[must_use]
+    pub fn progress(&self) -> Progress {
+        self.progress.clone()
+    }
+
+    /// Why it was not read to its end, if it was not.
+    #[must_use]
+    pub fn cut_short(&self) -> Option<String> {
+        match &self.source {
+            Source::Recording(recording) => match recording.messages.report() {
+                LogReport::Recording(RecordingReport { cut_short, .. }) => cut_short,
+                LogReport::Text(_) => None,
+            },
+            Source::Csv { .. } | Source::Wire { .. } => None,
+        }
+    }
+}
+
+impl Recording {
+    fn next_ticks(&mut self) -> Result<Option<Ticks>, Error> {
+        while self.ready.is_empty() {
+            let Some(Message { topic, frame, .. }) = self.messages.next_message()? else { return Ok(None) };
+            match topic {
+                Topic::Corrected(unit) => {
+                    // A frame that cannot be read is missing: its ticks will be.
+                    let Ok(batch) = codec::decode::<CorrectedBatch>(&frame) else { continue };
+                    let mut ticks = Ticks { unit, ..ticks_of(&batch)? };
+                    let event = self.events.remove(&ticks.unit);
+                    if let (Some(first), Some(event)) = (ticks.ticks.first_mut(), event) {
+                        first.event = Some(event.into());
+                    }
+                    self.ready.push_back(ticks);
+                }
+                Topic::Journal(unit) => {
+                    if let Ok(Some(entry)) = join(&mut self.joiner, &frame)
+                        && !matches!(entry.event, JournalEvent::Memory { .. })
+                    {
+                        self.events.insert(unit, entry_words(&entry));
+                    }
+                }
+                _ => {}
+            }
+        }
+        Ok(self.ready.pop_front())
+    }
+}
+
+/// The ticks of a batch.
+pub(crate) fn ticks_of(batch: &CorrectedBatch) -> Result<Ticks, Error> {
+    let CorrectedBatch { unit, revision, ticks, .. } = batch;
+    let digest = (revision.counter > 0).then_some(revision.digest);
+    let tick = |tick: &isotherm_protocol::corrected::CorrectedTick| LogTick {
+        tick: tick.to_core(revision.counter),
+        digest,
+        event: None,
+    };
+    Ok(Ticks { unit: unit_id(unit)?, ticks: ticks.iter().map(tick).collect() })
+}
+
+/// The next rows of a CSV.
+fn read_rows(lines: &mut impl BufRead, line: &mut u64) -> io::Result<Vec<LogTick>> {
+    let mut ticks = Vec::new();
+    let mut row = String::new();
+    while ticks.len() < ROWS {
+        row.clear();
+        if lines.by_ref().take(LONGEST_ROW).read_line(&mut row)? == 0 {
+            break;
+        }
+        *line += 1;
+        let row = row.trim_end();
+        if *line == 1 && row == HEADER {
+            continue;
+        }
+        let tick = read_tick(row).map_err(|words| io::Error::other(format!("line {line}: {words}")))?;
+        ticks.push(LogTick { tick, ..LogTick::default() });
+    }
+    Ok(ticks)
+}
+
+/// The next frame behind its length.
+fn read_frame(bytes: &mut impl BufRead, frame: &mut Vec<u8>) -> io::Result<Option<CorrectedBatch>> {
+    let other =
+        |words: String| io::Error::other(format!("{words}: is it a corrected log (MCAP, CSV or wire)?"));
+    if bytes.fill_buf()?.is_empty() {
+        return Ok(None);
+    }
+    let mut length = [0; 4];
+    bytes.read_exact(&mut length)?;
+    let length = u32::from_le_bytes(length);
+    if length as usize > MAX_FRAME {
+        return Err(other(format!("a frame of {length} bytes, longer than any")));
+    }
+    frame.clear();
+    if bytes.take(u64::from(length)).read_to_end(frame)? < length as usize {
+        return Err(other("it ends in the middle of a frame".to_owned()));
+    }
+    codec::decode(frame).map(Some).map_err(|error| other(error.to_string()))
+}

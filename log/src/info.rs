@@ -1,0 +1,309 @@
+//! What a log holds: topics, rates, gaps, jitter, temperatures, switches, calibrations, commands.
+//!
+//! [`Survey`] takes the messages of a log one by one and keeps figures only: its memory grows with the number of topics,
+//! never with the length of the log. Lists (swaps, commands, states, revisions) are bounded too, each with its count beside it.
+//!
+//! | module | holds |
+//! |---|---|
+//! | `histogram` | distributions of times: median and 99th percentile in fixed memory |
+//! | `sequence` | gaps, duplicates, late ticks, beginnings anew |
+//! | `timing` | reception against the producer's clock |
+//! | `topic` | one stream: rate, intervals, and the above |
+//! | `raw`, `corrected`, `journal` | what is special to these |
+//! | `files` | sizes, chunks, whether a recording is whole |
+
+mod corrected;
+mod files;
+mod histogram;
+mod journal;
+mod raw;
+mod sequence;
+#[cfg(test)]
+mod tests;
+mod timing;
+mod topic;
+
+use std::collections::BTreeMap;
+
+use isotherm_protocol::codec::{self, CodecError};
+use isotherm_protocol::corrected::CorrectedBatch;
+use isotherm_protocol::key::{RawStream, UnitId};
+use isotherm_protocol::raw::{AccelBatch, GyroBatch, HealthBatch, TemperatureBatch};
+use isotherm_protocol::reference::Reference;
+use isotherm_protocol::service_status::ServiceStatus;
+use isotherm_protocol::status::Status;
+use serde::Serialize;
+
+use crate::message::{Message, Topic};
+use crate::recording::{Attachment, Metadata};
+use crate::source::LogReport;
+
+pub use corrected::{AppliedInfo, CorrectedInfo, RevisionInfo};
+pub use files::{ChunksInfo, FileInfo};
+pub use histogram::Spread;
+pub use journal::{CommandInfo, JournalInfo, StateInfo, StatusInfo, SwapInfo};
+pub use raw::{ModeInfo, ReadingInfo, Readings};
+pub use sequence::{Gap, Gaps, Order};
+pub use timing::Jitter;
+pub use topic::{LongestInterval, Rate, TopicInfo};
+
+use corrected::CorrectedSurvey;
+use journal::JournalSurvey;
+use raw::Modes;
+use sequence::Place;
+use topic::TopicSurvey;
+
+/// Most topics of no unit, attachments and metadata records that are told one by one.
+const MAX_LISTED: usize = 1024;
+
+/// A file inside a recording.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct AttachmentInfo {
+    /// Its name.
+    pub name: String,
+    /// Its media type.
+    pub media_type: String,
+    /// When it was attached (ns since 1970-01-01 UTC).
+    pub attached_ns: u64,
+    /// Its length.
+    pub bytes: u64,
+}
+
+/// What a log holds of one unit.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct UnitInfo {
+    /// Its topics, in the order of their keys.
+    pub topics: Vec<TopicInfo>,
+    /// Raw temperatures by channel, as they were sent.
+    pub temperatures: Readings,
+    /// Lasing modes; `None` for an instrument without.
+    pub modes: Option<ModeInfo>,
+    /// What the producer reported of the instrument, by name.
+    pub health: Readings,
+    /// Corrected ticks; `None` where there is none.
+    pub corrected: Option<CorrectedInfo>,
+    /// States, from the statuses; `None` where there is none.
+    pub status: Option<StatusInfo>,
+    /// Swaps and commands; `None` without a journal.
+    pub journal: Option<JournalInfo>,
+}
+
+/// What a log holds.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LogInfo {
+    /// Its files.
+    pub files: Vec<FileInfo>,
+    /// What reading it came to.
+    pub reading: LogReport,
+    /// When the first message was received (ns since 1970-01-01 UTC); `None` for text logs.
+    pub first_received_ns: Option<u64>,
+    /// The same of the last.
+    pub last_received_ns: Option<u64>,
+    /// Units by their serial.
+    pub units: BTreeMap<String, UnitInfo>,
+    /// Topics of no unit.
+    pub other_topics: Vec<TopicInfo>,
+    /// Messages of further topics of no unit, beyond 1024.
+    pub other_messages: u64,
+    /// Versions of the services that were heard.
+    pub service_versions: Vec<String>,
+    /// Files inside the recordings, the first 1024.
+    pub attachments: Vec<AttachmentInfo>,
+    /// What the recorder wrote down: versions, when and how, counts.
+    pub metadata: Vec<Metadata>,
+}
+
+/// Looks at the messages of a log, one by one.
+#[derive(Debug, Default)]
+pub struct Survey {
+    recording: bool,
+    units: BTreeMap<UnitId, UnitSurvey>,
+    others: BTreeMap<String, TopicSurvey>,
+    other_messages: u64,
+    service_versions: Vec<String>,
+    attachments: Vec<AttachmentInfo>,
+    metadata: Vec<Metadata>,
+    received_ns: Option<[u64; 2]>,
+    ticks: u64,
+}
+
+/// One unit.
+#[derive(Debug, Default)]
+struct UnitSurvey {
+    topics: BTreeMap<Topic, TopicSurvey>,
+    temperatures: Readings,
+    modes: Modes,
+    health: Readings,
+    corrected: CorrectedSurvey,
+    status: StatusInfo,
+    journal: JournalSurvey,
+}
+
+impl Survey {
+    /// Nothing seen yet; receive times say something where the log is a recording.
+    #[must_use]
+    pub fn new(recording: bool) -> Self {
+        Self { recording, ..Self::default() }
+    }
+
+    /// Takes the next message.
+    pub fn take(&mut self, message: &Message) {
+        let received = message.received_ns;
+        let range = self.received_ns.get_or_insert([received; 2]);
+        *range = [range[0].min(received), range[1].max(received)];
+        if let Some(unit) = message.topic.unit() {
+            let unit = match self.units.get_mut(unit) {
+                Some(unit) => unit,
+                None => self.units.entry(unit.clone()).or_default(),
+            };
+            self.ticks += unit.take(message);
+            return;
+        }
+        let key = message.topic.key();
+        if !self.others.contains_key(&key) && self.others.len() == MAX_LISTED {
+            self.other_messages += 1;
+            return;
+        }
+        let topic = self.others.entry(key).or_insert_with_key(|key| TopicSurvey::new(key.clone()));
+        topic.message(&message.frame);
+        if let Topic::Service(_) = message.topic {
+            match codec::decode::<ServiceStatus>(&message.frame) {
+                Ok(status) => remember(&mut self.service_versions, status.version),
+                Err(error) => topic.unreadable(&error),
+            }
+        }
+    }
+
+    /// Takes what a recording holds beside messages.
+    pub fn beside(&mut self, attachments: Vec<Attachment>, metadata: Vec<Metadata>) {
+        let room = MAX_LISTED.saturating_sub(self.attachments.len());
+        self.attachments.extend(attachments.into_iter().take(room).map(|attachment| AttachmentInfo {
+            bytes: attachment.bytes.len() as u64,
+            name: attachment.name,
+            media_type: attachment.media_type,
+            attached_ns: attachment.attached_ns,
+        }));
+        let room = MAX_LISTED.saturating_sub(self.metadata.len());
+        self.metadata.extend(metadata.into_iter().take(room));
+    }
+
+    /// Ticks so far, raw and corrected.
+    #[must_use]
+    pub fn ticks(&self) -> u64 {
+        self.ticks
+    }
+
+    /// What it comes to.
+    #[must_use]
+    pub fn finish(self, files: Vec<FileInfo>, reading: LogReport) -> LogInfo {
+        let recording = self.recording;
+        let received = self.received_ns.filter(|_| recording);
+        let finished = |topics: Vec<TopicSurvey>| {
+            topics.into_iter().map(|topic| topic.finish(recording)).collect::<Vec<_>>()
+        };
+        let units = self.units.into_iter().map(|(unit, survey)| {
+            let info = UnitInfo {
+                topics: finished(survey.topics.into_values().collect()),
+                temperatures: survey.temperatures,
+                modes: survey.modes.finish(),
+                health: survey.health,
+                corrected: survey.corrected.finish(),
+                status: (!survey.status.states.is_empty()).then_some(survey.status),
+                journal: survey.journal.finish(),
+            };
+            (unit.to_string(), info)
+        });
+        LogInfo {
+            files,
+            reading,
+            first_received_ns: received.map(|[first, _]| first),
+            last_received_ns: received.map(|[_, last]| last),
+            units: units.collect(),
+            other_topics: finished(self.others.into_values().collect()),
+            other_messages: self.other_messages,
+            service_versions: self.service_versions,
+            attachments: self.attachments,
+            metadata: self.metadata,
+        }
+    }
+}
+
+impl UnitSurvey {
+    /// Takes a message; how many ticks are in it.
+    fn take(&mut self, message: &Message) -> u64 {
+        let Message { topic, received_ns, frame } = message;
+        let mut survey = match self.topics.remove(topic) {
+            Some(survey) => survey,
+            None => TopicSurvey::new(topic.key()),
+        };
+        survey.message(frame);
+        let before = survey.count();
+        if let Err(error) = self.read(topic, *received_ns, frame, &mut survey) {
+            survey.unreadable(&error);
+        }
+        let ticks = survey.count() - before;
+        self.topics.insert(topic.clone(), survey);
+        ticks
+    }
+
+    fn read(
+        &mut self,
+        topic: &Topic,
+        received_ns: u64,
+        frame: &[u8],
+        survey: &mut TopicSurvey,
+    ) -> Result<(), CodecError> {
+        match topic {
+            Topic::Raw(_, RawStream::Gyro) => {
+                let batch: GyroBatch = codec::decode(frame)?;
+                let times = batch.ticks.iter().map(|tick| (tick.end_time_ns, tick.duration_ns));
+                match survey.ticks(batch.series, batch.first_sequence, received_ns, times) {
+                    Place::Old => {}
+                    place => self.modes.take(&batch, place == Place::Start),
+                }
+            }
+            Topic::Raw(_, RawStream::Accel) => {
+                let batch: AccelBatch = codec::decode(frame)?;
+                let times = batch.ticks.iter().map(|tick| (tick.end_time_ns, tick.duration_ns));
+                survey.ticks(0, batch.first_sequence, received_ns, times);
+            }
+            Topic::Raw(_, RawStream::Temperature) => {
+                let batch: TemperatureBatch = codec::decode(frame)?;
+                survey.readings(received_ns, batch.ticks.iter().map(|tick| tick.time_ns));
+                self.temperatures.temperatures(&batch);
+            }
+            Topic::Raw(_, RawStream::Health) => {
+                let batch: HealthBatch = codec::decode(frame)?;
+                survey.readings(received_ns, batch.ticks.iter().map(|tick| tick.time_ns));
+                self.health.health(&batch);
+            }
+            Topic::Reference(_) => {
+                let reference: Reference = codec::decode(frame)?;
+                survey.readings(received_ns, std::iter::once(reference.end_ns));
+            }
+            Topic::Corrected(_) => {
+                let batch: CorrectedBatch = codec::decode(frame)?;
+                // A batch may have gaps between its ticks, and an output may stand for several raw ticks.
+                for tick in &batch.ticks {
+                    let first = tick.sequence.saturating_sub(u64::from(tick.ticks.saturating_sub(1)));
+                    survey.outputs(first, u64::from(tick.ticks.max(1)), tick.end_time_ns, tick.duration_ns);
+                }
+                if let Some(last) = batch.ticks.last() {
+                    survey.received(received_ns, last.end_time_ns);
+                }
+                self.corrected.take(&batch);
+            }
+            Topic::Status(_) => self.status.take(received_ns, &codec::decode::<Status>(frame)?),
+            Topic::Journal(_) => self.journal.take(received_ns, frame)?,
+            Topic::Service(_) | Topic::Other(_) => {}
+        }
+        Ok(())
+    }
+}
+
+/// Notes a value that is not in the list yet.
+fn remember(list: &mut Vec<String>, value: String) {
+    if !list.contains(&value) && list.len() < MAX_LISTED {
+        list.push(value);
+    }
+}

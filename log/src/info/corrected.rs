@@ -1,0 +1,134 @@
+//! What the corrected topic of a unit says beside its ticks.
+
+use std::collections::BTreeMap;
+
+use isotherm_correction::sample::{SensorFlags, TickFlags};
+use isotherm_protocol::corrected::{CorrectedBatch, Revision};
+use serde::Serialize;
+
+/// Most revisions and channels that are told one by one.
+const MAX_LISTED: usize = 1024;
+
+/// The first tick of a calibration revision.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct RevisionInfo {
+    /// The revision.
+    #[serde(flatten)]
+    pub revision: Revision,
+    /// Sequence number of its first tick.
+    pub first_sequence: u64,
+    /// End of that tick (ns on the producer's clock).
+    pub first_end_ns: i64,
+}
+
+/// The range of a temperature as it was applied.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct AppliedInfo {
+    /// The lowest (°C).
+    pub min_deg_c: f64,
+    /// The highest (°C).
+    pub max_deg_c: f64,
+    /// The largest magnitude of its rate (°C/s).
+    pub max_rate_deg_c_per_s: f64,
+}
+
+/// What the corrected ticks come to.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct CorrectedInfo {
+    /// Outputs.
+    pub outputs: u64,
+    /// Raw ticks in them.
+    pub ticks: u64,
+    /// Outputs that announce a gap before them.
+    pub gaps: u64,
+    /// Raw ticks announced as missing.
+    pub missed_ticks: u64,
+    /// Most raw ticks missing in one of these gaps.
+    pub longest_gap_ticks: u64,
+    /// Outputs with each flag that occurred.
+    pub flags: BTreeMap<&'static str, u64>,
+    /// Outputs in which any sensor has a flag other than `VALID`, for each that occurred.
+    pub sensor_flags: BTreeMap<&'static str, u64>,
+    /// Revisions in the order of their first ticks, the first 1024 of them.
+    pub revisions: Vec<RevisionInfo>,
+    /// Changes from one revision to another.
+    pub revision_changes: u64,
+    /// Temperatures applied, by channel.
+    pub temperatures: BTreeMap<String, AppliedInfo>,
+}
+
+/// Follows the corrected ticks.
+#[derive(Debug, Clone, Default)]
+pub(super) struct CorrectedSurvey {
+    info: CorrectedInfo,
+    revision: Option<Revision>,
+    flags: [u64; 16],
+    sensor_flags: [u64; 8],
+}
+
+impl CorrectedSurvey {
+    pub(super) fn take(&mut self, batch: &CorrectedBatch) {
+        let info = &mut self.info;
+        if self.revision != Some(batch.revision) {
+            info.revision_changes += u64::from(self.revision.is_some());
+            self.revision = Some(batch.revision);
+            if let Some(first) = batch.ticks.first()
+                && info.revisions.len() < MAX_LISTED
+            {
+                let first_sequence = first.sequence.saturating_sub(u64::from(first.ticks.saturating_sub(1)));
+                let first_end_ns = first.end_time_ns;
+                info.revisions.push(RevisionInfo { revision: batch.revision, first_sequence, first_end_ns });
+            }
+        }
+        for tick in &batch.ticks {
+            info.outputs += 1;
+            info.ticks += u64::from(tick.ticks);
+            info.gaps += u64::from(tick.missed > 0);
+            info.missed_ticks = info.missed_ticks.saturating_add(tick.missed);
+            info.longest_gap_ticks = info.longest_gap_ticks.max(tick.missed);
+            count(&mut self.flags, tick.flags);
+            let sensors = tick.gyro_flags.iter().chain(&tick.accel_flags);
+            let any = sensors.fold(0, |bits, flags| bits | flags) & !SensorFlags::VALID.bits();
+            count(&mut self.sensor_flags, u16::from(any));
+        }
+        for applied in &batch.temperatures {
+            let (value, rate) = (applied.temperature_deg_c, applied.rate_deg_c_per_s.abs());
+            let channel = applied.channel.as_str();
+            if !info.temperatures.contains_key(channel) && info.temperatures.len() < MAX_LISTED {
+                let new = AppliedInfo { min_deg_c: value, max_deg_c: value, max_rate_deg_c_per_s: rate };
+                info.temperatures.insert(channel.to_owned(), new);
+            }
+            if let Some(range) = info.temperatures.get_mut(channel) {
+                range.min_deg_c = range.min_deg_c.min(value);
+                range.max_deg_c = range.max_deg_c.max(value);
+                range.max_rate_deg_c_per_s = range.max_rate_deg_c_per_s.max(rate);
+            }
+        }
+    }
+
+    pub(super) fn finish(self) -> Option<CorrectedInfo> {
+        let mut info = self.info;
+        let flags = TickFlags::all().iter_names().map(|(name, flag)| (name, flag.bits()));
+        info.flags = named(flags, &self.flags);
+        let flags = SensorFlags::all().iter_names().map(|(name, flag)| (name, u16::from(flag.bits())));
+        info.sensor_flags = named(flags, &self.sensor_flags);
+        (info.outputs > 0).then_some(info)
+    }
+}
+
+/// Counts the bits that are set.
+fn count(counts: &mut [u64], bits: u16) {
+    let mut rest = bits;
+    while rest != 0 {
+        if let Some(count) = counts.get_mut(rest.trailing_zeros() as usize) {
+            *count += 1;
+        }
+        rest &= rest - 1;
+    }
+}
+
+/// Counts by the names of their bits, those that occurred.
+fn named(flags: impl Iterator<Item = (&'static str, u16)>, counts: &[u64]) -> BTreeMap<&'static str, u64> {
+    let counted = flags.filter_map(|(name, bits)| Some((name, *counts.get(bits.trailing_zeros() as usize)?)));
+    counted.filter(|(_, count)| *count > 0).collect()
+}

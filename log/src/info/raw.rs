@@ -1,0 +1,148 @@
+//! What the raw topics of a unit say beside their ticks: temperatures, modes, health.
+
+use std::collections::BTreeMap;
+
+use isotherm_protocol::raw::{GyroBatch, HealthBatch, Mode, TemperatureBatch};
+use serde::Serialize;
+
+use super::histogram::{Histogram, Spread};
+
+/// Most channels or health readings that are told apart; others are counted.
+const MAX_NAMES: usize = 256;
+
+/// Readings of one name.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct ReadingInfo {
+    /// Readings that are numbers.
+    pub readings: u64,
+    /// Readings that are none.
+    pub missing: u64,
+    /// The smallest, as it was sent: V, counts or °C.
+    pub min: f64,
+    /// The largest, likewise.
+    pub max: f64,
+    /// The first, likewise.
+    pub first: f64,
+    /// The last, likewise.
+    pub last: f64,
+}
+
+/// Readings by their name.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Readings {
+    /// Each name and its readings.
+    #[serde(flatten)]
+    pub by_name: BTreeMap<String, ReadingInfo>,
+    /// Readings of further names, beyond 256.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub others: u64,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands a reference over")]
+fn is_zero(count: &u64) -> bool {
+    *count == 0
+}
+
+impl Readings {
+    fn add(&mut self, name: &str, value: f64) {
+        if !self.by_name.contains_key(name) {
+            if self.by_name.len() == MAX_NAMES {
+                self.others += 1;
+                return;
+            }
+            self.by_name.insert(name.to_owned(), ReadingInfo::default());
+        }
+        let Some(info) = self.by_name.get_mut(name) else { return };
+        if !value.is_finite() {
+            info.missing += 1;
+            return;
+        }
+        if info.readings == 0 {
+            (info.min, info.max, info.first) = (value, value, value);
+        }
+        info.readings += 1;
+        (info.min, info.max, info.last) = (info.min.min(value), info.max.max(value), value);
+    }
+
+    /// Whether there is none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.by_name.is_empty()
+    }
+
+    pub(super) fn temperatures(&mut self, batch: &TemperatureBatch) {
+        for tick in &batch.ticks {
+            for (channel, &raw) in batch.channels.iter().zip(&tick.raw) {
+                self.add(channel, raw);
+            }
+        }
+    }
+
+    pub(super) fn health(&mut self, batch: &HealthBatch) {
+        for reading in batch.ticks.iter().flat_map(|tick| &tick.readings) {
+            self.add(&reading.name, reading.value);
+        }
+    }
+}
+
+/// The lasing modes of a unit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct ModeInfo {
+    /// Ticks in mode +1.
+    pub plus_ticks: u64,
+    /// Ticks in mode −1.
+    pub minus_ticks: u64,
+    /// Ticks in which another mode is commanded than in the one before.
+    pub changes: u64,
+    /// Ticks at whose start a switch was commanded.
+    pub switch_commands: u64,
+    /// Time from each change to the next; a whole period is two of them. `None` for fewer than two.
+    pub between_changes: Option<Spread>,
+}
+
+/// Follows the lasing modes.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Modes {
+    ticks: [u64; 2],
+    changes: u64,
+    commands: u64,
+    mode: Option<Mode>,
+    changed_ns: Option<i64>,
+    between: Histogram,
+}
+
+impl Modes {
+    /// Takes ticks that go on from those before, or begin anew.
+    pub(super) fn take(&mut self, batch: &GyroBatch, anew: bool) {
+        if anew {
+            (self.mode, self.changed_ns) = (None, None);
+        }
+        for tick in &batch.ticks {
+            self.commands += u64::from(tick.switch_command);
+            match tick.mode {
+                Some(Mode::Plus) => self.ticks[0] += 1,
+                Some(Mode::Minus) => self.ticks[1] += 1,
+                None => continue,
+            }
+            if self.mode.is_some_and(|mode| Some(mode) != tick.mode) {
+                self.changes += 1;
+                if let Some(before) = self.changed_ns.replace(tick.end_time_ns) {
+                    self.between.add(tick.end_time_ns.saturating_sub(before).max(0).unsigned_abs());
+                }
+            }
+            self.mode = tick.mode;
+        }
+    }
+
+    /// What it comes to; `None` for an instrument without modes.
+    pub(super) fn finish(self) -> Option<ModeInfo> {
+        let [plus_ticks, minus_ticks] = self.ticks;
+        (plus_ticks + minus_ticks + self.commands > 0).then(|| ModeInfo {
+            plus_ticks,
+            minus_ticks,
+            changes: self.changes,
+            switch_commands: self.commands,
+            between_changes: self.between.spread(),
+        })
+    }
+}

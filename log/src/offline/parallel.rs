@@ -1,0 +1,177 @@
+//! Several units of a recording at once: one thread reads, others correct, the caller's writes.
+//!
+//! The recording is read in blocks of messages. Each unit belongs to one worker, which gets the unit's messages of every
+//! block in recorded order; what the workers make of a block is put together again by unit before the next. So neither
+//! the number of threads nor their timing reaches a result, and only a few blocks are in memory at a time.
+
+use std::collections::BTreeMap;
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::thread;
+
+use super::unit::{Form, Output, UnitPlan, UnitReport, UnitWork};
+use crate::diff::DiffOptions;
+use crate::error::Error;
+use crate::message::Message;
+use crate::part::{LogFiles, Part};
+use crate::progress::Progress;
+use crate::source::LogReport;
+
+/// Messages in one block.
+const BLOCK: usize = 1024;
+/// Blocks between two threads.
+const DEPTH: usize = 4;
+
+/// How units are corrected.
+#[derive(Debug, Clone, Copy)]
+pub struct RunOptions {
+    /// Threads that correct (≥ 1); the results do not depend on it.
+    pub threads: usize,
+    /// What is made of corrected ticks.
+    pub form: Form,
+    /// Ticks that were made of messages received earlier are not given out (ns since 1970-01-01 UTC).
+    pub from_ns: u64,
+    /// How ticks are compared with those that the service published.
+    pub diff: DiffOptions,
+}
+
+/// What has been made of one block: by the unit's place in the plans, in that order.
+pub type Made = Vec<(usize, Output)>;
+
+/// Messages of one block for one worker, by the unit's place in the plans.
+type Job = Vec<(usize, Message)>;
+
+/// Corrects the units of a log; `each` takes what is made of them, block by block.
+///
+/// # Errors
+/// Those of reading and of `each`.
+pub fn correct(
+    files: &LogFiles,
+    part: &Part,
+    plans: Vec<UnitPlan>,
+    options: RunOptions,
+    each: &mut dyn FnMut(Made, &Progress) -> Result<(), Error>,
+) -> Result<(Vec<UnitReport>, LogReport), Error> {
+    let workers = options.threads.clamp(1, plans.len().max(1));
+    let places: BTreeMap<_, _> =
+        plans.iter().enumerate().map(|(place, plan)| (plan.id.clone(), place)).collect();
+    let mut of_worker: Vec<Vec<(usize, UnitWork)>> = (0..workers).map(|_| Vec::new()).collect();
+    for (place, plan) in plans.into_iter().enumerate() {
+        let work = UnitWork::new(plan, options.form, options.from_ns, options.diff);
+        if let Some(works) = of_worker.get_mut(place % workers) {
+            works.push((place, work));
+        }
+    }
+    thread::scope(|scope| {
+        let (mut jobs, mut made, mut running) = (Vec::new(), Vec::new(), Vec::new());
+        for works in of_worker {
+            let (job_sender, job_receiver) = sync_channel::<Job>(DEPTH);
+            let (made_sender, made_receiver) = sync_channel::<Made>(DEPTH);
+            jobs.push(job_sender);
+            made.push(made_receiver);
+            running.push(scope.spawn(move || work(works, &job_receiver, &made_sender)));
+        }
+        let (progress_sender, progress_receiver) = sync_channel(1);
+        let places = &places;
+        let reading = scope.spawn(move || read(files, part, places, &jobs, &progress_sender));
+        let taken = match progress_receiver.recv() {
+            Ok(progress) => put_together(&made, &mut |block| each(block, &progress)),
+            // It could not be opened: the reader says why.
+            Err(_) => Ok(()),
+        };
+        // Whoever still waits to hand something over need not.
+        drop(made);
+        let report = joined(reading.join());
+        let mut reports = Vec::new();
+        for worker in running {
+            reports.extend(joined(worker.join()));
+        }
+        taken?;
+        reports.sort_by_key(|(place, _)| *place);
+        Ok((reports.into_iter().map(|(_, report)| report).collect(), report?))
+    })
+}
+
+/// What a thread has ended with; its panic is the caller's.
+fn joined<T>(ended: thread::Result<T>) -> T {
+    ended.unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+}
+
+/// Reads the log and hands each worker its messages.
+fn read(
+    files: &LogFiles,
+    part: &Part,
+    places: &BTreeMap<isotherm_protocol::key::UnitId, usize>,
+    jobs: &[SyncSender<Job>],
+    progress: &SyncSender<Progress>,
+) -> Result<LogReport, Error> {
+    let mut messages = files.open(part)?;
+    // The caller waits for it.
+    let _ = progress.send(messages.progress());
+    let mut over = false;
+    while !over {
+        let mut block: Vec<Job> = jobs.iter().map(|_| Vec::new()).collect();
+        for _ in 0..BLOCK {
+            let Some(message) = messages.next_message()? else {
+                over = true;
+                break;
+            };
+            let place = message.topic.unit().and_then(|unit| places.get(unit)).copied();
+            if let Some(place) = place
+                && let Some(job) = block.get_mut(place % jobs.len())
+            {
+                job.push((place, message));
+            }
+        }
+        for (job, worker) in block.into_iter().zip(jobs) {
+            if worker.send(job).is_err() {
+                // Nobody wants it any more.
+                return Ok(messages.report());
+            }
+        }
+    }
+    Ok(messages.report())
+}
+
+/// Corrects the units of one worker.
+fn work(
+    mut works: Vec<(usize, UnitWork)>,
+    jobs: &Receiver<Job>,
+    made: &SyncSender<Made>,
+) -> Vec<(usize, UnitReport)> {
+    let end_block = |works: &mut Vec<(usize, UnitWork)>| {
+        made.send(works.iter_mut().map(|(place, work)| (*place, work.output())).collect()).is_ok()
+    };
+    for job in jobs {
+        for (place, message) in job {
+            if let Ok(index) = works.binary_search_by_key(&place, |(place, _)| *place)
+                && let Some((_, work)) = works.get_mut(index)
+            {
+                work.take(message);
+            }
+        }
+        if !end_block(&mut works) {
+            break;
+        }
+    }
+    for (_, work) in &mut works {
+        work.finish();
+    }
+    end_block(&mut works);
+    works.into_iter().map(|(place, work)| (place, work.report())).collect()
+}
+
+/// Takes what every worker has made of a block, block after block.
+fn put_together(
+    made: &[Receiver<Made>],
+    each: &mut dyn FnMut(Made) -> Result<(), Error>,
+) -> Result<(), Error> {
+    loop {
+        let mut block = Made::new();
+        for worker in made {
+            let Ok(of_worker) = worker.recv() else { return Ok(()) };
+            block.extend(of_worker);
+        }
+        block.sort_by_key(|(place, _)| *place);
+        each(block)?;
+    }
+}

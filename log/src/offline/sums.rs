@@ -1,0 +1,113 @@
+//! Figures of corrected ticks: how many, what was flagged, mean rates and specific forces.
+
+use std::collections::BTreeMap;
+
+use isotherm_correction::sample::{CorrectedTick, SensorFlags, TickFlags};
+use isotherm_correction::units::{AngularRate, Span};
+use serde::Serialize;
+
+/// Sums over corrected ticks.
+#[derive(Debug, Clone, Default)]
+pub struct Sums {
+    /// Raw ticks that are in the outputs.
+    ticks: u64,
+    /// Outputs.
+    outputs: u64,
+    /// Raw ticks that outputs announced as missing.
+    missed: u64,
+    /// Outputs that announced any.
+    gaps: u64,
+    /// Time covered (ns).
+    duration_ns: i64,
+    /// Angles turned (rad).
+    angle_rad: [f64; 3],
+    /// Velocity gained (m/s).
+    velocity_m_per_s: [f64; 3],
+    /// Outputs with each flag, by its bit.
+    flags: [u64; 16],
+    /// Outputs in which any sensor has a flag, by its bit.
+    sensor_flags: [u64; 8],
+}
+
+/// What the sums come to.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Summary {
+    /// Raw ticks that are in the outputs.
+    pub ticks: u64,
+    /// Outputs; fewer than ticks where ticks are summed to navigation steps.
+    pub outputs: u64,
+    /// Gaps that were announced.
+    pub gaps: u64,
+    /// Raw ticks that are missing in them.
+    pub missed_ticks: u64,
+    /// Time covered (s).
+    pub duration_s: f64,
+    /// Mean rates about the case axes (°/h).
+    pub mean_rate_deg_per_h: [f64; 3],
+    /// Mean specific force along the case axes (m/s²).
+    pub mean_specific_force_m_per_s2: [f64; 3],
+    /// Outputs with each flag that occurred.
+    pub flags: BTreeMap<&'static str, u64>,
+    /// Outputs in which any sensor has a flag other than `VALID`, for each that occurred.
+    pub sensor_flags: BTreeMap<&'static str, u64>,
+}
+
+impl Sums {
+    /// Adds one output.
+    pub fn add(&mut self, tick: &CorrectedTick) {
+        self.ticks += u64::from(tick.ticks);
+        self.outputs += 1;
+        self.missed += tick.missed;
+        self.gaps += u64::from(tick.missed > 0);
+        self.duration_ns = self.duration_ns.saturating_add(tick.duration.as_ns());
+        for (sum, delta) in self.angle_rad.iter_mut().zip(tick.delta_angle) {
+            *sum += delta;
+        }
+        for (sum, delta) in self.velocity_m_per_s.iter_mut().zip(tick.delta_velocity) {
+            *sum += delta;
+        }
+        let bits = tick.flags.bits();
+        for (bit, count) in self.flags.iter_mut().enumerate() {
+            *count += u64::from(bits >> bit & 1);
+        }
+        let sensors = tick.gyro_flags.iter().chain(&tick.accel_flags);
+        let bits = sensors.fold(0, |bits, flags| bits | (*flags - SensorFlags::VALID).bits());
+        for (bit, count) in self.sensor_flags.iter_mut().enumerate() {
+            *count += u64::from(bits >> bit & 1);
+        }
+    }
+
+    /// Raw ticks so far.
+    #[must_use]
+    pub fn ticks(&self) -> u64 {
+        self.ticks
+    }
+
+    /// What the sums come to; means are 0 where no time was covered.
+    #[must_use]
+    pub fn summary(&self) -> Summary {
+        let duration_s = Span::from_ns(self.duration_ns).as_s();
+        let mean = |sum: f64| if duration_s > 0.0 { sum / duration_s } else { 0.0 };
+        let named = TickFlags::all().iter_names().filter_map(|(name, flag)| {
+            let count = *self.flags.get(flag.bits().trailing_zeros() as usize)?;
+            (count > 0).then_some((name, count))
+        });
+        let sensors = SensorFlags::all().iter_names().filter_map(|(name, flag)| {
+            let count = *self.sensor_flags.get(flag.bits().trailing_zeros() as usize)?;
+            (count > 0).then_some((name, count))
+        });
+        Summary {
+            ticks: self.ticks,
+            outputs: self.outputs,
+            gaps: self.gaps,
+            missed_ticks: self.missed,
+            duration_s,
+            mean_rate_deg_per_h: self
+                .angle_rad
+                .map(|sum| AngularRate::from_rad_per_s(mean(sum)).as_deg_per_h()),
+            mean_specific_force_m_per_s2: self.velocity_m_per_s.map(mean),
+            flags: named.collect(),
+            sensor_flags: sensors.collect(),
+        }
+    }
+}

@@ -1,0 +1,277 @@
+//! One unit of a recording on its way through a replica: corrected ticks out, in the form that is asked for.
+
+use isotherm_correction::unit::UnitSettings;
+use isotherm_protocol::codec;
+use isotherm_protocol::corrected::CorrectedBatch;
+use isotherm_protocol::digest::Digest;
+use isotherm_protocol::journal::{JournalEntry, JournalEvent, split};
+use isotherm_protocol::key::UnitId;
+use isotherm_protocol::stream::UnitStream;
+use serde::Serialize;
+
+use super::rows::{write_frame, write_tick};
+use super::sums::{Summary, Sums};
+use crate::diff::{Account, Comparison, DiffOptions, LogTick, Side, ticks_of};
+use crate::message::{Message, Topic};
+use crate::replica::{Changes, Done, Outline, Replica, ReplicaReport, entry_words};
+
+/// What is made of corrected ticks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Form {
+    /// Nothing but their sums.
+    Sums,
+    /// Rows of a CSV.
+    Csv,
+    /// Frames of the wire, each behind its length.
+    Wire,
+    /// Messages of a recording, with what the journal says between them.
+    Messages,
+}
+
+/// What a unit is corrected by.
+#[derive(Debug, Clone)]
+pub enum Basis {
+    /// Its journal.
+    Journal {
+        /// Where its entries stand.
+        outline: Outline,
+        /// What is to be other than in the service.
+        changes: Changes,
+    },
+    /// Settings and a calibration that were given.
+    Given {
+        /// The settings.
+        settings: UnitSettings,
+        /// The calibration.
+        calibration: Option<super::Loaded>,
+    },
+}
+
+/// One unit that is to be corrected.
+#[derive(Debug, Clone)]
+pub struct UnitPlan {
+    /// The unit.
+    pub id: UnitId,
+    /// What it is corrected by.
+    pub basis: Basis,
+    /// Whether its ticks are compared with those that the recording has of the service.
+    pub compare: bool,
+}
+
+/// What has been made of a part of a unit's ticks.
+#[derive(Debug, Default)]
+pub struct Output {
+    /// Rows or frames.
+    pub bytes: Vec<u8>,
+    /// Messages.
+    pub messages: Vec<Message>,
+    /// Documents that the journal has, and their SHA-256.
+    pub documents: Vec<(Digest, String)>,
+    /// Raw ticks in it.
+    pub ticks: u64,
+}
+
+/// What correcting a unit came to.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct UnitReport {
+    /// Serial of the unit.
+    pub unit: UnitId,
+    /// Whether its journal was followed.
+    pub by_journal: bool,
+    /// Figures of the corrected ticks.
+    #[serde(flatten)]
+    pub summary: Summary,
+    /// Counters of the unit that are not zero.
+    pub counters: std::collections::BTreeMap<String, u64>,
+    /// What became of the journal.
+    pub replica: ReplicaReport,
+    /// How the ticks compare with those that the service published.
+    pub published: Option<Account>,
+}
+
+impl UnitReport {
+    /// Whether anything was lost, or is other than the service had it.
+    #[must_use]
+    pub fn lost_data(&self) -> bool {
+        !self.replica.is_exact() || self.published.as_ref().is_some_and(|account| !account.agrees())
+    }
+}
+
+/// A unit at work.
+#[derive(Debug)]
+pub(super) struct UnitWork {
+    replica: Replica,
+    by_journal: bool,
+    taker: Taker,
+}
+
+/// Takes corrected ticks from the stream.
+#[derive(Debug)]
+struct Taker {
+    id: UnitId,
+    form: Form,
+    /// Ticks that were made of messages received before are not given out (ns since 1970-01-01 UTC).
+    from_ns: u64,
+    received_ns: u64,
+    sums: Sums,
+    comparison: Option<Comparison>,
+    /// What the journal said since the last tick.
+    event: Option<Box<str>>,
+    output: Output,
+    frame: Vec<u8>,
+}
+
+impl UnitWork {
+    pub(super) fn new(plan: UnitPlan, form: Form, from_ns: u64, diff: DiffOptions) -> Self {
+        let UnitPlan { id, basis, compare } = plan;
+        let by_journal = matches!(basis, Basis::Journal { .. });
+        let replica = match basis {
+            Basis::Journal { outline, changes } => Replica::new(id.clone(), outline, changes),
+            Basis::Given { settings, calibration } => {
+                Replica::without_journal(id.clone(), settings, calibration.as_ref())
+            }
+        };
+        let taker = Taker {
+            id,
+            form,
+            from_ns,
+            received_ns: 0,
+            sums: Sums::default(),
+            comparison: compare.then(|| Comparison::new(diff, false)),
+            event: None,
+            output: Output::default(),
+            frame: Vec::new(),
+        };
+        Self { replica, by_journal, taker }
+    }
+
+    /// Takes a message of the unit.
+    pub(super) fn take(&mut self, message: Message) {
+        if let (Topic::Corrected(_), Some(comparison)) = (&message.topic, &mut self.taker.comparison) {
+            // What cannot be read is missing.
+            let batch = codec::decode::<CorrectedBatch>(&message.frame).ok();
+            let ticks = batch.and_then(|batch| ticks_of(&batch).ok());
+            let ticks = ticks.into_iter().flat_map(|ticks| ticks.ticks);
+            ticks.for_each(|tick| comparison.push(Side::B, tick));
+        }
+        self.replica.take(message);
+        self.go_on();
+    }
+
+    fn go_on(&mut self) {
+        let Self { replica, taker, .. } = self;
+        while let Some(done) = replica.step(&mut |stream| taker.take(stream)) {
+            taker.note(&done);
+            // What was made before the part is given out to nobody, tick by tick.
+            if taker.received_ns < taker.from_ns
+                && let Some(stream) = replica.stream_mut()
+            {
+                taker.take(stream);
+            }
+        }
+    }
+
+    /// What has been made since it was last asked.
+    pub(super) fn output(&mut self) -> Output {
+        let Self { replica, taker, .. } = self;
+        if let Some(stream) = replica.stream_mut() {
+            taker.take(stream);
+        }
+        taker.comparison.iter_mut().for_each(Comparison::advance);
+        std::mem::take(&mut taker.output)
+    }
+
+    /// The log is over.
+    pub(super) fn finish(&mut self) {
+        self.replica.finish();
+        self.go_on();
+    }
+
+    pub(super) fn report(self) -> UnitReport {
+        let counters = self.replica.stream().map(UnitStream::counters).unwrap_or_default();
+        let counters = counters.into_iter().filter(|counter| counter.value > 0);
+        UnitReport {
+            unit: self.taker.id,
+            by_journal: self.by_journal,
+            summary: self.taker.sums.summary(),
+            counters: counters.map(|counter| (counter.name, counter.value)).collect(),
+            replica: self.replica.report().clone(),
+            published: self.taker.comparison.map(Comparison::finish),
+        }
+    }
+}
+
+impl Taker {
+    /// Takes what is ready.
+    fn take(&mut self, stream: &mut UnitStream) {
+        if stream.ready().is_empty() {
+            return;
+        }
+        if let Some(comparison) = &mut self.comparison {
+            for tick in stream.ready() {
+                let event = self.event.take();
+                comparison.push(Side::A, LogTick { tick: tick.clone(), digest: None, event });
+            }
+        }
+        if self.received_ns < self.from_ns {
+            drop(stream.take_ready());
+            return;
+        }
+        for tick in stream.ready() {
+            self.sums.add(tick);
+            self.output.ticks += u64::from(tick.ticks);
+        }
+        match self.form {
+            Form::Sums => drop(stream.take_ready()),
+            // Writing to a vector does not fail.
+            Form::Csv => {
+                let ticks = stream.take_ready();
+                let _ = ticks.iter().try_for_each(|tick| write_tick(&mut self.output.bytes, tick));
+            }
+            Form::Wire => {
+                while stream.next_frame(&mut self.frame) {
+                    let _ = write_frame(&mut self.output.bytes, &self.frame);
+                }
+            }
+            Form::Messages => {
+                while stream.next_frame(&mut self.frame) {
+                    let topic = Topic::Corrected(self.id.clone());
+                    let message = Message { topic, received_ns: self.received_ns, frame: self.frame.clone() };
+                    self.output.messages.push(message);
+                }
+            }
+        }
+    }
+
+    /// Notes what the replica has just done.
+    fn note(&mut self, done: &Done) {
+        match done {
+            Done::Frame { received_ns, .. } => self.received_ns = *received_ns,
+            Done::Entry { entry, left_out: false, received_ns } => {
+                self.event = Some(entry_words(entry).into());
+                if self.form == Form::Messages && *received_ns >= self.from_ns {
+                    self.keep(entry, *received_ns);
+                }
+            }
+            Done::Entry { .. } | Done::Notice(_) | Done::Flushed => {}
+        }
+    }
+
+    /// Puts an entry between the messages, and its documents beside them.
+    fn keep(&mut self, entry: &JournalEntry, received_ns: u64) {
+        let documents = match &entry.event {
+            JournalEvent::Changed { document, .. } => [document, &None],
+            JournalEvent::Memory { document, pending, .. } => [document, pending],
+            _ => [&None, &None],
+        };
+        let documents = documents.into_iter().flatten();
+        self.output.documents.extend(documents.map(|text| (Digest::of(text.as_bytes()), text.clone())));
+        if matches!(entry.event, JournalEvent::Memory { .. }) {
+            return;
+        }
+        let topic = Topic::Journal(self.id.clone());
+        let frames = split(entry).into_iter().filter_map(|part| codec::encode(&part).ok());
+        let messages = frames.map(|frame| Message { topic: topic.clone(), received_ns, frame });
+        self.output.messages.extend(messages);
+    }
+}

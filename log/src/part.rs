@@ -1,0 +1,148 @@
+//! A part of a log: some of its units, some of its time. It can be opened again and again.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use isotherm_correction::units::Span;
+use isotherm_protocol::key::UnitId;
+
+use crate::error::Error;
+use crate::mapping::Mapping;
+use crate::message::Message;
+use crate::progress::Progress;
+use crate::source::{Log, LogReport, TextOptions, is_recording};
+
+/// The files of a log, and how they are read.
+#[derive(Debug, Clone)]
+pub enum LogFiles {
+    /// Recordings, read one behind the other.
+    Recordings(Vec<PathBuf>),
+    /// A text log.
+    Text {
+        /// Its files in the order of the mapping's, or one folder that has them all.
+        paths: Vec<PathBuf>,
+        /// Which column is what.
+        mapping: Box<Mapping>,
+        /// The unit that it is of.
+        unit: UnitId,
+        /// Gyro ticks in one batch (1…4096).
+        batch_ticks: usize,
+    },
+}
+
+/// Which part of a log is taken.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Part {
+    /// The units that are taken; all where it is empty. What is of no unit is always taken.
+    pub units: BTreeSet<UnitId>,
+    /// From this long after the log's beginning on.
+    pub start: Span,
+    /// Up to this long after the log's beginning; `None` is to the end.
+    pub end: Option<Span>,
+}
+
+impl LogFiles {
+    /// Opens a part of the log.
+    ///
+    /// A recording's time is that of reception, counted from its first message, and its messages are taken whole. A text
+    /// log's time is that of its rows, and its ticks are taken one by one: see [`crate::text::Window`].
+    ///
+    /// # Errors
+    /// [`Error::File`]; for a text log as [`crate::text::LogReader::open`].
+    pub fn open(&self, part: &Part) -> Result<Messages, Error> {
+        let (log, window) = match self {
+            Self::Recordings(paths) => {
+                let window =
+                    (part.start > Span::ZERO || part.end.is_some()).then_some((part.start, part.end));
+                (Log::recordings(paths)?, window)
+            }
+            Self::Text { paths, mapping, unit, batch_ticks } => {
+                let options = TextOptions {
+                    mapping,
+                    unit,
+                    batch_ticks: *batch_ticks,
+                    start: part.start,
+                    duration: part
+                        .end
+                        .map(|end| Span::from_ns(end.as_ns().saturating_sub(part.start.as_ns()))),
+                };
+                (Log::text(paths, options)?, None)
+            }
+        };
+        Ok(Messages { log, units: part.units.clone(), window, beginning_ns: None, over: false })
+    }
+}
+
+/// The messages of a part of a log, one by one in constant memory.
+#[derive(Debug)]
+pub struct Messages {
+    log: Log,
+    units: BTreeSet<UnitId>,
+    /// Begin and end after the first message, of a recording.
+    window: Option<(Span, Option<Span>)>,
+    beginning_ns: Option<u64>,
+    over: bool,
+}
+
+impl Messages {
+    /// The next message; `None` behind the last.
+    ///
+    /// # Errors
+    /// [`Error::File`] and [`Error::Log`].
+    pub fn next_message(&mut self) -> Result<Option<Message>, Error> {
+        while !self.over {
+            let Some(message) = self.log.next_message()? else { break };
+            if self.holds(&message) {
+                return Ok(Some(message));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Whether a message belongs to the part; notes when the part is over.
+    fn holds(&mut self, message: &Message) -> bool {
+        if let Some((start, end)) = self.window {
+            let beginning = *self.beginning_ns.get_or_insert(message.received_ns);
+            // Receive times may stand still or go back a little; what is before the first is at its beginning.
+            let after = i64::try_from(message.received_ns.saturating_sub(beginning)).unwrap_or(i64::MAX);
+            self.over = end.is_some_and(|end| after > end.as_ns());
+            if self.over || after < start.as_ns() {
+                return false;
+            }
+        }
+        self.units.is_empty() || message.topic.unit().is_none_or(|unit| self.units.contains(unit))
+    }
+
+    /// How far the log has been read.
+    #[must_use]
+    pub fn progress(&self) -> Progress {
+        self.log.progress()
+    }
+
+    /// What reading came to so far.
+    #[must_use]
+    pub fn report(&self) -> LogReport {
+        self.log.report()
+    }
+
+    /// The log itself, for what it holds beside messages.
+    pub fn log(&mut self) -> &mut Log {
+        &mut self.log
+    }
+}
+
+/// Whether these files are recordings; recordings and text logs do not go together.
+///
+/// # Errors
+/// [`Error::Usage`] where some are recordings and others are not.
+pub fn are_recordings(paths: &[PathBuf]) -> Result<bool, Error> {
+    let recording = |path: &PathBuf| is_recording(Path::new(path));
+    match (paths.iter().find(|path| recording(path)), paths.iter().find(|path| !recording(path))) {
+        (Some(recording), Some(other)) => Err(Error::Usage(format!(
+            "{} is a recording and {} is none (or cannot be read): give recordings alone, or the files of one text log",
+            recording.display(),
+            other.display()
+        ))),
+        (recording, _) => Ok(recording.is_some()),
+    }
+}

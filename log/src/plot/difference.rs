@@ -1,0 +1,141 @@
+//! Corrected ticks of two logs, subtracted where both have one.
+
+use std::collections::VecDeque;
+
+use isotherm_protocol::corrected::CorrectedTick;
+
+use super::track::Track;
+use super::unit::increments;
+
+/// Radians in seconds of arc.
+const ARCSEC: f64 = 180.0 / std::f64::consts::PI * 3600.0;
+/// Most ticks of one log that wait for the other's.
+const MAX_WAITING: usize = 1 << 16;
+
+/// A tick that waits.
+#[derive(Debug, Clone, Copy)]
+struct Waiting {
+    at_ns: i64,
+    increments: [f64; 6],
+    angle_rad: [f64; 3],
+}
+
+/// The second log's ticks minus the first's.
+#[derive(Debug)]
+pub(super) struct Difference {
+    waiting: [VecDeque<Waiting>; 2],
+    /// Differences of rates (°/h), of specific forces (m/s²), and of the angles added up (″).
+    pub(super) track: Track,
+    /// Ticks that both logs have.
+    pub(super) common: u64,
+    /// Ticks that only one of the logs has.
+    pub(super) single: [u64; 2],
+    /// Ticks that differ at all.
+    pub(super) differing: u64,
+    angle_arcsec: [f64; 3],
+}
+
+impl Difference {
+    pub(super) fn new(detail: usize) -> Self {
+        Self {
+            waiting: [VecDeque::new(), VecDeque::new()],
+            track: Track::new(9, detail),
+            common: 0,
+            single: [0, 0],
+            differing: 0,
+            angle_arcsec: [0.0; 3],
+        }
+    }
+
+    /// Takes a tick of a log (0 or 1) at a time of the common axis.
+    pub(super) fn take(&mut self, log: usize, at_ns: i64, tick: &CorrectedTick) {
+        let waiting = Waiting { at_ns, increments: increments(tick), angle_rad: tick.delta_angle_rad };
+        let [first, second] = &mut self.waiting;
+        (if log == 0 { first } else { second }).push_back(waiting);
+        self.compare();
+        let [first, second] = &mut self.waiting;
+        for (queue, single) in [first, second].into_iter().zip(&mut self.single) {
+            if queue.len() > MAX_WAITING {
+                queue.pop_front();
+                *single += 1;
+            }
+        }
+    }
+
+    /// There are no further ticks.
+    pub(super) fn end(&mut self) {
+        for (queue, single) in self.waiting.iter_mut().zip(&mut self.single) {
+            *single += queue.len() as u64;
+            queue.clear();
+        }
+    }
+
+    fn compare(&mut self) {
+        let [first, second] = &mut self.waiting;
+        while let (Some(a), Some(b)) = (first.front().copied(), second.front().copied()) {
+            if a.at_ns < b.at_ns {
+                first.pop_front();
+                self.single[0] += 1;
+                continue;
+            }
+            if b.at_ns < a.at_ns {
+                second.pop_front();
+                self.single[1] += 1;
+                continue;
+            }
+            first.pop_front();
+            second.pop_front();
+            self.common += 1;
+            let mut values = [0.0; 9];
+            for ((value, a), b) in values.iter_mut().zip(a.increments).zip(b.increments) {
+                *value = b - a;
+            }
+            let differs = values.iter().any(|value| *value != 0.0);
+            self.differing += u64::from(differs);
+            let angles = a.angle_rad.iter().zip(b.angle_rad);
+            for ((sum, value), (a, b)) in
+                self.angle_arcsec.iter_mut().zip(values.iter_mut().skip(6)).zip(angles)
+            {
+                *sum += (b - a) * ARCSEC;
+                *value = *sum;
+            }
+            self.track.push(a.at_ns, &values, u32::from(differs));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn tick(angle: f64) -> CorrectedTick {
+        let core = isotherm_correction::sample::CorrectedTick {
+            delta_angle: [angle, 0.0, 0.0],
+            duration: isotherm_correction::units::Span::from_ms(10),
+            ..Default::default()
+        };
+        CorrectedTick::from(&core)
+    }
+
+    #[test]
+    fn ticks_of_one_time_are_subtracted_and_others_counted() {
+        let mut difference = Difference::new(100);
+        (0..10).for_each(|index| difference.take(0, index * 10, &tick(1e-6)));
+        (5..12).for_each(|index| difference.take(1, index * 10, &tick(3e-6)));
+        difference.end();
+        assert_eq!((difference.common, difference.single, difference.differing), (5, [5, 2], 5));
+        let rate = difference.track.overall(0, 1.0).unwrap();
+        assert!((rate.mean - 2e-6 * 100.0 * 206_264.806).abs() < 1e-3, "{rate:?}");
+        let angle = difference.track.overall(6, 1.0).unwrap();
+        assert!((angle.max - 1e-5 * ARCSEC).abs() < 1e-9, "{angle:?}");
+    }
+
+    #[test]
+    fn a_log_without_its_other_waits_in_bounded_memory() {
+        let mut difference = Difference::new(100);
+        (0..100_000).for_each(|index| difference.take(1, index, &tick(0.0)));
+        assert!(difference.waiting[1].len() <= MAX_WAITING);
+        difference.end();
+        assert_eq!((difference.common, difference.single), (0, [0, 100_000]));
+    }
+}

@@ -1,0 +1,65 @@
+//! Words and figures of a page.
+
+use isotherm_correction::units::Span;
+
+use crate::plot::PlotSummary;
+
+/// What is to be known of the page as a whole.
+pub(super) fn remarks(summary: &PlotSummary) -> Vec<String> {
+    let mut words = Vec::new();
+    if let [first, second] = summary.logs.as_slice() {
+        words.push(format!(
+            "A is {first}, B is {second}; differences are B minus A, of ticks that end at the same time."
+        ));
+    }
+    for (unit, difference) in &summary.differences {
+        words.push(format!(
+            "Unit {unit}: {} corrected ticks are in both logs, {} of them differ; {} are in A only, {} in B only.",
+            difference.common_ticks, difference.differing_ticks, difference.only_first, difference.only_second
+        ));
+    }
+    if let Some(moved_ns) = summary.second_moved_ns {
+        words.push(format!(
+            "The logs are of different times: B is moved by {:.3} s so that both begin together.",
+            Span::from_ns(moved_ns).as_s()
+        ));
+    }
+    if summary.units_left_out > 0 {
+        words.push(format!("{} further units are left out: choose with --unit.", summary.units_left_out));
+    }
+    for (unit, logs) in &summary.units {
+        let left_out: u64 = logs.iter().flatten().map(|log| log.marks_left_out).sum();
+        if left_out > 0 {
+            words.push(format!(
+                "Unit {unit}: {left_out} further marks are left out; plot a shorter part to see them."
+            ));
+        }
+        let unreadable: u64 = logs.iter().flatten().map(|log| log.unreadable_messages).sum();
+        if unreadable > 0 {
+            words.push(format!("Unit {unit}: {unreadable} messages cannot be read and are not shown."));
+        }
+    }
+    if summary.reading.iter().any(crate::source::LogReport::lost_data) {
+        words.push("Reading was not complete: see what the program said on standard error.".to_owned());
+    }
+    words
+}
+
+/// A number of the table, to seven digits.
+pub(super) fn figure(value: f64) -> String {
+    let size = value.abs();
+    if size != 0.0 && !(1e-4..1e9).contains(&size) {
+        return format!("{value:.4e}").replace('-', "−");
+    }
+    let whole_digits = [1.0, 10.0, 100.0, 1e3, 1e4, 1e5].iter().filter(|limit| size >= **limit).count();
+    format!("{value:.*}", 7 - whole_digits.min(6)).replace('-', "−")
+}
+
+/// A duration in words.
+pub(super) fn duration(seconds: f64) -> String {
+    match seconds {
+        short if short < 120.0 => format!("{short:.3} s"),
+        minutes if minutes < 7200.0 => format!("{:.1} min", minutes / 60.0),
+        hours => format!("{:.2} h", hours / 3600.0),
+    }
+}

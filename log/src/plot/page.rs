@@ -1,0 +1,169 @@
+//! Pages with diagrams that one can zoom into: one HTML file each that needs nothing beside it and nothing from a network.
+//!
+//! A [`Page`] is made of paragraphs, tables and [`Chart`]s. A chart stacks [`Panel`]s over one common horizontal axis; a panel
+//! holds curves ([`Series`]) or, in one row each, what is the case from when to when ([`Lane`]). [`Mark`]s stand across all
+//! panels. Colours are named by what they stand for ([`Ink`]) and follow the reader's light or dark setting.
+//!
+//! Curves are [`Samples`]: points with their places, or bins of equal width with smallest, largest and mean value. The page
+//! draws, for each column of pixels, the smallest and largest of what falls into it, so that no peak is lost at any zoom.
+//!
+//! ```
+//! use isotherm_log::plot::page::{Axis, Chart, Content, Form, Ink, Page, Panel, Samples, Series};
+//!
+//! let residual = Series {
+//!     name: "residual".into(),
+//!     ink: Ink::Corrected,
+//!     form: Form::Dots,
+//!     samples: Samples::points([(-40.0, 0.3), (20.0, -0.1), (60.0, 0.2)]),
+//! };
+//! let mut page = Page::new("Fit of the static bias");
+//! page.paragraph("Residuals of the fit against temperature.");
+//! page.chart(&Chart {
+//!     caption: "Residuals, gyro x.".into(),
+//!     x: Axis::of("temperature", "°C"),
+//!     panels: vec![Panel {
+//!         title: "bias".into(),
+//!         unit: "°/h".into(),
+//!         height: 160,
+//!         logarithmic: false,
+//!         content: Content::Series(vec![residual]),
+//!     }],
+//!     marks: Vec::new(),
+//! });
+//! assert!(page.to_html().starts_with("<!doctype html>"));
+//! ```
+//!
+//! What this module refuses to do: know anything of logs, units or calibrations.
+
+mod chart;
+mod encode;
+#[cfg(test)]
+mod tests;
+
+use std::fmt::Write;
+
+pub use chart::{Axis, Bits, Chart, Content, Form, Ink, Lane, Mark, Panel, Places, Samples, Series, Stretch};
+
+use encode::Store;
+
+/// The page's style sheet; the script takes the colours from it too.
+const STYLE: &str = include_str!("page/style.css");
+
+/// The parts of the page's script, in this order. The first three know nothing of the page and are tested by themselves.
+const SCRIPT: [&str; 5] = [
+    include_str!("page/scale.js"),
+    include_str!("page/samples.js"),
+    include_str!("page/draw.js"),
+    include_str!("page/panel.js"),
+    include_str!("page/chart.js"),
+];
+
+/// A table whose first column names the rows.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Table {
+    /// Heads of all columns.
+    pub head: Vec<String>,
+    /// Rows, each as long as the head.
+    pub rows: Vec<Vec<String>>,
+}
+
+/// A page that is being written from top to bottom.
+#[derive(Debug, Clone)]
+pub struct Page {
+    title: String,
+    body: String,
+    store: Store,
+    charts: usize,
+}
+
+impl Page {
+    /// A page with nothing but its title.
+    #[must_use]
+    pub fn new(title: &str) -> Self {
+        let body = format!("<h1>{}</h1>\n", escape(title));
+        Self { title: title.to_owned(), body, store: Store::default(), charts: 0 }
+    }
+
+    /// Begins a section.
+    pub fn heading(&mut self, text: &str) {
+        self.line("h2", "", text);
+    }
+
+    /// A sentence that says the result, set larger than text.
+    pub fn headline(&mut self, text: &str) {
+        self.line("p", " class=\"headline\"", text);
+    }
+
+    /// A paragraph.
+    pub fn paragraph(&mut self, text: &str) {
+        self.line("p", "", text);
+    }
+
+    /// A table.
+    pub fn table(&mut self, table: &Table) {
+        self.body.push_str("<div class=\"table\"><table>\n<thead><tr>");
+        self.cells("th", &table.head);
+        self.body.push_str("</tr></thead>\n<tbody>\n");
+        for row in &table.rows {
+            let (name, values) = row.split_at(row.len().min(1));
+            self.body.push_str("<tr>");
+            self.cells("th", name);
+            self.cells("td", values);
+            self.body.push_str("</tr>\n");
+        }
+        self.body.push_str("</tbody></table></div>\n");
+    }
+
+    /// A chart. Without a script its caption and a sentence in place of the diagram are there.
+    pub fn chart(&mut self, chart: &Chart) {
+        let shape = self.store.chart(chart);
+        let id = self.charts;
+        self.charts += 1;
+        let caption = escape(&chart.caption);
+        self.write(format_args!(
+            "<figure class=\"chart\" id=\"chart{id}\" tabindex=\"0\" aria-label=\"{caption}\">\n\
+             <noscript><p class=\"noscript\">The diagrams are drawn by a script inside this file, and scripts are switched \
+             off. The figures in the tables are complete without it.</p></noscript>\n\
+             <script type=\"application/json\">{shape}</script>\n<figcaption>{caption}</figcaption>\n</figure>\n",
+        ));
+    }
+
+    /// The finished page.
+    #[must_use]
+    pub fn to_html(&self) -> String {
+        let data = self.store.to_html();
+        let title = escape(&self.title);
+        let script = if self.charts == 0 {
+            String::new()
+        } else {
+            format!("<script>\n\"use strict\";\n(() => {{\n{}}})();\n</script>\n", SCRIPT.concat())
+        };
+        format!(
+            "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+             <meta name=\"color-scheme\" content=\"light dark\">\n\
+             <title>{title}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n<main>\n{}</main>\n{data}{script}</body>\n</html>\n",
+            self.body
+        )
+    }
+
+    fn cells(&mut self, tag: &str, cells: &[String]) {
+        for cell in cells {
+            self.write(format_args!("<{tag}>{}</{tag}>", escape(cell)));
+        }
+    }
+
+    fn line(&mut self, tag: &str, attributes: &str, text: &str) {
+        self.write(format_args!("<{tag}{attributes}>{}</{tag}>\n", escape(text)));
+    }
+
+    fn write(&mut self, text: std::fmt::Arguments<'_>) {
+        // Writing to a string cannot fail.
+        let _ = self.body.write_fmt(text);
+    }
+}
+
+/// Text as it may stand in HTML and in an attribute.
+fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}

@@ -1,0 +1,110 @@
+// Axes: ranges, tick marks, how numbers and times are written. Nothing here knows the page.
+
+/** Tick marks within [low, high], at most about `most`, at 1, 2 or 5 times a power of ten. */
+function linearTicks(low, high, most) {
+  const span = high - low;
+  if (!(span > 0) || !isFinite(span)) return { values: [low], decimals: 0 };
+  const coarse = span / Math.max(most, 2);
+  let exponent = Math.floor(Math.log10(coarse));
+  let factor = [1, 2, 5].find(f => f * 10 ** exponent >= coarse * (1 - 1e-9));
+  if (factor === undefined) { factor = 1; exponent += 1; }
+  const step = factor * 10 ** exponent;
+  const values = [];
+  for (let i = Math.ceil(low / step - 1e-9); i * step <= high + 1e-9 * step; i++) values.push(i * step);
+  return { values, decimals: Math.min(Math.max(-exponent, 0), 12) };
+}
+
+/** Tick marks of a logarithmic axis: the powers of ten, and 2 and 5 times these where there is room. */
+function logTicks(low, high, most) {
+  const values = [];
+  const decades = Math.log10(high / low);
+  const factors = decades * 3 <= most ? [1, 2, 5] : [1];
+  const skip = Math.max(1, Math.ceil(decades / most));
+  for (let e = Math.floor(Math.log10(low)); e <= Math.ceil(Math.log10(high)); e++) {
+    if (((e % skip) + skip) % skip) continue;
+    for (const f of factors) {
+      const value = f * 10 ** e;
+      if (value >= low * (1 - 1e-9) && value <= high * (1 + 1e-9)) values.push(value);
+    }
+  }
+  return { values, decimals: null };
+}
+
+/** Steps of a time axis, in seconds; below the first decimal ones. */
+const TIME_STEPS = [1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 10800, 21600, 43200, 86400];
+
+/** Tick marks of a time axis in seconds. */
+function timeTicks(low, high, most) {
+  const coarse = (high - low) / Math.max(most, 2);
+  if (!(coarse > 0.5) || coarse > 86400) return linearTicks(low, high, most);
+  const step = TIME_STEPS.find(s => s >= coarse) ?? 86400;
+  const values = [];
+  for (let i = Math.ceil(low / step - 1e-9); i * step <= high + 1e-9 * step; i++) values.push(i * step);
+  return { values, decimals: 0 };
+}
+
+/** Thousands set apart by a narrow space, with a real minus sign. */
+function grouped(text) {
+  const negative = text.startsWith("-");
+  const [whole, rest] = (negative ? text.slice(1) : text).split(".");
+  const zero = /^[0.]*$/.test(whole + (rest ?? ""));
+  const digits = whole.length > 4 ? whole.replace(/\B(?=(\d{3})+$)/g, "\u202f") : whole;
+  return (negative && !zero ? "\u2212" : "") + digits + (rest === undefined ? "" : "." + rest);
+}
+
+/** A number beside a tick mark. */
+function tickLabel(value, decimals) {
+  const size = Math.abs(value);
+  if (decimals === null || size >= 1e9 || (size > 0 && decimals > 6 && size < 1e-3)) return plain(value, 3);
+  return grouped(value.toFixed(decimals));
+}
+
+/** A number by itself, to so many significant digits. */
+function plain(value, digits) {
+  if (!isFinite(value)) return "\u2014";
+  if (value === 0) return "0";
+  const size = Math.abs(value);
+  if (size >= 1e9 || size < 1e-4) {
+    const [mantissa, exponent] = value.toExponential(digits - 1).split("e");
+    return grouped(mantissa.includes(".") ? mantissa.replace(/\.?0+$/, "") : mantissa) + "\u00d710" +
+      [...String(Number(exponent))].map(c => c === "-" ? "\u207b" : "\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079"[c]).join("");
+  }
+  return grouped(value.toFixed(Math.min(Math.max(digits - 1 - Math.floor(Math.log10(size)), 0), 12)));
+}
+
+/** Seconds as 1:02:03.4, or 12.345 s below a minute; `step` says how fine. */
+function clock(seconds, step) {
+  const decimals = step >= 1 ? 0 : Math.min(Math.ceil(-Math.log10(step) - 1e-9), 9);
+  const rounded = Number(Math.abs(seconds).toFixed(decimals));
+  const sign = seconds < 0 && rounded > 0 ? "\u2212" : "";
+  if (rounded < 60) return sign + rounded.toFixed(decimals) + " s";
+  const whole = Math.floor(rounded);
+  const [h, m, s] = [Math.floor(whole / 3600), Math.floor(whole / 60) % 60, rounded - Math.floor(whole / 60) * 60];
+  const tail = s.toFixed(decimals).padStart(decimals ? decimals + 3 : 2, "0");
+  return sign + (h ? h + ":" + String(m).padStart(2, "0") : m) + ":" + tail;
+}
+
+/** What a part of the axis is after zooming by `factor` about `at`, held inside `whole`. */
+function zoomed([low, high], at, factor, whole, least) {
+  const span = Math.min(Math.max((high - low) * factor, least), whole[1] - whole[0]);
+  const share = (at - low) / (high - low);
+  return held([at - share * span, at + (1 - share) * span], whole);
+}
+
+/** A part of the axis moved so far that it lies inside `whole`. */
+function held([low, high], whole) {
+  const span = Math.min(high - low, whole[1] - whole[0]);
+  const from = Math.min(Math.max(low, whole[0]), whole[1] - span);
+  return [from, from + span];
+}
+
+/** Place on the axis to pixel, and back. */
+function mapping([low, high], pixels, logarithmic) {
+  if (!logarithmic) {
+    const scale = pixels / (high - low);
+    return { to: x => (x - low) * scale, from: p => low + p / scale };
+  }
+  const [l, h] = [Math.log(low), Math.log(high)];
+  const scale = pixels / (h - l);
+  return { to: x => (Math.log(x) - l) * scale, from: p => Math.exp(l + p / scale) };
+}

@@ -1,0 +1,302 @@
+//! The logs, read once and in step, into what is shown of their units.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::sync::Arc;
+
+use isotherm_correction::unit::UnitSettings;
+use isotherm_protocol::document::Document;
+use isotherm_protocol::key::UnitId;
+use isotherm_protocol::stream::UnitStream;
+
+use super::difference::Difference;
+use super::nominal::Nominal;
+use super::page::Page;
+use super::unit::UnitPlot;
+use super::{DifferenceSummary, MAX_UNITS, PlotLog, PlotOptions, PlotSummary, UnitSummary, layout, track};
+use crate::error::Error;
+use crate::message::{Message, Topic};
+
+/// Logs that begin further apart than this are laid side by side by their beginnings (ns).
+const APART_NS: u64 = 86_400_000_000_000;
+/// Messages that are looked at for the first time of a log.
+const LOOK_AHEAD: usize = 4096;
+
+/// A log that is being read.
+struct Source {
+    log: PlotLog,
+    /// Messages read and not taken yet.
+    ahead: VecDeque<Message>,
+    over: bool,
+    /// Where on the axis it is (ns).
+    now_ns: i64,
+    stream: Option<UnitStream>,
+}
+
+impl Source {
+    /// Sees to it that a message waits, if there is one.
+    fn fill(&mut self) -> Result<(), Error> {
+        if self.ahead.is_empty() && !self.over {
+            match self.log.messages.next_message()? {
+                Some(message) => self.ahead.push_back(message),
+                None => self.over = true,
+            }
+        }
+        Ok(())
+    }
+
+    /// The producer's time of the first message that has one (ns).
+    fn first_ns(&mut self) -> Result<Option<i64>, Error> {
+        while self.ahead.len() < LOOK_AHEAD && !self.over {
+            let Some(message) = self.log.messages.next_message()? else {
+                self.over = true;
+                break;
+            };
+            let time = message.time();
+            self.ahead.push_back(message);
+            if let Some(time) = time {
+                return Ok(Some(time.as_ns()));
+            }
+        }
+        Ok(None)
+    }
+}
+
+/// One unit in all logs.
+pub(super) struct UnitLogs {
+    pub(super) logs: Vec<Option<UnitPlot>>,
+    pub(super) difference: Option<Difference>,
+}
+
+/// What is being read.
+pub(super) struct Plot {
+    logs: Vec<Source>,
+    units: BTreeMap<UnitId, UnitLogs>,
+    left_out: BTreeSet<UnitId>,
+    detail: usize,
+    nominal: Option<Nominal>,
+    /// By how much each log is moved on the axis (ns).
+    moved_ns: Vec<i64>,
+    second_moved_ns: Option<i64>,
+}
+
+impl Plot {
+    /// Nothing read yet.
+    pub(super) fn new(logs: Vec<PlotLog>, options: &PlotOptions) -> Result<Self, Error> {
+        let parsed = options.calibration.as_deref().map(|text| Document::parse(text, None)).transpose();
+        let parsed = parsed
+            .map_err(|problems| Error::Calibration(problems.iter().map(ToString::to_string).collect()))?;
+        let mut sources = Vec::with_capacity(logs.len());
+        for log in logs {
+            let stream = match &parsed {
+                Some(parsed) if log.correct => {
+                    let unit = crate::offline::unit_id(&parsed.document.unit)?;
+                    let mut stream = UnitStream::new(unit, UnitSettings::default());
+                    let digest = parsed.digest.first_chunk().copied().unwrap_or_default();
+                    stream.install(Arc::new(parsed.calibration.clone()), digest);
+                    Some(stream)
+                }
+                _ => None,
+            };
+            sources.push(Source { log, ahead: VecDeque::new(), over: false, now_ns: i64::MIN, stream });
+        }
+        let mut plot = Self {
+            moved_ns: vec![0; sources.len()],
+            logs: sources,
+            units: BTreeMap::new(),
+            left_out: BTreeSet::new(),
+            detail: options.detail.clamp(2, 1 << 20),
+            nominal: options.calibration.as_deref().and_then(Nominal::of),
+            second_moved_ns: None,
+        };
+        plot.align()?;
+        Ok(plot)
+    }
+
+    /// Lays logs of different times side by side by their beginnings.
+    fn align(&mut self) -> Result<(), Error> {
+        let [first, second] = self.logs.as_mut_slice() else { return Ok(()) };
+        if let (Some(first), Some(second)) = (first.first_ns()?, second.first_ns()?)
+            && first.abs_diff(second) > APART_NS
+        {
+            let by = first.saturating_sub(second);
+            self.second_moved_ns = Some(by);
+            if let Some(moved) = self.moved_ns.get_mut(1) {
+                *moved = by;
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes the next message of the log that is behind; false when all are over.
+    pub(super) fn step(&mut self) -> Result<bool, Error> {
+        let Some(log) = self.next_log()? else { return Ok(false) };
+        if let Some(message) = self.logs.get_mut(log).and_then(|source| source.ahead.pop_front()) {
+            self.take(log, &message);
+        }
+        Ok(true)
+    }
+
+    /// The log that is behind on the axis; `None` when all are over.
+    fn next_log(&mut self) -> Result<Option<usize>, Error> {
+        for source in &mut self.logs {
+            source.fill()?;
+        }
+        let waiting = self.logs.iter().enumerate().filter(|(_, source)| !source.ahead.is_empty());
+        let next = waiting.min_by_key(|(_, source)| source.now_ns).map(|(log, _)| log);
+        if next.is_none() {
+            self.flush();
+        }
+        Ok(next)
+    }
+
+    /// What still waits in the streams comes out.
+    fn flush(&mut self) {
+        for log in 0..self.logs.len() {
+            let Some(mut stream) = self.logs.get_mut(log).and_then(|source| source.stream.take()) else {
+                continue;
+            };
+            stream.flush();
+            self.take_corrected(log, &mut stream, None, 0);
+        }
+    }
+
+    fn take(&mut self, log: usize, message: &Message) {
+        self.show(log, message);
+        let Some(mut stream) = self.logs.get_mut(log).and_then(|source| source.stream.take()) else { return };
+        if let Topic::Raw(unit, kind) = &message.topic {
+            // A frame that cannot be read was counted where it was shown.
+            let _ = stream.receive(*kind, &message.frame);
+            self.take_corrected(log, &mut stream, Some(unit), message.received_ns);
+        }
+        if let Some(source) = self.logs.get_mut(log) {
+            source.stream = Some(stream);
+        }
+    }
+
+    /// Shows what a stream has corrected.
+    fn take_corrected(
+        &mut self,
+        log: usize,
+        stream: &mut UnitStream,
+        unit: Option<&UnitId>,
+        received_ns: u64,
+    ) {
+        let unit = unit.or_else(|| self.units.keys().next()).cloned().unwrap_or_else(|| stream.id().clone());
+        let mut frame = Vec::new();
+        while stream.next_frame(&mut frame) {
+            let topic = Topic::Corrected(unit.clone());
+            self.show(log, &Message { topic, received_ns, frame: std::mem::take(&mut frame) });
+        }
+    }
+
+    /// Enters a message into what is shown of its unit.
+    fn show(&mut self, log: usize, message: &Message) {
+        let Some(serial) = message.topic.unit() else { return };
+        let Some(source) = self.logs.get_mut(log) else { return };
+        let serial = source.log.shown_as.as_ref().unwrap_or(serial);
+        if !self.units.contains_key(serial) {
+            if self.units.len() == MAX_UNITS {
+                if self.left_out.len() < LOOK_AHEAD {
+                    self.left_out.insert(serial.clone());
+                }
+                return;
+            }
+            let logs = self.moved_ns.iter().map(|_| None).collect();
+            self.units.insert(serial.clone(), UnitLogs { logs, difference: None });
+        }
+        let Some(unit) = self.units.get_mut(serial) else { return };
+        let UnitLogs { logs, difference } = unit;
+        let both = logs.len() == 2;
+        let Some(place) = logs.get_mut(log) else { return };
+        let moved = self.moved_ns.get(log).copied().unwrap_or(0);
+        let (detail, nominal) = (self.detail, &self.nominal);
+        let shown = place.get_or_insert_with(|| UnitPlot::new(detail, nominal.clone(), moved));
+        shown.take(message, &mut |at_ns, tick| {
+            if both {
+                difference.get_or_insert_with(|| Difference::new(detail)).take(log, at_ns, tick);
+            }
+        });
+        if let Some(now) = shown.clock.now() {
+            source.now_ns = now;
+        }
+    }
+
+    /// Draws what was read.
+    pub(super) fn finish(mut self) -> Result<(Page, PlotSummary), Error> {
+        for unit in self.units.values_mut() {
+            if let Some(difference) = &mut unit.difference {
+                difference.end();
+            }
+        }
+        // Documents may also lie in the recording as files.
+        for (log, source) in self.logs.iter_mut().enumerate() {
+            let Some(recording) = source.log.messages.log().recording() else { continue };
+            for attachment in recording.take_attachments() {
+                let Ok(text) = std::str::from_utf8(&attachment.bytes) else { continue };
+                let Ok(document) = Document::parse(text, None) else { continue };
+                let unit = self.units.iter_mut().find(|(unit, _)| unit.as_str() == document.document.unit);
+                if let Some(shown) = unit.and_then(|(_, unit)| unit.logs.get_mut(log)?.as_mut())
+                    && shown.nominal.is_none()
+                {
+                    shown.learn(text);
+                }
+            }
+        }
+        let summary = self.summary();
+        // The page's size is bounded by that of two units.
+        let units = self.units.len();
+        if units > 2 {
+            let detail = (self.detail * 2 / units).max(256);
+            for unit in self.units.values_mut() {
+                let tracks = unit.logs.iter_mut().flatten().flat_map(UnitPlot::tracks);
+                tracks.for_each(|track| track.reduce(detail));
+                if let Some(difference) = &mut unit.difference {
+                    difference.track.reduce(detail);
+                }
+            }
+        }
+        let units: Vec<_> = self.units.into_iter().collect();
+        let page = layout::page(units, &summary).ok_or_else(|| {
+            Error::Usage(
+                "the log holds nothing to draw: no raw and no corrected ticks of the units asked for"
+                    .to_owned(),
+            )
+        })?;
+        Ok((page, summary))
+    }
+
+    fn summary(&self) -> PlotSummary {
+        let of = |shown: &UnitPlot| UnitSummary {
+            raw_ticks: shown.gyro.as_ref().map_or(0, |raw| raw.track.ticks()),
+            corrected_ticks: shown.corrected.as_ref().map_or(0, track::Track::ticks),
+            missed_ticks: shown.missed,
+            marks: shown.happenings.len() as u64,
+            marks_left_out: shown.unlisted,
+            unreadable_messages: shown.unreadable,
+        };
+        let units = self.units.iter().map(|(unit, shown)| {
+            (unit.to_string(), shown.logs.iter().map(|shown| shown.as_ref().map(of)).collect())
+        });
+        let differences = self.units.iter().filter_map(|(unit, shown)| {
+            let difference = shown.difference.as_ref().filter(|_| {
+                shown.logs.iter().flatten().filter(|shown| shown.corrected.is_some()).count() == 2
+            })?;
+            let [only_first, only_second] = difference.single;
+            let summary = DifferenceSummary {
+                common_ticks: difference.common,
+                differing_ticks: difference.differing,
+                only_first,
+                only_second,
+            };
+            Some((unit.to_string(), summary))
+        });
+        PlotSummary {
+            logs: self.logs.iter().map(|source| source.log.name.clone()).collect(),
+            reading: self.logs.iter().map(|source| source.log.messages.report()).collect(),
+            units: units.collect(),
+            differences: differences.collect(),
+            units_left_out: self.left_out.len() as u64,
+            second_moved_ns: self.second_moved_ns,
+        }
+    }
+}

@@ -1,0 +1,168 @@
+//! Pages of made-up logs.
+
+use isotherm_correction::sample as core;
+use isotherm_correction::units::{Span, Timestamp};
+use isotherm_protocol::codec;
+use isotherm_protocol::corrected::{CorrectedBatch, Revision};
+
+use super::reading::UnitLogs;
+use super::unit::UnitPlot;
+use super::*;
+use crate::message::{Message, Topic};
+use crate::part::{LogFiles, Part};
+use crate::recording::{RecordingOptions, RecordingWriter};
+
+/// A recording of corrected ticks of 5 ms: the rate about x is `rate(n)`; ten ticks to a batch, another revision at `change`.
+fn recording(
+    path: &std::path::Path,
+    unit: &str,
+    ticks: std::ops::Range<u64>,
+    change: u64,
+    delta: impl Fn(u64) -> f64,
+) {
+    let mut writer = RecordingWriter::create(path, RecordingOptions::default()).unwrap();
+    let unit = UnitId::new(unit).unwrap();
+    for first in ticks.clone().step_by(10) {
+        let tick = |sequence: u64| {
+            let tick = core::CorrectedTick {
+                sequence,
+                end_time: Timestamp::from_ns(i64::try_from(sequence).unwrap() * 5_000_000),
+                duration: Span::from_ns(5_000_000),
+                ticks: 1,
+                delta_angle: [delta(sequence), 0.0, 1e-6],
+                delta_velocity: [0.0, 0.0, 0.049],
+                mode: Some(core::LasingMode::Plus),
+                flags: if sequence == 15 {
+                    core::TickFlags::ANGLE_RESTORED
+                } else {
+                    core::TickFlags::empty()
+                },
+                ..core::CorrectedTick::default()
+            };
+            isotherm_protocol::corrected::CorrectedTick::from(&tick)
+        };
+        let batch = CorrectedBatch {
+            unit: unit.to_string(),
+            revision: Revision { counter: 1 + u64::from(first >= change), digest: [0xab; 8] },
+            temperatures: std::iter::empty().collect(),
+            ticks: (first..(first + 10).min(ticks.end)).map(tick).collect(),
+        };
+        let frame = codec::encode(&batch).unwrap();
+        writer.write(&Message { topic: Topic::Corrected(unit.clone()), received_ns: first, frame }).unwrap();
+    }
+    writer.finish().unwrap();
+}
+
+fn log(path: &std::path::Path) -> PlotLog {
+    let messages = LogFiles::Recordings(vec![path.to_owned()]).open(&Part::default()).unwrap();
+    let name = path.file_name().unwrap().to_string_lossy().into_owned();
+    PlotLog { name, messages, shown_as: None, correct: false }
+}
+
+#[test]
+fn two_logs_are_compared_tick_by_tick() {
+    let folder = tempfile::tempdir().unwrap();
+    let [a, b] = ["a.mcap", "b.mcap"].map(|name| folder.path().join(name));
+    recording(&a, "ZLG-0001", 0..500, 250, |_| 1e-6);
+    recording(&b, "ZLG-0001", 100..600, 9999, |sequence| if sequence < 300 { 1e-6 } else { 1.5e-6 });
+    let (page, summary) = plot(vec![log(&a), log(&b)], &PlotOptions::default(), &mut |_| {}).unwrap();
+    let difference = summary.differences["ZLG-0001"];
+    let expected =
+        DifferenceSummary { common_ticks: 400, differing_ticks: 200, only_first: 100, only_second: 100 };
+    assert_eq!(difference, expected);
+    let html = page.to_html();
+    for words in ["A corrected", "B corrected", "B − A x", "calibration change", "ANGLE_RESTORED", "mode +1"]
+    {
+        assert!(html.contains(words), "{words}");
+    }
+    assert!(html.contains("calibration 2 (abababab) from tick 250 on"));
+    assert!(html.contains("400 corrected ticks are in both logs, 200 of them differ"));
+    // The mean of the differences: half of the common ticks differ by 0.5 µrad in 5 ms.
+    let mean = 0.5 * 0.5e-6 / 0.005 * nominal::DEG_PER_H;
+    assert!(html.contains(&format!("<td>{mean:.5}</td>")), "{mean}");
+}
+
+#[test]
+fn a_log_without_ticks_is_refused_in_words() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("empty.mcap");
+    RecordingWriter::create(&path, RecordingOptions::default()).unwrap().finish().unwrap();
+    let error = plot(vec![log(&path)], &PlotOptions::default(), &mut |_| {}).unwrap_err();
+    assert!(error.to_string().contains("nothing to draw"), "{error}");
+}
+
+#[test]
+fn the_page_of_many_ticks_is_no_larger_than_that_of_few() {
+    let folder = tempfile::tempdir().unwrap();
+    let size = |ticks: u64| {
+        let path = folder.path().join(format!("{ticks}.mcap"));
+        recording(
+            &path,
+            "ZLG-0001",
+            0..ticks,
+            u64::MAX,
+            |sequence| if sequence == 7777 { 1.0 } else { 1e-6 },
+        );
+        let options = PlotOptions { detail: 512, calibration: None };
+        let (page, summary) = plot(vec![log(&path)], &options, &mut |_| {}).unwrap();
+        assert_eq!(summary.units["ZLG-0001"][0].as_ref().unwrap().corrected_ticks, ticks);
+        let html = page.to_html();
+        // The peak is in the table whatever was joined: 1 rad in 5 ms.
+        assert!(
+            html.contains(&format!("{:.0}", 200.0 * nominal::DEG_PER_H).chars().take(5).collect::<String>())
+        );
+        html.len()
+    };
+    let (few, many) = (size(10_000), size(100_000));
+    assert!(many < few * 2, "{few} {many}");
+}
+
+#[test]
+fn ten_million_ticks_make_a_bounded_page() {
+    let begun = std::time::Instant::now();
+    let mut shown = UnitPlot::new(PlotOptions::default().detail, None, 0);
+    let unit = UnitId::new("ZLG-0001").unwrap();
+    let mut frame = Vec::new();
+    let ticks = 10_000_000_u64;
+    for first in (0..ticks).step_by(256) {
+        let tick = |sequence: u64| {
+            let noise = f64::from(u16::try_from(sequence * 7919 % 1000).unwrap());
+            let tick = core::CorrectedTick {
+                sequence,
+                end_time: Timestamp::from_ns(i64::try_from(sequence).unwrap() * 5_000_000),
+                duration: Span::from_ns(5_000_000),
+                ticks: 1,
+                delta_angle: [1e-9 * noise, 2e-9 * noise, 1e-6],
+                delta_velocity: [0.0, 1e-6 * noise, 0.049],
+                ..core::CorrectedTick::default()
+            };
+            isotherm_protocol::corrected::CorrectedTick::from(&tick)
+        };
+        let batch = CorrectedBatch {
+            unit: unit.to_string(),
+            revision: Revision::default(),
+            temperatures: std::iter::empty().collect(),
+            ticks: (first..(first + 256).min(ticks)).map(tick).collect(),
+        };
+        codec::encode_into(&batch, &mut frame).unwrap();
+        let message = Message { topic: Topic::Corrected(unit.clone()), received_ns: 0, frame: frame.clone() };
+        shown.take(&message, &mut |_, _| {});
+    }
+    let taken = begun.elapsed();
+    let summary = PlotSummary {
+        logs: vec!["ten million".into()],
+        reading: Vec::new(),
+        units: BTreeMap::new(),
+        differences: BTreeMap::new(),
+        units_left_out: 0,
+        second_moved_ns: None,
+    };
+    let logs = UnitLogs { logs: vec![Some(shown)], difference: None };
+    let html = layout::page(vec![(unit, logs)], &summary).unwrap().to_html();
+    println!(
+        "10 000 000 ticks: {taken:?} to take in, {:?} in all, page {} bytes",
+        begun.elapsed(),
+        html.len()
+    );
+    assert!(html.len() < 8_000_000, "{}", html.len());
+}

@@ -1,0 +1,259 @@
+//! Writing what was found into a new file.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use mcap::records::{Channel, MessageHeader, Record};
+use mcap::{McapError, Writer};
+
+use super::RecoveryReport;
+use crate::error::Error;
+use crate::message::Topic;
+use crate::recording::writer::{declare, failed};
+use crate::recording::{
+    Attachment, CHANNELS, Documents, MESSAGE_ENCODING, METADATA, RecordingOptions, place,
+};
+
+/// A schema: its name, encoding and text.
+type Schema = (String, String, Vec<u8>);
+
+/// What the file says of its channels, wherever it stands in it.
+#[derive(Debug, Default)]
+pub(super) struct Definitions {
+    schemas: BTreeMap<u16, Schema>,
+    channels: BTreeMap<u16, Channel>,
+    /// Keys of channels, from records beside the chunks.
+    keys: BTreeMap<u16, String>,
+    /// How many of them there were when the pass began.
+    before: usize,
+}
+
+impl Definitions {
+    /// Whether the pass has found some that it did not know when it began.
+    pub(super) fn are_more(&self) -> bool {
+        self.count() > self.before
+    }
+
+    fn count(&self) -> usize {
+        self.channels.len() + self.keys.len()
+    }
+}
+
+/// A channel of the new file.
+#[derive(Debug)]
+struct Target {
+    id: u16,
+    key: String,
+    /// Number that its next message should have; `None` for channels whose messages are not numbered by a recorder.
+    next: Option<u32>,
+    is_journal: bool,
+}
+
+/// The new file.
+pub(super) struct Rescue<'a> {
+    writer: Writer<BufWriter<Arc<File>>>,
+    file: Arc<File>,
+    path: PathBuf,
+    definitions: &'a mut Definitions,
+    /// By number in the old file; `None` where nothing names it.
+    targets: HashMap<u16, Option<Target>>,
+    journal: Documents,
+    /// Documents of the journal that are not attached yet.
+    documents: BTreeMap<String, Attachment>,
+    attached: BTreeSet<String>,
+    /// Messages that there were, as the old file's summary says.
+    stated: Option<u64>,
+}
+
+impl<'a> Rescue<'a> {
+    /// Creates the new file.
+    ///
+    /// # Errors
+    /// [`Error::File`].
+    pub(super) fn create(
+        path: &Path,
+        options: RecordingOptions,
+        profile: &str,
+        definitions: &'a mut Definitions,
+    ) -> Result<Self, Error> {
+        let file = Arc::new(place::create(path, options.overwrite)?);
+        let buffered = BufWriter::new(Arc::clone(&file));
+        let writer = options.to_library().profile(profile).create(buffered);
+        let writer = writer.map_err(|source| failed(path, source))?;
+        definitions.before = definitions.count();
+        Ok(Self {
+            writer,
+            file,
+            path: path.to_owned(),
+            definitions,
+            targets: HashMap::new(),
+            journal: Documents::new(),
+            documents: BTreeMap::new(),
+            attached: BTreeSet::new(),
+            stated: None,
+        })
+    }
+
+    /// Takes one record.
+    ///
+    /// # Errors
+    /// [`Error::File`] where it cannot be written.
+    pub(super) fn take(&mut self, record: Record<'_>, report: &mut RecoveryReport) -> Result<(), Error> {
+        match record {
+            Record::Schema { header, data } => {
+                let schema = (header.name, header.encoding, data.into_owned());
+                self.definitions.schemas.insert(header.id, schema);
+            }
+            Record::Channel(channel) => {
+                self.definitions.channels.insert(channel.id, channel);
+            }
+            Record::Message { header, data } => self.message(header, &data, report)?,
+            Record::Attachment { header, data, .. } => {
+                report.attachments += 1;
+                self.attach(&Attachment {
+                    name: header.name,
+                    media_type: header.media_type,
+                    attached_ns: header.log_time,
+                    bytes: data.into_owned(),
+                })?;
+            }
+            Record::Metadata(metadata) => {
+                if metadata.name == CHANNELS {
+                    let keys = metadata.metadata.iter();
+                    let keys = keys.filter_map(|(id, key)| Some((id.parse().ok()?, key.clone())));
+                    self.definitions.keys.extend(keys);
+                }
+                report.metadata += 1;
+                self.writer.write_metadata(&metadata).map_err(|source| self.failed(source))?;
+            }
+            Record::Statistics(statistics) => self.stated = Some(statistics.message_count),
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// Chunks stay as they were.
+    ///
+    /// # Errors
+    /// As [`Rescue::take`].
+    pub(super) fn end_chunk(&mut self) -> Result<(), Error> {
+        self.writer.flush().map_err(|source| self.failed(source))
+    }
+
+    /// Ends the file with a summary, and with a record of what was lost.
+    ///
+    /// # Errors
+    /// As [`Rescue::take`].
+    pub(super) fn finish(mut self, report: &mut RecoveryReport) -> Result<(), Error> {
+        for document in std::mem::take(&mut self.documents).into_values() {
+            report.documents_rebuilt += 1;
+            self.attach(&document)?;
+        }
+        let written = report.messages + report.nameless;
+        report.missing = match self.stated {
+            Some(stated) => stated.saturating_sub(written),
+            None => report.topics.values().map(|topic| topic.missing).sum(),
+        };
+        self.writer.write_metadata(&account(report)).map_err(|source| self.failed(source))?;
+        self.writer.finish().map_err(|source| self.failed(source))?;
+        let Self { writer, file, path, .. } = self;
+        let synced = writer.into_inner().flush().and_then(|()| file.sync_all());
+        synced.map_err(|source| Error::file(&path, "write the recording", source))
+    }
+
+    fn message(
+        &mut self,
+        header: MessageHeader,
+        data: &[u8],
+        report: &mut RecoveryReport,
+    ) -> Result<(), Error> {
+        let number = header.channel_id;
+        // Looked up each time where it is not known: its record may come later.
+        if self.targets.get(&number).is_none_or(Option::is_none) {
+            let target = self.declare(number).map_err(|source| self.failed(source))?;
+            self.targets.insert(number, target);
+        }
+        let Some(Some(target)) = self.targets.get_mut(&number) else {
+            report.nameless += 1;
+            return Ok(());
+        };
+        let topic = report.topics.entry(target.key.clone()).or_default();
+        if let Some(next) = target.next.as_mut() {
+            let passed_over = header.sequence.wrapping_sub(*next);
+            // A number that goes back is no loss.
+            topic.missing += u64::from(if passed_over < 1 << 31 { passed_over } else { 0 });
+            *next = header.sequence.wrapping_add(1);
+        }
+        topic.messages += 1;
+        report.messages += 1;
+        if target.is_journal {
+            for document in self.journal.take(data, header.log_time) {
+                if !self.attached.contains(&document.name) {
+                    self.documents.insert(document.name.clone(), document);
+                }
+            }
+        }
+        let header = MessageHeader { channel_id: target.id, ..header };
+        self.writer.write_to_known_channel(&header, data).map_err(|source| failed(&self.path, source))
+    }
+
+    /// Enters a channel of the old file into the new one; `None` where nothing names it.
+    fn declare(&mut self, number: u16) -> Result<Option<Target>, McapError> {
+        let (id, key, ours) = if let Some(channel) = self.definitions.channels.get(&number) {
+            let schema = match self.definitions.schemas.get(&channel.schema_id) {
+                Some((name, encoding, text)) => self.writer.add_schema(name, encoding, text)?,
+                None => 0,
+            };
+            let Channel { topic, message_encoding, metadata, .. } = channel;
+            let id = self.writer.add_channel(schema, topic, message_encoding, metadata)?;
+            (id, topic.clone(), message_encoding == MESSAGE_ENCODING)
+        } else if let Some(key) = self.definitions.keys.get(&number) {
+            (declare(&mut self.writer, &Topic::of(key))?, key.clone(), true)
+        } else {
+            return Ok(None);
+        };
+        let is_journal = ours && matches!(Topic::of(&key), Topic::Journal(_));
+        Ok(Some(Target { id, key, next: ours.then_some(0), is_journal }))
+    }
+
+    fn attach(&mut self, attachment: &Attachment) -> Result<(), Error> {
+        let Attachment { name, media_type, attached_ns, bytes } = attachment;
+        self.documents.remove(name);
+        self.attached.insert(name.clone());
+        let attachment = mcap::Attachment {
+            log_time: *attached_ns,
+            create_time: *attached_ns,
+            name: name.clone(),
+            media_type: media_type.clone(),
+            data: bytes.as_slice().into(),
+        };
+        self.writer.attach(&attachment).map_err(|source| self.failed(source))
+    }
+
+    fn failed(&self, source: McapError) -> Error {
+        failed(&self.path, source)
+    }
+}
+
+/// What the new file says of its making.
+fn account(report: &RecoveryReport) -> mcap::records::Metadata {
+    let number = |name: &str, value: u64| (name.to_owned(), value.to_string());
+    let mut metadata = BTreeMap::from([
+        ("record".to_owned(), "recovered".to_owned()),
+        ("version".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
+        ("original_ended".to_owned(), report.ended.to_string()),
+        number("messages", report.messages),
+        number("missing", report.missing),
+        number("nameless", report.nameless),
+        number("documents_rebuilt", report.documents_rebuilt),
+        number("damaged_places", report.damaged_places),
+        number("damaged_bytes", report.damaged_bytes),
+    ]);
+    if let Some(first) = report.damage.first() {
+        metadata.insert("first_damage".to_owned(), format!("byte {}: {}", first.offset, first.words));
+    }
+    mcap::records::Metadata { name: METADATA.to_owned(), metadata }
+}

@@ -1,0 +1,253 @@
+//! Whole records of a file, found again behind what is damaged.
+
+use std::fs::File;
+use std::io::{self, BufReader, Read, Seek, SeekFrom};
+use std::path::Path;
+
+use mcap::read::ChunkReader;
+use mcap::records::{Record, op};
+use serde::Serialize;
+
+use crate::error::Error;
+use crate::recording::record::{LONGEST_RECORD, metadata_length, parse};
+use crate::recording::{MAGIC, METADATA};
+
+/// Opcode and length of a record.
+const HEAD: usize = 9;
+/// The shortest head of a chunk's own: times, lengths, CRC, no compression.
+const CHUNK_HEAD: usize = 40;
+/// Bytes that are looked through at once for a record.
+const WINDOW: usize = 1 << 20;
+
+/// A place that was passed over.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Damage {
+    /// Where it begins (bytes from the file's beginning).
+    pub offset: u64,
+    /// How long it is (bytes).
+    pub length: u64,
+    /// What is wrong.
+    pub words: String,
+}
+
+/// What stands in the file next.
+#[derive(Debug)]
+pub(super) enum Piece {
+    /// A record beside the chunks.
+    Record(Record<'static>),
+    /// A chunk's records.
+    Chunk(Vec<Record<'static>>),
+    /// Something that is none of these.
+    Damage(Damage),
+}
+
+/// The profile that a file's first piece names.
+pub(super) fn profile(piece: Option<&Piece>) -> Option<&str> {
+    match piece {
+        Some(Piece::Record(Record::Header(header))) => Some(&header.profile),
+        _ => None,
+    }
+}
+
+/// Goes through a file.
+#[derive(Debug)]
+pub(super) struct Scanner {
+    file: BufReader<File>,
+    /// Where the next piece begins.
+    offset: u64,
+    length: u64,
+    /// Behind the footer only the magic follows.
+    footer: bool,
+}
+
+impl Scanner {
+    /// At the beginning of a file.
+    ///
+    /// # Errors
+    /// [`Error::File`].
+    pub(super) fn open(path: &Path) -> Result<Self, Error> {
+        let failed = |source| Error::file(path, "open the recording", source);
+        let mut file = File::open(path).map_err(failed)?;
+        let length = file.metadata().map_err(failed)?.len();
+        let mut magic = Vec::new();
+        (&mut file).take(MAGIC.len() as u64).read_to_end(&mut magic).map_err(failed)?;
+        let offset = if magic == MAGIC { length.min(MAGIC.len() as u64) } else { 0 };
+        Ok(Self { file: BufReader::with_capacity(WINDOW, file), offset, length, footer: false })
+    }
+
+    /// Length of the file (bytes).
+    pub(super) fn length(&self) -> u64 {
+        self.length
+    }
+
+    /// Where the next piece begins (bytes).
+    pub(super) fn offset(&self) -> u64 {
+        self.offset
+    }
+
+    /// The next piece; `None` behind the last.
+    ///
+    /// # Errors
+    /// Where the file cannot be read.
+    pub(super) fn next_piece(&mut self) -> io::Result<Option<Piece>> {
+        let begin = self.offset;
+        if self.footer && self.load(begin, MAGIC.len())? == MAGIC {
+            self.offset = self.length;
+        }
+        if self.offset >= self.length {
+            return Ok(None);
+        }
+        match self.piece_at(begin)? {
+            Ok((piece, length)) => {
+                self.offset += length;
+                self.footer = matches!(piece, Piece::Record(Record::Footer(_)));
+                Ok(Some(piece))
+            }
+            Err(words) => {
+                self.offset = self.next_whole(begin + 1)?;
+                self.footer = false;
+                Ok(Some(Piece::Damage(Damage { offset: begin, length: self.offset - begin, words })))
+            }
+        }
+    }
+
+    /// The whole piece at a place and its length, or why there is none.
+    fn piece_at(&mut self, at: u64) -> io::Result<Result<(Piece, u64), String>> {
+        let head = self.load(at, HEAD)?;
+        let Some((opcode, length)) = head_of(&head) else {
+            return Ok(Err("ends in the middle of a record".to_owned()));
+        };
+        if !is_opcode(opcode) {
+            return Ok(Err(format!("no record begins with {opcode:#04x}")));
+        }
+        let rest = self.length - at - HEAD as u64;
+        if length > rest {
+            let what = name(opcode);
+            return Ok(Err(format!("{what} of {length} bytes has only {rest} before the file ends")));
+        }
+        let Some(short) = usize::try_from(length).ok().filter(|length| *length <= LONGEST_RECORD) else {
+            return Ok(Err(format!("{} of {length} bytes is longer than {LONGEST_RECORD}", name(opcode))));
+        };
+        let data = self.load(at + HEAD as u64, short)?;
+        Ok(whole(opcode, &data).map(|piece| (piece, length + HEAD as u64)))
+    }
+
+    /// Where the next record begins that is sure to be one; the file's end where there is none.
+    fn next_whole(&mut self, from: u64) -> io::Result<u64> {
+        let mut begin = from;
+        while begin < self.length {
+            let window = self.load(begin, WINDOW + HEAD + CHUNK_HEAD)?;
+            let last = window.len().min(WINDOW);
+            for index in 0..last {
+                let at = begin + index as u64;
+                let plausible = window.get(index..).is_some_and(|here| self.may_be(here, at));
+                if plausible && self.piece_at(at)?.is_ok() {
+                    return Ok(at);
+                }
+            }
+            begin += last as u64;
+        }
+        Ok(self.length)
+    }
+
+    /// Whether a record of a kind that can be told from chance may begin here.
+    fn may_be(&self, here: &[u8], at: u64) -> bool {
+        let Some((opcode, length)) = head_of(here) else { return false };
+        let rest = self.length - at - HEAD as u64;
+        let fits = length <= rest && length <= LONGEST_RECORD as u64;
+        let body = here.get(HEAD..).unwrap_or_default();
+        let number = |at: usize| body.get(at..).and_then(|from| from.first_chunk()).copied();
+        match opcode {
+            // The compression's name, and lengths that go together.
+            op::CHUNK if fits && length >= CHUNK_HEAD as u64 => {
+                let name = body.get(28..).unwrap_or_default();
+                let compressions: [(&[u8], usize); 3] =
+                    [(b"\x04\0\0\0zstd", 4), (b"\x03\0\0\0lz4", 3), (b"\0\0\0\0", 0)];
+                let found = compressions.iter().find(|(start, _)| name.starts_with(start));
+                found.is_some_and(|(_, letters)| {
+                    let compressed = number(32 + letters).map_or(u64::MAX, u64::from_le_bytes);
+                    compressed.checked_add((CHUNK_HEAD + letters) as u64) == Some(length)
+                })
+            }
+            // Its CRC says whether it is one.
+            op::ATTACHMENT => fits && length > 40,
+            op::METADATA => fits && body.get(4..).is_some_and(|name| name.starts_with(METADATA.as_bytes())),
+            // What follows is the summary, or the footer.
+            op::DATA_END => length == 4 && body.get(4).copied().is_some_and(is_behind_data),
+            _ => false,
+        }
+    }
+
+    /// Bytes of the file, fewer at its end.
+    fn load(&mut self, at: u64, length: usize) -> io::Result<Vec<u8>> {
+        let here = self.file.stream_position()?;
+        match i64::try_from(at).ok().zip(i64::try_from(here).ok()) {
+            // Keeps what is buffered.
+            Some((at, here)) => self.file.seek_relative(at - here)?,
+            None => self.file.seek(SeekFrom::Start(at)).map(|_| ())?,
+        }
+        let mut bytes = Vec::new();
+        (&mut self.file).take(length as u64).read_to_end(&mut bytes)?;
+        Ok(bytes)
+    }
+}
+
+/// Opcode and length of a record.
+fn head_of(bytes: &[u8]) -> Option<(u8, u64)> {
+    let opcode = *bytes.first()?;
+    Some((opcode, u64::from_le_bytes(*bytes.get(1..)?.first_chunk()?)))
+}
+
+/// The piece that these bytes are, with everything checked that can be.
+fn whole(opcode: u8, data: &[u8]) -> Result<Piece, String> {
+    let damaged = |error: mcap::McapError| format!("{} is damaged: {error}", name(opcode));
+    if opcode == op::METADATA && metadata_length(data) != Some(data.len()) {
+        return Err("a metadata record is damaged: its lengths do not go together".to_owned());
+    }
+    match parse(opcode, data).map_err(damaged)? {
+        Record::Chunk { header, data } => {
+            if header.uncompressed_size > LONGEST_RECORD as u64 {
+                return Err(format!(
+                    "a chunk of {} bytes is longer than {LONGEST_RECORD}",
+                    header.uncompressed_size
+                ));
+            }
+            let records = ChunkReader::new(header, &data).map_err(damaged)?;
+            let records = records.map(|record| record.map(Record::into_owned)).collect::<Result<Vec<_>, _>>();
+            Ok(Piece::Chunk(records.map_err(damaged)?))
+        }
+        record => Ok(Piece::Record(record.into_owned())),
+    }
+}
+
+/// Whether the format knows it, or leaves it to others.
+fn is_opcode(opcode: u8) -> bool {
+    (op::HEADER..=op::DATA_END).contains(&opcode) || opcode >= 0x80
+}
+
+/// Whether it stands behind the end of the data.
+fn is_behind_data(opcode: u8) -> bool {
+    let summary = [
+        op::SCHEMA,
+        op::CHANNEL,
+        op::CHUNK_INDEX,
+        op::ATTACHMENT_INDEX,
+        op::STATISTICS,
+        op::METADATA_INDEX,
+        op::SUMMARY_OFFSET,
+        op::FOOTER,
+    ];
+    summary.contains(&opcode)
+}
+
+/// What a record is, for people.
+fn name(opcode: u8) -> &'static str {
+    match opcode {
+        op::CHUNK => "a chunk",
+        op::MESSAGE_INDEX => "an index of messages",
+        op::ATTACHMENT => "an attachment",
+        op::METADATA => "a metadata record",
+        op::HEADER | op::DATA_END | op::FOOTER => "the file's frame",
+        _ => "a record",
+    }
+}

@@ -1,0 +1,112 @@
+//! Where in a recording a stream begins: behind the last frame that its memory has heard, or at the first frame that a
+//! new unit was given.
+
+use std::collections::VecDeque;
+
+use isotherm_protocol::codec;
+use isotherm_protocol::key::{Input, RawStream};
+use isotherm_protocol::raw::GyroBatch;
+
+use super::{Frame, NEAR_NS, Sequencer};
+use crate::replica::outline::{Mark, MarkKind};
+
+/// How long before an entry that a stream begins with frames are kept for it (ns).
+const KEPT_NS: u64 = 5_000_000_000;
+
+impl Sequencer {
+    /// Goes on towards an entry that another stream begins with; `false` where more must come first.
+    pub(super) fn anchor(&mut self) -> bool {
+        let Some(mark) = self.marks.front() else { return false };
+        let (received_ns, kept_ns) = (mark.received_ns, mark.received_ns.saturating_sub(KEPT_NS));
+        if self.oldest(|_| true).is_some_and(|(_, frame)| frame.received_ns < kept_ns) {
+            // Of the stream before, or of none.
+            return self.give_oldest();
+        }
+        if !self.over && self.now_ns <= received_ns.saturating_add(NEAR_NS) {
+            return false;
+        }
+        let Some(mark) = self.marks.front().cloned() else { return false };
+        let cuts =
+            if mark.kind == MarkKind::Memory { self.behind_memory(&mark) } else { self.before_first(&mark) };
+        // A stream whose service has stopped is gone; one that was killed may have heard what comes before the cut.
+        while let Some(index) = self.first_before(&cuts) {
+            self.give(index);
+        }
+        self.given.iter_mut().for_each(VecDeque::clear);
+        self.carry_out(true)
+    }
+
+    /// The input whose next frame was recorded first, of those whose next frame is before their cut.
+    fn first_before(&self, cuts: &[u64; Input::ALL.len()]) -> Option<usize> {
+        let before = |index: usize| {
+            let front = self.waiting.get(index).and_then(VecDeque::front);
+            front.zip(cuts.get(index)).is_some_and(|(frame, cut)| frame.order < *cut)
+        };
+        self.oldest(before).map(|(index, _)| index)
+    }
+
+    /// For each input the order of the first frame that the memory has not heard.
+    fn behind_memory(&self, mark: &Mark) -> [u64; Input::ALL.len()] {
+        let mut cuts = [None; Input::ALL.len()];
+        let mut last: Option<&Frame> = None;
+        for ((cut, heard), frames) in cuts.iter_mut().zip(&mark.heard).zip(&self.waiting) {
+            if heard.frames == 0 {
+                continue;
+            }
+            // Of equal frames the last one before the memory came: a producer that repeats itself does so at once.
+            let same = || frames.iter().filter(|frame| frame.crc() == heard.crc);
+            let found = same().rfind(|frame| frame.received_ns <= mark.received_ns).or_else(|| same().next());
+            *cut = found.map(|frame| frame.order + 1);
+            last = last.into_iter().chain(found).max_by_key(|frame| frame.order);
+        }
+        // Had the memory heard any frame of the other inputs in the recording, it would name it; only what is much older
+        // than what it has heard can have been missed by the service.
+        let missed_ns = last.map_or(0, |frame| frame.received_ns.saturating_sub(NEAR_NS));
+        let mut orders = [0; Input::ALL.len()];
+        for ((order, cut), frames) in orders.iter_mut().zip(cuts).zip(&self.waiting) {
+            let missed = frames.iter().take_while(|frame| frame.received_ns < missed_ns).last();
+            *order = cut.unwrap_or_else(|| missed.map_or(0, |frame| frame.order + 1));
+        }
+        orders
+    }
+
+    /// For each input the order of the first frame that a new unit was given.
+    fn before_first(&self, mark: &Mark) -> [u64; Input::ALL.len()] {
+        let Some((_, oldest)) = self.oldest(|_| true) else { return [0; Input::ALL.len()] };
+        // A recording, or a unit, that begins with the stream: everything is the stream's.
+        let began_with_it = oldest.received_ns.saturating_add(NEAR_NS) >= mark.received_ns;
+        let fresh = self.unheard == 0 && self.standing.is_none();
+        if began_with_it && fresh {
+            return [0; Input::ALL.len()];
+        }
+        let by_sequence = self.published.and_then(|sequence| self.first_gyro_frame(mark, sequence));
+        let by_time = || {
+            let all = self.waiting.iter().flatten();
+            let before = all.clone().filter(|frame| frame.received_ns <= mark.received_ns);
+            // The entry came with the first frame, right behind it.
+            before.map(|frame| frame.order).max().or_else(|| all.map(|frame| frame.order).min())
+        };
+        [by_sequence.or_else(by_time).unwrap_or(0); Input::ALL.len()]
+    }
+
+    /// The first frame near the entry that has the tick which the new unit published first, or a later one.
+    fn first_gyro_frame(&self, mark: &Mark, sequence: u64) -> Option<u64> {
+        let frames = self.waiting.get(Input::Raw(RawStream::Gyro).index())?;
+        let near =
+            frames.iter().filter(|frame| frame.received_ns.saturating_add(NEAR_NS) >= mark.received_ns);
+        let gyro = near.filter_map(|frame| {
+            let batch: GyroBatch = codec::decode(&frame.bytes).ok()?;
+            let last = batch.first_sequence.saturating_add(batch.ticks.len() as u64);
+            ((batch.first_sequence..last).contains(&sequence)).then_some(frame.order)
+        });
+        let first = gyro.min()?;
+        // What was recorded right before it came to the service with it: the frames of a tick belong together.
+        let gyro_before =
+            frames.iter().rev().find(|frame| frame.order < first).map_or(0, |frame| frame.order + 1);
+        let together =
+            self.waiting.iter().flatten().filter(|frame| (gyro_before..=first).contains(&frame.order));
+        let received_ns = frames.iter().find(|frame| frame.order == first)?.received_ns;
+        let near = together.filter(|frame| frame.received_ns + 1_000_000 >= received_ns);
+        near.map(|frame| frame.order).min()
+    }
+}

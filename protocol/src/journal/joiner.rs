@@ -1,0 +1,167 @@
+//! Parts put together again.
+
+use std::collections::BTreeMap;
+
+use thiserror::Error;
+
+use super::{JournalEntry, JournalPart};
+use crate::codec::{CodecError, Message};
+
+/// Most entries of which some parts are there and others are not.
+pub const MAX_OPEN_ENTRIES: usize = 256;
+/// Most bytes of all of them together.
+pub const MAX_OPEN_BYTES: usize = 64 << 20;
+
+/// Why a part does not become an entry; nothing of its entry is kept.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum JoinError {
+    /// The part is none by itself.
+    #[error("journal of unit {unit}, entry {number}: {error}")]
+    Part {
+        /// Serial of the unit.
+        unit: String,
+        /// Number of the entry.
+        number: u64,
+        /// What is wrong with it.
+        error: CodecError,
+    },
+    /// The part before it did not come.
+    #[error(
+        "journal of unit {unit}, entry {number}: part {got} of {parts} has come, part {need} was to come: it is lost"
+    )]
+    Missing {
+        /// Serial of the unit.
+        unit: String,
+        /// Number of the entry.
+        number: u64,
+        /// The part that has come, from 0.
+        got: u32,
+        /// The part that was to come.
+        need: u32,
+        /// How many there are.
+        parts: u32,
+    },
+    /// Too many entries are incomplete.
+    #[error(
+        "journal of unit {unit}, entry {number}: the incomplete entries would be more than {MAX_OPEN_ENTRIES}, or longer \
+         than {MAX_OPEN_BYTES} bytes together"
+    )]
+    TooMuch {
+        /// Serial of the unit.
+        unit: String,
+        /// Number of the entry.
+        number: u64,
+    },
+    /// The parts together are no entry.
+    #[error("journal of unit {unit}, entry {number}: the parts together are no entry")]
+    Malformed {
+        /// Serial of the unit.
+        unit: String,
+        /// Number of the entry.
+        number: u64,
+    },
+    /// The entry is another one than its parts say.
+    #[error("journal of unit {unit}, entry {number}: the parts hold entry {got_number} of unit {got_unit}")]
+    Other {
+        /// Serial of the unit, as the parts say.
+        unit: String,
+        /// Number of the entry, likewise.
+        number: u64,
+        /// Serial of the unit, as the entry says.
+        got_unit: String,
+        /// Number of the entry, likewise.
+        got_number: u64,
+    },
+}
+
+/// An entry of which some parts are there.
+#[derive(Debug)]
+struct Open {
+    number: u64,
+    parts: u32,
+    /// The part that is to come.
+    next: u32,
+    bytes: Vec<u8>,
+}
+
+/// Puts the parts of entries together: of any number of units, those of one unit in the order in which they were sent.
+///
+/// The topic and each answer to a query need a joiner of their own. An entry whose remaining parts never come is given up
+/// when the unit's next one begins; its number is missing then.
+#[derive(Debug, Default)]
+pub struct Joiner {
+    /// By instance and unit.
+    open: BTreeMap<(String, String), Open>,
+    bytes: usize,
+    given_up: u64,
+}
+
+impl Joiner {
+    /// One that waits for nothing.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Takes a part; the entry where it was the last one.
+    ///
+    /// # Errors
+    /// [`JoinError`]: the entry is given up.
+    pub fn join(&mut self, part: JournalPart) -> Result<Option<JournalEntry>, JoinError> {
+        let checked = part.check();
+        let JournalPart { unit, instance, number, part: got, parts, bytes: more } = part;
+        let place = (instance, unit);
+        let unit = || place.1.clone();
+        let open = self.close(&place);
+        if let Err(error) = checked {
+            self.given_up += u64::from(open.is_some());
+            return Err(JoinError::Part { unit: unit(), number, error });
+        }
+        let open = match open {
+            Some(open) if (open.number, open.parts, open.next) == (number, parts, got) => open,
+            before => {
+                self.given_up += u64::from(before.is_some());
+                if got > 0 {
+                    let need = before
+                        .filter(|open| (open.number, open.parts) == (number, parts))
+                        .map_or(0, |open| open.next);
+                    return Err(JoinError::Missing { unit: unit(), number, got, need, parts });
+                }
+                Open { number, parts, next: 0, bytes: Vec::new() }
+            }
+        };
+        let Open { mut bytes, .. } = open;
+        bytes.extend(more);
+        if got + 1 < parts {
+            if self.open.len() >= MAX_OPEN_ENTRIES || self.bytes + bytes.len() > MAX_OPEN_BYTES {
+                self.given_up += 1;
+                return Err(JoinError::TooMuch { unit: unit(), number });
+            }
+            self.bytes += bytes.len();
+            self.open.insert(place, Open { number, parts, next: got + 1, bytes });
+            return Ok(None);
+        }
+        let Ok((entry, [])) = postcard::take_from_bytes::<JournalEntry>(&bytes) else {
+            return Err(JoinError::Malformed { unit: unit(), number });
+        };
+        if (&entry.instance, &entry.unit, entry.number) != (&place.0, &place.1, number) {
+            let (got_unit, got_number) = (entry.unit, entry.number);
+            return Err(JoinError::Other { unit: unit(), number, got_unit, got_number });
+        }
+        Ok(Some(entry))
+    }
+
+    /// Entries that were given up because parts of them never came.
+    #[must_use]
+    pub fn given_up(&self) -> u64 {
+        self.given_up
+    }
+
+    /// Takes an open entry out.
+    fn close(&mut self, place: &(String, String)) -> Option<Open> {
+        let open = self.open.remove(place)?;
+        self.bytes -= open.bytes.len();
+        Some(open)
+    }
+}

@@ -1,0 +1,184 @@
+//! What a service did to a stream beside giving it frames, done again.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use isotherm_correction::navigation::NavigationStep;
+use isotherm_correction::unit::{At, Change, UnitSettings};
+use isotherm_correction::units::{Span, Timestamp};
+use thiserror::Error;
+
+use super::{Label, MemoryError, UnitStream};
+use crate::control::Schedule;
+use crate::corrected::Revision;
+use crate::digest::{Digest, Digits};
+use crate::document::{Document, Problem};
+use crate::journal::JournalEvent;
+
+/// Why an event of a journal cannot be carried out; the stream is as before, unless it is said otherwise.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum JournalError {
+    /// A calibration that never was a document.
+    #[error(
+        "revision {revision} was no document, so that the journal does not have its coefficients: the log cannot be \
+         corrected from here on"
+    )]
+    NoDocument {
+        /// The revision counter.
+        revision: u64,
+    },
+    /// The text is not the one that the revision names.
+    #[error("the document of revision {} has the digest {got}…, must be {}…", .revision.counter, Digits(&.revision.digest))]
+    OtherDocument {
+        /// The revision.
+        revision: Revision,
+        /// Head of the text's SHA-256, in hexadecimal digits.
+        got: String,
+    },
+    /// The text is no valid document for this program.
+    #[error("the document of revision {revision} is not valid here: {}", words(.problems))]
+    Document {
+        /// The revision counter.
+        revision: u64,
+        /// Everything that is wrong with it.
+        problems: Vec<Problem>,
+    },
+    /// The stream was given that revision before, or a later one.
+    #[error("revision {got} comes too late: the stream was given revision {given} already")]
+    OldRevision {
+        /// The revision counter.
+        got: u64,
+        /// The highest that the stream was given.
+        given: u64,
+    },
+    /// The command had another outcome than in the service; it has been given all the same.
+    #[error("command {command} was {} by the service and is {} here: {words}", outcome(*.accepted), outcome(!.accepted))]
+    OtherOutcome {
+        /// Its name.
+        command: &'static str,
+        /// Whether the service's unit took it.
+        accepted: bool,
+        /// What the refusing one of the two said.
+        words: String,
+    },
+    /// The settings are none that a unit can have.
+    #[error("the unit began with settings that no unit can have: {what}")]
+    Settings {
+        /// What is wrong with them.
+        what: String,
+    },
+    /// The memory cannot be gone on with.
+    #[error(transparent)]
+    Memory(#[from] MemoryError),
+    /// The memory is that of another unit.
+    #[error("the memory is that of unit {got}, the stream is that of unit {need}")]
+    OtherUnit {
+        /// The unit of the memory.
+        got: String,
+        /// The unit of the stream.
+        need: String,
+    },
+}
+
+fn words(problems: &[Problem]) -> String {
+    problems.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ")
+}
+
+fn outcome(accepted: bool) -> &'static str {
+    if accepted { "accepted" } else { "refused" }
+}
+
+impl From<Schedule> for At {
+    fn from(schedule: Schedule) -> Self {
+        match schedule {
+            Schedule::NextTick => Self::NextTick,
+            Schedule::Sequence(sequence) => Self::Sequence(sequence),
+            Schedule::TimeNs(time_ns) => Self::Time(Timestamp::from_ns(time_ns)),
+        }
+    }
+}
+
+impl UnitStream {
+    /// Does what the service did, between the same two frames: where [`UnitStream::heard`] is what the entry says.
+    ///
+    /// [`JournalEvent::Memory`] puts the memory in the place of the stream's own; a stream that stands where the memory
+    /// was taken gives the same bits with it and without. [`JournalEvent::Ended`] changes nothing.
+    ///
+    /// # Errors
+    /// [`JournalError`].
+    pub fn carry_out(&mut self, event: &JournalEvent) -> Result<(), JournalError> {
+        match event {
+            JournalEvent::Began { settings, highest_revision } => {
+                check(settings)?;
+                self.begin_anew(*settings, *highest_revision);
+            }
+            JournalEvent::Memory { memory, .. } => self.remember(memory)?,
+            JournalEvent::Changed { revision, at, slew_ns, document, overlay, source } => {
+                let next_counter = self.next_counter();
+                if revision.counter < next_counter {
+                    let given = next_counter - 1;
+                    return Err(JournalError::OldRevision { got: revision.counter, given });
+                }
+                let Some(text) = document else {
+                    return Err(JournalError::NoDocument { revision: revision.counter });
+                };
+                let parsed = Document::parse(text, None)
+                    .map_err(|problems| JournalError::Document { revision: revision.counter, problems })?;
+                let digest = Digest(parsed.digest);
+                if digest.head() != revision.digest {
+                    let got = Digits(&digest.head()).to_string();
+                    return Err(JournalError::OtherDocument { revision: *revision, got });
+                }
+                let label = Label { overlay: *overlay, ..Label::of(&parsed.document, digest, source) };
+                let (at, slew) = ((*at).into(), Span::from_ns(*slew_ns));
+                let calibration = Arc::new(parsed.calibration);
+                self.schedule(Change { calibration, revision: revision.counter, at, slew }, label);
+            }
+            JournalEvent::Commanded { command, accepted, words } => {
+                let done = self.command(command);
+                if done.is_ok() != *accepted {
+                    let words = done.err().map_or_else(|| words.clone(), |refusal| refusal.to_string());
+                    return Err(JournalError::OtherOutcome {
+                        command: command.name(),
+                        accepted: *accepted,
+                        words,
+                    });
+                }
+            }
+            JournalEvent::Flushed => self.flush(),
+            JournalEvent::SelfTestExpired => self.expire_self_test(),
+            JournalEvent::PreLaunchEnded => self.end_pre_launch(),
+            JournalEvent::Ended => {}
+        }
+        Ok(())
+    }
+
+    /// Gives up everything but the serial and the account of what was heard: the unit begins again, with the counter of
+    /// its next revision behind `highest_revision`.
+    pub fn begin_anew(&mut self, settings: UnitSettings, highest_revision: u64) {
+        let anew = Self::new(self.id.clone(), settings).with_revision(highest_revision);
+        *self = Self { heard: self.heard, ..anew };
+    }
+
+    fn remember(&mut self, memory: &[u8]) -> Result<(), JournalError> {
+        let mut remembered = Self::from_memory(memory)?;
+        if remembered.id != self.id {
+            let (got, need) = (remembered.id.to_string(), self.id.to_string());
+            return Err(JournalError::OtherUnit { got, need });
+        }
+        let mut ready: VecDeque<_> = std::mem::take(&mut self.ready);
+        ready.append(&mut remembered.ready);
+        *self = Self { ready, ..remembered };
+        Ok(())
+    }
+}
+
+/// Checks what came from outside, as far as the unit rests on it.
+fn check(settings: &UnitSettings) -> Result<(), JournalError> {
+    let (ticks, coning_sculling) = (settings.navigation.ticks(), settings.navigation.coning_sculling());
+    match NavigationStep::new(ticks, coning_sculling) {
+        Ok(_) => Ok(()),
+        Err(error) => Err(JournalError::Settings { what: format!("navigation: {error}") }),
+    }
+}

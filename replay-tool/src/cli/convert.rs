@@ -1,0 +1,235 @@
+//! `isotherm-replay convert`.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use isotherm_log::file::read_small;
+use isotherm_log::source::LogReport;
+use isotherm_protocol::document::Document;
+use serde::Serialize;
+
+use super::log_args::LogArgs;
+use super::{Outcome, print, show};
+use crate::convert::{self, Conversion, Place, Ros2Options, Target};
+use crate::error::Error;
+
+/// Convert recordings to text, ROS 2 bags or Parquet, and text logs to recordings
+#[derive(Debug, Args)]
+#[command(
+    override_usage = "isotherm-replay convert [OPTIONS] <LOG>... <OUT>",
+    after_help = "OUT, the last name, is where it goes: a file that ends in .mcap, .csv or .csv.gz, or a folder with --to.\n\n\
+    Examples:\n  \
+    isotherm-replay simulate --preset mems-chamber --duration 60 --out mems.csv\n  \
+    isotherm-replay convert mems.csv --mapping mems.mapping.toml --unit MEMS-0001 mems.mcap\n  \
+    isotherm-replay convert mems.mcap text --to text\n  \
+    isotherm-replay convert mems.mcap bag --to ros2 --calibration config/calibration/MEMS-0001.toml\n  \
+    isotherm-replay convert mems.mcap tables --to parquet\n\n\
+    Text goes to FOLDER/UNIT/raw.csv with raw.mapping.toml, which reads it back to the same ticks, corrected.csv and\n\
+    health.csv; or, for one unit, beside a file that ends in .csv or .csv.gz. A new run of the producer begins a new\n\
+    file (raw.2.csv). Parquet goes to FOLDER/UNIT/STREAM.parquet. A ROS 2 bag has /imu/UNIT/data and\n\
+    /imu/UNIT/temperature/CHANNEL; for units without corrected ticks, or with --raw, /imu/UNIT/data_raw.\n\
+    Exit code 3: something of the log could not be read or written, and the summary says what."
+)]
+pub(super) struct ConvertArgs {
+    #[command(flatten)]
+    log: LogArgs,
+    /// What it is converted to; without it, as OUT ends
+    #[arg(long, value_enum, value_name = "TARGET")]
+    to: Option<Target>,
+    /// Write over files that are there already
+    #[arg(long)]
+    overwrite: bool,
+    /// Gyro ticks in one message of a recording
+    #[arg(long, value_name = "TICKS", default_value_t = 64, value_parser = clap::value_parser!(u16).range(1..=4096))]
+    batch: u16,
+    /// Raw readings into a ROS 2 bag too, at nominal scale, where there are corrected ticks
+    #[arg(long)]
+    raw: bool,
+    /// Calibration document (TOML) that says what raw readings in a ROS 2 bag are; those in recordings are known
+    #[arg(long, short, value_name = "FILE")]
+    calibration: Vec<PathBuf>,
+    /// Frame of the messages in a ROS 2 bag; without it, each unit's name in its topics
+    #[arg(long, value_name = "FRAME")]
+    frame: Option<String>,
+    /// Print the summary as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// Everything that the summary says.
+#[derive(Debug, Serialize)]
+struct Report<'a> {
+    target: Target,
+    #[serde(flatten)]
+    outcome: &'a convert::Outcome,
+}
+
+impl ConvertArgs {
+    /// Parts the last name from the others: two positional arguments, of which one is a list, could not stand apart with
+    /// an option between them.
+    fn split(&self) -> Result<(LogArgs, PathBuf), Error> {
+        let mut log = self.log.clone();
+        match log.log.pop() {
+            Some(out) if !log.log.is_empty() => Ok((log, out)),
+            _ => Err(Error::Usage("give the log, and behind it where the conversion goes".to_owned())),
+        }
+    }
+
+    /// What it is converted to.
+    fn target(&self, out: &Path) -> Result<Target, Error> {
+        let name = out.file_name().map(|name| name.to_string_lossy().to_lowercase()).unwrap_or_default();
+        let parquet = name.ends_with(".parquet");
+        let by_name = if name.ends_with(".mcap") {
+            Some(Target::Mcap)
+        } else if name.ends_with(".csv") || name.ends_with(".csv.gz") {
+            Some(Target::Text)
+        } else {
+            None
+        };
+        let out = out.display();
+        let target = match (self.to, by_name) {
+            (Some(to), Some(by_name)) if to != by_name => {
+                return Err(Error::Usage(format!(
+                    "{out} is the name of another kind of output than --to says"
+                )));
+            }
+            (to, by_name) => to.or(by_name),
+        };
+        match target {
+            // A reader would take a folder of that name for one table.
+            _ if parquet => Err(Error::Usage(format!(
+                "{out}: Parquet is one file per unit and stream: give a folder that does not end in .parquet, and --to parquet"
+            ))),
+            Some(Target::Mcap) if by_name.is_none() => {
+                Err(Error::Usage(format!("{out} does not end in .mcap, as a recording must")))
+            }
+            Some(target) => Ok(target),
+            None => Err(Error::Usage(format!(
+                "{out} does not say what to convert to: end it in .mcap, .csv or .csv.gz, or give a folder and --to text, ros2 or parquet"
+            ))),
+        }
+    }
+
+    /// Refuses options that have no meaning for the target.
+    fn refuse_idle_options(&self, target: Target) -> Result<(), Error> {
+        let idle = [
+            ("--raw", self.raw),
+            ("--calibration", !self.calibration.is_empty()),
+            ("--frame", self.frame.is_some()),
+        ];
+        match idle.iter().find(|(_, given)| *given && target != Target::Ros2) {
+            Some((option, _)) => Err(Error::Usage(format!("{option} is for ROS 2 bags: leave it out"))),
+            None => Ok(()),
+        }
+    }
+
+    /// The conversion that the arguments describe.
+    fn conversion(&self) -> Result<Conversion, Error> {
+        let (log, out) = self.split()?;
+        let target = self.target(&out)?;
+        self.refuse_idle_options(target)?;
+        for path in &log.log {
+            std::fs::metadata(path).map_err(|source| Error::file(path, "open the log", source))?;
+        }
+        let files = log.files(self.batch.into(), None)?;
+        if target == Target::Mcap && log.is_recording()? {
+            return Err(Error::Usage(
+                "the log is a recording already: convert it to something else".to_owned(),
+            ));
+        }
+        let inputs = log.inputs();
+        let inputs = inputs.into_iter().chain(self.calibration.iter().cloned()).collect();
+        let place = Place { overwrite: self.overwrite, inputs };
+        // Before a long log is read, not after.
+        match target {
+            Target::Ros2 | Target::Parquet => place.check_folder(&out)?,
+            Target::Text if !convert::is_csv(&out) => place.check_folder(&out)?,
+            Target::Text | Target::Mcap => place.check(&out)?,
+        }
+        let documents = self.calibration.iter().map(|path| document(path)).collect::<Result<_, _>>()?;
+        let mut sources: Vec<_> = vec![("log".to_owned(), names(&log.log))];
+        sources.extend(
+            log.mapping.as_ref().map(|mapping| ("mapping".to_owned(), mapping.display().to_string())),
+        );
+        Ok(Conversion {
+            files,
+            part: log.part()?,
+            target,
+            out,
+            place,
+            sources,
+            ros2: Ros2Options { raw: self.raw, frame: self.frame.clone(), documents },
+        })
+    }
+}
+
+/// Files by their names.
+fn names(paths: &[PathBuf]) -> String {
+    let names: Vec<_> = paths.iter().map(|path| path.display().to_string()).collect();
+    names.join(", ")
+}
+
+/// Reads a calibration document.
+fn document(path: &Path) -> Result<Document, Error> {
+    let bytes = read_small(path, "read the calibration document")?;
+    let parsed = Document::parse_bytes(&bytes, Some(&path.display().to_string())).map_err(|problems| {
+        isotherm_log::error::Error::Calibration(problems.iter().map(ToString::to_string).collect())
+    })?;
+    Ok(parsed.document)
+}
+
+/// Runs the command.
+pub(super) fn run(args: &ConvertArgs) -> Result<Outcome, Error> {
+    let conversion = args.conversion()?;
+    let outcome = conversion.run()?;
+    for note in &outcome.notes {
+        show::warn(note);
+    }
+    let report = Report { target: conversion.target, outcome: &outcome };
+    print(if args.json { show::json(&report) } else { human(&outcome) }.as_bytes())?;
+    Ok(if outcome.lost_data() { Outcome::DataLoss } else { Outcome::Complete })
+}
+
+/// The summary as tables.
+fn human(outcome: &convert::Outcome) -> String {
+    let converted = &outcome.converted;
+    let files: Vec<_> = converted
+        .files
+        .iter()
+        .map(|file| (format!("{}  {}", file.path.display(), file.what), file.rows.to_string()))
+        .collect();
+    let topics: Vec<_> =
+        outcome.topics.iter().map(|topic| (topic.name.clone(), topic.messages.to_string())).collect();
+    let mut counts: Vec<_> = Vec::new();
+    if converted.duplicates > 0 {
+        counts.push(("came more than once, written once".to_owned(), converted.duplicates.to_string()));
+    }
+    let left_out = converted.left_out.iter();
+    counts.extend(left_out.map(|(what, count)| (format!("left out: {what}"), count.to_string())));
+    counts.extend(converted.lost.iter().map(|(why, count)| (format!("LOST: {why}"), count.to_string())));
+    let mut text = String::new();
+    for rows in [&files, &topics, &counts] {
+        if !rows.is_empty() {
+            let rows: Vec<_> = rows.iter().map(|(name, figure)| (name.as_str(), figure.clone())).collect();
+            text += &show::table(&rows);
+        }
+    }
+    text + &reading(&outcome.log)
+}
+
+/// What reading the log came to, in words.
+fn reading(report: &LogReport) -> String {
+    match report {
+        LogReport::Text(report) => show::reading(report),
+        LogReport::Recording(report) => {
+            let mut text = String::new();
+            if let Some(words) = &report.cut_short {
+                text = format!("{words}; what was whole before it has been used\n");
+            }
+            if report.foreign_messages > 0 {
+                text += &format!("{} messages of other programs were passed over\n", report.foreign_messages);
+            }
+            text
+        }
+    }
+}

@@ -1,0 +1,142 @@
+//! Recordings: every unit by its own journal, all at once.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::thread::available_parallelism;
+
+use isotherm_correction::units::Span;
+use isotherm_log::diff::DiffOptions;
+use isotherm_log::file::read_small;
+use isotherm_log::offline::{Basis, Loaded, RunOptions, UnitPlan, correct, load_calibration};
+use isotherm_log::part::{LogFiles, Part};
+use isotherm_log::replica::{Changes, Outlines, scan};
+use isotherm_protocol::key::UnitId;
+
+use super::CorrectArgs;
+use super::report::Report;
+use super::sink::Sink;
+use crate::cli::{Outcome, print, show};
+use crate::error::Error;
+use crate::progress::Bar;
+
+/// Runs the command on recordings.
+pub(super) fn run(args: &CorrectArgs) -> Result<Outcome, Error> {
+    let files = args.log.files(1, None)?;
+    let mut part = args.log.part()?;
+    let outlines = scan(&args.log.log)?;
+    let mut loaded = BTreeMap::new();
+    for path in &args.calibration {
+        let calibration = load_calibration(path)?;
+        calibration.warnings.iter().for_each(|warning| show::warn(&warning.to_string()));
+        if let Some(before) = loaded.insert(calibration.unit.clone(), (path, calibration)) {
+            let words =
+                format!("--calibration is given twice for unit {}: {}", before.1.unit, before.0.display());
+            return Err(Error::Usage(words));
+        }
+    }
+    let calibrations =
+        loaded.iter().map(|(unit, (_, calibration))| (unit.clone(), calibration.clone())).collect();
+    outlines.damaged.iter().for_each(|words| show::warn(words));
+    let plans = plans(args, outlines, calibrations)?;
+    let units: Vec<_> = plans.iter().map(|plan| plan.id.clone()).collect();
+    let inputs: Vec<_> = args.log.inputs().into_iter().chain(args.calibration.iter().cloned()).collect();
+    let mut sink = Sink::open(args.out.as_deref(), args.format, &units, &inputs)?;
+    for (path, _) in loaded.values() {
+        sink.document(read_small(path, "read the calibration document")?)?;
+    }
+    // A journal is followed from its beginning; what comes before the part is corrected and not given out.
+    let by_journal = plans.iter().any(|plan| matches!(plan.basis, Basis::Journal { .. }));
+    let from_ns = if by_journal && part.start > Span::ZERO { beginning(&files, &mut part)? } else { 0 };
+    let cores = available_parallelism().map_or(1, usize::from);
+    let options = RunOptions {
+        threads: args.threads.map_or(cores, usize::from),
+        form: sink.form(args.format),
+        from_ns,
+        diff: DiffOptions::default(),
+    };
+    let (mut bar, mut ticks) = (None, 0);
+    let result = correct(&files, &part, plans, options, &mut |made, progress| {
+        let bar = bar.get_or_insert_with(|| Bar::over_log(progress.clone()));
+        ticks += made.iter().map(|(_, output)| output.ticks).sum::<u64>();
+        bar.show(format!("{ticks} ticks"));
+        sink.write(made).map_err(|error| match error {
+            Error::Log(error) => error,
+            other => isotherm_log::error::Error::Usage(other.to_string()),
+        })
+    });
+    bar.iter().for_each(Bar::finish);
+    let (units, log) = result?;
+    sink.finish(&args.log.log)?;
+    let report = Report::new(&units, &log);
+    report.warn();
+    let text = if args.json { show::json(&report) } else { report.human() };
+    if args.out.as_deref() == Some(Path::new("-")) {
+        let _ = std::io::Write::write_all(&mut std::io::stderr(), text.as_bytes());
+    } else {
+        print(text.as_bytes())?;
+    }
+    Ok(if report.lost_data() { Outcome::DataLoss } else { Outcome::Complete })
+}
+
+/// From which time of reception on ticks are given out; the part then begins with the log.
+fn beginning(files: &LogFiles, part: &mut Part) -> Result<u64, Error> {
+    let first = files.open(&Part::default())?.next_message()?;
+    let start = std::mem::take(&mut part.start);
+    let start_ns = u64::try_from(start.as_ns()).unwrap_or(0);
+    Ok(first.map_or(0, |message| message.received_ns.saturating_add(start_ns)))
+}
+
+/// What each unit of the log is corrected by.
+fn plans(
+    args: &CorrectArgs,
+    outlines: Outlines,
+    mut calibrations: BTreeMap<UnitId, Loaded>,
+) -> Result<Vec<UnitPlan>, Error> {
+    let wanted = args.log.units()?;
+    if let Some(unit) = wanted.iter().find(|unit| !outlines.units.contains_key(unit)) {
+        return Err(Error::Usage(format!("--unit {unit}: there is nothing of this unit in the log")));
+    }
+    let (mut plans, mut without) = (Vec::new(), Vec::new());
+    for (id, outline) in outlines.units {
+        if !outline.has_raw || !(wanted.is_empty() || wanted.contains(&id)) {
+            continue;
+        }
+        let calibration = calibrations.remove(&id);
+        let by_journal = !outline.journal.is_empty() && !args.ignore_journal;
+        if !by_journal && calibration.is_none() {
+            without.push(id.to_string());
+            continue;
+        }
+        let changed = calibration.is_some() || args.ignore_swaps || !by_journal;
+        let compare = outline.has_corrected && !args.no_compare && (args.compare || !changed);
+        let basis = if by_journal {
+            if let Some(setting) = args.given_setting() {
+                return Err(Error::Usage(format!(
+                    "{setting}: the journal of unit {id} has the settings that it had; leave it out, or --ignore-journal"
+                )));
+            }
+            Basis::Journal {
+                outline: outline.journal,
+                changes: Changes { calibration, ignore_swaps: args.ignore_swaps },
+            }
+        } else {
+            Basis::Given { settings: args.settings()?, calibration }
+        };
+        plans.push(UnitPlan { id, basis, compare });
+    }
+    if !without.is_empty() {
+        return Err(Error::Usage(format!(
+            "there is no journal to correct {} by: give --calibration FILE for each, or name the other units with --unit",
+            without.join(", ")
+        )));
+    }
+    if let Some(unit) = calibrations.keys().next() {
+        return Err(Error::Usage(format!(
+            "--calibration: there are no raw messages of unit {unit} in the log"
+        )));
+    }
+    if plans.is_empty() {
+        return Err(Error::Usage("there are no raw messages in the log to correct".to_owned()));
+    }
+    Ok(plans)
+}

@@ -1,0 +1,121 @@
+//! What correcting a recording came to.
+
+use comfy_table::{CellAlignment, Table, presets};
+use isotherm_log::offline::UnitReport;
+use isotherm_log::source::LogReport;
+use serde::Serialize;
+
+use crate::cli::diff::first_difference;
+use crate::cli::show;
+
+/// Everything that the summary says.
+#[derive(Debug, Serialize)]
+pub(super) struct Report<'r> {
+    units: &'r [UnitReport],
+    log: &'r LogReport,
+    /// Whether every unit's ticks are those that the service published, to the bit; left out where none were compared.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    identical: Option<bool>,
+}
+
+impl<'r> Report<'r> {
+    pub(super) fn new(units: &'r [UnitReport], log: &'r LogReport) -> Self {
+        let mut compared = units.iter().filter_map(|unit| unit.published.as_ref()).peekable();
+        let identical = compared.peek().is_some().then(|| compared.all(|account| account.agrees()));
+        Self { units, log, identical }
+    }
+
+    pub(super) fn lost_data(&self) -> bool {
+        self.log.lost_data() || self.units.iter().any(UnitReport::lost_data)
+    }
+
+    /// Says on stderr what is not as it should be.
+    pub(super) fn warn(&self) {
+        if let LogReport::Recording(report) = self.log {
+            report.cut_short.iter().for_each(|words| show::warn(words));
+        }
+        for unit in self.units {
+            let replica = &unit.replica;
+            for notice in &replica.notices {
+                show::warn(&format!("unit {}: {notice}", unit.unit));
+            }
+            if replica.further_notices > 0 {
+                show::warn(&format!("unit {}: {} further such", unit.unit, replica.further_notices));
+            }
+        }
+    }
+
+    pub(super) fn human(&self) -> String {
+        let mut table = Table::new();
+        table.load_preset(presets::NOTHING);
+        table.set_header([
+            "unit",
+            "ticks",
+            "gaps",
+            "missing",
+            "duration (s)",
+            "mean rate (°/h)",
+            "journal",
+            "published",
+        ]);
+        for unit in self.units {
+            let summary = &unit.summary;
+            let rate = summary.mean_rate_deg_per_h.map(|rate| format!("{rate:.4}")).join("  ");
+            table.add_row([
+                unit.unit.to_string(),
+                summary.ticks.to_string(),
+                summary.gaps.to_string(),
+                summary.missed_ticks.to_string(),
+                format!("{:.3}", summary.duration_s),
+                rate,
+                journal(unit),
+                published(unit),
+            ]);
+        }
+        for column in table.column_iter_mut().skip(1).take(5) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+        let mut text = format!("{table}\n");
+        for unit in self.units {
+            let first = unit.published.as_ref().filter(|account| !account.agrees());
+            if let Some(first) = first.and_then(|account| account.first.as_ref()) {
+                text += &format!("\nunit {}: the first difference\n", unit.unit);
+                text += &first_difference(first, ["corrected", "published"]);
+            }
+        }
+        match self.identical {
+            Some(true) => {
+                text += "identical: every tick that the service published is made again to the bit\n"
+            }
+            Some(false) => text += "different: not every tick is that which the service published\n",
+            None => {}
+        }
+        text
+    }
+}
+
+/// What became of the journal, in a few words.
+fn journal(unit: &UnitReport) -> String {
+    let replica = &unit.replica;
+    if !unit.by_journal {
+        return "not followed".to_owned();
+    }
+    let memories = match replica.memories_equal {
+        0 => String::new(),
+        1 => ", 1 memory equal".to_owned(),
+        count => format!(", {count} memories equal"),
+    };
+    let notices = replica.notices.len() as u64 + replica.further_notices;
+    let notices = if notices > 0 { format!(", {notices} warnings") } else { String::new() };
+    format!("{} entries{memories}{notices}", replica.entries)
+}
+
+/// How the ticks compare with what was published, in a few words.
+fn published(unit: &UnitReport) -> String {
+    let Some(account) = &unit.published else { return "not compared".to_owned() };
+    if account.agrees() {
+        return format!("{} identical", account.ticks);
+    }
+    let between = account.only_a.between + account.only_b.between;
+    format!("{} of {} differ, {between} in one alone", account.different, account.ticks)
+}

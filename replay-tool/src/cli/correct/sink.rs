@@ -1,0 +1,142 @@
+//! Where the corrected ticks of a recording's units go.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::create_dir_all;
+use std::path::{Path, PathBuf};
+
+use isotherm_log::file::refuse_overwriting;
+use isotherm_log::offline::{Form, Made};
+use isotherm_log::recording::{Attachment, Documents, METADATA, Metadata, RecordingOptions, RecordingWriter};
+use isotherm_protocol::digest::Digest;
+use isotherm_protocol::key::UnitId;
+
+use crate::error::Error;
+use crate::output::{Format, Output, write_header};
+
+/// What is written to.
+pub(super) enum Sink {
+    /// Nothing.
+    None,
+    /// A file for each unit, by its place.
+    Files(Vec<Output>),
+    /// A recording.
+    Recording { writer: Box<RecordingWriter>, attached: BTreeSet<Digest>, received_ns: u64 },
+}
+
+impl Sink {
+    /// Opens it.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] where several units do not fit, [`Error::Log`] where it cannot be created.
+    pub(super) fn open(
+        out: Option<&Path>,
+        format: Option<Format>,
+        units: &[UnitId],
+        inputs: &[PathBuf],
+    ) -> Result<Self, Error> {
+        let Some(out) = out else { return Ok(Self::None) };
+        let inputs: Vec<_> = inputs.iter().map(PathBuf::as_path).collect();
+        if out.extension().is_some_and(|extension| extension == "mcap") {
+            if format.is_some() {
+                return Err(Error::Usage("--format is for files other than FILE.mcap".to_owned()));
+            }
+            refuse_overwriting(out, &inputs)?;
+            let writer = Box::new(RecordingWriter::create(out, RecordingOptions::default())?);
+            return Ok(Self::Recording { writer, attached: BTreeSet::new(), received_ns: 0 });
+        }
+        let format = format.unwrap_or_default();
+        let folder = out.is_dir() || out.as_os_str().to_string_lossy().ends_with('/');
+        let paths: Vec<PathBuf> = match units {
+            _ if folder => {
+                create_dir_all(out).map_err(|source| Error::file(out, "create the folder", source))?;
+                let extension = if format == Format::Csv { "csv" } else { "wire" };
+                units.iter().map(|unit| out.join(format!("{unit}.{extension}"))).collect()
+            }
+            [_] => vec![out.to_owned()],
+            _ => {
+                return Err(Error::Usage(format!(
+                    "the log is of {} units: --out must be a folder ({}/) or FILE.mcap, or --unit must name one of them",
+                    units.len(),
+                    out.display()
+                )));
+            }
+        };
+        let mut files = Vec::new();
+        for path in paths {
+            refuse_overwriting(&path, &inputs)?;
+            let mut file = Output::create(&path)?;
+            if format == Format::Csv {
+                file.write(|writer| write_header(writer))?;
+            }
+            files.push(file);
+        }
+        Ok(Self::Files(files))
+    }
+
+    /// What has to be made of the ticks.
+    pub(super) fn form(&self, format: Option<Format>) -> Form {
+        match self {
+            Self::None => Form::Sums,
+            Self::Files(_) if format == Some(Format::Wire) => Form::Wire,
+            Self::Files(_) => Form::Csv,
+            Self::Recording { .. } => Form::Messages,
+        }
+    }
+
+    /// Puts a document beside the ticks, once.
+    pub(super) fn document(&mut self, bytes: Vec<u8>) -> Result<(), Error> {
+        if let Self::Recording { writer, attached, received_ns } = self
+            && attached.insert(Digest::of(&bytes))
+        {
+            let attachment: Attachment = Documents::attachment(bytes, *received_ns);
+            writer.attach(&attachment)?;
+        }
+        Ok(())
+    }
+
+    /// Writes what was made of a block.
+    pub(super) fn write(&mut self, made: Made) -> Result<(), Error> {
+        match self {
+            Self::None => Ok(()),
+            Self::Files(files) => made.into_iter().try_for_each(|(place, output)| {
+                let file = files.get_mut(place);
+                file.map_or(Ok(()), |file| file.write(|writer| writer.write_all(&output.bytes)))
+            }),
+            Self::Recording { .. } => {
+                let (mut messages, mut documents) = (Vec::new(), Vec::new());
+                for (_, output) in made {
+                    messages.extend(output.messages);
+                    documents.extend(output.documents);
+                }
+                // Each unit's own are in order already.
+                messages.sort_by_key(|message| message.received_ns);
+                if let Self::Recording { writer, received_ns, .. } = self {
+                    for message in &messages {
+                        *received_ns = message.received_ns.max(*received_ns);
+                        writer.write(message)?;
+                    }
+                }
+                documents.into_iter().try_for_each(|(_, text)| self.document(text.into_bytes()))
+            }
+        }
+    }
+
+    /// Writes out what is still here; a recording says of itself what it was made of.
+    pub(super) fn finish(self, inputs: &[PathBuf]) -> Result<(), Error> {
+        match self {
+            Self::None => Ok(()),
+            Self::Files(files) => files.into_iter().try_for_each(Output::finish),
+            Self::Recording { mut writer, .. } => {
+                let inputs: Vec<_> = inputs.iter().map(|path| path.display().to_string()).collect();
+                let values = [
+                    ("made_by", concat!("isotherm-replay correct ", env!("CARGO_PKG_VERSION")).to_owned()),
+                    ("made_of", inputs.join(", ")),
+                ];
+                let values: BTreeMap<_, _> =
+                    values.into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
+                writer.metadata(&Metadata { name: METADATA.to_owned(), values })?;
+                Ok(writer.finish()?)
+            }
+        }
+    }
+}

@@ -1,0 +1,176 @@
+//! `isotherm-replay diff`.
+
+mod show_difference;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use comfy_table::{CellAlignment, Table, presets};
+use isotherm_log::diff::{AXES, Account, CorrectedLog, DiffOptions, Largest, Tolerance, compare, is_csv};
+use isotherm_log::offline::unit_id;
+use isotherm_log::replica::scan;
+use isotherm_log::source::is_recording;
+use isotherm_protocol::key::UnitId;
+use serde::Serialize;
+
+pub(super) use show_difference::first_difference;
+
+use super::{Outcome, print, show};
+use crate::error::Error;
+use crate::progress::Bar;
+
+/// Compare two corrected logs tick by tick, and show the first difference
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  \
+    isotherm-replay simulate --preset mems-chamber --duration 60 --out mems.csv\n  \
+    isotherm-replay correct mems.csv --mapping mems.mapping.toml --calibration config/calibration/MEMS-0001.toml --out a.csv\n  \
+    isotherm-replay correct mems.csv --mapping mems.mapping.toml --calibration config/calibration/MEMS-0001.toml --out b.csv\n  \
+    isotherm-replay diff a.csv b.csv\n\n\
+    A log is a recording (MCAP) with corrected ticks, or a CSV or wire file of `isotherm-replay correct`. Ticks are known by \
+    their sequence number and end, and compared to the bit unless a tolerance is given.\n\n\
+    Exit codes: 0 identical, or within the tolerance; 1 different, or one cannot be read; 2 usage.")]
+pub(super) struct DiffArgs {
+    /// The first log
+    #[arg(value_name = "A")]
+    a: PathBuf,
+    /// The second log
+    #[arg(value_name = "B")]
+    b: PathBuf,
+    /// Unit to compare, all without it; of a CSV, the unit that it is of; may be given several times
+    #[arg(long, short, value_name = "SERIAL")]
+    unit: Vec<String>,
+    /// How much an angle increment may differ (rad)
+    #[arg(long, value_name = "RAD", default_value_t = 0.0, value_parser = not_negative)]
+    tolerance_angle: f64,
+    /// How much a velocity increment may differ (m/s)
+    #[arg(long, value_name = "M/S", default_value_t = 0.0, value_parser = not_negative)]
+    tolerance_velocity: f64,
+    /// How much any number that is not whole may differ, as a share of the larger of the two
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = not_negative)]
+    tolerance_relative: f64,
+    /// Ticks to show before and behind the first difference
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u16).range(0..=1000))]
+    around: u16,
+    /// Print the result as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// Reads a tolerance.
+fn not_negative(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value.is_finite() && value >= 0.0 => Ok(value),
+        _ => Err("must be a number from 0 on".into()),
+    }
+}
+
+/// Everything that was found.
+#[derive(Debug, Serialize)]
+struct Report<'r> {
+    a: String,
+    b: String,
+    identical: bool,
+    tolerance: Tolerance,
+    units: &'r BTreeMap<UnitId, Account>,
+}
+
+/// Runs the command.
+pub(super) fn run(args: &DiffArgs) -> Result<Outcome, Error> {
+    let units = args.unit.iter().map(|serial| unit_id(serial)).collect::<Result<BTreeSet<_>, _>>()?;
+    let unnamed = unnamed(args, &units)?;
+    let mut a = CorrectedLog::open(&args.a, &units, &unnamed)?;
+    let mut b = CorrectedLog::open(&args.b, &units, &unnamed)?;
+    let tolerance = Tolerance {
+        angle_rad: args.tolerance_angle,
+        velocity_m_per_s: args.tolerance_velocity,
+        relative: args.tolerance_relative,
+    };
+    let options = DiffOptions { tolerance, around: usize::from(args.around) };
+    let mut bar = Bar::over_log(a.progress());
+    let accounts = compare(&mut a, &mut b, options, |ticks| bar.step(|| format!("{ticks} ticks")))?;
+    bar.finish();
+    if accounts.is_empty() {
+        return Err(Error::Usage("there are no corrected ticks in either log".to_owned()));
+    }
+    for words in [a.cut_short(), b.cut_short()].into_iter().flatten() {
+        show::warn(&words);
+    }
+    let identical = accounts.values().all(Account::is_identical);
+    let name = |path: &Path| path.display().to_string();
+    let report = Report { a: name(&args.a), b: name(&args.b), identical, tolerance, units: &accounts };
+    print(if args.json { show::json(&report) } else { human(&report) }.as_bytes())?;
+    Ok(if identical { Outcome::Complete } else { Outcome::Different })
+}
+
+/// The unit that a CSV is of, where it is not said: the only one of the other log.
+fn unnamed(args: &DiffArgs, units: &BTreeSet<UnitId>) -> Result<UnitId, Error> {
+    let csv = [&args.a, &args.b].map(|path| is_csv(path));
+    let other = match csv {
+        [true, false] => &args.b,
+        [false, true] => &args.a,
+        _ => return Ok(unit_id("unit")?),
+    };
+    if !units.is_empty() {
+        return match units.first().filter(|_| units.len() == 1) {
+            Some(unit) => Ok(unit.clone()),
+            None => Err(Error::Usage("a CSV is of one unit: give --unit once".to_owned())),
+        };
+    }
+    let of_other: Vec<UnitId> = if is_recording(other) {
+        let outlines = scan(std::slice::from_ref(other))?;
+        outlines.units.into_iter().filter(|(_, unit)| unit.has_corrected).map(|(unit, _)| unit).collect()
+    } else {
+        let mut log = CorrectedLog::open(other, units, &unit_id("unit")?)?;
+        log.next_ticks()?.map(|ticks| ticks.unit).into_iter().collect()
+    };
+    match of_other.as_slice() {
+        [unit] => Ok(unit.clone()),
+        _ => Err(Error::Usage(format!(
+            "{} is of {} units, and a CSV does not say which it is of: give --unit SERIAL",
+            other.display(),
+            of_other.len()
+        ))),
+    }
+}
+
+/// The result as a table, and the first difference of each unit.
+fn human(report: &Report<'_>) -> String {
+    let mut table = Table::new();
+    table.load_preset(presets::NOTHING);
+    table.set_header(["unit", "ticks in both", "different", "only in A", "only in B"]);
+    for (unit, account) in report.units {
+        table.add_row([
+            unit.to_string(),
+            account.ticks.to_string(),
+            account.different.to_string(),
+            account.only_a.all().to_string(),
+            account.only_b.all().to_string(),
+        ]);
+    }
+    table.column_iter_mut().skip(1).for_each(|column| column.set_cell_alignment(CellAlignment::Right));
+    let mut text = format!("{table}\n");
+    for (unit, account) in report.units {
+        let Some(first) = &account.first else { continue };
+        text += &format!("\nunit {unit}: the first difference\n");
+        text += &first_difference(first, ["A", "B"]);
+        if account.different > 0 {
+            text += "\nlargest differences\n";
+            text += &largest("angle", "rad", "°/h", &account.angle);
+            text += &largest("velocity", "m/s", "mg", &account.velocity);
+        }
+    }
+    text += if report.identical { "identical\n" } else { "\ndifferent\n" };
+    text
+}
+
+fn largest(what: &str, unit_of_measure: &str, as_rate: &str, largest: &[Largest; 3]) -> String {
+    let line = |(axis, largest): (&&str, &Largest)| match largest.increment {
+        0.0 => format!("  {what} {axis}: none\n"),
+        increment => format!(
+            "  {what} {axis}: {increment:e} {unit_of_measure} ({:e} {as_rate}) at tick {}\n",
+            largest.equivalent, largest.sequence
+        ),
+    };
+    AXES.iter().zip(largest).map(line).collect()
+}

@@ -1,0 +1,88 @@
+//! The first difference of two logs, for people.
+
+use comfy_table::{Table, presets};
+use isotherm_correction::sample::CorrectedTick;
+use isotherm_log::diff::{Equivalent, FieldDifference, FirstDifference, Happened, LogTick, Row, mode};
+
+/// The first difference with the ticks around it, in words; `names` are those of the two logs.
+pub(in crate::cli) fn first_difference(first: &FirstDifference, names: [&str; 2]) -> String {
+    let [a, b] = names;
+    let mut text = format!("tick {}, which ends at {} ns", first.sequence, first.end_time_ns);
+    match first.only_in {
+        Some("a") => text += &format!(", is in {a} alone\n"),
+        Some(_) => text += &format!(", is in {b} alone\n"),
+        None => text += "\n",
+    }
+    for field in &first.fields {
+        text += &in_field(field, names);
+    }
+    text += &happened(&first.event_a, a);
+    text += &happened(&first.event_b, b);
+    text += &around(first, names);
+    text
+}
+
+/// One field: both values as they read back, their bits, and what the difference comes to.
+fn in_field(field: &FieldDifference, [name_a, name_b]: [&str; 2]) -> String {
+    let FieldDifference { field, a, b, a_bits, b_bits, equivalent } = field;
+    let bits = |bits: &Option<String>| bits.as_ref().map(|bits| format!("  {bits}")).unwrap_or_default();
+    let width = name_a.len().max(name_b.len());
+    let equivalent = match equivalent {
+        Some(Equivalent::DegPerH(rate)) => format!("    differ by {rate:e} °/h\n"),
+        Some(Equivalent::MilliG(force)) => format!("    differ by {force:e} mg\n"),
+        None => String::new(),
+    };
+    format!(
+        "  {field}\n    {name_a:width$} {a}{}\n    {name_b:width$} {b}{}\n{equivalent}",
+        bits(a_bits),
+        bits(b_bits)
+    )
+}
+
+/// What happened last in a log.
+fn happened(happened: &Happened, name: &str) -> String {
+    let line = |words: &Option<String>| {
+        words.as_ref().map(|words| format!("  last in {name}: {words}\n")).unwrap_or_default()
+    };
+    line(&happened.journal) + &line(&happened.tick)
+}
+
+/// The ticks around it side by side.
+fn around(first: &FirstDifference, [name_a, name_b]: [&str; 2]) -> String {
+    let mut table = Table::new();
+    table.load_preset(presets::NOTHING);
+    table.set_header(["", "tick", "", "Δθ x, y, z (rad)", "Δv x, y, z (m/s)", "mode", "rev", "flags"]);
+    for (place, Row { a, b }) in first.around.iter().enumerate() {
+        let marker = if place == first.at { ">" } else { "" };
+        match (a, b) {
+            (Some(a), Some(b)) if isotherm_log::diff::identical(a, b) => {
+                row(&mut table, marker, "both", Some(a))
+            }
+            _ => {
+                row(&mut table, marker, name_a, a.as_ref());
+                row(&mut table, marker, name_b, b.as_ref());
+            }
+        }
+    }
+    format!("{table}\n")
+}
+
+fn row(table: &mut Table, marker: &str, name: &str, tick: Option<&LogTick>) {
+    let Some(LogTick { tick, .. }) = tick else {
+        table.add_row([marker, "", name, "—", "", "", "", ""]);
+        return;
+    };
+    let CorrectedTick { sequence, delta_angle, delta_velocity, revision, flags, .. } = tick;
+    let vector = |vector: &[f64; 3]| vector.map(|value| format!("{value:?}")).join("  ");
+    let flags: Vec<_> = flags.iter_names().map(|(name, _)| name).collect();
+    table.add_row([
+        marker.to_owned(),
+        sequence.to_string(),
+        name.to_owned(),
+        vector(delta_angle),
+        vector(delta_velocity),
+        mode(tick.mode).to_owned(),
+        revision.to_string(),
+        flags.join(" "),
+    ]);
+}

@@ -1,0 +1,77 @@
+//! `isotherm-replay info`.
+
+mod tables;
+
+use clap::Args;
+use isotherm_log::info::{FileInfo, LogInfo, Survey};
+use isotherm_log::text::LogReader;
+use isotherm_protocol::key::UnitId;
+
+use super::log_args::LogArgs;
+use super::{Outcome, print, show};
+use crate::error::Error;
+use crate::progress::Bar;
+
+/// Ticks in one batch of a text log.
+const BATCH: usize = 256;
+/// What a text log's unit is called where nobody says.
+const UNNAMED: &str = "log";
+
+/// Say what a log holds: topics, rates, gaps, jitter, temperatures, mode switches, calibrations, commands
+#[derive(Debug, Args)]
+#[command(after_help = "Example, in two steps:\n  \
+    isotherm-replay simulate --preset mems-chamber --duration 60 --out mems.csv\n  \
+    isotherm-replay info mems.csv --mapping mems.mapping.toml\n\n\
+    Memory does not grow with the length of the log. Exit code 3: the log is cut short, or rows of it could not be read.")]
+pub(super) struct InfoArgs {
+    #[command(flatten)]
+    log: LogArgs,
+    /// Print everything as one JSON object; times are in ns
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the command.
+pub(super) fn run(args: &InfoArgs) -> Result<Outcome, Error> {
+    let recording = args.log.is_recording()?;
+    let unnamed = UnitId::new(UNNAMED).ok();
+    let mut messages = args.log.messages(BATCH, unnamed.as_ref())?;
+    let files = args.log.log_files()?;
+    let files: Vec<_> = files.iter().map(|path| FileInfo::of(path)).collect::<Result<_, _>>()?;
+    let mut survey = Survey::new(recording);
+    let mut bar = Bar::over_log(messages.progress());
+    loop {
+        let message = messages.next_message()?;
+        if let Some(recordings) = messages.log().recording() {
+            survey.beside(recordings.take_attachments(), recordings.take_metadata());
+        }
+        let Some(message) = message else { break };
+        survey.take(&message);
+        bar.step(|| format!("{} ticks", survey.ticks()));
+    }
+    bar.finish();
+    let info = survey.finish(files, messages.report());
+    print(if args.json { show::json(&info) } else { tables::of(&info) }.as_bytes())?;
+    Ok(outcome(&info))
+}
+
+/// How it went.
+fn outcome(info: &LogInfo) -> Outcome {
+    let cut = |file: &FileInfo| file.recording.as_ref().is_some_and(|recording| !recording.complete);
+    if info.reading.lost_data() || info.files.iter().any(cut) { Outcome::DataLoss } else { Outcome::Complete }
+}
+
+impl LogArgs {
+    /// The files that the log is read from: those of a folder are the mapping's.
+    ///
+    /// # Errors
+    /// As [`LogArgs::events`].
+    fn log_files(&self) -> Result<Vec<std::path::PathBuf>, Error> {
+        if self.is_recording()? {
+            return Ok(self.log.clone());
+        }
+        let events = self.events()?;
+        let reader: &LogReader = events.inner();
+        Ok(reader.paths().to_vec())
+    }
+}

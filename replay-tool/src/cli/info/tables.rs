@@ -1,0 +1,350 @@
+//! What a log holds, as tables.
+
+use std::fmt::Write;
+
+use comfy_table::{CellAlignment, Table, presets};
+use isotherm_correction::units::Span;
+use isotherm_log::info::{
+    FileInfo, JournalInfo, LogInfo, Readings, Spread, StateInfo, StatusInfo, TopicInfo, UnitInfo,
+};
+use isotherm_log::source::LogReport;
+
+use crate::cli::show;
+
+/// Most swaps, commands, states or revisions that are listed; JSON has more.
+const LISTED: usize = 20;
+
+/// Everything.
+pub(super) fn of(info: &LogInfo) -> String {
+    let mut text = String::new();
+    files(&mut text, info);
+    for (unit, of) in &info.units {
+        line(&mut text, format_args!("\nUnit {unit}"));
+        text += &topics(&of.topics);
+        let begin_ns = of.topics.iter().filter_map(|topic| topic.first_ns).min().unwrap_or(0);
+        unit_details(&mut text, of, begin_ns);
+    }
+    if !info.other_topics.is_empty() {
+        line(&mut text, format_args!("\nOf no unit"));
+        text += &topics(&info.other_topics);
+        if info.other_messages > 0 {
+            line(&mut text, format_args!("and {} messages of further topics", info.other_messages));
+        }
+    }
+    text
+}
+
+fn files(text: &mut String, info: &LogInfo) {
+    for FileInfo { path, bytes, recording } in &info.files {
+        line(text, format_args!("{path}: {}", bytes_of(*bytes)));
+        let Some(layout) = recording else { continue };
+        let end =
+            if layout.complete { "whole" } else { "cut short: `isotherm-replay recover` makes it whole" };
+        line(
+            text,
+            format_args!(
+                "  {} chunks, {} of messages in {} ({}), {} attachments, {end}",
+                layout.chunks,
+                bytes_of(layout.uncompressed_bytes),
+                bytes_of(layout.stored_bytes),
+                layout.compression.join(", "),
+                layout.attachments
+            ),
+        );
+    }
+    match &info.reading {
+        LogReport::Recording(report) => {
+            if let Some(words) = &report.cut_short {
+                line(text, format_args!("not read to the end: {words}"));
+            }
+            if report.foreign_messages > 0 {
+                line(
+                    text,
+                    format_args!("{} messages of something else passed over", report.foreign_messages),
+                );
+            }
+        }
+        LogReport::Text(report) => {
+            line(text, format_args!("{} rows read, {} dropped in front", report.rows, report.dropped_rows));
+            text.push_str(&show::reading(report));
+        }
+    }
+    if let (Some(first), Some(last)) = (info.first_received_ns, info.last_received_ns) {
+        line(
+            text,
+            format_args!("received over {}, from {first} ns since 1970", seconds(last.saturating_sub(first))),
+        );
+    }
+    if !info.service_versions.is_empty() {
+        line(text, format_args!("service version {}", info.service_versions.join(", ")));
+    }
+    for metadata in &info.metadata {
+        line(text, format_args!("metadata {:?}:", metadata.name));
+        for (name, value) in metadata.values.iter().take(LISTED * 2) {
+            line(text, format_args!("  {name} = {value}"));
+        }
+    }
+    for attachment in info.attachments.iter().take(LISTED) {
+        let (name, kind) = (&attachment.name, &attachment.media_type);
+        line(text, format_args!("attachment {name:?} ({kind}, {})", bytes_of(attachment.bytes)));
+    }
+    more(text, info.attachments.len());
+}
+
+fn topics(topics: &[TopicInfo]) -> String {
+    const HEAD: [&str; 11] = [
+        "topic",
+        "messages",
+        "ticks",
+        "Hz",
+        "mean Hz",
+        "s",
+        "gaps",
+        "missing",
+        "doubled",
+        "late",
+        "jitter p50/p99/max (ms)",
+    ];
+    let mut table = Table::new();
+    table.load_preset(presets::NOTHING);
+    table.set_header(HEAD);
+    for topic in topics {
+        let order = |of: fn(&isotherm_log::info::Order) -> u64| {
+            topic.order.as_ref().map_or_else(dash, |order| of(order).to_string())
+        };
+        let rate = |of: fn(&isotherm_log::info::Rate) -> f64| {
+            topic.rate.as_ref().map_or_else(dash, |rate| format!("{:.4}", of(rate)))
+        };
+        let ticks = if topic.ticks > 0 { topic.ticks.to_string() } else { dash() };
+        table.add_row([
+            topic.key.clone(),
+            topic.messages.to_string(),
+            ticks,
+            rate(|rate| rate.nominal_hz),
+            rate(|rate| rate.mean_hz),
+            if topic.rate.is_some() { format!("{:.3}", topic.duration_s) } else { dash() },
+            order(|order| order.gaps.count),
+            order(|order| order.gaps.missing_ticks),
+            order(|order| order.duplicates),
+            order(|order| order.late),
+            topic.jitter.as_ref().map_or_else(dash, |jitter| spread(&jitter.delay)),
+        ]);
+    }
+    for column in table.column_iter_mut().skip(1) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    let mut text = format!("{table}\n");
+    for topic in topics {
+        topic_details(&mut text, topic);
+    }
+    text
+}
+
+/// What of a topic is worth a sentence.
+fn topic_details(text: &mut String, topic: &TopicInfo) {
+    let (key, begin_ns) = (&topic.key, topic.first_ns.unwrap_or(0));
+    if let Some(order) = &topic.order {
+        if let Some(gap) = order.gaps.longest {
+            line(
+                text,
+                format_args!(
+                    "{key}: longest gap {} ticks from {} on, after {}",
+                    gap.ticks,
+                    gap.first_sequence,
+                    after(gap.after_ns, begin_ns)
+                ),
+            );
+        }
+        if order.restarts > 0 {
+            let (restarts, series) = (order.restarts, order.series_changes);
+            line(
+                text,
+                format_args!("{key}: began anew {restarts} times, {series} of them with another series"),
+            );
+        }
+    }
+    if topic.time_went_back > 0 {
+        line(text, format_args!("{key}: time did not go on {} times", topic.time_went_back));
+    }
+    if let (Some(longest), Some(intervals)) = (topic.longest_interval, topic.intervals)
+        && longest.ns > intervals.p50_ns.saturating_mul(3) / 2
+    {
+        line(
+            text,
+            format_args!(
+                "{key}: longest time between consecutive ticks {}, after {}",
+                seconds(longest.ns),
+                after(longest.after_ns, begin_ns)
+            ),
+        );
+    }
+    if let Some(durations) = topic.tick_durations.filter(|durations| durations.min_ns != durations.max_ns) {
+        line(text, format_args!("{key}: tick durations p50/p99/max {} ms", spread(&durations)));
+    }
+    if let Some(drift) =
+        topic.jitter.and_then(|jitter| jitter.clock_drift_ppm).filter(|drift| drift.abs() >= 1.0)
+    {
+        if drift.abs() < 10_000.0 {
+            line(text, format_args!("{key}: the recorder's clock gains {drift:.1} ppm on the producer's"));
+        } else {
+            line(text, format_args!("{key}: played at {:.3} times its speed", 1.0 / (1.0 + drift * 1e-6)));
+        }
+    }
+    if topic.unreadable > 0 {
+        let first = topic.first_unreadable.as_deref().unwrap_or_default();
+        line(text, format_args!("{key}: {} messages cannot be read; the first: {first}", topic.unreadable));
+    }
+}
+
+fn unit_details(text: &mut String, unit: &UnitInfo, begin_ns: i64) {
+    readings(text, "temperature", &unit.temperatures);
+    readings(text, "health", &unit.health);
+    if let Some(modes) = &unit.modes {
+        let between = modes.between_changes.map_or_else(String::new, |between| {
+            format!(", {} from one to the next (median)", seconds(between.p50_ns))
+        });
+        line(
+            text,
+            format_args!(
+                "modes: {} ticks +1, {} ticks −1, {} switches, {} commanded{between}",
+                modes.plus_ticks, modes.minus_ticks, modes.changes, modes.switch_commands
+            ),
+        );
+    }
+    if let Some(corrected) = &unit.corrected {
+        line(
+            text,
+            format_args!(
+                "corrected: {} outputs of {} ticks, {} gaps announced with {} ticks, the longest {}",
+                corrected.outputs,
+                corrected.ticks,
+                corrected.gaps,
+                corrected.missed_ticks,
+                corrected.longest_gap_ticks
+            ),
+        );
+        let flags: Vec<_> = corrected.flags.iter().map(|(name, count)| format!("{name} {count}")).collect();
+        let sensors: Vec<_> =
+            corrected.sensor_flags.iter().map(|(name, count)| format!("{name} {count}")).collect();
+        if !flags.is_empty() || !sensors.is_empty() {
+            line(text, format_args!("flags: {}", [flags, sensors].concat().join(", ")));
+        }
+        for (channel, range) in &corrected.temperatures {
+            line(
+                text,
+                format_args!(
+                    "temperature applied {channel}: {:.3} to {:.3} °C, up to {:.4} °C/s",
+                    range.min_deg_c, range.max_deg_c, range.max_rate_deg_c_per_s
+                ),
+            );
+        }
+        for first in corrected.revisions.iter().take(LISTED) {
+            line(
+                text,
+                format_args!(
+                    "calibration {} ({}): first tick {}, {}",
+                    first.revision.counter,
+                    hexadecimal(first.revision.digest),
+                    first.first_sequence,
+                    after(first.first_end_ns, begin_ns)
+                ),
+            );
+        }
+        more(text, corrected.revisions.len());
+    }
+    if let Some(journal) = &unit.journal {
+        journal_details(text, journal);
+    }
+    if let Some(status) = &unit.status {
+        states(text, status, begin_ns);
+    }
+}
+
+fn journal_details(text: &mut String, journal: &JournalInfo) {
+    let entries: Vec<_> = journal.entries.iter().map(|(name, count)| format!("{name} {count}")).collect();
+    line(text, format_args!("journal: {}", entries.join(", ")));
+    if journal.missing_entries > 0 || journal.broken_parts > 0 {
+        let (missing, broken) = (journal.missing_entries, journal.broken_parts);
+        line(text, format_args!("journal: {missing} entries are missing, {broken} parts make none"));
+    }
+    for swap in journal.swaps.iter().take(LISTED) {
+        let (counter, digest) = (swap.revision.counter, hexadecimal(swap.revision.digest));
+        line(text, format_args!("given: calibration {counter} ({digest}), {}", swap.source));
+    }
+    more(text, journal.swaps.len());
+    for command in journal.commands.iter().take(LISTED) {
+        let verdict = if command.accepted { "" } else { "refused: " };
+        line(text, format_args!("command {}: {verdict}{}", command.command, command.words));
+    }
+    more(text, journal.commands.len());
+}
+
+fn states(text: &mut String, status: &StatusInfo, begin_ns: i64) {
+    for StateInfo { last_tick_ns, state, .. } in status.states.iter().take(LISTED) {
+        let state = isotherm_correction::operation::State::from(*state);
+        let when = last_tick_ns.map_or_else(|| "before the first tick".to_owned(), |ns| after(ns, begin_ns));
+        line(text, format_args!("state {state}: {when}"));
+    }
+    more(text, status.states.len());
+}
+
+fn readings(text: &mut String, what: &str, readings: &Readings) {
+    for (name, info) in &readings.by_name {
+        let missing = if info.missing > 0 { format!(", {} missing", info.missing) } else { String::new() };
+        line(
+            text,
+            format_args!(
+                "{what} {name}: {} readings, {} to {} as sent{missing}",
+                info.readings, info.min, info.max
+            ),
+        );
+    }
+}
+
+/// Says that a list is longer than what was printed.
+fn more(text: &mut String, length: usize) {
+    if length > LISTED {
+        line(text, format_args!("  and {} more: --json lists them", length - LISTED));
+    }
+}
+
+fn line(text: &mut String, words: std::fmt::Arguments<'_>) {
+    // Writing to a string cannot fail.
+    let _ = writeln!(text, "{words}");
+}
+
+fn dash() -> String {
+    "–".to_owned()
+}
+
+/// Milliseconds, to the microsecond.
+fn spread(spread: &Spread) -> String {
+    [spread.p50_ns, spread.p99_ns, spread.max_ns].map(|ns| format!("{:.3}", as_s(ns) * 1e3)).join(" / ")
+}
+
+fn as_s(ns: u64) -> f64 {
+    Span::from_ns(i64::try_from(ns).unwrap_or(i64::MAX)).as_s()
+}
+
+fn seconds(ns: u64) -> String {
+    format!("{:.6} s", as_s(ns))
+}
+
+/// A time as seconds behind the beginning.
+fn after(ns: i64, begin_ns: i64) -> String {
+    format!("{:.6} s from the beginning", Span::from_ns(ns.saturating_sub(begin_ns)).as_s())
+}
+
+fn hexadecimal(digest: [u8; 8]) -> String {
+    format!("{:016x}", u64::from_be_bytes(digest))
+}
+
+/// A number of bytes in the unit that suits it.
+fn bytes_of(bytes: u64) -> String {
+    match bytes {
+        0..10_000 => format!("{bytes} B"),
+        10_000..10_000_000 => format!("{} kB", bytes / 1000),
+        10_000_000..10_000_000_000 => format!("{} MB", bytes / 1_000_000),
+        _ => format!("{} GB", bytes / 1_000_000_000),
+    }
+}

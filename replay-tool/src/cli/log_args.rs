@@ -1,0 +1,148 @@
+//! The arguments that name a log and a part of it, the same for every command.
+
+use std::collections::BTreeSet;
+use std::path::PathBuf;
+
+use clap::Args;
+use isotherm_correction::units::Span;
+use isotherm_log::mapping::Mapping;
+use isotherm_log::offline::unit_id;
+use isotherm_log::part::{LogFiles, Messages, Part, are_recordings};
+use isotherm_log::text::{LogReader, Window};
+use isotherm_protocol::key::UnitId;
+
+use super::seconds;
+use crate::error::Error;
+
+/// Which log, and which part of it.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct LogArgs {
+    /// Recordings, read one behind the other; or the files of one text log in the order of its mapping, or the folder that has them
+    #[arg(required = true, value_name = "LOG")]
+    pub(crate) log: Vec<PathBuf>,
+    /// Column mapping of a text log (TOML); ready ones are in config/mappings
+    #[arg(long, short, value_name = "FILE")]
+    pub(crate) mapping: Option<PathBuf>,
+    /// Unit to take from recordings, all without it; of a text log, the unit that it is of; may be given several times
+    #[arg(long, short, value_name = "SERIAL")]
+    pub(crate) unit: Vec<String>,
+    /// Begin this long after the log's beginning (s)
+    #[arg(long, value_name = "SECONDS", default_value = "0", value_parser = seconds)]
+    pub(crate) start: Span,
+    /// Take this much of the log (s); without it, all
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    pub(crate) duration: Option<Span>,
+    /// Stop this long after the log's beginning (s)
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, conflicts_with = "duration")]
+    pub(crate) end: Option<Span>,
+}
+
+impl LogArgs {
+    /// Whether the log is recordings.
+    ///
+    /// # Errors
+    /// Where recordings and other files are mixed, or a mapping is given for recordings.
+    pub(crate) fn is_recording(&self) -> Result<bool, Error> {
+        let recordings = are_recordings(&self.log)?;
+        match &self.mapping {
+            Some(mapping) if recordings => Err(Error::Usage(format!(
+                "--mapping {} is for text logs, the log is recordings: leave it out",
+                mapping.display()
+            ))),
+            _ => Ok(recordings),
+        }
+    }
+
+    /// The units given.
+    ///
+    /// # Errors
+    /// For a serial that cannot be one.
+    pub(crate) fn units(&self) -> Result<BTreeSet<UnitId>, Error> {
+        let units = self.unit.iter().map(|serial| unit_id(serial));
+        Ok(units.collect::<Result<_, _>>()?)
+    }
+
+    /// The part of the log's time and units.
+    ///
+    /// # Errors
+    /// As [`LogArgs::units`], and where the part ends before it begins.
+    pub(crate) fn part(&self) -> Result<Part, Error> {
+        let end = match (self.end, self.duration) {
+            (Some(end), _) if end < self.start => {
+                let (end, start) = (end.as_s(), self.start.as_s());
+                return Err(Error::Usage(format!("--end is {end} s, must not be before --start, {start} s")));
+            }
+            (Some(end), _) => Some(end),
+            (None, duration) => {
+                duration.map(|duration| Span::from_ns(self.start.as_ns().saturating_add(duration.as_ns())))
+            }
+        };
+        Ok(Part { units: self.units()?, start: self.start, end })
+    }
+
+    /// Which files to open, and how. A text log is of the one unit that is given, else of `unit`; it is put into gyro
+    /// batches of so many ticks.
+    ///
+    /// # Errors
+    /// As [`LogArgs::is_recording`] and [`Mapping::load`]; where a text log has no unit or several.
+    pub(crate) fn files(&self, batch_ticks: usize, unit: Option<&UnitId>) -> Result<LogFiles, Error> {
+        if self.is_recording()? {
+            return Ok(LogFiles::Recordings(self.log.clone()));
+        }
+        let given = self.units()?;
+        let mut units = given.iter().chain(unit.filter(|_| given.is_empty()));
+        let unit = match (units.next(), units.next()) {
+            (Some(unit), None) => unit.clone(),
+            (None, _) => {
+                let words = "a text log does not say which unit it is of: give --unit SERIAL";
+                return Err(Error::Usage(words.to_owned()));
+            }
+            (Some(_), Some(_)) => {
+                let words = "a text log is of one unit: give --unit once";
+                return Err(Error::Usage(words.to_owned()));
+            }
+        };
+        let mapping = Box::new(self.text_mapping()?);
+        Ok(LogFiles::Text { paths: self.log.clone(), mapping, unit, batch_ticks })
+    }
+
+    /// Opens the log's part as messages: [`LogArgs::files`] and [`LogArgs::part`] in one.
+    ///
+    /// # Errors
+    /// As these.
+    pub(crate) fn messages(&self, batch_ticks: usize, unit: Option<&UnitId>) -> Result<Messages, Error> {
+        Ok(self.files(batch_ticks, unit)?.open(&self.part()?)?)
+    }
+
+    /// Opens the part of a text log as events.
+    ///
+    /// # Errors
+    /// As [`LogArgs::files`], and where the log is a recording.
+    pub(crate) fn events(&self) -> Result<Window<LogReader>, Error> {
+        if self.is_recording()? {
+            return Err(Error::Usage("this needs a text log, the log is recordings".to_owned()));
+        }
+        let part = self.part()?;
+        let duration = part.end.map(|end| Span::from_ns(end.as_ns().saturating_sub(part.start.as_ns())));
+        Ok(Window::new(LogReader::open(&self.text_mapping()?, &self.log)?, part.start, duration))
+    }
+
+    /// The mapping of a text log.
+    fn text_mapping(&self) -> Result<Mapping, Error> {
+        if let Some(mapping) = &self.mapping {
+            return Ok(Mapping::load(mapping)?);
+        }
+        for path in &self.log {
+            std::fs::metadata(path).map_err(|source| Error::file(path, "open the log", source))?;
+        }
+        let log = self.log.first().map(|path| path.display().to_string()).unwrap_or_default();
+        Err(Error::Usage(format!(
+            "{log} is no recording, and a text log needs --mapping FILE: ready ones are in config/mappings"
+        )))
+    }
+
+    /// Every file that is read, for outputs that must not fall on one.
+    pub(crate) fn inputs(&self) -> Vec<PathBuf> {
+        self.log.iter().chain(&self.mapping).cloned().collect()
+    }
+}

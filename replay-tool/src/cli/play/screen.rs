@@ -1,0 +1,63 @@
+//! The line that shows where playing is.
+
+use std::cell::RefCell;
+use std::io::{Write, stderr};
+
+use super::show;
+use crate::keyboard::KEYS;
+use crate::play::{Position, Watch};
+use crate::progress::Bar;
+
+/// The progress bar, and what is said beside it.
+pub(super) struct Screen {
+    bar: RefCell<Bar>,
+    /// The terminal does not go to a line's beginning by itself.
+    raw: bool,
+}
+
+impl Screen {
+    /// With the keys, where somebody is at the keyboard.
+    pub(super) fn new(keyboard: bool) -> Self {
+        let screen = Self { bar: RefCell::new(Bar::over_share()), raw: keyboard };
+        if keyboard {
+            screen.line(KEYS);
+        }
+        screen
+    }
+
+    /// Takes the bar away.
+    pub(super) fn finish(&self) {
+        self.bar.borrow().finish();
+    }
+
+    /// Prints a line above the bar.
+    fn line(&self, words: &str) {
+        let end = if self.raw { "\r\n" } else { "\n" };
+        self.bar.borrow().beside(|| {
+            // A reader that has gone away is no error.
+            let _ = write!(stderr(), "{words}{end}");
+        });
+    }
+}
+
+impl Watch for Screen {
+    fn at(&self, position: &Position) {
+        let mut bar = self.bar.borrow_mut();
+        if bar.is_hidden() {
+            return;
+        }
+        let Position { log_s, ticks_sent, pass, speed, actual_speed, .. } = *position;
+        let speed =
+            if position.paused { "paused".to_owned() } else { format!("{actual_speed:.1}× of {speed}") };
+        let pass = if pass > 1 { format!("  pass {pass}") } else { String::new() };
+        bar.share(position.share, format!("{log_s:.2} s{pass}  {ticks_sent} ticks  {speed}"));
+    }
+
+    fn say(&self, words: &str) {
+        if self.bar.borrow().is_hidden() {
+            show::warn(words);
+        } else {
+            self.line(&format!("warning: {words}"));
+        }
+    }
+}

@@ -1,0 +1,134 @@
+//! The summary as tables, and what must be said beside it.
+
+use comfy_table::{CellAlignment, Table, presets};
+
+use super::{Report, show};
+use crate::play::{Acknowledge, PlayOptions, PlayReport, UnitReport};
+use isotherm_log::source::LogReport;
+
+/// Most serials that are listed in a warning.
+const LISTED: usize = 5;
+
+/// What whoever reads only the table must know.
+pub(super) fn warnings(play: &PlayReport) -> Vec<String> {
+    let of = |chosen: fn(&UnitReport) -> bool| {
+        let units: Vec<_> = play.units.iter().filter(|unit| chosen(unit)).map(|unit| &*unit.unit).collect();
+        (!units.is_empty()).then(|| list(&units))
+    };
+    let uncalibrated = of(|unit| unit.ticks_uncalibrated.is_some_and(|ticks| ticks > 0)).map(|units| {
+        format!("{units}: no calibration in the service for some ticks, whose readings came back unscaled")
+    });
+    let mixed = of(UnitReport::is_mixed).map(|units| {
+        format!(
+            "{units}: somebody else plays it, or more than one service answers: what came back is not sure to be what was sent"
+        )
+    });
+    let unreadable = of(|unit| unit.counts.messages_unreadable > 0).map(|units| {
+        format!("{units}: some of the log's messages cannot be read; they were played as they are")
+    });
+    uncalibrated.into_iter().chain(mixed).chain(unreadable).collect()
+}
+
+/// Serials, not all where they are many.
+fn list(units: &[&str]) -> String {
+    match units.len().checked_sub(LISTED) {
+        Some(more) if more > 0 => format!("{} and {more} more", units[..LISTED].join(", ")),
+        _ => units.join(", "),
+    }
+}
+
+/// The summary as tables.
+pub(super) fn human(report: &Report<'_>, options: &PlayOptions) -> String {
+    let play = report.play;
+    let late = &play.lateness;
+    let mut rows = vec![
+        ("messages sent", play.messages_sent.to_string()),
+        ("time in the log (s)", format!("{:.3}", play.log_s)),
+        ("time taken (s)", format!("{:.3}", play.elapsed_s)),
+    ];
+    if play.paused_s > 0.0 {
+        rows.push(("of it paused (s)", format!("{:.3}", play.paused_s)));
+    }
+    rows.push(("actual speed", format!("{:.2}×", play.actual_speed)));
+    if play.passes > 1 {
+        rows.push(("passes", play.passes.to_string()));
+    }
+    if play.seeks > 0 {
+        rows.push(("seeks", play.seeks.to_string()));
+    }
+    if late.messages > 0 {
+        rows.extend([
+            ("deadlines missed", format!("{} of {}", late.misses, late.messages)),
+            (
+                "late by (ms): half, 99 %, most",
+                format!("{:.3}, {:.3}, {:.3}", late.p50_ms, late.p99_ms, late.max_ms),
+            ),
+        ]);
+    }
+    show::table(&rows) + &units(play, options) + &reading(report.log)
+}
+
+/// One row per unit.
+fn units(play: &PlayReport, options: &PlayOptions) -> String {
+    if play.units.is_empty() {
+        return String::new();
+    }
+    let figure = |count: Option<u64>| count.map_or_else(String::new, |count| count.to_string());
+    let (acknowledged, faults) = (options.acknowledge != Acknowledge::No, !options.faults.is_none());
+    let mut header = vec!["unit", "gyro", "accel", "temp"];
+    if faults {
+        header.extend(["withheld", "again", "held back"]);
+    }
+    if acknowledged {
+        header.extend(["came back", "uncalibrated", "not sent", "announced", "late", "lost", "duplicated"]);
+    }
+    let under_way = play.ticks_under_way.is_some_and(|ticks| ticks > 0);
+    if under_way {
+        header.push("under way");
+    }
+    let mut table = Table::new();
+    table.load_preset(presets::NOTHING).set_header(header);
+    for unit in &play.units {
+        let counts = &unit.counts;
+        let mut row = vec![
+            unit.unit.clone(),
+            unit.ticks_sent.to_string(),
+            counts.accel_ticks_sent.to_string(),
+            counts.temperature_readings_sent.to_string(),
+        ];
+        if faults {
+            let counts = [counts.messages_withheld, counts.messages_sent_again, counts.messages_held_back];
+            row.extend(counts.map(|count| count.to_string()));
+        }
+        if acknowledged {
+            let counts = [
+                unit.ticks_acknowledged,
+                unit.ticks_uncalibrated,
+                unit.ticks_not_sent,
+                unit.ticks_announced_missing,
+                unit.ticks_late,
+                unit.ticks_lost,
+                unit.ticks_duplicated,
+            ];
+            row.extend(counts.map(figure));
+        }
+        if under_way {
+            row.push(figure(unit.ticks_under_way));
+        }
+        table.add_row(row);
+    }
+    for column in table.column_iter_mut().skip(1) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    format!("{table}\n")
+}
+
+/// What reading the log came to, in words; empty where there is nothing to say.
+fn reading(log: &LogReport) -> String {
+    match log {
+        LogReport::Text(report) => show::reading(report),
+        LogReport::Recording(report) => {
+            report.cut_short.as_ref().map_or_else(String::new, |words| format!("{words}\n"))
+        }
+    }
+}

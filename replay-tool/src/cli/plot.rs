@@ -1,0 +1,173 @@
+//! `isotherm-replay plot`.
+
+use std::fmt::Write;
+use std::path::PathBuf;
+
+use clap::Args;
+use isotherm_log::file::{read_small_text, refuse_overwriting};
+use isotherm_log::plot::{PlotLog, PlotOptions, PlotSummary, plot};
+use isotherm_log::source::LogReport;
+use isotherm_protocol::key::UnitId;
+use serde::Serialize;
+
+use super::log_args::LogArgs;
+use super::{Outcome, print, show};
+use crate::error::Error;
+use crate::progress::Bar;
+
+/// Ticks in one batch of a text log.
+const BATCH: usize = 256;
+/// What a text log's unit is called where nobody says.
+const UNNAMED: &str = "log";
+
+/// Draw a log, or two over one time axis, as one HTML file that one can zoom into
+#[derive(Debug, Args)]
+#[command(after_help = "Example, in two steps:\n  \
+    isotherm-replay simulate --preset mems-chamber --duration 60 --out mems.csv\n  \
+    isotherm-replay plot mems.csv --mapping mems.mapping.toml --calibration config/calibration/MEMS-0001.toml --out mems.html\n\n\
+    The file needs no network and nothing beside it. Two logs: isotherm-replay plot a.mcap --beside b.mcap --out both.html")]
+pub(super) struct PlotArgs {
+    #[command(flatten)]
+    log: LogArgs,
+    /// Another log, to be drawn over the same time axis with its difference; it is read as the first, may be given several times
+    /// for the files of one log
+    #[arg(long, value_name = "LOG")]
+    beside: Vec<PathBuf>,
+    /// Column mapping of the other log, where it is a text log; without it, that of the first
+    #[arg(long, value_name = "FILE", requires = "beside")]
+    beside_mapping: Option<PathBuf>,
+    /// Unit of the other log; without it, as for the first
+    #[arg(long, value_name = "SERIAL", requires = "beside")]
+    beside_unit: Vec<String>,
+    /// Calibration document (TOML): text logs are corrected with it and raw counts scaled; recordings know their own
+    #[arg(long, short, value_name = "FILE")]
+    calibration: Option<PathBuf>,
+    /// The page
+    #[arg(long, short, value_name = "FILE")]
+    out: PathBuf,
+    /// Most bins of each quantity; logs of up to three times as many ticks are drawn tick by tick
+    #[arg(long, value_name = "BINS", default_value_t = 32_768, value_parser = clap::value_parser!(u32).range(64..=1_048_576))]
+    detail: u32,
+    /// Print the summary as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// What the summary says.
+#[derive(Debug, Serialize)]
+struct Report<'a> {
+    page: String,
+    bytes: usize,
+    #[serde(flatten)]
+    summary: &'a PlotSummary,
+}
+
+impl PlotArgs {
+    /// How the other log is named and read.
+    fn other(&self) -> Option<LogArgs> {
+        if self.beside.is_empty() {
+            return None;
+        }
+        let mut other = self.log.clone();
+        other.log.clone_from(&self.beside);
+        let recording = other.log.first().is_some_and(|path| isotherm_log::source::is_recording(path));
+        other.mapping = self.beside_mapping.clone().or_else(|| other.mapping.filter(|_| !recording));
+        if !self.beside_unit.is_empty() {
+            other.unit.clone_from(&self.beside_unit);
+        }
+        Some(other)
+    }
+}
+
+/// Runs the command.
+pub(super) fn run(args: &PlotArgs) -> Result<Outcome, Error> {
+    let other = args.other();
+    let mut inputs = args.log.inputs();
+    inputs.extend(other.iter().flat_map(LogArgs::inputs));
+    inputs.extend(args.calibration.clone());
+    refuse_overwriting(&args.out, &inputs.iter().map(PathBuf::as_path).collect::<Vec<_>>())?;
+    let calibration = args.calibration.as_deref();
+    let calibration =
+        calibration.map(|path| read_small_text(path, "read the calibration document")).transpose()?;
+
+    let unnamed = UnitId::new(UNNAMED).ok();
+    let first_units = args.log.units()?;
+    let mut logs = Vec::new();
+    let mut bar = None;
+    for log in std::iter::once(&args.log).chain(&other) {
+        let messages = log.messages(BATCH, unnamed.as_ref())?;
+        bar.get_or_insert_with(|| Bar::over_log(messages.progress()));
+        let names: Vec<_> = log.log.iter().filter_map(|path| path.file_name()).collect();
+        let name = names.iter().map(|name| name.to_string_lossy()).collect::<Vec<_>>().join(", ");
+        // Units of different serials are compared where each log has one that was asked for.
+        let one =
+            |units: &std::collections::BTreeSet<UnitId>| units.first().filter(|_| units.len() == 1).cloned();
+        let shown_as = one(&first_units).filter(|_| log.units().is_ok_and(|units| units.len() == 1));
+        let correct = !log.is_recording()? && calibration.is_some();
+        logs.push(PlotLog { name, messages, shown_as, correct });
+    }
+    let options = PlotOptions { detail: usize::try_from(args.detail).unwrap_or(usize::MAX), calibration };
+    let (page, summary) = plot(logs, &options, &mut |messages| {
+        if let Some(bar) = &mut bar {
+            bar.show(format!("{messages} messages"));
+        }
+    })?;
+    let html = page.to_html();
+    std::fs::write(&args.out, &html).map_err(|source| Error::file(&args.out, "write the page", source))?;
+    if let Some(bar) = &bar {
+        bar.finish();
+    }
+    let report = Report { page: args.out.display().to_string(), bytes: html.len(), summary: &summary };
+    print(if args.json { show::json(&report) } else { human(&report) }.as_bytes())?;
+    let lost = summary.reading.iter().any(LogReport::lost_data);
+    Ok(if lost { Outcome::DataLoss } else { Outcome::Complete })
+}
+
+/// The summary in words.
+fn human(report: &Report<'_>) -> String {
+    let Report { page, bytes, summary } = report;
+    let mut text = format!("{page}: {} kB\n", bytes / 1000);
+    let mut line = |words: std::fmt::Arguments<'_>| {
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "{words}");
+    };
+    for (unit, logs) in &summary.units {
+        for (log, shown) in summary.logs.iter().zip(logs) {
+            let Some(shown) = shown else { continue };
+            line(format_args!(
+                "unit {unit} in {log}: {} raw ticks, {} corrected, {} announced as missing, {} marks",
+                shown.raw_ticks, shown.corrected_ticks, shown.missed_ticks, shown.marks
+            ));
+            if shown.marks_left_out + shown.unreadable_messages > 0 {
+                line(format_args!(
+                    "  {} further marks left out, {} messages cannot be read",
+                    shown.marks_left_out, shown.unreadable_messages
+                ));
+            }
+        }
+    }
+    for (unit, difference) in &summary.differences {
+        line(format_args!(
+            "unit {unit}: {} corrected ticks in both, {} of them differ; {} only in the first, {} only in the second",
+            difference.common_ticks,
+            difference.differing_ticks,
+            difference.only_first,
+            difference.only_second
+        ));
+    }
+    if summary.units_left_out > 0 {
+        line(format_args!("{} further units are left out: choose with --unit", summary.units_left_out));
+    }
+    for report in &summary.reading {
+        match report {
+            LogReport::Recording(report) => {
+                if let Some(words) = &report.cut_short {
+                    line(format_args!("not read to the end: {words}"));
+                }
+            }
+            LogReport::Text(report) => line(format_args!("{}", show::reading(report).trim_end())),
+        }
+    }
+    text.truncate(text.trim_end().len());
+    text + "\n"
+}

@@ -1,0 +1,94 @@
+//! `isotherm-replay recover`.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use isotherm_log::recording::recover::{Recovery, RecoveryReport};
+use isotherm_log::recording::{RecordingOptions, is_being_written};
+
+use super::{Outcome, print, show};
+use crate::error::Error;
+use crate::progress::Bar;
+
+/// Damaged places that the table names.
+const SHOWN: usize = 5;
+
+/// Get back what is whole of a recording that is cut short or damaged
+#[derive(Debug, Args)]
+#[command(after_help = "Example, of a recording that is cut in the middle:\n  \
+    isotherm-replay record cut.mcap --no-service --duration 1\n  \
+    truncate --size=-50 cut.mcap\n  \
+    isotherm-replay recover cut.mcap whole.mcap\n\n\
+    Chunks are taken or left as a whole, by their checksum; behind a damaged one reading goes on. The new file has a summary;\n\
+    calibration documents that the journal holds are attached anew. The old file stays as it is.\n\
+    Exit code 3: something that was in the file is lost; the summary says what.")]
+pub(super) struct RecoverArgs {
+    /// The recording
+    #[arg(value_name = "IN")]
+    input: PathBuf,
+    /// The new file
+    #[arg(value_name = "OUT")]
+    output: PathBuf,
+    /// How chunks of the new file are compressed
+    #[arg(long, value_enum, default_value_t)]
+    compression: super::record::Compression,
+    /// Write over the new file where it is there already
+    #[arg(long)]
+    overwrite: bool,
+    /// Print the summary as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the command.
+pub(super) fn run(args: &RecoverArgs) -> Result<Outcome, Error> {
+    let recovery = Recovery::open(&args.input)?;
+    if is_being_written(&args.input) {
+        show::warn(&format!("{} is being written: what comes now is not recovered", args.input.display()));
+    }
+    let options = RecordingOptions {
+        compress: args.compression.compresses(),
+        overwrite: args.overwrite,
+        ..RecordingOptions::default()
+    };
+    let mut bar = Bar::over_log(recovery.progress());
+    let recovered = recovery.run(&args.output, options, |report| {
+        bar.step(|| format!("{} messages", report.messages));
+    });
+    bar.finish();
+    let report = recovered?;
+    print(if args.json { show::json(&report) } else { human(&report, &args.output) }.as_bytes())?;
+    Ok(if report.lost_data() { Outcome::DataLoss } else { Outcome::Complete })
+}
+
+/// The summary as a table.
+fn human(report: &RecoveryReport, output: &Path) -> String {
+    let mut rows = vec![
+        ("written to", output.display().to_string()),
+        ("messages", report.messages.to_string()),
+        ("of topics", report.topics.len().to_string()),
+        ("in chunks", report.chunks.to_string()),
+        ("attachments", report.attachments.to_string()),
+        ("documents attached anew", report.documents_rebuilt.to_string()),
+        ("messages known to be lost", report.missing.to_string()),
+        ("messages of unknown topics", report.nameless.to_string()),
+        ("places passed over", report.damaged_places.to_string()),
+        ("of bytes", format!("{} of {}", report.damaged_bytes, report.bytes)),
+    ];
+    let ended = if report.ended { "yes" } else { "no: what its recorder had in memory is lost too" };
+    rows.push(("the file had its end", ended.to_owned()));
+    let mut text = show::table(&rows);
+    for damage in report.damage.iter().take(SHOWN) {
+        let (offset, length) = (damage.offset, damage.length);
+        text += &format!("byte {offset}, {length} bytes passed over: {}\n", damage.words);
+    }
+    if report.damaged_places > SHOWN as u64 {
+        text += &format!("and {} further places: see --json\n", report.damaged_places - SHOWN as u64);
+    }
+    let missing = report.topics.iter().filter(|(_, topic)| topic.missing > 0);
+    for (key, topic) in missing {
+        text +=
+            &format!("{key}: {} of {} messages are missing\n", topic.missing, topic.missing + topic.messages);
+    }
+    text
+}

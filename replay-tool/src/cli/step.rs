@@ -1,0 +1,216 @@
+//! `isotherm-replay step`.
+
+mod words;
+
+use std::io::{self, BufRead, IsTerminal, Write};
+use std::path::PathBuf;
+
+use clap::Args;
+use isotherm_correction::unit::UnitSettings;
+use isotherm_log::offline::{Loaded, load_calibration};
+use isotherm_log::part::Part;
+use isotherm_log::replica::stepper::{Step, Stepper};
+use isotherm_log::replica::{Changes, Replica, scan};
+use isotherm_protocol::key::UnitId;
+
+use super::{LogArgs, Outcome, print, show};
+use crate::error::Error;
+
+/// What can be typed between two events.
+const HELP: &str = "Enter: next event · number, Enter: so many · s SEQ: to gyro tick SEQ · q: end";
+
+/// Walk through the events of a unit's state machine one by one
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  \
+    isotherm-replay simulate --preset mems-chamber --duration 10 --out mems.csv\n  \
+    isotherm-replay step mems.csv --mapping mems.mapping.toml --calibration config/calibration/MEMS-0001.toml --from 100 --count 3\n\n\
+    Without --from, --count and --json, on a terminal, it stops behind each event: Enter for the next, a number and Enter for so \
+    many, s SEQ to go to gyro tick SEQ, q to end.\n\n\
+    A recording is gone through by its own journal, as `isotherm-replay correct` does.")]
+pub(super) struct StepArgs {
+    #[command(flatten)]
+    log: LogArgs,
+    /// Calibration document (TOML) of a text log, or of a recording without a journal
+    #[arg(long, short, value_name = "FILE")]
+    calibration: Option<PathBuf>,
+    /// Begin to print at this gyro tick
+    #[arg(long, value_name = "SEQ")]
+    from: Option<u64>,
+    /// Print so many events
+    #[arg(long, value_name = "N")]
+    count: Option<u64>,
+    /// Print each event as one JSON object on a line
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the command.
+pub(super) fn run(args: &StepArgs) -> Result<Outcome, Error> {
+    let loaded = args.calibration.as_deref().map(load_calibration).transpose()?;
+    let mut stepper = open(args, loaded.as_ref())?;
+    let terminal = io::stdin().is_terminal() && io::stdout().is_terminal();
+    let interactive = terminal && args.from.is_none() && args.count.is_none() && !args.json;
+    if interactive {
+        converse(&mut stepper, &mut io::stdin().lock())?;
+    } else {
+        list(&mut stepper, args)?;
+    }
+    Ok(if stepper.replica().report().is_exact() { Outcome::Complete } else { Outcome::DataLoss })
+}
+
+/// Opens the log of one unit.
+fn open(args: &StepArgs, loaded: Option<&Loaded>) -> Result<Stepper, Error> {
+    let settings = UnitSettings::default();
+    if !args.log.is_recording()? {
+        let Some(loaded) = loaded else {
+            return Err(Error::Usage("a text log needs --calibration FILE".to_owned()));
+        };
+        let messages = args.log.messages(1, Some(&loaded.unit))?;
+        return Ok(Stepper::new(
+            messages,
+            Replica::without_journal(loaded.unit.clone(), settings, Some(loaded)),
+        ));
+    }
+    let mut outlines = scan(&args.log.log)?;
+    outlines.damaged.iter().for_each(|words| show::warn(words));
+    let wanted = args.log.units()?;
+    let holds = |unit: &UnitId| wanted.is_empty() || wanted.contains(unit);
+    let units: Vec<_> = outlines
+        .units
+        .iter()
+        .filter(|(unit, outline)| outline.has_raw && holds(unit))
+        .map(|(unit, _)| unit.clone())
+        .collect();
+    let [unit] = units.as_slice() else {
+        let names: Vec<_> = units.iter().map(UnitId::as_str).collect();
+        return Err(Error::Usage(match names.len() {
+            0 => "there are no raw messages in the log, or none of that unit".to_owned(),
+            _ => format!("the log is of {}: name one with --unit", names.join(", ")),
+        }));
+    };
+    let journal = outlines.units.remove(unit).unwrap_or_default().journal;
+    let part = Part { units: [unit.clone()].into(), ..args.log.part()? };
+    let messages = args.log.files(1, None)?.open(&part)?;
+    let replica = match loaded {
+        Some(loaded) if loaded.unit != *unit => {
+            return Err(Error::Usage(format!(
+                "--calibration is for unit {}, the log is of {unit}",
+                loaded.unit
+            )));
+        }
+        _ if !journal.is_empty() => {
+            let changes = Changes { calibration: loaded.cloned(), ignore_swaps: false };
+            Replica::new(unit.clone(), journal, changes)
+        }
+        Some(loaded) => Replica::without_journal(unit.clone(), settings, Some(loaded)),
+        None => {
+            let words = format!("there is no journal to go through unit {unit} by: give --calibration FILE");
+            return Err(Error::Usage(words));
+        }
+    };
+    Ok(Stepper::new(messages, replica))
+}
+
+/// Prints what was asked for.
+fn list(stepper: &mut Stepper, args: &StepArgs) -> Result<(), Error> {
+    let mut next = match args.from {
+        Some(sequence) => stepper.go_to(sequence)?,
+        None => stepper.next_step()?,
+    };
+    let mut left = args.count.unwrap_or(u64::MAX);
+    while let Some(step) = next.filter(|_| left > 0) {
+        if args.json {
+            tell_json(&step)?
+        } else {
+            tell(&step)?
+        }
+        left -= 1;
+        next = if left > 0 { stepper.next_step()? } else { None };
+    }
+    Ok(())
+}
+
+/// What somebody at a terminal wants next.
+#[derive(Debug, PartialEq, Eq)]
+enum Wish {
+    Next(u64),
+    GoTo(u64),
+    Quit,
+    Help,
+}
+
+fn wish(line: &str) -> Wish {
+    let line = line.trim();
+    match line.split_once(' ') {
+        Some(("s", sequence)) => sequence.trim().parse().map_or(Wish::Help, Wish::GoTo),
+        _ if line.is_empty() => Wish::Next(1),
+        _ if line == "q" => Wish::Quit,
+        _ => line.parse().map_or(Wish::Help, Wish::Next),
+    }
+}
+
+/// Steps as it is told to.
+fn converse(stepper: &mut Stepper, input: &mut dyn BufRead) -> Result<(), Error> {
+    let _ = writeln!(io::stderr(), "{HELP}");
+    let mut line = String::new();
+    loop {
+        let step = match wish(&line) {
+            Wish::Quit => return Ok(()),
+            Wish::Help => {
+                let _ = writeln!(io::stderr(), "{HELP}");
+                None
+            }
+            Wish::GoTo(sequence) => match stepper.go_to(sequence)? {
+                Some(step) => Some(step),
+                None => return over(),
+            },
+            Wish::Next(count) => {
+                let mut last = None;
+                for _ in 0..count {
+                    let Some(step) = stepper.next_step()? else { return over() };
+                    last = Some(step);
+                }
+                last
+            }
+        };
+        step.iter().try_for_each(tell)?;
+        line.clear();
+        match input.read_line(&mut line) {
+            Ok(0) => return Ok(()),
+            Ok(_) => {}
+            Err(source) => return Err(Error::file("standard input".as_ref(), "read", source)),
+        }
+    }
+}
+
+/// Says that there is no further event.
+fn over() -> Result<(), Error> {
+    print("the log is over\n".as_bytes())
+}
+
+fn tell(step: &Step) -> Result<(), Error> {
+    print(words::step(step).as_bytes())
+}
+
+fn tell_json(step: &Step) -> Result<(), Error> {
+    print(show::json(step).as_bytes())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_typed_is_understood() {
+        for (line, expected) in [
+            ("\n", Wish::Next(1)),
+            ("12\n", Wish::Next(12)),
+            ("s 4711\n", Wish::GoTo(4711)),
+            ("q\n", Wish::Quit),
+            ("s x\n", Wish::Help),
+            ("what?\n", Wish::Help),
+        ] {
+            assert_eq!(wish(line), expected, "{line:?}");
+        }
+    }
+}

@@ -1,0 +1,159 @@
+//! A log in another form: recordings as text, ROS 2 bags and Parquet files, text logs as recordings.
+
+mod output;
+mod parquet;
+mod recording;
+mod ros2;
+mod text;
+
+use std::path::PathBuf;
+
+use clap::ValueEnum;
+use isotherm_log::convert::Converted;
+use isotherm_log::convert::contents::Contents;
+use isotherm_log::message::Message;
+use isotherm_log::part::{LogFiles, Messages, Part};
+use isotherm_log::recording::Attachment;
+use isotherm_log::source::LogReport;
+use isotherm_protocol::document::Document;
+use serde::Serialize;
+
+use crate::error::Error;
+use crate::progress::Bar;
+
+pub use output::Place;
+pub use ros2::Ros2Options;
+pub use text::is_csv;
+
+/// What a log is converted to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Target {
+    /// Recording (MCAP) with the raw messages of a text log
+    Mcap,
+    /// Text: raw streams as CSV with a mapping, corrected ticks as CSV
+    Text,
+    /// ROS 2 bag: a folder with metadata.yaml and an MCAP file
+    Ros2,
+    /// Parquet: one file per unit and stream
+    Parquet,
+}
+
+/// A conversion that is to be done.
+#[derive(Debug)]
+pub struct Conversion {
+    /// The log.
+    pub files: LogFiles,
+    /// The part of it.
+    pub part: Part,
+    /// What it is converted to.
+    pub target: Target,
+    /// Where that goes.
+    pub out: PathBuf,
+    /// How files are created.
+    pub place: Place,
+    /// Names of the log's files and of its mapping, for the provenance.
+    pub sources: Vec<(String, String)>,
+    /// For ROS 2 bags.
+    pub ros2: Ros2Options,
+}
+
+/// What a conversion came to.
+#[derive(Debug, Clone, Serialize)]
+pub struct Outcome {
+    /// What was written, and what was not.
+    #[serde(flatten)]
+    pub converted: Converted,
+    /// Topics of a ROS 2 bag.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub topics: Vec<isotherm_log::ros2::BagTopic>,
+    /// Units that have nothing in a ROS 2 bag, and why.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<String>,
+    /// What reading the log came to.
+    pub log: LogReport,
+}
+
+impl Outcome {
+    /// Files written and what was lost, without topics.
+    fn of(converted: Converted, log: LogReport) -> Self {
+        Self { converted, topics: Vec::new(), notes: Vec::new(), log }
+    }
+
+    /// Whether anything was lost, in the log or on the way.
+    #[must_use]
+    pub fn lost_data(&self) -> bool {
+        self.converted.lost_data() || self.log.lost_data()
+    }
+}
+
+/// What the first reading of a log found.
+#[derive(Debug, Default)]
+struct Found {
+    contents: Contents,
+    /// Calibration documents in recordings, in their order.
+    documents: Vec<Document>,
+}
+
+impl Conversion {
+    /// Does it. Files appear under their names when everything is written; after an error there are none.
+    ///
+    /// # Errors
+    /// Those of the log and of the outputs.
+    pub fn run(&self) -> Result<Outcome, Error> {
+        match self.target {
+            Target::Mcap => recording::convert(self),
+            Target::Text => text::convert(self, &self.look()?),
+            Target::Ros2 => ros2::convert(self, &self.look()?),
+            Target::Parquet => parquet::convert(self, &self.look()?),
+        }
+    }
+
+    /// Finds out what the log holds.
+    fn look(&self) -> Result<Found, Error> {
+        let mut found = Found::default();
+        self.read("looking", |message, attachments| {
+            found.contents.add(message);
+            found.documents.extend(attachments.iter().filter_map(document));
+            Ok(())
+        })?;
+        Ok(found)
+    }
+
+    /// Reads the log's part; `each` gets every message, and the files that stand before it in a recording.
+    fn read(
+        &self,
+        words: &'static str,
+        mut each: impl FnMut(&Message, &[Attachment]) -> Result<(), Error>,
+    ) -> Result<LogReport, Error> {
+        let mut messages = self.files.open(&self.part)?;
+        let mut bar = Bar::over_log(messages.progress());
+        while let Some(message) = messages.next_message()? {
+            each(&message, &attachments(&mut messages))?;
+            bar.step(|| words.to_owned());
+        }
+        bar.finish();
+        Ok(messages.report())
+    }
+
+    /// Names and values that every output carries.
+    fn provenance(&self) -> Vec<(String, String)> {
+        let mut words = vec![("isotherm".to_owned(), env!("CARGO_PKG_VERSION").to_owned())];
+        words.extend(self.sources.iter().cloned());
+        if self.part.start.as_ns() > 0 || self.part.end.is_some() {
+            words.push(("start_s".to_owned(), self.part.start.as_s().to_string()));
+            words.extend(self.part.end.map(|end| ("end_s".to_owned(), end.as_s().to_string())));
+        }
+        words
+    }
+}
+
+/// Files that were come across since the last message.
+fn attachments(messages: &mut Messages) -> Vec<Attachment> {
+    messages.log().recording().map(|reader| reader.take_attachments()).unwrap_or_default()
+}
+
+/// A calibration document in a recording; what is none is passed over.
+fn document(attachment: &Attachment) -> Option<Document> {
+    Document::parse_bytes(&attachment.bytes, None).ok().map(|parsed| parsed.document)
+}

@@ -1,0 +1,80 @@
+//! Where playing is, and what it came to.
+
+use std::time::Duration;
+
+use isotherm_log::source::LogReport;
+use tokio::time::Instant;
+
+use super::Player;
+use crate::play::Watch;
+use crate::play::report::{PlayReport, Position, UnitReport};
+use crate::play::units::PlayedUnit;
+
+impl<W: Watch> Player<'_, W> {
+    /// How fast it was, pauses left out.
+    fn actual_speed(&self, elapsed: Duration, paused: Duration) -> f64 {
+        let playing = elapsed.saturating_sub(paused).as_secs_f64();
+        if playing > 0.0 { seconds(self.played_ns) / playing } else { 0.0 }
+    }
+
+    fn times(&self) -> (Duration, Duration) {
+        let now = self.ended.unwrap_or_else(Instant::now);
+        let paused = self.paused_for + self.paused.map_or(Duration::ZERO, |since| now - since);
+        (now - self.begun, paused)
+    }
+
+    pub(super) fn position(&self) -> Position {
+        let (elapsed, paused) = self.times();
+        let log_s = seconds(self.last_at.or(self.from).unwrap_or(0));
+        let progress = self.reel.progress();
+        #[expect(clippy::cast_precision_loss, reason = "a share of a bar")]
+        let of_pass = match self.options.part.end {
+            Some(end) => log_s / (end.as_s() - self.options.part.start.as_s()),
+            None => progress.read() as f64 / progress.total().max(1) as f64,
+        };
+        #[expect(clippy::cast_precision_loss, reason = "a share of a bar")]
+        let share = match self.options.passes {
+            Some(passes) => ((self.pass - 1) as f64 + of_pass.min(1.0)) / passes.max(1) as f64,
+            None => of_pass,
+        };
+        Position {
+            log_s,
+            share: if share.is_finite() { share.clamp(0.0, 1.0) } else { 0.0 },
+            ticks_sent: self.ticks_sent,
+            pass: self.pass,
+            speed: self.pacer.speed(),
+            actual_speed: self.actual_speed(elapsed, paused),
+            paused: self.paused.is_some(),
+        }
+    }
+
+    /// What reading the log came to.
+    pub(in crate::play) fn log_report(&self) -> LogReport {
+        self.reel.report()
+    }
+
+    /// What playing came to.
+    pub(in crate::play) fn report(&self, stopped: bool) -> PlayReport {
+        let (elapsed, paused) = self.times();
+        let mut units: Vec<_> = self.units.iter().map(PlayedUnit::report).collect();
+        if self.gave_up {
+            units.iter_mut().for_each(UnitReport::give_up);
+        }
+        PlayReport {
+            passes: self.pass,
+            seeks: self.seeks,
+            log_s: seconds(self.played_ns),
+            elapsed_s: elapsed.as_secs_f64(),
+            paused_s: paused.as_secs_f64(),
+            actual_speed: self.actual_speed(elapsed, paused),
+            lateness: self.pacer.lateness(),
+            stopped,
+            ..PlayReport::of(units)
+        }
+    }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "exact below 100 days, and no result rests on it")]
+fn seconds(ns: i64) -> f64 {
+    ns as f64 * 1e-9
+}

@@ -1,0 +1,222 @@
+//! What playing came to.
+
+use isotherm_bus::outlet::Account;
+use serde::Serialize;
+
+use super::reel::Load;
+use crate::pace::{Lateness, Speed};
+
+/// What was sent of a unit.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub struct Counts {
+    /// Messages sent, those that were sent before among them.
+    pub messages_sent: u64,
+    /// Messages sent that the service cannot read; the log has them so.
+    pub messages_unreadable: u64,
+    /// Messages that were not sent, by `--loss`.
+    pub messages_withheld: u64,
+    /// Messages that were sent a second time, by `--duplicate`.
+    pub messages_sent_again: u64,
+    /// Messages that were sent behind later ones, by `--reorder`.
+    pub messages_held_back: u64,
+    /// Gyro ticks in the messages sent.
+    pub ticks_in_messages: u64,
+    /// Gyro ticks that were not sent, by `--loss`.
+    pub ticks_withheld: u64,
+    /// Accelerometer ticks sent.
+    pub accel_ticks_sent: u64,
+    /// Temperature readings sent.
+    pub temperature_readings_sent: u64,
+    /// Health readings sent: times at which there were some.
+    pub health_readings_sent: u64,
+    /// Rate references sent.
+    pub references_sent: u64,
+}
+
+impl Counts {
+    /// Notes a message that went out.
+    pub(super) fn note(&mut self, load: Load, again: bool, held_back: bool) {
+        self.messages_sent += 1;
+        self.messages_sent_again += u64::from(again);
+        self.messages_held_back += u64::from(held_back);
+        match load {
+            Load::Gyro(ticks) => self.ticks_in_messages += ticks.count,
+            Load::Accel(ticks) => self.accel_ticks_sent += ticks,
+            Load::Temperature(readings) => self.temperature_readings_sent += readings,
+            Load::Health(times) => self.health_readings_sent += times,
+            Load::Reference => self.references_sent += 1,
+            Load::Unreadable => self.messages_unreadable += 1,
+        }
+    }
+}
+
+/// What was sent of a unit, and what became of it. What comes back is `None` without acknowledgement.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct UnitReport {
+    /// Its serial on the bus.
+    pub unit: String,
+    /// Its serial in the log.
+    pub of: String,
+    /// What was sent.
+    #[serde(flatten)]
+    pub counts: Counts,
+    /// Gyro ticks sent, each counted once.
+    pub ticks_sent: u64,
+    /// Gyro ticks between the first and the last of a run that were never sent, because the log does not have them, or
+    /// because they were passed over or withheld: the service announces them as missing.
+    pub ticks_not_sent: Option<u64>,
+    /// Gyro ticks that came back corrected, each counted once.
+    pub ticks_acknowledged: Option<u64>,
+    /// Gyro ticks that the service announced as missing.
+    pub ticks_announced_missing: Option<u64>,
+    /// Gyro ticks that came back as they were, because the service has no calibration for the unit.
+    pub ticks_uncalibrated: Option<u64>,
+    /// Gyro ticks sent behind later ones, too late to come back.
+    pub ticks_late: Option<u64>,
+    /// Gyro ticks sent in their order that did not come back.
+    pub ticks_lost: Option<u64>,
+    /// Gyro ticks under way when playing was stopped.
+    pub ticks_under_way: Option<u64>,
+    /// Gyro ticks that came back more than once.
+    pub ticks_duplicated: Option<u64>,
+    /// Runs sent: series, or what began anew in one.
+    pub runs: Option<u64>,
+    /// Times that the unit's corrected stream began anew; more than the runs behind the first only where somebody else plays
+    /// the unit.
+    pub restarts: Option<u64>,
+}
+
+impl UnitReport {
+    pub(super) fn new(unit: &str, of: &str, counts: Counts, account: Option<Account>) -> Self {
+        let told = |of: fn(&Account) -> u64| account.as_ref().map(of);
+        Self {
+            unit: unit.to_owned(),
+            of: of.to_owned(),
+            counts,
+            ticks_sent: account.map_or(counts.ticks_in_messages, |account| account.ticks_sent),
+            ticks_not_sent: told(|account| account.ticks_not_sent),
+            ticks_acknowledged: told(|account| account.ticks_back),
+            ticks_announced_missing: told(|account| account.ticks_announced_missing),
+            ticks_uncalibrated: told(|account| account.ticks_uncalibrated),
+            ticks_late: told(|account| account.ticks_late),
+            ticks_lost: told(|account| account.ticks_lost),
+            ticks_under_way: told(|account| account.ticks_under_way),
+            ticks_duplicated: told(|account| account.ticks_duplicated),
+            runs: told(|account| account.runs),
+            restarts: told(|account| account.restarts),
+        }
+    }
+
+    /// What did not come back by the end counts as lost.
+    pub(super) fn give_up(&mut self) {
+        if let (Some(lost), Some(under_way)) = (&mut self.ticks_lost, &mut self.ticks_under_way) {
+            *lost += std::mem::take(under_way);
+        }
+    }
+
+    /// Whether what came back is not what was sent: somebody else plays the unit, or more than one service answers.
+    #[must_use]
+    pub fn is_mixed(&self) -> bool {
+        let own = self.runs.map_or(0, |runs| runs.saturating_sub(1));
+        self.restarts.is_some_and(|restarts| restarts > own)
+            || self.ticks_duplicated.is_some_and(|ticks| ticks > 0)
+    }
+}
+
+/// What playing came to: the sums over the units, and the units.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct PlayReport {
+    /// Messages sent.
+    pub messages_sent: u64,
+    /// Gyro ticks sent, each counted once.
+    pub ticks_sent: u64,
+    /// Accelerometer ticks sent.
+    pub accel_ticks_sent: u64,
+    /// Temperature readings sent.
+    pub temperature_readings_sent: u64,
+    /// As for each unit; `None` without acknowledgement, here and below.
+    pub ticks_not_sent: Option<u64>,
+    /// As for each unit.
+    pub ticks_acknowledged: Option<u64>,
+    /// As for each unit.
+    pub ticks_announced_missing: Option<u64>,
+    /// As for each unit.
+    pub ticks_uncalibrated: Option<u64>,
+    /// As for each unit.
+    pub ticks_late: Option<u64>,
+    /// As for each unit.
+    pub ticks_lost: Option<u64>,
+    /// As for each unit.
+    pub ticks_under_way: Option<u64>,
+    /// As for each unit.
+    pub ticks_duplicated: Option<u64>,
+    /// Times that the log was played, the last one perhaps not to its end.
+    pub passes: u64,
+    /// Times that somebody went to another place in it.
+    pub seeks: u64,
+    /// Time of the log that was played (s).
+    pub log_s: f64,
+    /// Time that it took (s).
+    pub elapsed_s: f64,
+    /// Time that playing was paused (s), part of the former.
+    pub paused_s: f64,
+    /// How many times as fast as recorded, pauses left out.
+    pub actual_speed: f64,
+    /// How late messages went out.
+    pub lateness: Lateness,
+    /// Playing was stopped by a signal.
+    pub stopped: bool,
+    /// The units, in the order in which the log names them.
+    pub units: Vec<UnitReport>,
+}
+
+impl PlayReport {
+    /// The sums over units.
+    pub(super) fn of(units: Vec<UnitReport>) -> Self {
+        let sum = |of: fn(&UnitReport) -> u64| units.iter().map(of).sum();
+        let told = |of: fn(&UnitReport) -> Option<u64>| {
+            units.iter().filter_map(of).reduce(|sum, count| sum.saturating_add(count))
+        };
+        Self {
+            messages_sent: sum(|unit| unit.counts.messages_sent),
+            ticks_sent: sum(|unit| unit.ticks_sent),
+            accel_ticks_sent: sum(|unit| unit.counts.accel_ticks_sent),
+            temperature_readings_sent: sum(|unit| unit.counts.temperature_readings_sent),
+            ticks_not_sent: told(|unit| unit.ticks_not_sent),
+            ticks_acknowledged: told(|unit| unit.ticks_acknowledged),
+            ticks_announced_missing: told(|unit| unit.ticks_announced_missing),
+            ticks_uncalibrated: told(|unit| unit.ticks_uncalibrated),
+            ticks_late: told(|unit| unit.ticks_late),
+            ticks_lost: told(|unit| unit.ticks_lost),
+            ticks_under_way: told(|unit| unit.ticks_under_way),
+            ticks_duplicated: told(|unit| unit.ticks_duplicated),
+            units,
+            ..Self::default()
+        }
+    }
+
+    /// Whether a tick that was sent in its order did not come back.
+    #[must_use]
+    pub fn lost_data(&self) -> bool {
+        self.ticks_lost.is_some_and(|lost| lost > 0)
+    }
+}
+
+/// Where playing is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Position {
+    /// Time in the log, from its first message on (s).
+    pub log_s: f64,
+    /// Share of everything that is to be played (0…1); of this pass where there is no last one.
+    pub share: f64,
+    /// Gyro ticks sent.
+    pub ticks_sent: u64,
+    /// Which pass, from 1.
+    pub pass: u64,
+    /// How fast it is to be.
+    pub speed: Speed,
+    /// How fast it was, pauses left out.
+    pub actual_speed: f64,
+    /// Nothing goes out.
+    pub paused: bool,
+}

@@ -1,0 +1,108 @@
+//! Saying why nothing comes back, before patience ends.
+
+use std::collections::BTreeMap;
+use std::convert::Infallible;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use isotherm_bus::outlet::UnderWay;
+use isotherm_bus::presence;
+use isotherm_correction::operation;
+use isotherm_protocol::key::UnitId;
+use isotherm_protocol::status::{Output, Status};
+use tokio::time::Instant;
+use zenoh::Session;
+
+use super::Watch;
+
+/// Time between two looks.
+const LOOK: Duration = Duration::from_millis(500);
+/// So long nothing comes back before it is said.
+const QUIET: Duration = Duration::from_secs(3);
+/// How long the service may take to answer what it knows of the unit.
+const ANSWER: Duration = Duration::from_secs(2);
+
+/// What is under way of each unit; the player adds to it.
+pub(super) type Shared = Arc<Mutex<Vec<UnderWay>>>;
+
+/// When a unit's last batch came back.
+struct Since {
+    batches: u64,
+    seen: Instant,
+    said: bool,
+}
+
+/// Looks now and then whether what is sent comes back, and says where it does not.
+pub(super) async fn watch(session: &Session, shared: &Shared, watch: &impl Watch) -> Infallible {
+    let mut since: BTreeMap<UnitId, Since> = BTreeMap::new();
+    loop {
+        tokio::time::sleep(LOOK).await;
+        let units = shared.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let mut silent = Vec::new();
+        for unit in &units {
+            let (batches, ticks, now) = (unit.batches(), unit.ticks(), Instant::now());
+            let since = since.entry(unit.unit().clone()).or_insert(Since { batches, seen: now, said: false });
+            if batches != since.batches || ticks == 0 {
+                (since.batches, since.seen) = (batches, now);
+            } else if !since.said && now - since.seen >= QUIET {
+                since.said = true;
+                silent.push((unit.unit(), ticks));
+            }
+        }
+        // One unit stands for the others that fell silent with it.
+        if let Some((unit, ticks)) = silent.first() {
+            let status = presence::status(session, unit, ANSWER).await;
+            let mut text = words(unit, *ticks, status.as_ref());
+            if silent.len() > 1 {
+                text += &format!(" ({} other units likewise)", silent.len() - 1);
+            }
+            watch.say(&text);
+        }
+    }
+}
+
+/// Why nothing comes back, as far as the unit's status tells.
+fn words(unit: &UnitId, ticks: u64, status: Option<&Status>) -> String {
+    let quiet =
+        format!("{unit}: nothing has come back for {} s, {ticks} ticks are under way", QUIET.as_secs());
+    match status {
+        None => format!("{quiet}; the service says nothing of the unit"),
+        Some(status) if !operation::State::from(status.state).is_running() => format!(
+            "{quiet}: the unit is in {}, where nothing goes out; `isotherm command {unit} run` puts it to work, \
+             --no-acknowledge plays without waiting for it",
+            operation::State::from(status.state)
+        ),
+        Some(status) if status.output == Output::Held => format!(
+            "{quiet}: the unit has no calibration, and the service holds such units back (uncalibrated = \"hold\"); give it \
+             one, or play with --no-acknowledge"
+        ),
+        Some(_) => {
+            format!("{quiet}; see the service's log and the unit's status, or play with --no-acknowledge")
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use isotherm_protocol::status::State;
+
+    use super::*;
+
+    #[test]
+    fn the_words_fit_what_the_status_says() {
+        let unit = UnitId::new("ZLG-0001").unwrap();
+        let status = |state, output| Status { state, output, ..Status::default() };
+        let running = State::RunningWithReversal;
+        let table = [
+            (None, "says nothing of the unit"),
+            (Some(status(State::Standby, Output::Calibrated)), "is in standby"),
+            (Some(status(State::SelfTest, Output::Calibrated)), "is in self-test"),
+            (Some(status(running, Output::Held)), "uncalibrated = \"hold\""),
+            (Some(status(running, Output::Calibrated)), "see the service's log"),
+        ];
+        for (status, expected) in table {
+            let text = words(&unit, 300, status.as_ref());
+            assert!(text.contains(expected) && text.contains("300 ticks"), "{text}");
+        }
+    }
+}

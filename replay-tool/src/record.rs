@@ -1,0 +1,302 @@
+//! Recording what is on the bus.
+//!
+//! ```text
+//! receive threads ──▶ queue (bytes bounded, what is beyond is counted) ──▶ one thread that writes
+//!                       ▲
+//! answers of services ──┘   memory of units, documents, configuration, history: for every file anew
+//! ```
+
+mod files;
+mod inquiry;
+mod queue;
+mod report;
+mod scribe;
+mod services;
+mod told;
+mod topics;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Duration;
+
+use isotherm_bus::{BusError, SessionOptions};
+use isotherm_log::recording::RecordingOptions;
+use isotherm_protocol::key::UnitId;
+use tokio::signal::unix::{Signal, SignalKind, signal};
+use tokio::sync::mpsc::unbounded_channel;
+use tokio::time::{Instant, MissedTickBehavior, interval, timeout};
+use zenoh::Session;
+use zenoh::pubsub::Subscriber;
+use zenoh::sample::SampleKind;
+
+use crate::error::Error;
+use files::Files;
+use queue::Queue;
+use report::{fill, finish};
+use scribe::{Scribe, Told};
+use services::{await_service, follow_services, open, start_asker};
+
+pub use queue::TopicCount;
+pub use report::{EndedBy, RecordReport};
+pub use scribe::Bounds;
+pub use topics::{TopicFilter, is_first, key_expressions};
+
+/// How often the figures are shown.
+const WATCH_INTERVAL: Duration = Duration::from_millis(250);
+/// How long the topics must be silent behind the last service's end.
+const SILENCE: Duration = Duration::from_millis(500);
+/// How long a session may take to close.
+const CLOSE_LIMIT: Duration = Duration::from_secs(5);
+/// The signal for a file that would be longer than the system allows. Caught, writing fails as on a full disk.
+const SIGXFSZ: i32 = 25;
+
+/// Whether a service is needed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ServiceWait {
+    /// No: only what comes is recorded.
+    Without,
+    /// It must answer within this time.
+    Within(Duration),
+    /// It is waited for, however long.
+    Forever,
+}
+
+/// What is recorded, and how.
+#[derive(Debug, Clone)]
+pub struct RecordOptions {
+    /// Where it is written to; with rotation, `-0001` and so on is added to the name.
+    pub out: PathBuf,
+    /// How the session is opened.
+    pub session: SessionOptions,
+    /// Units to record; all where none is given.
+    pub units: Vec<UnitId>,
+    /// Topics to record; every kind where none is given.
+    pub topics: Vec<TopicFilter>,
+    /// Whether a service is needed.
+    pub service: ServiceWait,
+    /// How long a query may take.
+    pub query_limit: Duration,
+    /// How long is recorded; until it is stopped where not given.
+    pub duration: Option<Duration>,
+    /// Whether recording ends with the last service.
+    pub until_service_stops: bool,
+    /// Whether chunks are compressed.
+    pub compress: bool,
+    /// When chunks and files end.
+    pub bounds: Bounds,
+    /// How many files of a row are kept.
+    pub keep: Option<usize>,
+    /// Whether files that are there already are written over.
+    pub overwrite: bool,
+    /// What may wait to be written (bytes).
+    pub queue_bytes: u64,
+}
+
+/// Records until it is told to stop.
+///
+/// `watch` is called several times a second with the figures so far.
+///
+/// # Errors
+/// [`Error::Usage`] and [`Error::Log`] where the file cannot be begun, [`Error::Bus`] where the session cannot be opened or
+/// no service answers, [`Error::Stopped`] where it was stopped before it began. A disk that is full later is no error: see
+/// [`RecordReport::failure`].
+pub async fn record(
+    options: &RecordOptions,
+    mut watch: impl FnMut(&RecordReport),
+) -> Result<RecordReport, Error> {
+    let rotates = options.bounds.file_bytes.is_some() || options.bounds.file_time.is_some();
+    let files = Files::new(&options.out, rotates, options.keep, options.overwrite)?;
+    let mut stop = Stop::listen()?;
+    let session = open(options, &mut stop).await?;
+    let recorded = on_session(&session, options, files, &mut stop, &mut watch).await;
+    let closed = isotherm_bus::close(session, CLOSE_LIMIT).await;
+    let mut report = recorded?;
+    if let Err(error) = closed {
+        report.warnings.push(error.to_string());
+    }
+    Ok(report)
+}
+
+/// Signals that end a recording.
+struct Stop {
+    interrupt: Signal,
+    terminate: Signal,
+    _too_long: Signal,
+}
+
+impl Stop {
+    fn listen() -> Result<Self, Error> {
+        let listen = |kind| signal(kind).map_err(|source| Error::Runtime { source });
+        Ok(Self {
+            interrupt: listen(SignalKind::interrupt())?,
+            terminate: listen(SignalKind::terminate())?,
+            _too_long: listen(SignalKind::from_raw(SIGXFSZ))?,
+        })
+    }
+
+    /// Ends with the next of them.
+    async fn asked(&mut self) {
+        tokio::select! {
+            _ = self.interrupt.recv() => {}
+            _ = self.terminate.recv() => {}
+        }
+    }
+}
+
+/// Records on an open session.
+async fn on_session(
+    session: &Session,
+    options: &RecordOptions,
+    files: Files,
+    stop: &mut Stop,
+    watch: &mut impl FnMut(&RecordReport),
+) -> Result<RecordReport, Error> {
+    let queue = Arc::new(Queue::new(options.queue_bytes));
+    let (tell, mut lives) = unbounded_channel();
+    let subscribers = subscribe(session, options, &queue).await?;
+    let life = follow_services(session, tell).await?;
+    await_service(session, options.service, stop).await?;
+
+    let writing = RecordingOptions {
+        compress: options.compress,
+        overwrite: options.overwrite,
+        ..RecordingOptions::default()
+    };
+    let (tell, mut told) = unbounded_channel();
+    let scribe = Scribe::begin(Arc::clone(&queue), files, writing, options.bounds, described(options), tell)?;
+    let thread = std::thread::Builder::new().name("recording".to_owned()).spawn(move || scribe.run());
+    let thread = thread.map_err(|source| Error::Runtime { source })?;
+
+    let begun = Instant::now();
+    let (asker, questions, mut answers) = start_asker(session, options, &queue);
+    let mut report = RecordReport::default();
+    let mut alive = BTreeSet::new();
+    let mut ticks = interval(WATCH_INTERVAL);
+    ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
+    let mut silence = Silence::default();
+    report.ended_by = loop {
+        tokio::select! {
+            () = stop.asked() => break EndedBy::Signal,
+            () = after(options.duration, begun) => break EndedBy::Duration,
+            Some(told) = told.recv() => match told {
+                Told::Begun => drop(questions.send(())),
+                Told::Warning(words) => report.warnings.push(words),
+                Told::Failed => break EndedBy::Failure,
+            },
+            Some(life) = lives.recv() => {
+                if life.note(&mut alive, &mut report) {
+                    // It may not have heard of the subscriptions when its first units began.
+                    let _ = questions.send(());
+                }
+            }
+            Some(words) = answers.recv() => report.warnings.push(words),
+            _ = ticks.tick() => {
+                fill(&mut report, &queue, begun);
+                watch(&report);
+                let over = options.until_service_stops && !report.services.is_empty() && alive.is_empty();
+                if over && silence.holds(report.received) {
+                    break EndedBy::ServiceStop;
+                }
+            }
+        }
+    };
+    // What is on its way to a callback comes in before the subscription has ended.
+    for subscriber in subscribers {
+        let _ = subscriber.undeclare().await;
+    }
+    drop((questions, life));
+    let finished = async {
+        // The last file needs its answers as the others do.
+        let _ = timeout(options.query_limit, asker).await;
+        queue.close();
+        tokio::task::spawn_blocking(move || thread.join()).await
+    };
+    let done = tokio::select! {
+        done = finished => done,
+        // Somebody is in a hurry: the file is left as it is, whole up to its last chunk.
+        () = stop.asked() => return Err(Error::Stopped),
+    };
+    while let Ok(words) = answers.try_recv() {
+        report.warnings.push(words);
+    }
+    fill(&mut report, &queue, begun);
+    let lost_thread = || Error::Runtime { source: std::io::Error::other("the writing thread has ended") };
+    finish(
+        &mut report,
+        done.ok().and_then(Result::ok).ok_or_else(lost_thread)?,
+        options.service != ServiceWait::Without,
+    );
+    Ok(report)
+}
+
+/// Subscribes; receive threads only hand over.
+async fn subscribe(
+    session: &Session,
+    options: &RecordOptions,
+    queue: &Arc<Queue>,
+) -> Result<Vec<Subscriber<()>>, Error> {
+    let expressions = Arc::new(key_expressions(&options.topics, &options.units));
+    let mut subscribers = Vec::new();
+    for (index, keys) in expressions.iter().enumerate() {
+        let (queue, expressions) = (Arc::clone(queue), Arc::clone(&expressions));
+        let subscriber = session
+            .declare_subscriber(keys)
+            .callback(move |sample| {
+                // A deletion says nothing on these keys.
+                if sample.kind() == SampleKind::Put && is_first(&expressions, index, sample.key_expr()) {
+                    let payload = sample.payload();
+                    // A copy: a part of Zenoh's buffer would hold the whole of it.
+                    queue.message(sample.key_expr(), || payload.to_bytes().into_owned(), payload.len());
+                }
+            })
+            .await
+            .map_err(|source| BusError::Declare { key: keys.to_string(), source })?;
+        subscribers.push(subscriber);
+    }
+    Ok(subscribers)
+}
+
+/// Ends that long after the beginning; never where no time is given.
+async fn after(duration: Option<Duration>, begun: Instant) {
+    match duration.and_then(|duration| begun.checked_add(duration)) {
+        Some(end) => tokio::time::sleep_until(end).await,
+        None => std::future::pending().await,
+    }
+}
+
+/// Since when nothing has come.
+#[derive(Debug, Default)]
+struct Silence(Option<(u64, Instant)>);
+
+impl Silence {
+    /// Whether the number has been the same for long enough.
+    fn holds(&mut self, received: u64) -> bool {
+        let now = Instant::now();
+        let (before, since) = *self.0.get_or_insert((received, now));
+        if before != received {
+            self.0 = Some((received, now));
+        }
+        before == received && now - since >= SILENCE
+    }
+}
+
+/// What a recording says of how it was made; nothing of the computer that it was made on.
+fn described(options: &RecordOptions) -> BTreeMap<String, String> {
+    let join = |texts: Vec<String>| if texts.is_empty() { "all".to_owned() } else { texts.join(" ") };
+    let topics = key_expressions(&options.topics, &options.units).iter().map(ToString::to_string).collect();
+    let mut described = BTreeMap::from([
+        ("compression".to_owned(), if options.compress { "zstd" } else { "none" }.to_owned()),
+        ("chunk_s".to_owned(), options.bounds.chunk.as_secs_f64().to_string()),
+        ("units".to_owned(), join(options.units.iter().map(ToString::to_string).collect())),
+        ("topics".to_owned(), join(topics)),
+        ("with_service".to_owned(), (options.service != ServiceWait::Without).to_string()),
+    ]);
+    if let Some(bytes) = options.bounds.file_bytes {
+        described.insert("max_size_bytes".to_owned(), bytes.to_string());
+    }
+    if let Some(time) = options.bounds.file_time {
+        described.insert("max_duration_s".to_owned(), time.as_secs_f64().to_string());
+    }
+    described
+}

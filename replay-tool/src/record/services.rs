@@ -1,0 +1,144 @@
+//! Services: waiting for one, following which are there, asking each.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+use std::time::Duration;
+
+use isotherm_bus::{BusError, SessionOptions, presence};
+use isotherm_protocol::key;
+use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
+use tokio::task::JoinHandle;
+use zenoh::Session;
+use zenoh::pubsub::Subscriber;
+use zenoh::sample::SampleKind;
+
+use super::queue::Queue;
+use super::{RecordOptions, RecordReport, ServiceWait, Stop, inquiry};
+use crate::error::Error;
+
+/// How long one wait for a service takes where it is repeated.
+const ONE_WAIT: Duration = Duration::from_secs(5);
+/// How long to wait before a session is opened again.
+const OPEN_AGAIN: Duration = Duration::from_millis(500);
+
+/// Opens the session; tries again where a service is waited for.
+pub(super) async fn open(options: &RecordOptions, stop: &mut Stop) -> Result<Session, Error> {
+    loop {
+        let opened = tokio::select! {
+            opened = open_once(&options.session) => opened,
+            () = stop.asked() => return Err(Error::Stopped),
+        };
+        match opened {
+            Err(BusError::Open(_)) if options.service == ServiceWait::Forever => {
+                tokio::select! {
+                    () = tokio::time::sleep(OPEN_AGAIN) => {}
+                    () = stop.asked() => return Err(Error::Stopped),
+                }
+            }
+            opened => return Ok(opened?),
+        }
+    }
+}
+
+/// Opens the session: as a client where there is one endpoint and nothing else is said. A peer hears only from those that it is
+/// connected to itself, and raw messages come from producers; to a client the service, or a router, passes them on.
+async fn open_once(options: &SessionOptions) -> Result<Session, BusError> {
+    if options.config.is_some() || options.connect.len() != 1 || !options.listen.is_empty() {
+        return isotherm_bus::open(options).await;
+    }
+    let mut config = options.to_config()?;
+    for (option, value) in [("mode", "\"client\""), ("listen/endpoints", "[]")] {
+        let set = config.insert_json5(option, value);
+        set.map_err(|source| BusError::Option { option, value: value.to_owned(), source })?;
+    }
+    zenoh::open(config).await.map_err(BusError::Open)
+}
+
+/// Waits for a service, as the options say.
+pub(super) async fn await_service(
+    session: &Session,
+    wait: ServiceWait,
+    stop: &mut Stop,
+) -> Result<(), Error> {
+    loop {
+        let limit = match wait {
+            ServiceWait::Without => return Ok(()),
+            ServiceWait::Within(limit) => limit,
+            ServiceWait::Forever => ONE_WAIT,
+        };
+        let found = tokio::select! {
+            found = presence::wait_for_service(session, limit) => found,
+            () = stop.asked() => return Err(Error::Stopped),
+        };
+        match found {
+            Err(BusError::NoService { .. }) if wait == ServiceWait::Forever => {}
+            found => return Ok(found?),
+        }
+    }
+}
+
+/// A service has come or gone.
+#[derive(Debug)]
+pub(super) struct Life {
+    instance: String,
+    is_alive: bool,
+}
+
+impl Life {
+    /// Enters it; whether it is one that has come.
+    pub(super) fn note(self, alive: &mut BTreeSet<String>, report: &mut RecordReport) -> bool {
+        let Self { instance, is_alive } = self;
+        if is_alive {
+            report.services.insert(instance.clone());
+            return alive.insert(instance);
+        }
+        if alive.remove(&instance) {
+            report.warnings.push(format!("service {instance} is gone"));
+        }
+        false
+    }
+}
+
+/// Follows which services are there.
+pub(super) async fn follow_services(
+    session: &Session,
+    lives: UnboundedSender<Life>,
+) -> Result<Subscriber<()>, BusError> {
+    session
+        .liveliness()
+        .declare_subscriber(key::ALL_SERVICES_ALIVE)
+        .history(true)
+        .callback(move |sample| {
+            if let Some(instance) = key::parse_service_alive(sample.key_expr()) {
+                let is_alive = sample.kind() == SampleKind::Put;
+                let _ = lives.send(Life { instance: instance.to_owned(), is_alive });
+            }
+        })
+        .await
+        .map_err(|source| BusError::Declare { key: key::ALL_SERVICES_ALIVE.to_owned(), source })
+}
+
+/// Starts the task that asks services, once for all requests that have come meanwhile; it ends with the requests.
+pub(super) fn start_asker(
+    session: &Session,
+    options: &RecordOptions,
+    queue: &Arc<Queue>,
+) -> (JoinHandle<()>, UnboundedSender<()>, UnboundedReceiver<String>) {
+    let (questions, mut asked) = unbounded_channel();
+    let (answer, answers) = unbounded_channel();
+    let (session, queue, units) = (session.clone(), Arc::clone(queue), options.units.clone());
+    let (limit, without) = (options.query_limit, options.service == ServiceWait::Without);
+    let task = tokio::spawn(async move {
+        while asked.recv().await.is_some() {
+            while asked.try_recv().is_ok() {}
+            if without {
+                continue;
+            }
+            match inquiry::ask(&session, &units, limit, &queue).await {
+                Ok(words) => words.into_iter().for_each(|words| drop(answer.send(words))),
+                Err(error) => drop(answer.send(error.to_string())),
+            }
+        }
+    });
+    (task, questions, answers)
+}

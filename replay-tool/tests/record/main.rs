@@ -1,0 +1,7 @@
+//! Recording from the bus, and recovering what a recorder has left behind.
+
+#![expect(clippy::unwrap_used, reason = "helpers of tests end the test where something is not as it must be")]
+
+mod bus;
+mod common;
+mod recover;

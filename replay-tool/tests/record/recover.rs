@@ -1,0 +1,64 @@
+//! `recover` as it is called.
+
+use std::fs;
+
+use isotherm_log::recording::{RecordingOptions, RecordingWriter};
+
+use crate::common::{replay, shell_example, temperature};
+
+/// A recording of a hundred messages in ten chunks.
+fn write(path: &std::path::Path) {
+    let mut writer = RecordingWriter::create(path, RecordingOptions::default()).unwrap();
+    for number in 0..100 {
+        writer.write(&temperature("A-1", number)).unwrap();
+        if number % 10 == 9 {
+            writer.flush().unwrap();
+        }
+    }
+    writer.finish().unwrap();
+}
+
+#[test]
+fn what_is_lost_is_said_and_the_old_file_stays() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    write(&path.join("a.mcap"));
+    let whole = fs::read(path.join("a.mcap")).unwrap();
+    let output = replay(path, &["recover", "a.mcap", "b.mcap", "--json"]);
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    let summary: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((summary["messages"].as_u64(), summary["missing"].as_u64()), (Some(100), Some(0)));
+
+    // A bit in the middle of the fifth chunk, the record with opcode 6.
+    let mut damaged = whole.clone();
+    let (mut at, mut chunks) = (8, Vec::new());
+    while let Some(head) = whole.get(at..at + 9) {
+        let length = usize::try_from(u64::from_le_bytes(*head[1..].first_chunk().unwrap())).unwrap() + 9;
+        chunks.extend((head[0] == 6).then_some(at + length / 2));
+        at += length;
+    }
+    damaged[chunks[4]] ^= 1;
+    fs::write(path.join("a.mcap"), &damaged).unwrap();
+    let output = replay(path, &["recover", "a.mcap", "c.mcap"]);
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert_eq!(output.status.code(), Some(3), "{text}");
+    assert!(text.contains("imu/A-1/raw/temp: 10 of 100 messages are missing"), "{text}");
+    assert_eq!(fs::read(path.join("a.mcap")).unwrap(), damaged);
+
+    for (arguments, words) in [
+        (["recover", "a.mcap", "a.mcap"], "would be written over"),
+        (["recover", "a.mcap", "c.mcap"], "there already"),
+        (["recover", "missing.mcap", "d.mcap"], "missing.mcap: cannot open"),
+    ] {
+        let output = replay(path, &arguments);
+        let errors = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(matches!(output.status.code(), Some(1 | 2)) && errors.contains(words), "{errors}");
+    }
+    assert_eq!(fs::read(path.join("a.mcap")).unwrap(), damaged);
+    assert_eq!(replay(path, &["recover", "a.mcap", "c.mcap", "--overwrite"]).status.code(), Some(3));
+}
+
+#[test]
+fn the_example_of_the_help_works_as_printed() {
+    shell_example("recover", &["record", "truncate", "recover"]);
+}

@@ -1,0 +1,305 @@
+//! Logs converted there and back.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use isotherm_correction::sample::{ChannelName, OutputKind};
+use isotherm_log::mapping::Mapping;
+use isotherm_log::message::{Message, Topic};
+use isotherm_log::recording::{RecordingOptions, RecordingReader, RecordingWriter};
+use isotherm_log::text::{LogEvent, LogReader};
+use isotherm_protocol::codec;
+use isotherm_protocol::raw::{AccelBatch, GyroBatch, GyroTick, HealthBatch, HealthReading, HealthTick};
+use isotherm_protocol::raw::{Readings, TemperatureBatch, TemperatureTick};
+use serde_json::Value;
+
+use crate::common::{check, mapping, replay, stdout};
+use crate::real_logs::data;
+
+/// All events of a text log.
+fn events(mapping: &Path, log: &Path) -> Vec<LogEvent> {
+    let mapping = Mapping::load(mapping).unwrap();
+    LogReader::open(&mapping, &[log.to_path_buf()]).unwrap().map(Result::unwrap).collect()
+}
+
+/// All messages of a recording.
+fn messages(path: &Path) -> Vec<Message> {
+    let mut reader = RecordingReader::open(&[path.to_path_buf()], std::sync::Arc::default()).unwrap();
+    std::iter::from_fn(|| reader.next_message().unwrap()).collect()
+}
+
+fn record(path: &Path, messages: &[Message]) {
+    let mut writer = RecordingWriter::create(path, RecordingOptions::default()).unwrap();
+    messages.iter().for_each(|message| writer.write(message).unwrap());
+    writer.finish().unwrap();
+}
+
+/// Runs a conversion with its summary as JSON, which must end with this code.
+fn convert(folder: &Path, args: &[&str], code: i32) -> Value {
+    let output = replay(folder, &[&["convert", "--json"], args].concat());
+    check(&output, code, "");
+    serde_json::from_str(&stdout(&output)).unwrap()
+}
+
+/// A text log to a recording, back to text, and once more to a recording: the same ticks, the same messages.
+fn there_and_back(mapping: &Path, log: &Path) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let [mapping_name, log_name] = [mapping, log].map(|path| path.to_str().unwrap());
+    convert(folder.path(), &[log_name, "-m", mapping_name, "-u", "U-1", "a.mcap"], 0);
+    let back = convert(folder.path(), &["a.mcap", "b.csv"], 0);
+    assert_eq!((back["duplicates"].as_u64(), &back["lost"]), (Some(0), &serde_json::json!({})));
+    let before = events(mapping, log);
+    let after = events(&path("b.mapping.toml"), &path("b.csv"));
+    assert_eq!(before.len(), after.len());
+    for (before, after) in before.iter().zip(&after) {
+        assert_eq!(before, after);
+    }
+    convert(folder.path(), &["b.csv", "-m", "b.mapping.toml", "-u", "U-1", "c.mcap"], 0);
+    assert!(messages(&path("a.mcap")) == messages(&path("c.mcap")), "the same messages");
+}
+
+#[test]
+fn simulated_logs_come_back_to_the_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    let presets = stdout(&replay(folder.path(), &["simulate", "--list-presets"]));
+    for name in presets.lines().map(|line| line.split_whitespace().next().unwrap()) {
+        let simulate = ["simulate", "--preset", name, "--duration", "20", "--out", "log.csv"];
+        check(&replay(folder.path(), &simulate), 0, "");
+        there_and_back(&folder.path().join("log.mapping.toml"), &folder.path().join("log.csv"));
+    }
+}
+
+#[test]
+fn with_data_real_logs_come_back_to_the_bit() {
+    for (name, log) in [
+        ("rlg-static.toml", "rlg-static/rlg-static.imu.gz"),
+        ("chamber-mems.toml", "chamber-mems/chamber.tsv"),
+        ("tumble-mems.toml", "tumble-mems"),
+    ] {
+        let Some(log) = data(log) else { continue };
+        there_and_back(&fs::canonicalize(mapping(name)).unwrap(), &fs::canonicalize(log).unwrap());
+    }
+}
+
+/// A gyro message of one tick of three counts that ends at so many milliseconds.
+fn gyro(unit: &str, series: u64, sequence: u64, end_ms: i64) -> Message {
+    let number = i32::try_from(sequence).unwrap();
+    let tick = GyroTick {
+        end_time_ns: end_ms * 1_000_000,
+        duration_ns: 10_000_000,
+        readings: Readings::Counts([number, -number, i32::MIN].into_iter().collect()),
+        mode: None,
+        switch_command: false,
+        meander: None,
+        half_periods: [].into_iter().collect(),
+    };
+    let frame = codec::encode(&GyroBatch { first_sequence: sequence, series, ticks: vec![tick] }).unwrap();
+    Message { topic: Topic::of(&format!("imu/{unit}/raw/gyro")), received_ns: 5, frame }
+}
+
+fn accel(unit: &str, sequence: u64, end_ms: i64, volts: &[f64]) -> Message {
+    let tick = isotherm_protocol::raw::AccelTick {
+        end_time_ns: end_ms * 1_000_000,
+        duration_ns: 10_000_000,
+        readings: Readings::Means(volts.iter().copied().collect()),
+    };
+    let frame = codec::encode(&AccelBatch { first_sequence: sequence, ticks: vec![tick] }).unwrap();
+    Message { topic: Topic::of(&format!("imu/{unit}/raw/accel")), received_ns: 5, frame }
+}
+
+fn temperatures(unit: &str, channels: &[&str], time_ms: i64, raw: &[f64]) -> Message {
+    let channels = channels.iter().map(|name| ChannelName::from(name).unwrap()).collect();
+    let ticks = vec![TemperatureTick { time_ns: time_ms * 1_000_000, raw: raw.iter().copied().collect() }];
+    let frame = codec::encode(&TemperatureBatch { channels, ticks }).unwrap();
+    Message { topic: Topic::of(&format!("imu/{unit}/raw/temp")), received_ns: 5, frame }
+}
+
+fn health(unit: &str) -> Message {
+    let readings = vec![HealthReading { name: ChannelName::from("half, \"wave\"").unwrap(), value: 48.25 }];
+    let frame = codec::encode(&HealthBatch { ticks: vec![HealthTick { time_ns: 7, readings }] }).unwrap();
+    Message { topic: Topic::of(&format!("imu/{unit}/raw/health")), received_ns: 5, frame }
+}
+
+/// Paths of the files that a summary names, and their rows.
+fn files(summary: &Value) -> Vec<(String, u64)> {
+    let files = summary["files"].as_array().unwrap().iter();
+    let mut files: Vec<_> = files
+        .map(|file| (file["path"].as_str().unwrap().to_owned(), file["rows"].as_u64().unwrap()))
+        .collect();
+    files.sort();
+    files
+}
+
+fn pairs(files: &[(&str, u64)]) -> Vec<(String, u64)> {
+    files.iter().map(|(path, rows)| ((*path).to_owned(), *rows)).collect()
+}
+
+#[test]
+fn odd_serials_and_channels_each_get_their_own_folder_and_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let odd = ["a,b", "a;b", "µ \"x\"", "line\nend"];
+    let raw = [-0.0, 1e-300, f64::INFINITY, 273.15];
+    let mut all = Vec::new();
+    for unit in ["..", "A-1", "A_1", "0042"] {
+        all.push(temperatures(unit, &odd, 4, &raw));
+        all.push(gyro(unit, 0, 1, 10));
+        all.push(health(unit));
+    }
+    record(&path("odd.mcap"), &all);
+    let summary = convert(folder.path(), &["odd.mcap", "out", "--to", "text"], 0);
+    for unit in ["%2E.", "A-1", "A_1", "0042"] {
+        let raw_csv = path(&format!("out/{unit}/raw.csv"));
+        let back = events(&path(&format!("out/{unit}/raw.mapping.toml")), &raw_csv);
+        let readings: Vec<_> = back
+            .iter()
+            .filter_map(|event| match event {
+                LogEvent::Temperature(reading) => Some((reading.channel.to_string(), reading.raw.to_bits())),
+                _ => None,
+            })
+            .collect();
+        let mut expected: Vec<_> =
+            odd.iter().zip(raw).map(|(name, raw)| ((*name).to_owned(), raw.to_bits())).collect();
+        expected.sort();
+        assert_eq!(readings, expected, "{unit}");
+        let health = fs::read_to_string(path(&format!("out/{unit}/health.csv"))).unwrap();
+        assert_eq!(health, "time_ns,name,value\n7,\"half, \"\"wave\"\"\",48.25\n");
+    }
+    assert_eq!(files(&summary).len(), 12);
+    let bag = replay(folder.path(), &["convert", "odd.mcap", "bag", "--to", "ros2", "--frame", "x"]);
+    check(&bag, 2, "A-1: its raw readings are counts: correct the log first");
+    assert!(!path("bag").exists());
+}
+
+#[test]
+fn a_stream_that_is_empty_is_read_back_as_empty() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    record(&path("accel.mcap"), &[accel("A-1", 7, 10, &[0.1, -0.0])]);
+    convert(folder.path(), &["accel.mcap", "accel.csv"], 0);
+    let back = events(&path("accel.mapping.toml"), &path("accel.csv"));
+    let [LogEvent::Accel { output: OutputKind::Mean, tick }] = back.as_slice() else { panic!("{back:?}") };
+    assert_eq!((tick.sequence, tick.readings[1].to_bits()), (7, (-0.0f64).to_bits()));
+
+    record(&path("none.mcap"), &[]);
+    for target in ["text", "parquet"] {
+        let summary = convert(folder.path(), &["none.mcap", target, "--to", target], 0);
+        assert_eq!(files(&summary), []);
+    }
+    let output = replay(folder.path(), &["convert", "none.mcap", "bag", "--to", "ros2"]);
+    check(&output, 2, "nothing in the log can go into a ROS 2 bag: it has no units");
+}
+
+#[test]
+fn doubled_and_late_ticks_and_new_runs_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let mut all: Vec<_> = (0..700_u64).map(|n| gyro("A-1", 3, n, 10 * n.cast_signed())).collect();
+    all.swap(100, 103);
+    all.insert(50, all[49].clone());
+    all.push(gyro("A-1", 3, 2, 25));
+    all.extend((0..5_u64).map(|n| gyro("A-1", 4, n, 10 * n.cast_signed())));
+    all.push(Message { frame: vec![1, 2, 3, 4, 5, 6, 7], ..gyro("A-1", 4, 0, 0) });
+    record(&path("x.mcap"), &all);
+    let summary = convert(folder.path(), &["x.mcap", "x.csv"], 3);
+    assert_eq!(summary["duplicates"], 1);
+    let lost = serde_json::json!({ "frames that cannot be read": 1, "too late to be put in order": 1 });
+    assert_eq!(summary["lost"], lost);
+    assert_eq!(files(&summary), pairs(&[("x.2.csv", 5), ("x.csv", 700), ("x.mapping.toml", 1)]));
+    for (name, ticks) in [("x.csv", 700), ("x.2.csv", 5)] {
+        let back = events(&path("x.mapping.toml"), &path(name));
+        let sequences: Vec<_> = back
+            .iter()
+            .filter_map(|event| match event {
+                LogEvent::Gyro { tick, .. } => Some(tick.sequence),
+                _ => None,
+            })
+            .collect();
+        assert_eq!(sequences, (0..ticks).collect::<Vec<_>>(), "{name}");
+    }
+    // Parquet has everything as it came.
+    let summary = convert(folder.path(), &["x.mcap", "tables", "--to", "parquet"], 3);
+    assert_eq!(files(&summary), pairs(&[("tables/A-1/raw_gyro.parquet", 707)]));
+}
+
+#[test]
+fn a_recording_that_is_cut_is_converted_to_its_last_whole_chunk() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let options = RecordingOptions { chunk_bytes: 2000, ..RecordingOptions::default() };
+    let mut writer = RecordingWriter::create(&path("whole.mcap"), options).unwrap();
+    (0..500_u64).for_each(|n| writer.write(&gyro("A-1", 3, n, 10 * n.cast_signed())).unwrap());
+    writer.finish().unwrap();
+    let bytes = fs::read(path("whole.mcap")).unwrap();
+    fs::write(path("cut.mcap"), &bytes[..bytes.len() / 2]).unwrap();
+    let summary = convert(folder.path(), &["cut.mcap", "cut.csv"], 3);
+    assert!(summary["log"]["cut_short"].as_str().unwrap().contains("cut.mcap"));
+    let back = events(&path("cut.mapping.toml"), &path("cut.csv"));
+    assert!((1..500).contains(&back.len()), "{}", back.len());
+}
+
+#[test]
+fn the_part_that_is_asked_for_is_converted() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let at = |n: u64, message: Message| Message { received_ns: n * 10_000_000, ..message };
+    let mut all = Vec::new();
+    for n in 0..100_u64 {
+        all.push(at(n, gyro("A-1", 3, n, 10 * n.cast_signed())));
+        all.push(at(n, gyro("B-2", 3, n, 10 * n.cast_signed())));
+    }
+    record(&path("x.mcap"), &all);
+    let part = ["x.mcap", "x.csv.gz", "--unit", "B-2", "--start", "0.2", "--duration", "0.3"];
+    let summary = convert(folder.path(), &part, 0);
+    assert_eq!(files(&summary), pairs(&[("x.csv.gz", 31), ("x.mapping.toml", 1)]));
+    assert_eq!(events(&path("x.mapping.toml"), &path("x.csv.gz")).len(), 31);
+    let output = replay(folder.path(), &["convert", "x.mcap", "y.csv"]);
+    check(
+        &output,
+        2,
+        "y.csv holds one unit, the log has 2 (A-1, B-2): give --unit, or a folder with --to text",
+    );
+}
+
+#[test]
+fn nothing_is_written_over_and_nothing_half_is_left() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let names = || -> Vec<PathBuf> {
+        let mut names: Vec<_> =
+            folder.path().read_dir().unwrap().map(|entry| entry.unwrap().path()).collect();
+        names.sort();
+        names
+    };
+    record(&path("x.mcap"), &[gyro("A-1", 3, 1, 10)]);
+    fs::write(path("x.csv"), "mine").unwrap();
+    fs::write(path("y.mapping.toml"), "mine").unwrap();
+    fs::create_dir_all(path("full/other")).unwrap();
+    let before = names();
+    let run = |args: &[&str]| replay(folder.path(), &[&["convert"], args].concat());
+    check(&run(&["x.mcap", "x.csv"]), 2, "x.csv is there already");
+    check(&run(&["x.mcap", "y.csv"]), 2, "y.mapping.toml is there already");
+    check(&run(&["x.mcap", "full", "--to", "parquet"]), 2, "the folder full has something in it");
+    check(&run(&["x.mcap", "x.csv", "--to", "ros2"]), 2, "another kind of output");
+    check(&run(&["x.mcap", "x.mcap"]), 2, "a recording already");
+    check(&run(&["x.mcap", "other"]), 2, "does not say what to convert to");
+    check(&run(&["x.mcap", "x.parquet", "--to", "parquet"]), 2, "one file per unit and stream");
+    check(&run(&["x.mcap", "z.csv", "--frame", "x"]), 2, "--frame is for ROS 2 bags");
+    check(&run(&["none.mcap", "z.csv"]), 1, "none.mcap");
+    check(&run(&["x.csv", "-m", "y.mapping.toml", "-u", "A-1", "z.mcap"]), 78, "y.mapping.toml:1");
+    assert_eq!(names(), before);
+    assert_eq!(fs::read_to_string(path("x.csv")).unwrap(), "mine");
+    check(&run(&["x.mcap", "x.csv", "--overwrite"]), 0, "");
+    check(&run(&["x.mcap", "full", "--to", "parquet", "--overwrite"]), 0, "");
+    assert!(path("full/other").is_dir() && path("full/A-1/raw_gyro.parquet").is_file());
+    assert!(fs::read_to_string(path("x.csv")).unwrap().starts_with("end_time_ns,"));
+
+    // A text log that fails in its middle leaves nothing behind.
+    let csv = "end_time_ns,gyro_sequence,gyro_duration_ns,gyro_1,gyro_2,gyro_3\n1,0,1,1,1,1\n2,x,1,1,1,1\n";
+    fs::write(path("bad.csv"), csv).unwrap();
+    let before = names();
+    let bad = ["bad.csv", "-m", "x.mapping.toml", "-u", "A-1"];
+    check(&run(&[&bad[..], &["bad.mcap"]].concat()), 1, "bad.csv:3:");
+    assert_eq!(names(), before);
+}

@@ -1,0 +1,212 @@
+//! `correct` of recordings, `diff` and `step` as they are called.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::Path;
+use std::process::Output;
+
+use isotherm_log::mapping::Mapping;
+use isotherm_log::offline::unit_id;
+use isotherm_log::part::{LogFiles, Part};
+use isotherm_log::recording::{RecordingOptions, RecordingWriter};
+use serde_json::Value;
+
+use crate::common::{replay, root};
+
+fn stdout(output: &Output) -> String {
+    String::from_utf8(output.stdout.clone()).unwrap()
+}
+
+/// Checks the exit code; what was said on stderr.
+fn ended(output: &Output, code: i32) -> String {
+    let errors = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(code), "{}\n{errors}", stdout(output));
+    errors
+}
+
+fn document() -> String {
+    fs::read_to_string(root().join("config/calibration/MEMS-0001.toml")).unwrap()
+}
+
+/// A folder with a simulated log of twenty seconds, as text and as a recording of raw messages, and its document.
+fn simulated() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let args = ["simulate", "--preset", "mems-chamber", "--duration", "20", "--out", "mems.csv"];
+    ended(&replay(folder.path(), &args), 0);
+    fs::write(folder.path().join("mems.toml"), document()).unwrap();
+    let files = LogFiles::Text {
+        paths: vec![folder.path().join("mems.csv")],
+        mapping: Box::new(Mapping::load(&folder.path().join("mems.mapping.toml")).unwrap()),
+        unit: unit_id("MEMS-0001").unwrap(),
+        batch_ticks: 7,
+    };
+    let mut messages = files.open(&Part::default()).unwrap();
+    let path = folder.path().join("raw.mcap");
+    let mut writer = RecordingWriter::create(&path, RecordingOptions::default()).unwrap();
+    while let Some(message) = messages.next_message().unwrap() {
+        writer.write(&message).unwrap();
+    }
+    writer.finish().unwrap();
+    folder
+}
+
+/// `correct` of the text log with a document, to a file.
+fn correct(folder: &Path, document: &str, out: &str) {
+    let args =
+        ["correct", "mems.csv", "--mapping", "mems.mapping.toml", "--calibration", document, "--out", out];
+    ended(&replay(folder, &args), 0);
+}
+
+#[test]
+fn one_coefficient_changed_in_its_last_digit_is_found_at_the_first_tick_that_it_changes() {
+    let folder = simulated();
+    let from = "coefficients_deg_per_h = [90.0,";
+    let text = document();
+    assert!(text.contains(from));
+    fs::write(
+        folder.path().join("b.toml"),
+        text.replacen(from, "coefficients_deg_per_h = [90.00000000000001,", 1),
+    )
+    .unwrap();
+    correct(folder.path(), "mems.toml", "a.csv");
+    correct(folder.path(), "b.toml", "b.csv");
+    let rows = |name: &str| -> Vec<String> {
+        let text = fs::read_to_string(folder.path().join(name)).unwrap();
+        text.lines().skip(1).map(str::to_owned).collect()
+    };
+    let (a, b) = (rows("a.csv"), rows("b.csv"));
+    let different = a.iter().zip(&b).filter(|(a, b)| a != b).count();
+    let first = a.iter().zip(&b).position(|(a, b)| a != b).expect("some tick changes");
+
+    let output = replay(folder.path(), &["diff", "a.csv", "b.csv", "--json"]);
+    ended(&output, 1);
+    let report: Value = serde_json::from_str(&stdout(&output)).unwrap();
+    let account = &report["units"]["unit"];
+    assert_eq!(account["different"], different);
+    assert_eq!(account["first"]["sequence"], first);
+    let field = &account["first"]["fields"][0];
+    assert_eq!(field["field"], "delta_angle_x_rad");
+    let cell = |row: &str| row.split(',').nth(5).unwrap().to_owned();
+    assert_eq!((&field["a"], &field["b"]), (&Value::from(cell(&a[first])), &Value::from(cell(&b[first]))));
+    assert!(
+        field["a_bits"].as_str().unwrap().starts_with("0x") && field["equivalent"]["deg_per_h"].is_number()
+    );
+
+    let output = replay(folder.path(), &["diff", "a.csv", "b.csv", "--around", "2"]);
+    ended(&output, 1);
+    let words = stdout(&output);
+    for expected in [
+        &format!("tick {first}, which ends at"),
+        "delta_angle_x_rad",
+        "°/h",
+        "last in A: tick 0",
+        "\ndifferent\n",
+    ] {
+        assert!(words.contains(expected), "{expected:?} in {words}");
+    }
+    ended(&replay(folder.path(), &["diff", "a.csv", "b.csv", "--tolerance-angle", "1e-12"]), 0);
+    let output = replay(folder.path(), &["diff", "a.csv", "a.csv"]);
+    ended(&output, 0);
+    assert!(stdout(&output).ends_with("identical\n"));
+}
+
+#[test]
+fn a_recording_of_raw_messages_is_corrected_with_a_document_as_its_text_is() {
+    let folder = simulated();
+    correct(folder.path(), "mems.toml", "text.csv");
+    let raw = |more: &[&str]| {
+        let args = ["correct", "raw.mcap"].into_iter().chain(more.iter().copied()).collect::<Vec<_>>();
+        replay(folder.path(), &args)
+    };
+    assert!(ended(&raw(&[]), 2).contains("no journal to correct MEMS-0001 by: give --calibration FILE"));
+    for (out, file) in
+        [("raw.csv", "raw.csv"), ("folder/", "folder/MEMS-0001.csv"), ("made.mcap", "made.mcap")]
+    {
+        let output = raw(&["--calibration", "mems.toml", "--out", out]);
+        ended(&output, 0);
+        assert!(stdout(&output).contains("2000"), "{}", stdout(&output));
+        let output = replay(folder.path(), &["diff", "text.csv", file]);
+        ended(&output, 0);
+    }
+    let wire = raw(&["--calibration", "mems.toml", "--format", "wire", "--out", "raw.wire"]);
+    ended(&wire, 0);
+    ended(&replay(folder.path(), &["diff", "made.mcap", "raw.wire"]), 0);
+    // The document went along.
+    let mut reader = isotherm_log::recording::RecordingReader::open(
+        &[folder.path().join("made.mcap")],
+        std::sync::Arc::default(),
+    )
+    .unwrap();
+    while reader.next_message().unwrap().is_some() {}
+    let attached: BTreeSet<_> = reader.take_attachments().into_iter().map(|file| file.bytes).collect();
+    assert_eq!(attached, BTreeSet::from([document().into_bytes()]));
+}
+
+#[test]
+fn what_does_not_go_together_is_refused() {
+    let folder = simulated();
+    fs::write(folder.path().join("other.toml"), document().replace("MEMS-0001", "MEMS-0002")).unwrap();
+    let text = ["mems.csv", "--mapping", "mems.mapping.toml"];
+    for (args, words) in [
+        (vec!["correct", text[0], text[1], text[2]], "needs --calibration"),
+        (
+            vec!["correct", text[0], text[1], text[2], "--calibration", "mems.toml", "--ignore-swaps"],
+            "--ignore-swaps is for recordings",
+        ),
+        (vec!["correct", "raw.mcap", "--calibration", "other.toml"], "no journal"),
+        (
+            vec!["correct", "raw.mcap", "--calibration", "mems.toml", "--calibration", "mems.toml"],
+            "given twice for unit MEMS-0001",
+        ),
+        (vec!["correct", "raw.mcap", "--unit", "X-1", "--calibration", "mems.toml"], "nothing of this unit"),
+        (vec!["correct", "raw.mcap", "--mapping", "mems.mapping.toml"], "is for text logs"),
+        (
+            vec!["correct", "raw.mcap", "--calibration", "mems.toml", "--out", "raw.mcap"],
+            "would be written over",
+        ),
+        (vec!["diff", "raw.mcap", "raw.mcap"], "no corrected ticks in either log"),
+        (vec!["step", "raw.mcap"], "no journal to go through unit MEMS-0001 by"),
+        (vec!["step", "raw.mcap", "--calibration", "other.toml"], "--calibration is for unit MEMS-0002"),
+    ] {
+        let errors = ended(&replay(folder.path(), &args), 2);
+        assert!(errors.contains(words), "{args:?}: {errors}");
+    }
+}
+
+#[test]
+fn events_are_stepped_through_one_by_one() {
+    let folder = simulated();
+    let step = |more: &[&str]| {
+        let args = ["step", "mems.csv", "--mapping", "mems.mapping.toml", "--calibration", "mems.toml"];
+        let output = replay(folder.path(), &args.into_iter().chain(more.iter().copied()).collect::<Vec<_>>());
+        ended(&output, 0);
+        stdout(&output)
+    };
+    let words = step(&["--from", "100", "--count", "1"]);
+    for expected in
+        ["gyro 100,", "running without mode reversal, revision 1", "out          tick 100", "°C/min", "mg"]
+    {
+        assert!(words.contains(expected), "{expected:?} in {words}");
+    }
+    let lines = step(&["--json"]);
+    let events: Vec<Value> = lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let frames = events.iter().filter(|event| event["what"]["kind"] == "frame").count();
+    assert!(frames >= 4000, "{frames}");
+    let sequences: Vec<u64> = events
+        .iter()
+        .flat_map(|event| event["out"].as_array().unwrap())
+        .map(|tick| tick["sequence"].as_u64().unwrap())
+        .collect();
+    assert!(sequences.iter().copied().eq(0..2000), "every tick once, in order");
+    let numbers = events.iter().map(|event| event["number"].as_u64().unwrap());
+    assert!(numbers.eq(1..=events.len() as u64));
+    let recording =
+        ["step", "raw.mcap", "--calibration", "mems.toml", "--from", "50", "--count", "2", "--json"];
+    let output = replay(folder.path(), &recording);
+    ended(&output, 0);
+    let first: Value = serde_json::from_str(stdout(&output).lines().next().unwrap()).unwrap();
+    assert_eq!(
+        (&first["what"]["first_sequence"], &first["what"]["ticks"]),
+        (&Value::from(49), &Value::from(7))
+    );
+}

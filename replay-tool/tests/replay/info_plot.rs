@@ -1,0 +1,125 @@
+//! `info` and `plot` as their users run them: on simulated logs, and on the real ones where the data are there.
+
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::common::{mapping, replay, root};
+use crate::real_logs::data;
+
+/// Runs a command that must go well, and reads what it printed as JSON.
+fn json(folder: &Path, args: &[&str]) -> Value {
+    let output = replay(folder, args);
+    let words = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{args:?}: {words}");
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+/// A topic of the only unit.
+fn topic(info: &Value, unit: &str, key: &str) -> Value {
+    let topics = info["units"][unit]["topics"].as_array().unwrap();
+    topics.iter().find(|topic| topic["key"] == format!("imu/{unit}/{key}").as_str()).unwrap().clone()
+}
+
+/// What `info` says of a log that a ready mapping reads.
+fn info_of(mapping_name: &str, log: &Path) -> Value {
+    let mapping = mapping(mapping_name);
+    let [log, mapping] = [log, &mapping].map(|path| path.to_str().unwrap().to_owned());
+    json(&root(), &["info", &log, "--mapping", &mapping, "--unit", "U", "--json"])
+}
+
+#[test]
+fn with_data_info_tells_what_the_real_logs_hold() {
+    if let Some(log) = data("rlg-static/rlg-static.imu.gz") {
+        let info = info_of("rlg-static.toml", &log);
+        let gyro = topic(&info, "U", "raw/gyro");
+        assert_eq!(
+            (gyro["ticks"].as_u64(), gyro["order"]["gaps"]["count"].as_u64()),
+            (Some(184_718), Some(0))
+        );
+        assert_eq!(gyro["rate"]["nominal_hz"].as_f64(), Some(100.0));
+        assert_eq!(gyro["duration_s"].as_f64(), Some(1847.17));
+    }
+    if let Some(log) = data("chamber-mems/chamber.tsv") {
+        let info = info_of("chamber-mems.toml", &log);
+        let gyro = topic(&info, "U", "raw/gyro");
+        assert_eq!(gyro["ticks"].as_u64(), Some(8400));
+        assert!((gyro["rate"]["nominal_hz"].as_f64().unwrap() - 1.979).abs() < 0.001, "{gyro}");
+        let temperature = &info["units"]["U"]["temperatures"]["imu"];
+        assert_eq!(temperature["readings"].as_u64(), Some(8400));
+        assert!((temperature["min"].as_f64().unwrap() + 17.603).abs() < 1e-3, "{temperature}");
+        assert!((temperature["max"].as_f64().unwrap() - 73.967).abs() < 1e-3, "{temperature}");
+    }
+    if let Some(log) = data("tumble-mems") {
+        let info = info_of("tumble-mems.toml", &log);
+        assert_eq!(topic(&info, "U", "raw/accel")["ticks"].as_u64(), Some(51_175));
+        assert_eq!(info["files"].as_array().unwrap().len(), 2, "the folder's files are named");
+    }
+}
+
+#[test]
+fn with_data_the_chamber_log_is_drawn_raw_and_corrected() {
+    let Some(log) = data("chamber-mems/chamber.tsv") else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let files = [log, mapping("chamber-mems.toml"), root().join("config/calibration/chamber-mems.toml")];
+    let [log, mapping, calibration] = files.map(|path| path.canonicalize().unwrap().display().to_string());
+    let args =
+        ["plot", &log, "--mapping", &mapping, "--calibration", &calibration, "--out", "c.html", "--json"];
+    let summary = json(folder.path(), &args);
+    let unit = &summary["units"]["log"][0];
+    assert_eq!((unit["raw_ticks"].as_u64(), unit["corrected_ticks"].as_u64()), (Some(8400), Some(8400)));
+    assert_eq!(unit["marks"].as_u64(), Some(0), "long batches of other streams are no jumps of the clock");
+    let html = std::fs::read_to_string(folder.path().join("c.html")).unwrap();
+    assert!(
+        html.contains("corrected specific force along z (m/s²)") && html.contains("temperatures applied")
+    );
+    assert!(!html.contains("http:") && !html.contains("src="));
+    assert_eq!(summary["bytes"].as_u64(), Some(html.len() as u64));
+}
+
+#[test]
+fn a_simulated_log_with_modes_is_told_and_drawn() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |args: &[&str]| replay(folder.path(), args);
+    let simulated = run(&["simulate", "--preset", "zeeman-sine", "--duration", "30", "--out", "z.csv"]);
+    assert!(simulated.status.success());
+    let info =
+        json(folder.path(), &["info", "z.csv", "--mapping", "z.mapping.toml", "--unit", "Z", "--json"]);
+    let gyro = topic(&info, "Z", "raw/gyro");
+    assert_eq!((gyro["ticks"].as_u64(), gyro["rate"]["nominal_hz"].as_f64()), (Some(6000), Some(200.0)));
+    let modes = &info["units"]["Z"]["modes"];
+    assert_eq!((modes["changes"].as_u64(), modes["switch_commands"].as_u64()), (Some(2), Some(2)));
+    assert_eq!(modes["between_changes"]["p50_ns"].as_u64(), Some(12_000_000_000));
+
+    let tables = run(&["info", "z.csv", "--mapping", "z.mapping.toml"]);
+    let text = String::from_utf8(tables.stdout).unwrap();
+    assert!(text.contains("2 switches, 2 commanded, 12.000000 s from one to the next"), "{text}");
+
+    // Counts, of which nothing is known, in a panel of their own; then by nominal scale.
+    let plotted = run(&["plot", "z.csv", "--mapping", "z.mapping.toml", "--out", "raw.html"]);
+    assert!(plotted.status.success());
+    let html = std::fs::read_to_string(folder.path().join("raw.html")).unwrap();
+    assert!(html.contains("raw gyro 1 (counts/s)") && !html.contains("corrected rate"));
+    let calibration = root().join("config/calibration/ZLG-0001.toml").canonicalize().unwrap();
+    let calibration = calibration.to_str().unwrap();
+    let both =
+        ["plot", "z.csv", "--mapping", "z.mapping.toml", "--beside", "z.csv", "--calibration", calibration];
+    let summary = json(folder.path(), &[&both[..], &["--out", "both.html", "--json"]].concat());
+    let difference = &summary["differences"]["log"];
+    assert_eq!(
+        (difference["common_ticks"].as_u64(), difference["differing_ticks"].as_u64()),
+        (Some(6000), Some(0)),
+        "a log does not differ from itself"
+    );
+    let html = std::fs::read_to_string(folder.path().join("both.html")).unwrap();
+    assert!(html.contains("B − A rate about x (°/h)") && html.contains("A raw rate about x (°/h)"));
+}
+
+#[test]
+fn a_page_is_not_written_over_its_log() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("log.csv"), "1\n").unwrap();
+    let output = replay(folder.path(), &["plot", "log.csv", "--mapping", "m.toml", "--out", "log.csv"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("would be written over"));
+}

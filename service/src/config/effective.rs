@@ -1,0 +1,261 @@
+//! The configuration as it holds, defaults included, as text that [`Settings::parse`] takes.
+
+use std::path::Path;
+use std::time::Duration;
+
+use isotherm_correction::unit::Uncalibrated;
+use isotherm_correction::units::{AngularRate, Span, SpecificForce};
+use serde::Serialize;
+use zenoh::qos::CongestionControl;
+
+use super::{Settings, Severity};
+
+/// What is said before the text.
+const NOTE: &str = "\
+# The configuration that holds, defaults included.
+# Left out, because it may hold passwords and keys: what stands in the Zenoh configuration file, and what follows a `#` or `?`
+# in an endpoint.
+";
+
+/// The keys of `config/service.toml`, in its order.
+#[derive(Serialize)]
+struct Effective {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    calibrations: Option<String>,
+    strict_start: bool,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    state: Option<String>,
+    initial_state: &'static str,
+    drift_estimate: &'static str,
+    reference_delay_ms: i64,
+    uncalibrated: &'static str,
+    max_units: usize,
+    pairing_window_ms: i64,
+    temperature_delay_ms: i64,
+    tail_flush_ms: u64,
+    status_interval_ms: u64,
+    stop_timeout_ms: u64,
+    congestion: &'static str,
+    folder: Folder,
+    swap: Swap,
+    pre_launch: PreLaunch,
+    navigation: Navigation,
+    metrics: Metrics,
+    zenoh: Zenoh,
+}
+
+#[derive(Serialize)]
+struct Folder {
+    settle_ms: u64,
+    poll_s: f64,
+}
+
+#[derive(Serialize)]
+struct Swap {
+    max_age_days: u64,
+    age: &'static str,
+    outside_range: &'static str,
+    max_jump_deg_per_h: f64,
+    max_jump_mg: f64,
+    jump: &'static str,
+    old_schema: &'static str,
+    slew_ms: i64,
+    require_signature: bool,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    trusted_keys: Option<String>,
+}
+
+#[derive(Serialize)]
+struct PreLaunch {
+    duration_s: f64,
+    max_static_change_deg_per_h: f64,
+    max_magnetic_change_deg_per_h: f64,
+    max_imbalance: f64,
+    min_time_per_mode_s: f64,
+    min_good_share: f64,
+}
+
+#[derive(Serialize)]
+struct Navigation {
+    ticks: u16,
+    coning_sculling: bool,
+}
+
+#[derive(Serialize)]
+struct Metrics {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    listen: Option<String>,
+    allow_remote: bool,
+}
+
+#[derive(Serialize)]
+struct Zenoh {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    config: Option<String>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    connect: Vec<String>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    listen: Vec<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    namespace: Option<String>,
+}
+
+impl Settings {
+    /// The configuration as text, the version of the program as its first line; what may be secret is left out, and it is
+    /// said what.
+    #[must_use]
+    pub fn to_toml(&self) -> String {
+        let head = concat!("# isotherm ", env!("CARGO_PKG_VERSION"), "\n");
+        // Nothing in it that TOML has no form for.
+        let body = toml::to_string(&self.effective()).unwrap_or_else(|error| format!("# {error}\n"));
+        format!("{head}{NOTE}\n{body}")
+    }
+
+    fn effective(&self) -> Effective {
+        let Self { unit, pre_launch, swap, session, .. } = self;
+        let limits = &pre_launch.limits;
+        let deg_per_h = |rate| AngularRate::from_rad_per_s(rate).as_deg_per_h();
+        let milli_g = |force| SpecificForce::from_m_per_s2(force).as_g() * 1e3;
+        Effective {
+            calibrations: self.calibrations.as_deref().map(text),
+            strict_start: self.strict_start,
+            state: self.state.as_deref().map(text),
+            initial_state: if unit.in_standby { "standby" } else { "running" },
+            drift_estimate: if unit.subtract_drift { "subtract" } else { "publish" },
+            reference_delay_ms: span_ms(unit.reference_delay),
+            uncalibrated: match unit.uncalibrated {
+                Uncalibrated::PassThrough => "pass-through",
+                Uncalibrated::Hold => "hold",
+            },
+            max_units: self.max_units,
+            pairing_window_ms: span_ms(unit.pairing_window),
+            temperature_delay_ms: span_ms(unit.temperature_delay),
+            tail_flush_ms: ms(self.tail_flush),
+            status_interval_ms: ms(self.status_interval),
+            stop_timeout_ms: ms(self.stop_timeout),
+            congestion: if self.congestion == CongestionControl::Block { "block" } else { "drop" },
+            folder: Folder { settle_ms: ms(self.folder.settle), poll_s: self.folder.poll.as_secs_f64() },
+            swap: Swap {
+                max_age_days: swap.max_age.map_or(0, |age| age.as_secs() / super::swap::DAY_S),
+                age: severity(swap.age),
+                outside_range: severity(swap.outside_range),
+                max_jump_deg_per_h: swap.max_jump_rad_per_s.map_or(0.0, deg_per_h),
+                max_jump_mg: swap.max_jump_m_per_s2.map_or(0.0, milli_g),
+                jump: severity(swap.jump),
+                old_schema: severity(swap.old_schema),
+                slew_ms: span_ms(swap.slew),
+                require_signature: swap.require_signature,
+                trusted_keys: swap.trusted_keys.as_deref().map(text),
+            },
+            pre_launch: PreLaunch {
+                duration_s: pre_launch.duration.as_s(),
+                max_static_change_deg_per_h: deg_per_h(limits.static_bias_change_rad_per_s),
+                max_magnetic_change_deg_per_h: deg_per_h(limits.magnetic_bias_change_rad_per_s),
+                max_imbalance: limits.mode_imbalance,
+                min_time_per_mode_s: limits.time_per_mode.as_s(),
+                min_good_share: limits.good_share,
+            },
+            navigation: Navigation {
+                ticks: unit.navigation.ticks(),
+                coning_sculling: unit.navigation.coning_sculling(),
+            },
+            metrics: Metrics {
+                listen: self.metrics.listen.map(|address| address.to_string()),
+                allow_remote: self.metrics.allow_remote,
+            },
+            zenoh: Zenoh {
+                config: session.config.as_deref().map(text),
+                connect: session.connect.iter().map(|endpoint| without_options(endpoint)).collect(),
+                listen: session.listen.iter().map(|endpoint| without_options(endpoint)).collect(),
+                namespace: session.namespace.clone(),
+            },
+        }
+    }
+}
+
+fn text(path: &Path) -> String {
+    path.display().to_string()
+}
+
+/// An endpoint without its metadata and options: those of a link with TLS may be the key itself.
+fn without_options(endpoint: &str) -> String {
+    endpoint.split(['?', '#']).next().unwrap_or_default().to_owned()
+}
+
+fn ms(duration: Duration) -> u64 {
+    u64::try_from(duration.as_millis()).unwrap_or(u64::MAX)
+}
+
+fn span_ms(span: Span) -> i64 {
+    span.as_ns() / 1_000_000
+}
+
+fn severity(severity: Severity) -> &'static str {
+    match severity {
+        Severity::Warn => "warn",
+        Severity::Refuse => "refuse",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn again(settings: &Settings) -> Settings {
+        let text = settings.to_toml();
+        Settings::parse(&text, Path::new("effective.toml"))
+            .unwrap_or_else(|problems| panic!("{problems:?}\n{text}"))
+    }
+
+    #[test]
+    fn what_is_written_is_read_back_as_the_same_settings() {
+        assert_eq!(again(&Settings::default()), Settings::default());
+        let text = r#"
+            state = "state"
+            calibrations = "calibration"
+            strict_start = true
+            initial_state = "standby"
+            drift_estimate = "subtract"
+            reference_delay_ms = 17
+            uncalibrated = "hold"
+            max_units = 3
+            pairing_window_ms = 20
+            temperature_delay_ms = 0
+            tail_flush_ms = 70
+            status_interval_ms = 200
+            stop_timeout_ms = 900
+            congestion = "block"
+            folder = { settle_ms = 40, poll_s = 0.5 }
+            swap = { max_age_days = 12, age = "refuse", max_jump_deg_per_h = 8.0, max_jump_mg = 2.0, jump = "warn", slew_ms = 5 }
+            pre_launch = { duration_s = 61.5, max_imbalance = 0.5, min_time_per_mode_s = 31.0, min_good_share = 0.25 }
+            navigation = { ticks = 4, coning_sculling = true }
+            metrics = { listen = "127.0.0.1:0" }
+            zenoh = { listen = ["tcp/127.0.0.1:0"], namespace = "site/a" }
+        "#;
+        let settings = Settings::parse(text, Path::new("/etc/isotherm/service.toml")).unwrap();
+        let read = again(&settings);
+        let limits = |settings: &Settings| {
+            let swap = &settings.swap;
+            [swap.max_jump_rad_per_s.unwrap(), swap.max_jump_m_per_s2.unwrap()]
+        };
+        // Through °/h and mg and back: not to the last digit.
+        for (got, expected) in limits(&read).into_iter().zip(limits(&settings)) {
+            assert!((got / expected - 1.0).abs() < 1e-12, "{got} {expected}");
+        }
+        let [rate, force] = limits(&settings);
+        let mut read = read;
+        (read.swap.max_jump_rad_per_s, read.swap.max_jump_m_per_s2) = (Some(rate), Some(force));
+        assert_eq!(read, settings);
+    }
+
+    #[test]
+    fn the_version_comes_first_and_no_secret_at_all() {
+        let mut settings = Settings::default();
+        settings.session.connect =
+            vec!["tls/192.0.2.1:7447?prio=1#connect_private_key_base64=c2VjcmV0".to_owned()];
+        let text = settings.to_toml();
+        assert!(text.starts_with(concat!("# isotherm ", env!("CARGO_PKG_VERSION"), "\n")), "{text}");
+        assert!(text.contains("connect = [\"tls/192.0.2.1:7447\"]"), "{text}");
+        assert!(!text.contains("c2VjcmV0") && text.contains("Left out"), "{text}");
+    }
+}

@@ -1,0 +1,74 @@
+//! Answers to queries.
+
+use isotherm_protocol::journal::split;
+use isotherm_protocol::{codec, key};
+use zenoh::Wait;
+use zenoh::bytes::ZBytes;
+use zenoh::key_expr::keyexpr;
+use zenoh::query::Query;
+
+use super::{Asked, Work};
+
+impl Work {
+    /// Replies with everything that the query's key takes in, of what is asked for.
+    pub(super) fn answer(&mut self, asked: Asked, query: &Query) {
+        match asked {
+            Asked::Status => self.answer_status(query),
+            Asked::Memory => self.answer_memory(query),
+            Asked::Configuration => {
+                let key = key::configuration(self.instance.name());
+                if takes_in(query, &key) {
+                    reply(query, &key, Ok(self.configuration.clone()));
+                }
+            }
+        }
+    }
+
+    /// Replies with the status of units, and of the service itself.
+    fn answer_status(&mut self, query: &Query) {
+        let instance = self.instance.name();
+        let statuses = self.intake.each_unit(|actor| {
+            let key = key::status(actor.id());
+            takes_in(query, &key).then(|| (key, codec::encode(&actor.status(instance))))
+        });
+        let mut replies: Vec<_> = statuses.into_iter().flatten().collect();
+        let key = key::service_status(instance);
+        if takes_in(query, &key)
+            && let Some(status) = self.instance.status(&self.intake, true)
+        {
+            replies.push((key, codec::encode(&status)));
+        }
+        for (key, frame) in replies {
+            reply(query, &key, frame.map_err(Into::into));
+        }
+    }
+
+    /// Replies with the memory of units, in parts; one unit behind the other, so that only one memory is there at a time.
+    fn answer_memory(&mut self, query: &Query) {
+        let instance = self.instance.name();
+        let units = self.intake.each_unit(|actor| {
+            let unit = actor.id();
+            takes_in(query, &key::journal(unit)).then(|| unit.clone())
+        });
+        for unit in units.into_iter().flatten() {
+            // A unit that has just started anew is asked once more by whoever misses its answer.
+            let Some(memory) = self.intake.with(&unit, |actor| actor.memory(instance)) else { continue };
+            let key = key::journal(&unit);
+            for part in split(&memory) {
+                reply(query, &key, codec::encode(&part).map_err(Into::into));
+            }
+        }
+    }
+}
+
+/// Whether a query asks for a key too.
+fn takes_in(query: &Query, key: &str) -> bool {
+    keyexpr::new(key).is_ok_and(|key| query.key_expr().intersects(key))
+}
+
+fn reply(query: &Query, key: &str, payload: Result<impl Into<ZBytes>, zenoh::Error>) {
+    let sent = payload.and_then(|payload| query.reply(key, payload).wait());
+    if let Err(error) = sent {
+        tracing::warn!(key, "cannot answer a query: {}", isotherm_bus::words(&error));
+    }
+}
