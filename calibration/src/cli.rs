@@ -1,5 +1,6 @@
 //! The command line: arguments in, exit code out.
 
+mod bar;
 mod drift;
 mod impact;
 
@@ -90,7 +91,11 @@ impl LogArgs {
     /// Reads all of the unit.
     pub(crate) fn read(&self) -> Result<Series, Error> {
         let unit = self.serial()?;
-        Series::read(&mut self.open()?, unit.as_ref(), |_| {})
+        let mut log = self.open()?;
+        let mut bar = bar::Bar::over_log(log.progress());
+        let series = Series::read(&mut log, unit.as_ref(), |_| bar.step());
+        bar.finish();
+        series
     }
 }
 

@@ -9,10 +9,11 @@
 //! | [`trend`] | trend of first and second order; "fit 21 h, extrapolate the rest" |
 //! | [`analysis`] | all of it for one sensor, and for all on both processor cores |
 //! | [`parameters`] | what the estimator is to expect: `[gyro.sensor.drift]`, as text and put into a document |
-//! | [`report`], [`page`] | tables, JSON; the HTML report |
+//! | [`figures`], [`report`], [`page`] | digits and units; tables, JSON; the HTML report |
 
 pub mod analysis;
 pub mod columns;
+pub mod figures;
 pub mod markov;
 pub mod page;
 pub mod parameters;

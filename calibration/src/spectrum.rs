@@ -64,7 +64,8 @@ impl Spectrum {
         let mut scratch = vec![Complex::default(); fft.get_inplace_scratch_len()];
         let mut buffer = vec![Complex::default(); length];
         let mut sums = vec![0.0; length / 2];
-        let starts = |piece: &[f64]| (0..=piece.len().saturating_sub(length)).step_by(length / 2).collect::<Vec<_>>();
+        let starts =
+            |piece: &[f64]| (0..=piece.len().saturating_sub(length)).step_by(length / 2).collect::<Vec<_>>();
         let fitting = pieces.iter().filter(|piece| piece.len() >= length);
         let segments: Vec<&[f64]> = fitting
             .flat_map(|piece| starts(piece).into_iter().filter_map(|start| piece.get(start..start + length)))
@@ -138,6 +139,7 @@ impl Spectrum {
 }
 
 #[cfg(test)]
+#[expect(clippy::cast_precision_loss, reason = "numbers of ticks of tests")]
 mod tests {
     use super::*;
 

@@ -257,7 +257,7 @@ impl UnitSurvey {
             Topic::Raw(_, RawStream::Gyro) => {
                 let batch: GyroBatch = codec::decode(frame)?;
                 let times = batch.ticks.iter().map(|tick| (tick.end_time_ns, tick.duration_ns));
-                match survey.ticks(batch.series, batch.first_sequence, received_ns, times) {
+                match survey.ticks(batch.series, batch.first_sequence, received_ns, &times) {
                     Place::Old => {}
                     place => self.modes.take(&batch, place == Place::Start),
                 }
@@ -265,7 +265,7 @@ impl UnitSurvey {
             Topic::Raw(_, RawStream::Accel) => {
                 let batch: AccelBatch = codec::decode(frame)?;
                 let times = batch.ticks.iter().map(|tick| (tick.end_time_ns, tick.duration_ns));
-                survey.ticks(0, batch.first_sequence, received_ns, times);
+                survey.ticks(0, batch.first_sequence, received_ns, &times);
             }
             Topic::Raw(_, RawStream::Temperature) => {
                 let batch: TemperatureBatch = codec::decode(frame)?;

@@ -1,12 +1,7 @@
 //! A log alone is enough: what a recorder hears on the raw topics and in the journal gives the service's output again, to
 //! the bit, from the beginning and from any memory on.
 
-#![expect(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    reason = "a test may panic, its helpers included"
-)]
+#![expect(clippy::unwrap_used, clippy::expect_used, reason = "a test may panic, its helpers included")]
 
 use std::path::Path;
 use std::sync::{Arc, Mutex};

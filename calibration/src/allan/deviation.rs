@@ -82,7 +82,8 @@ impl Phase {
             return None;
         }
         let width = m as f64;
-        let power = if estimator == Estimator::Modified { width * width * width * width } else { width * width };
+        let power =
+            if estimator == Estimator::Modified { width * width * width * width } else { width * width };
         Some(Variance { ticks: m, variance: sum / (2.0 * power * differences as f64), differences })
     }
 }
@@ -121,8 +122,13 @@ fn overlapping(x: &[f64], m: usize) -> (f64, usize) {
 fn modified(x: &[f64], m: usize) -> (f64, usize) {
     let Some(last) = x.get(3 * m - 1..) else { return (0.0, 0) };
     let (Some(second), Some(third)) = (x.get(m..), x.get(2 * m..)) else { return (0.0, 0) };
-    let mut window: f64 =
-        x.iter().zip(second).zip(third).take(m).map(|((first, second), third)| third - 2.0 * second + first).sum();
+    let mut window: f64 = x
+        .iter()
+        .zip(second)
+        .zip(third)
+        .take(m)
+        .map(|((first, second), third)| third - 2.0 * second + first)
+        .sum();
     let mut sum = window * window;
     let count = last.len();
     // From one window to the next, the first difference leaves and one more joins: the third difference of x.
@@ -142,6 +148,7 @@ pub fn lengths(ticks: usize, factor: usize) -> Vec<usize> {
 }
 
 #[cfg(test)]
+#[expect(clippy::cast_precision_loss, reason = "numbers of ticks of tests")]
 mod tests {
     use super::*;
 

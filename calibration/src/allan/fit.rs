@@ -31,8 +31,13 @@ pub enum Term {
 
 impl Term {
     /// All of them, in the order of the powers of τ.
-    pub const ALL: [Self; 5] =
-        [Self::Quantization, Self::AngleRandomWalk, Self::BiasInstability, Self::RateRandomWalk, Self::RateRamp];
+    pub const ALL: [Self; 5] = [
+        Self::Quantization,
+        Self::AngleRandomWalk,
+        Self::BiasInstability,
+        Self::RateRandomWalk,
+        Self::RateRamp,
+    ];
 
     /// Its letter.
     #[must_use]
@@ -43,7 +48,8 @@ impl Term {
     /// Its name.
     #[must_use]
     pub const fn name(self) -> &'static str {
-        ["quantization", "angle random walk", "bias instability", "rate random walk", "rate ramp"][self as usize]
+        ["quantization", "angle random walk", "bias instability", "rate random walk", "rate ramp"]
+            [self as usize]
     }
 
     /// σ²(τ) for a coefficient of one, τ in s.
@@ -257,7 +263,8 @@ impl<'a> Problem<'a> {
             }
         };
         let inverse = |matrix: DMatrix<f64>| factor.l().solve_lower_triangular(&matrix);
-        let by_row = |matrix: &DMatrix<f64>| DMatrix::from_fn(count, matrix.ncols(), |r, c| matrix[(r, c)] / scale[r]);
+        let by_row =
+            |matrix: &DMatrix<f64>| DMatrix::from_fn(count, matrix.ncols(), |r, c| matrix[(r, c)] / scale[r]);
         let design = inverse(by_row(&self.design))?;
         let values = inverse(by_row(&DMatrix::from_column_slice(count, 1, self.values.as_slice())))?;
         Some(Whitened { design, values: values.column(0).into_owned() })
@@ -304,8 +311,12 @@ impl Whitened {
         let mut best: Option<(f64, [f64; 5], Vec<usize>)> = None;
         // With five terms, all 31 choices are tried: nothing can be missed.
         for choice in 1_u32..1 << among.len() {
-            let terms: Vec<usize> =
-                among.iter().enumerate().filter(|(bit, _)| (choice >> bit) & 1 == 1).map(|(_, term)| *term).collect();
+            let terms: Vec<usize> = among
+                .iter()
+                .enumerate()
+                .filter(|(bit, _)| (choice >> bit) & 1 == 1)
+                .map(|(_, term)| *term)
+                .collect();
             let Some((squares, cost, _)) = self.solve(&terms) else { continue };
             if squares.iter().all(|square| *square > 0.0) && best.as_ref().is_none_or(|best| cost < best.0) {
                 let mut all = [0.0; 5];

@@ -1,18 +1,17 @@
 //! `isotherm-calibrate drift`.
 
 use std::fs::OpenOptions;
-use std::io::{self, IsTerminal, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use isotherm_log::diff::is_csv;
 use isotherm_log::file::{read_small_text, refuse_overwriting};
 use isotherm_log::offline::load_calibration;
-use isotherm_log::progress::Progress;
 use isotherm_protocol::document::{Created, Document};
 use serde_json::json;
 
+use super::bar::Bar;
 use super::{LogArgs, print};
 use crate::drift::analysis::{Wanted, analyse};
 use crate::drift::columns::{Columns, Kind};
@@ -23,12 +22,9 @@ use crate::drift::report::Report;
 use crate::drift::trend::FIT_H;
 use crate::error::Error;
 use crate::provenance::{TOOL, command_line, origin};
-use crate::series::Series;
 
 /// Line that lets editors check a document.
 const SCHEMA_LINE: &str = "#:schema ../calibration.schema.json\n\n";
-/// Messages between two looks at the progress.
-const STRIDE: u32 = 64;
 
 /// Noise and drift of a log at rest: Allan deviation, Markov drift, trend, spectrum, estimator parameters
 #[derive(Debug, Args)]
@@ -88,41 +84,6 @@ enum Taus {
     Decade,
 }
 
-/// A bar over a log's bytes, on a terminal only.
-pub(super) struct Bar {
-    drawn: ProgressBar,
-    progress: Option<Progress>,
-    since: u32,
-}
-
-impl Bar {
-    pub(super) fn new(progress: Option<Progress>) -> Self {
-        let target =
-            if io::stderr().is_terminal() { ProgressDrawTarget::stderr_with_hz(5) } else { ProgressDrawTarget::hidden() };
-        let drawn = ProgressBar::with_draw_target(progress.as_ref().map(Progress::total), target);
-        let template = if progress.is_some() { "{bar:30} {percent:>3} %  reading  {eta} left" } else { "{spinner} {msg}" };
-        if let Ok(style) = ProgressStyle::with_template(template) {
-            drawn.set_style(style);
-        }
-        Self { drawn, progress, since: 0 }
-    }
-
-    pub(super) fn step(&mut self) {
-        self.since += 1;
-        if self.since >= STRIDE {
-            self.since = 0;
-            match &self.progress {
-                Some(progress) => self.drawn.set_position(progress.read()),
-                None => self.drawn.tick(),
-            }
-        }
-    }
-
-    pub(super) fn finish(&self) {
-        self.drawn.finish_and_clear();
-    }
-}
-
 impl DriftArgs {
     /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
@@ -130,9 +91,7 @@ impl DriftArgs {
         let columns = self.columns()?;
         let (unit, kind, corrected) = (columns.unit.to_string(), columns.kind, columns.corrected);
         let grid = Grid::of(columns)?;
-        let bar = Bar::new(None);
-        bar.drawn.set_message("Allan deviations, drift, spectrum");
-        bar.drawn.tick();
+        let bar = Bar::at_work("Allan deviations, drift, spectrum");
         let factor = if self.taus == Taus::Decade { 10 } else { 2 };
         let sensors = analyse(&grid, Wanted { factor, fit_h: self.fit_hours });
         bar.finish();
@@ -186,9 +145,10 @@ impl DriftArgs {
             refuse_overwriting(out, &inputs)?;
         }
         match &self.out {
-            Some(out) if out.exists() && !self.overwrite => {
-                Err(Error::Usage(format!("{} is there already: give another name, or --overwrite", out.display())))
-            }
+            Some(out) if out.exists() && !self.overwrite => Err(Error::Usage(format!(
+                "{} is there already: give another name, or --overwrite",
+                out.display()
+            ))),
             _ => Ok(()),
         }
     }
@@ -197,25 +157,27 @@ impl DriftArgs {
         let kind = if self.accelerometers { Kind::Force } else { Kind::Rate };
         let unit = self.log.serial()?;
         if self.corrected || self.log.log.iter().any(|path| is_csv(path)) {
-            let mut bar = Bar::new(None);
+            let mut bar = Bar::at_work("reading");
             let columns = Columns::of_corrected(&self.log.log, unit.as_ref(), kind, || bar.step());
             bar.finish();
             return columns;
         }
-        let mut log = self.log.open()?;
-        let mut bar = Bar::new(Some(log.progress()));
         if let Some(document) = &self.document {
             let loaded = load_calibration(document)?;
+            let mut log = self.log.open()?;
+            let mut bar = Bar::over_log(log.progress());
             // A text log names no unit of its own: it is taken to be the document's.
             let unit = unit.filter(|_| log.recording().is_some());
             let columns = Columns::corrected_by(&mut log, &loaded, unit.as_ref(), kind, || bar.step());
             bar.finish();
             return columns;
         }
-        let series = Series::read(&mut log, unit.as_ref(), |_| bar.step());
-        bar.finish();
-        let series = series?;
-        if self.accelerometers { Columns::of_accelerometers(series) } else { Columns::of_gyros(series, self.increment_weight) }
+        let series = self.log.read()?;
+        if self.accelerometers {
+            Columns::of_accelerometers(series)
+        } else {
+            Columns::of_gyros(series, self.increment_weight)
+        }
     }
 
     /// Puts the parameters into a document and writes it, after its own reader has taken it.
@@ -243,7 +205,8 @@ impl DriftArgs {
             .iter()
             .flat_map(|(name, found)| found.notes.iter().map(move |note| format!("gyro {name}: {note}")))
             .collect();
-        let log: Vec<_> = of_log.log.iter().map(|log| json!({ "name": log.name, "sha256": log.sha256 })).collect();
+        let log: Vec<_> =
+            of_log.log.iter().map(|log| json!({ "name": log.name, "sha256": log.sha256 })).collect();
         let about = json!({
             "tool": TOOL,
             "command": of_log.command,
@@ -259,7 +222,8 @@ impl DriftArgs {
         document.origin = Some(whole);
         let body = document.to_toml().map_err(|error| Error::Document(vec![error.to_string()]))?;
         let text = format!("{SCHEMA_LINE}{body}");
-        Document::parse(&text, Some(&out.display().to_string())).map_err(|found| Error::Document(problems(found)))?;
+        Document::parse(&text, Some(&out.display().to_string()))
+            .map_err(|found| Error::Document(problems(found)))?;
         write_file(out, text.as_bytes(), self.overwrite)
     }
 }
@@ -268,7 +232,11 @@ impl DriftArgs {
 pub(super) fn write_file(path: &Path, bytes: &[u8], overwrite: bool) -> Result<(), Error> {
     let mut options = OpenOptions::new();
     options.write(true);
-    if overwrite { options.create(true).truncate(true) } else { options.create_new(true) };
+    if overwrite {
+        options.create(true).truncate(true)
+    } else {
+        options.create_new(true)
+    };
     let written = options.open(path).and_then(|mut file| file.write_all(bytes));
     written.map_err(|source| Error::file(path, "write", source))
 }

@@ -10,7 +10,8 @@ use isotherm_log::file::{read_small_text, refuse_overwriting};
 use isotherm_log::offline::load_calibration;
 use isotherm_protocol::document::Document;
 
-use super::drift::{Bar, write_file};
+use super::bar::Bar;
+use super::drift::write_file;
 use super::{LogArgs, print};
 use crate::drift::HOUR_S;
 use crate::drift::columns::{Columns, Kind};
@@ -26,7 +27,7 @@ const SEEDS: u32 = 50;
 /// Most hours of either part.
 const MOST_HOURS: f64 = 1000.0;
 /// Sizes of the gyros in tables 1 and 2 of 002, for a drift without a document: σ, τ, σ1, τ1, constant part, N.
-const SIZES_DEG_H: [f64; 6] = [0.0034, 9.5, 0.000_08, 140.0, 0.05, 0.001];
+const SIZES_DEG_H: [f64; 6] = [0.0034, 9.5, 0.000_08, 140.0, 0.05, 0.0002];
 
 /// What a drift means for navigation: heading and position of a platform system over two days on its own
 #[derive(Debug, Args)]
@@ -51,7 +52,13 @@ pub(super) struct ImpactArgs {
     #[arg(long, short, value_name = "DOC")]
     document: Option<PathBuf>,
     /// Straight trend from the calibration's beginning (°/h²)
-    #[arg(long, value_name = "DEG_PER_H2", alias = "trend-deg-per-h2", allow_hyphen_values = true, conflicts_with = "log")]
+    #[arg(
+        long,
+        value_name = "DEG_PER_H2",
+        alias = "trend-deg-per-h2",
+        allow_hyphen_values = true,
+        conflicts_with = "log"
+    )]
     trend: Option<f64>,
     /// Constant that appears at departure, as after a shock (°/h)
     #[arg(long, value_name = "DEG_PER_H", alias = "constant-deg-per-h", allow_hyphen_values = true, conflicts_with_all = ["log", "seeds"])]
@@ -78,7 +85,7 @@ pub(super) struct ImpactArgs {
     #[arg(long, value_name = "RATIO", default_value_t = TURN_RATIO, allow_hyphen_values = true)]
     turn_ratio: f64,
     /// Standard error of the rate that the calibration knows, per minute (°/h)
-    #[arg(long, value_name = "DEG_PER_H", default_value_t = 0.01)]
+    #[arg(long, value_name = "DEG_PER_H", default_value_t = 0.001)]
     reference_sigma: f64,
     /// The velocity log does not keep the level gyros observable
     #[arg(long)]
@@ -119,7 +126,9 @@ impl ImpactArgs {
         let parts = self.parts()?;
         let report = if !self.log.is_empty() {
             self.sail_log(&mut voyage, &parts)?
-        } else if self.seeds.is_some() || (self.trend.is_none() && self.constant.is_none() && self.document.is_some()) {
+        } else if self.seeds.is_some()
+            || (self.trend.is_none() && self.constant.is_none() && self.document.is_some())
+        {
             self.sail_seeds(&voyage, &parts)?
         } else if self.trend.is_some() || self.constant.is_some() {
             self.sail_stated(&voyage, &parts)?
@@ -130,7 +139,11 @@ impl ImpactArgs {
         if let Some(html) = &self.html {
             write_file(html, report.to_html().as_bytes(), true)?;
         }
-        if self.json { print(format!("{}\n", report.to_json()).as_bytes()) } else { print(report.to_text().as_bytes()) }
+        if self.json {
+            print(format!("{}\n", report.to_json()).as_bytes())
+        } else {
+            print(report.to_text().as_bytes())
+        }
     }
 
     /// Checks the numbers.
@@ -239,13 +252,15 @@ impl ImpactArgs {
             Gyro::Z => [0.0, 0.0, slope],
             Gyro::Each | Gyro::All => [slope; 3],
         };
-        let bar = Bar::new(None);
+        let bar = Bar::at_work("sailing");
         let sailed = sail_all(voyage, parts, on_top, &seeds);
         bar.finish();
         let Voyages { first, spread } = sailed?;
         let rows = first.into_iter().zip(spread);
-        let rows = rows.map(|(course, spread)| Row { case: "all gyros".to_owned(), course, spread: Some(spread) });
-        let trend = self.trend.map(|trend| format!(", with a trend of {trend} °/h² on top")).unwrap_or_default();
+        let rows =
+            rows.map(|(course, spread)| Row { case: "all gyros".to_owned(), course, spread: Some(spread) });
+        let trend =
+            self.trend.map(|trend| format!(", with a trend of {trend} °/h² on top")).unwrap_or_default();
         let from = self.document.as_ref().map_or_else(
             || "gyros of the size of tables 1 and 2 of 002".to_owned(),
             |path| format!("gyros as {} states them", path.display()),
@@ -265,7 +280,11 @@ impl ImpactArgs {
         );
         let mut rows = Vec::new();
         for care in CARES {
-            rows.push(Row { case: "as logged".to_owned(), course: voyage.sail(care, &drift, parts)?, spread: None });
+            rows.push(Row {
+                case: "as logged".to_owned(),
+                course: voyage.sail(care, &drift, parts)?,
+                spread: None,
+            });
         }
         let source = format!("The log of unit {}", columns.unit);
         Ok(Report { voyage: *voyage, source, seeds: 0, rows, notes })
@@ -276,7 +295,7 @@ impl ImpactArgs {
         let unit = args.serial()?;
         let raw = self.mapping.is_some();
         if !raw && (self.log.iter().all(|path| is_csv(path)) || self.document.is_none()) {
-            let mut bar = Bar::new(None);
+            let mut bar = Bar::at_work("reading");
             let columns = Columns::of_corrected(&self.log, unit.as_ref(), Kind::Rate, || bar.step());
             bar.finish();
             return columns;
@@ -286,7 +305,7 @@ impl ImpactArgs {
         };
         let loaded = load_calibration(document)?;
         let mut log = args.open()?;
-        let mut bar = Bar::new(Some(log.progress()));
+        let mut bar = Bar::over_log(log.progress());
         let unit = unit.filter(|_| log.recording().is_some());
         let columns = Columns::corrected_by(&mut log, &loaded, unit.as_ref(), Kind::Rate, || bar.step());
         bar.finish();

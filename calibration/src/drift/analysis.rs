@@ -240,7 +240,8 @@ fn table(
         let tau_s = m as f64 * tick_s;
         let law = noise.map_or(PowerLaw::White, |noise| noise.dominant(tau_s).law());
         let of = ESTIMATORS.map(|estimator| {
-            let same = |(other, variance): &&(Estimator, Variance)| *other == estimator && variance.ticks == m;
+            let same =
+                |(other, variance): &&(Estimator, Variance)| *other == estimator && variance.ticks == m;
             let (_, variance) = variances.iter().find(same)?;
             let degrees = degrees_of_freedom(estimator, law, m, variance.differences);
             let [low, high] = interval(degrees);

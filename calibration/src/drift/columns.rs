@@ -77,10 +77,16 @@ impl Columns {
     pub fn of_accelerometers(series: Series) -> Result<Self, Error> {
         let Series { unit, accels, .. } = series;
         let scale = match accels.output {
-            None => return Err(nothing("accelerometer ticks", "leave --accelerometers out to look at the gyros")),
+            None => {
+                return Err(nothing(
+                    "accelerometer ticks",
+                    "leave --accelerometers out to look at the gyros",
+                ));
+            }
             Some(OutputKind::Counts) => {
                 return Err(Error::Refused(vec![
-                    "the accelerometer readings are counts: give a calibration document with --document".to_owned(),
+                    "the accelerometer readings are counts: give a calibration document with --document"
+                        .to_owned(),
                 ]));
             }
             Some(OutputKind::Mean) => Scale::Mean(1.0),
@@ -101,7 +107,10 @@ impl Columns {
             match scale {
                 Scale::Mean(factor) => column.iter_mut().for_each(|reading| *reading *= factor),
                 Scale::PerSecond(factor) => {
-                    column.iter_mut().zip(&duration_s).for_each(|(reading, duration)| *reading *= factor / duration);
+                    column
+                        .iter_mut()
+                        .zip(&duration_s)
+                        .for_each(|(reading, duration)| *reading *= factor / duration);
                 }
             }
             column
@@ -210,7 +219,10 @@ impl Columns {
 
     fn finish(self) -> Result<Self, Error> {
         if self.end_ns.is_empty() {
-            return Err(nothing("ticks that could be corrected", "is the document for this unit, and the mapping right?"));
+            return Err(nothing(
+                "ticks that could be corrected",
+                "is the document for this unit, and the mapping right?",
+            ));
         }
         Ok(self)
     }

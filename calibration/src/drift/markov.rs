@@ -236,7 +236,8 @@ impl<'a> Problem<'a> {
                 [a + step[0], b - step[1]],
                 [a - step[0], b + step[1]],
             ];
-            let inside = |at: &[f64; 2]| (shortest..=longest).contains(&at[0]) && (-18.0..=9.0).contains(&at[1]);
+            let inside =
+                |at: &[f64; 2]| (shortest..=longest).contains(&at[0]) && (-18.0..=9.0).contains(&at[1]);
             let tried = around.into_iter().chain(diagonal).filter(inside).map(|at| (at, self.cost(at)));
             match tried.min_by(|a, b| a.1.total_cmp(&b.1)) {
                 Some(better) if better.1 < best.1 => best = better,
@@ -310,11 +311,14 @@ impl Fit {
     #[must_use]
     pub fn with_daily_lines(slow: &Slow, degree: u32) -> Option<(Self, Vec<DailyLine>)> {
         let length_h = slow.length_h();
-        let resolved = |period: &u32| f64::from(*period) * PERIODS <= length_h && f64::from(*period) > 4.0 * slow.width_h;
+        let resolved = |period: &u32| {
+            f64::from(*period) * PERIODS <= length_h && f64::from(*period) > 4.0 * slow.width_h
+        };
         let periods_h: Vec<u32> = [24, 8].into_iter().filter(resolved).collect();
         let all = Self::of(slow, &Beside { degree, periods_h })?;
         let lines = all.lines();
-        let stay: Vec<u32> = lines.iter().filter(|line| line.stands_out()).map(|line| line.period_h).collect();
+        let stay: Vec<u32> =
+            lines.iter().filter(|line| line.stands_out()).map(|line| line.period_h).collect();
         if stay.len() == lines.len() {
             return Some((all, lines));
         }
@@ -384,7 +388,8 @@ impl Fit {
             let at = first + 2 * index;
             let wave = self.beta.get(at..at + 2)?;
             let block = self.covariance.view((at, at), (2, 2));
-            let inverse = Matrix2::new(block[(0, 0)], block[(0, 1)], block[(1, 0)], block[(1, 1)]).try_inverse()?;
+            let inverse =
+                Matrix2::new(block[(0, 0)], block[(0, 1)], block[(1, 0)], block[(1, 1)]).try_inverse()?;
             let vector = nalgebra::Vector2::new(wave[0], wave[1]);
             let chi_square = vector.dot(&(inverse * vector));
             Some(DailyLine { period_h: *period, amplitude: vector.norm(), chi_square })

@@ -20,7 +20,7 @@ pub fn page(report: &Report) -> String {
     page.paragraph(&format!(
         "{} ticks of {} s, {:.2} h{}.",
         report.ticks,
-        super::report::short(report.tick_s),
+        super::figures::short(report.tick_s),
         report.length_h,
         if report.corrected { ", corrected and along the case axes" } else { ", raw readings" }
     ));
@@ -104,7 +104,10 @@ fn panel(title: String, unit: &str, logarithmic: bool, content: Vec<Series>) -> 
 fn allan(report: &Report) -> Chart {
     let of = |sensor: &Analysis| {
         let curve = |estimator: usize| {
-            sensor.allan.iter().filter_map(move |row| Some((row.tau_s, row.of.get(estimator)?.as_ref()?.value)))
+            sensor
+                .allan
+                .iter()
+                .filter_map(move |row| Some((row.tau_s, row.of.get(estimator)?.as_ref()?.value)))
         };
         let inks = [Ink::Second, Ink::First, Ink::Third];
         let mut curves: Vec<Series> = ESTIMATORS
@@ -121,11 +124,17 @@ fn allan(report: &Report) -> Chart {
             })
             .collect();
         for end in [0, 1] {
-            let limit = sensor.allan.iter().filter_map(move |row| Some((row.tau_s, row.of[1].as_ref()?.interval[end])));
+            let limit = sensor
+                .allan
+                .iter()
+                .filter_map(move |row| Some((row.tau_s, row.of[1].as_ref()?.interval[end])));
             curves.push(series("95 % of overlapping".to_owned(), Ink::Faint, Form::Line, limit));
         }
         if let Some(noise) = &sensor.noise {
-            let fit = sensor.allan.iter().map(|row| (row.tau_s, noise.variances(row.tau_s).iter().sum::<f64>().sqrt()));
+            let fit = sensor
+                .allan
+                .iter()
+                .map(|row| (row.tau_s, noise.variances(row.tau_s).iter().sum::<f64>().sqrt()));
             curves.push(series("fit".to_owned(), Ink::Alert, Form::Line, fit));
         }
         panel(format!("{} {}", report.kind.sensor(), sensor.name), report.kind.measure(), true, curves)
@@ -147,7 +156,10 @@ fn slow(report: &Report) -> Chart {
             Form::Line,
             slow.time_h.iter().copied().zip(slow.mean.iter().copied()),
         )];
-        let fits = [(sensor.markov.as_ref().map(|(fit, _)| fit), "first order", Ink::First), (sensor.second_order.as_ref(), "second order", Ink::Third)];
+        let fits = [
+            (sensor.markov.as_ref().map(|(fit, _)| fit), "first order", Ink::First),
+            (sensor.second_order.as_ref(), "second order", Ink::Third),
+        ];
         for (fit, name, ink) in fits {
             if let Some(fit) = fit {
                 let points = slow.time_h.iter().map(|time| (*time, fit.trend_at(*time)));
@@ -169,7 +181,9 @@ fn autocorrelation(report: &Report) -> Option<Chart> {
         let auto = sensor.autocorrelation.as_ref()?;
         let points = auto.lag_h.iter().copied().zip(auto.correlation.iter().copied());
         let mut curves = vec![series("of the slow part".to_owned(), Ink::Raw, Form::Line, points)];
-        if let Some((Fit { noise: Noise { correlation_time_h: time_h, markov: true, .. }, .. }, _)) = &sensor.markov {
+        if let Some((Fit { noise: Noise { correlation_time_h: time_h, markov: true, .. }, .. }, _)) =
+            &sensor.markov
+        {
             let model = auto.lag_h.iter().map(|lag| (*lag, libm::exp(-lag / time_h)));
             curves.push(series("Markov part".to_owned(), Ink::First, Form::Line, model));
         }
@@ -216,11 +230,16 @@ fn spectrum(report: &Report) -> Chart {
         // The largest of each group, so that no line is lost.
         let points: Vec<(f64, f64)> = spectrum.points().map(|(hz, density)| (hz, density.sqrt())).collect();
         let largest = |group: &[(f64, f64)]| {
-            group.iter().copied().fold((0.0, 0.0), |best: (f64, f64), point| if point.1 > best.1 { point } else { best })
+            group
+                .iter()
+                .copied()
+                .fold((0.0, 0.0), |best: (f64, f64), point| if point.1 > best.1 { point } else { best })
         };
-        let points: Vec<(f64, f64)> = points.chunks(stride).map(largest).filter(|point| point.0 > 0.0).collect();
+        let points: Vec<(f64, f64)> =
+            points.chunks(stride).map(largest).filter(|point| point.0 > 0.0).collect();
         let mut curves = vec![series("density".to_owned(), Ink::Raw, Form::Line, points)];
-        let lines = sensor.lines.iter().map(|line| (line.frequency_hz, spectrum_at(sensor, line.frequency_hz)));
+        let lines =
+            sensor.lines.iter().map(|line| (line.frequency_hz, spectrum_at(sensor, line.frequency_hz)));
         curves.push(series("lines".to_owned(), Ink::Alert, Form::Dots, lines));
         Some(panel(format!("{} {}", report.kind.sensor(), sensor.name), &unit, true, curves))
     };

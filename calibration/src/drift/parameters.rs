@@ -58,7 +58,10 @@ impl Parameters {
         let (trend_sigma, trend_time_h) = match trend {
             Trend::Seen { slope, holds_h } => (slope.abs(), holds_h),
             Trend::NotSeen { error } => {
-                notes.push(format!("no trend is seen; one of up to {:.2e} °/h² would not be", TREND_SIGMAS * error));
+                notes.push(format!(
+                    "no trend is seen; one of up to {:.2e} °/h² would not be",
+                    TREND_SIGMAS * error
+                ));
                 (0.0, TREND_CORRELATION_TIME_H)
             }
         };
@@ -143,7 +146,11 @@ fn digits(value: f64) -> f64 {
 ///
 /// # Errors
 /// [`Error::Refused`] where an input axis lies along no case axis, or there is another number of sensors.
-pub fn put(document: &mut Document, parameters: &[(String, Parameters)], keep_initial: bool) -> Result<(), Error> {
+pub fn put(
+    document: &mut Document,
+    parameters: &[(String, Parameters)],
+    keep_initial: bool,
+) -> Result<(), Error> {
     let rows = &document.gyro.orientation.rows;
     let mut reasons = Vec::new();
     for (index, sensor) in document.gyro.sensor.iter_mut().enumerate() {

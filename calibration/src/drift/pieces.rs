@@ -110,7 +110,9 @@ impl Grid {
                 Err(why) => grid.refused.push(why),
                 Ok(bad) => {
                     if bad > 0 {
-                        grid.notes.push(format!("{called}: {bad} readings are no good numbers and count as missing."));
+                        grid.notes.push(format!(
+                            "{called}: {bad} readings are no good numbers and count as missing."
+                        ));
                     }
                     grid.sensors.push(Sensor { name, pieces: cut(column, &gaps, bridge) });
                 }
@@ -225,6 +227,7 @@ fn cut(column: Vec<f64>, gaps: &[Gap], bridge: bool) -> Vec<Piece> {
 }
 
 #[cfg(test)]
+#[expect(clippy::cast_precision_loss, reason = "numbers of ticks of tests")]
 mod tests {
     use super::super::columns::Kind;
     use super::*;
@@ -256,7 +259,8 @@ mod tests {
         let wave = wave(6000);
         assert!((pieces[0].readings[3000] - 0.5 * (wave[2999] + wave[3000])).abs() < 1e-15);
 
-        let far: Vec<i64> = (0..6000).map(|k| if k < 3000 { k } else { k + 500 }).map(|k| k * 1_000_000).collect();
+        let far: Vec<i64> =
+            (0..6000).map(|k| if k < 3000 { k } else { k + 500 }).map(|k| k * 1_000_000).collect();
         let grid = Grid::of(columns(far, vec![wave])).unwrap();
         let pieces = &grid.sensors[0].pieces;
         assert_eq!((pieces.len(), pieces[1].start, grid.ticks), (2, 3500, 6500));

@@ -2,13 +2,12 @@
 
 use std::fmt::Write;
 
-use comfy_table::{CellAlignment, Table, presets};
 use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::analysis::{Analysis, Deviation};
 use super::columns::Kind;
-use super::markov::Estimate;
+use super::figures::{short, stated_in, table, with_interval};
 use super::parameters::{Parameters, Trend, markov, trend};
 use crate::allan::{Coefficient, Term};
 
@@ -40,47 +39,6 @@ pub struct Report {
     pub parameters: Vec<(String, Parameters)>,
 }
 
-/// Factor from readings and seconds to the unit of measure that a coefficient is stated in, and its symbol.
-#[must_use]
-pub fn stated_in(term: Term, kind: Kind) -> (f64, &'static str) {
-    match (term, kind) {
-        (Term::Quantization, Kind::Rate) => (1.0, "″"),
-        (Term::AngleRandomWalk, Kind::Rate) => (1.0 / 60.0, "°/√h"),
-        (Term::BiasInstability, Kind::Rate) => (1.0, "°/h"),
-        (Term::RateRandomWalk, Kind::Rate) => (60.0, "°/h/√h"),
-        (Term::RateRamp, Kind::Rate) => (3600.0, "°/h²"),
-        (Term::Quantization, Kind::Force) => (1.0, "m/s"),
-        (Term::AngleRandomWalk, Kind::Force) => (60.0, "m/s/√h"),
-        (Term::BiasInstability, Kind::Force) => (1.0, "m/s²"),
-        (Term::RateRandomWalk, Kind::Force) => (60.0, "m/s²/√h"),
-        (Term::RateRamp, Kind::Force) => (3600.0, "m/s²/h"),
-    }
-}
-
-/// Three significant digits.
-#[must_use]
-pub fn short(value: f64) -> String {
-    let size = value.abs();
-    if size == 0.0 || !size.is_finite() {
-        format!("{value}")
-    } else if !(1e-3..1e5).contains(&size) {
-        format!("{value:.2e}")
-    } else {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and 5")]
-        let places = (2.0 - libm::floor(libm::log10(size))).clamp(0.0, 5.0) as usize;
-        format!("{value:.places$}")
-    }
-}
-
-/// A number with its interval.
-#[must_use]
-pub fn with_interval(estimate: &Estimate) -> String {
-    match estimate.interval {
-        Some([low, high]) => format!("{} ({}…{})", short(estimate.value), short(low), short(high)),
-        None => format!("{} (not bounded)", short(estimate.value)),
-    }
-}
-
 impl Report {
     /// The first line: what was found, in words.
     #[must_use]
@@ -91,12 +49,19 @@ impl Report {
             let (factor, unit) = stated_in(Term::AngleRandomWalk, self.kind);
             let mut words = match walk {
                 Some(Coefficient::Observed { value, .. }) => format!("N {} {unit}", short(value * factor)),
-                Some(Coefficient::NotObservable { below }) => format!("N below {} {unit}", short(below * factor)),
+                Some(Coefficient::NotObservable { below }) => {
+                    format!("N below {} {unit}", short(below * factor))
+                }
                 None => "too short for noise coefficients".to_owned(),
             };
             match markov(analysis.markov.as_ref().map(|(fit, _)| fit)) {
                 Some((sigma, time)) => {
-                    let _ = write!(words, ", drift σ {} {measure} over {} h", short(sigma.value), short(time.value));
+                    let _ = write!(
+                        words,
+                        ", drift σ {} {measure} over {} h",
+                        short(sigma.value),
+                        short(time.value)
+                    );
                 }
                 None => words.push_str(", no slow drift beside the noise"),
             }
@@ -109,7 +74,8 @@ impl Report {
             format!("{sensor} {}: {words}", analysis.name)
         };
         let sensors: Vec<String> = self.sensors.iter().map(of).collect();
-        let refused = if self.refused.is_empty() { String::new() } else { format!("; {} refused", self.refused.len()) };
+        let refused =
+            if self.refused.is_empty() { String::new() } else { format!("; {} refused", self.refused.len()) };
         format!("{}{refused}.", sensors.join("; "))
     }
 
@@ -123,7 +89,8 @@ impl Report {
             }
         }
         let longest = self.sensors.iter().map(|sensor| sensor.allan.len()).max().unwrap_or(0);
-        let cell = |deviation: Option<Deviation>| deviation.map_or_else(|| "–".to_owned(), |d| short(d.value));
+        let cell =
+            |deviation: Option<Deviation>| deviation.map_or_else(|| "–".to_owned(), |d| short(d.value));
         let row = |index: usize| {
             let tau = self.sensors.iter().find_map(|sensor| sensor.allan.get(index)).map_or(0.0, |d| d.tau_s);
             let cells = self.sensors.iter().flat_map(|sensor| {
@@ -142,14 +109,21 @@ impl Report {
         let head = std::iter::once(String::new()).chain(names).collect();
         let row = |term: Term| {
             let (factor, unit) = stated_in(term, self.kind);
-            let cells = self.sensors.iter().map(|sensor| match sensor.noise.as_ref().map(|noise| noise.of_term(term)) {
-                Some(Coefficient::Observed { value, interval: [low, high] }) => {
-                    format!("{} ({}…{})", short(value * factor), short(low * factor), short(high * factor))
+            let cells = self.sensors.iter().map(|sensor| {
+                match sensor.noise.as_ref().map(|noise| noise.of_term(term)) {
+                    Some(Coefficient::Observed { value, interval: [low, high] }) => {
+                        format!(
+                            "{} ({}…{})",
+                            short(value * factor),
+                            short(low * factor),
+                            short(high * factor)
+                        )
+                    }
+                    Some(Coefficient::NotObservable { below }) if below.is_finite() => {
+                        format!("not observable (< {})", short(below * factor))
+                    }
+                    _ => "not observable".to_owned(),
                 }
-                Some(Coefficient::NotObservable { below }) if below.is_finite() => {
-                    format!("not observable (< {})", short(below * factor))
-                }
-                _ => "not observable".to_owned(),
             });
             std::iter::once(format!("{} {}, {unit}", term.symbol(), term.name())).chain(cells).collect()
         };
@@ -167,12 +141,15 @@ impl Report {
             rows.push(std::iter::once(name).chain(self.sensors.iter().map(of)).collect());
         };
         let none = || "–".to_owned();
-        let power = |value: Option<(f64, f64)>| value.map_or_else(none, |(v, e)| format!("{} ± {}", short(v), short(e)));
+        let power = |value: Option<(f64, f64)>| {
+            value.map_or_else(none, |(v, e)| format!("{} ± {}", short(v), short(e)))
+        };
         row(format!("mean, {measure}"), &|a| short(a.mean));
         row(format!("standard deviation, {measure}"), &|a| short(a.deviation));
         row(format!("of the slow part, {measure}"), &|a| short(a.slow_deviation));
         row(format!("σ of the Markov part, {measure}"), &|a| {
-            markov(a.markov.as_ref().map(|(fit, _)| fit)).map_or_else(|| "none seen".to_owned(), |(s, _)| with_interval(&s))
+            markov(a.markov.as_ref().map(|(fit, _)| fit))
+                .map_or_else(|| "none seen".to_owned(), |(s, _)| with_interval(&s))
         });
         row("its correlation time, h".to_owned(), &|a| {
             markov(a.markov.as_ref().map(|(fit, _)| fit)).map_or_else(none, |(_, t)| with_interval(&t))
@@ -180,7 +157,9 @@ impl Report {
         row("the autocorrelation falls to 1/e at, h".to_owned(), &|a| {
             a.autocorrelation.as_ref().and_then(|auto| auto.correlation_time_h).map_or_else(none, short)
         });
-        row(format!("trend, {measure} per h"), &|a| power(a.markov.as_ref().and_then(|(fit, _)| fit.power(1))));
+        row(format!("trend, {measure} per h"), &|a| {
+            power(a.markov.as_ref().and_then(|(fit, _)| fit.power(1)))
+        });
         row(format!("second order, {measure} per h²"), &|a| {
             power(a.second_order.as_ref().and_then(|fit| fit.power(2)))
         });
@@ -191,7 +170,17 @@ impl Report {
     #[must_use]
     pub fn extrapolation_rows(&self) -> (Vec<String>, Vec<Vec<String>>) {
         let measure = self.kind.measure();
-        let head = ["", "fitted, h", "extrapolated, h", "slope, per h", "error at end", "rms", "largest", "of the range", "without slope"];
+        let head = [
+            "",
+            "fitted, h",
+            "extrapolated, h",
+            "slope, per h",
+            "error at end",
+            "rms",
+            "largest",
+            "of the range",
+            "without slope",
+        ];
         let head = head.map(str::to_owned).to_vec();
         let rows = self.sensors.iter().filter_map(|sensor| {
             let e = sensor.extrapolation.as_ref()?;
@@ -294,7 +283,8 @@ impl Report {
         let sensors: Vec<Value> = self.sensors.iter().map(|sensor| self.sensor_json(sensor)).collect();
         if let Some(object) = value.as_object_mut() {
             object.insert("verdict".to_owned(), json!(self.verdict()));
-            object.insert("measure".to_owned(), json!(if self.kind == Kind::Rate { "deg/h" } else { "m/s2" }));
+            object
+                .insert("measure".to_owned(), json!(if self.kind == Kind::Rate { "deg/h" } else { "m/s2" }));
             object.insert("sensors".to_owned(), json!(sensors));
         }
         value
@@ -319,7 +309,9 @@ impl Report {
                 Some(Coefficient::Observed { value, interval }) => {
                     json!({ "value": value * factor, "interval": interval.map(|end| end * factor), "unit": unit })
                 }
-                Some(Coefficient::NotObservable { below }) => json!({ "below": below * factor, "unit": unit }),
+                Some(Coefficient::NotObservable { below }) => {
+                    json!({ "below": below * factor, "unit": unit })
+                }
                 None => Value::Null,
             };
             noise.insert(term.symbol().to_owned(), value);
@@ -335,7 +327,8 @@ impl Report {
             .iter()
             .map(|line| json!({ "frequency_hz": line.frequency_hz, "amplitude": line.amplitude, "ratio": line.ratio }))
             .collect();
-        let power = |value: Option<(f64, f64)>| value.map(|(value, error)| json!({ "value": value, "sigma": error }));
+        let power =
+            |value: Option<(f64, f64)>| value.map(|(value, error)| json!({ "value": value, "sigma": error }));
         let parameters = self.parameters.iter().find(|(name, _)| *name == sensor.name);
         json!({
             "name": sensor.name,
@@ -357,15 +350,4 @@ impl Report {
             "drift_notes": parameters.map(|(_, parameters)| json!(parameters.notes)),
         })
     }
-}
-
-/// A table as text, numbers to the right.
-#[must_use]
-pub fn table(head: &[String], rows: &[Vec<String>]) -> String {
-    let mut table = Table::new();
-    table.load_preset(presets::NOTHING).set_header(head).add_rows(rows);
-    for column in table.column_iter_mut().skip(1) {
-        column.set_cell_alignment(CellAlignment::Right);
-    }
-    table.to_string()
 }

@@ -51,7 +51,11 @@ impl Extrapolation {
         if times.len() < FEWEST || later.len() < FEWEST {
             return None;
         }
-        let columns = DMatrix::from_fn(times.len(), 2, |row, column| if column == 0 { 1.0 } else { times[row] - first });
+        let columns = DMatrix::from_fn(
+            times.len(),
+            2,
+            |row, column| if column == 0 { 1.0 } else { times[row] - first },
+        );
         let qr = columns.qr();
         let right = qr.q().transpose() * DVector::from_column_slice(means);
         let line = qr.r().solve_upper_triangular(&right)?;

@@ -132,6 +132,7 @@ impl Ins {
 }
 
 #[cfg(test)]
+#[expect(clippy::cast_precision_loss, reason = "numbers of ticks of tests")]
 mod tests {
     use isotherm_correction::units::AngularRate;
 

@@ -125,7 +125,10 @@ fn spread(figures: &[Figures]) -> Spread {
         let of = |value: fn(&Figures) -> f64| {
             let mut values: Vec<f64> = figures.iter().map(value).collect();
             values.sort_by(f64::total_cmp);
-            values.get((values.len() * share / 100).min(values.len().saturating_sub(1))).copied().unwrap_or(0.0)
+            values
+                .get((values.len() * share / 100).min(values.len().saturating_sub(1)))
+                .copied()
+                .unwrap_or(0.0)
         };
         Figures {
             radial_at_end_m: of(|figures| figures.radial_at_end_m),

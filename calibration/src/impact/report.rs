@@ -10,7 +10,7 @@ use super::ins::Errors;
 use super::monte_carlo::Spread;
 use super::scenario::{Care, Course, Figures, Voyage};
 use crate::drift::DEG_PER_H_IN_RAD_PER_S;
-use crate::drift::report::{short, table};
+use crate::drift::figures::{short, table};
 
 /// Height of a panel (CSS pixels).
 const HEIGHT: u32 = 220;
@@ -66,7 +66,9 @@ impl Report {
     #[must_use]
     pub fn verdict(&self) -> String {
         let radial = |row: &&Row| row.judged().radial_largest_m;
-        let Some(worst) = self.rows.iter().max_by(|a, b| radial(a).total_cmp(&radial(b))) else { return String::new() };
+        let Some(worst) = self.rows.iter().max_by(|a, b| radial(a).total_cmp(&radial(b))) else {
+            return String::new();
+        };
         let of = |care: Care| {
             let row = self.rows.iter().find(|row| row.case == worst.case && row.course.care == care);
             row.map(Row::judged).unwrap_or_default()
@@ -96,14 +98,18 @@ impl Report {
     /// Head and rows of the table.
     #[must_use]
     pub fn rows(&self) -> (Vec<String>, Vec<Vec<String>>) {
-        let mut head = vec!["drift", "care", "position at end, m", "largest, m", "heading at end, ′", "largest, ′"];
+        let mut head =
+            vec!["drift", "care", "position at end, m", "largest, m", "heading at end, ′", "largest, ′"];
         if self.seeds > 0 {
             head.extend(["95 %: position largest, m", "heading largest, ′"]);
         }
         let rows = self.rows.iter().map(|row| {
-            let Figures { radial_at_end_m, radial_largest_m, heading_at_end_arcmin, heading_largest_arcmin } = row.judged();
+            let Figures { radial_at_end_m, radial_largest_m, heading_at_end_arcmin, heading_largest_arcmin } =
+                row.judged();
             let mut cells = vec![row.case.clone(), row.course.care.words().to_owned()];
-            cells.extend([radial_at_end_m, radial_largest_m, heading_at_end_arcmin, heading_largest_arcmin].map(short));
+            cells.extend(
+                [radial_at_end_m, radial_largest_m, heading_at_end_arcmin, heading_largest_arcmin].map(short),
+            );
             if let Some(spread) = &row.spread {
                 let far = spread.within_95_percent;
                 cells.extend([far.radial_largest_m, far.heading_largest_arcmin].map(short));
@@ -139,7 +145,13 @@ impl Report {
                 let points = row.course.points.iter();
                 let points: Vec<Value> = points
                     .map(|(hours, errors)| {
-                        json!([hours, errors.heading_arcmin(), errors.position_m[0], errors.position_m[1], errors.radial_m()])
+                        json!([
+                            hours,
+                            errors.heading_arcmin(),
+                            errors.position_m[0],
+                            errors.position_m[1],
+                            errors.radial_m()
+                        ])
                     })
                     .collect();
                 if let Some(object) = value.as_object_mut() {
@@ -182,7 +194,8 @@ impl Report {
 
     fn chart(&self, case: &str) -> Chart {
         let curves = |of: &dyn Fn(&Course) -> Vec<(f64, f64)>| {
-            let rows = self.rows.iter().filter(|row| row.case == case).zip([Ink::Alert, Ink::Second, Ink::First]);
+            let rows =
+                self.rows.iter().filter(|row| row.case == case).zip([Ink::Alert, Ink::Second, Ink::First]);
             let curve = |(row, ink): (&Row, Ink)| Series {
                 name: row.course.care.words().to_owned(),
                 ink,
@@ -192,7 +205,9 @@ impl Report {
             Content::Series(rows.map(curve).collect())
         };
         let errors = |of: fn(&Errors) -> f64| {
-            move |course: &Course| course.points.iter().map(|(hours, errors)| (*hours, of(errors))).collect::<Vec<_>>()
+            move |course: &Course| {
+                course.points.iter().map(|(hours, errors)| (*hours, of(errors))).collect::<Vec<_>>()
+            }
         };
         let azimuth = |course: &Course| {
             let left = course.points.iter().zip(&course.left);
@@ -226,7 +241,11 @@ impl Report {
             short(v.turn_ratio),
             short(v.calibration_h),
             short(v.hours),
-            if v.log_aids_level { "observed through the velocity log all the time" } else { "not observed either" }
+            if v.log_aids_level {
+                "observed through the velocity log all the time"
+            } else {
+                "not observed either"
+            }
         )
     }
 }

@@ -95,7 +95,8 @@ impl Course {
     #[must_use]
     pub fn figures(&self) -> Figures {
         let end = self.points.last().map(|point| point.1).unwrap_or_default();
-        let largest = |of: &dyn Fn(&Errors) -> f64| self.points.iter().map(|point| of(&point.1)).fold(0.0, f64::max);
+        let largest =
+            |of: &dyn Fn(&Errors) -> f64| self.points.iter().map(|point| of(&point.1)).fold(0.0, f64::max);
         Figures {
             radial_at_end_m: end.radial_m(),
             radial_largest_m: largest(&Errors::radial_m),
@@ -124,7 +125,7 @@ impl Voyage {
     /// [`Error::Refused`]: everything that is wrong with the parts.
     pub fn sail(&self, care: Care, drift: &Drift, parts: &[DriftParts; 3]) -> Result<Course, Error> {
         let departure = self.calibration_ticks();
-        let left = match care {
+        let left: Vec<[f64; 3]> = match care {
             Care::Held => {
                 let held = drift.held;
                 let less = |drift: &[f64; 3]| [drift[0] - held[0], drift[1] - held[1], drift[2] - held[2]];
@@ -136,7 +137,8 @@ impl Voyage {
                     level_afterwards: self.log_aids_level,
                     reference_sigma_rad_per_s: self.reference_sigma_rad_per_s,
                 };
-                let parts = if care == Care::WithTrend { *parts } else { parts.each_ref().map(without_trend) };
+                let parts =
+                    if care == Care::WithTrend { *parts } else { parts.each_ref().map(without_trend) };
                 residual(&drift.truth, &drift.measured, &parts, &aiding).map_err(Error::Refused)?
             }
         };

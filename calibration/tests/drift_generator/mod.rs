@@ -103,7 +103,10 @@ pub(crate) fn recording(
             sequence: index as u64,
             end_time: Timestamp::from_ns((index as i64 + 1) * tick_ns),
             duration: Span::from_ns(tick_ns),
-            readings: columns.iter().map(|column| column[index] * (std::f64::consts::PI / 180.0 / 3600.0)).collect(),
+            readings: columns
+                .iter()
+                .map(|column| column[index] * (std::f64::consts::PI / 180.0 / 3600.0))
+                .collect(),
             ..GyroTick::default()
         };
         batcher.gyro(OutputKind::Mean, tick).unwrap();

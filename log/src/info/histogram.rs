@@ -78,6 +78,11 @@ impl Histogram {
         self.range.map(|_| self.quantile(500))
     }
 
+    /// How many values there are.
+    pub(super) fn count(&self) -> u64 {
+        self.count
+    }
+
     /// What it comes to; `None` where there is no value.
     pub(super) fn spread(&self) -> Option<Spread> {
         let [min_ns, max_ns] = self.range?;

@@ -32,7 +32,7 @@ fn gyro(first: u64, ticks: u64, late_ns: u64) -> Message {
         end_time_ns: end_ns(sequence),
         duration_ns: TICK_NS,
         readings: WireReadings::Counts([1, 2, 3].into_iter().collect()),
-        mode: Some(if sequence / 10 % 2 == 0 { Mode::Plus } else { Mode::Minus }),
+        mode: Some(if (sequence / 10).is_multiple_of(2) { Mode::Plus } else { Mode::Minus }),
         switch_command: sequence > 0 && sequence.is_multiple_of(10),
         meander: None,
         half_periods: std::iter::empty().collect(),
@@ -77,7 +77,9 @@ fn corrected(sequences: &[u64], missed: u64, counter: u64) -> Message {
 /// What a recording of these messages holds.
 fn info_of(messages: &[Message]) -> LogInfo {
     let mut survey = Survey::new(true);
-    messages.iter().for_each(|message| survey.take(message));
+    for message in messages {
+        survey.take(message);
+    }
     survey.finish(Vec::new(), LogReport::Recording(RecordingReport::default()))
 }
 

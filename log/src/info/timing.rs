@@ -1,21 +1,26 @@
 //! When the messages of a stream were received, against when they happened.
 
+use isotherm_correction::units::{Span, Timestamp};
 use serde::Serialize;
 
 use super::histogram::{Histogram, Spread};
 
 /// Messages that are looked at together, at most.
 const BLOCK_MESSAGES: usize = 4096;
-/// Time that they cover, at most (ns).
+/// Fewest of them, where they come that seldom: one alone says nothing.
+const FEWEST_MESSAGES: usize = 16;
+/// Time that they cover, where they are no fewer (ns).
 const BLOCK_NS: i64 = 10_000_000_000;
 
 /// How the times of reception scatter against those of the producer's clock.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Jitter {
-    /// Delay of a message's reception behind the end of its last tick, over the smallest such delay of the same 10 s.
+    /// Delay of a message's reception behind the end of its last tick, over the smallest such delay of the same 10 s, or of
+    /// 16 messages where these take longer; a drift of the clocks is taken out.
     pub delay: Spread,
     /// How much faster the recorder's clock ran than the producer's, by the smallest delays at both ends (1e-6); a log that
-    /// was recorded from a replay shows the replay's speed here. `None` for less than 10 s.
+    /// was recorded from a replay shows the replay's speed here. `None` for less than 10 s and
+    /// for fewer than 64 messages.
     pub clock_drift_ppm: Option<f64>,
 }
 
@@ -30,8 +35,8 @@ struct Smallest {
 /// Follows the delays of one stream.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Delays {
-    /// Delays of the present block.
-    block: Vec<i64>,
+    /// Times (ns on the producer's clock) and delays of the present block.
+    block: Vec<(i64, i64)>,
     /// The producer's time at its beginning.
     begun_ns: Option<i64>,
     last_ns: i64,
@@ -48,23 +53,27 @@ impl Delays {
         let since = event_ns.saturating_sub(begun);
         // Time that goes back belongs to another run of the producer, which has a clock of its own.
         let other_clock = since < -BLOCK_NS;
-        if other_clock || since >= BLOCK_NS || self.block.len() >= BLOCK_MESSAGES {
+        if other_clock
+            || (since >= BLOCK_NS && self.block.len() >= FEWEST_MESSAGES)
+            || self.block.len() >= BLOCK_MESSAGES
+        {
             self.close();
             self.begun_ns = Some(event_ns);
         }
         if other_clock {
             (self.first, self.last) = (None, None);
         }
-        self.block.push(received.saturating_sub(event_ns));
+        self.block.push((event_ns, received.saturating_sub(event_ns)));
         self.last_ns = event_ns;
     }
 
     /// What it comes to; `None` where there is no message.
     pub(super) fn jitter(mut self) -> Option<Jitter> {
         self.close();
+        let enough = self.spread.count() >= 4 * FEWEST_MESSAGES as u64;
         let drift = |first: Smallest, last: Smallest| {
             let (delay, time) = (last.delay_ns.saturating_sub(first.delay_ns), last.at_ns - first.at_ns);
-            (time >= BLOCK_NS).then(|| seconds(delay) / seconds(time) * 1e6)
+            (time >= BLOCK_NS && enough).then(|| seconds(delay) / seconds(time) * 1e6)
         };
         let clock_drift_ppm = self.first.zip(self.last).and_then(|(first, last)| drift(first, last));
         self.spread.spread().map(|delay| Jitter { delay, clock_drift_ppm })
@@ -72,19 +81,34 @@ impl Delays {
 
     /// Ends the block.
     fn close(&mut self) {
-        let Some(&smallest) = self.block.iter().min() else { return };
-        for delay in self.block.drain(..) {
-            self.spread.add(delay.saturating_sub(smallest).unsigned_abs());
+        let smallest = |part: &[(i64, i64)]| part.iter().copied().min_by_key(|&(_, delay)| delay);
+        let Some((_, least)) = smallest(&self.block) else { return };
+        // A clock that drifts, or a replay at another speed, tilts all delays alike: a line through the smallest of both
+        // halves takes that out.
+        let (early, late) = self.block.split_at(self.block.len() / 2);
+        let line = smallest(early).zip(smallest(late)).filter(|((from, _), (to, _))| to > from);
+        let tilt = line.map_or(0.0, |((from, first), (to, last))| {
+            seconds(last.saturating_sub(first)) / seconds(to.saturating_sub(from))
+        });
+        let begun = self.begun_ns.unwrap_or(0);
+        let level = |&(at, delay): &(i64, i64)| {
+            let by = Span::from_s((tilt * seconds(at.saturating_sub(begun))).abs()).as_ns();
+            delay.saturating_sub(if tilt < 0.0 { -by } else { by })
+        };
+        let lowest = self.block.iter().map(level).min().unwrap_or(0);
+        for message in &self.block {
+            self.spread.add(level(message).saturating_sub(lowest).max(0).unsigned_abs());
         }
-        let smallest = Smallest { at_ns: self.last_ns, delay_ns: smallest };
+        self.block.clear();
+        let smallest = Smallest { at_ns: self.last_ns, delay_ns: least };
         self.first.get_or_insert(smallest);
         self.last = Some(smallest);
     }
 }
 
-/// Nanoseconds in seconds.
+/// Nanoseconds in seconds, with their sign.
 pub(super) fn seconds(ns: i64) -> f64 {
-    isotherm_correction::units::Span::from_ns(ns).as_s()
+    Timestamp::from_ns(ns).seconds_from(Timestamp::from_ns(0))
 }
 
 #[cfg(test)]
@@ -102,11 +126,35 @@ mod tests {
             delays.take(received.unsigned_abs(), event);
         }
         let jitter = delays.jitter().unwrap();
-        // Within 10 s the drift comes to 0.2 ms.
-        assert!(jitter.delay.p50_ns <= 200_000, "{jitter:?}");
+        assert!(jitter.delay.p50_ns <= 1000, "{jitter:?}");
         assert!((2_900_000..3_100_000).contains(&jitter.delay.p99_ns), "{jitter:?}");
         assert!((2_900_000..3_100_000).contains(&jitter.delay.max_ns), "{jitter:?}");
         assert!((jitter.clock_drift_ppm.unwrap() - 20.0).abs() < 0.5, "{jitter:?}");
+    }
+
+    #[test]
+    fn a_replay_at_another_speed_is_no_jitter() {
+        for speed in [2, 30] {
+            let mut delays = Delays::default();
+            (0..5000).for_each(|index: i64| {
+                let event = index * 50_000_000;
+                let late = if index % 10 == 3 { 400_000 } else { 0 };
+                delays.take((event / speed + late).unsigned_abs(), event);
+            });
+            let jitter = delays.jitter().unwrap();
+            assert!(jitter.delay.p50_ns < 1000 && jitter.delay.max_ns.abs_diff(400_000) < 1000, "{jitter:?}");
+        }
+    }
+
+    #[test]
+    fn a_clock_that_loses_has_a_negative_drift() {
+        let mut delays = Delays::default();
+        (0..2000).for_each(|index: i64| {
+            let event = index * 50_000_000;
+            delays.take((event - event / 100_000).unsigned_abs() + 1_000_000_000, event);
+        });
+        let drift = delays.jitter().unwrap().clock_drift_ppm.unwrap();
+        assert!((drift + 10.0).abs() < 0.5, "{drift}");
     }
 
     #[test]

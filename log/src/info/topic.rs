@@ -110,7 +110,7 @@ impl TopicSurvey {
         series: u64,
         first: u64,
         received_ns: u64,
-        times: impl Iterator<Item = TickTime> + Clone,
+        times: &(impl Iterator<Item = TickTime> + Clone),
     ) -> Place {
         let ends = || times.clone().map(|(end, _)| end);
         let (Some(first_end_ns), Some(last_end_ns)) = (ends().next(), ends().last()) else {

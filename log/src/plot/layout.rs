@@ -3,13 +3,13 @@
 mod words;
 
 use isotherm_correction::sample::{OutputKind, SensorFlags, TickFlags};
-use isotherm_correction::units::Span;
 use isotherm_protocol::key::UnitId;
 
 use super::difference::Difference;
 use super::nominal::{DEG_PER_H, Scale, unscaled};
 use super::page::{Axis, Chart, Content, Form, Ink, Lane, Mark, Page, Panel, Series, Stretch, Table};
 use super::reading::UnitLogs;
+use super::time::seconds;
 use super::track::{Finished, Overall, Track};
 use super::unit::{ACCEL_FLAGS, GYRO_FLAGS, MODE_MINUS, MODE_PLUS, RawTrack, SWITCH, Since, UnitPlot};
 use super::{AXES, PlotSummary};
@@ -34,7 +34,7 @@ pub(super) fn page(units: Vec<(UnitId, UnitLogs)>, summary: &PlotSummary) -> Opt
         page.heading(&format!("Unit {unit}"));
         page.paragraph(&format!(
             "Time 0 is {begin_ns} ns on the producer's clock; {} are shown.",
-            duration(Span::from_ns(end_ns.saturating_sub(begin_ns)).as_s())
+            duration(seconds(end_ns.saturating_sub(begin_ns)))
         ));
         page.chart(&chart);
         let head = ["", "min", "mean", "max"].map(str::to_owned).to_vec();
@@ -118,7 +118,7 @@ impl Drawing {
 
     /// Seconds on the axis.
     fn seconds(&self, at_ns: i64) -> f64 {
-        Span::from_ns(at_ns.saturating_sub(self.begin_ns)).as_s()
+        seconds(at_ns.saturating_sub(self.begin_ns))
     }
 
     fn marks(&self, log: usize, shown: &mut UnitPlot, marks: &mut Vec<Mark>) {
@@ -241,7 +241,7 @@ impl Drawing {
         let factor = |index: usize| scale.factors.get(index).copied().unwrap_or(f64::NAN);
         for index in 0..sensors {
             let what = match scale.axes.get(index).and_then(|axis| AXES.get(*axis)) {
-                Some(axis) => format!("{along} {axis}"),
+                Some(name) => format!("{along} {name}"),
                 None => format!("{sensor} {}", index + 1),
             };
             self.row(format!("{prefix}raw {what} ({unit})"), track.overall(index, factor(index)));
@@ -250,15 +250,12 @@ impl Drawing {
         let mut own = Vec::new();
         for index in 0..sensors {
             let ink = if log == 0 { Ink::Raw } else { Ink::Fourth };
-            match scale.axes.get(index).and_then(|axis| axes.get_mut(*axis)) {
-                Some(curves) => {
-                    curves.extend(curve(&finished, index, factor(index), format!("{prefix}raw"), ink));
-                }
-                None => {
-                    let ink = Ink::several().nth(index + 3 * log).unwrap_or(Ink::First);
-                    let name = format!("{prefix}{sensor} {}", index + 1);
-                    own.extend(curve(&finished, index, factor(index), name, ink));
-                }
+            if let Some(curves) = scale.axes.get(index).and_then(|axis| axes.get_mut(*axis)) {
+                curves.extend(curve(&finished, index, factor(index), format!("{prefix}raw"), ink));
+            } else {
+                let ink = Ink::several().nth(index + 3 * log).unwrap_or(Ink::First);
+                let name = format!("{prefix}{sensor} {}", index + 1);
+                own.extend(curve(&finished, index, factor(index), name, ink));
             }
         }
         let title = format!("raw {sensor}s");

@@ -9,9 +9,8 @@ mod tests;
 
 use std::sync::Arc;
 
-use isotherm_correction::units::Span;
-
 use super::page::{Bits, Places, Samples};
+use super::time::seconds as seconds_of;
 
 /// So many times as many ticks as bins are kept as they are: they take the same room in the file.
 const EXACT: usize = 3;
@@ -109,7 +108,7 @@ impl Track {
                 values.extend((0..self.width).map(value));
                 bits.push(flags);
                 if times.len() > EXACT * self.detail {
-                    self.to_bins();
+                    self.take_bins();
                 }
             }
             Form::Bins { .. } => self.enter(time_ns, &value, flags),
@@ -130,14 +129,14 @@ impl Track {
         self.detail = detail.max(2);
         let exact = matches!(&self.form, Form::Exact { times, .. } if times.len() > EXACT * self.detail);
         if exact {
-            self.to_bins();
+            self.take_bins();
         }
         while matches!(&self.form, Form::Bins { bits, .. } if bits.len() > self.detail) {
             self.coarsen();
         }
     }
 
-    fn to_bins(&mut self) {
+    fn take_bins(&mut self) {
         let empty = Form::Bins { shift: FINEST, first: 0, cells: Vec::new(), bits: Vec::new() };
         let Form::Exact { times, values, bits } = std::mem::replace(&mut self.form, empty) else { return };
         if let (Some(low), Some(high), Form::Bins { shift, first, .. }) =
@@ -200,7 +199,7 @@ impl Track {
         let count = (bits.len() + odd).div_ceil(2);
         let (mut joined, mut flags) = (vec![Cell::EMPTY; count * width], vec![0; count]);
         for (index, old) in bits.iter().enumerate() {
-            let to = (index + odd) / 2;
+            let to = (index + odd) >> 1;
             if let Some(flags) = flags.get_mut(to) {
                 *flags |= old;
             }
@@ -243,7 +242,7 @@ impl Track {
                 // Late ticks go to their place; those of equal time stay as they came.
                 order.sort_by_key(|&index| times.get(index));
                 let seconds = |&index: &usize| {
-                    Span::from_ns(times.get(index).map_or(0, |time| time.saturating_sub(origin_ns))).as_s()
+                    seconds_of(times.get(index).map_or(0, |time| time.saturating_sub(origin_ns)))
                 };
                 let x: Arc<[f64]> = order.iter().map(seconds).collect();
                 let flags = order.iter().filter_map(|&index| bits.get(index).copied()).collect();
@@ -260,10 +259,8 @@ impl Track {
             Form::Bins { shift, first, cells, bits } => {
                 let begin = i128::from(first) << shift;
                 let after_ns = i64::try_from(begin - i128::from(origin_ns)).unwrap_or(i64::MAX);
-                let places = Places::Bins {
-                    first: Span::from_ns(after_ns).as_s(),
-                    width: Span::from_ns(1_i64 << shift.min(62)).as_s(),
-                };
+                let places =
+                    Places::Bins { first: seconds_of(after_ns), width: seconds_of(1_i64 << shift.min(62)) };
                 let column = |number: usize| {
                     Column::Bins(cells.iter().skip(number).step_by(width.max(1)).copied().collect())
                 };

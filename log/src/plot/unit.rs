@@ -12,7 +12,7 @@ use isotherm_protocol::status::{Output, Status};
 
 use super::nominal::{DEG_PER_H, Nominal};
 use super::page::Ink;
-use super::time::{Clock, Stream};
+use super::time::{Clock, Stream, seconds};
 use super::track::Track;
 use crate::message::{Message, Topic};
 
@@ -131,7 +131,7 @@ impl UnitPlot {
     fn time(&mut self, stream: Stream, event_ns: i64) -> i64 {
         let (at_ns, jumped) = self.clock.axis(stream, event_ns);
         if let Some(by_ns) = jumped {
-            let by = isotherm_correction::units::Span::from_ns(by_ns).as_s();
+            let by = seconds(by_ns);
             let words = format!("the producer's clock jumps by {by:.3} s; the axis goes on");
             self.happen(at_ns, "clock jump", words, Ink::Alert);
         }
@@ -331,15 +331,19 @@ fn push(tracks: &mut BTreeMap<String, Track>, channel: &str, detail: usize, at_n
 /// Rates (°/h) and specific forces (m/s²) of a tick.
 pub(super) fn increments(tick: &CorrectedTick) -> [f64; 6] {
     let per_second = per_second(tick.duration_ns);
-    let [x, y, z] = tick.delta_angle_rad.map(|angle| angle * per_second * DEG_PER_H);
-    let [u, v, w] = tick.delta_velocity_m_per_s.map(|velocity| velocity * per_second);
-    [x, y, z, u, v, w]
+    let rates = tick.delta_angle_rad.map(|angle| angle * per_second * DEG_PER_H);
+    let forces = tick.delta_velocity_m_per_s.map(|velocity| velocity * per_second);
+    let mut all = [0.0; 6];
+    for (to, from) in all.iter_mut().zip(rates.into_iter().chain(forces)) {
+        *to = from;
+    }
+    all
 }
 
 /// What to multiply increments with (1/s); not a number for no time at all.
 fn per_second(duration_ns: u64) -> f64 {
-    let span = isotherm_correction::units::Span::from_ns(i64::try_from(duration_ns).unwrap_or(i64::MAX));
-    if duration_ns == 0 { f64::NAN } else { 1.0 / span.as_s() }
+    let span_s = seconds(i64::try_from(duration_ns).unwrap_or(i64::MAX));
+    if duration_ns == 0 { f64::NAN } else { 1.0 / span_s }
 }
 
 /// All flags of a tick in one word.

@@ -66,6 +66,23 @@ fn a_memory_that_is_lost_the_first_file_of_a_row_is_enough_and_so_is_the_second(
 }
 
 #[test]
+fn a_recorder_that_hears_the_producer_only_after_it_asked_begins_with_the_next_memory() {
+    let mut session = Session::new();
+    session.ticks(300);
+    session.recorded.clear();
+    session.memory();
+    session.way = |_, _| Way::Service;
+    session.ticks(20);
+    session.way = |_, _| Way::Both;
+    session.ticks(200);
+    session.memory();
+    lively(&mut session);
+    let (account, report) = replay(&session.recording(), Changes::default());
+    assert_eq!(kinds(&report), Vec::<&str>::new(), "{report:#?}");
+    assert!(account.agrees() && account.only_b.before >= 219, "{account:#?}");
+}
+
+#[test]
 fn what_the_recorder_lost_is_said_and_the_memory_puts_it_right() {
     let lost: fn(Input, u64) -> Way = |input, sequence| match (input, sequence) {
         (Input::Raw(RawStream::Gyro), 250..253) => Way::Service,

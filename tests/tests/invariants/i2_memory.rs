@@ -5,7 +5,7 @@ mod scenarios;
 mod script;
 
 use isotherm_correction::operation::State;
-use isotherm_protocol::stream::{InForce, MemoryError, UnitStream};
+use isotherm_protocol::stream::{InForce, Label, MemoryError, UnitStream};
 use isotherm_tests::dice::Dice;
 use proptest::prelude::*;
 use script::{Scenario, Step};
@@ -32,11 +32,13 @@ fn run(scenario: &Scenario, mut cut: impl FnMut(usize, &UnitStream) -> bool) -> 
             // A bad frame is part of what happens.
             Step::Frame(input, frame) => drop(stream.take(*input, frame)),
             Step::Event(event) => stream.carry_out(event).unwrap(),
-            Step::Give(change) => drop(stream.schedule(change.clone(), Default::default())),
+            Step::Give(change) => {
+                let _ = stream.schedule(change.clone(), Label::default());
+            }
         }
         let mut frame = Vec::new();
         // Some outputs wait in the stream over the next cut.
-        while index % 3 != 0 && stream.next_frame(&mut frame) {
+        while !index.is_multiple_of(3) && stream.next_frame(&mut frame) {
             frames.push(frame.clone());
         }
         in_force.extend(std::iter::from_fn(|| stream.take_in_force()));

@@ -133,7 +133,12 @@ async fn a_killed_recorder_loses_its_last_chunk_at_most() {
             let back = back.get(publisher.key_expr().as_str()).cloned().unwrap_or_default();
             assert!(of_unit.starts_with(&back), "kill {kill}: nothing is lost before the last, or doubled");
             let at_least = sent.iter().filter(|(at, _)| *at + CHUNK + ON_THE_WAY < killed).count();
-            assert!(back.len() >= at_least, "kill {kill}: {} of {} are there, {at_least} must be", back.len(), of_unit.len());
+            assert!(
+                back.len() >= at_least,
+                "kill {kill}: {} of {} are there, {at_least} must be",
+                back.len(),
+                of_unit.len()
+            );
             sent_in_all += of_unit.len();
             back_in_all += back.len();
         }

@@ -43,6 +43,8 @@ const RUN_AT: u64 = 160;
 const MIDDLE: u64 = 95;
 /// When it must be there.
 const MIDDLE_AT_LATEST: u64 = 115;
+/// It begins a new file every second, and asks for the memory of every unit for each.
+const ROW: [&str; 2] = ["--max-duration", "1"];
 /// A key that recorders listen to last: who publishes on it knows when they hear everything.
 const READY: &str = "test/ready";
 
@@ -153,10 +155,12 @@ struct Recorder {
 }
 
 impl Recorder {
-    fn start(file: PathBuf, locators: &[String]) -> Self {
+    /// Starts one that records to a file, or to a row of files where `more` says so.
+    fn start(file: PathBuf, locators: &[String], more: &[&str]) -> Self {
         let mut command = Command::new(program("isotherm-replay"));
         command.arg("record").arg(&file).args(["--until-service-stops", "--json"]);
         locators.iter().for_each(|locator| drop(command.args(["--connect", locator])));
+        command.args(more);
         for topic in ["raw", "reference", "corrected", "status", "service", "journal", READY] {
             command.args(["--topic", topic]);
         }
@@ -164,12 +168,23 @@ impl Recorder {
         Self { child, file }
     }
 
-    /// Waits for its end, with the service's; nothing may be lost.
-    fn wait(self) -> PathBuf {
-        let output = self.child.wait_with_output().unwrap();
-        let report = String::from_utf8(output.stdout).unwrap();
-        assert!(output.status.success(), "{}: {report}", output.status);
-        self.file
+    /// Its files so far, in their order.
+    fn files(&self) -> Vec<String> {
+        let stem = self.file.file_stem().unwrap().to_str().unwrap();
+        let folder = std::fs::read_dir(self.file.parent().unwrap()).unwrap();
+        let paths = folder.map(|entry| entry.unwrap().path().to_str().unwrap().to_owned());
+        let mut files: Vec<_> = paths.filter(|path| path.contains(&format!("/{stem}"))).collect();
+        files.sort();
+        files
+    }
+
+    /// Waits for its end, with the service's; nothing may be lost. Its files.
+    fn wait(mut self) -> Vec<String> {
+        let mut report = String::new();
+        std::io::Read::read_to_string(self.child.stdout.as_mut().unwrap(), &mut report).unwrap();
+        let status = self.child.wait().unwrap();
+        assert!(status.success(), "{status}: {report}");
+        self.files()
     }
 }
 
@@ -186,7 +201,7 @@ async fn until_heard(session: &Session) {
 /// Waits until a recorder writes its file.
 async fn until_recording(recorder: &Recorder) {
     let deadline = Instant::now() + LIMIT;
-    while !recorder.file.exists() {
+    while recorder.files().is_empty() {
         assert!(Instant::now() < deadline, "the recorder records");
         tokio::time::sleep(Duration::from_millis(5)).await;
     }
@@ -241,7 +256,7 @@ impl Scene {
 }
 
 /// Plays the session; the recordings from the beginning and from the middle.
-async fn play(folder: &Path) -> [PathBuf; 2] {
+async fn play(folder: &Path) -> [Vec<String>; 2] {
     let documents = folder.join("documents");
     std::fs::create_dir(&documents).unwrap();
     for number in 0..UNITS {
@@ -261,7 +276,7 @@ async fn play(folder: &Path) -> [PathBuf; 2] {
     let producers = open(&of_service).await.unwrap();
     let all: Vec<_> = to_service.into_iter().chain(locators(&producers)).collect();
 
-    let first = Recorder::start(folder.join("begin.mcap"), &all);
+    let first = Recorder::start(folder.join("begin.mcap"), &all, &[]);
     until_heard(&producers).await;
     let mut lines = Vec::new();
     for number in 0..UNITS {
@@ -275,7 +290,7 @@ async fn play(folder: &Path) -> [PathBuf; 2] {
         match chunk {
             STANDBY_AT => scene.command(json!({"command": "standby"})).await,
             RUN_AT => scene.command(json!({"command": "run"})).await,
-            MIDDLE => second = Some(Recorder::start(folder.join("middle.mcap"), &all)),
+            MIDDLE => second = Some(Recorder::start(folder.join("middle.mcap"), &all, &ROW)),
             MIDDLE_AT_LATEST => until_recording(second.as_ref().expect("it was started")).await,
             _ => {}
         }
@@ -303,12 +318,10 @@ async fn play(folder: &Path) -> [PathBuf; 2] {
 }
 
 /// Corrects a recording and has it compared with what the service published; the report by unit.
-fn corrected(recording: &Path, more: &[&str]) -> Vec<Value> {
-    let arguments = ["correct", recording.to_str().unwrap(), "--json"];
-    let output = process::run(
-        "isotherm-replay",
-        &arguments.into_iter().chain(more.iter().copied()).collect::<Vec<_>>(),
-    );
+fn corrected(recording: &[String], more: &[&str]) -> Vec<Value> {
+    let recording = recording.iter().map(String::as_str);
+    let arguments = ["correct", "--json"].into_iter().chain(recording).chain(more.iter().copied());
+    let output = process::run("isotherm-replay", &arguments.collect::<Vec<_>>());
     let (report, errors) =
         (String::from_utf8(output.stdout).unwrap(), String::from_utf8_lossy(&output.stderr));
     assert!(output.status.success(), "{}: {report}\n{errors}", output.status);
@@ -347,7 +360,12 @@ async fn ten_minutes_of_eight_units_are_corrected_again_to_the_bit() {
         }
         assert_eq!(unit["published"]["only_b"]["before"], 0, "{unit:#}");
     }
+    assert!(middle.len() > 2, "a row of files: {middle:?}");
     let part = corrected(&middle, &[]);
+    for unit in &part {
+        let equal = unit["replica"]["memories_equal"].as_u64().unwrap();
+        assert!(equal > 0, "the service's memory, to the bit: {unit:#}");
+    }
     for (part, whole) in ticks(&part).into_iter().zip(ticks(&whole)) {
         assert!(part > whole / 4 && part < whole, "{part} of {whole}");
     }
@@ -356,7 +374,7 @@ async fn ten_minutes_of_eight_units_are_corrected_again_to_the_bit() {
     corrected(&begin, &["--out", &one, "--threads", "1"]);
     assert_eq!(std::fs::read(&one).unwrap(), std::fs::read(&many).unwrap());
 
-    let begin = begin.to_str().unwrap();
+    let begin = begin[0].as_str();
     let identical = process::run("isotherm-replay", &["diff", begin, &many]);
     let words = String::from_utf8_lossy(&identical.stdout);
     assert!(identical.status.code() == Some(0) && words.ends_with("identical\n"), "{words}");

@@ -1,8 +1,7 @@
 //! Words and figures of a page.
 
-use isotherm_correction::units::Span;
-
 use crate::plot::PlotSummary;
+use crate::plot::time::seconds;
 
 /// What is to be known of the page as a whole.
 pub(super) fn remarks(summary: &PlotSummary) -> Vec<String> {
@@ -21,7 +20,7 @@ pub(super) fn remarks(summary: &PlotSummary) -> Vec<String> {
     if let Some(moved_ns) = summary.second_moved_ns {
         words.push(format!(
             "The logs are of different times: B is moved by {:.3} s so that both begin together.",
-            Span::from_ns(moved_ns).as_s()
+            seconds(moved_ns)
         ));
     }
     if summary.units_left_out > 0 {

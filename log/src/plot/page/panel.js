@@ -90,7 +90,7 @@ class Panel {
       const room = high > low ? 0.06 * (high - low) : Math.max(Math.abs(low) * 1e-6, 1e-9);
       [low, high] = [low - room, high + room];
     }
-    const most = Math.max(2, Math.round(this.height / 34));
+    const most = Math.max(2, Math.round(this.height / 27));
     const { values, decimals } = logarithmic ? logTicks(low, high, most) : linearTicks(low, high, most);
     const ticks = values.map(value => ({ value, label: tickLabel(value, decimals) }));
     return { ticks, ...mapping([low, high], this.height, logarithmic) };

@@ -32,12 +32,12 @@ fn page() -> Page {
         logarithmic: false,
         content,
     };
-    let bits = Arc::new(Bits(vec![0, 1, 3, 2]));
+    let flags = Arc::new(Bits(vec![0, 1, 3, 2]));
     let lane = |bit| Lane::Bit {
         name: format!("bit {bit}"),
         ink: Ink::Alert,
         bit,
-        bits: Arc::clone(&bits),
+        bits: Arc::clone(&flags),
         places: Places::Points(Arc::clone(&x)),
     };
     let stretch = Stretch { from: 0.0, to: 2.0, label: "standby".into(), ink: Ink::Third };

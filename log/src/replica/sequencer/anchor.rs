@@ -26,6 +26,10 @@ impl Sequencer {
             return false;
         }
         let Some(mark) = self.marks.front().cloned() else { return false };
+        if let Some(better) = self.better_memory(&mark) {
+            self.marks.drain(..better);
+            return true;
+        }
         let cuts =
             if mark.kind == MarkKind::Memory { self.behind_memory(&mark) } else { self.before_first(&mark) };
         // A stream whose service has stopped is gone; one that was killed may have heard what comes before the cut.
@@ -34,6 +38,24 @@ impl Sequencer {
         }
         self.given.iter_mut().for_each(VecDeque::clear);
         self.carry_out(true)
+    }
+
+    /// Place, among the entries to come, of a memory to begin with instead of `mark`.
+    ///
+    /// A recorder may have asked before it heard the producers. Where the last gyro frame that the memory has heard is not in
+    /// the recording, some that came behind it may be missing too; a later memory is then the surer one to begin with.
+    fn better_memory(&self, mark: &Mark) -> Option<usize> {
+        let gyro = Input::Raw(RawStream::Gyro).index();
+        let heard = mark.heard.get(gyro).filter(|_| mark.kind == MarkKind::Memory)?;
+        let recorded = self.waiting.get(gyro)?.iter().any(|frame| frame.crc() == heard.crc);
+        if recorded || heard.frames == 0 {
+            return None;
+        }
+        let mut later = self.marks.iter().enumerate().skip(1);
+        let later =
+            later.find(|(_, later)| later.kind == MarkKind::Memory && later.instance == mark.instance);
+        let goes_on = |later: &Mark| later.heard.get(gyro).is_some_and(|later| later.frames > heard.frames);
+        later.filter(|(_, later)| goes_on(later)).map(|(place, _)| place)
     }
 
     /// The input whose next frame was recorded first, of those whose next frame is before their cut.

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use comfy_table::{CellAlignment, Table, presets};
-use isotherm_correction::units::Span;
+use isotherm_correction::units::{Span, Timestamp};
 use isotherm_log::info::{
     FileInfo, JournalInfo, LogInfo, Readings, Spread, StateInfo, StatusInfo, TopicInfo, UnitInfo,
 };
@@ -332,7 +332,7 @@ fn seconds(ns: u64) -> String {
 
 /// A time as seconds behind the beginning.
 fn after(ns: i64, begin_ns: i64) -> String {
-    format!("{:.6} s from the beginning", Span::from_ns(ns.saturating_sub(begin_ns)).as_s())
+    format!("{:.6} s from the beginning", Timestamp::from_ns(ns).seconds_from(Timestamp::from_ns(begin_ns)))
 }
 
 fn hexadecimal(digest: [u8; 8]) -> String {

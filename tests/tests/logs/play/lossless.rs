@@ -60,11 +60,12 @@ async fn nothing_is_lost_while_somebody_stalls(seconds: u32, batch: &str) {
     let unit = UnitId::new(UNIT).unwrap();
     let mut consumer = Consumer::declare(&consuming, Some(&unit)).await.unwrap();
     let (sender, stalled) = tokio::sync::oneshot::channel();
-    let mut sender = Some(sender);
+    let sender = std::sync::Mutex::new(Some(sender));
     let _blocked = blocked
         .declare_subscriber(key::corrected(&unit))
         .callback(move |_| {
-            if let Some(sender) = sender.take() {
+            let first = sender.lock().unwrap().take();
+            if let Some(sender) = first {
                 std::thread::sleep(STALL);
                 let _ = sender.send(());
             }
