@@ -117,6 +117,8 @@ pub struct NoiseFit {
 const ROUNDS: usize = 6;
 /// A squared coefficient below so many of its sigmas is not observable: 5 % on one side.
 const LEAST_SIGMAS: f64 = 1.645;
+/// χ² per degree of freedom beyond which the five terms do not describe a log.
+const LARGEST_CHI_SQUARE: f64 = 3.0;
 /// Half width of a 95 % interval in sigmas.
 const SIGMAS_95: f64 = 1.96;
 
@@ -134,17 +136,24 @@ impl NoiseFit {
         let (squares, kept) = whitened.eliminate()?;
         let (_, cost, sigmas) = whitened.solve(&kept)?;
         let degrees = variances.len().saturating_sub(kept.len()).max(1);
+        #[expect(clippy::cast_precision_loss, reason = "a handful")]
+        let chi_square_per_degree = cost / degrees as f64;
+        let widen = widen(chi_square_per_degree);
         let mut coefficients = [Coefficient::NotObservable { below: 0.0 }; 5];
         for (place, coefficient) in coefficients.iter_mut().enumerate() {
             let square = squares[place];
             *coefficient = match kept.iter().position(|term| *term == place) {
-                Some(at) => observed(square, sigmas.get(at).copied().unwrap_or(0.0)),
-                None => Coefficient::NotObservable { below: whitened.limit(&kept, place) },
+                Some(at) => observed(square, widen * sigmas.get(at).copied().unwrap_or(0.0)),
+                None => Coefficient::NotObservable { below: whitened.limit(&kept, place, widen) },
             };
         }
-        #[expect(clippy::cast_precision_loss, reason = "a handful")]
-        let chi_square_per_degree = cost / degrees as f64;
         Some(Self { coefficients, chi_square_per_degree })
+    }
+
+    /// Whether the five terms describe the log; otherwise something else than noise is in it, and uncertainties are widened.
+    #[must_use]
+    pub fn describes(&self) -> bool {
+        self.chi_square_per_degree <= LARGEST_CHI_SQUARE
     }
 
     /// What the fit says of a coefficient.
@@ -169,6 +178,11 @@ impl NoiseFit {
         let largest = Term::ALL.into_iter().max_by(|a, b| of[*a as usize].total_cmp(&of[*b as usize]));
         largest.filter(|term| of[*term as usize] > 0.0).unwrap_or(Term::AngleRandomWalk)
     }
+}
+
+/// Factor on all sigmas where the five terms do not describe the log.
+fn widen(chi_square_per_degree: f64) -> f64 {
+    if chi_square_per_degree > LARGEST_CHI_SQUARE { chi_square_per_degree.sqrt() } else { 1.0 }
 }
 
 /// A coefficient with the interval that χ² with its equivalent degrees of freedom gives its square.
@@ -345,11 +359,11 @@ impl Whitened {
     }
 
     /// What the coefficient of a term that was left out is below.
-    fn limit(&self, kept: &[usize], term: usize) -> f64 {
+    fn limit(&self, kept: &[usize], term: usize, widen: f64) -> f64 {
         let mut terms = kept.to_vec();
         terms.push(term);
         let Some((squares, _, sigmas)) = self.solve(&terms) else { return f64::INFINITY };
         let square = squares.last().copied().unwrap_or(0.0).max(0.0);
-        (square + SIGMAS_95 * sigmas.last().copied().unwrap_or(f64::INFINITY)).sqrt()
+        (square + widen * SIGMAS_95 * sigmas.last().copied().unwrap_or(f64::INFINITY)).sqrt()
     }
 }

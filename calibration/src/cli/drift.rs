@@ -34,6 +34,7 @@ const SCHEMA_LINE: &str = "#:schema ../calibration.schema.json\n\n";
     isotherm-calibrate drift static.mcap --document unit.toml --out unit-drift.toml\n\n\
     With --document the log is corrected first, by the service's own code, and what is analysed is what the calibration leaves. \
     Rates are in °/h, N in °/√h, K in °/h/√h, R in °/h², Q in ″.")]
+#[expect(clippy::struct_excessive_bools, reason = "switches of a command line")]
 pub(super) struct DriftArgs {
     #[command(flatten)]
     log: LogArgs,

@@ -152,7 +152,9 @@ impl Columns {
         }
         stream.flush();
         stream.take_ready().iter().for_each(|tick| columns.push(tick));
-        if let Some(found) = found.filter(|found| *found != loaded.unit) {
+        // A text log names no unit.
+        let named = found.filter(|found| *found != loaded.unit && log.recording().is_some());
+        if let Some(found) = named {
             columns.notes.push(format!("The log is of unit {found}, the document for {}.", loaded.unit));
         }
         columns.finish()

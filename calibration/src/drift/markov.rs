@@ -20,6 +20,8 @@ const LEAST_GAIN: f64 = 9.21;
 const LINE_CHI_SQUARE: f64 = 13.8;
 /// A line shows from so many periods on.
 const PERIODS: f64 = 2.0;
+/// Shortest correlation time (h), a reference of a minute: what is faster is noise to the estimator.
+const SHORTEST_TIME_H: f64 = 1.0 / 60.0;
 /// Step of the numeric second derivatives, in natural logarithms.
 const DIFFERENCE: f64 = 0.05;
 
@@ -35,7 +37,7 @@ pub struct Beside {
 /// Size of the noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Noise {
-    /// τ (h); infinite share of nothing where there is no Markov part.
+    /// τ (h).
     pub correlation_time_h: f64,
     /// Variance of the white part of a bin over that of the Markov part.
     pub white_ratio: f64,
@@ -214,8 +216,8 @@ impl<'a> Problem<'a> {
 
     /// The most likely noise, by a grid and then ever smaller steps.
     fn best(&self) -> [f64; 2] {
-        let shortest = libm::log(0.5 * self.slow.width_h);
-        let longest = libm::log(60.0 * self.span_h[1]);
+        let shortest = libm::log(self.slow.width_h.max(SHORTEST_TIME_H));
+        let longest = libm::log((60.0 * self.span_h[1]).max(2.0 * SHORTEST_TIME_H));
         let mut best = ([shortest, 0.0], f64::INFINITY);
         for i in 0..20 {
             for j in 0..14 {
@@ -305,9 +307,8 @@ impl Fit {
         Some(Self::build(&problem, beside, noise, &solution))
     }
 
-    /// The same, with the lines of the day that stand out beside the trend, and what is to be said of each.
-    ///
-    /// Lines of the hall must not count as the gyro's drift, so σ and τ are those without them.
+    /// The same, with the lines of the day that stand out beside the trend, and what is to be said of each:
+    /// lines of the hall must not count as the gyro's drift, so σ and τ are those without them.
     #[must_use]
     pub fn with_daily_lines(slow: &Slow, degree: u32) -> Option<(Self, Vec<DailyLine>)> {
         let length_h = slow.length_h();

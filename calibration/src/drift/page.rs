@@ -32,6 +32,7 @@ pub fn page(report: &Report) -> String {
         "Coefficients are fitted to the overlapping variances with their covariance; intervals hold 95 %. A coefficient that the \
          log does not show is given as the limit that it is below.",
     );
+    report.noise_words().iter().for_each(|words| page.paragraph(words));
     page.heading("Drift");
     page.chart(&slow(report));
     tabulate(&mut page, report.drift_rows());
@@ -135,7 +136,7 @@ fn allan(report: &Report) -> Chart {
                 .allan
                 .iter()
                 .map(|row| (row.tau_s, noise.variances(row.tau_s).iter().sum::<f64>().sqrt()));
-            curves.push(series("fit".to_owned(), Ink::Alert, Form::Line, fit));
+            curves.push(series("fit".to_owned(), Ink::Fourth, Form::Line, fit));
         }
         panel(format!("{} {}", report.kind.sensor(), sensor.name), report.kind.measure(), true, curves)
     };
@@ -157,7 +158,7 @@ fn slow(report: &Report) -> Chart {
             slow.time_h.iter().copied().zip(slow.mean.iter().copied()),
         )];
         let fits = [
-            (sensor.markov.as_ref().map(|(fit, _)| fit), "first order", Ink::First),
+            (sensor.markov.as_ref().map(|(fit, _)| fit), "first order", Ink::Second),
             (sensor.second_order.as_ref(), "second order", Ink::Third),
         ];
         for (fit, name, ink) in fits {
@@ -185,7 +186,7 @@ fn autocorrelation(report: &Report) -> Option<Chart> {
             &sensor.markov
         {
             let model = auto.lag_h.iter().map(|lag| (*lag, libm::exp(-lag / time_h)));
-            curves.push(series("Markov part".to_owned(), Ink::First, Form::Line, model));
+            curves.push(series("Markov part".to_owned(), Ink::Second, Form::Line, model));
         }
         Some(panel(format!("{} {}", report.kind.sensor(), sensor.name), "", false, curves))
     };
@@ -209,7 +210,7 @@ fn extrapolation(report: &Report) -> Chart {
         let rest = slow.time_h.iter().filter(|time| **time - first > found.fit_h);
         let curves = vec![
             series("slow part".to_owned(), Ink::Raw, Form::Line, points),
-            series("fitted".to_owned(), Ink::First, Form::Line, fitted.map(|time| (*time, line(*time)))),
+            series("fitted".to_owned(), Ink::Second, Form::Line, fitted.map(|time| (*time, line(*time)))),
             series("extrapolated".to_owned(), Ink::Alert, Form::Line, rest.map(|time| (*time, line(*time)))),
         ];
         Some(panel(format!("{} {}", report.kind.sensor(), sensor.name), report.kind.measure(), false, curves))

@@ -3,6 +3,7 @@
 use isotherm_protocol::document::{Document, Drift};
 
 use super::analysis::Analysis;
+use super::figures::short;
 use super::markov::{Estimate, Fit};
 use crate::allan::{Coefficient, Term};
 use crate::error::Error;
@@ -14,6 +15,8 @@ pub const TREND_CORRELATION_TIME_H: f64 = 140.0;
 pub const TREND_SIGMAS: f64 = 2.0;
 /// The constant part where nobody states it, in standard deviations of the slow part.
 const CONSTANT_SIGMAS: f64 = 10.0;
+/// Length of a reference at rest (s).
+const REFERENCE_S: f64 = 60.0;
 /// Ranges that a document allows.
 const TIME_RANGE_H: [f64; 2] = [0.02, 250_000.0];
 const INITIAL_RANGE: [f64; 2] = [1e-6, 20_000.0];
@@ -65,11 +68,7 @@ impl Parameters {
                 (0.0, TREND_CORRELATION_TIME_H)
             }
         };
-        let walk = analysis.noise.as_ref().map(|noise| noise.of_term(Term::AngleRandomWalk));
-        if let Some(Coefficient::NotObservable { .. }) = walk {
-            notes.push("angle random walk is not observable: its upper limit stands in its place".to_owned());
-        }
-        let walk = walk.map_or(analysis.deviation, Coefficient::value_or_limit) / 60.0;
+        let walk = walk(analysis, &mut notes) / 60.0;
         let initial = initial_sigma.unwrap_or_else(|| {
             notes.push(format!(
                 "one log at rest cannot tell the constant part from the Earth's rate: initial_sigma is {CONSTANT_SIGMAS} \
@@ -96,6 +95,35 @@ impl Parameters {
     pub fn to_toml(&self, name: &str) -> Result<String, Error> {
         let body = toml::to_string(&self.drift).map_err(|error| Error::Document(vec![error.to_string()]))?;
         Ok(format!("# gyro {name}\n[gyro.sensor.drift]\n{body}"))
+    }
+}
+
+/// N (°/h·√s).
+fn walk(analysis: &Analysis, notes: &mut Vec<String>) -> f64 {
+    match &analysis.noise {
+        Some(noise) if noise.describes() => {
+            let walk = noise.of_term(Term::AngleRandomWalk);
+            if let Coefficient::NotObservable { .. } = walk {
+                notes.push(
+                    "angle random walk is not observable: its upper limit stands in its place".to_owned(),
+                );
+            }
+            walk.value_or_limit()
+        }
+        _ => {
+            // What the estimator sees is means over a reference.
+            let far = |tau: f64| libm::log(tau / REFERENCE_S).abs();
+            let overlapping =
+                analysis.allan.iter().filter_map(|row| Some((row.tau_s, row.of[1].as_ref()?.value)));
+            let nearest = overlapping.min_by(|a, b| far(a.0).total_cmp(&far(b.0)));
+            let (tau_s, deviation) = nearest.unwrap_or((1.0, analysis.deviation));
+            notes.push(format!(
+                "the five noise terms do not describe the log: the angle random walk is that of means over {} s, as long as a \
+                 reference",
+                short(tau_s)
+            ));
+            deviation * tau_s.sqrt()
+        }
     }
 }
 

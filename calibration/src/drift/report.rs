@@ -9,7 +9,7 @@ use super::analysis::{Analysis, Deviation};
 use super::columns::Kind;
 use super::figures::{short, stated_in, table, with_interval};
 use super::parameters::{Parameters, Trend, markov, trend};
-use crate::allan::{Coefficient, Term};
+use crate::allan::{Coefficient, NoiseFit, Term};
 
 /// What is said of the log as a whole.
 #[derive(Debug, Clone, Serialize)]
@@ -47,7 +47,9 @@ impl Report {
         let of = |analysis: &Analysis| {
             let walk = analysis.noise.as_ref().map(|noise| noise.of_term(Term::AngleRandomWalk));
             let (factor, unit) = stated_in(Term::AngleRandomWalk, self.kind);
+            let described = analysis.noise.as_ref().is_some_and(NoiseFit::describes);
             let mut words = match walk {
+                Some(_) if !described => "more than noise in it".to_owned(),
                 Some(Coefficient::Observed { value, .. }) => format!("N {} {unit}", short(value * factor)),
                 Some(Coefficient::NotObservable { below }) => {
                     format!("N below {} {unit}", short(below * factor))
@@ -199,6 +201,22 @@ impl Report {
         (head, rows.collect())
     }
 
+    /// Sensors whose Allan deviation the five terms do not describe.
+    #[must_use]
+    pub fn noise_words(&self) -> Vec<String> {
+        let badly = self.sensors.iter().filter_map(|sensor| {
+            let noise = sensor.noise.as_ref().filter(|noise| !noise.describes())?;
+            Some(format!(
+                "{} {}: the five terms do not describe this log (χ² per degree of freedom {}): vibration, motion or a change of \
+                 temperature is in it. Read the diagram, not the coefficients; their uncertainties are widened by √χ².",
+                self.kind.sensor(),
+                sensor.name,
+                short(noise.chi_square_per_degree)
+            ))
+        });
+        badly.collect()
+    }
+
     /// What is to be said of lines, by sensor.
     #[must_use]
     pub fn line_words(&self) -> Vec<String> {
@@ -264,7 +282,7 @@ impl Report {
         part("Noise coefficients (95 % confidence)", self.noise_rows());
         part("Drift", self.drift_rows());
         part("A straight line through the beginning, extrapolated", self.extrapolation_rows());
-        for line in self.line_words() {
+        for line in self.noise_words().into_iter().chain(self.line_words()) {
             let _ = writeln!(text, "\n{line}");
         }
         for (name, parameters) in &self.parameters {

@@ -195,7 +195,7 @@ impl Report {
     fn chart(&self, case: &str) -> Chart {
         let curves = |of: &dyn Fn(&Course) -> Vec<(f64, f64)>| {
             let rows =
-                self.rows.iter().filter(|row| row.case == case).zip([Ink::Alert, Ink::Second, Ink::First]);
+                self.rows.iter().filter(|row| row.case == case).zip([Ink::Third, Ink::Second, Ink::First]);
             let curve = |(row, ink): (&Row, Ink)| Series {
                 name: row.course.care.words().to_owned(),
                 ink,
@@ -209,10 +209,18 @@ impl Report {
                 course.points.iter().map(|(hours, errors)| (*hours, of(errors))).collect::<Vec<_>>()
             }
         };
-        let azimuth = |course: &Course| {
-            let left = course.points.iter().zip(&course.left);
-            left.map(|((hours, _), left)| (*hours, left[2] * DEG_PER_H_IN_RAD_PER_S)).collect::<Vec<_>>()
+        // The gyro of which most is left.
+        let rows = || self.rows.iter().filter(|row| row.case == case);
+        let most = |axis: usize| {
+            let left = rows().flat_map(|row| row.course.left.iter());
+            left.map(|left| left[axis].abs()).fold(0.0, f64::max)
         };
+        let axis = [2, 0, 1].into_iter().max_by(|a, b| most(*a).total_cmp(&most(*b))).unwrap_or(2);
+        let left = |course: &Course| {
+            let left = course.points.iter().zip(&course.left);
+            left.map(|((hours, _), left)| (*hours, left[axis] * DEG_PER_H_IN_RAD_PER_S)).collect::<Vec<_>>()
+        };
+        let title = format!("drift of gyro {} that is left", ["x", "y", "z"][axis]);
         let panel = |title: &str, unit: &str, content| Panel {
             title: title.to_owned(),
             unit: unit.to_owned(),
@@ -226,7 +234,7 @@ impl Report {
             panels: vec![
                 panel("radial position error", "m", curves(&errors(Errors::radial_m))),
                 panel("heading error", "′", curves(&errors(Errors::heading_arcmin))),
-                panel("drift of the azimuth gyro that is left", "°/h", curves(&azimuth)),
+                panel(&title, "°/h", curves(&left)),
             ],
             marks: Vec::new(),
         }

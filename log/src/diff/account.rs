@@ -103,6 +103,8 @@ pub struct Account {
     pub ticks: u64,
     /// Of these, how many differ by more than is allowed.
     pub different: u64,
+    /// Ticks of both that were made by different documents, whether they differ or not; where both logs say by which.
+    pub other_document: u64,
     /// Ticks of the first log alone.
     pub only_a: Only,
     /// Ticks of the second log alone.
@@ -226,6 +228,8 @@ impl Comparison {
             (Some(a), Some(b)) => {
                 self.settle_only();
                 self.account.ticks += 1;
+                let other = a.digest.zip(b.digest).is_some_and(|(a, b)| a != b);
+                self.account.other_document += u64::from(other);
                 if !identical(a, b) && self.different(a, b, &row) {
                     return;
                 }

@@ -9,7 +9,8 @@ use serde::Serialize;
 pub struct LogTick {
     /// The tick.
     pub tick: CorrectedTick,
-    /// Head of the SHA-256 of the calibration document; `None` where the log does not have it.
+    /// Head of the SHA-256 of the calibration document; `None` where the log does not have it. It says who made the tick and
+    /// is no part of it: the same increments by two documents are the same tick.
     pub digest: Option<[u8; 8]>,
     /// What the journal says happened right before it, in words.
     pub event: Option<Box<str>>,
@@ -74,7 +75,6 @@ pub const AXES: [&str; 3] = ["x", "y", "z"];
 #[must_use]
 pub fn differences(a: &LogTick, b: &LogTick, tolerance: &Tolerance) -> Vec<FieldDifference> {
     let mut found = Found { fields: Vec::new(), tolerance };
-    let (digest_a, digest_b) = (a.digest, b.digest);
     let (a, b) = (&a.tick, &b.tick);
     found.plain("sequence", a.sequence, b.sequence);
     found.plain("end_time_ns", a.end_time.as_ns(), b.end_time.as_ns());
@@ -106,23 +106,18 @@ pub fn differences(a: &LogTick, b: &LogTick, tolerance: &Tolerance) -> Vec<Field
     let limit = tolerance.velocity_m_per_s / seconds;
     found.numbers("accel_parity", "m_per_s2", (&a.accel_parity, &b.accel_parity), limit, &force);
     found.plain("revision", a.revision, b.revision);
-    if let (Some(a), Some(b)) = (digest_a, digest_b) {
-        found.words("digest", a, b, |digest| format!("{:016x}", u64::from_be_bytes(digest)));
-    }
     found.fields
 }
 
-/// Whether two ticks are the same, bit for bit.
+/// Whether two ticks are the same, bit for bit, whichever document made them.
 #[must_use]
 pub fn identical(a: &LogTick, b: &LogTick) -> bool {
     // As bits: zero has a sign, and what is not a number may still be the same.
     let same =
         |a: &[f64], b: &[f64]| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits());
-    let digests = a.digest.zip(b.digest).is_none_or(|(a, b)| a == b);
     let (a, b) = (&a.tick, &b.tick);
-    digests
-        && (a.sequence, a.end_time, a.duration, a.ticks, a.missed)
-            == (b.sequence, b.end_time, b.duration, b.ticks, b.missed)
+    (a.sequence, a.end_time, a.duration, a.ticks, a.missed)
+        == (b.sequence, b.end_time, b.duration, b.ticks, b.missed)
         && same(&a.delta_angle, &b.delta_angle)
         && same(&a.delta_velocity, &b.delta_velocity)
         && (a.mode, a.flags, a.revision) == (b.mode, b.flags, b.revision)

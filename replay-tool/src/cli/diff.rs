@@ -150,6 +150,10 @@ fn human(report: &Report<'_>) -> String {
     }
     table.column_iter_mut().skip(1).for_each(|column| column.set_cell_alignment(CellAlignment::Right));
     let mut text = format!("{table}\n");
+    for (unit, account) in report.units.iter().filter(|(_, account)| account.other_document > 0) {
+        let count = account.other_document;
+        text += &format!("unit {unit}: {count} ticks in both were made by different calibration documents\n");
+    }
     for (unit, account) in report.units {
         let Some(first) = &account.first else { continue };
         text += &format!("\nunit {unit}: the first difference\n");

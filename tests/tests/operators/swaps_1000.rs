@@ -296,20 +296,51 @@ fn written(state: &Path) -> BTreeMap<String, Vec<Written>> {
     units
 }
 
+/// A revision with its first tick, and what it needs offline.
+struct Compiled {
+    first: FirstTick,
+    /// It and its slew; in front of it those that were replaced before a single tick was corrected with them. They made no
+    /// tick, but a slew begins where they were.
+    changes: Vec<(u64, Arc<Calibration>, Span)>,
+}
+
+/// The revisions that made ticks, compiled, in order.
+fn compile(unit: &str, revisions: &[Written], state: &Path) -> Vec<Compiled> {
+    let mut compiled = Vec::new();
+    let mut changes = Vec::new();
+    for Written { acceptance, first } in revisions {
+        let Acceptance { revision, digest, slew_ms, schedule, .. } = acceptance;
+        if first.is_none() && *schedule != Schedule::NextTick {
+            continue;
+        }
+        let parsed = Document::parse(&kept(state, digest), None).expect("what was accepted is valid");
+        assert_eq!(parsed.document.unit, unit);
+        let slew = Span::from_ms(u32::try_from(*slew_ms).unwrap());
+        changes.push((*revision, Arc::new(parsed.calibration), slew));
+        if let Some(first) = *first {
+            compiled.push(Compiled { first, changes: std::mem::take(&mut changes) });
+        }
+    }
+    assert!(
+        compiled.is_sorted_by_key(|revision| revision.first.first_sequence),
+        "{unit}: in the order of their ticks"
+    );
+    compiled
+}
+
 /// The same ticks corrected offline, with the documents of the audit file from the ticks on that it names.
-fn offline(scenario: &Scenario, revisions: &[(FirstTick, Arc<Calibration>, Span)]) -> Vec<CorrectedTick> {
+fn offline(scenario: &Scenario, revisions: &[Compiled]) -> Vec<CorrectedTick> {
     let output = scenario.instrument.gyros.output_kind();
     let accel_output = scenario.instrument.accel_output_kind().unwrap();
     let mut unit = Unit::new(UnitSettings::default());
     let mut ticks = Vec::new();
-    let mut revisions = revisions.iter();
+    let mut revisions = revisions.iter().peekable();
     for step in Simulation::new(scenario).unwrap().take(usize::try_from(TICKS).unwrap()) {
-        if unit.pending().is_none()
-            && let Some((first, calibration, slew)) = revisions.next()
-        {
-            let at = At::Sequence(first.first_sequence);
-            let calibration = Arc::clone(calibration);
-            unit.schedule(Change { calibration, revision: first.revision, at, slew: *slew });
+        if let Some(due) = revisions.next_if(|due| due.first.first_sequence == step.gyro.sequence) {
+            for (revision, calibration, slew) in &due.changes {
+                let (revision, calibration, slew) = (*revision, Arc::clone(calibration), *slew);
+                unit.schedule(Change { calibration, revision, at: At::NextTick, slew });
+            }
         }
         let mut emit = |tick: &CorrectedTick| ticks.push(tick.clone());
         unit.handle(Event::Temperature(&step.temperatures), &mut emit);
@@ -326,19 +357,7 @@ fn offline(scenario: &Scenario, revisions: &[(FirstTick, Arc<Calibration>, Span)
 fn judge(number: u64, batches: &[CorrectedBatch], revisions: &[Written], state: &Path) {
     let unit = serial(number);
     let in_force: Vec<_> = revisions.iter().filter(|written| written.first.is_some()).collect();
-    let compiled: Vec<_> = in_force
-        .iter()
-        .map(|written| {
-            let Acceptance { digest, slew_ms, .. } = &written.acceptance;
-            let parsed = Document::parse(&kept(state, digest), None).expect("what was accepted is valid");
-            assert_eq!(parsed.document.unit, unit);
-            let slew = Span::from_ms(u32::try_from(*slew_ms).unwrap());
-            (written.first.unwrap(), Arc::new(parsed.calibration), slew)
-        })
-        .collect();
-    for (before, after) in compiled.iter().zip(compiled.iter().skip(1)) {
-        assert!(before.0.first_sequence < after.0.first_sequence, "{unit}: in the order of their ticks");
-    }
+    let compiled = compile(&unit, revisions, state);
     let expected = offline(&scenario(number), &compiled);
     let mut expected = expected.as_slice();
     let mut outputs = 0;
