@@ -67,8 +67,8 @@ class Player:
         _, status = os.waitpid(self.pid, 0)
         if os.waitstatus_to_exitcode(status) != code:
             sys.exit("exit code %d: %r" % (os.waitstatus_to_exitcode(status), self.text))
-        summaries = [line for line in self.text.splitlines() if line.startswith("{")]
-        return json.loads(summaries[-1])
+        # What takes the bar away may stand before it on its line.
+        return json.loads(re.findall(r"\{.*\}", self.text)[-1])
 
 
 def check(holds, what):

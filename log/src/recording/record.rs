@@ -49,7 +49,7 @@ mod tests {
     fn an_attachment_of_any_bytes_is_no_panic() {
         for length in 0..64 {
             for byte in [0, 1, 4, 20, 255] {
-                assert!(parse(op::ATTACHMENT, &vec![byte; length]).is_err() || length == 32 && byte == 0);
+                assert!(parse(op::ATTACHMENT, &vec![byte; length]).is_err() || length == 36 && byte == 0);
             }
         }
     }

@@ -88,6 +88,8 @@ pub struct Recovery {
     input: PathBuf,
     read: Arc<AtomicU64>,
     length: u64,
+    /// It begins as a recording does.
+    begins_well: bool,
 }
 
 impl Recovery {
@@ -97,7 +99,8 @@ impl Recovery {
     /// [`Error::File`] where it cannot be read.
     pub fn open(input: &Path) -> Result<Self, Error> {
         let scanner = Scanner::open(input)?;
-        Ok(Self { input: input.to_owned(), read: Arc::default(), length: scanner.length() })
+        let (length, begins_well) = (scanner.length(), scanner.begins_well());
+        Ok(Self { input: input.to_owned(), read: Arc::default(), length, begins_well })
     }
 
     /// How far it has been read.
@@ -129,7 +132,7 @@ impl Recovery {
                 &mut watch,
             )?;
         }
-        if report.chunks + report.attachments + report.metadata == 0 && report.damaged_places > 0 {
+        if report.chunks + report.attachments + report.metadata == 0 && !self.begins_well {
             // What was written holds nothing.
             let _ = std::fs::remove_file(output);
             let source = std::io::Error::other("nothing in it is whole, or it is no recording");

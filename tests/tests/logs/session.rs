@@ -4,8 +4,9 @@
 //! lost, doubled and out of order on the producers' side. One recorder is there from the beginning, another comes in the
 //! middle.
 
-use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+mod recorder;
+
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use isotherm_bus::{SessionOptions, close, locators, open};
@@ -19,11 +20,13 @@ use isotherm_simulator::{Scenario, Simulation, Step};
 use isotherm_tests::bench::LIMIT;
 use isotherm_tests::dice::Dice;
 use isotherm_tests::operator::Operator;
-use isotherm_tests::process::{self, program};
+use isotherm_tests::process;
 use serde_json::{Value, json};
 use zenoh::Session;
 use zenoh::pubsub::Publisher;
 use zenoh::qos::{CongestionControl, Priority};
+
+use recorder::{Recorder, until_heard, until_recording};
 
 const DOCUMENT: &str = include_str!("../../../config/calibration/ZLG-0001.toml");
 const UNITS: usize = 8;
@@ -45,8 +48,6 @@ const MIDDLE: u64 = 95;
 const MIDDLE_AT_LATEST: u64 = 115;
 /// It begins a new file every second, and asks for the memory of every unit for each.
 const ROW: [&str; 2] = ["--max-duration", "1"];
-/// A key that recorders listen to last: who publishes on it knows when they hear everything.
-const READY: &str = "test/ready";
 
 fn serial(number: usize) -> String {
     format!("LOG-{number}")
@@ -145,67 +146,6 @@ impl Line {
         let index = RawStream::ALL.iter().position(|stream| *stream == frame.stream).unwrap();
         self.publishers[index].put(frame.frame.clone()).await.unwrap();
         self.sent += if frame.stream == RawStream::Gyro { frame.ticks } else { 0 };
-    }
-}
-
-/// A recorder in a process of its own.
-struct Recorder {
-    child: Child,
-    file: PathBuf,
-}
-
-impl Recorder {
-    /// Starts one that records to a file, or to a row of files where `more` says so.
-    fn start(file: PathBuf, locators: &[String], more: &[&str]) -> Self {
-        let mut command = Command::new(program("isotherm-replay"));
-        command.arg("record").arg(&file).args(["--until-service-stops", "--json"]);
-        for locator in locators {
-            command.args(["--connect", locator]);
-        }
-        command.args(more);
-        for topic in ["raw", "reference", "corrected", "status", "service", "journal", READY] {
-            command.args(["--topic", topic]);
-        }
-        let child = command.stdout(Stdio::piped()).spawn().expect("the recorder starts");
-        Self { child, file }
-    }
-
-    /// Its files so far, in their order.
-    fn files(&self) -> Vec<String> {
-        let stem = self.file.file_stem().unwrap().to_str().unwrap();
-        let folder = std::fs::read_dir(self.file.parent().unwrap()).unwrap();
-        let paths = folder.map(|entry| entry.unwrap().path().to_str().unwrap().to_owned());
-        let mut files: Vec<_> = paths.filter(|path| path.contains(&format!("/{stem}"))).collect();
-        files.sort();
-        files
-    }
-
-    /// Waits for its end, with the service's; nothing may be lost. Its files.
-    fn wait(mut self) -> Vec<String> {
-        let mut report = String::new();
-        std::io::Read::read_to_string(self.child.stdout.as_mut().unwrap(), &mut report).unwrap();
-        let status = self.child.wait().unwrap();
-        assert!(status.success(), "{status}: {report}");
-        self.files()
-    }
-}
-
-/// Waits until a recorder hears what is published on the session.
-async fn until_heard(session: &Session) {
-    let ready = session.declare_publisher(READY).await.unwrap();
-    let deadline = Instant::now() + LIMIT;
-    while !ready.matching_status().await.unwrap().matching() {
-        assert!(Instant::now() < deadline, "the recorder listens");
-        tokio::time::sleep(Duration::from_millis(5)).await;
-    }
-}
-
-/// Waits until a recorder writes its file.
-async fn until_recording(recorder: &Recorder) {
-    let deadline = Instant::now() + LIMIT;
-    while recorder.files().is_empty() {
-        assert!(Instant::now() < deadline, "the recorder records");
-        tokio::time::sleep(Duration::from_millis(5)).await;
     }
 }
 

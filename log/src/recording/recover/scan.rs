@@ -4,8 +4,9 @@ use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 
-use mcap::read::ChunkReader;
+use mcap::McapError;
 use mcap::records::{Record, op};
+use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use serde::Serialize;
 
 use crate::error::Error;
@@ -73,6 +74,11 @@ impl Scanner {
         (&mut file).take(MAGIC.len() as u64).read_to_end(&mut magic).map_err(failed)?;
         let offset = if magic == MAGIC { length.min(MAGIC.len() as u64) } else { 0 };
         Ok(Self { file: BufReader::with_capacity(WINDOW, file), offset, length, footer: false })
+    }
+
+    /// Whether it begins as a recording does. Called before the first piece is taken.
+    pub(super) fn begins_well(&self) -> bool {
+        self.offset > 0
     }
 
     /// Length of the file (bytes).
@@ -200,24 +206,38 @@ fn head_of(bytes: &[u8]) -> Option<(u8, u64)> {
 
 /// The piece that these bytes are, with everything checked that can be.
 fn whole(opcode: u8, data: &[u8]) -> Result<Piece, String> {
-    let damaged = |error: mcap::McapError| format!("{} is damaged: {error}", name(opcode));
+    let damaged = |error: McapError| format!("{} is damaged: {error}", name(opcode));
     if opcode == op::METADATA && metadata_length(data) != Some(data.len()) {
         return Err("a metadata record is damaged: its lengths do not go together".to_owned());
     }
-    match parse(opcode, data).map_err(damaged)? {
-        Record::Chunk { header, data } => {
-            if header.uncompressed_size > LONGEST_RECORD as u64 {
-                return Err(format!(
-                    "a chunk of {} bytes is longer than {LONGEST_RECORD}",
-                    header.uncompressed_size
-                ));
-            }
-            let records = ChunkReader::new(header, &data).map_err(damaged)?;
-            let records = records.map(|record| record.map(Record::into_owned)).collect::<Result<Vec<_>, _>>();
-            Ok(Piece::Chunk(records.map_err(damaged)?))
-        }
-        record => Ok(Piece::Record(record.into_owned())),
+    if opcode == op::CHUNK {
+        return records(data).map(Piece::Chunk).map_err(damaged);
     }
+    Ok(Piece::Record(parse(opcode, data).map_err(damaged)?.into_owned()))
+}
+
+/// The records of a chunk, of all of them or of none.
+fn records(data: &[u8]) -> Result<Vec<Record<'static>>, McapError> {
+    // Not the library's own reader of chunks: it takes every length in a damaged one for true, and memory for it.
+    let options = LinearReaderOptions::default()
+        .with_skip_start_magic(true)
+        .with_skip_end_magic(true)
+        .with_prevalidate_chunk_crcs(true)
+        .with_record_length_limit(LONGEST_RECORD);
+    let mut reader = LinearReader::new_with_options(options);
+    let length = (data.len() as u64).to_le_bytes();
+    let mut chunk = [op::CHUNK].as_slice().chain(length.as_slice()).chain(data);
+    let mut records = Vec::new();
+    while let Some(event) = reader.next_event() {
+        match event? {
+            LinearReadEvent::ReadRequest(_) => {
+                let count = chunk.read(reader.insert(WINDOW))?;
+                reader.notify_read(count);
+            }
+            LinearReadEvent::Record { opcode, data } => records.push(parse(opcode, data)?.into_owned()),
+        }
+    }
+    Ok(records)
 }
 
 /// Whether the format knows it, or leaves it to others.
