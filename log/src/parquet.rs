@@ -12,9 +12,11 @@
 //! Messages are written as they came: in their order, doubled where they were. Where ticks of one stream have different
 //! numbers or kinds of readings, the columns are there for all of them and empty where a tick has none.
 
+mod columns;
+mod rows;
 mod streams;
 mod table;
 #[cfg(test)]
 mod tests;
 
-pub use streams::{STREAMS, UnitTables};
+pub use streams::UnitTables;

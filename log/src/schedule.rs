@@ -65,13 +65,11 @@ impl Schedule {
             return time_ns.saturating_sub(first);
         }
         let due = self.ties.get(unit).map(|tie| time_ns.saturating_sub(*tie));
-        match due.filter(|due| due.saturating_sub(received).abs() <= TIED_NS) {
-            Some(due) => due,
-            None => {
-                self.ties.insert(unit.clone(), time_ns.saturating_sub(received));
-                received
-            }
+        if let Some(due) = due.filter(|due| due.saturating_sub(received).abs() <= TIED_NS) {
+            return due;
         }
+        self.ties.insert(unit.clone(), time_ns.saturating_sub(received));
+        received
     }
 }
 

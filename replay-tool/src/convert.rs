@@ -6,14 +6,14 @@ mod recording;
 mod ros2;
 mod text;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 use isotherm_log::convert::Converted;
 use isotherm_log::convert::contents::Contents;
 use isotherm_log::message::Message;
 use isotherm_log::part::{LogFiles, Messages, Part};
-use isotherm_log::recording::Attachment;
+use isotherm_log::recording::{Attachment, RecordingReader};
 use isotherm_log::source::LogReport;
 use isotherm_protocol::document::Document;
 use serde::Serialize;
@@ -23,7 +23,6 @@ use crate::progress::Bar;
 
 pub use output::Place;
 pub use ros2::Ros2Options;
-pub use text::is_csv;
 
 /// What a log is converted to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize)]
@@ -37,6 +36,24 @@ pub enum Target {
     Ros2,
     /// Parquet: one file per unit and stream
     Parquet,
+}
+
+impl Target {
+    /// What the name of a file says; `None` for a folder, or a name that says nothing.
+    #[must_use]
+    pub fn by_name(out: &Path) -> Option<Self> {
+        let ends = |path: &Path, in_what: &str| {
+            path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(in_what))
+        };
+        let plain = if ends(out, "gz") { out.with_extension("") } else { out.to_owned() };
+        if ends(&plain, "csv") {
+            Some(Self::Text)
+        } else if ends(out, "mcap") {
+            Some(Self::Mcap)
+        } else {
+            None
+        }
+    }
 }
 
 /// A conversion that is to be done.
@@ -150,7 +167,7 @@ impl Conversion {
 
 /// Files that were come across since the last message.
 fn attachments(messages: &mut Messages) -> Vec<Attachment> {
-    messages.log().recording().map(|reader| reader.take_attachments()).unwrap_or_default()
+    messages.log().recording().map(RecordingReader::take_attachments).unwrap_or_default()
 }
 
 /// A calibration document in a recording; what is none is passed over.

@@ -153,7 +153,7 @@ async fn run<W: Watch>(
     let under_way = player.under_way();
     tokio::select! {
         biased;
-        played = player.run() => played,
+        ended = player.run() => ended,
         () = service.gone() => {
             Err(BusError::ServiceGone { key: key::ALL_SERVICES_ALIVE.to_owned() }.into())
         }

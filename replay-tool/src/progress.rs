@@ -10,7 +10,7 @@ use isotherm_log::progress::Progress;
 /// Events between two looks at the bar.
 const STRIDE: u32 = 1024;
 /// Steps of a bar over a share.
-const SHARES: u64 = 100_000;
+const SHARES: u32 = 100_000;
 
 /// A bar over the bytes of a log, or over ticks.
 #[derive(Debug)]
@@ -41,14 +41,14 @@ impl Bar {
     /// A bar over a share of something, from 0 to 1.
     #[must_use]
     pub fn over_share() -> Self {
-        let bar = bar(SHARES, "{bar:30} {percent:>3} %  {msg}  {eta} left");
+        let bar = bar(u64::from(SHARES), "{bar:30} {percent:>3} %  {msg}  {eta} left");
         Self { drawn: bar, progress: None, since: 0 }
     }
 
     /// Shows a share, at once.
     pub fn share(&mut self, share: f64, message: String) {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "held between 0 and 1")]
-        let position = (share.clamp(0.0, 1.0) * SHARES as f64) as u64;
+        let position = (share.clamp(0.0, 1.0) * f64::from(SHARES)) as u64;
         self.drawn.set_position(position);
         self.drawn.set_message(message);
     }

@@ -52,6 +52,14 @@ class Player:
             if time.monotonic() > deadline or not self.read(0.05):
                 sys.exit("%r is not shown behind %r" % (pattern, self.text[behind:]))
 
+    def flow(self):
+        """Waits until a few more ticks have gone out than are shown now."""
+        shown = lambda: int(([0] + re.findall(r"(\d+) ticks", self.text))[-1])
+        goal, deadline = shown() + 5, time.monotonic() + LIMIT
+        while shown() < goal:
+            if time.monotonic() > deadline or not self.read(0.05):
+                sys.exit("nothing goes out any more: %r" % self.text)
+
     def press(self, keys):
         place = len(self.text)
         os.write(self.terminal, keys)
@@ -78,16 +86,16 @@ def check(holds, what):
 
 # Space pauses, n and the right arrow play one gyro batch each, space goes on, q ends in order.
 player = Player()
-place = player.until(r"space pause")
-place = player.until(r"\d+ ticks  \d", place)
+player.until(r"space pause")
+player.flow()
 check(player.echo is False, "keys are taken at once")
-place = player.until(r"(\d+) ticks  paused", player.press(b" "))
+player.until(r"(\d+) ticks  paused", player.press(b" "))
 at = int(re.findall(r"(\d+) ticks  paused", player.text)[-1])
-place = player.until(r" %d ticks  paused" % (at + 1), player.press(b"n"))
-place = player.until(r" %d ticks  paused" % (at + 2), player.press(RIGHT))
-place = player.until(r"\d+ ticks  \d", player.press(b" "))
-place = player.until(r"of 2 ", player.press(b"+"))
-place = player.until(r"of 1 ", player.press(b"-"))
+player.until(r" %d ticks  paused" % (at + 1), player.press(b"n"))
+player.until(r" %d ticks  paused" % (at + 2), player.press(RIGHT))
+player.until(r"\d+ ticks  \d", player.press(b" "))
+player.until(r"of 2 ", player.press(b"+"))
+player.until(r"of 1 ", player.press(b"-"))
 player.press(b"q")
 summary = player.end(0)
 check(summary["ticks_lost"] == 0 and summary["ticks_under_way"] == 0 and not summary["stopped"], summary)
@@ -96,11 +104,10 @@ check(summary["paused_s"] > 0, summary)
 
 # On by 10 s in the same run, what is passed over announced; back by 10 s in a new one.
 player = Player()
-place = player.until(r"\d+ ticks  \d")
-place = player.until(r"1\d\.\d+ s  ", player.press(RIGHT))
-place = player.until(r"2\d\.\d+ s  ", player.press(b"]"))
-place = player.until(r"1\d\.\d+ s  ", player.press(b"["))
-place = player.until(r" \d\.\d+ s  ", player.press(LEFT))
+player.flow()
+for keys, seconds in ((RIGHT, r"1\d"), (b"]", r"2\d"), (b"[", r"1\d"), (LEFT, r" \d")):
+    player.until(seconds + r"\.\d+ s  ", player.press(keys))
+    player.flow()
 player.press(b"q")
 summary = player.end(0)
 unit = summary["units"][0]
@@ -111,7 +118,7 @@ check(unit["ticks_lost"] == 0, summary)
 # Ctrl-C, and signals of others, also while playing is paused.
 for stop in (b"\x03", signal.SIGTERM, signal.SIGINT):
     player = Player()
-    player.until(r"\d+ ticks  \d")
+    player.flow()
     player.until(r"\d+ ticks  paused", player.press(b" "))
     if isinstance(stop, bytes):
         player.press(stop)

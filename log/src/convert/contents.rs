@@ -44,8 +44,8 @@ pub type Shapes = BTreeMap<Shape, u64>;
 /// The shape that most ticks have; the first of several that are equally frequent.
 #[must_use]
 pub fn usual(shapes: &Shapes) -> Option<Shape> {
-    let shaped = shapes.iter().filter(|(shape, _)| shape.sensors > 0);
-    shaped.rev().max_by_key(|(_, ticks)| **ticks).map(|(shape, _)| *shape)
+    let sensed = shapes.iter().filter(|(shape, _)| shape.sensors > 0);
+    sensed.rev().max_by_key(|(_, ticks)| **ticks).map(|(shape, _)| *shape)
 }
 
 /// Largest numbers per corrected tick.

@@ -17,13 +17,13 @@ pub enum Decoded {
     /// Raw accelerometer ticks.
     Accel(AccelBatch),
     /// Raw temperature readings.
-    Temperature(TemperatureBatch),
+    Temperature(Box<TemperatureBatch>),
     /// What the instrument reports of itself.
     Health(HealthBatch),
     /// A rate reference.
     Reference(Reference),
     /// Corrected ticks.
-    Corrected(CorrectedBatch),
+    Corrected(Box<CorrectedBatch>),
     /// A unit's status.
     Status(Box<Status>),
     /// Part of a unit's journal; it stays as it is.
@@ -39,10 +39,10 @@ pub fn decode(message: &Message) -> Result<Option<(&UnitId, Decoded)>, CodecErro
     let decoded = match &message.topic {
         Topic::Raw(_, RawStream::Gyro) => Decoded::Gyro(codec::decode(frame)?),
         Topic::Raw(_, RawStream::Accel) => Decoded::Accel(codec::decode(frame)?),
-        Topic::Raw(_, RawStream::Temperature) => Decoded::Temperature(codec::decode(frame)?),
+        Topic::Raw(_, RawStream::Temperature) => Decoded::Temperature(Box::new(codec::decode(frame)?)),
         Topic::Raw(_, RawStream::Health) => Decoded::Health(codec::decode(frame)?),
         Topic::Reference(_) => Decoded::Reference(codec::decode(frame)?),
-        Topic::Corrected(_) => Decoded::Corrected(codec::decode(frame)?),
+        Topic::Corrected(_) => Decoded::Corrected(Box::new(codec::decode(frame)?)),
         Topic::Status(_) => Decoded::Status(Box::new(codec::decode(frame)?)),
         Topic::Journal(_) => Decoded::Journal,
         Topic::Service(_) | Topic::Other(_) => return Ok(None),

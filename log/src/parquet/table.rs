@@ -144,12 +144,12 @@ impl Table {
     /// Creates the file for about so many rows. `provenance`: names and values for the file's metadata.
     pub(super) fn create(
         path: &Path,
-        columns: Vec<Column>,
+        columns: &[Column],
         expected_rows: u64,
         provenance: &[(String, String)],
     ) -> Result<Self, Error> {
         let file = File::create(path).map_err(|source| Error::file(path, "create", source))?;
-        let writer = open(BufWriter::new(file), &columns, provenance).map_err(|error| failed(path, error))?;
+        let writer = open(BufWriter::new(file), columns, provenance).map_err(|error| failed(path, error))?;
         Ok(Self {
             writer,
             path: path.to_owned(),

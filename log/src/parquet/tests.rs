@@ -32,7 +32,7 @@ fn rows_of_many_groups_are_read_back() {
     let path = folder.path().join("x.parquet");
     let columns = vec![full("time_ns", I64), sparse("value", Kind::Double), full("name", Kind::Text)];
     let words = [("unit".to_owned(), "A-1".to_owned())];
-    let mut table = Table::create(&path, columns, 40_000, &words).unwrap();
+    let mut table = Table::create(&path, &columns, 40_000, &words).unwrap();
     for n in 0..40_000_i32 {
         let value = (n % 3 != 0).then_some(f64::from(n) * 0.1);
         table
@@ -58,7 +58,7 @@ fn a_cell_that_does_not_fit_is_an_error() {
     let folder = tempfile::tempdir().unwrap();
     let columns = || vec![full("value", Kind::Double)];
     for cell in [Cell::Empty, Cell::Integer(1)] {
-        let mut table = Table::create(&folder.path().join("x.parquet"), columns(), 1, &[]).unwrap();
+        let mut table = Table::create(&folder.path().join("x.parquet"), &columns(), 1, &[]).unwrap();
         assert!(table.push([cell]).unwrap_err().to_string().contains("does not fit the column \"value\""));
     }
 }
@@ -119,7 +119,9 @@ fn streams_have_columns_for_every_shape_of_tick() {
     })
     .unwrap();
     let status = Decoded::Status(Box::new(status));
-    for decoded in [Decoded::Gyro(counts), Decoded::Gyro(means), Decoded::Corrected(corrected), status] {
+    for decoded in
+        [Decoded::Gyro(counts), Decoded::Gyro(means), Decoded::Corrected(Box::new(corrected)), status]
+    {
         assert!(tables.take(99, &decoded).unwrap());
     }
     assert!(!tables.take(99, &Decoded::Journal).unwrap());

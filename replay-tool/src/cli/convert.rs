@@ -77,15 +77,8 @@ impl ConvertArgs {
 
     /// What it is converted to.
     fn target(&self, out: &Path) -> Result<Target, Error> {
-        let name = out.file_name().map(|name| name.to_string_lossy().to_lowercase()).unwrap_or_default();
-        let parquet = name.ends_with(".parquet");
-        let by_name = if name.ends_with(".mcap") {
-            Some(Target::Mcap)
-        } else if name.ends_with(".csv") || name.ends_with(".csv.gz") {
-            Some(Target::Text)
-        } else {
-            None
-        };
+        let by_name = Target::by_name(out);
+        let parquet = out.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("parquet"));
         let out = out.display();
         let target = match (self.to, by_name) {
             (Some(to), Some(by_name)) if to != by_name => {
@@ -143,7 +136,7 @@ impl ConvertArgs {
         // Before a long log is read, not after.
         match target {
             Target::Ros2 | Target::Parquet => place.check_folder(&out)?,
-            Target::Text if !convert::is_csv(&out) => place.check_folder(&out)?,
+            Target::Text if Target::by_name(&out).is_none() => place.check_folder(&out)?,
             Target::Text | Target::Mcap => place.check(&out)?,
         }
         let documents = self.calibration.iter().map(|path| document(path)).collect::<Result<_, _>>()?;
@@ -227,7 +220,8 @@ fn reading(report: &LogReport) -> String {
                 text = format!("{words}; what was whole before it has been used\n");
             }
             if report.foreign_messages > 0 {
-                text += &format!("{} messages of other programs were passed over\n", report.foreign_messages);
+                text += &report.foreign_messages.to_string();
+                text += " messages of other programs were passed over\n";
             }
             text
         }

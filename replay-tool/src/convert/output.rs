@@ -23,7 +23,7 @@ pub struct Place {
 #[derive(Debug)]
 pub(super) struct Partial {
     path: PathBuf,
-    partial: PathBuf,
+    writing: PathBuf,
     kept: bool,
 }
 
@@ -70,9 +70,9 @@ impl Place {
             std::fs::create_dir_all(folder)
                 .map_err(|source| Error::file(folder, "create the folder", source))?;
         }
-        let mut partial = path.as_os_str().to_owned();
-        partial.push(".partial");
-        Ok(Partial { path: path.to_owned(), partial: partial.into(), kept: false })
+        let mut writing = path.as_os_str().to_owned();
+        writing.push(".partial");
+        Ok(Partial { path: path.to_owned(), writing: writing.into(), kept: false })
     }
 
     /// A file of text or bytes to be written, compressed where its name ends in `.gz`.
@@ -99,7 +99,7 @@ impl Place {
 impl Partial {
     /// Where it is written to.
     pub(super) fn writing(&self) -> &Path {
-        &self.partial
+        &self.writing
     }
 
     /// Where it will be.
@@ -109,7 +109,7 @@ impl Partial {
 
     /// It is whole: gives it its name.
     pub(super) fn keep(mut self) -> Result<(), Error> {
-        std::fs::rename(&self.partial, &self.path)
+        std::fs::rename(&self.writing, &self.path)
             .map_err(|source| Error::file(&self.path, "name the file", source))?;
         self.kept = true;
         Ok(())
@@ -120,7 +120,7 @@ impl Drop for Partial {
     fn drop(&mut self) {
         if !self.kept {
             // It may never have been created.
-            let _ = std::fs::remove_file(&self.partial);
+            let _ = std::fs::remove_file(&self.writing);
         }
     }
 }

@@ -45,7 +45,7 @@ pub(super) fn convert(conversion: &Conversion, found: &Found) -> Result<Outcome,
     }
     for partial in partials {
         if let Some(file) = converted.files.iter_mut().find(|file| file.path == partial.writing()) {
-            file.path = partial.path().to_owned();
+            partial.path().clone_into(&mut file.path);
         }
         partial.keep()?;
     }

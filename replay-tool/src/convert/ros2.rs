@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use isotherm_correction::sample::TickFlags;
+use isotherm_correction::sample::{ChannelName, TickFlags};
 use isotherm_log::convert::contents::{UnitContents, usual};
 use isotherm_log::convert::decoded::{Decoded, decode};
 use isotherm_log::convert::rows::{Row, Rows, Step};
@@ -134,7 +134,7 @@ impl UnitBag {
             unit: unit.to_string(),
             base: format!("/imu/{name}"),
             frame: options.frame.clone().unwrap_or_else(|| name.to_owned()),
-            channels: Names::of(channels.map(|channel| channel.as_str()), "channel"),
+            channels: Names::of(channels.map(ChannelName::as_str), "channel"),
             corrected,
             raw,
             note,
@@ -232,7 +232,7 @@ impl UnitBag {
                     self.write(&topic, Some(&reading.channel), row.time_ns, message, bag, converted)?;
                 }
                 None => {
-                    converted.leave_out("raw temperature readings without a document that converts them", 1)
+                    converted.leave_out("raw temperature readings without a document that converts them", 1);
                 }
             }
         }

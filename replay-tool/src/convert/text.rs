@@ -15,13 +15,13 @@ use isotherm_protocol::key::UnitId;
 use isotherm_protocol::raw::HealthBatch;
 
 use super::output::{Partial, Place, Sink, folder};
-use super::{Conversion, Found, Outcome};
+use super::{Conversion, Found, Outcome, Target};
 use crate::error::Error;
 use crate::output::{write_header, write_tick};
 
 pub(super) fn convert(conversion: &Conversion, found: &Found) -> Result<Outcome, Error> {
     let units = &found.contents.units;
-    let single = is_csv(&conversion.out);
+    let single = Target::by_name(&conversion.out) == Some(Target::Text);
     if single && units.len() > 1 {
         let names: Vec<_> = units.keys().map(UnitId::as_str).collect();
         return Err(Error::Usage(format!(
@@ -60,13 +60,6 @@ pub(super) fn convert(conversion: &Conversion, found: &Found) -> Result<Outcome,
     Ok(Outcome::of(converted, log))
 }
 
-/// Whether a name is that of a CSV, compressed or not.
-#[must_use]
-pub fn is_csv(path: &Path) -> bool {
-    let name = path.file_name().map(|name| name.to_string_lossy().to_lowercase()).unwrap_or_default();
-    name.ends_with(".csv") || name.ends_with(".csv.gz")
-}
-
 /// Names of a unit's files.
 #[derive(Debug, Clone)]
 struct Names {
@@ -82,7 +75,8 @@ impl Names {
     /// Beside the CSV that was named.
     fn beside(out: &Path) -> Self {
         let name = out.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-        let length = if name.to_lowercase().ends_with(".gz") { ".csv.gz".len() } else { ".csv".len() };
+        let compressed = out.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("gz"));
+        let length = if compressed { ".csv.gz".len() } else { ".csv".len() };
         let (stem, end) = name.split_at(name.len() - length);
         Self { stem: out.with_file_name(stem), end: end.to_owned(), single: true }
     }

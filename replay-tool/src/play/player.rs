@@ -27,6 +27,17 @@ use next::Waiting;
 /// How often the position is shown.
 const SHOW: Duration = Duration::from_millis(50);
 
+/// How far it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Stage {
+    /// Messages go out.
+    Playing,
+    /// Somebody has asked for the end: no more go out.
+    Finishing,
+    /// What has not come back by now does not count as under way any more.
+    Waited,
+}
+
 /// Plays.
 pub(super) struct Player<'a, W> {
     session: &'a Session,
@@ -57,10 +68,9 @@ pub(super) struct Player<'a, W> {
     shown: Option<Instant>,
     paused: Option<Instant>,
     steps: u64,
-    finish: bool,
+    stage: Stage,
     begun: Instant,
     ended: Option<Instant>,
-    gave_up: bool,
     played_ns: i64,
     paused_for: Duration,
     pass: u64,
@@ -96,10 +106,9 @@ impl<'a, W: Watch> Player<'a, W> {
             shown: None,
             paused: None,
             steps: 0,
-            finish: false,
+            stage: Stage::Playing,
             begun: Instant::now(),
             ended: None,
-            gave_up: false,
             played_ns: 0,
             paused_for: Duration::ZERO,
             pass: 1,
@@ -125,10 +134,10 @@ impl<'a, W: Watch> Player<'a, W> {
             }
         }
         self.begun = Instant::now();
-        while !self.finish {
+        while self.stage == Stage::Playing {
             self.obey_all()?;
             self.stay_paused().await?;
-            if self.finish {
+            if self.stage != Stage::Playing {
                 break;
             }
             match self.next_due().await? {
@@ -185,7 +194,7 @@ impl<'a, W: Watch> Player<'a, W> {
             if self.seeks != seeks {
                 return Ok(());
             }
-            if self.finish || self.paused.is_some() || self.steps > 0 {
+            if self.stage != Stage::Playing || self.paused.is_some() || self.steps > 0 {
                 self.waiting.push(Reverse(next));
                 return Ok(());
             }
@@ -264,7 +273,7 @@ impl<'a, W: Watch> Player<'a, W> {
                 drained => drained?,
             }
         }
-        self.gave_up = true;
+        self.stage = Stage::Waited;
         Ok(())
     }
 }

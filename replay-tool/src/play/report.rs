@@ -174,9 +174,8 @@ impl PlayReport {
     /// The sums over units.
     pub(super) fn of(units: Vec<UnitReport>) -> Self {
         let sum = |of: fn(&UnitReport) -> u64| units.iter().map(of).sum();
-        let told = |of: fn(&UnitReport) -> Option<u64>| {
-            units.iter().filter_map(of).reduce(|sum, count| sum.saturating_add(count))
-        };
+        let told =
+            |of: fn(&UnitReport) -> Option<u64>| units.iter().filter_map(of).reduce(u64::saturating_add);
         Self {
             messages_sent: sum(|unit| unit.counts.messages_sent),
             ticks_sent: sum(|unit| unit.ticks_sent),

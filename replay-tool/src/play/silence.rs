@@ -52,11 +52,12 @@ pub(super) async fn watch(session: &Session, shared: &Shared, watch: &impl Watch
         // One unit stands for the others that fell silent with it.
         if let Some((unit, ticks)) = silent.first() {
             let status = presence::status(session, unit, ANSWER).await;
-            let mut text = words(unit, *ticks, status.as_ref());
-            if silent.len() > 1 {
-                text += &format!(" ({} other units likewise)", silent.len() - 1);
-            }
-            watch.say(&text);
+            let text = words(unit, *ticks, status.as_ref());
+            let others = match silent.len() - 1 {
+                0 => String::new(),
+                others => format!(" ({others} other units likewise)"),
+            };
+            watch.say(&(text + &others));
         }
     }
 }

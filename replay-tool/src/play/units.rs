@@ -36,7 +36,7 @@ pub(super) struct PlayedUnit {
 #[derive(Debug)]
 pub(super) struct Units<'a> {
     options: &'a PlayOptions,
-    units: Vec<PlayedUnit>,
+    all: Vec<PlayedUnit>,
     /// Places of the units that one of the log is played as.
     of: BTreeMap<UnitId, Range<usize>>,
     serials: BTreeSet<UnitId>,
@@ -45,7 +45,7 @@ pub(super) struct Units<'a> {
 impl<'a> Units<'a> {
     /// None yet.
     pub(super) fn new(options: &'a PlayOptions) -> Self {
-        Self { options, units: Vec::new(), of: BTreeMap::new(), serials: BTreeSet::new() }
+        Self { options, all: Vec::new(), of: BTreeMap::new(), serials: BTreeSet::new() }
     }
 
     /// The places of the units that a unit of the log is played as.
@@ -64,7 +64,7 @@ impl<'a> Units<'a> {
                 (1..=copies).map(serial).collect::<Result<_, _>>()?
             }
         };
-        let begin = self.units.len();
+        let begin = self.all.len();
         for unit in serials {
             if !self.serials.insert(unit.clone()) {
                 return Err(Error::Usage(format!(
@@ -74,7 +74,7 @@ impl<'a> Units<'a> {
             }
             let faults = (!self.options.faults.is_none())
                 .then(|| Faults::new(self.options.faults, self.options.seed, stream(&unit)));
-            self.units.push(PlayedUnit {
+            self.all.push(PlayedUnit {
                 unit,
                 of: of.clone(),
                 faults,
@@ -82,11 +82,11 @@ impl<'a> Units<'a> {
                 counts: Counts::default(),
             });
         }
-        let places = begin..self.units.len();
+        let places = begin..self.all.len();
         self.of.insert(of.clone(), places.clone());
         // The more units, the less each may have under way: together it must fit the queues in between.
         if let Some(limit) = self.max_in_flight() {
-            self.units.iter_mut().filter_map(|unit| unit.outlet.as_mut()).for_each(|it| it.allow(limit));
+            self.all.iter_mut().filter_map(|unit| unit.outlet.as_mut()).for_each(|it| it.allow(limit));
         }
         Ok(places)
     }
@@ -96,26 +96,24 @@ impl<'a> Units<'a> {
         match self.options.acknowledge {
             Acknowledge::No => None,
             Acknowledge::Bounded(Some(given)) => Some(given),
-            Acknowledge::Bounded(None) => {
-                Some((ALL_IN_FLIGHT / self.units.len().max(1) as u64).min(IN_FLIGHT))
-            }
+            Acknowledge::Bounded(None) => Some((ALL_IN_FLIGHT / self.all.len().max(1) as u64).min(IN_FLIGHT)),
         }
     }
 
     pub(super) fn len(&self) -> usize {
-        self.units.len()
+        self.all.len()
     }
 
     pub(super) fn get_mut(&mut self, place: usize) -> Option<&mut PlayedUnit> {
-        self.units.get_mut(place)
+        self.all.get_mut(place)
     }
 
     pub(super) fn iter(&self) -> impl Iterator<Item = &PlayedUnit> {
-        self.units.iter()
+        self.all.iter()
     }
 
     pub(super) fn iter_mut(&mut self) -> impl Iterator<Item = &mut PlayedUnit> {
-        self.units.iter_mut()
+        self.all.iter_mut()
     }
 }
 

@@ -30,7 +30,9 @@ fn messages(path: &Path) -> Vec<Message> {
 
 fn record(path: &Path, messages: &[Message]) {
     let mut writer = RecordingWriter::create(path, RecordingOptions::default()).unwrap();
-    messages.iter().for_each(|message| writer.write(message).unwrap());
+    for message in messages {
+        writer.write(message).unwrap();
+    }
     writer.finish().unwrap();
 }
 
@@ -228,7 +230,9 @@ fn a_recording_that_is_cut_is_converted_to_its_last_whole_chunk() {
     let path = |name: &str| folder.path().join(name);
     let options = RecordingOptions { chunk_bytes: 2000, ..RecordingOptions::default() };
     let mut writer = RecordingWriter::create(&path("whole.mcap"), options).unwrap();
-    (0..500_u64).for_each(|n| writer.write(&gyro("A-1", 3, n, 10 * n.cast_signed())).unwrap());
+    for n in 0..500_u64 {
+        writer.write(&gyro("A-1", 3, n, 10 * n.cast_signed())).unwrap();
+    }
     writer.finish().unwrap();
     let bytes = fs::read(path("whole.mcap")).unwrap();
     fs::write(path("cut.mcap"), &bytes[..bytes.len() / 2]).unwrap();

@@ -73,7 +73,7 @@ fn what_cannot_be_read_right_is_refused_with_line_and_column() {
             "a truncated last line",
             ROWS.trim_end().trim_end_matches(";20.5").to_owned(),
             1,
-            "log.csv:11:17: column 5 \"T\": is missing, the row has only 4 cells; the last line has no line end",
+            "log.csv:11:16: column 5 \"T\": is missing, the row has only 4 cells; the last line has no line end",
         ),
         (
             "a gap",
@@ -90,7 +90,6 @@ fn what_cannot_be_read_right_is_refused_with_line_and_column() {
         ("time standing still", ROWS.replace("\n30;", "\n20;"), 1, "time stands still or goes back"),
         ("a decimal comma", ROWS.replacen("-1.25", "-1,25", 1), 1, "log.csv:2:8: column 3 \"y\": \"-1,25\""),
         ("a cell too many", ROWS.replacen("20.5", "20;5", 1), 1, "log.csv:2:19: column 6: \"5\" is too much"),
-        ("UTF-16", String::from_utf8_lossy(b"\xff").into_owned(), 1, "log.csv:1:1"),
     ];
     let semicolons = mapping("delimiter = \"semicolon\"", "");
     for (name, log, expected, words) in &table {
@@ -98,6 +97,9 @@ fn what_cannot_be_read_right_is_refused_with_line_and_column() {
         assert_eq!(code, Some(*expected), "{name}: {errors}");
         assert!(errors.contains(words), "{name}: {errors}");
     }
+    let utf16: Vec<_> = "\u{feff}t;x\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
+    let (code, _, errors) = correct(folder.path(), &semicolons, &utf16);
+    assert!(code == Some(1) && errors.contains("log.csv:1:1: is UTF-16 text: save it as UTF-8"), "{errors}");
 }
 
 #[test]

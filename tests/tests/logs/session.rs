@@ -325,7 +325,7 @@ async fn ten_minutes_of_eight_units_are_corrected_again_to_the_bit() {
     let (weight, changed) = ("per_count = 1.97\n", path("changed.toml"));
     let text = document(0, "0.41");
     assert!(text.contains(weight));
-    std::fs::write(&changed, text.replacen(weight, "per_count = 1.9700000000000002\n", 1)).unwrap();
+    std::fs::write(&changed, text.replacen(weight, "per_count = 1.970000000000001\n", 1)).unwrap();
     let (a, b, other) = (path("a.csv"), path("b.csv"), path("other.mcap"));
     let unit = serial(0);
     process::run_well("isotherm-replay", &["correct", begin, "--unit", &unit, "--out", &a]);

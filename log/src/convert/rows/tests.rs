@@ -85,9 +85,13 @@ fn a_row_waits_until_every_stream_is_five_seconds_further() {
     let contents = UnitContents { gyro: shapes(), accel: shapes(), ..UnitContents::default() };
     let mut rows = Rows::of(&contents);
     // A batch of a minute before the other stream's.
-    (0..60).for_each(|n| rows.gyro(OutputKind::Mean, gyro(7, n, 1000 * n.cast_signed())));
+    for n in 0..60_u64 {
+        rows.gyro(OutputKind::Mean, gyro(7, n, 1000 * n.cast_signed()));
+    }
     assert_eq!(rows.next_step(), None);
-    (0..60).for_each(|n| rows.accel(OutputKind::Mean, accel(n, 1000 * n.cast_signed())));
+    for n in 0..60_u64 {
+        rows.accel(OutputKind::Mean, accel(n, 1000 * n.cast_signed()));
+    }
     assert!(matches!(rows.next_step(), Some(Step::Row(row)) if row.gyro.is_some() && row.accel.is_some()));
     assert_eq!(steps(rows).1, Tally::default());
 }

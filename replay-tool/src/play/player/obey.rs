@@ -3,7 +3,7 @@
 use tokio::sync::mpsc::UnboundedReceiver;
 use tokio::time::Instant;
 
-use super::Player;
+use super::{Player, Stage};
 use crate::error::Error;
 use crate::play::{Command, Watch};
 
@@ -18,7 +18,7 @@ impl<W: Watch> Player<'_, W> {
 
     /// Waits for commands while playing is paused and no step is asked for.
     pub(super) async fn stay_paused(&mut self) -> Result<(), Error> {
-        while self.paused.is_some() && self.steps == 0 && !self.finish {
+        while self.paused.is_some() && self.steps == 0 && self.stage == Stage::Playing {
             self.show();
             let command = command(&mut self.commands).await;
             self.obey(command)?;
@@ -39,7 +39,7 @@ impl<W: Watch> Player<'_, W> {
             Command::Seek(seconds) => self.seek(seconds)?,
             Command::Faster => self.pacer.set_speed(self.pacer.speed().faster()),
             Command::Slower => self.pacer.set_speed(self.pacer.speed().slower()),
-            Command::Finish => self.finish = true,
+            Command::Finish => self.stage = Stage::Finishing,
             Command::Stop => return Err(Error::Stopped),
         }
         self.show();

@@ -5,7 +5,7 @@ use std::time::Duration;
 use isotherm_log::source::LogReport;
 use tokio::time::Instant;
 
-use super::Player;
+use super::{Player, Stage};
 use crate::play::Watch;
 use crate::play::report::{PlayReport, Position, UnitReport};
 use crate::play::units::PlayedUnit;
@@ -57,7 +57,7 @@ impl<W: Watch> Player<'_, W> {
     pub(in crate::play) fn report(&self, stopped: bool) -> PlayReport {
         let (elapsed, paused) = self.times();
         let mut units: Vec<_> = self.units.iter().map(PlayedUnit::report).collect();
-        if self.gave_up {
+        if self.stage == Stage::Waited {
             units.iter_mut().for_each(UnitReport::give_up);
         }
         PlayReport {

@@ -86,7 +86,9 @@ fn messages() -> Vec<Message> {
 
 fn record(path: &Path, messages: &[Message]) {
     let mut writer = RecordingWriter::create(path, RecordingOptions::default()).unwrap();
-    messages.iter().for_each(|message| writer.write(message).unwrap());
+    for message in messages {
+        writer.write(message).unwrap();
+    }
     writer.finish().unwrap();
 }
 
