@@ -78,7 +78,7 @@ impl Series {
                 Err(Error::Refused(vec![format!("the log has no raw readings{of}")]))
             }
             (Some((first, _)), Some((second, _))) => {
-                let others: String = found.map(|(serial, _)| format!(", {serial}")).collect();
+                let others = found.fold(String::new(), |list, (serial, _)| format!("{list}, {serial}"));
                 Err(Error::Refused(vec![format!(
                     "the log is of several units ({first}, {second}{others}): choose one with --unit"
                 )]))

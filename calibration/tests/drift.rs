@@ -5,6 +5,8 @@
     clippy::cast_possible_wrap,
     reason = "numbers of ticks and seeds of tests"
 )]
+#![expect(clippy::unwrap_used, reason = "helpers of tests end the test where something is not as it must be")]
+#![expect(clippy::float_cmp, reason = "a document states what was printed")]
 
 mod drift_generator;
 
@@ -92,7 +94,7 @@ fn what_is_not_there_is_not_observable() {
             match found.of_term(term) {
                 Coefficient::Observed { .. } => wrong += 1,
                 Coefficient::NotObservable { below } => {
-                    limits += usize::from(below.is_finite() && *below >= 0.0)
+                    limits += usize::from(below.is_finite() && *below >= 0.0);
                 }
             }
         }
@@ -112,10 +114,10 @@ fn what_is_not_there_is_not_observable() {
 
 #[test]
 fn sigma_and_correlation_time_of_table_1_are_recovered() {
+    const SEEDS: u64 = 12;
     // Gyros of table 1: σ (°/h) and the middle of the correlation times (h), with a trend and white noise of 0.002 °/√h; as
     // much of them as three runs of 72 h, as 002 took them.
     let gyros = [(0.0040, 7.0), (0.0030, 7.5), (0.0035, 9.5), (0.0046, 11.0), (0.0029, 10.0), (0.0026, 10.0)];
-    const SEEDS: u64 = 12;
     let (mut inside, mut bounded) = (0, 0);
     let (mut sigmas, mut taus) = (Vec::new(), Vec::new());
     for (gyro, (sigma, tau)) in gyros.into_iter().enumerate() {

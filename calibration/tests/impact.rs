@@ -1,5 +1,6 @@
 //! `impact`: the figures of 002, and the command as its user calls it.
 #![expect(clippy::cast_precision_loss, reason = "ticks of three days")]
+#![expect(clippy::unwrap_used, reason = "helpers of tests end the test where something is not as it must be")]
 
 use std::path::Path;
 use std::process::{Command, Output};

@@ -30,13 +30,15 @@ impl Topic {
     /// The topic of a key, without namespace.
     #[must_use]
     pub fn of(key: &str) -> Self {
+        type Parse = fn(&str) -> Option<&str>;
+        type Make = fn(UnitId) -> Topic;
         let unit = |serial: &str| UnitId::new(serial).ok();
         if let Some((serial, stream)) = key::parse_raw(key)
             && let Some(unit) = unit(serial)
         {
             return Self::Raw(unit, stream);
         }
-        let kinds: [(fn(&str) -> Option<&str>, fn(UnitId) -> Self); 4] = [
+        let kinds: [(Parse, Make); 4] = [
             (key::parse_reference, Self::Reference),
             (key::parse_corrected, Self::Corrected),
             (key::parse_status, Self::Status),

@@ -74,7 +74,7 @@ pub fn degrees_of_freedom(estimator: Estimator, law: PowerLaw, m: usize, differe
         vec![per_time as f64, 2.0 * per_time as f64]
     } else {
         let last = (REACH * per_time as f64).min(count - 1.0);
-        (1_u32..).map(|k| f64::from(k) * stride as f64).take_while(|lag| *lag <= last).collect()
+        (1..=u32::MAX).map(|k| f64::from(k) * stride as f64).take_while(|lag| *lag <= last).collect()
     };
     let square = |lag: f64| {
         let value = kernel(law, smooth, lag / per_time as f64) / middle;

@@ -231,11 +231,11 @@ fn table(
     noise: Option<&NoiseFit>,
     factor: usize,
 ) -> Vec<Deviations> {
-    let mut ticks: Vec<usize> = variances.iter().map(|(_, variance)| variance.ticks).collect();
-    ticks.sort_unstable();
-    ticks.dedup();
-    let wanted = lengths(ticks.last().map_or(0, |last| last * 3), factor);
-    ticks.retain(|m| wanted.contains(m));
+    let mut factors: Vec<usize> = variances.iter().map(|(_, variance)| variance.ticks).collect();
+    factors.sort_unstable();
+    factors.dedup();
+    let wanted = lengths(factors.last().map_or(0, |last| last * 3), factor);
+    factors.retain(|m| wanted.contains(m));
     let row = |m: usize| {
         let tau_s = m as f64 * tick_s;
         let law = noise.map_or(PowerLaw::White, |noise| noise.dominant(tau_s).law());
@@ -254,5 +254,5 @@ fn table(
         });
         Deviations { tau_s, of }
     };
-    ticks.into_iter().map(row).collect()
+    factors.into_iter().map(row).collect()
 }

@@ -168,7 +168,9 @@ impl<'a> Problem<'a> {
                 variance = 0.0;
             } else if let Some(before) = before {
                 let decay = libm::exp(-(time - before) / noise.correlation_time_h);
-                states.iter_mut().for_each(|state| *state *= decay);
+                for state in &mut states {
+                    *state *= decay;
+                }
                 variance = decay * decay * variance + (1.0 - decay * decay);
             }
             before = Some(*time);

@@ -41,21 +41,18 @@ impl Parameters {
         let length_h = analysis.slow.length_h();
         let fit = analysis.markov.as_ref().map(|(fit, _)| fit);
         let part = fit.and_then(|fit| Some((fit.sigma?, fit.correlation_time_h?)));
-        let (sigma, time_h) = match part {
-            Some((sigma, time)) => {
-                if time.value > length_h / 3.0 {
-                    notes.push(format!(
+        let (sigma, time_h) = if let Some((sigma, time)) = part {
+            if time.value > length_h / 3.0 {
+                notes.push(format!(
                         "the correlation time of {:.1} h rests on a log of {length_h:.1} h: three times as much is needed to \
                          tell it from a trend",
                         time.value
                     ));
-                }
-                (sigma.value, time.value)
             }
-            None => {
-                notes.push("no slow drift stands out of the white noise: sigma is 0".to_owned());
-                (0.0, length_h)
-            }
+            (sigma.value, time.value)
+        } else {
+            notes.push("no slow drift stands out of the white noise: sigma is 0".to_owned());
+            (0.0, length_h)
         };
         let trend = trend(analysis);
         let (trend_sigma, trend_time_h) = match trend {
@@ -154,8 +151,8 @@ pub fn trend(analysis: &Analysis) -> Trend {
     }
     // A bend of c2·t² changes the slope by 2·c2 per hour.
     let bend = analysis.second_order.as_ref().and_then(|fit| fit.power(2));
-    let bent = bend.filter(|(bend, error)| bend.abs() > TREND_SIGMAS * error);
-    let holds_h = bent.map_or(TREND_CORRELATION_TIME_H, |(bend, _)| (slope / (2.0 * bend)).abs());
+    let seen = bend.filter(|(bend, error)| bend.abs() > TREND_SIGMAS * error);
+    let holds_h = seen.map_or(TREND_CORRELATION_TIME_H, |(bend, _)| (slope / (2.0 * bend)).abs());
     Trend::Seen { slope, holds_h }
 }
 

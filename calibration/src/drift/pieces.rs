@@ -83,7 +83,7 @@ impl Grid {
         let middle_ns = *middle;
         let gaps = gaps(&intervals, middle_ns);
         let missing: usize = gaps.iter().map(|gap| gap.missing).sum();
-        let ticks = count + missing;
+        let places = count + missing;
         let uneven = intervals.iter().filter(|interval| {
             let off = (**interval - middle_ns).abs() as f64;
             off > UNEVEN * middle_ns as f64 && **interval < middle_ns + middle_ns / 2
@@ -103,7 +103,7 @@ impl Grid {
         }
         let bridge = missing as f64 <= LARGEST_BRIDGED_SHARE * count as f64;
         notes.extend(words(&gaps, bridge, tick_s));
-        let mut grid = Self { tick_s, ticks, sensors: Vec::new(), refused: Vec::new(), notes };
+        let mut grid = Self { tick_s, ticks: places, sensors: Vec::new(), refused: Vec::new(), notes };
         for (name, column) in names.into_iter().zip(values) {
             let called = format!("{} {name}", kind.sensor());
             match check(&called, &column) {

@@ -22,9 +22,9 @@ impl Slow {
     /// Of readings every `tick_s`, with the place of each on a grid of ticks.
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "counts of ticks are far below 2⁵³")]
-    pub fn of(pieces: &[(usize, &[f64])], ticks: usize, tick_s: f64) -> Self {
-        let width = ticks.div_ceil(BINS).max(1);
-        let bins = ticks.div_ceil(width);
+    pub fn of(pieces: &[(usize, &[f64])], places: usize, tick_s: f64) -> Self {
+        let width = places.div_ceil(BINS).max(1);
+        let bins = places.div_ceil(width);
         let mut sums = vec![(0.0, 0_usize); bins];
         for (start, readings) in pieces {
             // A block ends where a bin does.

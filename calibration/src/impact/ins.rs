@@ -14,8 +14,8 @@
 //! δL̇ = δv_N/R,    δλ̇ = δv_E/(R·cos L)
 //! ```
 //!
-//! The platform stands at the angle A(t) = k·Ω·t, so its gyros x and y give ε_N = ε_x·cos A − ε_y·sin A and
-//! ε_E = ε_x·sin A + ε_y·cos A; the azimuth gyro's drift enters as it is. That is why a constant drift of x or y does
+//! The platform stands at the angle A(t) = k·Ω·t, so its gyros x and y give `ε_N = ε_x·cos A − ε_y·sin A` and
+//! `ε_E = ε_x·sin A + ε_y·cos A`; the azimuth gyro's drift enters as it is. That is why a constant drift of x or y does
 //! not add up, and one of z does.
 
 use isotherm_correction::earth::EARTH_RATE;

@@ -53,7 +53,9 @@ impl Normal {
         let mut tau = 1.0;
         while tau < 10.0 * count as f64 {
             let mut markov = Markov::new(self, sigma, 1.0 / tau);
-            sum.iter_mut().for_each(|value| *value += markov.next(self));
+            for value in &mut sum {
+                *value += markov.next(self);
+            }
             tau *= ratio;
         }
         sum

@@ -32,8 +32,10 @@ fn read(paths: &[&Path]) -> (Vec<Message>, RecordingReader) {
 
 /// Messages of two units, on their way into a small-chunked recording.
 fn messages() -> Vec<Message> {
-    (0..500)
-        .map(|n| message(["A-1", "B-2"][usize::from(n % 3 == 0)], n * 5_000_000, 7_000 + n as u64))
+    (0..500_u32)
+        .map(|n| {
+            message(["A-1", "B-2"][usize::from(n % 3 == 0)], i64::from(n) * 5_000_000, 7_000 + u64::from(n))
+        })
         .collect()
 }
 
@@ -47,7 +49,9 @@ fn write(path: &Path, messages: &[Message]) {
         bytes: b"unit = 1".to_vec(),
     };
     writer.attach(&document).unwrap();
-    messages.iter().for_each(|message| writer.write(message).unwrap());
+    for message in messages {
+        writer.write(message).unwrap();
+    }
     let values = BTreeMap::from([("version".to_owned(), "1".to_owned())]);
     writer.metadata(&Metadata { name: METADATA.to_owned(), values }).unwrap();
     writer.finish().unwrap();
@@ -141,9 +145,13 @@ fn a_file_given_up_ends_behind_what_was_whole() {
     let path = folder.path().join("a.mcap");
     let mut writer = RecordingWriter::create(&path, RecordingOptions::default()).unwrap();
     let (first, rest) = (&messages()[..10], &messages()[10..]);
-    first.iter().for_each(|message| writer.write(message).unwrap());
+    for message in first {
+        writer.write(message).unwrap();
+    }
     writer.flush().unwrap();
-    rest.iter().for_each(|message| writer.write(message).unwrap());
+    for message in rest {
+        writer.write(message).unwrap();
+    }
     let values = BTreeMap::from([("why".to_owned(), "full".to_owned())]);
     writer.abandon(&Metadata { name: METADATA.to_owned(), values });
     let (back, mut reader) = read(&[&path]);

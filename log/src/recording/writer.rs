@@ -142,13 +142,12 @@ impl RecordingWriter {
     /// [`Error::File`]; nothing can be written behind it: see [`RecordingWriter::abandon`].
     pub fn write(&mut self, message: &Message) -> Result<(), Error> {
         let Message { topic, received_ns, frame } = message;
-        let channel = match self.channels.get_mut(topic) {
-            Some(channel) => channel,
-            None => {
-                let id = declare(&mut self.writer, topic).map_err(|source| failed(&self.path, source))?;
-                self.unnamed.insert(id.to_string(), topic.key());
-                self.channels.entry(topic.clone()).or_insert(Channel { id, messages: 0 })
-            }
+        let channel = if let Some(channel) = self.channels.get_mut(topic) {
+            channel
+        } else {
+            let id = declare(&mut self.writer, topic).map_err(|source| failed(&self.path, source))?;
+            self.unnamed.insert(id.to_string(), topic.key());
+            self.channels.entry(topic.clone()).or_insert(Channel { id, messages: 0 })
         };
         let time = message.time().and_then(|time| u64::try_from(time.as_ns()).ok());
         let header = MessageHeader {

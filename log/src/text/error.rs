@@ -78,7 +78,8 @@ pub enum Reason {
     },
     /// A step of time that no tick spans, where the mapping knows of no gaps.
     #[error(
-        "is {step} s after the row before it, {ticks} nominal ticks: for a log with gaps, set gap_after_ticks in [file.time]"
+        "is {} s after the row before it, {ticks} nominal ticks: for a log with gaps, set gap_after_ticks in [file.time]",
+        (.step * 1e9).round() / 1e9
     )]
     Gap {
         /// The step (s).

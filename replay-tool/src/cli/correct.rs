@@ -27,6 +27,7 @@ use crate::output::Format;
     too, they are compared to the bit.\n\n\
     Exit code 3: recorder and service did not have the same, corrected and published ticks differ, or a part of the log could \
     not be read.")]
+#[expect(clippy::struct_excessive_bools, reason = "each is a switch of the command line")]
 pub(super) struct CorrectArgs {
     #[command(flatten)]
     log: LogArgs,

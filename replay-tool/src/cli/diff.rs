@@ -2,6 +2,8 @@
 
 mod show_difference;
 
+use std::fmt::Write as _;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
@@ -152,11 +154,12 @@ fn human(report: &Report<'_>) -> String {
     let mut text = format!("{table}\n");
     for (unit, account) in report.units.iter().filter(|(_, account)| account.other_document > 0) {
         let count = account.other_document;
-        text += &format!("unit {unit}: {count} ticks in both were made by different calibration documents\n");
+        let _ =
+            writeln!(text, "unit {unit}: {count} ticks in both were made by different calibration documents");
     }
     for (unit, account) in report.units {
         let Some(first) = &account.first else { continue };
-        text += &format!("\nunit {unit}: the first difference\n");
+        let _ = writeln!(text, "\nunit {unit}: the first difference");
         text += &first_difference(first, ["A", "B"]);
         if account.different > 0 {
             text += "\nlargest differences\n";

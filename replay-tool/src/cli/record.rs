@@ -32,6 +32,7 @@ const SMALLEST_QUEUE: u64 = 1 << 20;
     isotherm-replay record run.mcap --connect tcp/127.0.0.1:7447\n\n\
     Exit code 3: messages were lost, or the disk was full; the files hold everything up to there."
 )]
+#[expect(clippy::struct_excessive_bools, reason = "each is a switch of the command line")]
 pub(super) struct RecordArgs {
     /// File to write to; .mcap is added where it is missing; with --max-size or --max-duration RUN-0001.mcap and so on
     #[arg(value_name = "OUT")]

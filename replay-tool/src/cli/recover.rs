@@ -1,5 +1,6 @@
 //! `isotherm-replay recover`.
 
+
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -77,18 +78,17 @@ fn human(report: &RecoveryReport, output: &Path) -> String {
     ];
     let ended = if report.ended { "yes" } else { "no: what its recorder had in memory is lost too" };
     rows.push(("the file had its end", ended.to_owned()));
-    let mut text = show::table(&rows);
+    let mut lines = Vec::new();
     for damage in report.damage.iter().take(SHOWN) {
         let (offset, length) = (damage.offset, damage.length);
-        text += &format!("byte {offset}, {length} bytes passed over: {}\n", damage.words);
+        lines.push(format!("byte {offset}, {length} bytes passed over: {}\n", damage.words));
     }
     if report.damaged_places > SHOWN as u64 {
-        text += &format!("and {} further places: see --json\n", report.damaged_places - SHOWN as u64);
+        lines.push(format!("and {} further places: see --json\n", report.damaged_places - SHOWN as u64));
     }
-    let missing = report.topics.iter().filter(|(_, topic)| topic.missing > 0);
-    for (key, topic) in missing {
-        text +=
-            &format!("{key}: {} of {} messages are missing\n", topic.missing, topic.missing + topic.messages);
+    for (key, topic) in report.topics.iter().filter(|(_, topic)| topic.missing > 0) {
+        let all = topic.missing + topic.messages;
+        lines.push(format!("{key}: {} of {all} messages are missing\n", topic.missing));
     }
-    text
+    show::table(&rows) + &lines.concat()
 }

@@ -120,9 +120,9 @@ fn list(stepper: &mut Stepper, args: &StepArgs) -> Result<(), Error> {
     let mut left = args.count.unwrap_or(u64::MAX);
     while let Some(step) = next.filter(|_| left > 0) {
         if args.json {
-            tell_json(&step)?
+            tell_json(&step)?;
         } else {
-            tell(&step)?
+            tell(&step)?;
         }
         left -= 1;
         next = if left > 0 { stepper.next_step()? } else { None };

@@ -286,9 +286,9 @@ impl Scribe {
         self.note(flushed)?;
         let lost = self.queue.lost();
         let next = Current::begin(&mut self.files, self.writing, &self.described, lost.clone())?;
-        let last = std::mem::replace(&mut self.current, next);
-        let path = last.writer.path().to_owned();
-        last.finish("next file", &self.topics, &lost)?;
+        let full = std::mem::replace(&mut self.current, next);
+        let path = full.writer.path().to_owned();
+        full.finish("next file", &self.topics, &lost)?;
         let length = std::fs::metadata(&path).map(|metadata| metadata.len());
         self.before_bytes += length.map_err(|source| Error::file(&path, "look at the recording", source))?;
         if let Some(words) = self.files.prune() {

@@ -119,10 +119,10 @@ fn raw(serial: &str) -> String {
 async fn publish(bench: &Bench, count: u32) -> BTreeMap<String, Vec<Vec<u8>>> {
     let mut published = BTreeMap::new();
     for serial in ["A-1", "B-2"] {
-        let publisher = bench.publisher(&raw(serial)).await;
+        let topic = bench.publisher(&raw(serial)).await;
         for number in 0..count {
             let frame = temperature(serial, number).frame;
-            publisher.put(frame.clone()).await.unwrap();
+            topic.put(frame.clone()).await.unwrap();
             published.entry(raw(serial)).or_insert_with(Vec::new).push(frame);
         }
     }
@@ -175,7 +175,7 @@ async fn what_is_published_is_in_the_file() {
     assert_eq!(metadata[0].values["units"], "A-1 B-2");
     assert!(metadata[0].values["wire_versions"].contains("raw_gyro 1 to 1"));
     assert_eq!(metadata[1].values["written"], "4001");
-    let text = format!("{:?}", metadata);
+    let text = format!("{metadata:?}");
     assert!(!text.contains("127.0.0.1") && !text.contains(bench.folder.path().to_str().unwrap()), "{text}");
     bench.end().await;
 }
@@ -203,7 +203,7 @@ async fn at_the_seam_of_two_files_nothing_is_lost_or_doubled() {
     last.put("the last one").await.unwrap();
     let all = || {
         let number = |number: u32| bench.path(&format!("run-{number:04}.mcap"));
-        (1..).map(number).take_while(|path| path.exists()).collect::<Vec<_>>()
+        (1..=9999).map(number).take_while(|path| path.exists()).collect::<Vec<_>>()
     };
     wait_for_last(|| all().pop().unwrap(), 1).await;
     recorder.interrupt();
@@ -289,12 +289,12 @@ async fn a_full_disk_ends_the_recording_and_nothing_else() {
     // Blocks of 512 or of 1024 bytes, as the shell has it.
     let recorder =
         bench.record("ulimit -f 64;", &["run", "--compression", "none", "--chunk-seconds", "0.02"]);
-    let publisher = bench.publisher(&raw("A-1")).await;
+    let topic = bench.publisher(&raw("A-1")).await;
     let mut published = Vec::new();
     let flood = async {
-        while publisher.matching_status().await.unwrap().matching() {
+        while topic.matching_status().await.unwrap().matching() {
             let frame = temperature("A-1", u32::try_from(published.len()).unwrap()).frame;
-            publisher.put(frame.clone()).await.unwrap();
+            topic.put(frame.clone()).await.unwrap();
             published.push(frame);
             // A producer goes on at its pace.
             tokio::time::sleep(Duration::from_micros(200)).await;

@@ -38,7 +38,9 @@ fn write(path: &Path, compress: bool) {
         bytes: b"unit = 1".to_vec(),
     };
     writer.attach(&document).unwrap();
-    messages().iter().for_each(|message| writer.write(message).unwrap());
+    for message in &messages() {
+        writer.write(message).unwrap();
+    }
     let values = BTreeMap::from([("version".to_owned(), "1".to_owned())]);
     writer.metadata(&Metadata { name: "isotherm".to_owned(), values }).unwrap();
     writer.finish().unwrap();

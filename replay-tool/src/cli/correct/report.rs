@@ -1,5 +1,7 @@
 //! What correcting a recording came to.
 
+use std::fmt::Write as _;
+
 use comfy_table::{CellAlignment, Table, presets};
 use isotherm_log::offline::UnitReport;
 use isotherm_log::source::LogReport;
@@ -21,7 +23,7 @@ pub(super) struct Report<'r> {
 impl<'r> Report<'r> {
     pub(super) fn new(units: &'r [UnitReport], log: &'r LogReport) -> Self {
         let mut compared = units.iter().filter_map(|unit| unit.published.as_ref()).peekable();
-        let identical = compared.peek().is_some().then(|| compared.all(|account| account.agrees()));
+        let identical = compared.peek().is_some().then(|| compared.all(isotherm_log::diff::Account::agrees));
         Self { units, log, identical }
     }
 
@@ -79,13 +81,13 @@ impl<'r> Report<'r> {
         for unit in self.units {
             let first = unit.published.as_ref().filter(|account| !account.agrees());
             if let Some(first) = first.and_then(|account| account.first.as_ref()) {
-                text += &format!("\nunit {}: the first difference\n", unit.unit);
+                let _ = writeln!(text, "\nunit {}: the first difference", unit.unit);
                 text += &first_difference(first, ["corrected", "published"]);
             }
         }
         match self.identical {
             Some(true) => {
-                text += "identical: every tick that the service published is made again to the bit\n"
+                text += "identical: every tick that the service published is made again to the bit\n";
             }
             Some(false) => text += "different: not every tick is that which the service published\n",
             None => {}

@@ -1,5 +1,7 @@
 //! The first difference of two logs, for people.
 
+use std::fmt::Write as _;
+
 use comfy_table::{Table, presets};
 use isotherm_correction::sample::CorrectedTick;
 use isotherm_log::diff::{Equivalent, FieldDifference, FirstDifference, Happened, LogTick, Row, mode};
@@ -9,8 +11,9 @@ pub(in crate::cli) fn first_difference(first: &FirstDifference, names: [&str; 2]
     let [a, b] = names;
     let mut text = format!("tick {}, which ends at {} ns", first.sequence, first.end_time_ns);
     match first.only_in {
-        Some("a") => text += &format!(", is in {a} alone\n"),
-        Some(_) => text += &format!(", is in {b} alone\n"),
+        Some(one) => {
+            let _ = writeln!(text, ", is in {} alone", if one == "a" { a } else { b });
+        }
         None => text += "\n",
     }
     for field in &first.fields {
@@ -56,7 +59,7 @@ fn around(first: &FirstDifference, [name_a, name_b]: [&str; 2]) -> String {
         let marker = if place == first.at { ">" } else { "" };
         match (a, b) {
             (Some(a), Some(b)) if isotherm_log::diff::identical(a, b) => {
-                row(&mut table, marker, "both", Some(a))
+                row(&mut table, marker, "both", Some(a));
             }
             _ => {
                 row(&mut table, marker, name_a, a.as_ref());

@@ -99,8 +99,12 @@ pub(super) fn human(report: &RecordReport) -> String {
     if report.files_deleted > 0 {
         rows.push(("older files deleted", report.files_deleted.to_string()));
     }
-    let files = report.files.iter().map(|path| format!("{}\n", path.display())).collect::<String>();
-    topics(&report.topics) + &show::table(&rows) + &files
+    let mut text = topics(&report.topics) + &show::table(&rows);
+    for path in &report.files {
+        text.push_str(&path.to_string_lossy());
+        text.push('\n');
+    }
+    text
 }
 
 /// A table of topics.

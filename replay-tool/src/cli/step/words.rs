@@ -1,5 +1,7 @@
 //! One event of a state machine in words.
 
+use std::fmt::Write as _;
+
 use isotherm_log::replica::stepper::{Step, What};
 
 /// What happened, and what it did.
@@ -7,7 +9,7 @@ pub(super) fn step(step: &Step) -> String {
     let mut text = format!("#{} {}\n", step.number, what(&step.what));
     let mut line = |name: &str, words: String| {
         if !words.is_empty() {
-            text += &format!("    {name:<12} {words}\n");
+            let _ = writeln!(text, "    {name:<12} {words}");
         }
     };
     let revision = match (step.revision, step.pending) {
