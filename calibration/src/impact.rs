@@ -1,4 +1,4 @@
-//! What a drift that is left means for navigation [002].
+//! What a drift that is left means for navigation (002).
 //!
 //! | file | holds |
 //! |---|---|

@@ -38,7 +38,7 @@ impl Output {
     /// Creates a file, or takes standard output for `-`.
     ///
     /// # Errors
-    /// [`Error::File`] where it cannot be created.
+    /// [`Error::Log`] where it cannot be created.
     pub fn create(path: &Path) -> Result<Self, Error> {
         let writer: Box<dyn Write> = match path.to_str() {
             Some("-") => Box::new(io::stdout()),
@@ -50,7 +50,7 @@ impl Output {
     /// Writes whatever `write` does.
     ///
     /// # Errors
-    /// [`Error::File`] where it cannot be written.
+    /// [`Error::Log`] where it cannot be written.
     pub fn write(&mut self, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), Error> {
         let failed = |source| Error::file(Path::new(&self.name), "write", source);
         write(&mut self.writer).map_err(failed)
@@ -59,7 +59,7 @@ impl Output {
     /// Writes out what is still here.
     ///
     /// # Errors
-    /// [`Error::File`] where it cannot be written.
+    /// [`Error::Log`] where it cannot be written.
     pub fn finish(mut self) -> Result<(), Error> {
         self.write(|writer| writer.flush())
     }

@@ -1,4 +1,4 @@
-//! Trend of the slow part, and how far it can be trusted beyond the log: "fit 21 h, extrapolate the rest" [002].
+//! Trend of the slow part, and how far it can be trusted beyond the log: "fit 21 h, extrapolate the rest" (002).
 
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;

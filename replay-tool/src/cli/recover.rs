@@ -1,6 +1,5 @@
 //! `isotherm-replay recover`.
 
-
 use std::path::{Path, PathBuf};
 
 use clap::Args;
