@@ -21,7 +21,7 @@
 //! | [`diff`] | two corrected logs compared |
 //! | [`info`] | what a log holds, in figures |
 //! | [`plot`] | a log, or two, as a page to look at; pages for other reports |
-//! | [`file`] | small files read whole, outputs that must not fall on inputs |
+//! | [`mod@file`] | small files read whole, outputs that must not fall on inputs |
 //! | [`error`] | what can go wrong |
 
 pub mod convert;
