@@ -5,8 +5,9 @@
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`series`] | a log as columns: ticks, readings, temperatures of one unit |
-//! | [`provenance`] | where the numbers of a document come from |
+//! | [`run`] | what a log has of one unit, to be corrected again and again |
+//! | [`series`], [`means`] | a run as columns: raw readings; corrected outputs averaged over windows |
+//! | [`nominal`], [`written`], [`provenance`] | a document: before a fit, on its way to a file, where its numbers come from |
 //! | [`drift`], [`allan`], [`spectrum`] | noise and drift of a static log |
 //! | [`impact`] | what a drift that is left means for navigation |
 //! | [`error`], [`cli`] | what can go wrong; the command line |
@@ -15,7 +16,13 @@ pub mod allan;
 pub mod cli;
 pub mod drift;
 pub mod error;
+#[cfg(test)]
+mod fixture;
 pub mod impact;
+pub mod means;
+pub mod nominal;
 pub mod provenance;
+pub mod run;
 pub mod series;
 pub mod spectrum;
+pub mod written;

@@ -4,8 +4,9 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
+use isotherm_protocol::digest::Digest;
 use isotherm_protocol::document::{Log, Origin};
-use sha2::{Digest, Sha256};
+use sha2::{Digest as _, Sha256};
 
 use crate::error::Error;
 
@@ -34,7 +35,7 @@ fn log_of(path: &Path) -> Result<Log, Error> {
         }
     }
     let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    let sha256 = hash.finalize().iter().fold(String::new(), |hex, byte| format!("{hex}{byte:02x}"));
+    let sha256 = Digest::from(<[u8; 32]>::from(hash.finalize())).to_string();
     Ok(Log { name, sha256 })
 }
 

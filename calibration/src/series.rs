@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use isotherm_correction::sample::{LasingMode, OutputKind};
-use isotherm_log::message::Topic;
-use isotherm_log::source::Log;
+use isotherm_correction::sample::{AccelTick, GyroTick, LasingMode, OutputKind, TemperatureReading};
+use isotherm_log::message::{Message, Topic};
+use isotherm_log::text::LogEvent;
 use isotherm_protocol::codec;
 use isotherm_protocol::key::{RawStream, UnitId};
 use isotherm_protocol::raw::{AccelBatch, GyroBatch, TemperatureBatch};
@@ -53,39 +53,6 @@ pub struct Series {
 }
 
 impl Series {
-    /// Reads everything of a log that is of one unit; `unit` chooses where it has several.
-    ///
-    /// # Errors
-    /// [`Error::Refused`] where the log has several units and none is chosen, or nothing of the chosen one; [`Error::Log`].
-    pub fn read(log: &mut Log, unit: Option<&UnitId>, mut progress: impl FnMut(u64)) -> Result<Self, Error> {
-        let mut of_unit: BTreeMap<UnitId, Self> = BTreeMap::new();
-        let mut ticks = 0;
-        while let Some(message) = log.next_message()? {
-            let Topic::Raw(serial, stream) = &message.topic else { continue };
-            if unit.is_some_and(|unit| unit != serial) {
-                continue;
-            }
-            let series = of_unit.entry(serial.clone()).or_insert_with(|| Self::empty(serial.clone()));
-            series.bad_frames += u64::from(!series.take(*stream, &message.frame)?);
-            ticks += 1;
-            progress(ticks);
-        }
-        let mut found = of_unit.into_iter();
-        match (found.next(), found.next()) {
-            (Some((_, series)), None) => Ok(series),
-            (None, _) => {
-                let of = unit.map(|unit| format!(" of unit {unit}")).unwrap_or_default();
-                Err(Error::Refused(vec![format!("the log has no raw readings{of}")]))
-            }
-            (Some((first, _)), Some((second, _))) => {
-                let others = found.fold(String::new(), |list, (serial, _)| format!("{list}, {serial}"));
-                Err(Error::Refused(vec![format!(
-                    "the log is of several units ({first}, {second}{others}): choose one with --unit"
-                )]))
-            }
-        }
-    }
-
     /// Nothing of a unit yet.
     #[must_use]
     pub fn empty(unit: UnitId) -> Self {
@@ -99,39 +66,70 @@ impl Series {
         }
     }
 
+    /// Takes what a message has of raw readings; a frame that cannot be read is counted.
+    ///
+    /// # Errors
+    /// [`Error::Refused`] where ticks are of another instrument than those before.
+    pub fn take_message(&mut self, message: &Message) -> Result<(), Error> {
+        let Topic::Raw(_, stream) = &message.topic else { return Ok(()) };
+        let readable = self.take(*stream, &message.frame)?;
+        self.bad_frames += u64::from(!readable);
+        Ok(())
+    }
+
+    /// Takes one event.
+    ///
+    /// # Errors
+    /// As [`Series::take_message`].
+    pub fn take_event(&mut self, event: &LogEvent) -> Result<(), Error> {
+        match event {
+            LogEvent::Gyro { output, tick } => self.gyro(*output, tick)?,
+            LogEvent::Accel { output, tick } => self.accel(*output, tick)?,
+            LogEvent::Temperature(reading) => self.temperature(reading),
+        }
+        Ok(())
+    }
+
     /// Takes one frame; `false` where it cannot be read.
     fn take(&mut self, stream: RawStream, frame: &[u8]) -> Result<bool, Error> {
         match stream {
             RawStream::Gyro => {
                 let Ok(batch) = codec::decode::<GyroBatch>(frame) else { return Ok(false) };
-                for tick in batch.to_core() {
-                    let (end, duration) = (tick.end_time.as_ns(), tick.duration.as_s());
-                    self.gyros.push(batch.output(), tick.sequence, (end, duration), &tick.readings)?;
-                    self.mode.push(match tick.mode {
-                        Some(LasingMode::Plus) => 1,
-                        Some(LasingMode::Minus) => -1,
-                        None => 0,
-                    });
-                }
+                batch.to_core().try_for_each(|tick| self.gyro(batch.output(), &tick))?;
             }
             RawStream::Accel => {
                 let Ok(batch) = codec::decode::<AccelBatch>(frame) else { return Ok(false) };
-                for tick in batch.to_core() {
-                    let (end, duration) = (tick.end_time.as_ns(), tick.duration.as_s());
-                    self.accels.push(batch.output(), tick.sequence, (end, duration), &tick.readings)?;
-                }
+                batch.to_core().try_for_each(|tick| self.accel(batch.output(), &tick))?;
             }
             RawStream::Temperature => {
                 let Ok(batch) = codec::decode::<TemperatureBatch>(frame) else { return Ok(false) };
-                for reading in batch.to_core() {
-                    let channel = self.temperatures.entry(reading.channel.to_string()).or_default();
-                    channel.time_ns.push(reading.time.as_ns());
-                    channel.raw.push(reading.raw);
-                }
+                batch.to_core().for_each(|reading| self.temperature(&reading));
             }
             RawStream::Health => {}
         }
         Ok(true)
+    }
+
+    fn gyro(&mut self, output: OutputKind, tick: &GyroTick) -> Result<(), Error> {
+        let (end, duration) = (tick.end_time.as_ns(), tick.duration.as_s());
+        self.gyros.push(output, tick.sequence, (end, duration), &tick.readings)?;
+        self.mode.push(match tick.mode {
+            Some(LasingMode::Plus) => 1,
+            Some(LasingMode::Minus) => -1,
+            None => 0,
+        });
+        Ok(())
+    }
+
+    fn accel(&mut self, output: OutputKind, tick: &AccelTick) -> Result<(), Error> {
+        let (end, duration) = (tick.end_time.as_ns(), tick.duration.as_s());
+        self.accels.push(output, tick.sequence, (end, duration), &tick.readings)
+    }
+
+    fn temperature(&mut self, reading: &TemperatureReading) {
+        let channel = self.temperatures.entry(reading.channel.to_string()).or_default();
+        channel.time_ns.push(reading.time.as_ns());
+        channel.raw.push(reading.raw);
     }
 }
 

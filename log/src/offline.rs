@@ -17,9 +17,9 @@ use std::slice;
 use std::sync::Arc;
 
 use isotherm_correction::sample::CorrectedTick;
-use isotherm_correction::unit::{Event, UnitSettings};
+use isotherm_correction::unit::{Event, Unit, UnitSettings};
 use isotherm_protocol::document::{Document, Problem};
-use isotherm_protocol::key::UnitId;
+use isotherm_protocol::key::{RawStream, UnitId};
 use isotherm_protocol::stream::UnitStream;
 
 pub use parallel::{Made, RunOptions, correct};
@@ -93,6 +93,17 @@ impl Offline {
             }
             LogEvent::Temperature(reading) => Event::Temperature(slice::from_ref(reading)),
         });
+    }
+
+    /// Takes one frame of raw readings. One that cannot be read is counted, and its ticks are a gap.
+    pub fn receive(&mut self, input: RawStream, frame: &[u8]) {
+        let _ = self.stream.receive(input, frame);
+    }
+
+    /// The unit as it stands.
+    #[must_use]
+    pub fn unit(&self) -> &Unit {
+        self.stream.unit()
     }
 
     /// Releases what still waits: the log is over.

@@ -5,6 +5,8 @@ use std::io::{self, IsTerminal};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use isotherm_log::progress::Progress;
 
+use crate::run::Watch;
+
 /// Steps between two looks at the progress.
 const STRIDE: u32 = 64;
 
@@ -16,32 +18,44 @@ pub(crate) struct Bar {
 }
 
 impl Bar {
-    /// Over the bytes of a log.
-    pub(crate) fn over_log(progress: Progress) -> Self {
-        Self::new(Some(progress), "{bar:30} {percent:>3} %  reading  {eta} left")
+    /// Over the readings of logs, one after the other.
+    pub(crate) fn reading() -> Self {
+        Self::new("{bar:30} {percent:>3} %  reading  {eta} left")
     }
 
     /// Without an end in sight.
     pub(crate) fn at_work(message: &'static str) -> Self {
-        let bar = Self::new(None, "{spinner} {msg}");
+        let bar = Self::new("{spinner} {msg}");
         bar.drawn.set_message(message);
         bar.drawn.tick();
         bar
     }
 
-    fn new(progress: Option<Progress>, template: &str) -> Self {
+    fn new(template: &str) -> Self {
         let terminal = io::stderr().is_terminal();
         let target =
             if terminal { ProgressDrawTarget::stderr_with_hz(5) } else { ProgressDrawTarget::hidden() };
-        let drawn = ProgressBar::with_draw_target(progress.as_ref().map(Progress::total), target);
+        let drawn = ProgressBar::with_draw_target(None, target);
         if let Ok(style) = ProgressStyle::with_template(template) {
             drawn.set_style(style);
         }
-        Self { drawn, progress, since: 0 }
+        Self { drawn, progress: None, since: 0 }
     }
 
-    /// One step is done.
-    pub(crate) fn step(&mut self) {
+    /// Takes the bar away.
+    pub(crate) fn finish(&self) {
+        self.drawn.finish_and_clear();
+    }
+}
+
+impl Watch for Bar {
+    fn begin(&mut self, progress: Progress) {
+        self.drawn.reset();
+        self.drawn.set_length(progress.total());
+        self.progress = Some(progress);
+    }
+
+    fn step(&mut self) {
         self.since += 1;
         if self.since >= STRIDE {
             self.since = 0;
@@ -52,8 +66,7 @@ impl Bar {
         }
     }
 
-    /// Takes the bar away.
-    pub(crate) fn finish(&self) {
-        self.drawn.finish_and_clear();
+    fn end(&mut self) {
+        self.finish();
     }
 }

@@ -1,18 +1,17 @@
 //! `isotherm-calibrate drift`.
 
-use std::fs::OpenOptions;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use isotherm_log::diff::is_csv;
-use isotherm_log::file::{read_small_text, refuse_overwriting};
+use isotherm_log::file::refuse_overwriting;
 use isotherm_log::offline::load_calibration;
-use isotherm_protocol::document::{Created, Document};
+use isotherm_protocol::document::Created;
 use serde_json::json;
 
 use super::bar::Bar;
-use super::{LogArgs, print};
+use super::print;
+use super::runs::LogArgs;
 use crate::drift::analysis::{Wanted, analyse};
 use crate::drift::columns::{Columns, Kind};
 use crate::drift::page::page;
@@ -22,9 +21,8 @@ use crate::drift::report::Report;
 use crate::drift::trend::FIT_H;
 use crate::error::Error;
 use crate::provenance::{TOOL, command_line, origin};
-
-/// Line that lets editors check a document.
-const SCHEMA_LINE: &str = "#:schema ../calibration.schema.json\n\n";
+use crate::run::Watch;
+use crate::written::{Written, write_file};
 
 /// Noise and drift of a log at rest: Allan deviation, Markov drift, trend, spectrum, estimator parameters
 #[derive(Debug, Args)]
@@ -156,7 +154,7 @@ impl DriftArgs {
 
     fn columns(&self) -> Result<Columns, Error> {
         let kind = if self.accelerometers { Kind::Force } else { Kind::Rate };
-        let unit = self.log.serial()?;
+        let unit = self.log.reading.serial()?;
         if self.corrected || self.log.log.iter().any(|path| is_csv(path)) {
             let mut bar = Bar::at_work("reading");
             let columns = Columns::of_corrected(&self.log.log, unit.as_ref(), kind, || bar.step());
@@ -165,13 +163,8 @@ impl DriftArgs {
         }
         if let Some(document) = &self.document {
             let loaded = load_calibration(document)?;
-            let mut log = self.log.open()?;
-            let mut bar = Bar::over_log(log.progress());
-            // A text log names no unit of its own: it is taken to be the document's.
-            let unit = unit.filter(|_| log.recording().is_some());
-            let columns = Columns::corrected_by(&mut log, &loaded, unit.as_ref(), kind, || bar.step());
-            bar.finish();
-            return columns;
+            let run = self.log.run(Some(&loaded.unit))?;
+            return Columns::corrected_by(&run, &loaded, kind, Bar::reading());
         }
         let series = self.log.read()?;
         if self.accelerometers {
@@ -183,13 +176,7 @@ impl DriftArgs {
 
     /// Puts the parameters into a document and writes it, after its own reader has taken it.
     fn write_document(&self, path: &Path, out: &Path, report: &Report) -> Result<(), Error> {
-        let text = read_small_text(path, "read the calibration document")?;
-        let problems = |problems: Vec<isotherm_protocol::document::Problem>| {
-            problems.iter().map(ToString::to_string).collect::<Vec<_>>()
-        };
-        let parsed = Document::parse(&text, Some(&path.display().to_string()))
-            .map_err(|found| isotherm_log::error::Error::Calibration(problems(found)))?;
-        let mut document = parsed.document;
+        let mut document = Written::read(path)?.document;
         // What the document says of the constant part holds, unless something else was stated.
         put(&mut document, &report.parameters, self.initial_sigma.is_none())?;
         if let Some(created) = &self.created {
@@ -221,23 +208,6 @@ impl DriftArgs {
         details.insert("drift".to_owned(), about);
         whole.details = Some(details);
         document.origin = Some(whole);
-        let body = document.to_toml().map_err(|error| Error::Document(vec![error.to_string()]))?;
-        let text = format!("{SCHEMA_LINE}{body}");
-        Document::parse(&text, Some(&out.display().to_string()))
-            .map_err(|found| Error::Document(problems(found)))?;
-        write_file(out, text.as_bytes(), self.overwrite)
+        Written::of(&document)?.save(out, self.overwrite)
     }
-}
-
-/// Writes a file; one that is there only where that is allowed.
-pub(super) fn write_file(path: &Path, bytes: &[u8], overwrite: bool) -> Result<(), Error> {
-    let mut options = OpenOptions::new();
-    options.write(true);
-    if overwrite {
-        options.create(true).truncate(true)
-    } else {
-        options.create_new(true)
-    };
-    let written = options.open(path).and_then(|mut file| file.write_all(bytes));
-    written.map_err(|source| Error::file(path, "write", source))
 }

@@ -11,8 +11,8 @@ use isotherm_log::offline::load_calibration;
 use isotherm_protocol::document::Document;
 
 use super::bar::Bar;
-use super::drift::write_file;
-use super::{LogArgs, print};
+use super::print;
+use super::runs::{LogArgs, Reading};
 use crate::drift::HOUR_S;
 use crate::drift::columns::{Columns, Kind};
 use crate::error::Error;
@@ -21,6 +21,8 @@ use crate::impact::logged;
 use crate::impact::monte_carlo::{Voyages, sail_all};
 use crate::impact::report::{Report, Row};
 use crate::impact::scenario::{CARES, Drift, Voyage};
+use crate::run::Watch;
+use crate::written::write_file;
 
 /// Seeds where nobody says.
 const SEEDS: u32 = 50;
@@ -42,12 +44,8 @@ pub(super) struct ImpactArgs {
     /// A log at rest: corrected ticks (CSV, .mcap), or raw ones with --document
     #[arg(value_name = "LOG")]
     log: Vec<PathBuf>,
-    /// Column mapping of a raw text log (TOML)
-    #[arg(long, short, value_name = "FILE", requires = "document")]
-    mapping: Option<PathBuf>,
-    /// The unit, where a recording has several
-    #[arg(long, short, value_name = "SERIAL")]
-    unit: Option<String>,
+    #[command(flatten)]
+    reading: Reading,
     /// Calibration document (TOML) that says what the estimator is to expect; a raw log is corrected with it
     #[arg(long, short, value_name = "DOC")]
     document: Option<PathBuf>,
@@ -291,9 +289,9 @@ impl ImpactArgs {
     }
 
     fn columns(&self) -> Result<Columns, Error> {
-        let args = LogArgs { log: self.log.clone(), mapping: self.mapping.clone(), unit: self.unit.clone() };
-        let unit = args.serial()?;
-        let raw = self.mapping.is_some();
+        let args = LogArgs { log: self.log.clone(), reading: self.reading.clone() };
+        let unit = self.reading.serial()?;
+        let raw = self.reading.mapping.is_some();
         if !raw && (self.log.iter().all(|path| is_csv(path)) || self.document.is_none()) {
             let mut bar = Bar::at_work("reading");
             let columns = Columns::of_corrected(&self.log, unit.as_ref(), Kind::Rate, || bar.step());
@@ -304,12 +302,7 @@ impl ImpactArgs {
             return Err(Error::Usage("a raw log needs --document, to be corrected with".to_owned()));
         };
         let loaded = load_calibration(document)?;
-        let mut log = args.open()?;
-        let mut bar = Bar::over_log(log.progress());
-        let unit = unit.filter(|_| log.recording().is_some());
-        let columns = Columns::corrected_by(&mut log, &loaded, unit.as_ref(), Kind::Rate, || bar.step());
-        bar.finish();
-        columns
+        Columns::corrected_by(&args.run(Some(&loaded.unit))?, &loaded, Kind::Rate, Bar::reading())
     }
 }
 

@@ -3,16 +3,13 @@
 use std::path::PathBuf;
 
 use isotherm_correction::sample::{CorrectedTick, OutputKind, SensorFlags};
-use isotherm_correction::unit::UnitSettings;
 use isotherm_log::diff::CorrectedLog;
-use isotherm_log::message::Topic;
 use isotherm_log::offline::Loaded;
-use isotherm_log::source::Log;
 use isotherm_protocol::key::UnitId;
-use isotherm_protocol::stream::UnitStream;
 
 use super::DEG_PER_H_IN_RAD_PER_S;
 use crate::error::Error;
+use crate::run::{Run, Watch};
 use crate::series::{Series, Ticks};
 
 /// What a column measures.
@@ -119,43 +116,15 @@ impl Columns {
         Self { unit, kind, names, corrected: false, end_ns, values, notes: Vec::new() }
     }
 
-    /// From the log of a unit, corrected with a document by the same stream as the service's.
+    /// From the run of a unit, corrected with a document by the same stream as the service's.
     ///
     /// # Errors
-    /// [`Error::Refused`] where nothing comes out, [`Error::Log`].
-    pub fn corrected_by(
-        log: &mut Log,
-        loaded: &Loaded,
-        unit: Option<&UnitId>,
-        kind: Kind,
-        mut progress: impl FnMut(),
-    ) -> Result<Self, Error> {
+    /// As [`Run::correct`].
+    pub fn corrected_by(run: &Run, loaded: &Loaded, kind: Kind, watch: impl Watch) -> Result<Self, Error> {
         let mut columns = Self::empty(loaded.unit.clone(), kind);
-        let mut stream = UnitStream::new(loaded.unit.clone(), UnitSettings::default());
-        stream.install(loaded.calibration.clone(), loaded.digest);
-        let mut found: Option<UnitId> = unit.cloned();
-        while let Some(message) = log.next_message()? {
-            let Topic::Raw(serial, input) = &message.topic else { continue };
-            if unit.is_some_and(|unit| unit != serial) {
-                continue;
-            }
-            let first = found.get_or_insert_with(|| serial.clone());
-            if first != serial {
-                return Err(Error::Refused(vec![format!(
-                    "the log is of several units ({first}, {serial}): choose one with --unit"
-                )]));
-            }
-            // A frame that cannot be read is counted by the stream, and its ticks are a gap.
-            let _ = stream.receive(*input, &message.frame);
-            stream.take_ready().iter().for_each(|tick| columns.push(tick));
-            progress();
-        }
-        stream.flush();
-        stream.take_ready().iter().for_each(|tick| columns.push(tick));
-        // A text log names no unit.
-        let named = found.filter(|found| *found != loaded.unit && log.recording().is_some());
-        if let Some(found) = named {
-            columns.notes.push(format!("The log is of unit {found}, the document for {}.", loaded.unit));
+        columns.notes = run.correct(loaded, watch, |tick, _| columns.push(tick))?;
+        if run.unit != loaded.unit {
+            columns.notes.push(format!("The log is of unit {}, the document for {}.", run.unit, loaded.unit));
         }
         columns.finish()
     }

@@ -1,0 +1,155 @@
+//! The arguments that name logs, the same for every command.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use isotherm_correction::units::Span;
+use isotherm_log::mapping::Mapping;
+use isotherm_log::offline::unit_id;
+use isotherm_log::part::{LogFiles, Part, are_recordings};
+use isotherm_log::source::Log;
+use isotherm_protocol::key::UnitId;
+
+use super::bar::Bar;
+use crate::error::Error;
+use crate::run::{Run, units_of};
+use crate::series::Series;
+
+/// Gyro ticks in a batch of a text log.
+const BATCH_TICKS: usize = 512;
+
+/// Logs, of one unit or of several.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct LogArgs {
+    /// Recordings (.mcap), or the files of a text log in the order of its mapping
+    #[arg(required = true, value_name = "LOG")]
+    pub(crate) log: Vec<PathBuf>,
+    #[command(flatten)]
+    pub(crate) reading: Reading,
+}
+
+/// How logs are read.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct Reading {
+    /// Column mapping of a text log (TOML); ready ones are in config/mappings
+    #[arg(long, short, value_name = "FILE")]
+    pub(crate) mapping: Option<PathBuf>,
+    /// The unit, where a recording has several, or the serial of a text log's
+    #[arg(long, short, value_name = "SERIAL")]
+    pub(crate) unit: Option<String>,
+    /// Leave out this much of each log's beginning (s)
+    #[arg(long, value_name = "SECONDS", default_value = "0", value_parser = seconds)]
+    pub(crate) start: Span,
+    /// Take this much of each log (s); without it, all
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    pub(crate) duration: Option<Span>,
+}
+
+impl LogArgs {
+    /// The one run of one unit that the files are together; a text log that is given no serial is of `fallback`.
+    pub(crate) fn run(&self, fallback: Option<&UnitId>) -> Result<Run, Error> {
+        let mut units = self.reading.runs_in(&self.log, fallback)?;
+        match (units.pop_first(), units.keys().next()) {
+            (Some((_, run)), None) => Ok(run),
+            (Some((first, _)), Some(second)) => {
+                let others = units.keys().skip(1).fold(String::new(), |list, unit| format!("{list}, {unit}"));
+                Err(Error::Refused(vec![format!(
+                    "the log is of several units ({first}, {second}{others}): choose one with --unit"
+                )]))
+            }
+            (None, _) => Err(Error::Refused(vec!["the log has no raw readings".to_owned()])),
+        }
+    }
+
+    /// Reads all of the one unit.
+    pub(crate) fn read(&self) -> Result<Series, Error> {
+        self.run(None)?.series(Bar::reading())
+    }
+}
+
+impl Reading {
+    /// The serial that was given.
+    pub(crate) fn serial(&self) -> Result<Option<UnitId>, Error> {
+        Ok(self.unit.as_deref().map(unit_id).transpose()?)
+    }
+
+    /// Runs by unit, each log for itself: every recording is a run, and of text logs as many files as the mapping has.
+    pub(crate) fn runs(
+        &self,
+        logs: &[PathBuf],
+        fallback: Option<&UnitId>,
+    ) -> Result<BTreeMap<UnitId, Vec<Run>>, Error> {
+        let together = if are_recordings(logs)? { 1 } else { self.text_mapping(logs)?.files.len().max(1) };
+        let folders = logs.iter().all(|path| path.is_dir());
+        let mut of_unit: BTreeMap<UnitId, Vec<Run>> = BTreeMap::new();
+        for log in logs.chunks(if folders { 1 } else { together }) {
+            for (unit, run) in self.runs_in(log, fallback)? {
+                of_unit.entry(unit).or_default().push(run);
+            }
+        }
+        Ok(of_unit)
+    }
+
+    /// The runs of every unit in files that are one log.
+    fn runs_in(&self, log: &[PathBuf], fallback: Option<&UnitId>) -> Result<BTreeMap<UnitId, Run>, Error> {
+        let end =
+            self.duration.map(|length| Span::from_ns(self.start.as_ns().saturating_add(length.as_ns())));
+        let part = Part { start: self.start, end, ..Part::default() };
+        let given = self.serial()?;
+        let name = names(log);
+        let run = |unit: UnitId, files| (unit.clone(), Run::new(name.clone(), unit, files, &part));
+        if !are_recordings(log)? {
+            let unit = match given.as_ref().or(fallback) {
+                Some(unit) => unit.clone(),
+                None => unit_id("UNIT")?,
+            };
+            let mapping = Box::new(self.text_mapping(log)?);
+            let files =
+                LogFiles::Text { paths: log.to_vec(), mapping, unit: unit.clone(), batch_ticks: BATCH_TICKS };
+            return Ok([run(unit, files)].into());
+        }
+        if let Some(mapping) = &self.mapping {
+            let words = format!(
+                "--mapping {} is for text logs, {name} is a recording: leave it out",
+                mapping.display()
+            );
+            return Err(Error::Usage(words));
+        }
+        let units = match given {
+            Some(unit) => vec![unit],
+            None => units_of(&mut Log::recordings(log)?, Bar::reading())?,
+        };
+        Ok(units.into_iter().map(|unit| run(unit, LogFiles::Recordings(log.to_vec()))).collect())
+    }
+
+    fn text_mapping(&self, logs: &[PathBuf]) -> Result<Mapping, Error> {
+        if let Some(mapping) = &self.mapping {
+            return Ok(Mapping::load(mapping)?);
+        }
+        for path in logs {
+            std::fs::metadata(path).map_err(|source| Error::file(path, "open the log", source))?;
+        }
+        Err(Error::Usage(format!(
+            "{} is no recording, and a text log needs --mapping FILE: ready ones are in config/mappings",
+            names(logs)
+        )))
+    }
+}
+
+/// Reads seconds.
+fn seconds(text: &str) -> Result<Span, String> {
+    match text.parse::<f64>() {
+        Ok(seconds) if (0.0..=1e9).contains(&seconds) => Ok(Span::from_s(seconds)),
+        _ => Err("must be a number of seconds from 0 to 1000000000".into()),
+    }
+}
+
+/// Names of files, as a run is called.
+fn names(paths: &[PathBuf]) -> String {
+    let name = |path: &PathBuf| -> String {
+        let name = Path::new(path).file_name();
+        name.map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
+    };
+    paths.iter().map(name).collect::<Vec<_>>().join(" + ")
+}

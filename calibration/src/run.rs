@@ -1,0 +1,164 @@
+//! A run: what one log has of one unit, to be corrected again and again by the service's own code.
+
+use std::collections::BTreeSet;
+
+use isotherm_correction::sample::CorrectedTick;
+use isotherm_correction::unit::{Unit, UnitSettings};
+use isotherm_log::message::Topic;
+use isotherm_log::offline::{Loaded, Offline};
+use isotherm_log::part::{LogFiles, Part};
+use isotherm_log::progress::Progress;
+use isotherm_log::source::Log;
+use isotherm_log::text::LogEvent;
+use isotherm_protocol::key::UnitId;
+
+use crate::error::Error;
+use crate::series::Series;
+
+/// What one log has of one unit.
+#[derive(Debug, Clone)]
+pub struct Run {
+    /// What the run is called in reports: the names of its files.
+    pub name: String,
+    /// The unit.
+    pub unit: UnitId,
+    source: Source,
+}
+
+#[derive(Debug, Clone)]
+enum Source {
+    Files { files: LogFiles, part: Part },
+    Events(Vec<LogEvent>),
+}
+
+/// What a correction passed over, as `isotherm-replay correct` says it; empty where all is well.
+pub type Troubles = Vec<String>;
+
+impl Run {
+    /// The run of a unit in the files of a log; nothing is read yet.
+    #[must_use]
+    pub fn new(name: String, unit: UnitId, files: LogFiles, part: &Part) -> Self {
+        let part = Part { units: [unit.clone()].into(), ..part.clone() };
+        Self { name, unit, source: Source::Files { files, part } }
+    }
+
+    /// A run that is already in memory.
+    #[must_use]
+    pub fn of_events(name: String, unit: UnitId, events: Vec<LogEvent>) -> Self {
+        Self { name, unit, source: Source::Events(events) }
+    }
+
+    /// Its readings as columns.
+    ///
+    /// # Errors
+    /// As [`Series::read`].
+    pub fn series(&self, mut watch: impl Watch) -> Result<Series, Error> {
+        let mut series = Series::empty(self.unit.clone());
+        match &self.source {
+            Source::Events(events) => events.iter().try_for_each(|event| series.take_event(event))?,
+            Source::Files { files, part } => {
+                let mut messages = files.open(part)?;
+                watch.begin(messages.progress());
+                while let Some(message) = messages.next_message()? {
+                    series.take_message(&message)?;
+                    watch.step();
+                }
+                watch.end();
+            }
+        }
+        if series.gyros.is_empty() && series.accels.is_empty() {
+            return Err(Error::Refused(vec![format!(
+                "{} has no raw ticks of unit {}",
+                self.name, self.unit
+            )]));
+        }
+        Ok(series)
+    }
+
+    /// Corrects the run with a calibration, as `isotherm-replay correct --ignore-journal` does; `each` sees every
+    /// corrected tick, and the unit as it stands behind it.
+    ///
+    /// # Errors
+    /// [`Error::Log`] where the log cannot be read; [`Error::Refused`] where nothing comes out.
+    pub fn correct(
+        &self,
+        loaded: &Loaded,
+        mut watch: impl Watch,
+        mut each: impl FnMut(&CorrectedTick, &Unit),
+    ) -> Result<Troubles, Error> {
+        let mut unit = Offline::new(loaded, UnitSettings::default());
+        let mut count = 0_u64;
+        let mut give_out = |unit: &mut Offline| {
+            for tick in &unit.take() {
+                count += 1;
+                each(tick, unit.unit());
+            }
+        };
+        match &self.source {
+            Source::Events(events) => {
+                for event in events {
+                    unit.handle(event);
+                    give_out(&mut unit);
+                }
+            }
+            Source::Files { files, part } => {
+                let mut messages = files.open(part)?;
+                watch.begin(messages.progress());
+                while let Some(message) = messages.next_message()? {
+                    if let Topic::Raw(_, input) = &message.topic {
+                        unit.receive(*input, &message.frame);
+                        give_out(&mut unit);
+                    }
+                    watch.step();
+                }
+                watch.end();
+            }
+        }
+        unit.finish();
+        give_out(&mut unit);
+        let troubles = unit.troubles();
+        if count == 0 {
+            let mut reasons = vec![format!(
+                "{}: nothing of unit {} could be corrected: is the document for this unit, and the mapping right?",
+                self.name, self.unit
+            )];
+            reasons.extend(troubles);
+            return Err(Error::Refused(reasons));
+        }
+        Ok(troubles)
+    }
+}
+
+/// The units that recordings have raw readings of.
+///
+/// # Errors
+/// [`Error::Log`].
+pub fn units_of(log: &mut Log, mut watch: impl Watch) -> Result<Vec<UnitId>, Error> {
+    let mut units = BTreeSet::new();
+    watch.begin(log.progress());
+    while let Some(message) = log.next_message()? {
+        if let Topic::Raw(unit, _) = message.topic {
+            units.insert(unit);
+        }
+        watch.step();
+    }
+    watch.end();
+    Ok(units.into_iter().collect())
+}
+
+/// Whoever watches a long reading.
+pub trait Watch {
+    /// A reading begins.
+    fn begin(&mut self, progress: Progress);
+    /// It went a step further.
+    fn step(&mut self);
+    /// It is over.
+    fn end(&mut self);
+}
+
+/// Nobody watches.
+impl Watch for () {
+    fn begin(&mut self, _: Progress) {}
+    fn step(&mut self) {}
+    fn end(&mut self) {}
+}

@@ -1,0 +1,98 @@
+//! A calibration document on its way to a file: what is judged is what its own reader makes of the text.
+
+use std::fs::OpenOptions;
+use std::io::Write;
+use std::path::Path;
+use std::sync::Arc;
+
+use isotherm_log::file::read_small_text;
+use isotherm_log::offline::{Loaded, unit_id};
+use isotherm_protocol::document::{Document, Parsed, Problem};
+
+use crate::error::Error;
+
+/// Line that lets editors check a document.
+const SCHEMA_LINE: &str = "#:schema ../calibration.schema.json\n\n";
+/// Digits that coefficients are written with: no conversion of units shows in them, and no fit is as good.
+const DIGITS: usize = 12;
+
+/// A document beside its text and the calibration that the service makes of it.
+#[derive(Debug, Clone)]
+pub struct Written {
+    /// The text.
+    pub text: String,
+    /// The document as it is read back from the text.
+    pub document: Document,
+    /// Its calibration.
+    pub loaded: Loaded,
+}
+
+impl Written {
+    /// Writes a document out and reads it back.
+    ///
+    /// # Errors
+    /// [`Error::Document`] with every problem that its reader has with it.
+    pub fn of(document: &Document) -> Result<Self, Error> {
+        let body = document.to_toml().map_err(|error| Error::Document(vec![error.to_string()]))?;
+        let text = format!("{SCHEMA_LINE}{body}");
+        let parsed = Document::parse(&text, None).map_err(|found| Error::Document(words(&found)))?;
+        Self::from_parts(text, parsed)
+    }
+
+    /// Reads a document from a file.
+    ///
+    /// # Errors
+    /// [`Error::Log`] where it cannot be read, with every problem of it.
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        let text = read_small_text(path, "read the calibration document")?;
+        let parsed = Document::parse(&text, Some(&path.display().to_string()))
+            .map_err(|found| isotherm_log::error::Error::Calibration(words(&found)))?;
+        Self::from_parts(text, parsed)
+    }
+
+    fn from_parts(text: String, parsed: Parsed) -> Result<Self, Error> {
+        let mut digest = [0; 8];
+        digest.copy_from_slice(parsed.digest.first_chunk::<8>().unwrap_or(&[0; 8]));
+        let loaded = Loaded {
+            calibration: Arc::new(parsed.calibration),
+            digest,
+            unit: unit_id(&parsed.document.unit)?,
+            warnings: parsed.warnings,
+        };
+        Ok(Self { text, document: parsed.document, loaded })
+    }
+
+    /// Writes it to a file; one that is there only where that is allowed.
+    ///
+    /// # Errors
+    /// [`Error::Log`] where that cannot be done.
+    pub fn save(&self, path: &Path, overwrite: bool) -> Result<(), Error> {
+        write_file(path, self.text.as_bytes(), overwrite)
+    }
+}
+
+/// A number as documents state it: without the dust of unit conversions, in twelve digits.
+#[must_use]
+pub fn tidy(value: f64) -> f64 {
+    format!("{value:.*e}", DIGITS - 1).parse().unwrap_or(value)
+}
+
+/// Writes a file; one that is there only where that is allowed.
+///
+/// # Errors
+/// [`Error::Log`] where that cannot be done.
+pub fn write_file(path: &Path, bytes: &[u8], overwrite: bool) -> Result<(), Error> {
+    let mut options = OpenOptions::new();
+    options.write(true);
+    if overwrite {
+        options.create(true).truncate(true)
+    } else {
+        options.create_new(true)
+    };
+    let written = options.open(path).and_then(|mut file| file.write_all(bytes));
+    written.map_err(|source| Error::file(path, "write", source))
+}
+
+fn words(problems: &[Problem]) -> Vec<String> {
+    problems.iter().map(ToString::to_string).collect()
+}
