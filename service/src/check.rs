@@ -1,4 +1,4 @@
-//! The `check` command: calibration documents, service configurations and Zenoh configurations.
+//! The `check` command: calibration documents, overlays, service configurations and Zenoh configurations.
 
 mod kinds;
 mod rivals;
@@ -25,9 +25,11 @@ Examples:
   isotherm check config/calibration/*.toml
   isotherm check --json --kind calibration new.toml
   isotherm check --trusted-keys keys units/*.toml
+  isotherm check state/overlays/*.toml
 
 Every problem goes to stderr as file:line:column: key: message, one line per good file to stdout.
 A calibration document need not be signed, but a signature that does not hold makes it bad.
+An overlay is checked by itself; whether it fits the document that it is for, a swap says.
 Exit codes: 0 all good, 78 a file is bad, 1 a file cannot be read (and none is bad).")]
 pub struct CheckArgs {
     /// Files to validate
@@ -50,6 +52,8 @@ pub struct CheckArgs {
 pub enum FileKind {
     /// Calibration document of a unit (TOML).
     Calibration,
+    /// Changes of the bias constants of a calibration document (TOML), such as the result of a pre-launch calibration.
+    Overlay,
     /// Service configuration (TOML).
     Service,
     /// Zenoh configuration (JSON5).
@@ -82,13 +86,13 @@ pub struct Finding {
 pub struct Summary {
     /// In words.
     pub summary: String,
-    /// Serial of the unit, for a calibration document.
+    /// Serial of the unit, for a calibration document or overlay.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unit: Option<String>,
-    /// SHA-256 of a calibration document, in hexadecimal digits.
+    /// SHA-256 of a calibration document or overlay, in hexadecimal digits.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub digest: Option<String>,
-    /// Who signed a calibration document.
+    /// Who signed it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub signature: Option<Signer>,
 }

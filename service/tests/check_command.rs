@@ -145,6 +145,37 @@ fn documents_of_one_folder_that_name_one_unit_are_bad() {
 }
 
 #[test]
+fn an_overlay_is_checked_as_what_it_is() {
+    let folder = TempDir::new().unwrap();
+    let text = format!(
+        "schema = 1\noverlay_of = \"{}\"\nunit = \"ZLG-0001\"\n\n[[gyro]]\nname = \"x\"\n\
+         static_bias_change_deg_per_h = 0.031\nstatic_bias_sigma_deg_per_h = 0.004\n",
+        "27fb".repeat(16)
+    );
+    // Several of one unit lie in one folder: they are results, no rivals.
+    let (a, b) = (write(&folder, "a.toml", &text), write(&folder, "b.toml", &format!("{text}# again\n")));
+    let output = check(&["--json", &a, &b]);
+    assert_eq!(output.status.code(), Some(0), "{output:?}");
+    let found: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let [first, second] = found["files"].as_array().unwrap().as_slice() else { panic!("{found}") };
+    assert_eq!((&first["kind"], &first["unit"]), (&Value::from("overlay"), &Value::from("ZLG-0001")));
+    assert_ne!(first["digest"], second["digest"]);
+    let words = first["summary"].as_str().unwrap();
+    let begin = "overlay for unit ZLG-0001: changes x of the document with sha256 27fb27fb27fb27fb, sha256 ";
+    assert!(words.starts_with(begin), "{words}");
+
+    let broken = write(&folder, "broken.toml", &text.replace("unit = \"ZLG-0001\"", "units = \"ZLG-0001\""));
+    let output = check(&[&broken]);
+    assert_eq!(output.status.code(), Some(78));
+    let problems = lines(&output.stderr);
+    for start in
+        [format!("{broken}:3:1: units: is not a known key"), format!("{broken}:1:1: unit: is missing")]
+    {
+        assert!(problems.iter().any(|problem| problem.starts_with(&start)), "{start}\nin {problems:#?}");
+    }
+}
+
+#[test]
 fn what_is_nothing_or_no_text_is_bad() {
     let folder = TempDir::new().unwrap();
     let empty = write(&folder, "empty.toml", "# nothing\n");

@@ -2,11 +2,13 @@
 
 use std::path::Path;
 
+use isotherm_protocol::digest::Digest;
 use isotherm_protocol::document::{Channel, Document, Parsed, Problem};
+use isotherm_protocol::overlay::{Overlay, ParsedOverlay, is_overlay};
 use isotherm_protocol::signature::TrustedKeys;
 use toml::de::DeTable;
 
-use super::signer::signer;
+use super::signer::{Signer, signer};
 use super::{FileKind, Finding, Summary};
 use crate::config::Settings;
 use crate::signing::read_trusted_keys;
@@ -41,6 +43,7 @@ pub(super) fn check_file(path: &Path, forced: Option<FileKind>, trusted: Option<
     let kind = forced.or_else(|| recognise(path, &bytes));
     let checked = text(&bytes, &file).and_then(|text| match kind {
         Some(FileKind::Calibration) => check_calibration(text, &file, trusted),
+        Some(FileKind::Overlay) => check_overlay(text, &file, trusted),
         Some(FileKind::Service) => check_service(text, path),
         Some(FileKind::Zenoh) => check_zenoh(text, &file),
         None => Err(vec![whole(&file, NO_KEYS.to_owned())]),
@@ -55,14 +58,17 @@ pub(super) fn check_file(path: &Path, forced: Option<FileKind>, trusted: Option<
 /// Problems, or a summary with warnings.
 type Checked = Result<(Summary, Vec<Problem>), Vec<Problem>>;
 
-/// JSON by its extension; a calibration document by a key that only it has; else a service configuration, unless there
-/// are no keys at all: a calibration document that was cut to nothing must not pass for a configuration of defaults.
+/// JSON by its extension; an overlay, then a calibration document, by a key that only it has; else a service configuration,
+/// unless there are no keys at all: a calibration document that was cut to nothing must not pass for a configuration of defaults.
 fn recognise(path: &Path, bytes: &[u8]) -> Option<FileKind> {
     let extension = path.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
     if matches!(extension.as_deref(), Some("json" | "json5")) {
         return Some(FileKind::Zenoh);
     }
     let text = String::from_utf8_lossy(bytes);
+    if is_overlay(&text) {
+        return Some(FileKind::Overlay);
+    }
     // What has errors of syntax is recognised by what could be read nevertheless.
     let (root, errors) = DeTable::parse_recoverable(&text);
     let root = root.get_ref();
@@ -75,25 +81,52 @@ fn recognise(path: &Path, bytes: &[u8]) -> Option<FileKind> {
 
 fn check_calibration(text: &str, file: &str, trusted: Option<&TrustedKeys>) -> Checked {
     let signer = signer(text, trusted).map_err(|error| error.problem(Some(file)));
-    let (parsed, signer) = match (Document::parse(text, Some(file)), signer) {
-        (Ok(parsed), Ok(signer)) => (parsed, signer),
-        (Ok(_), Err(problem)) => return Err(vec![problem]),
-        // The signature's line is the last.
-        (Err(problems), signer) => return Err(problems.into_iter().chain(signer.err()).collect()),
-    };
+    let (parsed, signer) = signed(Document::parse(text, Some(file)), signer)?;
     let Parsed { document, calibration, digest, warnings } = parsed;
-    let digest = digest.iter().fold(String::new(), |text, byte| text + &format!("{byte:02x}"));
     let words = format!(
-        "calibration of unit {}: {} gyros, {} accelerometers, {}, sha256 {}{}",
+        "calibration of unit {}: {} gyros, {} accelerometers, {}, sha256 ",
         document.unit,
         calibration.gyro_count(),
         calibration.accel_count(),
         temperatures(&document.temperature.channel),
-        digest.get(..16).unwrap_or_default(),
-        signer.as_ref().map_or_else(String::new, |signer| format!(", {signer}")),
     );
-    let (unit, digest) = (Some(document.unit), Some(digest));
-    Ok((Summary { summary: words, unit, digest, signature: signer }, warnings))
+    Ok((summary(&words, document.unit, Digest(digest), signer), warnings))
+}
+
+/// An overlay by itself: whether it fits its base shows only beside that.
+fn check_overlay(text: &str, file: &str, trusted: Option<&TrustedKeys>) -> Checked {
+    let signer = signer(text, trusted).map_err(|error| error.problem(Some(file)));
+    let (parsed, signer) = signed(Overlay::parse(text, Some(file)), signer)?;
+    let ParsedOverlay { overlay, digest, .. } = parsed;
+    let gyros: Vec<_> = overlay.gyro.iter().map(|gyro| gyro.name.as_str()).collect();
+    let words = format!(
+        "overlay for unit {}: changes {} of the document with sha256 {}, sha256 ",
+        overlay.unit,
+        gyros.join(", "),
+        overlay.overlay_of.get(..16).unwrap_or_default(),
+    );
+    Ok((summary(&words, overlay.unit, Digest(digest), signer), Vec::new()))
+}
+
+/// What was parsed, with its signer; the problems of both.
+fn signed<T>(
+    parsed: Result<T, Vec<Problem>>,
+    signer: Result<Option<Signer>, Problem>,
+) -> Result<(T, Option<Signer>), Vec<Problem>> {
+    match (parsed, signer) {
+        (Ok(parsed), Ok(signer)) => Ok((parsed, signer)),
+        (Ok(_), Err(problem)) => Err(vec![problem]),
+        // The signature's line is the last.
+        (Err(problems), signer) => Err(problems.into_iter().chain(signer.err()).collect()),
+    }
+}
+
+/// The summary of a document of either kind; `words` end before the digest.
+fn summary(words: &str, unit: String, digest: Digest, signature: Option<Signer>) -> Summary {
+    let digest = digest.to_string();
+    let short = digest.get(..16).unwrap_or_default();
+    let by = signature.as_ref().map_or_else(String::new, |signer| format!(", {signer}"));
+    Summary { summary: format!("{words}{short}{by}"), unit: Some(unit), digest: Some(digest), signature }
 }
 
 /// The range over all temperature channels, e.g. `-55…85 °C in 3 channels`.

@@ -6,14 +6,16 @@ use std::path::PathBuf;
 
 use isotherm_protocol::document::Problem;
 
-use super::Finding;
+use super::{FileKind, Finding};
 
 /// Refuses every good document beside which, in the same folder, another one names its unit.
 ///
-/// Documents of one unit in different folders are a comparison, and one file given twice is one file.
+/// Documents of one unit in different folders are a comparison, and one file given twice is one file. Overlays of a unit
+/// are results, one beside the other.
 pub(super) fn refuse(findings: &mut [Finding]) {
     let mut found: BTreeMap<(PathBuf, String), BTreeMap<PathBuf, Vec<usize>>> = BTreeMap::new();
-    for (index, finding) in findings.iter().enumerate() {
+    let documents = |(_, finding): &(usize, &Finding)| finding.kind == Some(FileKind::Calibration);
+    for (index, finding) in findings.iter().enumerate().filter(documents) {
         let unit = finding.summary.as_ref().and_then(|summary| summary.unit.clone());
         if let (Some(unit), Ok(path)) = (unit, canonicalize(&finding.file)) {
             let folder = path.parent().map_or_else(PathBuf::new, PathBuf::from);
