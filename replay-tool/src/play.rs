@@ -26,7 +26,7 @@ use crate::pace::Speed;
 use player::Player;
 use stop::stop_asked;
 
-pub use report::{Counts, PlayReport, Position, UnitReport};
+pub use report::{Counts, PlayReport, Position, Returned, UnitReport};
 
 /// How long a session may take to close.
 const CLOSE_LIMIT: Duration = Duration::from_secs(5);

@@ -38,10 +38,10 @@ impl Bar {
         Self { drawn: bar, progress: None, since: 0 }
     }
 
-    /// A bar over a share of something, from 0 to 1.
+    /// A bar over a share of something, from 0 to 1; how long it takes is for the message to say.
     #[must_use]
     pub fn over_share() -> Self {
-        let bar = bar(u64::from(SHARES), "{bar:30} {percent:>3} %  {msg}  {eta} left");
+        let bar = bar(u64::from(SHARES), "{bar:30} {percent:>3} %  {msg}");
         Self { drawn: bar, progress: None, since: 0 }
     }
 

@@ -7,7 +7,6 @@ use isotherm_bus::outlet::{GyroTicks, new_series};
 use isotherm_correction::units::{Span, Timestamp};
 use isotherm_log::message::{Message, Topic};
 use isotherm_log::part::{LogFiles, Messages};
-use isotherm_log::progress::Progress;
 use isotherm_log::schedule::Schedule;
 use isotherm_log::source::LogReport;
 use isotherm_protocol::codec;
@@ -69,6 +68,8 @@ pub(super) enum Load {
 pub(super) struct Reel<'a> {
     options: &'a PlayOptions,
     messages: Messages,
+    /// How far the log was read when its first message came: to the part that is played (bytes).
+    first_bytes: Option<u64>,
     schedule: Schedule,
     series: SeriesNumbers,
     /// When the units' next health readings are due, where they are given.
@@ -82,12 +83,14 @@ impl<'a> Reel<'a> {
         let messages = options.files.open(&options.part)?;
         let series = SeriesNumbers::from(options.series.unwrap_or_else(new_series));
         let schedule = schedule(options);
-        Ok(Self { options, messages, schedule, series, health_due: None, ready: VecDeque::new() })
+        let ready = VecDeque::new();
+        Ok(Self { options, messages, first_bytes: None, schedule, series, health_due: None, ready })
     }
 
     /// Goes back to the beginning: what follows is of new series.
     pub(super) fn rewind(&mut self) -> Result<(), Error> {
         self.messages = self.options.files.open(&self.options.part)?;
+        self.first_bytes = None;
         self.schedule = schedule(self.options);
         self.series.begin_anew();
         self.health_due = None;
@@ -95,9 +98,13 @@ impl<'a> Reel<'a> {
         Ok(())
     }
 
-    /// How far the log has been read.
-    pub(super) fn progress(&self) -> Progress {
-        self.messages.progress()
+    /// How far the log has been read (0…1), from the beginning of the part that is played.
+    #[expect(clippy::cast_precision_loss, reason = "a share of a bar")]
+    pub(super) fn share(&self) -> f64 {
+        let progress = self.messages.progress();
+        let first = self.first_bytes.unwrap_or_else(|| progress.read());
+        let all = progress.total().saturating_sub(first).max(1);
+        progress.read().saturating_sub(first) as f64 / all as f64
     }
 
     /// What reading it came to.
@@ -112,6 +119,7 @@ impl<'a> Reel<'a> {
                 return Ok(Some(cue));
             }
             let Some(message) = self.messages.next_message()? else { return Ok(None) };
+            self.first_bytes.get_or_insert_with(|| self.messages.progress().read());
             self.take(message);
         }
     }

@@ -1,5 +1,8 @@
 //! What playing came to.
 
+use std::ops::Add;
+use std::time::Duration;
+
 use isotherm_bus::outlet::Account;
 use serde::Serialize;
 
@@ -50,18 +53,9 @@ impl Counts {
     }
 }
 
-/// What was sent of a unit, and what became of it. What comes back is `None` without acknowledgement.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
-pub struct UnitReport {
-    /// Its serial on the bus.
-    pub unit: String,
-    /// Its serial in the log.
-    pub of: String,
-    /// What was sent.
-    #[serde(flatten)]
-    pub counts: Counts,
-    /// Gyro ticks sent, each counted once.
-    pub ticks_sent: u64,
+/// What became of gyro ticks, of a unit or of all; everything is `None` without acknowledgement.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub struct Returned {
     /// Gyro ticks between the first and the last of a run that were never sent, because the log does not have them, or
     /// because they were passed over or withheld: the service announces them as missing.
     pub ticks_not_sent: Option<u64>,
@@ -79,6 +73,59 @@ pub struct UnitReport {
     pub ticks_under_way: Option<u64>,
     /// Gyro ticks that came back more than once.
     pub ticks_duplicated: Option<u64>,
+}
+
+impl From<&Account> for Returned {
+    fn from(account: &Account) -> Self {
+        Self {
+            ticks_not_sent: Some(account.ticks_not_sent),
+            ticks_acknowledged: Some(account.ticks_back),
+            ticks_announced_missing: Some(account.ticks_announced_missing),
+            ticks_uncalibrated: Some(account.ticks_uncalibrated),
+            ticks_late: Some(account.ticks_late),
+            ticks_lost: Some(account.ticks_lost),
+            ticks_under_way: Some(account.ticks_under_way),
+            ticks_duplicated: Some(account.ticks_duplicated),
+        }
+    }
+}
+
+impl Add for Returned {
+    type Output = Self;
+
+    /// The sums of what is known.
+    fn add(self, other: Self) -> Self {
+        let sum = |of: fn(&Self) -> Option<u64>| {
+            [of(&self), of(&other)].into_iter().flatten().reduce(u64::saturating_add)
+        };
+        Self {
+            ticks_not_sent: sum(|ticks| ticks.ticks_not_sent),
+            ticks_acknowledged: sum(|ticks| ticks.ticks_acknowledged),
+            ticks_announced_missing: sum(|ticks| ticks.ticks_announced_missing),
+            ticks_uncalibrated: sum(|ticks| ticks.ticks_uncalibrated),
+            ticks_late: sum(|ticks| ticks.ticks_late),
+            ticks_lost: sum(|ticks| ticks.ticks_lost),
+            ticks_under_way: sum(|ticks| ticks.ticks_under_way),
+            ticks_duplicated: sum(|ticks| ticks.ticks_duplicated),
+        }
+    }
+}
+
+/// What was sent of a unit, and what became of it. What comes back is `None` without acknowledgement.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct UnitReport {
+    /// Its serial on the bus.
+    pub unit: String,
+    /// Its serial in the log.
+    pub of: String,
+    /// What was sent.
+    #[serde(flatten)]
+    pub counts: Counts,
+    /// Gyro ticks sent, each counted once.
+    pub ticks_sent: u64,
+    /// What became of them.
+    #[serde(flatten)]
+    pub returned: Returned,
     /// Runs sent: series, or what began anew in one.
     pub runs: Option<u64>,
     /// Times that the unit's corrected stream began anew; more than the runs behind the first only where somebody else plays
@@ -94,14 +141,7 @@ impl UnitReport {
             of: of.to_owned(),
             counts,
             ticks_sent: account.map_or(counts.ticks_in_messages, |account| account.ticks_sent),
-            ticks_not_sent: told(|account| account.ticks_not_sent),
-            ticks_acknowledged: told(|account| account.ticks_back),
-            ticks_announced_missing: told(|account| account.ticks_announced_missing),
-            ticks_uncalibrated: told(|account| account.ticks_uncalibrated),
-            ticks_late: told(|account| account.ticks_late),
-            ticks_lost: told(|account| account.ticks_lost),
-            ticks_under_way: told(|account| account.ticks_under_way),
-            ticks_duplicated: told(|account| account.ticks_duplicated),
+            returned: account.as_ref().map(Returned::from).unwrap_or_default(),
             runs: told(|account| account.runs),
             restarts: told(|account| account.restarts),
         }
@@ -109,7 +149,8 @@ impl UnitReport {
 
     /// What did not come back by the end counts as lost.
     pub(super) fn give_up(&mut self) {
-        if let (Some(lost), Some(under_way)) = (&mut self.ticks_lost, &mut self.ticks_under_way) {
+        let Returned { ticks_lost, ticks_under_way, .. } = &mut self.returned;
+        if let (Some(lost), Some(under_way)) = (ticks_lost, ticks_under_way) {
             *lost += std::mem::take(under_way);
         }
     }
@@ -119,7 +160,7 @@ impl UnitReport {
     pub fn is_mixed(&self) -> bool {
         let own = self.runs.map_or(0, |runs| runs.saturating_sub(1));
         self.restarts.is_some_and(|restarts| restarts > own)
-            || self.ticks_duplicated.is_some_and(|ticks| ticks > 0)
+            || self.returned.ticks_duplicated.is_some_and(|ticks| ticks > 0)
     }
 }
 
@@ -134,22 +175,9 @@ pub struct PlayReport {
     pub accel_ticks_sent: u64,
     /// Temperature readings sent.
     pub temperature_readings_sent: u64,
-    /// As for each unit; `None` without acknowledgement, here and below.
-    pub ticks_not_sent: Option<u64>,
-    /// As for each unit.
-    pub ticks_acknowledged: Option<u64>,
-    /// As for each unit.
-    pub ticks_announced_missing: Option<u64>,
-    /// As for each unit.
-    pub ticks_uncalibrated: Option<u64>,
-    /// As for each unit.
-    pub ticks_late: Option<u64>,
-    /// As for each unit.
-    pub ticks_lost: Option<u64>,
-    /// As for each unit.
-    pub ticks_under_way: Option<u64>,
-    /// As for each unit.
-    pub ticks_duplicated: Option<u64>,
+    /// What became of the gyro ticks.
+    #[serde(flatten)]
+    pub returned: Returned,
     /// Times that the log was played, the last one perhaps not to its end.
     pub passes: u64,
     /// Times that somebody went to another place in it.
@@ -174,21 +202,12 @@ impl PlayReport {
     /// The sums over units.
     pub(super) fn of(units: Vec<UnitReport>) -> Self {
         let sum = |of: fn(&UnitReport) -> u64| units.iter().map(of).sum();
-        let told =
-            |of: fn(&UnitReport) -> Option<u64>| units.iter().filter_map(of).reduce(u64::saturating_add);
         Self {
             messages_sent: sum(|unit| unit.counts.messages_sent),
             ticks_sent: sum(|unit| unit.ticks_sent),
             accel_ticks_sent: sum(|unit| unit.counts.accel_ticks_sent),
             temperature_readings_sent: sum(|unit| unit.counts.temperature_readings_sent),
-            ticks_not_sent: told(|unit| unit.ticks_not_sent),
-            ticks_acknowledged: told(|unit| unit.ticks_acknowledged),
-            ticks_announced_missing: told(|unit| unit.ticks_announced_missing),
-            ticks_uncalibrated: told(|unit| unit.ticks_uncalibrated),
-            ticks_late: told(|unit| unit.ticks_late),
-            ticks_lost: told(|unit| unit.ticks_lost),
-            ticks_under_way: told(|unit| unit.ticks_under_way),
-            ticks_duplicated: told(|unit| unit.ticks_duplicated),
+            returned: units.iter().map(|unit| unit.returned).fold(Returned::default(), Add::add),
             units,
             ..Self::default()
         }
@@ -197,7 +216,7 @@ impl PlayReport {
     /// Whether a tick that was sent in its order did not come back.
     #[must_use]
     pub fn lost_data(&self) -> bool {
-        self.ticks_lost.is_some_and(|lost| lost > 0)
+        self.returned.ticks_lost.is_some_and(|lost| lost > 0)
     }
 }
 
@@ -208,6 +227,9 @@ pub struct Position {
     pub log_s: f64,
     /// Share of everything that is to be played (0…1); of this pass where there is no last one.
     pub share: f64,
+    /// How long the rest takes at this speed, pauses left out; of this pass where there is no last one. `None` as long as nobody can
+    /// know.
+    pub left: Option<Duration>,
     /// Gyro ticks sent.
     pub ticks_sent: u64,
     /// Which pass, from 1.

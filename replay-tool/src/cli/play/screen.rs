@@ -2,6 +2,9 @@
 
 use std::cell::RefCell;
 use std::io::{Write, stderr};
+use std::time::Duration;
+
+use indicatif::HumanDuration;
 
 use super::show;
 use crate::keyboard::KEYS;
@@ -46,11 +49,14 @@ impl Watch for Screen {
         if bar.is_hidden() {
             return;
         }
-        let Position { log_s, ticks_sent, pass, speed, actual_speed, .. } = *position;
+        let Position { log_s, ticks_sent, pass, speed, actual_speed, left, .. } = *position;
         let speed =
             if position.paused { "paused".to_owned() } else { format!("{actual_speed:.1}× of {speed}") };
         let pass = if pass > 1 { format!("  pass {pass}") } else { String::new() };
-        bar.share(position.share, format!("{log_s:.2} s{pass}  {ticks_sent} ticks  {speed}"));
+        // Whole seconds: what is left is an estimate.
+        let left = left.map(|left| Duration::from_secs(left.as_secs()));
+        let left = left.map_or_else(String::new, |left| format!("  {:#} left", HumanDuration(left)));
+        bar.share(position.share, format!("{log_s:.2} s{pass}  {ticks_sent} ticks  {speed}{left}"));
     }
 
     fn say(&self, words: &str) {

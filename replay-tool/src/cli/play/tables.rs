@@ -15,9 +15,12 @@ pub(super) fn warnings(play: &PlayReport) -> Vec<String> {
         let units: Vec<_> = play.units.iter().filter(|unit| chosen(unit)).map(|unit| &*unit.unit).collect();
         (!units.is_empty()).then(|| list(&units))
     };
-    let uncalibrated = of(|unit| unit.ticks_uncalibrated.is_some_and(|ticks| ticks > 0)).map(|units| {
-        format!("{units}: no calibration in the service for some ticks, whose readings came back unscaled")
-    });
+    let uncalibrated =
+        of(|unit| unit.returned.ticks_uncalibrated.is_some_and(|ticks| ticks > 0)).map(|units| {
+            format!(
+                "{units}: no calibration in the service for some ticks, whose readings came back unscaled"
+            )
+        });
     let mixed = of(UnitReport::is_mixed).map(|units| {
         format!(
             "{units}: somebody else plays it, or more than one service answers: what came back is not sure to be what was sent"
@@ -82,7 +85,7 @@ fn units(play: &PlayReport, options: &PlayOptions) -> String {
     if acknowledged {
         header.extend(["came back", "uncalibrated", "not sent", "announced", "late", "lost", "duplicated"]);
     }
-    let under_way = play.ticks_under_way.is_some_and(|ticks| ticks > 0);
+    let under_way = play.returned.ticks_under_way.is_some_and(|ticks| ticks > 0);
     if under_way {
         header.push("under way");
     }
@@ -102,18 +105,18 @@ fn units(play: &PlayReport, options: &PlayOptions) -> String {
         }
         if acknowledged {
             let counts = [
-                unit.ticks_acknowledged,
-                unit.ticks_uncalibrated,
-                unit.ticks_not_sent,
-                unit.ticks_announced_missing,
-                unit.ticks_late,
-                unit.ticks_lost,
-                unit.ticks_duplicated,
+                unit.returned.ticks_acknowledged,
+                unit.returned.ticks_uncalibrated,
+                unit.returned.ticks_not_sent,
+                unit.returned.ticks_announced_missing,
+                unit.returned.ticks_late,
+                unit.returned.ticks_lost,
+                unit.returned.ticks_duplicated,
             ];
             row.extend(counts.map(figure));
         }
         if under_way {
-            row.push(figure(unit.ticks_under_way));
+            row.push(figure(unit.returned.ticks_under_way));
         }
         table.add_row(row);
     }

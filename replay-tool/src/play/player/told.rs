@@ -6,6 +6,7 @@ use isotherm_log::source::LogReport;
 use tokio::time::Instant;
 
 use super::{Player, Stage};
+use crate::pace::Speed;
 use crate::play::Watch;
 use crate::play::report::{PlayReport, Position, UnitReport};
 use crate::play::units::PlayedUnit;
@@ -26,24 +27,34 @@ impl<W: Watch> Player<'_, W> {
     pub(super) fn position(&self) -> Position {
         let (elapsed, paused) = self.times();
         let log_s = seconds(self.last_at.or(self.from).unwrap_or(0));
-        let progress = self.reel.progress();
-        #[expect(clippy::cast_precision_loss, reason = "a share of a bar")]
         let of_pass = match self.options.part.end {
             Some(end) => log_s / (end.as_s() - self.options.part.start.as_s()),
-            None => progress.read() as f64 / progress.total().max(1) as f64,
+            None => self.reel.share(),
         };
-        #[expect(clippy::cast_precision_loss, reason = "a share of a bar")]
-        let share = match self.options.passes {
-            Some(passes) => ((self.pass - 1) as f64 + of_pass.min(1.0)) / passes.max(1) as f64,
-            None => of_pass,
+        let of_pass = if of_pass.is_finite() { of_pass.clamp(0.0, 1.0) } else { 0.0 };
+        #[expect(clippy::cast_precision_loss, reason = "shares of a bar")]
+        let (share, passes_left) = match self.options.passes {
+            Some(passes) => (
+                ((self.pass - 1) as f64 + of_pass) / passes.max(1) as f64,
+                passes.saturating_sub(self.pass) as f64,
+            ),
+            None => (of_pass, 0.0),
         };
+        let (speed, actual_speed) = (self.pacer.speed(), self.actual_speed(elapsed, paused));
+        let times = match speed {
+            Speed::Times(times) => times,
+            Speed::Max => actual_speed,
+        };
+        // How long the log is shows by how far it has been read.
+        let left_s = log_s / of_pass * (1.0 - of_pass + passes_left) / times;
         Position {
             log_s,
-            share: if share.is_finite() { share.clamp(0.0, 1.0) } else { 0.0 },
+            share: share.clamp(0.0, 1.0),
+            left: Duration::try_from_secs_f64(left_s).ok(),
             ticks_sent: self.ticks_sent,
             pass: self.pass,
-            speed: self.pacer.speed(),
-            actual_speed: self.actual_speed(elapsed, paused),
+            speed,
+            actual_speed,
             paused: self.paused.is_some(),
         }
     }
