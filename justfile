@@ -1,4 +1,4 @@
-# One recipe per step of `.ci/run`; `just` lists them.
+# One recipe per step of `.ci/run`; `just` lists them. What they need is said there.
 
 _list:
     @just --list --unsorted
