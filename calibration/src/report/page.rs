@@ -9,7 +9,7 @@ use super::{Coefficient, Curve, FitReport, stated, verdict};
 use crate::spectrum::Spectrum;
 
 /// Most points of a curve on the page; of more, the smallest and the largest of each group are there.
-const POINTS: usize = 8192;
+const POINTS: usize = 4096;
 /// Height of a panel of curves (CSS pixels).
 const HEIGHT: u32 = 170;
 /// Height of a panel of coefficients.
