@@ -4,6 +4,8 @@ mod bar;
 mod drift;
 mod impact;
 mod runs;
+mod show;
+mod validate;
 
 use std::io::{self, Write};
 use std::process::ExitCode;
@@ -29,6 +31,8 @@ struct Cli {
 enum Command {
     Drift(drift::DriftArgs),
     Impact(impact::ImpactArgs),
+    Show(show::ShowArgs),
+    Validate(validate::ValidateArgs),
     /// Print a completion script for a shell
     #[command(after_help = "Example:\n  isotherm-calibrate completions bash > isotherm-calibrate.bash")]
     Completions {
@@ -42,6 +46,8 @@ fn run(cli: Cli) -> Result<(), Error> {
     match cli.command {
         Command::Drift(args) => args.run(),
         Command::Impact(args) => args.run(),
+        Command::Show(args) => args.run(),
+        Command::Validate(args) => args.run(),
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), "isotherm-calibrate", &mut script);

@@ -11,6 +11,8 @@
 //! | [`drift`], [`allan`], [`spectrum`] | noise and drift of a static log |
 //! | [`report`] | what a fit says: verdicts, before and after, coefficients; text, JSON and page |
 //! | [`impact`] | what a drift that is left means for navigation |
+//! | [`show`] | a document in words and curves |
+//! | [`validate`] | a document judged on other logs |
 //! | [`error`], [`cli`] | what can go wrong; the command line |
 
 pub mod allan;
@@ -26,5 +28,7 @@ pub mod provenance;
 pub mod report;
 pub mod run;
 pub mod series;
+pub mod show;
 pub mod spectrum;
+pub mod validate;
 pub mod written;

@@ -27,7 +27,10 @@ impl Sigmas {
             for (sensor, terms) in sensors.as_table().into_iter().flatten() {
                 for (term, values) in terms.as_table().into_iter().flatten() {
                     let number = |value: &Value| {
-                        #[expect(clippy::cast_precision_loss, reason = "a whole number that someone wrote by hand")]
+                        #[expect(
+                            clippy::cast_precision_loss,
+                            reason = "a whole number that someone wrote by hand"
+                        )]
                         value.as_float().or_else(|| value.as_integer().map(|whole| whole as f64))
                     };
                     let values = values.as_array().map(|values| values.iter().filter_map(number).collect());
@@ -55,7 +58,9 @@ impl Sigmas {
     /// All of them.
     pub fn iter(&self) -> impl Iterator<Item = ((&str, &str, &str), &[f64])> {
         let parts = |(kind, sensor, term)| -> (&str, &str, &str) { (kind, sensor, term) };
-        self.0.iter().map(move |((kind, sensor, term), values)| (parts((kind, sensor, term)), values.as_slice()))
+        self.0
+            .iter()
+            .map(move |((kind, sensor, term), values)| (parts((kind, sensor, term)), values.as_slice()))
     }
 
     /// Writes them into the details of a document's origin, beside what is there; without any, nothing changes.
@@ -103,6 +108,9 @@ mod tests {
         let read = Written::of(&document).unwrap().document;
         let found = Sigmas::of(&read);
         assert_eq!(found.get("accel", "x", "axis_arcsec"), Some([0.5, 12.0, 0.0].as_slice()));
-        assert_eq!((found.get("gyro", "z", "static_bias"), found.iter().count()), (Some([0.01].as_slice()), 2));
+        assert_eq!(
+            (found.get("gyro", "z", "static_bias"), found.iter().count()),
+            (Some([0.01].as_slice()), 2)
+        );
     }
 }
