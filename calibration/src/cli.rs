@@ -3,6 +3,7 @@
 mod bar;
 mod drift;
 mod impact;
+mod merge;
 mod runs;
 mod show;
 mod validate;
@@ -31,6 +32,7 @@ struct Cli {
 enum Command {
     Drift(drift::DriftArgs),
     Impact(impact::ImpactArgs),
+    Merge(merge::MergeArgs),
     Show(show::ShowArgs),
     Validate(validate::ValidateArgs),
     /// Print a completion script for a shell
@@ -46,6 +48,7 @@ fn run(cli: Cli) -> Result<(), Error> {
     match cli.command {
         Command::Drift(args) => args.run(),
         Command::Impact(args) => args.run(),
+        Command::Merge(args) => args.run(),
         Command::Show(args) => args.run(),
         Command::Validate(args) => args.run(),
         Command::Completions { shell } => {

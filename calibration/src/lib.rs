@@ -11,6 +11,7 @@
 //! | [`drift`], [`allan`], [`spectrum`] | noise and drift of a static log |
 //! | [`report`] | what a fit says: verdicts, before and after, coefficients; text, JSON and page |
 //! | [`impact`] | what a drift that is left means for navigation |
+//! | [`merge`] | parts of a calibration in one document |
 //! | [`show`] | a document in words and curves |
 //! | [`validate`] | a document judged on other logs |
 //! | [`error`], [`cli`] | what can go wrong; the command line |
@@ -23,6 +24,7 @@ pub mod error;
 mod fixture;
 pub mod impact;
 pub mod means;
+pub mod merge;
 pub mod nominal;
 pub mod provenance;
 pub mod report;

@@ -2,9 +2,8 @@
 
 use std::fmt::Write;
 
+use comfy_table::{CellAlignment, presets};
 use isotherm_log::plot::page::{Chart, Page, Table};
-
-use crate::drift::figures::table;
 
 /// A line, sentences, tables and charts.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -41,7 +40,7 @@ impl Sheet {
             let _ = writeln!(text, "{note}");
         }
         for (heading, rows) in &self.tables {
-            let _ = writeln!(text, "\n{heading}\n{}", table(&rows.head, &rows.rows));
+            let _ = writeln!(text, "\n{heading}\n{}", aligned(rows));
         }
         text
     }
@@ -62,4 +61,22 @@ impl Sheet {
         }
         page.to_html()
     }
+}
+
+/// A table as text: figures to the right, words and formulas to the left.
+fn aligned(table: &Table) -> String {
+    let mut text = comfy_table::Table::new();
+    text.load_preset(presets::NOTHING).set_header(&table.head).add_rows(&table.rows);
+    for (index, column) in text.column_iter_mut().enumerate().skip(1) {
+        let figure = |row: &Vec<String>| {
+            row.get(index).is_none_or(|cell| {
+                let begins = cell.chars().next().is_none_or(|c| c.is_ascii_digit() || "-−+(–".contains(c));
+                begins && !cell.contains('·')
+            })
+        };
+        if table.rows.iter().all(figure) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    text.to_string()
 }

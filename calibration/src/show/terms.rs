@@ -8,7 +8,6 @@ use isotherm_correction::curve::{Curve, CurveParts};
 use isotherm_protocol::document::{Argument, Document, Shape, Unit};
 use toml::{Table, Value};
 
-use crate::drift::figures::short;
 use crate::error::Error;
 
 /// Units that a key may end with.
@@ -208,9 +207,9 @@ fn polynomial(coefficients: &[f64], reference: f64, argument: Argument) -> Strin
     let of = if reference == 0.0 {
         symbol.to_owned()
     } else if reference < 0.0 {
-        format!("({symbol} + {})", short(-reference))
+        format!("({symbol} + {})", exact(-reference))
     } else {
-        format!("({symbol} − {})", short(reference))
+        format!("({symbol} − {})", exact(reference))
     };
     let mut words = String::new();
     for (power, coefficient) in
