@@ -1,6 +1,7 @@
 //! The command line: arguments in, exit code out.
 
 mod bar;
+mod diff;
 mod drift;
 mod impact;
 mod merge;
@@ -30,6 +31,7 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Diff(diff::DiffArgs),
     Drift(drift::DriftArgs),
     Impact(impact::ImpactArgs),
     Merge(merge::MergeArgs),
@@ -46,6 +48,7 @@ enum Command {
 /// Runs the command that the arguments name.
 fn run(cli: Cli) -> Result<(), Error> {
     match cli.command {
+        Command::Diff(args) => args.run(),
         Command::Drift(args) => args.run(),
         Command::Impact(args) => args.run(),
         Command::Merge(args) => args.run(),

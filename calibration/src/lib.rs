@@ -11,6 +11,7 @@
 //! | [`drift`], [`allan`], [`spectrum`] | noise and drift of a static log |
 //! | [`report`] | what a fit says: verdicts, before and after, coefficients; text, JSON and page |
 //! | [`impact`] | what a drift that is left means for navigation |
+//! | [`diff`] | what has changed between two documents |
 //! | [`merge`] | parts of a calibration in one document |
 //! | [`show`] | a document in words and curves |
 //! | [`validate`] | a document judged on other logs |
@@ -18,6 +19,7 @@
 
 pub mod allan;
 pub mod cli;
+pub mod diff;
 pub mod drift;
 pub mod error;
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! A document in people's words and as curves.
 
 mod about;
-mod charts;
+pub(crate) mod charts;
 pub mod terms;
 
 use isotherm_correction::calibration::Steady;
