@@ -103,7 +103,15 @@ fn sums(written: &Written, range: [f64; 2]) -> Vec<Panel> {
         let curve = line("steady".to_owned(), Ink::First, at.iter().map(bias));
         panel(&format!("accelerometer {}", accel.name), "mg", vec![curve])
     });
-    gyros.chain(accels).collect()
+    // What is constant stands in the table.
+    let varies = |panel: &Panel| match &panel.content {
+        Content::Series(curves) => curves.iter().any(|curve| match &curve.samples {
+            Samples::Points { y, .. } => y.iter().any(|value| y.first().is_some_and(|first| value != first)),
+            Samples::Bins { .. } => true,
+        }),
+        Content::Lanes(_) => true,
+    };
+    gyros.chain(accels).filter(varies).collect()
 }
 
 fn axes(written: &Written, range: [f64; 2]) -> Vec<Panel> {
