@@ -1,9 +1,13 @@
 //! The command line: arguments in, exit code out.
 
 mod bar;
+mod diff;
 mod drift;
 mod impact;
+mod merge;
 mod runs;
+mod show;
+mod validate;
 
 use std::io::{self, Write};
 use std::process::ExitCode;
@@ -27,8 +31,12 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Diff(diff::DiffArgs),
     Drift(drift::DriftArgs),
     Impact(impact::ImpactArgs),
+    Merge(merge::MergeArgs),
+    Show(show::ShowArgs),
+    Validate(validate::ValidateArgs),
     /// Print a completion script for a shell
     #[command(after_help = "Example:\n  isotherm-calibrate completions bash > isotherm-calibrate.bash")]
     Completions {
@@ -40,8 +48,12 @@ enum Command {
 /// Runs the command that the arguments name.
 fn run(cli: Cli) -> Result<(), Error> {
     match cli.command {
+        Command::Diff(args) => args.run(),
         Command::Drift(args) => args.run(),
         Command::Impact(args) => args.run(),
+        Command::Merge(args) => args.run(),
+        Command::Show(args) => args.run(),
+        Command::Validate(args) => args.run(),
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), "isotherm-calibrate", &mut script);
