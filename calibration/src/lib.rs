@@ -10,6 +10,7 @@
 //! | [`nominal`], [`written`], [`provenance`] | a document: before a fit, on its way to a file, where its numbers come from |
 //! | [`drift`], [`allan`], [`spectrum`] | noise and drift of a static log |
 //! | [`impact`] | what a drift that is left means for navigation |
+//! | [`positions`], [`tumble`] | accelerometers on a stand; a unit tumbled by hand |
 //! | [`error`], [`cli`] | what can go wrong; the command line |
 
 pub mod allan;
@@ -21,8 +22,10 @@ mod fixture;
 pub mod impact;
 pub mod means;
 pub mod nominal;
+pub mod positions;
 pub mod provenance;
 pub mod run;
 pub mod series;
 pub mod spectrum;
+pub mod tumble;
 pub mod written;

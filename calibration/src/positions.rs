@@ -1,0 +1,24 @@
+//! Orientation, scale factor and bias of accelerometers from positions of a stand (models §9, 004).
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`track`], [`still`], [`pose`] | a run tick by tick; where it stands still; means over that |
+//! | [`bare`] | a document of a unit that has none yet |
+//! | [`gravity`] | what everything is relative to |
+//! | [`plan`], [`matching`], [`faults`] | positions of a stand; which pose is which; sensors that are no use |
+//! | [`model`], [`fit`] | the outputs as a function of what is to be found; finding it |
+//! | [`budget`] | what a planned calibration will come to |
+//! | [`solve`] | nonlinear least squares with covariance |
+
+pub mod bare;
+pub mod budget;
+pub mod faults;
+pub mod fit;
+pub mod gravity;
+pub mod matching;
+pub mod model;
+pub mod plan;
+pub mod pose;
+pub mod solve;
+pub mod still;
+pub mod track;
