@@ -38,7 +38,9 @@ impl Pose {
         intervals.iter().map(|interval| Self::over(track, run, *interval)).collect()
     }
 
-    fn over(track: &Track, run: usize, interval: Interval) -> Self {
+    /// Means over one interval.
+    #[must_use]
+    pub fn over(track: &Track, run: usize, interval: Interval) -> Self {
         let ticks = interval.first..interval.end;
         let durations = &track.duration_s[ticks.clone()];
         let length: f64 = durations.iter().sum();
