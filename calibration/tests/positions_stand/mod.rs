@@ -15,7 +15,7 @@ use isotherm_simulator::motion::{Motion, Path};
 use isotherm_simulator::orientation::Orientation;
 use isotherm_simulator::presets::{mems_chamber, zeeman_rest};
 use isotherm_simulator::{Scenario, Simulation};
-use nalgebra::{Matrix3, Rotation3, Vector3};
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 /// Gravity of the stand (m/s²).
 pub(crate) const GRAVITY: f64 = 9.8154;
@@ -192,7 +192,9 @@ pub(crate) fn log(
     for (index, (level_to_case, position)) in attitudes.iter().zip(order).enumerate() {
         if let (Some(speed), true) = (stand.turn_deg_per_s, index > 0) {
             let before = &attitudes[index - 1];
-            let seen = Rotation3::from_matrix(&(level_to_case * before.transpose()));
+            // Half a turn has no axis in a rotation matrix, but in a quaternion it has.
+            let seen = Rotation3::from_matrix_unchecked(level_to_case * before.transpose());
+            let seen = UnitQuaternion::from_rotation_matrix(&seen);
             if let Some((axis, angle)) = seen.axis_angle() {
                 // Components of what stands still turn the other way.
                 let ticks = (angle.to_degrees() / speed / tick_s).ceil().max(1.0) as i64;
