@@ -5,6 +5,7 @@ mod drift;
 mod impact;
 mod positions;
 mod runs;
+mod tumble;
 
 use std::io::{self, Write};
 use std::process::ExitCode;
@@ -31,6 +32,7 @@ enum Command {
     Drift(drift::DriftArgs),
     Impact(impact::ImpactArgs),
     Positions(positions::PositionsArgs),
+    Tumble(tumble::TumbleArgs),
     /// Print a completion script for a shell
     #[command(after_help = "Example:\n  isotherm-calibrate completions bash > isotherm-calibrate.bash")]
     Completions {
@@ -45,6 +47,7 @@ fn run(cli: Cli) -> Result<(), Error> {
         Command::Drift(args) => args.run(),
         Command::Impact(args) => args.run(),
         Command::Positions(args) => args.run(),
+        Command::Tumble(args) => args.run(),
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), "isotherm-calibrate", &mut script);

@@ -11,7 +11,7 @@ use crate::written::tidy;
 const ROOM_DEG_C: f64 = 1.0;
 
 /// Units of scale factor and bias for an output.
-const fn units(output: AccelOutput) -> (Unit, Unit) {
+pub(crate) const fn units(output: AccelOutput) -> (Unit, Unit) {
     match output {
         AccelOutput::Counts => (Unit::CountsPerSPerMPerS2, Unit::CountsPerS),
         AccelOutput::Volts => (Unit::VPerMPerS2, Unit::V),
@@ -63,7 +63,7 @@ fn curve<Q: Quantity>(analysis: &Analysis, scaled: &[f64], range: [f64; 2]) -> C
 }
 
 /// Moves an accelerometer's curves to what one temperature says, keeping their shape; false where a shape could not be kept.
-fn level(sensor: &mut AccelSensor, scale: f64, bias: f64, deg_c: f64, (scale_unit, bias_unit): (Unit, Unit)) -> bool {
+pub(crate) fn level(sensor: &mut AccelSensor, scale: f64, bias: f64, deg_c: f64, (scale_unit, bias_unit): (Unit, Unit)) -> bool {
     let mut kept = true;
     let constant = |value: f64| Shape::Constant { value: tidy(value) };
     let shape = match (sensor.scale_factor.shape(), value_at(sensor.scale_factor.shape(), deg_c)) {

@@ -165,7 +165,7 @@ fn way(track: &Track, before: &Pose, after: &Pose) -> Matrix3<f64> {
 }
 
 /// How a fixed vector's components change while the case turns by a rotation vector.
-fn seen(turn: Vector3<f64>) -> Matrix3<f64> {
+pub(crate) fn seen(turn: Vector3<f64>) -> Matrix3<f64> {
     let size = turn.norm();
     if size == 0.0 {
         return Matrix3::identity();

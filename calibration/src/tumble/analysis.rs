@@ -4,7 +4,7 @@ use crate::means::Size;
 use crate::positions::faults;
 use crate::positions::pose::Pose;
 use crate::positions::solve::NoSolution;
-use crate::positions::still::{Interval, StillLimits, still};
+use crate::positions::still::{StillLimits, still};
 use crate::positions::track::Track;
 
 use super::accel::{self, AccelFit, SENSORS, norm};
@@ -52,6 +52,16 @@ pub struct Tumble {
     pub held_out: Size,
     /// What is to be said.
     pub warnings: Vec<String>,
+}
+
+impl Tumble {
+    /// Mean temperature of a channel over all poses (°C).
+    #[must_use]
+    pub fn mean_temperature(&self, channel: &str) -> Option<f64> {
+        let of = |pose: &Pose| Some((pose.temperature_deg_c.get(channel)? * pose.duration_s, pose.duration_s));
+        let (sum, time) = self.poses.iter().filter_map(of).fold((0.0, 0.0), |(a, b), (x, y)| (a + x, b + y));
+        (time > 0.0).then(|| sum / time)
+    }
 }
 
 /// Fits a tumble log.
@@ -237,20 +247,7 @@ fn gyros(track: &Track, poses: &[Pose], accel: &AccelFit) -> Result<GyroFit, Str
         let of = |pose: &Pose| pose.gyros.get(gyro).copied().unwrap_or(f64::NAN) * pose.duration_s;
         poses.iter().map(of).sum::<f64>() / total
     });
-    let direction = |pose: &Pose| {
-        let force = accel.force(&pose.outputs);
-        force.map(|c| c / norm(force))
-    };
-    let between = |pair: &[Pose]| {
-        let [before, after] = pair else { return None };
-        let directions = [direction(before), direction(after)];
-        let cosine: f64 = directions[0].iter().zip(directions[1]).map(|(a, b)| a * b).sum();
-        let ticks = [before.interval.end, after.interval.first];
-        let length = after.span_s[0] - before.span_s[1];
-        let turned = cosine < libm::cos(SHORTEST_TURN_RAD);
-        (turned && length < LONGEST_TRANSITION_S).then_some(Transition { ticks, directions })
-    };
-    let transitions: Vec<Transition> = poses.windows(2).filter_map(between).collect();
+    let transitions = transitions(poses, |pose| accel.force(&pose.outputs));
     if transitions.len() < 6 {
         return Err(format!(
             "only {} turns of at least {:.0}° within {LONGEST_TRANSITION_S} s lie between the poses, six are needed: turn the unit \
@@ -267,35 +264,21 @@ fn gyros(track: &Track, poses: &[Pose], accel: &AccelFit) -> Result<GyroFit, Str
     })
 }
 
-/// Interval of a pose, for whoever marks it.
+/// Turns between neighbouring poses, by the specific force that each has.
 #[must_use]
-pub fn intervals(poses: &[Pose]) -> Vec<Interval> {
-    poses.iter().map(|pose| pose.interval).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    #[test]
-    fn probe() {
-        use isotherm_log::{mapping::Mapping, part::{LogFiles, Part}, offline::unit_id};
-        use crate::run::Run;
-        let base = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
-        let mapping = Mapping::load(format!("{base}/config/mappings/tumble-mems.toml").as_ref()).unwrap();
-        let unit = unit_id("T").unwrap();
-        let files = LogFiles::Text { paths: vec!["/work/shared/data/tumble-mems".into()], mapping: Box::new(mapping), unit: unit.clone(), batch_ticks: 512 };
-        let run = Run::new("t".into(), unit, files, &Part::default());
-        let series = run.series(()).unwrap();
-        let doc = crate::positions::bare::bare(&series, isotherm_protocol::document::AccelOutput::Volts, None).unwrap();
-        let written = crate::written::Written::of(&doc).unwrap();
-        let track = Track::of(&run, &written.loaded, ()).unwrap();
-        println!("{} ticks", track.len());
-        for window_s in [1.0, 2.0, 3.0] { for factor in FACTORS {
-            let limits = StillLimits { window_s, factor, rate_deg_per_s: 1.0, least_s: 1.0, settle_s: 0.0 };
-            let s = Settings { gravity: 9.81744, limits, search: false, start_s: 30.0 };
-            match analyse(&track, &s) { Err(e) => println!("{window_s} {factor} {e:?}"),
-            Ok(t) => println!("{window_s} {factor} n {} scale {:?} bias {:?} rms {:e} held {:e} gyro {:?}", t.poses.len(), t.accel.scale.map(|k| 1.0/k), t.accel.bias, Size::of(&t.accel.residual).rms, t.held_out.rms,
-              t.gyro.map(|g| (g.weight.map(|w| 6258.0/w), g.rest, g.rows, Size::of(&g.angle).rms.to_degrees()))) }
-        }}
-    }
+pub fn transitions(poses: &[Pose], force: impl Fn(&Pose) -> [f64; 3]) -> Vec<Transition> {
+    let direction = |pose: &Pose| {
+        let force = force(pose);
+        force.map(|c| c / norm(force))
+    };
+    let between = |pair: &[Pose]| {
+        let [before, after] = pair else { return None };
+        let directions = [direction(before), direction(after)];
+        let cosine: f64 = directions[0].iter().zip(directions[1]).map(|(a, b)| a * b).sum();
+        let ticks = [before.interval.end, after.interval.first];
+        let length = after.span_s[0] - before.span_s[1];
+        let turned = cosine < libm::cos(SHORTEST_TURN_RAD);
+        (turned && length < LONGEST_TRANSITION_S).then_some(Transition { ticks, directions })
+    };
+    poses.windows(2).filter_map(between).collect()
 }

@@ -1,6 +1,8 @@
 //! Gyros against accelerometers: between two poses the rotated direction of gravity must be the one that the accelerometers
 //! find there (Tedaldi, Pretto and Menegatti 2014).
 
+use nalgebra::{Matrix3, Vector3};
+
 use crate::positions::solve::{NoSolution, solve};
 use crate::positions::track::Track;
 
@@ -73,34 +75,39 @@ fn rows(p: &[f64]) -> [[f64; 3]; 3] {
 }
 
 /// Rate about the case axes per output of each gyro.
-fn inverse_of(p: &[f64]) -> nalgebra::Matrix3<f64> {
-    let axes = nalgebra::Matrix3::from_fn(|i, j| rows(p)[i][j]);
-    let scale = nalgebra::Matrix3::from_diagonal(&weights(p).into());
-    axes.try_inverse().unwrap_or_else(nalgebra::Matrix3::identity) * scale
+fn inverse_of(p: &[f64]) -> Matrix3<f64> {
+    let axes = Matrix3::from_fn(|i, j| rows(p)[i][j]);
+    let scale = Matrix3::from_diagonal(&weights(p).into());
+    axes.try_inverse().unwrap_or_else(Matrix3::identity) * scale
 }
 
 /// The direction before the transition, as the case sees it after the gyros' rotation.
 fn turned(
     track: &Track,
     rest: [f64; 3],
-    inverse: &nalgebra::Matrix3<f64>,
+    inverse: &Matrix3<f64>,
     transition: &Transition,
 ) -> [f64; 3] {
-    let mut seen = nalgebra::Vector3::from(transition.directions[0]);
+    let mut seen = Vector3::from(transition.directions[0]);
     for tick in transition.ticks[0]..transition.ticks[1] {
         let output = |gyro: usize| {
             let column = track.gyros.get(gyro).and_then(|column| column.get(tick));
             column.copied().unwrap_or(f64::NAN) - rest[gyro]
         };
         let duration = track.duration_s.get(tick).copied().unwrap_or(0.0);
-        let turn = inverse * nalgebra::Vector3::new(output(0), output(1), output(2)) * duration;
-        // Rodrigues, with the opposite sign: what stands still is seen to turn the other way.
-        let angle = turn.norm();
-        if angle > 0.0 {
-            let axis = turn / angle;
-            let (sine, cosine) = libm::sincos(angle);
-            seen = seen * cosine - axis.cross(&seen) * sine + axis * (axis.dot(&seen) * (1.0 - cosine));
-        }
+        seen = crate::positions::matching::seen(inverse * Vector3::new(output(0), output(1), output(2)) * duration) * seen;
     }
     seen.into()
+}
+
+/// Angle (rad) between the direction that corrected rates predict after a transition and the one that corrected accelerometers
+/// find there.
+#[must_use]
+pub fn angle_of(track: &Track, transition: &Transition) -> f64 {
+    let mut seen = Vector3::from(transition.directions[0]);
+    for tick in transition.ticks[0]..transition.ticks[1] {
+        let rate = Vector3::from_fn(|axis, _| track.rate_deg_per_s[axis][tick].to_radians());
+        seen = crate::positions::matching::seen(rate * track.duration_s[tick]) * seen;
+    }
+    seen.angle(&Vector3::from(transition.directions[1]))
 }
