@@ -7,6 +7,7 @@
 //! | [`gravity`] | what everything is relative to |
 //! | [`plan`], [`times`], [`matching`], [`faults`] | positions of a stand; when which was held; which pose is which; sensors that are no use |
 //! | [`model`], [`fit`] | the outputs as a function of what is to be found; finding it |
+//! | [`temperature`], [`doubts`] | levels and channels; what is doubtful about a result |
 //! | [`analysis`], [`document`], [`provenance`], [`judged`], [`report`] | from runs to a result; as a document, with where it comes from; what it leaves; in words |
 //! | [`budget`] | what a planned calibration will come to |
 //! | [`solve`] | nonlinear least squares with covariance |
@@ -15,6 +16,7 @@ pub mod analysis;
 pub mod bare;
 pub mod budget;
 pub mod document;
+pub mod doubts;
 pub mod faults;
 pub mod fit;
 pub mod gravity;
@@ -27,5 +29,6 @@ pub mod provenance;
 pub mod report;
 pub mod solve;
 pub mod still;
+pub mod temperature;
 pub mod times;
 pub mod track;

@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "helpers of tests end the test where something is not as it must be")]
 
 #[path = "positions_stand/mod.rs"]
+#[expect(dead_code, reason = "other tests use the rest")]
 mod stand;
 
 use isotherm_calibration::positions::analysis::{Analysis, Settings, analyse};
@@ -46,6 +47,7 @@ fn quick(seed: u64) -> Stand {
         positioning: POSITIONING,
         tick_ns: 1_000_000_000,
         hold_s: 20.0,
+        start_s: 0.0,
         turn_deg_per_s: None,
         seed,
     }
@@ -85,7 +87,11 @@ fn plausible(what: &str, values: &[f64], degrees: f64) {
     let share = |low: f64, high: f64| values.iter().filter(|v| (low..high).contains(&one.cdf(**v))).count();
     let (lower, upper) = (share(0.0, 0.05), share(0.95, 2.0));
     let mean = sum / (degrees * values.len() as f64);
-    println!("{what}: χ² per degree {mean:.3}, p {:.4}; {lower} below 5 %, {upper} above 95 % of {}", all.cdf(sum), values.len());
+    println!(
+        "{what}: χ² per degree {mean:.3}, p {:.4}; {lower} below 5 %, {upper} above 95 % of {}",
+        all.cdf(sum),
+        values.len()
+    );
     assert!((0.001..0.999).contains(&all.cdf(sum)), "{what}: mean χ² per degree {mean}");
     // Five in a hundred in each tail, within three and a half standard deviations.
     let expected = 0.05 * values.len() as f64;
@@ -130,12 +136,14 @@ fn over_temperature(seed: u64, bend: f64) -> (Analysis, [[f64; 3]; 3], [[f64; 3]
     let level = stand::true_rows(&stand::instrument(), 20.0);
     // Some ″/°C of silicon; the quadratic part is 40″ at the ends.
     let slopes = [[0.0, 2.5e-5, -1.2e-5], [-0.9e-5, 0.0, 2.1e-5], [1.6e-5, -2.8e-5, 0.0]];
-    let bends = [[0.0, 8e-8, -5e-8], [-6e-8, 0.0, 7e-8], [5e-8, -8e-8, 0.0]].map(|row: [f64; 3]| row.map(|c| c * bend));
+    let bends = [[0.0, 8e-8, -5e-8], [-6e-8, 0.0, 7e-8], [5e-8, -8e-8, 0.0]]
+        .map(|row: [f64; 3]| row.map(|c| c * bend));
     let (mut runs, mut rows) = (Vec::new(), Vec::new());
     let errors = quick(seed).errors;
     for (index, deg_c) in [-40.0, -10.0, 20.0, 45.0, 70.0].into_iter().enumerate() {
         let away = deg_c + HOUSING_ABOVE_DEG_C - 20.0;
-        let axes = [0, 1, 2].map(|s| [0, 1, 2].map(|i| level[s][i] + slopes[s][i] * away + bends[s][i] * away * away));
+        let axes = [0, 1, 2]
+            .map(|s| [0, 1, 2].map(|i| level[s][i] + slopes[s][i] * away + bends[s][i] * away * away));
         let how = Stand { errors, ..quick(seed * 10 + index as u64 + 7) };
         let order: Vec<usize> = (0..12).collect();
         let (events, held) = stand::log(&stand::with_axes(&axes), deg_c, &plan, &order, &how);
@@ -167,7 +175,11 @@ fn linear_and_quadratic_axes_over_temperature_are_recovered() {
     plausible("slopes", &slopes_of, 6.0);
     plausible("quadratic terms", &bends_of, 6.0);
     let (found, ..) = over_temperature(1, 1.0);
-    assert!(found.warnings.iter().any(|words| words.contains("C bends with temperature")), "{:?}", found.warnings);
+    assert!(
+        found.warnings.iter().any(|words| words.contains("C bends with temperature")),
+        "{:?}",
+        found.warnings
+    );
     assert!((found.widened - 1.0).abs() < 1e-12, "the quadratic form describes it: {}", found.widened);
 }
 
@@ -185,20 +197,34 @@ fn poses_are_found_and_known_though_some_are_missing_and_some_repeated() {
     let cases = [
         ("all", all.clone(), 12, ""),
         ("two missing", vec![0, 1, 2, 4, 5, 6, 7, 8, 9, 11], 10, "missing positions: X up a, Z down b"),
-        ("one repeated", vec![0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 2], 13, "more than once, all of them used: Z down a"),
+        (
+            "one repeated",
+            vec![0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 2],
+            13,
+            "more than once, all of them used: Z down a",
+        ),
         ("another order", vec![0, 4, 2, 3, 1, 7, 5, 6, 11, 9, 10, 8], 12, ""),
         ("six", vec![0, 2, 3, 4, 5, 6], 6, "do not tell the stand's level from the axes"),
     ];
     for (name, order, count, words) in cases {
         let (events, held) = stand::log(&instrument, 20.0, &plan, &order, &driven(5));
         let runs = [stand::run("room", events)];
-        let found = analyse(&tracks(&runs, &document), &document.document, &settings(plan.clone(), None)).unwrap();
+        let found =
+            analyse(&tracks(&runs, &document), &document.document, &settings(plan.clone(), None)).unwrap();
         assert_eq!(found.poses.len(), count, "{name}");
         for ((pose, position, _), (span, planned)) in found.poses.iter().zip(&held) {
             assert_eq!(position, planned, "{name}: {:?}", pose.span_s);
-            assert!(pose.span_s[0] > span[0] && pose.span_s[1] < span[1] + 1e-6, "{name}: {:?} in {span:?}", pose.span_s);
+            assert!(
+                pose.span_s[0] > span[0] && pose.span_s[1] < span[1] + 1e-6,
+                "{name}: {:?} in {span:?}",
+                pose.span_s
+            );
         }
-        assert!(words.is_empty() || found.warnings.iter().any(|w| w.contains(words)), "{name}: {:?}", found.warnings);
+        assert!(
+            words.is_empty() || found.warnings.iter().any(|w| w.contains(words)),
+            "{name}: {:?}",
+            found.warnings
+        );
         let chi_square = chi_square(&away(&found, &truth, 0, false), found.fit.axes_covariance(&plan, 0));
         assert!(chi_square < 22.5, "{name}: χ² {chi_square} with 6 degrees, 0.1 %");
     }
@@ -282,7 +308,9 @@ fn what_cannot_be_fitted_is_refused_with_what_to_do() {
     assert!(short.contains("stands still nowhere") && short.contains("--least"), "{short}");
     let dead = refused(&all, &driven(3), &|track| track.outputs[1].fill(0.0));
     assert!(dead.contains("accelerometer y reads 0 in every tick"), "{dead}");
-    let gaps = refused(&all, &driven(3), &|track| track.outputs[2].iter_mut().step_by(20).for_each(|x| *x = f64::NAN));
+    let gaps = refused(&all, &driven(3), &|track| {
+        track.outputs[2].iter_mut().step_by(20).for_each(|x| *x = f64::NAN)
+    });
     assert!(gaps.contains("are no numbers"), "{gaps}");
     let clipped = refused(&all, &driven(3), &|track| {
         track.outputs[0].iter_mut().for_each(|x| *x = x.min(3e5));

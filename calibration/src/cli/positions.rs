@@ -1,31 +1,34 @@
 //! `isotherm-calibrate positions`.
 
+mod planned;
+mod steps;
+
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use isotherm_log::file::refuse_overwriting;
-use isotherm_protocol::document::{AccelOutput, Created, Document};
+use isotherm_protocol::document::AccelOutput;
 
-use super::bar::Bar;
 use super::print;
 use super::runs::Reading;
 use crate::error::Error;
 use crate::positions::analysis::{Analysis, Settings, analyse, positions};
-use crate::positions::bare::bare;
-use crate::positions::budget::{ARCSEC_PER_RAD, Budget};
+use crate::positions::budget::ARCSEC_PER_RAD;
 use crate::positions::document::{complete, range};
 use crate::positions::gravity;
-use crate::positions::judged::{Judgement, judge};
+use crate::positions::judged::Judgement;
 use crate::positions::plan::Plan;
 use crate::positions::pose::Pose;
 use crate::positions::provenance::{before, with_origin};
 use crate::positions::report::{Set, report};
 use crate::positions::still::StillLimits;
 use crate::positions::times::Times;
-use crate::positions::track::Track;
 use crate::report::FitReport;
 use crate::run::Run;
 use crate::written::{Written, write_file};
+use planned::PlannedArgs;
+pub(super) use steps::date;
+use steps::{first_document, judged, tracks};
 
 /// Axes, scale factors and biases of accelerometers from positions of a stand, at one temperature or several
 #[derive(Debug, Args)]
@@ -108,27 +111,8 @@ pub(super) struct PositionsArgs {
     /// What a mean of an accelerometer is measured in, where there is no document: "V", or "m/s2"
     #[arg(long, value_name = "UNIT", default_value = "V", value_parser = ["V", "m/s2"])]
     accelerometer_unit: String,
-    /// Planned: white noise of an accelerometer (V²·s)
-    #[arg(long, value_name = "Q", default_value_t = 3e-9, requires = "budget")]
-    noise: f64,
-    /// Planned: time in each position (s)
-    #[arg(long, value_name = "SECONDS", default_value_t = 30.0, requires = "budget")]
-    seconds: f64,
-    /// Planned: output of an accelerometer at 1 g (V)
-    #[arg(long, value_name = "V", default_value_t = 1.0, requires = "budget")]
-    scale: f64,
-    /// Planned: thermal expansion of housing and sensor (1e-6/°C)
-    #[arg(long, value_name = "PPM", num_args = 2, default_values_t = [22.9, 15.0], requires = "budget")]
-    expansion: Vec<f64>,
-    /// Planned: temperature of calibration and highest temperature inside (°C)
-    #[arg(long, value_name = "DEG_C", num_args = 2, default_values_t = [20.0, 85.0], requires = "budget", allow_hyphen_values = true)]
-    temperatures: Vec<f64>,
-    /// Planned: error of the measured temperature (°C)
-    #[arg(long, value_name = "DEG_C", default_value_t = 0.2, requires = "budget")]
-    temperature_error: f64,
-    /// Planned: how fast an axis turns (″/°C); quartz 1.5, silicon up to 6
-    #[arg(long, value_name = "ARCSEC", default_value_t = 1.5, requires = "budget")]
-    axis_rate: f64,
+    #[command(flatten)]
+    planned: PlannedArgs,
     /// Write the report with its diagrams as one HTML file
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
@@ -175,9 +159,9 @@ impl PositionsArgs {
             ("--threshold", self.threshold),
             ("--still-rate", self.still_rate),
             ("--least", self.least),
-            ("--noise", self.noise),
-            ("--seconds", self.seconds),
-            ("--scale", self.scale),
+            ("--noise", self.planned.noise),
+            ("--seconds", self.planned.seconds),
+            ("--scale", self.planned.scale),
         ];
         for (name, value) in positive {
             if !(value.is_finite() && value > 0.0) {
@@ -189,9 +173,10 @@ impl PositionsArgs {
                 return Err(Error::Usage(format!("{name} is {value}, must be a number, 0 or above")));
             }
         }
-        let inputs: Vec<&Path> = (self.log.iter().chain(&self.judge).chain(&self.document).chain(&self.times))
-            .map(PathBuf::as_path)
-            .collect();
+        let inputs: Vec<&Path> =
+            (self.log.iter().chain(&self.judge).chain(&self.document).chain(&self.times))
+                .map(PathBuf::as_path)
+                .collect();
         for out in self.out.iter().chain(&self.html) {
             refuse_overwriting(out, &inputs)?;
         }
@@ -205,18 +190,7 @@ impl PositionsArgs {
     }
 
     fn print_budget(&self, plan: &Plan) -> Result<(), Error> {
-        let pair = |values: &[f64]| [values.first().copied().unwrap_or(0.0), values.get(1).copied().unwrap_or(0.0)];
-        let budget = Budget {
-            positioning_arcsec: self.positioning,
-            run_out_arcsec: self.run_out,
-            noise: self.noise,
-            seconds: self.seconds,
-            scale_per_g: self.scale,
-            expansion_ppm_per_deg_c: pair(&self.expansion),
-            temperature_deg_c: pair(&self.temperatures),
-            temperature_error_deg_c: self.temperature_error,
-            axis_arcsec_per_deg_c: self.axis_rate,
-        };
+        let budget = self.planned.budget(self.positioning, self.run_out);
         let levelling_rad = self.levelling / ARCSEC_PER_RAD;
         if self.json {
             return print(format!("{}\n", budget.to_json(plan, levelling_rad)).as_bytes());
@@ -268,7 +242,11 @@ impl PositionsArgs {
         let (settings, about_gravity) = self.settings(plan)?;
         let base = self.document.as_deref().map(Written::read).transpose()?;
         let runs = self.runs(&self.log, base.as_ref())?;
-        let output = if self.accelerometer_unit == "V" { AccelOutput::Volts } else { AccelOutput::MetresPerSecondSquared };
+        let output = if self.accelerometer_unit == "V" {
+            AccelOutput::Volts
+        } else {
+            AccelOutput::MetresPerSecondSquared
+        };
         let base = match base {
             Some(base) if base.document.accel.is_some() => base,
             Some(_) => {
@@ -286,7 +264,8 @@ impl PositionsArgs {
         if let Some(created) = &self.created {
             document.created = Some(date(created)?);
         }
-        let before = Written::of(&before(&base.document, &analysis, settings.gravity, self.document.is_some()))?;
+        let before =
+            Written::of(&before(&base.document, &analysis, settings.gravity, self.document.is_some()))?;
         let bare = Written::of(&document)?;
         let inside: Vec<(Pose, usize)> =
             analysis.poses.iter().map(|(pose, position, _)| (pose.clone(), *position)).collect();
@@ -296,7 +275,8 @@ impl PositionsArgs {
         let names = name(&runs);
         let outside_set =
             outside.as_ref().map(|(judged, runs)| Set { judged: judged.as_slice(), runs: runs.as_slice() });
-        let report = report(&document, &analysis, &settings, Set { judged: &judged, runs: &names }, outside_set);
+        let report =
+            report(&document, &analysis, &settings, Set { judged: &judged, runs: &names }, outside_set);
         with_origin(&mut document, &analysis, &settings, &report, &self.log, range(&analysis))?;
         Ok(Made { written: Written::of(&document)?, report })
     }
@@ -316,36 +296,4 @@ impl PositionsArgs {
         let judged = judged(settings, analysis, &poses, &runs, [before, after])?;
         Ok(Some((judged, runs.into_iter().map(|run| run.name).collect())))
     }
-}
-
-/// A document where there is none.
-fn first_document(runs: &[Run], output: AccelOutput, created: Option<&str>) -> Result<Document, Error> {
-    let Some(run) = runs.first() else { return Err(Error::Refused(vec!["there is no log".to_owned()])) };
-    let series = run.series(Bar::reading())?;
-    let counts = series.accels.output == Some(isotherm_correction::sample::OutputKind::Counts);
-    bare(&series, if counts { AccelOutput::Counts } else { output }, created.map(date).transpose()?)
-}
-
-/// A date.
-pub(super) fn date(text: &str) -> Result<Created, Error> {
-    let date = text.parse().ok().and_then(Created::new);
-    date.ok_or_else(|| Error::Usage(format!("--created is {text:?}, must be a date such as 2026-11-22")))
-}
-
-/// Runs tick by tick, corrected with a document.
-fn tracks(runs: &[Run], written: &Written) -> Result<Vec<Track>, Error> {
-    runs.iter().map(|run| Track::of(run, &written.loaded, Bar::reading())).collect()
-}
-
-/// Poses of runs, before and after.
-fn judged(
-    settings: &Settings,
-    analysis: &Analysis,
-    poses: &[(Pose, usize)],
-    runs: &[Run],
-    [before, after]: [&Written; 2],
-) -> Result<Vec<Judgement>, Error> {
-    let (before, after) = (tracks(runs, before)?, tracks(runs, after)?);
-    let errors = analysis.fit.stand.map(|(error, _)| error);
-    Ok(judge(&settings.plan, errors, settings.gravity, poses, [&before, &after], &analysis.channels))
 }

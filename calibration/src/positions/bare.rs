@@ -26,7 +26,9 @@ pub fn bare(series: &Series, accel_output: AccelOutput, created: Option<Created>
                 .to_owned(),
         );
     }
-    for (kind, count) in [("gyros", series.gyros.readings.len()), ("accelerometers", series.accels.readings.len())] {
+    for (kind, count) in
+        [("gyros", series.gyros.readings.len()), ("accelerometers", series.accels.readings.len())]
+    {
         if count == 0 {
             reasons.push(format!("the log has no {kind}: see [file.gyro] and [file.accel] of its mapping"));
         } else if count != MIN_SENSORS {

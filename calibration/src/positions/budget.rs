@@ -85,11 +85,8 @@ impl Budget {
     /// Root sum of squares of all three (″).
     #[must_use]
     pub fn total_arcsec(&self) -> f64 {
-        let parts = [
-            self.stand_arcsec(),
-            self.housing_arcsec(),
-            self.temperature_arcsec(self.axis_arcsec_per_deg_c),
-        ];
+        let parts =
+            [self.stand_arcsec(), self.housing_arcsec(), self.temperature_arcsec(self.axis_arcsec_per_deg_c)];
         parts.iter().map(|part| part * part).sum::<f64>().sqrt()
     }
 
@@ -114,8 +111,7 @@ impl Budget {
             .collect();
         let guess = guesses(plan, &taken, 3).ok()?;
         let positioning = self.positioning_arcsec.hypot(self.run_out_arcsec) / ARCSEC_PER_RAD;
-        let weights =
-            Weights { intensity: vec![self.noise; 3], positioning_rad: positioning, levelling_rad };
+        let weights = Weights { intensity: vec![self.noise; 3], positioning_rad: positioning, levelling_rad };
         let found = fit(plan, &taken, &guess, &weights, Degrees { sensor: 0, axes: 0 }).ok()?;
         let covariance = found.axes_covariance(plan, 0);
         let sigma: Vec<f64> = covariance.diagonal().iter().map(|v| v.sqrt() * ARCSEC_PER_RAD).collect();

@@ -1,10 +1,13 @@
 //! What was found, as a document.
 
 use isotherm_correction::units::Angle;
-use isotherm_protocol::document::{AccelOutput, AccelSensor, Curve, Document, OrientationThermal, Quantity, Shape, Unit};
+use isotherm_protocol::document::{
+    AccelOutput, AccelSensor, Curve, Document, OrientationThermal, Quantity, Shape, Unit,
+};
 
-use super::analysis::{Analysis, value_at};
+use super::analysis::Analysis;
 use super::model::Sensor;
+use super::temperature::value_at;
 use crate::written::tidy;
 
 /// Room around the temperatures that were taken (°C), for the stand's chamber does not meet them to the degree.
@@ -59,11 +62,21 @@ fn curve<Q: Quantity>(analysis: &Analysis, scaled: &[f64], range: [f64; 2]) -> C
         factor /= analysis.half_deg_c;
         coefficient
     });
-    Curve::new(Shape::Polynomial { reference: analysis.reference_deg_c, coefficients: coefficients.collect(), range })
+    Curve::new(Shape::Polynomial {
+        reference: analysis.reference_deg_c,
+        coefficients: coefficients.collect(),
+        range,
+    })
 }
 
 /// Moves an accelerometer's curves to what one temperature says, keeping their shape; false where a shape could not be kept.
-pub(crate) fn level(sensor: &mut AccelSensor, scale: f64, bias: f64, deg_c: f64, (scale_unit, bias_unit): (Unit, Unit)) -> bool {
+pub(crate) fn level(
+    sensor: &mut AccelSensor,
+    scale: f64,
+    bias: f64,
+    deg_c: f64,
+    (scale_unit, bias_unit): (Unit, Unit),
+) -> bool {
     let mut kept = true;
     let constant = |value: f64| Shape::Constant { value: tidy(value) };
     let shape = match (sensor.scale_factor.shape(), value_at(sensor.scale_factor.shape(), deg_c)) {

@@ -47,13 +47,17 @@ pub fn clipped(tracks: &[Track], poses: &[Pose]) -> Vec<String> {
             let column = tracks.get(pose.run).and_then(|track| track.outputs.get(sensor));
             column.and_then(|column| column.get(pose.interval.first..pose.interval.end)).is_some_and(same)
         };
+        let value = |pose: &Pose| {
+            let column = tracks.get(pose.run).and_then(|track| track.outputs.get(sensor));
+            column.and_then(|column| column.get(pose.interval.first)).copied().unwrap_or(f64::NAN)
+        };
         let at: Vec<&Pose> = poses.iter().filter(constant).collect();
         if let (Some(first), true) = (at.first(), at.len() < poses.len()) {
             reasons.push(format!(
                 "accelerometer {} reads exactly {} throughout {} of {} poses: it is at its limit there; use a wider range, or leave \
                  these poses out",
                 name(sensor),
-                first.outputs.get(sensor).copied().unwrap_or(f64::NAN),
+                value(first),
                 at.len(),
                 poses.len()
             ));

@@ -110,7 +110,8 @@ pub fn fit(
 ) -> Result<Fit, NoSolution> {
     let model = Model { plan, guess: guess.to_vec(), degrees };
     let start = vec![0.0; model.count()];
-    let whitening: Vec<DMatrix<f64>> = taken.iter().map(|taken| whitening(&model, &start, taken, weights)).collect();
+    let whitening: Vec<DMatrix<f64>> =
+        taken.iter().map(|taken| whitening(&model, &start, taken, weights)).collect();
     let prior = weights.levelling_rad / SMALL;
     let residuals = |p: &[f64]| -> Vec<f64> {
         let mut all = Vec::with_capacity(taken.len() * guess.len() + 3);
@@ -156,5 +157,7 @@ fn whitening(model: &Model<'_>, start: &[f64], taken: &Taken, weights: &Weights)
         covariance += &change * change.transpose() * (sigma * sigma);
     }
     let lower = covariance.cholesky().map(|cholesky| cholesky.l());
-    lower.and_then(|lower| lower.try_inverse()).unwrap_or_else(|| DMatrix::from_element(count, count, f64::NAN))
+    lower
+        .and_then(|lower| lower.try_inverse())
+        .unwrap_or_else(|| DMatrix::from_element(count, count, f64::NAN))
 }

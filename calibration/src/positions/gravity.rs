@@ -12,8 +12,8 @@ const PER_METRE: f64 = 3.086e-6;
 pub fn normal(latitude_deg: f64, height_m: f64) -> f64 {
     let sine = libm::sin(latitude_deg.to_radians());
     let square = sine * sine;
-    let on_ellipsoid =
-        9.780_325_335_9 * (1.0 + 0.001_931_852_652_41 * square) / libm::sqrt(1.0 - 0.006_694_379_990_13 * square);
+    let on_ellipsoid = 9.780_325_335_9 * (1.0 + 0.001_931_852_652_41 * square)
+        / libm::sqrt(1.0 - 0.006_694_379_990_13 * square);
     on_ellipsoid - PER_METRE * height_m
 }
 
@@ -26,7 +26,8 @@ pub fn stated(
     latitude_deg: Option<f64>,
     height_m: f64,
 ) -> Result<(f64, Option<String>), Error> {
-    let usage = |name: &str, got: f64, range: &str| Err(Error::Usage(format!("{name} is {got}, must be {range}")));
+    let usage =
+        |name: &str, got: f64, range: &str| Err(Error::Usage(format!("{name} is {got}, must be {range}")));
     if let Some(got) = latitude_deg.filter(|latitude| !(-90.0..=90.0).contains(latitude)) {
         return usage("--latitude", got, "from -90 to 90 degrees");
     }

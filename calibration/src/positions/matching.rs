@@ -35,9 +35,10 @@ pub fn matched(plan: &Plan, track: &Track, poses: &[Pose]) -> Result<Vec<Option<
         return Ok(candidates.iter().map(|candidates| candidates.first().copied()).collect());
     }
     let ways: Vec<Matrix3<f64>> = poses.windows(2).map(|pair| way(track, &pair[0], &pair[1])).collect();
-    let agree = ways.iter().zip(directions.windows(2)).filter(|(way, pair)| {
-        (**way * pair[0]).angle(&pair[1]) < DIRECTION_RAD
-    });
+    let agree = ways
+        .iter()
+        .zip(directions.windows(2))
+        .filter(|(way, pair)| (**way * pair[0]).angle(&pair[1]) < DIRECTION_RAD);
     #[expect(clippy::cast_precision_loss, reason = "poses")]
     let share = agree.count() as f64 / ways.len().max(1) as f64;
     if share >= AGREEMENT {
@@ -177,7 +178,8 @@ pub(crate) fn seen(turn: Vector3<f64>) -> Matrix3<f64> {
 
 /// Stand to case in a position: columns are the stand's base axes in case axes. Without a stand, none.
 fn case_of(plan: &Plan, position: usize) -> Matrix3<f64> {
-    let Some(Attitude::Stand([first, second])) = plan.positions.get(position).map(|position| position.attitude)
+    let Some(Attitude::Stand([first, second])) =
+        plan.positions.get(position).map(|position| position.attitude)
     else {
         return Matrix3::identity();
     };

@@ -77,9 +77,14 @@ impl Guess {
     /// From the outputs by linear least squares: U = M·u + S, K·g the length of M.
     #[must_use]
     pub fn of(ups: &[[f64; 3]], outputs: &[f64]) -> Option<Self> {
-        let design = nalgebra::DMatrix::from_fn(ups.len(), 4, |row, column| {
-            if column < 3 { ups[row][column] } else { 1.0 }
-        });
+        let design =
+            nalgebra::DMatrix::from_fn(
+                ups.len(),
+                4,
+                |row, column| {
+                    if column < 3 { ups[row][column] } else { 1.0 }
+                },
+            );
         let svd = design.svd(true, true);
         let smallest = svd.singular_values.min();
         if ups.len() < 4 || smallest.is_nan() || smallest < 0.05 * svd.singular_values.max() {
@@ -151,7 +156,8 @@ impl Model<'_> {
     pub fn outputs_under(&self, parameters: &[f64], taken: &Taken, up: [f64; 3]) -> Vec<f64> {
         let (s, c) = (self.degrees.sensor + 1, self.degrees.axes + 1);
         let output = |(index, guess): (usize, &Guess)| {
-            let p = parameters.get(index * self.of_sensor()..(index + 1) * self.of_sensor()).unwrap_or_default();
+            let p =
+                parameters.get(index * self.of_sensor()..(index + 1) * self.of_sensor()).unwrap_or_default();
             let t = taken.sensor_t.get(index).copied().unwrap_or(0.0);
             let at = |from: usize, count: usize, x: f64| {
                 p[from..from + count].iter().rev().fold(0.0, |sum, coefficient| sum * x + coefficient)
@@ -160,8 +166,7 @@ impl Model<'_> {
             let bias = guess.bias + guess.scale * at(s, s, t) * SMALL;
             let (a, b) = (at(2 * s, c, taken.axes_t) * SMALL, at(2 * s + c, c, taken.axes_t) * SMALL);
             let [first, second] = guess.across;
-            let along: f64 =
-                (0..3).map(|i| (guess.axis[i] + a * first[i] + b * second[i]) * up[i]).sum();
+            let along: f64 = (0..3).map(|i| (guess.axis[i] + a * first[i] + b * second[i]) * up[i]).sum();
             let ratio = taken.ratio.get(index).copied().unwrap_or(1.0);
             scale * along / ratio + bias
         };
@@ -173,7 +178,8 @@ impl Model<'_> {
     pub fn state(&self, parameters: &[f64]) -> Vec<Sensor> {
         let (s, c) = (self.degrees.sensor + 1, self.degrees.axes + 1);
         let sensor = |(index, guess): (usize, &Guess)| {
-            let p = parameters.get(index * self.of_sensor()..(index + 1) * self.of_sensor()).unwrap_or_default();
+            let p =
+                parameters.get(index * self.of_sensor()..(index + 1) * self.of_sensor()).unwrap_or_default();
             let [first, second] = guess.across;
             let row = |power: usize| {
                 let (a, b) = (p[2 * s + power] * SMALL, p[2 * s + c + power] * SMALL);

@@ -17,10 +17,11 @@
 //! shows.) How the unit is mounted on the platform, and the zero of axis 1, cannot be told from where its axes are: they are part
 //! of C, and what the precision of the mounting is for.
 
+mod file;
+
 use std::path::Path;
 
 use isotherm_log::file::read_small_text;
-use serde::Deserialize;
 
 use crate::error::Error;
 
@@ -89,7 +90,10 @@ impl Plan {
             name: (*name).to_owned(),
             attitude: Attitude::Stand(angles.map(f64::to_radians)),
         };
-        Self { mounting: mounting('y', 'x').unwrap_or_default(), positions: positions.iter().map(position).collect() }
+        Self {
+            mounting: mounting('y', 'x').unwrap_or_default(),
+            positions: positions.iter().map(position).collect(),
+        }
     }
 
     /// The built-in plan of a name, or the one in a file (TOML, or CSV where its name ends so).
@@ -105,10 +109,10 @@ impl Plan {
         let path = Path::new(name);
         let text = read_small_text(path, "read the plan")?;
         let is_csv = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv"));
-        let read = if is_csv { of_csv(&text) } else { toml::from_str(&text).map_err(|error| error.to_string()) };
-        let plan = read.and_then(Written::plan);
-        plan.map_err(|words| {
-            Error::Usage(format!("{name}: {words}; a plan is \"twelve\", \"six\", or a file as docs/calibration.md shows"))
+        file::read(&text, is_csv).map_err(|words| {
+            Error::Usage(format!(
+                "{name}: {words}; a plan is \"twelve\", \"six\", or a file as docs/calibration.md shows"
+            ))
         })
     }
 
@@ -177,93 +181,6 @@ fn mounting(axis_1: char, axis_2: char) -> Option<[[f64; 3]; 3]> {
     (axis_1 != axis_2).then_some([second, first, cross])
 }
 
-/// A plan as its file has it.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Written {
-    /// Case axis along the stand's axis 1 at zero angles.
-    #[serde(default = "along_1")]
-    axis_1: char,
-    /// Case axis along its axis 2.
-    #[serde(default = "along_2")]
-    axis_2: char,
-    position: Vec<WrittenPosition>,
-}
-
-fn along_1() -> char {
-    'y'
-}
-
-fn along_2() -> char {
-    'x'
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct WrittenPosition {
-    name: String,
-    axis_1_deg: Option<f64>,
-    axis_2_deg: Option<f64>,
-    up: Option<[f64; 3]>,
-}
-
-impl Written {
-    fn plan(self) -> Result<Plan, String> {
-        let mounting = mounting(self.axis_1, self.axis_2).ok_or_else(|| {
-            format!("axis_1 is {:?} and axis_2 {:?}: they must be two of x, y, z", self.axis_1, self.axis_2)
-        })?;
-        if self.position.is_empty() {
-            return Err("it has no position".into());
-        }
-        let mut positions: Vec<Position> = Vec::new();
-        for position in self.position {
-            if positions.iter().any(|other| other.name == position.name) {
-                return Err(format!("position {:?} is there twice: names must differ", position.name));
-            }
-            let attitude = match (position.axis_1_deg, position.axis_2_deg, position.up) {
-                (Some(first), Some(second), None) if first.is_finite() && second.is_finite() => {
-                    Attitude::Stand([first.to_radians(), second.to_radians()])
-                }
-                (None, None, Some(up)) => {
-                    let norm = libm::sqrt(up.iter().map(|c| c * c).sum());
-                    if !(norm.is_finite() && norm > 0.0) {
-                        return Err(format!("position {:?}: up is {up:?}, no direction", position.name));
-                    }
-                    Attitude::Up(up.map(|c| c / norm))
-                }
-                _ => {
-                    return Err(format!(
-                        "position {:?} needs axis_1_deg and axis_2_deg, or up = [x, y, z]",
-                        position.name
-                    ));
-                }
-            };
-            positions.push(Position { name: position.name, attitude });
-        }
-        Ok(Plan { mounting, positions })
-    }
-}
-
-/// Rows `name,axis_1_deg,axis_2_deg` behind a line that names them.
-fn of_csv(text: &str) -> Result<Written, String> {
-    let mut lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));
-    match lines.next() {
-        Some((_, "name,axis_1_deg,axis_2_deg")) => {}
-        head => return Err(format!("the first line is {:?}, must be name,axis_1_deg,axis_2_deg", head.map(|h| h.1))),
-    }
-    let row = |(index, line): (usize, &str)| {
-        let cells: Vec<&str> = line.split(',').map(str::trim).collect();
-        let [name, first, second] = cells[..] else {
-            return Err(format!("line {}: {} cells, must be three", index + 1, cells.len()));
-        };
-        let number = |cell: &str| cell.parse().map_err(|_| format!("line {}: {cell:?} is no number", index + 1));
-        let (first, second) = (number(first)?, number(second)?);
-        Ok(WrittenPosition { name: name.into(), axis_1_deg: Some(first), axis_2_deg: Some(second), up: None })
-    };
-    let position = lines.map(row).collect::<Result<_, _>>()?;
-    Ok(Written { axis_1: along_1(), axis_2: along_2(), position })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -279,7 +196,10 @@ mod tests {
                     let position = &plan.positions[plan.index_of(&name).unwrap()];
                     let nominal = plan.up(&position.attitude, [0.0; 3]);
                     for (other, c) in nominal.iter().enumerate() {
-                        assert!((c - if other == axis { sign } else { 0.0 }).abs() < 1e-15, "{name} {nominal:?}");
+                        assert!(
+                            (c - if other == axis { sign } else { 0.0 }).abs() < 1e-15,
+                            "{name} {nominal:?}"
+                        );
                     }
                     plan.up(&position.attitude, errors)
                 });
@@ -302,7 +222,11 @@ mod tests {
         let csv = read("a.csv", "name,axis_1_deg,axis_2_deg\nYa,0,0\nZa,0,90\n").unwrap();
         let toml = "[[position]]\nname = \"Ya\"\naxis_1_deg = 0.0\naxis_2_deg = 0.0\n[[position]]\nname = \"Za\"\naxis_1_deg = 0.0\naxis_2_deg = 90.0\n";
         assert_eq!(csv, read("a.toml", toml).unwrap());
-        let up = read("up.toml", "axis_1 = \"z\"\naxis_2 = \"x\"\n[[position]]\nname = \"t\"\nup = [0.0, 3.0, 4.0]\n").unwrap();
+        let up = read(
+            "up.toml",
+            "axis_1 = \"z\"\naxis_2 = \"x\"\n[[position]]\nname = \"t\"\nup = [0.0, 3.0, 4.0]\n",
+        )
+        .unwrap();
         assert_eq!(up.up(&up.positions[0].attitude, [1e-3; 3]), [0.0, 0.6, 0.8]);
         for (name, text, word) in [
             ("b.csv", "a,b\n", "first line"),

@@ -25,11 +25,14 @@ pub fn before(base: &Document, analysis: &Analysis, gravity: f64, given: bool) -
         for (sensor, guess) in accel.sensor.iter_mut().zip(&analysis.fit.guess) {
             let unit = sensor.scale_factor.unit();
             // An accelerometer that is mounted the other way round is no error of its scale factor.
-            let sign = if guess.axis.iter().copied().fold(0.0, |a: f64, c| if c.abs() > a.abs() { c } else { a }) < 0.0 {
-                -1.0
-            } else {
-                1.0
-            };
+            let sign =
+                if guess.axis.iter().copied().fold(0.0, |a: f64, c| if c.abs() > a.abs() { c } else { a })
+                    < 0.0
+                {
+                    -1.0
+                } else {
+                    1.0
+                };
             let shape = Shape::Constant { value: tidy(sign * mean) };
             sensor.scale_factor = isotherm_protocol::document::Curve::new(shape).in_unit(unit);
         }
@@ -57,7 +60,12 @@ pub fn with_origin(
     let coefficients: serde_json::Map<String, serde_json::Value> = report
         .coefficients
         .iter()
-        .map(|c| (c.name.clone(), json!({ "value": c.value, "sigma": c.sigma.unwrap_or(f64::NAN), "unit": c.unit })))
+        .map(|c| {
+            (
+                c.name.clone(),
+                json!({ "value": c.value, "sigma": c.sigma.unwrap_or(f64::NAN), "unit": c.unit }),
+            )
+        })
         .filter(|(_, value)| value["sigma"].is_number() && value["value"].is_number())
         .collect();
     let fit = &analysis.fit;

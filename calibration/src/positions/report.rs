@@ -37,7 +37,8 @@ pub fn report(
     if let Some(set) = outside {
         report.residuals.extend(curves(set.judged, set.runs, Sample::Out));
     }
-    report.verdicts = Curve::verdicts(&report.residuals).into_iter().map(|v| v.stated_as(Figure::Rms)).collect();
+    report.verdicts =
+        Curve::verdicts(&report.residuals).into_iter().map(|v| v.stated_as(Figure::Rms)).collect();
     let length = Verdict::new("|f| − g", "m/s²", lengths(inside.judged)).stated_as(Figure::Rms);
     report.verdicts.push(length.out_of_sample(outside.map(|set| lengths(set.judged))));
     report.warnings.clone_from(&analysis.warnings);
@@ -146,7 +147,12 @@ fn coefficients(
     let s = fit.degrees.sensor + 1;
     for (index, (name, sensor)) in names.iter().zip(&fit.sensors).enumerate() {
         let sigma = |offset: usize, scale: f64| {
-            Some(fit.solution.sigma(index * of_sensor + offset) * super::model::SMALL * scale * analysis.widened)
+            Some(
+                fit.solution.sigma(index * of_sensor + offset)
+                    * super::model::SMALL
+                    * scale
+                    * analysis.widened,
+            )
         };
         let guess = fit.guess[index].scale;
         for (power, k) in sensor.scale.iter().enumerate() {
@@ -191,7 +197,8 @@ fn coefficients(
 }
 
 fn position_rows(settings: &Settings, set: Set<'_>) -> Table {
-    let head = ["position", "log", "at, s", "°C", "x, mg", "y, mg", "z, mg", "|f| − g, mg"].map(str::to_owned);
+    let head =
+        ["position", "log", "at, s", "°C", "x, mg", "y, mg", "z, mg", "|f| − g, mg"].map(str::to_owned);
     let row = |judgement: &Judgement| {
         let position = settings.plan.positions.get(judgement.position);
         let milli_g = |error: f64| format!("{:.4}", error / settings.gravity * 1e3);
@@ -273,7 +280,8 @@ fn axes_chart(analysis: &Analysis, settings: &Settings, names: &[String]) -> Cha
         }
     };
     Chart {
-        caption: "Elements of C over temperature: each temperature by itself, and the line of the document.".to_owned(),
+        caption: "Elements of C over temperature: each temperature by itself, and the line of the document."
+            .to_owned(),
         x: Axis::of("temperature", "°C"),
         panels: shown(analysis).into_iter().map(panel).collect(),
         marks: Vec::new(),

@@ -32,7 +32,9 @@ impl Times {
         let mut lines = lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
         match lines.next() {
             Some((_, "start_s,end_s,position" | "start_s,end_s,position,log")) => {}
-            other => return Err(wrong(other.map_or(1, |o| o.0), "the first line must name the columns".into())),
+            other => {
+                return Err(wrong(other.map_or(1, |o| o.0), "the first line must name the columns".into()));
+            }
         }
         for (line, row) in lines {
             let cells: Vec<&str> = row.split(',').map(str::trim).collect();
@@ -47,7 +49,10 @@ impl Times {
             };
             let span = [number(start)?, number(end)?];
             if span[1] <= span[0] {
-                return Err(wrong(line, format!("it ends at {} s, before it starts at {} s", span[1], span[0])));
+                return Err(wrong(
+                    line,
+                    format!("it ends at {} s, before it starts at {} s", span[1], span[0]),
+                ));
             }
             rows.push((span, position.to_owned(), log));
         }
@@ -65,7 +70,10 @@ impl Times {
         for (span, name, _) in self.rows.iter().filter(|(.., log)| own(log)) {
             let Some(position) = plan.index_of(name) else {
                 let names: Vec<&str> = plan.positions.iter().map(|position| position.name.as_str()).collect();
-                reasons.push(format!("--times: {name:?} is no position of the plan, which has {}", names.join(", ")));
+                reasons.push(format!(
+                    "--times: {name:?} is no position of the plan, which has {}",
+                    names.join(", ")
+                ));
                 continue;
             };
             let within = |tick: &usize| {

@@ -93,7 +93,10 @@ impl Track {
             gyro_counts: series.gyros.output == Some(OutputKind::Counts),
             rate_deg_per_s: rates.each_ref().map(|column| taken(column)),
             force_m_per_s2: forces.each_ref().map(|column| taken(column)),
-            temperature_deg_c: temperatures.iter().map(|(name, column)| (name.clone(), taken(column))).collect(),
+            temperature_deg_c: temperatures
+                .iter()
+                .map(|(name, column)| (name.clone(), taken(column)))
+                .collect(),
             end_ns: series.accels.end_ns,
             duration_s: series.accels.duration_s,
         })

@@ -99,7 +99,8 @@ pub fn fit(poses: &[Vec<f64>], gravity: f64) -> Result<AccelFit, NoSolution> {
 fn ellipsoid(poses: &[Vec<f64>], gravity: f64) -> Result<([f64; 3], [f64; 3]), NoSolution> {
     let column = |i: usize| poses.iter().map(move |pose| pose.get(i).copied().unwrap_or(f64::NAN));
     let ends = |i: usize| {
-        column(i).fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
+        column(i)
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
     };
     let centre = [0, 1, 2].map(|i| 0.5 * (ends(i).0 + ends(i).1));
     let half = [0, 1, 2].map(|i| 0.5 * (ends(i).1 - ends(i).0));

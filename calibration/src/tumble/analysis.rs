@@ -58,7 +58,8 @@ impl Tumble {
     /// Mean temperature of a channel over all poses (°C).
     #[must_use]
     pub fn mean_temperature(&self, channel: &str) -> Option<f64> {
-        let of = |pose: &Pose| Some((pose.temperature_deg_c.get(channel)? * pose.duration_s, pose.duration_s));
+        let of =
+            |pose: &Pose| Some((pose.temperature_deg_c.get(channel)? * pose.duration_s, pose.duration_s));
         let (sum, time) = self.poses.iter().filter_map(of).fold((0.0, 0.0), |(a, b), (x, y)| (a + x, b + y));
         (time > 0.0).then(|| sum / time)
     }
@@ -212,8 +213,15 @@ fn sound(poses: &[Pose], fit: &AccelFit) -> Result<(), Vec<String>> {
 /// A fit without a solution, in words.
 fn no_solution(why: &NoSolution) -> String {
     const NAMES: [&str; 9] = [
-        "scale factor of x", "scale factor of y", "scale factor of z", "bias of x", "bias of y", "bias of z",
-        "angle between x and y", "angle between x and z", "angle between y and z",
+        "scale factor of x",
+        "scale factor of y",
+        "scale factor of z",
+        "bias of x",
+        "bias of y",
+        "bias of z",
+        "angle between x and y",
+        "angle between x and z",
+        "angle between y and z",
     ];
     match why {
         NoSolution::NotDetermined(index) => format!(
@@ -240,7 +248,10 @@ fn held_out(poses: &[Pose], gravity: f64) -> Size {
 /// Fits the gyros to what lies between the poses.
 fn gyros(track: &Track, poses: &[Pose], accel: &AccelFit) -> Result<GyroFit, String> {
     if track.gyro_counts {
-        return Err("the gyros put out counts: the angle of one is wanted as a start, convert them in the mapping".into());
+        return Err(
+            "the gyros put out counts: the angle of one is wanted as a start, convert them in the mapping"
+                .into(),
+        );
     }
     let total: f64 = poses.iter().map(|pose| pose.duration_s).sum();
     let rest = [0, 1, 2].map(|gyro| {
@@ -258,7 +269,10 @@ fn gyros(track: &Track, poses: &[Pose], accel: &AccelFit) -> Result<GyroFit, Str
     }
     gyro::fit(track, rest, &transitions).map_err(|why| match why {
         NoSolution::NotDetermined(index) => {
-            format!("the turns do not determine gyro {}: turn the unit about each of its axes", AXES[index % 3])
+            format!(
+                "the turns do not determine gyro {}: turn the unit about each of its axes",
+                AXES[index % 3]
+            )
         }
         NoSolution::NoMinimum(words) => format!("no fit of the gyros was found ({words})"),
     })

@@ -6,8 +6,8 @@ use isotherm_protocol::document::{Curve, Document, Shape};
 use super::accel::AccelFit;
 use super::analysis::Tumble;
 use super::gyro::GyroFit;
-use crate::positions::analysis::value_at;
 use crate::positions::document::{level, units};
+use crate::positions::temperature::value_at;
 use crate::written::tidy;
 
 /// Puts what was found into a document; gives what is to be said of it.
@@ -35,7 +35,10 @@ pub fn complete(document: &Document, tumble: &Tumble) -> (Document, Vec<String>)
         }
         accel.orientation.rows = tumble.accel.rows.iter().map(|row| row.map(tidy)).collect();
         if accel.orientation.thermal.take().is_some() {
-            warnings.push("the old document's slopes of the accelerometers' axes are gone: the case axes are new ones".to_owned());
+            warnings.push(
+                "the old document's slopes of the accelerometers' axes are gone: the case axes are new ones"
+                    .to_owned(),
+            );
         }
     }
     if let Ok(gyro) = &tumble.gyro {
@@ -76,7 +79,9 @@ pub fn before(base: &Document, tumble: &Tumble, given: bool) -> Document {
             sensor.bias = Some(Curve::new(constant(mean(tumble.accel.bias))).in_unit(bias_unit));
         }
     }
-    if let Ok(gyro) = tumble.gyro.as_ref().map_err(|_| ()).and_then(|gyro| if given { Err(()) } else { Ok(gyro) }) {
+    if let Ok(gyro) =
+        tumble.gyro.as_ref().map_err(|_| ()).and_then(|gyro| if given { Err(()) } else { Ok(gyro) })
+    {
         // Without the mean at rest the gyros would be judged by their bias, which nobody leaves in.
         for (sensor, rest) in document.gyro.sensor.iter_mut().zip(gyro.rest) {
             let rest = AngularRate::from_rad_per_s(rest).as_deg_per_h();

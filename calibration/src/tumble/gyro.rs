@@ -66,11 +66,7 @@ fn weights(p: &[f64]) -> [f64; 3] {
 /// Input axes: each turned by two small angles from its case axis.
 fn rows(p: &[f64]) -> [[f64; 3]; 3] {
     let angle = |i: usize| p.get(3 + i).copied().unwrap_or(0.0);
-    let raw = [
-        [1.0, angle(0), angle(1)],
-        [angle(2), 1.0, angle(3)],
-        [angle(4), angle(5), 1.0],
-    ];
+    let raw = [[1.0, angle(0), angle(1)], [angle(2), 1.0, angle(3)], [angle(4), angle(5), 1.0]];
     raw.map(|row| row.map(|c| c / norm(row)))
 }
 
@@ -82,12 +78,7 @@ fn inverse_of(p: &[f64]) -> Matrix3<f64> {
 }
 
 /// The direction before the transition, as the case sees it after the gyros' rotation.
-fn turned(
-    track: &Track,
-    rest: [f64; 3],
-    inverse: &Matrix3<f64>,
-    transition: &Transition,
-) -> [f64; 3] {
+fn turned(track: &Track, rest: [f64; 3], inverse: &Matrix3<f64>, transition: &Transition) -> [f64; 3] {
     let mut seen = Vector3::from(transition.directions[0]);
     for tick in transition.ticks[0]..transition.ticks[1] {
         let output = |gyro: usize| {
@@ -95,7 +86,9 @@ fn turned(
             column.copied().unwrap_or(f64::NAN) - rest[gyro]
         };
         let duration = track.duration_s.get(tick).copied().unwrap_or(0.0);
-        seen = crate::positions::matching::seen(inverse * Vector3::new(output(0), output(1), output(2)) * duration) * seen;
+        seen = crate::positions::matching::seen(
+            inverse * Vector3::new(output(0), output(1), output(2)) * duration,
+        ) * seen;
     }
     seen.into()
 }

@@ -47,13 +47,17 @@ impl Left {
 
 /// Everything that is said.
 #[must_use]
-pub fn report(document: &Document, tumble: &Tumble, settings: &Settings, [before, after]: [&Left; 2]) -> FitReport {
+pub fn report(
+    document: &Document,
+    tumble: &Tumble,
+    settings: &Settings,
+    [before, after]: [&Left; 2],
+) -> FitReport {
     let mut report = FitReport::new("Accelerometers and gyros from a tumbled unit", &document.unit);
     let sizes = |of: fn(&Left) -> &[f64]| [Size::of(of(before)), Size::of(of(after))];
     let length = sizes(|left| &left.length);
     let accel = Verdict::new("|f|−g", "m/s²", length).stated_as(Figure::Rms);
-    let held_out = tumble.held_out;
-    report.verdicts.push(accel.remark(format!("{:.2e} m/s² rms in poses that a fit of the others did not see", held_out.rms)));
+    report.verdicts.push(accel.out_of_sample(Some([length[0], tumble.held_out])));
     let gyro = Verdict::new("gyros", "°", sizes(|left| &left.angle_deg)).stated_as(Figure::Rms);
     report.verdicts.push(match &tumble.gyro {
         Ok(_) => gyro.remark(format!("{} turns between poses", after.angle_deg.len())),
@@ -62,13 +66,14 @@ pub fn report(document: &Document, tumble: &Tumble, settings: &Settings, [before
     report.warnings.clone_from(&tumble.warnings);
     report.notes.push(format!(
         "{} poses, found with {} times the variance of the still start; g = {} m/s². z is the input axis of the third accelerometer, \
-         y lies in the plane of the second and third.",
+         y lies in the plane of the second and third. Out of sample: each pose by a fit of all others.",
         tumble.poses.len(),
         tumble.factor,
         settings.gravity
     ));
-    report.coefficients = coefficients(document, tumble, settings.gravity);
-    let time_s: Arc<[f64]> = tumble.poses.iter().map(|pose| 0.5 * (pose.span_s[0] + pose.span_s[1])).collect();
+    report.coefficients = coefficients(document, tumble);
+    let time_s: Arc<[f64]> =
+        tumble.poses.iter().map(|pose| 0.5 * (pose.span_s[0] + pose.span_s[1])).collect();
     report.residuals.push(Curve {
         of: "|f|−g".to_owned(),
         measure: "m/s²".to_owned(),
@@ -97,7 +102,7 @@ fn rows(tumble: &Tumble, after: &Left) -> Table {
     Table { head, rows: poses.map(row).collect() }
 }
 
-fn coefficients(document: &Document, tumble: &Tumble, gravity: f64) -> Vec<Coefficient> {
+fn coefficients(document: &Document, tumble: &Tumble) -> Vec<Coefficient> {
     let accel = &tumble.accel;
     let output = document.accel.as_ref().map_or("", |accel| match accel.output {
         isotherm_protocol::document::AccelOutput::Counts => "counts/s",
@@ -109,9 +114,13 @@ fn coefficients(document: &Document, tumble: &Tumble, gravity: f64) -> Vec<Coeff
         let of = |what: &str| format!("accelerometer {name} {what}");
         let per_output = 1.0 / accel.scale[axis];
         let sigma = accel.sigma[axis];
-        all.push(Coefficient::new(of("1/K"), format!("m/s² per {output}"), per_output, Some(per_output.abs() * sigma)));
+        all.push(Coefficient::new(
+            of("1/K"),
+            format!("m/s² per {output}"),
+            per_output,
+            Some(per_output.abs() * sigma),
+        ));
         all.push(Coefficient::new(of("S"), output, accel.bias[axis], Some(accel.sigma[3 + axis])));
-        let _ = gravity;
     }
     for (index, (row, column)) in [(0, 1), (0, 2), (1, 2)].into_iter().enumerate() {
         let value = accel.rows[row][column] * ARCSEC_PER_RAD;
@@ -161,7 +170,9 @@ pub fn with_origin(
     let coefficients: serde_json::Map<String, serde_json::Value> = report
         .coefficients
         .iter()
-        .map(|c| (c.name.clone(), json!({ "value": c.value, "sigma": c.sigma.unwrap_or(0.0), "unit": c.unit })))
+        .map(|c| {
+            (c.name.clone(), json!({ "value": c.value, "sigma": c.sigma.unwrap_or(0.0), "unit": c.unit }))
+        })
         .collect();
     let covariance: Vec<Vec<f64>> =
         tumble.accel.covariance.row_iter().map(|row| row.iter().copied().collect()).collect();

@@ -3,6 +3,8 @@
 //! The stand's kinematics are written out here a second time, with rotation matrices from north, east, down to the case, so that
 //! the plan's own formula is not what it is tested with.
 
+use std::collections::BTreeMap;
+
 use isotherm_calibration::positions::plan::{Attitude, Plan};
 use isotherm_calibration::run::Run;
 use isotherm_calibration::written::Written;
@@ -57,6 +59,8 @@ pub(crate) struct Stand {
     pub(crate) positioning: f64,
     pub(crate) tick_ns: i64,
     pub(crate) hold_s: f64,
+    /// How much longer the first position is held (s).
+    pub(crate) start_s: f64,
     /// Speed of the turns between positions (°/s); `None` where the log has no way from one to the next.
     pub(crate) turn_deg_per_s: Option<f64>,
     pub(crate) seed: u64,
@@ -78,8 +82,8 @@ pub(crate) fn with_axes(rows: &[[f64; 3]; 3]) -> Instrument {
 /// True axes at a housing temperature.
 pub(crate) fn true_rows(instrument: &Instrument, housing_deg_c: f64) -> [[f64; 3]; 3] {
     let orientation = &instrument.accelerometers.as_ref().unwrap().orientation;
-    let columns =
-        [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|unit| orientation.project(unit, housing_deg_c));
+    let columns = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+        .map(|unit| orientation.project(unit, housing_deg_c));
     [0, 1, 2].map(|sensor| [0, 1, 2].map(|axis| columns[axis][sensor]))
 }
 
@@ -94,7 +98,8 @@ pub(crate) fn document() -> Document {
         sensor.scale_factor = Curve::new(nominal).in_unit(Unit::CountsPerSPerMPerS2);
         sensor.bias = None;
         sensor.channel = Some(format!("accel{index}"));
-        let Shape::Polynomial { range, .. } = document.gyro.sensor[0].static_bias.as_ref().unwrap().shape() else {
+        let Shape::Polynomial { range, .. } = document.gyro.sensor[0].static_bias.as_ref().unwrap().shape()
+        else {
             unreachable!()
         };
         // The board's ratio is known from another calibration.
@@ -149,7 +154,6 @@ pub(crate) fn log(
     stand: &Stand,
 ) -> (Vec<LogEvent>, Vec<([f64; 2], usize)>) {
     let mut dice = Dice::new(stand.seed);
-    let tick_s = stand.tick_ns as f64 * 1e-9;
     let attitudes: Vec<Matrix3<f64>> = order
         .iter()
         .map(|position| {
@@ -157,6 +161,18 @@ pub(crate) fn log(
             Rotation3::new(error).matrix() * attitude(plan, *position, stand.errors)
         })
         .collect();
+    let (events, spans) = through(instrument, chamber_deg_c, &attitudes, stand);
+    (events, spans.into_iter().zip(order.iter().copied()).collect())
+}
+
+/// A log of attitudes (north, east, down to the case), each held; with the times. The first is held `start_s` longer.
+pub(crate) fn through(
+    instrument: &Instrument,
+    chamber_deg_c: f64,
+    attitudes: &[Matrix3<f64>],
+    stand: &Stand,
+) -> (Vec<LogEvent>, Vec<[f64; 2]>) {
+    let tick_s = stand.tick_ns as f64 * 1e-9;
     let (mut events, mut held) = (Vec::new(), Vec::new());
     let (mut sequence, mut time_ns, mut segment) = (0_u64, 0_i64, 0_u64);
     let mut play = |motion: Motion, ticks: i64, events: &mut Vec<LogEvent>| -> [f64; 2] {
@@ -174,7 +190,9 @@ pub(crate) fn log(
             let first = segment > 0;
             let readings = step.temperatures.into_iter();
             events.extend(
-                readings.filter(|reading| !first || reading.time.as_ns() > time_ns).map(LogEvent::Temperature),
+                readings
+                    .filter(|reading| !first || reading.time.as_ns() > time_ns)
+                    .map(LogEvent::Temperature),
             );
             step.gyro.sequence += sequence;
             if let (Some(output), Some(mut tick)) = (instrument.accel_output_kind(), step.accel) {
@@ -189,7 +207,7 @@ pub(crate) fn log(
         segment += 1;
         [begin, time_ns as f64 * 1e-9]
     };
-    for (index, (level_to_case, position)) in attitudes.iter().zip(order).enumerate() {
+    for (index, level_to_case) in attitudes.iter().enumerate() {
         if let (Some(speed), true) = (stand.turn_deg_per_s, index > 0) {
             let before = &attitudes[index - 1];
             // Half a turn has no axis in a rotation matrix, but in a quaternion it has.
@@ -203,8 +221,8 @@ pub(crate) fn log(
                 play(motion(before).along(path), ticks, &mut events);
             }
         }
-        let span = play(motion(level_to_case), (stand.hold_s / tick_s) as i64, &mut events);
-        held.push((span, *position));
+        let hold_s = if index == 0 { stand.hold_s + stand.start_s } else { stand.hold_s };
+        held.push(play(motion(level_to_case), (hold_s / tick_s).round() as i64, &mut events));
     }
     (events, held)
 }
@@ -212,4 +230,55 @@ pub(crate) fn log(
 /// The log as a run.
 pub(crate) fn run(name: &str, events: Vec<LogEvent>) -> Run {
     Run::of_events(name.to_owned(), unit_id("MEMS-0001").unwrap(), events)
+}
+
+/// A random attitude.
+pub(crate) fn any_attitude(dice: &mut Dice) -> Matrix3<f64> {
+    let [w, x, y] = dice.vector(1.0);
+    let [z, ..] = dice.vector(1.0);
+    *UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(w, x, y, z)).to_rotation_matrix().matrix()
+}
+
+/// The log as a text file with its mapping.
+pub(crate) fn as_text(events: &[LogEvent], counts: bool) -> (String, String) {
+    use std::fmt::Write;
+    let (mut text, mut temperatures) = (String::from("t,gx,gy,gz,ax,ay,az"), BTreeMap::new());
+    for event in events {
+        if let LogEvent::Temperature(reading) = event {
+            temperatures.insert(reading.channel.to_string(), f64::NAN);
+        }
+    }
+    temperatures.keys().for_each(|name| write!(text, ",{name}").unwrap());
+    text.push('\n');
+    let mut force = [0.0; 3];
+    for event in events {
+        match event {
+            LogEvent::Temperature(reading) => {
+                temperatures.insert(reading.channel.to_string(), reading.raw);
+            }
+            LogEvent::Accel { tick, .. } => force.copy_from_slice(&tick.readings),
+            LogEvent::Gyro { tick, .. } => {
+                write!(text, "{}", tick.end_time.as_ns()).unwrap();
+                tick.readings.iter().chain(&force).for_each(|value| write!(text, ",{value}").unwrap());
+                temperatures.values().for_each(|value| write!(text, ",{value}").unwrap());
+                text.push('\n');
+            }
+        }
+    }
+    let sensors = |letter: char, unit: &str| {
+        let one = |axis: char| format!("{{ column = \"{letter}{axis}\", unit = \"{unit}\" }}");
+        ['x', 'y', 'z'].map(one).join(", ")
+    };
+    let (output, unit) = if counts { ("counts", "counts") } else { ("mean", "m_per_s2") };
+    let mut mapping = format!(
+        "version = 1\ndescription = \"a simulated stand\"\n[[file]]\nname = \"log.csv\"\ndelimiter = \"comma\"\nheader = true\n\
+         [file.time]\ncolumn = \"t\"\nunit = \"ns\"\ntick_ms = 100\n[file.gyro]\noutput = \"mean\"\nsensors = [{}]\n\
+         [file.accel]\noutput = \"{output}\"\nsensors = [{}]\n",
+        sensors('g', "rad_per_s"),
+        sensors('a', unit)
+    );
+    for name in temperatures.keys() {
+        write!(mapping, "[[file.temperature]]\nchannel = \"{name}\"\ncolumn = \"{name}\"\nunit = \"volt\"\nevery_rows = 10\n").unwrap();
+    }
+    (text, mapping)
 }
