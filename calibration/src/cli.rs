@@ -8,6 +8,9 @@ mod merge;
 mod runs;
 mod show;
 mod validate;
+mod positions;
+mod runs;
+mod tumble;
 
 use std::io::{self, Write};
 use std::process::ExitCode;
@@ -37,6 +40,8 @@ enum Command {
     Merge(merge::MergeArgs),
     Show(show::ShowArgs),
     Validate(validate::ValidateArgs),
+    Positions(positions::PositionsArgs),
+    Tumble(tumble::TumbleArgs),
     /// Print a completion script for a shell
     #[command(after_help = "Example:\n  isotherm-calibrate completions bash > isotherm-calibrate.bash")]
     Completions {
@@ -54,6 +59,8 @@ fn run(cli: Cli) -> Result<(), Error> {
         Command::Merge(args) => args.run(),
         Command::Show(args) => args.run(),
         Command::Validate(args) => args.run(),
+        Command::Positions(args) => args.run(),
+        Command::Tumble(args) => args.run(),
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), "isotherm-calibrate", &mut script);

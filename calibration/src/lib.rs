@@ -15,6 +15,7 @@
 //! | [`merge`] | parts of a calibration in one document |
 //! | [`show`] | a document in words and curves |
 //! | [`validate`] | a document judged on other logs |
+//! | [`positions`], [`tumble`] | accelerometers on a stand; a unit tumbled by hand |
 //! | [`error`], [`cli`] | what can go wrong; the command line |
 
 pub mod allan;
@@ -28,6 +29,7 @@ pub mod impact;
 pub mod means;
 pub mod merge;
 pub mod nominal;
+pub mod positions;
 pub mod provenance;
 pub mod report;
 pub mod run;
@@ -35,4 +37,5 @@ pub mod series;
 pub mod show;
 pub mod spectrum;
 pub mod validate;
+pub mod tumble;
 pub mod written;

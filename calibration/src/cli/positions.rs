@@ -1,0 +1,299 @@
+//! `isotherm-calibrate positions`.
+
+mod planned;
+mod steps;
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use isotherm_log::file::refuse_overwriting;
+use isotherm_protocol::document::AccelOutput;
+
+use super::print;
+use super::runs::Reading;
+use crate::error::Error;
+use crate::positions::analysis::{Analysis, Settings, analyse, positions};
+use crate::positions::budget::ARCSEC_PER_RAD;
+use crate::positions::document::{complete, range};
+use crate::positions::gravity;
+use crate::positions::judged::Judgement;
+use crate::positions::plan::Plan;
+use crate::positions::pose::Pose;
+use crate::positions::provenance::{before, with_origin};
+use crate::positions::report::{Set, report};
+use crate::positions::still::StillLimits;
+use crate::positions::times::Times;
+use crate::report::FitReport;
+use crate::run::Run;
+use crate::written::{Written, write_file};
+use planned::PlannedArgs;
+pub(super) use steps::date;
+use steps::{first_document, judged, tracks};
+
+/// Axes, scale factors and biases of accelerometers from positions of a stand, at one temperature or several
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+    isotherm-calibrate positions --budget --positioning 5 --run-out 2\n  \
+    isotherm-calibrate positions cold.mcap room.mcap hot.mcap --document unit.toml --latitude 55.75 --out unit-positions.toml --html positions.html\n  \
+    isotherm-calibrate positions stand.mcap --plan my-plan.toml --gravity 9.8154 --times held.csv\n\n\
+    Still poses are found in the logs and known by the gyros' turns between them. Every set of positions works that shows each axis up \
+    and down; nine or more tell the stand's errors from the axes.")]
+#[expect(clippy::struct_excessive_bools, reason = "switches of a command line")]
+pub(super) struct PositionsArgs {
+    /// Recordings (.mcap), or the files of a text log in the order of its mapping: each temperature may be a log of its own
+    #[arg(value_name = "LOG", required_unless_present = "budget")]
+    log: Vec<PathBuf>,
+    #[command(flatten)]
+    reading: Reading,
+    /// Print what a planned calibration will come to, and nothing else; the defaults are the example of 004
+    #[arg(long, conflicts_with_all = ["log", "document", "out", "judge", "html", "times"])]
+    budget: bool,
+    /// Positions in the order in which they are taken: "twelve" (those of 004), "six", or a file (TOML, CSV)
+    #[arg(long, value_name = "PLAN", default_value = "twelve")]
+    plan: String,
+    /// Table of times (CSV: `start_s,end_s,position[,log]`): no poses are searched for
+    #[arg(long, value_name = "FILE")]
+    times: Option<PathBuf>,
+    /// Calibration document (TOML) that is completed; without it the accelerometers must stand along the case axes
+    #[arg(long, short, value_name = "DOC")]
+    document: Option<PathBuf>,
+    /// Log that the fit must not see, to judge it by; may be repeated
+    #[arg(long, value_name = "LOG")]
+    judge: Vec<PathBuf>,
+    /// Write the document with what was found
+    #[arg(long, short, value_name = "NEW")]
+    out: Option<PathBuf>,
+    /// Write over a file that is there
+    #[arg(long)]
+    overwrite: bool,
+    /// Date that the new document states (YYYY-MM-DD); that of the old one without it
+    #[arg(long, value_name = "DATE", requires = "out")]
+    created: Option<String>,
+    /// Gravity at the stand (m/s²)
+    #[arg(long, value_name = "M_PER_S2")]
+    gravity: Option<f64>,
+    /// Latitude of the stand (°), for normal gravity
+    #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
+    latitude: Option<f64>,
+    /// Height of the stand above the sea (m), for normal gravity
+    #[arg(long, value_name = "M", default_value_t = 0.0, allow_hyphen_values = true)]
+    height: f64,
+    /// σ1: standard deviation of the stand's positioning (″)
+    #[arg(long, value_name = "ARCSEC", default_value_t = 5.0)]
+    positioning: f64,
+    /// σ2: standard deviation of its axes' run-out (″)
+    #[arg(long, value_name = "ARCSEC", default_value_t = 2.0)]
+    run_out: f64,
+    /// How far the stand may be out of level (″, one sigma)
+    #[arg(long, value_name = "ARCSEC", default_value_t = 60.0)]
+    levelling: f64,
+    /// Window that stillness is looked for in (s)
+    #[arg(long, value_name = "SECONDS", default_value_t = 1.0)]
+    window: f64,
+    /// Variance over a window that is still, relative to that of the log's quietest fifth
+    #[arg(long, value_name = "FACTOR", default_value_t = 4.0)]
+    threshold: f64,
+    /// Rate beyond which the unit turns (°/s)
+    #[arg(long, value_name = "DEG_PER_S", default_value_t = 0.2)]
+    still_rate: f64,
+    /// Taken off the beginning of each pose (s)
+    #[arg(long, value_name = "SECONDS", default_value_t = 2.0)]
+    settle: f64,
+    /// Shortest pose (s)
+    #[arg(long, value_name = "SECONDS", default_value_t = 10.0)]
+    least: f64,
+    /// Temperature channels whose mean the axes follow; those of the document, or of the accelerometers, without it
+    #[arg(long, value_name = "CHANNEL")]
+    channel: Vec<String>,
+    /// Temperature that all polynomials are about (°C)
+    #[arg(long, value_name = "DEG_C", allow_hyphen_values = true)]
+    reference: Option<f64>,
+    /// What a mean of an accelerometer is measured in, where there is no document: "V", or "m/s2"
+    #[arg(long, value_name = "UNIT", default_value = "V", value_parser = ["V", "m/s2"])]
+    accelerometer_unit: String,
+    #[command(flatten)]
+    planned: PlannedArgs,
+    /// Write the report with its diagrams as one HTML file
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
+    /// Print everything as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// A fit with its report.
+struct Made {
+    written: Written,
+    report: FitReport,
+}
+
+impl PositionsArgs {
+    /// Does what the command says.
+    pub(super) fn run(&self) -> Result<(), Error> {
+        self.check()?;
+        let plan = Plan::named(&self.plan)?;
+        if self.budget {
+            return self.print_budget(&plan);
+        }
+        let made = self.make(plan)?;
+        if let Some(out) = &self.out {
+            made.written.save(out, self.overwrite)?;
+        }
+        if let Some(html) = &self.html {
+            write_file(html, made.report.to_html().as_bytes(), true)?;
+        }
+        if self.json {
+            print(format!("{}\n", made.report.to_json()).as_bytes())?;
+        } else {
+            print(made.report.to_text().as_bytes())?;
+        }
+        if made.report.accepted() { Ok(()) } else { Err(Error::Refused(made.report.refusals())) }
+    }
+
+    /// What the arguments must hold before anything is read.
+    fn check(&self) -> Result<(), Error> {
+        let positive = [
+            ("--positioning", self.positioning),
+            ("--levelling", self.levelling),
+            ("--window", self.window),
+            ("--threshold", self.threshold),
+            ("--still-rate", self.still_rate),
+            ("--least", self.least),
+            ("--noise", self.planned.noise),
+            ("--seconds", self.planned.seconds),
+            ("--scale", self.planned.scale),
+        ];
+        for (name, value) in positive {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(Error::Usage(format!("{name} is {value}, must be a number above 0")));
+            }
+        }
+        for (name, value) in [("--run-out", self.run_out), ("--settle", self.settle)] {
+            if !(value.is_finite() && value >= 0.0) {
+                return Err(Error::Usage(format!("{name} is {value}, must be a number, 0 or above")));
+            }
+        }
+        let inputs: Vec<&Path> =
+            (self.log.iter().chain(&self.judge).chain(&self.document).chain(&self.times))
+                .map(PathBuf::as_path)
+                .collect();
+        for out in self.out.iter().chain(&self.html) {
+            refuse_overwriting(out, &inputs)?;
+        }
+        match &self.out {
+            Some(out) if out.exists() && !self.overwrite => Err(Error::Usage(format!(
+                "{} is there already: give another name, or --overwrite",
+                out.display()
+            ))),
+            _ => Ok(()),
+        }
+    }
+
+    fn print_budget(&self, plan: &Plan) -> Result<(), Error> {
+        let budget = self.planned.budget(self.positioning, self.run_out);
+        let levelling_rad = self.levelling / ARCSEC_PER_RAD;
+        if self.json {
+            return print(format!("{}\n", budget.to_json(plan, levelling_rad)).as_bytes());
+        }
+        print(budget.to_text(plan, levelling_rad).as_bytes())
+    }
+
+    fn settings(&self, plan: Plan) -> Result<(Settings, Option<String>), Error> {
+        let (gravity, warning) = gravity::stated(self.gravity, self.latitude, self.height)?;
+        let settings = Settings {
+            plan,
+            gravity,
+            limits: StillLimits {
+                window_s: self.window,
+                factor: self.threshold,
+                rate_deg_per_s: self.still_rate,
+                least_s: self.least,
+                settle_s: self.settle,
+            },
+            times: self.times.as_deref().map(Times::read).transpose()?,
+            positioning_rad: self.positioning.hypot(self.run_out) / ARCSEC_PER_RAD,
+            levelling_rad: self.levelling / ARCSEC_PER_RAD,
+            channels: self.channel.clone(),
+            reference_deg_c: self.reference,
+        };
+        Ok((settings, warning))
+    }
+
+    /// Runs of the one unit in logs.
+    fn runs(&self, logs: &[PathBuf], base: Option<&Written>) -> Result<Vec<Run>, Error> {
+        let mut units = self.reading.runs(logs, base.map(|base| &base.loaded.unit))?;
+        let of_document = base.and_then(|base| units.remove(&base.loaded.unit));
+        if let Some(runs) = of_document {
+            return Ok(runs);
+        }
+        match (units.pop_first(), units.keys().next()) {
+            (Some((unit, _)), _) if base.is_some() => Err(Error::Refused(vec![format!(
+                "the logs are of unit {unit}, the document is not: give the document of that unit"
+            )])),
+            (Some((_, runs)), None) => Ok(runs),
+            (Some((first, _)), Some(second)) => Err(Error::Refused(vec![format!(
+                "the logs are of several units ({first}, {second}): choose one with --unit, each has its own axes"
+            )])),
+            (None, _) => Err(Error::Refused(vec!["the logs have no raw readings".to_owned()])),
+        }
+    }
+
+    fn make(&self, plan: Plan) -> Result<Made, Error> {
+        let (settings, about_gravity) = self.settings(plan)?;
+        let base = self.document.as_deref().map(Written::read).transpose()?;
+        let runs = self.runs(&self.log, base.as_ref())?;
+        let output = if self.accelerometer_unit == "V" {
+            AccelOutput::Volts
+        } else {
+            AccelOutput::MetresPerSecondSquared
+        };
+        let base = match base {
+            Some(base) if base.document.accel.is_some() => base,
+            Some(_) => {
+                return Err(Error::Refused(vec![
+                    "the document has no accelerometers: add [accel] with their channels, nominal scale factors and axes".to_owned(),
+                ]));
+            }
+            None => Written::of(&first_document(&runs, output, self.created.as_deref())?)?,
+        };
+        let tracks = tracks(&runs, &base)?;
+        let mut analysis = analyse(&tracks, &base.document, &settings).map_err(Error::Refused)?;
+        analysis.warnings.extend(about_gravity);
+        let (mut document, warnings) = complete(&base.document, &analysis, settings.gravity);
+        analysis.warnings.extend(warnings);
+        if let Some(created) = &self.created {
+            document.created = Some(date(created)?);
+        }
+        let before =
+            Written::of(&before(&base.document, &analysis, settings.gravity, self.document.is_some()))?;
+        let bare = Written::of(&document)?;
+        let inside: Vec<(Pose, usize)> =
+            analysis.poses.iter().map(|(pose, position, _)| (pose.clone(), *position)).collect();
+        let judged = judged(&settings, &analysis, &inside, &runs, [&before, &bare])?;
+        let outside = self.outside(&settings, &analysis, [&before, &bare, &base])?;
+        let name = |runs: &[Run]| -> Vec<String> { runs.iter().map(|run| run.name.clone()).collect() };
+        let names = name(&runs);
+        let outside_set =
+            outside.as_ref().map(|(judged, runs)| Set { judged: judged.as_slice(), runs: runs.as_slice() });
+        let report =
+            report(&document, &analysis, &settings, Set { judged: &judged, runs: &names }, outside_set);
+        with_origin(&mut document, &analysis, &settings, &report, &self.log, range(&analysis))?;
+        Ok(Made { written: Written::of(&document)?, report })
+    }
+
+    /// Positions that the fit has not seen.
+    fn outside(
+        &self,
+        settings: &Settings,
+        analysis: &Analysis,
+        [before, after, base]: [&Written; 3],
+    ) -> Result<Option<(Vec<Judgement>, Vec<String>)>, Error> {
+        if self.judge.is_empty() {
+            return Ok(None);
+        }
+        let runs = self.runs(&self.judge, Some(base))?;
+        let (poses, _) = positions(&tracks(&runs, base)?, settings).map_err(Error::Refused)?;
+        let judged = judged(settings, analysis, &poses, &runs, [before, after])?;
+        Ok(Some((judged, runs.into_iter().map(|run| run.name).collect())))
+    }
+}

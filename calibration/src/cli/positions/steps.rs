@@ -1,0 +1,50 @@
+//! Steps on the way from runs to a judged document.
+
+use isotherm_correction::sample::OutputKind;
+use isotherm_protocol::document::{AccelOutput, Created, Document};
+
+use crate::cli::bar::Bar;
+use crate::error::Error;
+use crate::positions::analysis::{Analysis, Settings};
+use crate::positions::bare::bare;
+use crate::positions::judged::{Judgement, judge};
+use crate::positions::pose::Pose;
+use crate::positions::track::Track;
+use crate::run::Run;
+use crate::written::Written;
+
+/// A document where there is none.
+pub(super) fn first_document(
+    runs: &[Run],
+    output: AccelOutput,
+    created: Option<&str>,
+) -> Result<Document, Error> {
+    let Some(run) = runs.first() else { return Err(Error::Refused(vec!["there is no log".to_owned()])) };
+    let series = run.series(Bar::reading())?;
+    let counts = series.accels.output == Some(OutputKind::Counts);
+    bare(&series, if counts { AccelOutput::Counts } else { output }, created.map(date).transpose()?)
+}
+
+/// A date.
+pub(in crate::cli) fn date(text: &str) -> Result<Created, Error> {
+    let date = text.parse().ok().and_then(Created::new);
+    date.ok_or_else(|| Error::Usage(format!("--created is {text:?}, must be a date such as 2026-11-22")))
+}
+
+/// Runs tick by tick, corrected with a document.
+pub(super) fn tracks(runs: &[Run], written: &Written) -> Result<Vec<Track>, Error> {
+    runs.iter().map(|run| Track::of(run, &written.loaded, Bar::reading())).collect()
+}
+
+/// Poses of runs, before and after.
+pub(super) fn judged(
+    settings: &Settings,
+    analysis: &Analysis,
+    poses: &[(Pose, usize)],
+    runs: &[Run],
+    [before, after]: [&Written; 2],
+) -> Result<Vec<Judgement>, Error> {
+    let (before, after) = (tracks(runs, before)?, tracks(runs, after)?);
+    let errors = analysis.fit.stand.map(|(error, _)| error);
+    Ok(judge(&settings.plan, errors, settings.gravity, poses, [&before, &after], &analysis.channels))
+}

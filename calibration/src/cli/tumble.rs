@@ -1,0 +1,189 @@
+//! `isotherm-calibrate tumble`.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use isotherm_correction::sample::OutputKind;
+use isotherm_log::file::refuse_overwriting;
+use isotherm_protocol::document::AccelOutput;
+
+use super::bar::Bar;
+use super::positions::date;
+use super::print;
+use super::runs::LogArgs;
+use crate::error::Error;
+use crate::positions::bare::bare;
+use crate::positions::gravity;
+use crate::positions::still::StillLimits;
+use crate::positions::track::Track;
+use crate::run::Run;
+use crate::tumble::analysis::{Settings, analyse};
+use crate::tumble::document::{before, complete};
+use crate::tumble::report::{Left, report, with_origin};
+use crate::written::{Written, write_file};
+
+/// Axes, scale factors and biases of a unit that was put down in many ways by hand: accelerometers from |f| = g, gyros against them
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+    isotherm-calibrate tumble gyro.txt.gz acc.txt.gz --mapping config/mappings/tumble-mems.toml --unit TUMBLE-0001 --gravity 9.81744 --out tumble.toml --html tumble.html\n  \
+    isotherm-calibrate tumble tumbled.mcap --document unit.toml --latitude 55.75 --out unit-tumbled.toml\n\n\
+    Leave the unit alone for half a minute, then put it down in thirty or more different ways for two seconds each. The case axes \
+    are defined by the accelerometers: z is that of the third, y lies in the plane of the second and third.")]
+pub(super) struct TumbleArgs {
+    #[command(flatten)]
+    log: LogArgs,
+    /// Calibration document (TOML) that is completed; without it everything else stands as the log has it
+    #[arg(long, short, value_name = "DOC")]
+    document: Option<PathBuf>,
+    /// Write the document with what was found
+    #[arg(long, short, value_name = "NEW")]
+    out: Option<PathBuf>,
+    /// Write over a file that is there
+    #[arg(long)]
+    overwrite: bool,
+    /// Date that the new document states (YYYY-MM-DD); that of the old one without it
+    #[arg(long, value_name = "DATE", requires = "out")]
+    created: Option<String>,
+    /// Gravity at the place (m/s²)
+    #[arg(long, value_name = "M_PER_S2")]
+    gravity: Option<f64>,
+    /// Latitude of the place (°), for normal gravity
+    #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
+    latitude: Option<f64>,
+    /// Height of the place above the sea (m), for normal gravity
+    #[arg(long, value_name = "M", default_value_t = 0.0, allow_hyphen_values = true)]
+    height: f64,
+    /// Time at the beginning that the unit was left alone (s)
+    #[arg(long, value_name = "SECONDS", default_value_t = 30.0)]
+    still_start: f64,
+    /// Window that stillness is looked for in (s)
+    #[arg(long, value_name = "SECONDS", default_value_t = 1.0)]
+    window: f64,
+    /// Variance over a window that is still, relative to that of the still start; the best of 2 to 10 without it
+    #[arg(long, value_name = "FACTOR")]
+    threshold: Option<f64>,
+    /// Rate beyond which the unit turns (°/s)
+    #[arg(long, value_name = "DEG_PER_S", default_value_t = 1.0)]
+    still_rate: f64,
+    /// Shortest pose (s), after half a window was taken off either end
+    #[arg(long, value_name = "SECONDS", default_value_t = 1.0)]
+    least: f64,
+    /// What a mean of an accelerometer is measured in, where there is no document: "V" (converter readings too), or "m/s2"
+    #[arg(long, value_name = "UNIT", default_value = "V", value_parser = ["V", "m/s2"])]
+    accelerometer_unit: String,
+    /// Write the report with its diagrams as one HTML file
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
+    /// Print everything as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+impl TumbleArgs {
+    /// Does what the command says.
+    pub(super) fn run(&self) -> Result<(), Error> {
+        self.check()?;
+        let (gravity, about_gravity) = gravity::stated(self.gravity, self.latitude, self.height)?;
+        let base = self.document.as_deref().map(Written::read).transpose()?;
+        let run = self.log.run(base.as_ref().map(|base| &base.loaded.unit))?;
+        let base = match base {
+            Some(base) if base.document.accel.is_some() => base,
+            Some(_) => {
+                return Err(Error::Refused(vec![
+                    "the document has no accelerometers: add [accel], or leave the document out".to_owned(),
+                ]));
+            }
+            None => self.first_document(&run)?,
+        };
+        let track = Track::of(&run, &base.loaded, Bar::reading())?;
+        let settings = Settings {
+            gravity,
+            limits: StillLimits {
+                window_s: self.window,
+                factor: self.threshold.unwrap_or(4.0),
+                rate_deg_per_s: self.still_rate,
+                least_s: self.least,
+                settle_s: 0.0,
+            },
+            search: self.threshold.is_none(),
+            start_s: self.still_start,
+        };
+        let bar = Bar::at_work("fitting");
+        let found = analyse(&track, &settings);
+        bar.finish();
+        let mut tumble = found.map_err(Error::Refused)?;
+        tumble.warnings.extend(about_gravity);
+        let (mut document, warnings) = complete(&base.document, &tumble);
+        tumble.warnings.extend(warnings);
+        if let Some(created) = &self.created {
+            document.created = Some(date(created)?);
+        }
+        let left = |written: &Written| -> Result<Left, Error> {
+            let track = Track::of(&run, &written.loaded, Bar::reading())?;
+            Ok(Left::of(&track, &tumble.poses, gravity))
+        };
+        let before = left(&Written::of(&before(&base.document, &tumble, self.document.is_some()))?)?;
+        let after = left(&Written::of(&document)?)?;
+        let report = report(&document, &tumble, &settings, [&before, &after]);
+        with_origin(&mut document, &tumble, &settings, &report, &self.log.log)?;
+        let written = Written::of(&document)?;
+        if let Some(out) = &self.out {
+            written.save(out, self.overwrite)?;
+        }
+        if let Some(html) = &self.html {
+            write_file(html, report.to_html().as_bytes(), true)?;
+        }
+        if self.json {
+            print(format!("{}\n", report.to_json()).as_bytes())?;
+        } else {
+            print(report.to_text().as_bytes())?;
+        }
+        if report.accepted() { Ok(()) } else { Err(Error::Refused(report.refusals())) }
+    }
+
+    /// What the arguments must hold before anything is read.
+    fn check(&self) -> Result<(), Error> {
+        let positive = [
+            ("--still-start", self.still_start),
+            ("--window", self.window),
+            ("--threshold", self.threshold.unwrap_or(1.0)),
+            ("--still-rate", self.still_rate),
+            ("--least", self.least),
+        ];
+        for (name, value) in positive {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(Error::Usage(format!("{name} is {value}, must be a number above 0")));
+            }
+        }
+        let inputs: Vec<&Path> = self.log.log.iter().chain(&self.document).map(PathBuf::as_path).collect();
+        for out in self.out.iter().chain(&self.html) {
+            refuse_overwriting(out, &inputs)?;
+        }
+        match &self.out {
+            Some(out) if out.exists() && !self.overwrite => Err(Error::Usage(format!(
+                "{} is there already: give another name, or --overwrite",
+                out.display()
+            ))),
+            _ => Ok(()),
+        }
+    }
+
+    /// A document where there is none.
+    fn first_document(&self, run: &Run) -> Result<Written, Error> {
+        let series = run.series(Bar::reading())?;
+        let output = match (series.accels.output, self.accelerometer_unit.as_str()) {
+            (Some(OutputKind::Counts), _) => AccelOutput::Counts,
+            (_, "V") => AccelOutput::Volts,
+            _ => AccelOutput::MetresPerSecondSquared,
+        };
+        let mut document = bare(&series, output, self.created.as_deref().map(date).transpose()?)?;
+        if output == AccelOutput::Volts {
+            document.note = Some(
+                "What this document calls V is the accelerometers' reading as the log has it: volts, or counts of a converter with \
+                 its zero at mid-scale, which the bias then holds."
+                    .to_owned(),
+            );
+        }
+        Written::of(&document)
+    }
+}

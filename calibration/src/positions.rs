@@ -1,0 +1,34 @@
+//! Orientation, scale factor and bias of accelerometers from positions of a stand (models §9, 004).
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`track`], [`still`], [`pose`] | a run tick by tick; where it stands still; means over that |
+//! | [`bare`] | a document of a unit that has none yet |
+//! | [`gravity`] | what everything is relative to |
+//! | [`plan`], [`times`], [`matching`], [`faults`] | positions of a stand; when which was held; which pose is which; sensors that are no use |
+//! | [`model`], [`fit`] | the outputs as a function of what is to be found; finding it |
+//! | [`temperature`], [`doubts`] | levels and channels; what is doubtful about a result |
+//! | [`analysis`], [`document`], [`provenance`], [`judged`], [`report`] | from runs to a result; as a document, with where it comes from; what it leaves; in words |
+//! | [`budget`] | what a planned calibration will come to |
+//! | [`solve`] | nonlinear least squares with covariance |
+
+pub mod analysis;
+pub mod bare;
+pub mod budget;
+pub mod document;
+pub mod doubts;
+pub mod faults;
+pub mod fit;
+pub mod gravity;
+pub mod judged;
+pub mod matching;
+pub mod model;
+pub mod plan;
+pub mod pose;
+pub mod provenance;
+pub mod report;
+pub mod solve;
+pub mod still;
+pub mod temperature;
+pub mod times;
+pub mod track;

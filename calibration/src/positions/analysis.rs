@@ -1,0 +1,247 @@
+//! From the runs of a unit to what its accelerometers are.
+
+use isotherm_protocol::document::Document;
+
+use super::doubts::{ACCIDENT, few, no_solution, quadratic_terms, sound, spread, survival, widening};
+use super::faults;
+use super::fit::{Fit, Weights, fit, guesses};
+use super::matching::matched;
+use super::model::{Degrees, Guess, Taken};
+use super::plan::Plan;
+use super::pose::{Pose, intensities};
+use super::still::{StillLimits, still};
+use super::temperature::{board_ratio, channels, levels, own_channels, reference};
+use super::times::Times;
+use super::track::Track;
+
+/// How the positions are looked at.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings {
+    /// The plan.
+    pub plan: Plan,
+    /// Gravity (m/s²).
+    pub gravity: f64,
+    /// What counts as still.
+    pub limits: StillLimits,
+    /// Which pose is which, where somebody says so.
+    pub times: Option<Times>,
+    /// Standard deviation of the case's direction in a position (rad).
+    pub positioning_rad: f64,
+    /// Standard deviation of the stand's level beforehand (rad).
+    pub levelling_rad: f64,
+    /// Channels that the orientation follows; those of the accelerometers where empty.
+    pub channels: Vec<String>,
+    /// Temperature that all polynomials are about (°C); chosen where absent.
+    pub reference_deg_c: Option<f64>,
+}
+
+/// What was found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Analysis {
+    /// All poses that are positions, with the position's number and the level's.
+    pub poses: Vec<(Pose, usize, usize)>,
+    /// The positions as the fit had them.
+    pub taken: Vec<Taken>,
+    /// Mean temperature of each level (°C); one that is no number where nothing measures it.
+    pub levels_deg_c: Vec<f64>,
+    /// What the document will hold: C constant or linear.
+    pub fit: Fit,
+    /// With C quadratic, where there are three temperatures or more, and how sure it is that it is (χ² of the quadratic terms,
+    /// their number, probability of an accident).
+    pub quadratic: Option<(Fit, f64, usize, f64)>,
+    /// Each temperature by itself.
+    pub of_level: Vec<Option<Fit>>,
+    /// Reference temperature and half the range (°C).
+    pub reference_deg_c: f64,
+    /// Half the range of temperature, which polynomials are scaled by (°C).
+    pub half_deg_c: f64,
+    /// Lowest and highest temperature (°C).
+    pub range_deg_c: [f64; 2],
+    /// Channels that the orientation follows.
+    pub channels: Vec<String>,
+    /// Weights that it was found with.
+    pub weights: Weights,
+    /// Factor by which all standard errors are widened.
+    pub widened: f64,
+    /// What is to be said.
+    pub warnings: Vec<String>,
+}
+
+/// Finds everything from the runs of a unit, corrected with the document at hand where that matters.
+///
+/// # Errors
+/// Every reason why it cannot be, with what to do.
+pub fn analyse(tracks: &[Track], document: &Document, settings: &Settings) -> Result<Analysis, Vec<String>> {
+    let reasons: Vec<String> = tracks.iter().flat_map(faults::dead).collect();
+    if !reasons.is_empty() {
+        return Err(reasons);
+    }
+    let (poses, mut warnings) = positions(tracks, settings)?;
+    let sensors = tracks.iter().map(|track| track.outputs.len()).max().unwrap_or(0);
+    let channels = channels(document, settings);
+    let own = own_channels(document, sensors);
+    let temperature = |pose: &Pose, channels: &[String]| pose.mean_temperature(channels);
+    let axes: Vec<Option<f64>> = poses.iter().map(|(pose, _)| temperature(pose, &channels)).collect();
+    let known = !channels.is_empty() && axes.iter().all(Option::is_some);
+    let axes: Vec<f64> =
+        axes.iter().map(|t| t.filter(|_| known).unwrap_or(document.temperature.assumed_deg_c)).collect();
+    let (level_of, levels_deg_c) = levels(&axes);
+    let (low, high) =
+        axes.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), t| (a.min(*t), b.max(*t)));
+    let reference = settings.reference_deg_c.unwrap_or_else(|| reference(low, high));
+    let half = (0.5 * (high - low)).max(1.0);
+    let scaled = |t: f64| (t - reference) / half;
+    let taken: Vec<Taken> = poses
+        .iter()
+        .zip(axes.iter().zip(&level_of))
+        .map(|((pose, position), (axes_t, level))| Taken {
+            position: *position,
+            outputs: pose.outputs.clone(),
+            ratio: (0..sensors).map(|sensor| board_ratio(document, sensor, pose)).collect(),
+            duration_s: pose.duration_s,
+            sensor_t: own
+                .iter()
+                .map(|channel| {
+                    let t = channel.as_ref().and_then(|name| pose.temperature_deg_c.get(name).copied());
+                    scaled(t.unwrap_or(*axes_t))
+                })
+                .collect(),
+            axes_t: scaled(*axes_t),
+            level: *level,
+        })
+        .collect();
+    let plain: Vec<Pose> = poses.iter().map(|(pose, _)| pose.clone()).collect();
+    let weights = Weights {
+        intensity: intensity(tracks, &plain)?,
+        positioning_rad: settings.positioning_rad,
+        levelling_rad: settings.levelling_rad,
+    };
+    let plan = &settings.plan;
+    let guess = guesses(plan, &taken, sensors).map_err(|bad| spread(plan, &taken, &bad))?;
+    let most = levels_deg_c.len() - 1;
+    let degrees = Degrees { sensor: most.min(2), axes: most.min(1) };
+    let found = fit(plan, &taken, &guess, &weights, degrees).map_err(|why| vec![no_solution(&why)])?;
+    let quadratic = (most >= 2)
+        .then(|| fit(plan, &taken, &guess, &weights, Degrees { axes: 2, ..degrees }).ok())
+        .flatten()
+        .map(|quadratic| {
+            let (chi_square, terms) = quadratic_terms(&quadratic, plan);
+            let accident = survival(chi_square, terms);
+            (quadratic, chi_square, terms, accident)
+        });
+    let best = quadratic.as_ref().filter(|found| found.3 < ACCIDENT).map_or(&found, |found| &found.0);
+    let widened = widening(best, &mut warnings);
+    let bent = quadratic.as_ref().is_some_and(|found| found.3 < ACCIDENT);
+    if bent {
+        warnings.push(
+            "C bends with temperature: the quadratic terms are no accident. The document holds the best straight line; the report \
+             has both, and what the line leaves"
+                .to_owned(),
+        );
+    }
+    few(plan, &taken, levels_deg_c.len(), settings, &mut warnings);
+    if !known && !document.temperature.channel.is_empty() {
+        warnings.push(
+            "the temperature channels have gaps or none is followed by the accelerometers: all positions count as one temperature"
+                .to_owned(),
+        );
+    }
+    let of_level =
+        (0..levels_deg_c.len()).map(|level| one_level(plan, &taken, &guess, &weights, level)).collect();
+    let poses = poses.into_iter().zip(&level_of).map(|((pose, position), level)| (pose, position, *level));
+    let analysis = Analysis {
+        poses: poses.collect(),
+        taken,
+        levels_deg_c,
+        fit: found,
+        quadratic,
+        of_level,
+        reference_deg_c: reference,
+        half_deg_c: half,
+        range_deg_c: [low, high],
+        channels: if known { channels } else { Vec::new() },
+        weights,
+        widened,
+        warnings,
+    };
+    sound(&analysis)?;
+    Ok(analysis)
+}
+
+/// The poses of all runs that are positions of the plan, with the position's number.
+///
+/// # Errors
+/// What is wrong with each run.
+pub fn positions(
+    tracks: &[Track],
+    settings: &Settings,
+) -> Result<(Vec<(Pose, usize)>, Vec<String>), Vec<String>> {
+    let mut found = Vec::new();
+    let mut warnings = Vec::new();
+    let mut reasons = Vec::new();
+    for (run, track) in tracks.iter().enumerate() {
+        if let Some(times) = &settings.times {
+            match times.poses(track, run, &settings.plan) {
+                Ok(poses) => found.extend(poses),
+                Err(words) => reasons.extend(words),
+            }
+            continue;
+        }
+        let intervals = still(track, &settings.limits, None);
+        let poses = Pose::of(track, run, &intervals);
+        if poses.is_empty() {
+            reasons.push(format!(
+                "{}: the unit stands still nowhere for {} s after {} s of settling: state less with --least and --settle, or give \
+                 the times with --times",
+                track.run, settings.limits.least_s, settings.limits.settle_s
+            ));
+            continue;
+        }
+        match matched(&settings.plan, track, &poses) {
+            Ok(matches) => {
+                let others = matches.iter().filter(|position| position.is_none()).count();
+                if others > 0 {
+                    warnings.push(format!(
+                        "{}: {others} of {} still poses are no position of the plan and were left out",
+                        track.run,
+                        poses.len()
+                    ));
+                }
+                found.extend(
+                    poses.into_iter().zip(matches).filter_map(|(pose, position)| Some((pose, position?))),
+                );
+            }
+            Err(words) => reasons.push(format!("{}: {words}", track.run)),
+        }
+    }
+    let poses: Vec<Pose> = found.iter().map(|(pose, _)| pose.clone()).collect();
+    reasons.extend(faults::clipped(tracks, &poses));
+    if reasons.is_empty() && found.is_empty() {
+        reasons.push("no position of the plan was found: is it the right --plan?".to_owned());
+    }
+    if reasons.is_empty() { Ok((found, warnings)) } else { Err(reasons) }
+}
+
+/// Intensities of the noise.
+fn intensity(tracks: &[Track], poses: &[Pose]) -> Result<Vec<f64>, Vec<String>> {
+    let found = intensities(tracks, poses);
+    if found.iter().any(|intensity| intensity.is_nan()) {
+        return Err(vec![
+            "the positions are too short to tell the noise: each needs two seconds at least".to_owned(),
+        ]);
+    }
+    // Without any noise a stand's errors alone would have to make a covariance that can be inverted.
+    let floor = |(sensor, intensity): (usize, f64)| {
+        let largest =
+            poses.iter().filter_map(|pose| pose.outputs.get(sensor)).fold(0.0, |a: f64, b| a.max(b.abs()));
+        intensity.max((1e-9 * largest).powi(2))
+    };
+    Ok(found.into_iter().enumerate().map(floor).collect())
+}
+
+/// A temperature by itself, where it has enough positions.
+fn one_level(plan: &Plan, taken: &[Taken], guess: &[Guess], weights: &Weights, level: usize) -> Option<Fit> {
+    let own: Vec<Taken> = taken.iter().filter(|taken| taken.level == level).cloned().collect();
+    let enough = guesses(plan, &own, guess.len()).is_ok();
+    enough.then(|| fit(plan, &own, guess, weights, Degrees { sensor: 0, axes: 0 }).ok()).flatten()
+}

@@ -1,0 +1,225 @@
+//! The error budget of a calibration that is planned (004, equations 3 to 7; models §9), before anyone books the chamber.
+
+use isotherm_log::plot::page::Table;
+use serde_json::{Value, json};
+
+use super::fit::{Weights, fit, guesses};
+use super::model::{Degrees, Taken};
+use super::plan::Plan;
+use crate::drift::figures::{short, table};
+
+/// ″ in one radian.
+pub const ARCSEC_PER_RAD: f64 = 206_264.806_247_096_36;
+
+/// What is planned.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Budget {
+    /// σ1: positioning of the stand (″).
+    pub positioning_arcsec: f64,
+    /// σ2: run-out of its axes (″).
+    pub run_out_arcsec: f64,
+    /// Q: white noise of an accelerometer (V²·s, or (m/s²)²·s and so on with the same unit in K).
+    pub noise: f64,
+    /// τ: time in each position (s).
+    pub seconds: f64,
+    /// K: output of an accelerometer at 1 g (V).
+    pub scale_per_g: f64,
+    /// Thermal expansion of housing and sensor (1e-6/°C).
+    pub expansion_ppm_per_deg_c: [f64; 2],
+    /// Temperature of calibration and highest temperature inside (°C).
+    pub temperature_deg_c: [f64; 2],
+    /// Error of the measured temperature (°C).
+    pub temperature_error_deg_c: f64,
+    /// k_C: how fast an axis turns (″/°C).
+    pub axis_arcsec_per_deg_c: f64,
+}
+
+impl Default for Budget {
+    /// The example of 004, with quartz accelerometers.
+    fn default() -> Self {
+        Self {
+            positioning_arcsec: 5.0,
+            run_out_arcsec: 2.0,
+            noise: 3e-9,
+            seconds: 30.0,
+            scale_per_g: 1.0,
+            expansion_ppm_per_deg_c: [22.9, 15.0],
+            temperature_deg_c: [20.0, 85.0],
+            temperature_error_deg_c: 0.2,
+            axis_arcsec_per_deg_c: 1.5,
+        }
+    }
+}
+
+/// k_C of 004 for accelerometers of quartz and of silicon (″/°C).
+pub const TYPICAL_ARCSEC_PER_DEG_C: [(&str, f64); 2] = [("quartz", 1.5), ("silicon", 6.0)];
+
+impl Budget {
+    /// White noise of a mean over τ as an angle (″).
+    #[must_use]
+    pub fn noise_arcsec(&self) -> f64 {
+        ARCSEC_PER_RAD * (self.noise / self.seconds).sqrt() / self.scale_per_g
+    }
+
+    /// Error of one element of C by the stand and the noise (″): 004, equation 4.
+    #[must_use]
+    pub fn stand_arcsec(&self) -> f64 {
+        let parts = [self.positioning_arcsec, self.run_out_arcsec, self.noise_arcsec()];
+        2.0 * parts.iter().map(|part| part * part).sum::<f64>().sqrt()
+    }
+
+    /// Largest plastic deformation of the housing (″): equation 6.
+    #[must_use]
+    pub fn housing_arcsec(&self) -> f64 {
+        let [housing, sensor] = self.expansion_ppm_per_deg_c;
+        let [cold, hot] = self.temperature_deg_c;
+        ARCSEC_PER_RAD * 0.1 * (housing - sensor) * 1e-6 * (hot - cold)
+    }
+
+    /// Error by the measured temperature for axes that turn with `rate` (″): equation 7.
+    #[must_use]
+    pub fn temperature_arcsec(&self, rate_arcsec_per_deg_c: f64) -> f64 {
+        self.temperature_error_deg_c * rate_arcsec_per_deg_c
+    }
+
+    /// Root sum of squares of all three (″).
+    #[must_use]
+    pub fn total_arcsec(&self) -> f64 {
+        let parts =
+            [self.stand_arcsec(), self.housing_arcsec(), self.temperature_arcsec(self.axis_arcsec_per_deg_c)];
+        parts.iter().map(|part| part * part).sum::<f64>().sqrt()
+    }
+
+    /// Standard error of the elements of C that the least-squares fit of a plan will state, mean and largest (″); `None` where
+    /// the plan does not determine them.
+    #[must_use]
+    #[expect(clippy::cast_precision_loss, reason = "six angles")]
+    pub fn of_plan(&self, plan: &Plan, levelling_rad: f64) -> Option<[f64; 2]> {
+        let taken: Vec<Taken> = plan
+            .positions
+            .iter()
+            .enumerate()
+            .map(|(position, stated)| Taken {
+                position,
+                outputs: plan.up(&stated.attitude, [0.0; 3]).map(|c| c * self.scale_per_g).to_vec(),
+                ratio: vec![1.0; 3],
+                duration_s: self.seconds,
+                sensor_t: vec![0.0; 3],
+                axes_t: 0.0,
+                level: 0,
+            })
+            .collect();
+        let guess = guesses(plan, &taken, 3).ok()?;
+        let positioning = self.positioning_arcsec.hypot(self.run_out_arcsec) / ARCSEC_PER_RAD;
+        let weights = Weights { intensity: vec![self.noise; 3], positioning_rad: positioning, levelling_rad };
+        let found = fit(plan, &taken, &guess, &weights, Degrees { sensor: 0, axes: 0 }).ok()?;
+        let covariance = found.axes_covariance(plan, 0);
+        let sigma: Vec<f64> = covariance.diagonal().iter().map(|v| v.sqrt() * ARCSEC_PER_RAD).collect();
+        let mean = (sigma.iter().map(|s| s * s).sum::<f64>() / sigma.len() as f64).sqrt();
+        Some([mean, sigma.iter().copied().fold(0.0, f64::max)])
+    }
+
+    /// As text.
+    #[must_use]
+    pub fn to_text(&self, plan: &Plan, levelling_rad: f64) -> String {
+        let Table { head, rows } = self.rows();
+        let typical = TYPICAL_ARCSEC_PER_DEG_C
+            .map(|(name, rate)| format!("{:.1}″ for {name} ({rate} ″/°C)", self.temperature_arcsec(rate)));
+        let of_plan = match self.of_plan(plan, levelling_rad) {
+            Some([mean, largest]) => format!(
+                "The weighted least-squares fit of the plan's {} positions uses every position for every element: it will state \
+                 {mean:.1}″ on average, {largest:.1}″ at most.",
+                plan.positions.len()
+            ),
+            None => "The plan's positions do not determine C: each axis must be seen up and down.".to_owned(),
+        };
+        format!(
+            "An axis will be known to {:.1}″ (one sigma).\n\n{}\n\nError by the measured temperature: {}.\n{of_plan}\n",
+            self.total_arcsec(),
+            table(&head, &rows),
+            typical.join(", ")
+        )
+    }
+
+    /// The budget as a table.
+    #[must_use]
+    pub fn rows(&self) -> Table {
+        let [housing, sensor] = self.expansion_ppm_per_deg_c;
+        let [cold, hot] = self.temperature_deg_c;
+        let row = |what: String, formula: String, value: f64| vec![what, formula, format!("{value:.1}")];
+        let rows = vec![
+            row("positioning σ1".into(), "given".into(), self.positioning_arcsec),
+            row("run-out σ2".into(), "given".into(), self.run_out_arcsec),
+            row(
+                "white noise".into(),
+                format!("ρ·√(Q/τ)/K, Q {}, τ {} s, K {}", short(self.noise), self.seconds, self.scale_per_g),
+                self.noise_arcsec(),
+            ),
+            row("stand and noise [004 eq. 4]".into(), "2·√(σ1² + σ2² + noise²)".into(), self.stand_arcsec()),
+            row(
+                "housing [004 eq. 6]".into(),
+                format!("0.1·({housing} − {sensor})·10⁻⁶·({hot} − {cold}) rad"),
+                self.housing_arcsec(),
+            ),
+            row(
+                "measured temperature [004 eq. 7]".into(),
+                format!("{} °C · {} ″/°C", self.temperature_error_deg_c, self.axis_arcsec_per_deg_c),
+                self.temperature_arcsec(self.axis_arcsec_per_deg_c),
+            ),
+            row("total".into(), "root of the sum of squares of the last three".into(), self.total_arcsec()),
+        ];
+        Table { head: ["", "", "″"].map(str::to_owned).to_vec(), rows }
+    }
+
+    /// As JSON.
+    #[must_use]
+    pub fn to_json(&self, plan: &Plan, levelling_rad: f64) -> Value {
+        let typical: serde_json::Map<String, Value> = TYPICAL_ARCSEC_PER_DEG_C
+            .iter()
+            .map(|(name, rate)| ((*name).to_owned(), json!(self.temperature_arcsec(*rate))))
+            .collect();
+        let of_plan = self.of_plan(plan, levelling_rad);
+        json!({
+            "noise_arcsec": self.noise_arcsec(),
+            "stand_arcsec": self.stand_arcsec(),
+            "housing_arcsec": self.housing_arcsec(),
+            "temperature_arcsec": self.temperature_arcsec(self.axis_arcsec_per_deg_c),
+            "temperature_typical_arcsec": typical,
+            "total_arcsec": self.total_arcsec(),
+            "positions": plan.positions.len(),
+            "fit_mean_arcsec": of_plan.map(|[mean, _]| mean),
+            "fit_largest_arcsec": of_plan.map(|[_, largest]| largest),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_examples_of_the_paper() {
+        let budget = Budget::default();
+        // 11.52″ in 004 (11.53 with its own numbers), 11″, 0.3″ and 1.2″.
+        assert!((budget.stand_arcsec() - 11.53).abs() < 0.005, "{}", budget.stand_arcsec());
+        assert!((budget.housing_arcsec() - 10.59).abs() < 0.005, "{}", budget.housing_arcsec());
+        assert!((budget.temperature_arcsec(1.5) - 0.3).abs() < 1e-12);
+        assert!((budget.temperature_arcsec(6.0) - 1.2).abs() < 1e-12);
+        assert!((budget.total_arcsec() - 15.66).abs() < 0.005, "{}", budget.total_arcsec());
+        let text = budget.to_text(&Plan::twelve(), 3e-4);
+        for words in ["11.5", "10.6", "0.3″ for quartz", "1.2″ for silicon", "15.7″"] {
+            assert!(text.contains(words), "{words} is not in\n{text}");
+        }
+    }
+
+    #[test]
+    fn twelve_positions_know_more_than_six() {
+        let budget = Budget::default();
+        let [twelve, _] = budget.of_plan(&Plan::twelve(), 3e-4).unwrap();
+        let [six, _] = budget.of_plan(&Plan::six(), 3e-4).unwrap();
+        // Four positions for every element: σ1 and σ2 by half, and what noise adds.
+        assert!(twelve > 0.5 * 29.0_f64.sqrt() && twelve < 0.7 * 29.0_f64.sqrt(), "{twelve}");
+        // The level is out by 60″, and nothing tells it from the axes.
+        assert!(six > 20.0, "{six}");
+    }
+}

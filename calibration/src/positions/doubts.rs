@@ -1,0 +1,151 @@
+//! What is doubtful about a result, and what makes it none.
+
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use super::analysis::{Analysis, Settings};
+use super::fit::Fit;
+use super::model::Taken;
+use super::plan::Plan;
+use super::solve::NoSolution;
+use super::{budget, faults, model};
+
+/// Fewest positions that tell the stand's errors from the axes.
+pub const GOOD_POSITIONS: usize = 9;
+/// Probability below which something is no accident.
+pub(super) const ACCIDENT: f64 = 1e-3;
+/// Largest standard error of a scale factor that is still a result (relative).
+const LARGEST_SIGMA: f64 = 1e-2;
+
+/// χ² of the quadratic terms of C, and their number.
+pub(super) fn quadratic_terms(fit: &Fit, plan: &Plan) -> (f64, usize) {
+    let covariance = fit.axes_covariance(plan, 2);
+    let model = fit.model(plan);
+    let terms: Vec<f64> = (0..fit.guess.len())
+        .flat_map(|sensor| [0, 1].map(|which| model.axis_index(sensor, which, 2)))
+        .map(|index| fit.solution.parameters[index] * model::SMALL)
+        .collect();
+    let terms = nalgebra::DVector::from_vec(terms);
+    let solved = covariance.cholesky().map(|cholesky| terms.dot(&cholesky.solve(&terms)));
+    (solved.unwrap_or(0.0), terms.len())
+}
+
+/// Probability that χ² is at least so large by accident.
+#[expect(clippy::cast_precision_loss, reason = "degrees of freedom")]
+pub(super) fn survival(chi_square: f64, degrees: usize) -> f64 {
+    ChiSquared::new(degrees as f64).map_or(1.0, |law| law.sf(chi_square))
+}
+
+/// Factor by which standard errors are widened where the positions scatter more than they should.
+pub(super) fn widening(fit: &Fit, warnings: &mut Vec<String>) -> f64 {
+    let (chi_square, degrees) = (fit.solution.chi_square, fit.solution.degrees);
+    let Some(per_degree) = fit.solution.per_degree() else { return 1.0 };
+    if survival(chi_square, degrees) >= ACCIDENT || per_degree <= 1.0 {
+        return 1.0;
+    }
+    let factor = per_degree.sqrt();
+    warnings.push(format!(
+        "the positions scatter {factor:.1} times as much as positioning, run-out and noise explain (χ² {chi_square:.0} with {degrees} \
+         degrees of freedom); all standard errors are widened by that. Look at the largest residuals: a position that is mistaken for \
+         another, a unit that was not settled, a stand that is worse than --positioning and --run-out say"
+    ));
+    factor
+}
+
+/// What few, missing and repeated positions mean.
+pub(super) fn few(
+    plan: &Plan,
+    taken: &[Taken],
+    levels: usize,
+    settings: &Settings,
+    warnings: &mut Vec<String>,
+) {
+    for level in 0..levels {
+        let count = |position: usize| {
+            taken.iter().filter(|taken| taken.level == level && taken.position == position).count()
+        };
+        let names = |which: &dyn Fn(usize) -> bool| -> Vec<&str> {
+            let positions = plan.positions.iter().enumerate().filter(|(index, _)| which(count(*index)));
+            positions.map(|(_, position)| position.name.as_str()).collect()
+        };
+        let at = if levels > 1 { format!("temperature {}: ", level + 1) } else { String::new() };
+        let (missing, repeated) = (names(&|count| count == 0), names(&|count| count > 1));
+        if !missing.is_empty() {
+            warnings.push(format!("{at}missing positions: {}", missing.join(", ")));
+        }
+        if !repeated.is_empty() {
+            warnings.push(format!(
+                "{at}positions taken more than once, all of them used: {}",
+                repeated.join(", ")
+            ));
+        }
+    }
+    let different =
+        (0..plan.positions.len()).filter(|p| taken.iter().any(|taken| taken.position == *p)).count();
+    if plan.has_stand() && different < GOOD_POSITIONS {
+        warnings.push(format!(
+            "{different} different positions do not tell the stand's level from the axes, {GOOD_POSITIONS} or more do: the standard \
+             errors of C hold what --levelling states ({:.0}″)",
+            settings.levelling_rad * budget::ARCSEC_PER_RAD
+        ));
+    }
+}
+
+/// Sensors whose positions do not spread, in words.
+pub(super) fn spread(plan: &Plan, taken: &[Taken], bad: &[usize]) -> Vec<String> {
+    let seen = |axis: usize, sign: f64| {
+        taken.iter().any(|taken| {
+            let position = plan.positions.get(taken.position);
+            position.is_some_and(|position| sign * plan.up(&position.attitude, [0.0; 3])[axis] > 0.5)
+        })
+    };
+    let lacking: Vec<String> = (0..3)
+        .flat_map(|axis| [(axis, 1.0, "up"), (axis, -1.0, "down")])
+        .filter(|(axis, sign, _)| !seen(*axis, *sign))
+        .map(|(axis, _, way)| format!("{} {way}", faults::name(axis)))
+        .collect();
+    let sensors: Vec<String> = bad.iter().map(|sensor| faults::name(*sensor)).collect();
+    let lacking = if lacking.is_empty() {
+        "the outputs do not follow the positions: is the plan the right one, and the columns of the mapping too?".to_owned()
+    } else {
+        format!("no position has {}", lacking.join(", "))
+    };
+    vec![format!(
+        "{} positions do not determine scale factor, bias and axis of accelerometer {}: {lacking}",
+        taken.len(),
+        sensors.join(", ")
+    )]
+}
+
+/// Whether what was found is a result.
+pub(super) fn sound(analysis: &Analysis) -> Result<(), Vec<String>> {
+    let fit = &analysis.fit;
+    let per_sensor = fit.solution.parameters.len().saturating_sub(3) / fit.guess.len().max(1);
+    let bad = |sensor: usize| {
+        let sigma = fit.solution.sigma(sensor * per_sensor) * model::SMALL * analysis.widened;
+        (!(sigma <= LARGEST_SIGMA)).then(|| {
+            format!(
+                "accelerometer {}: its scale factor is known to {:.2} % only, at most {} % is a result: look at its residuals, and at \
+                 its mapping",
+                faults::name(sensor),
+                sigma * 100.0,
+                LARGEST_SIGMA * 100.0
+            )
+        })
+    };
+    let reasons: Vec<String> = (0..fit.guess.len()).filter_map(bad).collect();
+    if reasons.is_empty() { Ok(()) } else { Err(reasons) }
+}
+
+/// No solution, in words.
+pub(super) fn no_solution(why: &NoSolution) -> String {
+    match why {
+        NoSolution::NotDetermined(index) => format!(
+            "the positions do not determine parameter {index}: take each axis up and down at each temperature, in two orientations"
+        ),
+        NoSolution::NoMinimum(words) => {
+            format!(
+                "no fit of the positions was found ({words}): is the plan the right one, and the mapping too?"
+            )
+        }
+    }
+}

@@ -1,0 +1,163 @@
+//! One weighted least-squares problem over all positions and temperatures (models §9).
+//!
+//! A position's outputs scatter for two reasons. White noise of each accelerometer is its own. An error of the stand's
+//! positioning turns the case, and all accelerometers feel it at once: their residuals of that position are correlated, and the
+//! weight is the inverse of the whole covariance
+//!
+//! ```text
+//! V = diag(Q_i/τ) + σ²·Σ_k d_k·d_kᵀ        d_k: change of the outputs per radian about either axis across "up"
+//! ```
+//!
+//! The stand's errors δ1…δ3 are parameters with a prior as wide as the stand may be out of level, so that few positions, which do
+//! not tell them from the axes, give what they can with uncertainties that say so.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::model::{Degrees, Guess, Model, SMALL, Sensor, Taken};
+use super::plan::{Attitude, Plan};
+use super::solve::{NoSolution, Solution, solve};
+
+/// What is known of the errors beforehand.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Weights {
+    /// Intensity of the white noise of each accelerometer (output²·s).
+    pub intensity: Vec<f64>,
+    /// Standard deviation of the case's direction in a position: positioning and run-out together (rad).
+    pub positioning_rad: f64,
+    /// Standard deviation of δ1, δ2, δ3 beforehand (rad).
+    pub levelling_rad: f64,
+}
+
+/// What was found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fit {
+    /// Degrees that it was found with.
+    pub degrees: Degrees,
+    /// The accelerometers.
+    pub sensors: Vec<Sensor>,
+    /// δ1, δ2, δ3 (rad) with standard errors.
+    pub stand: [(f64, f64); 3],
+    /// Parameters with their covariance, as [`Model`] counts them.
+    pub solution: Solution,
+    /// First guesses, which the parameters are relative to.
+    pub guess: Vec<Guess>,
+}
+
+impl Fit {
+    /// Covariance of the directions of all axes at the reference: two angles (rad) per accelerometer.
+    #[must_use]
+    pub fn axes_covariance(&self, plan: &Plan, power: usize) -> DMatrix<f64> {
+        let model = self.model(plan);
+        let index: Vec<usize> = (0..self.guess.len())
+            .flat_map(|sensor| [0, 1].map(|which| model.axis_index(sensor, which, power)))
+            .collect();
+        DMatrix::from_fn(index.len(), index.len(), |i, j| {
+            self.solution.covariance[(index[i], index[j])] * SMALL * SMALL
+        })
+    }
+
+    /// The model that it was found with.
+    #[must_use]
+    pub fn model<'a>(&self, plan: &'a Plan) -> Model<'a> {
+        Model { plan, guess: self.guess.clone(), degrees: self.degrees }
+    }
+
+    /// Standard errors of the elements of a sensor's row of C, by power (per scaled temperature to that power).
+    #[must_use]
+    pub fn axis_sigma(&self, plan: &Plan, sensor: usize, power: usize) -> [f64; 3] {
+        let covariance = self.axes_covariance(plan, power);
+        let Some(guess) = self.guess.get(sensor) else { return [f64::NAN; 3] };
+        let block = covariance.view((2 * sensor, 2 * sensor), (2, 2));
+        [0, 1, 2].map(|i| {
+            let [a, b] = [guess.across[0][i], guess.across[1][i]];
+            (a * a * block[(0, 0)] + 2.0 * a * b * block[(0, 1)] + b * b * block[(1, 1)]).max(0.0).sqrt()
+        })
+    }
+}
+
+/// First guesses of all accelerometers; `Err` names those whose positions do not spread.
+///
+/// # Errors
+/// Numbers of the accelerometers that the positions do not determine.
+pub fn guesses(plan: &Plan, taken: &[Taken], sensors: usize) -> Result<Vec<Guess>, Vec<usize>> {
+    let ups: Vec<[f64; 3]> = taken
+        .iter()
+        .map(|taken| {
+            let position = plan.positions.get(taken.position);
+            position.map_or([f64::NAN; 3], |position| plan.up(&position.attitude, [0.0; 3]))
+        })
+        .collect();
+    let of = |sensor: usize| {
+        let outputs: Vec<f64> =
+            taken.iter().map(|taken| taken.outputs.get(sensor).copied().unwrap_or(f64::NAN)).collect();
+        Guess::of(&ups, &outputs).ok_or(sensor)
+    };
+    let found: Vec<Result<Guess, usize>> = (0..sensors).map(of).collect();
+    let bad: Vec<usize> = found.iter().filter_map(|guess| guess.as_ref().err().copied()).collect();
+    if bad.is_empty() { Ok(found.into_iter().flatten().collect()) } else { Err(bad) }
+}
+
+/// Finds everything from the positions taken.
+///
+/// # Errors
+/// Where they do not determine it.
+pub fn fit(
+    plan: &Plan,
+    taken: &[Taken],
+    guess: &[Guess],
+    weights: &Weights,
+    degrees: Degrees,
+) -> Result<Fit, NoSolution> {
+    let model = Model { plan, guess: guess.to_vec(), degrees };
+    let start = vec![0.0; model.count()];
+    let whitening: Vec<DMatrix<f64>> =
+        taken.iter().map(|taken| whitening(&model, &start, taken, weights)).collect();
+    let prior = weights.levelling_rad / SMALL;
+    let residuals = |p: &[f64]| -> Vec<f64> {
+        let mut all = Vec::with_capacity(taken.len() * guess.len() + 3);
+        for (taken, whitening) in taken.iter().zip(&whitening) {
+            let predicted = model.outputs(p, taken);
+            let away = DVector::from_iterator(
+                guess.len(),
+                taken.outputs.iter().zip(&predicted).map(|(measured, predicted)| measured - predicted),
+            );
+            all.extend((whitening * away).iter());
+        }
+        all.extend(p[p.len() - 3..].iter().map(|error| error / prior));
+        all
+    };
+    let solution = solve(&start, residuals)?;
+    let errors = model.errors(&solution.parameters);
+    let from = model.count() - 3;
+    let stand = [0, 1, 2].map(|i| (errors[i], solution.sigma(from + i) * SMALL));
+    let sensors = model.state(&solution.parameters);
+    Ok(Fit { degrees, sensors, stand, solution, guess: guess.to_vec() })
+}
+
+/// L⁻¹ of V = L·Lᵀ for one position.
+fn whitening(model: &Model<'_>, start: &[f64], taken: &Taken, weights: &Weights) -> DMatrix<f64> {
+    let count = model.guess.len();
+    let position = model.plan.positions.get(taken.position);
+    let up = position.map_or([0.0; 3], |position| model.plan.up(&position.attitude, [0.0; 3]));
+    // A position without a stand behind it does not know which way the level is out.
+    let loose = position.is_some_and(|position| matches!(position.attitude, Attitude::Up(_)));
+    let sigma = if loose {
+        (weights.positioning_rad.powi(2) + weights.levelling_rad.powi(2)).sqrt()
+    } else {
+        weights.positioning_rad
+    };
+    let mut covariance = DMatrix::from_fn(count, count, |i, j| {
+        if i == j { weights.intensity.get(i).copied().unwrap_or(f64::NAN) / taken.duration_s } else { 0.0 }
+    });
+    let at_rest = DVector::from_vec(model.outputs_under(start, taken, [0.0; 3]));
+    let up = nalgebra::Vector3::from(up);
+    let first = nalgebra::Vector3::from(Guess::across_of(up.into())[0]);
+    for direction in [first, up.cross(&first)] {
+        let change = DVector::from_vec(model.outputs_under(start, taken, direction.into())) - &at_rest;
+        covariance += &change * change.transpose() * (sigma * sigma);
+    }
+    let lower = covariance.cholesky().map(|cholesky| cholesky.l());
+    lower
+        .and_then(|lower| lower.try_inverse())
+        .unwrap_or_else(|| DMatrix::from_element(count, count, f64::NAN))
+}

@@ -1,0 +1,203 @@
+//! What accelerometers put out on a stand, as a function of what is to be found.
+//!
+//! ```text
+//! U_i = K_i(T_i)·(C_i(T)·u)·g/r + S_i(T_i),     C_i(T) = n_i + a_i(T)·t_i + b_i(T)·w_i
+//! ```
+//!
+//! n is a sensor's first guess, t and w are at right angles to it. K, S, a and b are polynomials of temperature. This is the form
+//! that the service evaluates ([`Model::state`] only moves the length of C's row into K), so that nothing is lost between the
+//! fit and the document.
+
+use super::plan::{Plan, StandErrors};
+
+/// A position as it was taken.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Taken {
+    /// Position of the plan.
+    pub position: usize,
+    /// Mean output of each accelerometer.
+    pub outputs: Vec<f64>,
+    /// Ratio r of the board for each accelerometer.
+    pub ratio: Vec<f64>,
+    /// Time of the means (s).
+    pub duration_s: f64,
+    /// Temperature of each accelerometer less the reference, over half the range.
+    pub sensor_t: Vec<f64>,
+    /// Temperature that the orientation follows, likewise.
+    pub axes_t: f64,
+    /// Which of the temperatures it was taken at.
+    pub level: usize,
+}
+
+/// Degrees of the polynomials over temperature.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Degrees {
+    /// Of K and S.
+    pub sensor: usize,
+    /// Of C.
+    pub axes: usize,
+}
+
+/// First guess of one accelerometer.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Guess {
+    /// K·g (output units).
+    pub scale: f64,
+    /// S (output units).
+    pub bias: f64,
+    /// Axis, unit vector.
+    pub axis: [f64; 3],
+    /// Two unit vectors at right angles to it and to each other.
+    pub across: [[f64; 3]; 2],
+}
+
+/// The model of all accelerometers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Model<'a> {
+    /// The plan.
+    pub plan: &'a Plan,
+    /// First guesses.
+    pub guess: Vec<Guess>,
+    /// Degrees.
+    pub degrees: Degrees,
+}
+
+/// One accelerometer as it was found, by powers of the scaled temperature.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sensor {
+    /// K·g.
+    pub scale: Vec<f64>,
+    /// S.
+    pub bias: Vec<f64>,
+    /// C, row by power.
+    pub axis: Vec<[f64; 3]>,
+}
+
+impl Guess {
+    /// From the outputs by linear least squares: U = M·u + S, K·g the length of M.
+    #[must_use]
+    pub fn of(ups: &[[f64; 3]], outputs: &[f64]) -> Option<Self> {
+        let design =
+            nalgebra::DMatrix::from_fn(
+                ups.len(),
+                4,
+                |row, column| {
+                    if column < 3 { ups[row][column] } else { 1.0 }
+                },
+            );
+        let svd = design.svd(true, true);
+        let smallest = svd.singular_values.min();
+        if ups.len() < 4 || smallest.is_nan() || smallest < 0.05 * svd.singular_values.max() {
+            return None;
+        }
+        let found = svd.solve(&nalgebra::DVector::from_column_slice(outputs), 0.0).ok()?;
+        let scale = found.fixed_rows::<3>(0).norm();
+        if !(scale.is_finite() && scale > 0.0) {
+            return None;
+        }
+        let axis = [0, 1, 2].map(|i| found[i] / scale);
+        Some(Self { scale, bias: found[3], axis, across: across(axis) })
+    }
+}
+
+impl Guess {
+    /// Two unit vectors at right angles to a unit vector.
+    #[must_use]
+    pub fn across_of(axis: [f64; 3]) -> [[f64; 3]; 2] {
+        across(axis)
+    }
+}
+
+/// Two unit vectors at right angles to a unit vector, the first near the case axis that is farthest from it.
+fn across(n: [f64; 3]) -> [[f64; 3]; 2] {
+    let n = nalgebra::Vector3::from(n);
+    let mut unit = nalgebra::Vector3::zeros();
+    unit[n.iamin()] = 1.0;
+    let first = (unit - n * n.dot(&unit)).normalize();
+    [first.into(), n.cross(&first).into()]
+}
+
+impl Model<'_> {
+    /// Parameters of one accelerometer.
+    #[must_use]
+    pub fn of_sensor(&self) -> usize {
+        2 * (self.degrees.sensor + 1) + 2 * (self.degrees.axes + 1)
+    }
+
+    /// All parameters: accelerometer by accelerometer K, S, a, b, each by powers; then δ1, δ2, δ3 (in thousandths).
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.guess.len() * self.of_sensor() + 3
+    }
+
+    /// The stand's errors (rad).
+    #[must_use]
+    pub fn errors(&self, parameters: &[f64]) -> StandErrors {
+        let from = self.guess.len() * self.of_sensor();
+        [0, 1, 2].map(|i| parameters.get(from + i).copied().unwrap_or(0.0) * SMALL)
+    }
+
+    /// Place of a parameter of an accelerometer's axis: `which` of the two directions, power.
+    #[must_use]
+    pub fn axis_index(&self, sensor: usize, which: usize, power: usize) -> usize {
+        sensor * self.of_sensor() + 2 * (self.degrees.sensor + 1) + which * (self.degrees.axes + 1) + power
+    }
+
+    /// Outputs of all accelerometers in a position.
+    #[must_use]
+    pub fn outputs(&self, parameters: &[f64], taken: &Taken) -> Vec<f64> {
+        let Some(position) = self.plan.positions.get(taken.position) else { return Vec::new() };
+        let up = self.plan.up(&position.attitude, self.errors(parameters));
+        self.outputs_under(parameters, taken, up)
+    }
+
+    /// Outputs of all accelerometers under a direction of "up".
+    #[must_use]
+    pub fn outputs_under(&self, parameters: &[f64], taken: &Taken, up: [f64; 3]) -> Vec<f64> {
+        let (s, c) = (self.degrees.sensor + 1, self.degrees.axes + 1);
+        let output = |(index, guess): (usize, &Guess)| {
+            let p =
+                parameters.get(index * self.of_sensor()..(index + 1) * self.of_sensor()).unwrap_or_default();
+            let t = taken.sensor_t.get(index).copied().unwrap_or(0.0);
+            let at = |from: usize, count: usize, x: f64| {
+                p[from..from + count].iter().rev().fold(0.0, |sum, coefficient| sum * x + coefficient)
+            };
+            let scale = guess.scale * (1.0 + at(0, s, t) * SMALL);
+            let bias = guess.bias + guess.scale * at(s, s, t) * SMALL;
+            let (a, b) = (at(2 * s, c, taken.axes_t) * SMALL, at(2 * s + c, c, taken.axes_t) * SMALL);
+            let [first, second] = guess.across;
+            let along: f64 = (0..3).map(|i| (guess.axis[i] + a * first[i] + b * second[i]) * up[i]).sum();
+            let ratio = taken.ratio.get(index).copied().unwrap_or(1.0);
+            scale * along / ratio + bias
+        };
+        self.guess.iter().enumerate().map(output).collect()
+    }
+
+    /// What the parameters say of each accelerometer, rows of C at the reference of length one.
+    #[must_use]
+    pub fn state(&self, parameters: &[f64]) -> Vec<Sensor> {
+        let (s, c) = (self.degrees.sensor + 1, self.degrees.axes + 1);
+        let sensor = |(index, guess): (usize, &Guess)| {
+            let p =
+                parameters.get(index * self.of_sensor()..(index + 1) * self.of_sensor()).unwrap_or_default();
+            let [first, second] = guess.across;
+            let row = |power: usize| {
+                let (a, b) = (p[2 * s + power] * SMALL, p[2 * s + c + power] * SMALL);
+                let own = if power == 0 { 1.0 } else { 0.0 };
+                [0, 1, 2].map(|i| own * guess.axis[i] + a * first[i] + b * second[i])
+            };
+            let rows: Vec<[f64; 3]> = (0..c).map(row).collect();
+            let length = libm::sqrt(rows[0].iter().map(|x| x * x).sum());
+            let one = |power: usize| if power == 0 { 1.0 } else { 0.0 };
+            Sensor {
+                scale: (0..s).map(|j| guess.scale * (one(j) + p[j] * SMALL) * length).collect(),
+                bias: (0..s).map(|j| one(j) * guess.bias + guess.scale * p[s + j] * SMALL).collect(),
+                axis: rows.iter().map(|row| row.map(|x| x / length)).collect(),
+            }
+        };
+        self.guess.iter().enumerate().map(sensor).collect()
+    }
+}
+
+/// Unit of the parameters: a thousandth of K, of K·g, of a radian.
+pub const SMALL: f64 = 1e-3;

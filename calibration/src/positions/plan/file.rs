@@ -1,0 +1,106 @@
+//! Plans as their files have them.
+
+use serde::Deserialize;
+
+use super::{Attitude, Plan, Position, mounting};
+
+/// Reads a plan's text: CSV or TOML.
+pub(super) fn read(text: &str, is_csv: bool) -> Result<Plan, String> {
+    let written =
+        if is_csv { of_csv(text)? } else { toml::from_str(text).map_err(|error| error.to_string())? };
+    Written::plan(written)
+}
+
+/// A plan as its file has it.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Written {
+    /// Case axis along the stand's axis 1 at zero angles.
+    #[serde(default = "along_1")]
+    axis_1: char,
+    /// Case axis along its axis 2.
+    #[serde(default = "along_2")]
+    axis_2: char,
+    position: Vec<WrittenPosition>,
+}
+
+fn along_1() -> char {
+    'y'
+}
+
+fn along_2() -> char {
+    'x'
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WrittenPosition {
+    name: String,
+    axis_1_deg: Option<f64>,
+    axis_2_deg: Option<f64>,
+    up: Option<[f64; 3]>,
+}
+
+impl Written {
+    fn plan(self) -> Result<Plan, String> {
+        let mounting = mounting(self.axis_1, self.axis_2).ok_or_else(|| {
+            format!("axis_1 is {:?} and axis_2 {:?}: they must be two of x, y, z", self.axis_1, self.axis_2)
+        })?;
+        if self.position.is_empty() {
+            return Err("it has no position".into());
+        }
+        let mut positions: Vec<Position> = Vec::new();
+        for position in self.position {
+            if positions.iter().any(|other| other.name == position.name) {
+                return Err(format!("position {:?} is there twice: names must differ", position.name));
+            }
+            let attitude = match (position.axis_1_deg, position.axis_2_deg, position.up) {
+                (Some(first), Some(second), None) if first.is_finite() && second.is_finite() => {
+                    Attitude::Stand([first.to_radians(), second.to_radians()])
+                }
+                (None, None, Some(up)) => {
+                    let norm = libm::sqrt(up.iter().map(|c| c * c).sum());
+                    if !(norm.is_finite() && norm > 0.0) {
+                        return Err(format!("position {:?}: up is {up:?}, no direction", position.name));
+                    }
+                    Attitude::Up(up.map(|c| c / norm))
+                }
+                _ => {
+                    return Err(format!(
+                        "position {:?} needs axis_1_deg and axis_2_deg, or up = [x, y, z]",
+                        position.name
+                    ));
+                }
+            };
+            positions.push(Position { name: position.name, attitude });
+        }
+        Ok(Plan { mounting, positions })
+    }
+}
+
+/// Rows `name,axis_1_deg,axis_2_deg` behind a line that names them.
+fn of_csv(text: &str) -> Result<Written, String> {
+    let mut lines =
+        text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));
+    match lines.next() {
+        Some((_, "name,axis_1_deg,axis_2_deg")) => {}
+        head => {
+            return Err(format!(
+                "the first line is {:?}, must be name,axis_1_deg,axis_2_deg",
+                head.map(|h| h.1)
+            ));
+        }
+    }
+    let row = |(index, line): (usize, &str)| {
+        let cells: Vec<&str> = line.split(',').map(str::trim).collect();
+        let [name, first, second] = cells[..] else {
+            return Err(format!("line {}: {} cells, must be three", index + 1, cells.len()));
+        };
+        let number =
+            |cell: &str| cell.parse().map_err(|_| format!("line {}: {cell:?} is no number", index + 1));
+        let (first, second) = (number(first)?, number(second)?);
+        Ok(WrittenPosition { name: name.into(), axis_1_deg: Some(first), axis_2_deg: Some(second), up: None })
+    };
+    let position = lines.map(row).collect::<Result<_, _>>()?;
+    Ok(Written { axis_1: along_1(), axis_2: along_2(), position })
+}

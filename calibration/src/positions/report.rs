@@ -1,0 +1,289 @@
+//! What is said of a calibration on a stand.
+
+use isotherm_log::plot::page::{Axis, Chart, Content, Form, Ink, Panel, Samples, Series, Table};
+use isotherm_protocol::document::{Document, Sample};
+
+use super::analysis::{Analysis, Settings};
+use super::budget::ARCSEC_PER_RAD;
+use super::fit::Fit;
+use super::judged::{Judgement, curves, lengths};
+use crate::drift::figures::short;
+use crate::report::{Coefficient, Curve, Figure, FitReport, Verdict};
+
+const AXES: [&str; 3] = ["x", "y", "z"];
+/// Points of a curve over temperature.
+const POINTS: u32 = 60;
+
+/// A set of judged positions with the names of its runs.
+#[derive(Debug, Clone, Copy)]
+pub struct Set<'a> {
+    /// The positions.
+    pub judged: &'a [Judgement],
+    /// Names of the runs.
+    pub runs: &'a [String],
+}
+
+/// Everything that is said.
+#[must_use]
+pub fn report(
+    document: &Document,
+    analysis: &Analysis,
+    settings: &Settings,
+    inside: Set<'_>,
+    outside: Option<Set<'_>>,
+) -> FitReport {
+    let mut report = FitReport::new("Accelerometers from positions of a stand", &document.unit);
+    report.residuals = curves(inside.judged, inside.runs, Sample::In);
+    if let Some(set) = outside {
+        report.residuals.extend(curves(set.judged, set.runs, Sample::Out));
+    }
+    report.verdicts =
+        Curve::verdicts(&report.residuals).into_iter().map(|v| v.stated_as(Figure::Rms)).collect();
+    let length = Verdict::new("|f| − g", "m/s²", lengths(inside.judged)).stated_as(Figure::Rms);
+    report.verdicts.push(length.out_of_sample(outside.map(|set| lengths(set.judged))));
+    report.warnings.clone_from(&analysis.warnings);
+    report.notes = notes(analysis, settings);
+    let names = names(document, analysis.fit.guess.len());
+    report.coefficients = coefficients(document, analysis, settings, &names);
+    report.tables.push(("Positions".to_owned(), position_rows(settings, inside)));
+    if analysis.levels_deg_c.len() > 1 {
+        report.tables.push(("Axes by temperature, ″".to_owned(), level_rows(analysis, settings, &names)));
+        report.charts.push(("Axes over temperature".to_owned(), axes_chart(analysis, settings, &names)));
+    }
+    report
+}
+
+/// Names of the accelerometers.
+fn names(document: &Document, count: usize) -> Vec<String> {
+    let of = |index: usize| {
+        let sensor = document.accel.as_ref().and_then(|accel| accel.sensor.get(index));
+        sensor.map_or_else(|| index.to_string(), |sensor| sensor.name.clone())
+    };
+    (0..count).map(of).collect()
+}
+
+fn notes(analysis: &Analysis, settings: &Settings) -> Vec<String> {
+    let fit = &analysis.fit.solution;
+    let levels: Vec<String> = analysis.levels_deg_c.iter().map(|t| format!("{t:.1}")).collect();
+    let arcsec = |rad: f64| rad * ARCSEC_PER_RAD;
+    let noise: Vec<String> = analysis.weights.intensity.iter().map(|q| short(*q)).collect();
+    let mut notes = vec![
+        format!(
+            "{} positions at {} °C; g = {} m/s²; C about {} °C.",
+            analysis.poses.len(),
+            levels.join(", "),
+            settings.gravity,
+            analysis.reference_deg_c
+        ),
+        format!(
+            "Weighted with a stand of {:.1}″ (positioning and run-out) and white noise of {} output²·s; level known to {:.0}″ \
+             beforehand. χ² {:.1} with {} degrees of freedom.",
+            arcsec(analysis.weights.positioning_rad),
+            noise.join(", "),
+            arcsec(analysis.weights.levelling_rad),
+            fit.chi_square,
+            fit.degrees
+        ),
+    ];
+    if let Some((_, chi_square, terms, accident)) = &analysis.quadratic {
+        notes.push(format!(
+            "Quadratic terms of C: χ² {chi_square:.1} with {terms} of them, an accident with probability {}; the straight line of the \
+             document is off by {:.1}″ at most.",
+            short(*accident),
+            arcsec(bend(analysis))
+        ));
+    }
+    notes
+}
+
+/// Largest distance between the quadratic and the linear C over the range (rad).
+#[must_use]
+pub fn bend(analysis: &Analysis) -> f64 {
+    let Some((quadratic, ..)) = &analysis.quadratic else { return 0.0 };
+    let mut largest: f64 = 0.0;
+    for deg_c in over(analysis) {
+        let x = (deg_c - analysis.reference_deg_c) / analysis.half_deg_c;
+        for (bent, straight) in quadratic.sensors.iter().zip(&analysis.fit.sensors) {
+            let (a, b) = (at(&bent.axis, x), at(&straight.axis, x));
+            let away = libm::sqrt((0..3).map(|i| (a[i] - b[i]) * (a[i] - b[i])).sum());
+            largest = largest.max(away);
+        }
+    }
+    largest
+}
+
+/// Temperatures over the range.
+fn over(analysis: &Analysis) -> Vec<f64> {
+    let [low, high] = analysis.range_deg_c;
+    (0..=POINTS).map(|k| low + (high - low) * f64::from(k) / f64::from(POINTS)).collect()
+}
+
+/// A row of C at a scaled temperature.
+fn at(axis: &[[f64; 3]], x: f64) -> [f64; 3] {
+    axis.iter().rev().fold([0.0; 3], |sum, row| [0, 1, 2].map(|i| sum[i] * x + row[i]))
+}
+
+/// Elements of a row that say where the axis points: all but the largest.
+fn across(row: [f64; 3]) -> impl Iterator<Item = usize> {
+    let largest = (0..3).fold(0, |best, i| if row[i].abs() > row[best].abs() { i } else { best });
+    (0..3).filter(move |i| *i != largest)
+}
+
+fn coefficients(
+    document: &Document,
+    analysis: &Analysis,
+    settings: &Settings,
+    names: &[String],
+) -> Vec<Coefficient> {
+    let fit = &analysis.fit;
+    let output = document.accel.as_ref().map_or("", |accel| match accel.output {
+        isotherm_protocol::document::AccelOutput::Counts => "counts/s",
+        isotherm_protocol::document::AccelOutput::Volts => "V",
+        isotherm_protocol::document::AccelOutput::MetresPerSecondSquared => "m/s²",
+    });
+    let powers = ["", "/°C", "/°C²"];
+    let mut all = Vec::new();
+    let of_sensor = fit.solution.parameters.len().saturating_sub(3) / names.len().max(1);
+    let s = fit.degrees.sensor + 1;
+    for (index, (name, sensor)) in names.iter().zip(&fit.sensors).enumerate() {
+        let sigma = |offset: usize, scale: f64| {
+            Some(
+                fit.solution.sigma(index * of_sensor + offset)
+                    * super::model::SMALL
+                    * scale
+                    * analysis.widened,
+            )
+        };
+        let guess = fit.guess[index].scale;
+        for (power, k) in sensor.scale.iter().enumerate() {
+            let factor = analysis.half_deg_c.powi(-i32::try_from(power).unwrap_or(0));
+            let value = k * factor / settings.gravity;
+            let unit = format!("{output}/(m/s²){}", powers[power]);
+            let sigma = sigma(power, guess / settings.gravity * factor);
+            all.push(Coefficient::new(format!("accelerometer {name} K{power}"), unit, value, sigma));
+        }
+        for (power, bias) in sensor.bias.iter().enumerate() {
+            let factor = analysis.half_deg_c.powi(-i32::try_from(power).unwrap_or(0));
+            let unit = format!("{output}{}", powers[power]);
+            let sigma = sigma(s + power, guess * factor);
+            all.push(Coefficient::new(format!("accelerometer {name} S{power}"), unit, bias * factor, sigma));
+        }
+    }
+    let mut axes = |fit: &Fit, from: usize, what: &str| {
+        for (index, (name, sensor)) in names.iter().zip(&fit.sensors).enumerate() {
+            for (power, row) in sensor.axis.iter().enumerate().skip(from) {
+                let factor = analysis.half_deg_c.powi(-i32::try_from(power).unwrap_or(0)) * ARCSEC_PER_RAD;
+                let sigma = fit.axis_sigma(&settings.plan, index, power);
+                for i in across(sensor.axis[0]) {
+                    all.push(Coefficient::new(
+                        format!("accelerometer {name} C{power}{what} along {}", AXES[i]),
+                        format!("″{}", powers[power]),
+                        row[i] * factor,
+                        Some(sigma[i] * factor * analysis.widened),
+                    ));
+                }
+            }
+        }
+    };
+    axes(fit, 0, "");
+    if let Some((quadratic, ..)) = &analysis.quadratic {
+        axes(quadratic, 1, " (quadratic form)");
+    }
+    for (index, (value, sigma)) in fit.stand.iter().enumerate() {
+        let (value, sigma) = (value * ARCSEC_PER_RAD, sigma * ARCSEC_PER_RAD * analysis.widened);
+        all.push(Coefficient::new(format!("stand δ{}", index + 1), "″", value, Some(sigma)));
+    }
+    all
+}
+
+fn position_rows(settings: &Settings, set: Set<'_>) -> Table {
+    let head =
+        ["position", "log", "at, s", "°C", "x, mg", "y, mg", "z, mg", "|f| − g, mg"].map(str::to_owned);
+    let row = |judgement: &Judgement| {
+        let position = settings.plan.positions.get(judgement.position);
+        let milli_g = |error: f64| format!("{:.4}", error / settings.gravity * 1e3);
+        let mut row = vec![
+            position.map_or_else(String::new, |position| position.name.clone()),
+            set.runs.get(judgement.run).cloned().unwrap_or_default(),
+            format!("{:.1}", judgement.time_s),
+            if judgement.deg_c.is_finite() { format!("{:.2}", judgement.deg_c) } else { "–".to_owned() },
+        ];
+        row.extend(judgement.error[1].map(milli_g));
+        row.push(milli_g(judgement.length[1]));
+        row
+    };
+    Table { head: head.to_vec(), rows: set.judged.iter().map(row).collect() }
+}
+
+/// Elements that are shown over temperature: sensor, element.
+fn shown(analysis: &Analysis) -> Vec<(usize, usize)> {
+    let sensors = analysis.fit.sensors.iter().enumerate();
+    sensors.flat_map(|(index, sensor)| across(sensor.axis[0]).map(move |i| (index, i))).collect()
+}
+
+fn level_rows(analysis: &Analysis, settings: &Settings, names: &[String]) -> Table {
+    let shown = shown(analysis);
+    let head = std::iter::once("°C".to_owned())
+        .chain(shown.iter().map(|(index, i)| format!("{} along {}", names[*index], AXES[*i])))
+        .collect();
+    let row = |(deg_c, fit): (&f64, &Option<Fit>)| {
+        let cell = |(index, i): &(usize, usize)| {
+            let Some(fit) = fit else { return "–".to_owned() };
+            let value = fit.sensors[*index].axis[0][*i] * ARCSEC_PER_RAD;
+            let sigma = fit.axis_sigma(&settings.plan, *index, 0)[*i] * ARCSEC_PER_RAD * analysis.widened;
+            format!("{value:.1} ± {sigma:.1}")
+        };
+        std::iter::once(format!("{deg_c:.2}")).chain(shown.iter().map(cell)).collect()
+    };
+    Table { head, rows: analysis.levels_deg_c.iter().zip(&analysis.of_level).map(row).collect() }
+}
+
+fn axes_chart(analysis: &Analysis, settings: &Settings, names: &[String]) -> Chart {
+    let panel = |(index, i): (usize, usize)| {
+        let curve = |fit: &Fit| -> Vec<(f64, f64)> {
+            let value = |deg_c: f64| {
+                let x = (deg_c - analysis.reference_deg_c) / analysis.half_deg_c;
+                (deg_c, at(&fit.sensors[index].axis, x)[i] * ARCSEC_PER_RAD)
+            };
+            over(analysis).into_iter().map(value).collect()
+        };
+        let by_level = analysis.levels_deg_c.iter().zip(&analysis.of_level).filter_map(|(deg_c, fit)| {
+            Some((*deg_c, fit.as_ref()?.sensors[index].axis[0][i] * ARCSEC_PER_RAD))
+        });
+        let bar = |(deg_c, fit): (&f64, &Option<Fit>)| {
+            let fit = fit.as_ref()?;
+            let value = fit.sensors[index].axis[0][i] * ARCSEC_PER_RAD;
+            let sigma = fit.axis_sigma(&settings.plan, index, 0)[i] * ARCSEC_PER_RAD * analysis.widened;
+            Some([(*deg_c, value - 1.96 * sigma), (*deg_c, value + 1.96 * sigma), (*deg_c, f64::NAN)])
+        };
+        let bars = analysis.levels_deg_c.iter().zip(&analysis.of_level).filter_map(bar).flatten();
+        let series = |name: &str, ink, form, points: Vec<(f64, f64)>| Series {
+            name: name.to_owned(),
+            ink,
+            form,
+            samples: Samples::points(points),
+        };
+        let mut content = vec![
+            series("each temperature", Ink::Raw, Form::Dots, by_level.collect()),
+            series("95 %", Ink::Faint, Form::Line, bars.collect()),
+            series("linear", Ink::Second, Form::Line, curve(&analysis.fit)),
+        ];
+        if let Some((quadratic, ..)) = &analysis.quadratic {
+            content.push(series("quadratic", Ink::Third, Form::Line, curve(quadratic)));
+        }
+        Panel {
+            title: format!("accelerometer {} along {}", names[index], AXES[i]),
+            unit: "″".to_owned(),
+            height: 150,
+            logarithmic: false,
+            content: Content::Series(content),
+        }
+    };
+    Chart {
+        caption: "Elements of C over temperature: each temperature by itself, and the line of the document."
+            .to_owned(),
+        x: Axis::of("temperature", "°C"),
+        panels: shown(analysis).into_iter().map(panel).collect(),
+        marks: Vec::new(),
+    }
+}

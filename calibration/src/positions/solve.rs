@@ -1,0 +1,189 @@
+//! Nonlinear least squares: the minimum by Levenberg and Marquardt's method (`levenberg-marquardt`, after MINPACK), and
+//! the covariance of what was found.
+//!
+//! Residuals are whitened by whoever makes them, and parameters scaled so that one of them is a large change: derivatives
+//! are central differences over a millionth.
+
+use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt, TerminationReason};
+use nalgebra::DMatrix;
+use nalgebra_0_34 as minpack;
+use nalgebra_0_34::{Dyn, storage::Owned};
+
+/// Step of the differences.
+const STEP: f64 = 1e-6;
+/// A direction of the parameters whose singular value is below this share of the largest is not determined.
+const SINGULAR: f64 = 1e-9;
+
+/// What was found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Solution {
+    /// The parameters.
+    pub parameters: Vec<f64>,
+    /// Their covariance, for residuals of variance one.
+    pub covariance: DMatrix<f64>,
+    /// Residuals at the minimum.
+    pub residuals: Vec<f64>,
+    /// Sum of their squares.
+    pub chi_square: f64,
+    /// Residuals less parameters.
+    pub degrees: usize,
+}
+
+/// Why there is no solution.
+#[derive(Debug, Clone, PartialEq)]
+pub enum NoSolution {
+    /// The parameter with the largest part in a direction that the residuals do not depend on.
+    NotDetermined(usize),
+    /// The search ended without a minimum, in the library's words.
+    NoMinimum(String),
+}
+
+impl Solution {
+    /// Standard error of a parameter.
+    #[must_use]
+    pub fn sigma(&self, index: usize) -> f64 {
+        self.covariance.get((index, index)).map_or(f64::NAN, |variance| variance.max(0.0).sqrt())
+    }
+
+    /// χ² per degree of freedom; `None` without any.
+    #[must_use]
+    #[expect(clippy::cast_precision_loss, reason = "residuals of some hundred positions")]
+    pub fn per_degree(&self) -> Option<f64> {
+        (self.degrees > 0).then(|| self.chi_square / self.degrees as f64)
+    }
+}
+
+/// Minimises the sum of the squares of `residuals` from `start` on.
+///
+/// # Errors
+/// Where the residuals do not determine the parameters, or no minimum was found.
+pub fn solve(start: &[f64], residuals: impl Fn(&[f64]) -> Vec<f64>) -> Result<Solution, NoSolution> {
+    let problem = Problem { parameters: minpack::DVector::from_column_slice(start), residuals };
+    let (problem, report) = LevenbergMarquardt::new().with_patience(100).minimize(problem);
+    let good = report.termination.was_successful()
+        || matches!(report.termination, TerminationReason::NoImprovementPossible(_));
+    if !good {
+        return Err(NoSolution::NoMinimum(format!("{:?}", report.termination)));
+    }
+    let parameters: Vec<f64> = problem.parameters.iter().copied().collect();
+    let residuals = (problem.residuals)(&parameters);
+    let slopes = problem.slopes();
+    let slopes = DMatrix::from_iterator(slopes.nrows(), slopes.ncols(), slopes.iter().copied());
+    let covariance = covariance(&slopes)?;
+    let chi_square = residuals.iter().map(|residual| residual * residual).sum();
+    let degrees = residuals.len().saturating_sub(parameters.len());
+    Ok(Solution { parameters, covariance, residuals, chi_square, degrees })
+}
+
+/// (JᵀJ)⁻¹, through the singular values of J with its columns brought to length one.
+fn covariance(slopes: &DMatrix<f64>) -> Result<DMatrix<f64>, NoSolution> {
+    let lengths: Vec<f64> = slopes.column_iter().map(|column| column.norm()).collect();
+    if let Some(index) = lengths.iter().position(|length| length.is_nan() || *length <= 0.0) {
+        return Err(NoSolution::NotDetermined(index));
+    }
+    let mut scaled = slopes.clone();
+    for (mut column, length) in scaled.column_iter_mut().zip(&lengths) {
+        column /= *length;
+    }
+    let count = lengths.len();
+    let svd = scaled.svd(false, true);
+    let (Some(directions), largest) = (svd.v_t, svd.singular_values.max()) else {
+        return Err(NoSolution::NoMinimum("no singular values".into()));
+    };
+    let mut covariance = DMatrix::zeros(count, count);
+    for (value, direction) in svd.singular_values.iter().zip(directions.row_iter()) {
+        if value.is_nan() || *value <= SINGULAR * largest {
+            return Err(NoSolution::NotDetermined(direction.transpose().icamax()));
+        }
+        covariance += direction.tr_mul(&direction) / (value * value);
+    }
+    if svd.singular_values.len() < count {
+        return Err(NoSolution::NotDetermined(count - 1));
+    }
+    for (index, a) in lengths.iter().enumerate() {
+        for (other, b) in lengths.iter().enumerate() {
+            covariance[(index, other)] /= a * b;
+        }
+    }
+    Ok(covariance)
+}
+
+struct Problem<F> {
+    parameters: minpack::DVector<f64>,
+    residuals: F,
+}
+
+impl<F: Fn(&[f64]) -> Vec<f64>> Problem<F> {
+    /// Derivatives of the residuals, one column per parameter.
+    fn slopes(&self) -> minpack::DMatrix<f64> {
+        let mut at = self.parameters.as_slice().to_vec();
+        let mut columns = Vec::with_capacity(at.len());
+        for index in 0..at.len() {
+            let middle = at[index];
+            at[index] = middle + STEP;
+            let above = (self.residuals)(&at);
+            at[index] = middle - STEP;
+            let below = (self.residuals)(&at);
+            at[index] = middle;
+            let differences = above.iter().zip(&below).map(|(a, b)| (a - b) / (2.0 * STEP));
+            columns.push(minpack::DVector::from_iterator(above.len(), differences));
+        }
+        minpack::DMatrix::from_columns(&columns)
+    }
+}
+
+impl<F: Fn(&[f64]) -> Vec<f64>> LeastSquaresProblem<f64, Dyn, Dyn> for Problem<F> {
+    type ResidualStorage = Owned<f64, Dyn>;
+    type JacobianStorage = Owned<f64, Dyn, Dyn>;
+    type ParameterStorage = Owned<f64, Dyn>;
+
+    fn set_params(&mut self, parameters: &minpack::DVector<f64>) {
+        self.parameters.copy_from(parameters);
+    }
+
+    fn params(&self) -> minpack::DVector<f64> {
+        self.parameters.clone()
+    }
+
+    fn residuals(&self) -> Option<minpack::DVector<f64>> {
+        Some(minpack::DVector::from_vec((self.residuals)(self.parameters.as_slice())))
+    }
+
+    fn jacobian(&self) -> Option<minpack::DMatrix<f64>> {
+        Some(self.slopes())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_exponential_is_found_with_the_covariance_of_its_straight_neighbour() {
+        let times: Vec<f64> = (0..50).map(|k| 0.1 * f64::from(k)).collect();
+        let residuals = |p: &[f64]| {
+            times.iter().map(|t| (p[0] * libm::exp(-p[1] * t) - 2.0 * libm::exp(-0.7 * t)) / 0.01).collect()
+        };
+        let found = solve(&[1.0, 1.0], residuals).unwrap();
+        assert!((found.parameters[0] - 2.0).abs() < 1e-9 && (found.parameters[1] - 0.7).abs() < 1e-9);
+        // The normal matrix by hand.
+        let (mut a, mut b, mut c) = (0.0, 0.0, 0.0);
+        for t in &times {
+            let e = libm::exp(-0.7 * t);
+            let (x, y) = (e / 0.01, -2.0 * t * e / 0.01);
+            (a, b, c) = (a + x * x, b + x * y, c + y * y);
+        }
+        let determinant = a * c - b * b;
+        assert!((found.covariance[(0, 0)] / (c / determinant) - 1.0).abs() < 1e-6);
+        assert!((found.covariance[(0, 1)] / (-b / determinant) - 1.0).abs() < 1e-6);
+        assert_eq!(found.degrees, 48);
+    }
+
+    #[test]
+    fn a_parameter_that_nothing_depends_on_is_named() {
+        let lonely = solve(&[0.0, 0.0], |p| vec![p[0] - 1.0, 2.0 * p[0], 0.5 - p[0]]);
+        assert_eq!(lonely.unwrap_err(), NoSolution::NotDetermined(1));
+        let twins = solve(&[0.0, 0.0], |p| vec![p[0] + p[1] - 1.0, 2.0 * (p[0] + p[1]), 0.5]);
+        assert!(matches!(twins.unwrap_err(), NoSolution::NotDetermined(_)));
+    }
+}

@@ -1,0 +1,163 @@
+//! Where a unit stood still: static intervals of a run.
+//!
+//! A tick is still where the outputs of the accelerometers vary little over a window around it (Tedaldi, Pretto and Menegatti
+//! 2014), and the rates are near those of the still ticks: accelerometers do not feel a turn about the vertical. The window
+//! keeps half its length away from every motion.
+
+use super::track::{Track, quantile};
+
+/// What counts as still.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StillLimits {
+    /// Length of the window (s); eight ticks at least.
+    pub window_s: f64,
+    /// Variance over a window that is still, relative to that of the quietest fifth of the run, or of the given rest.
+    pub factor: f64,
+    /// Rate beyond which the unit turns (°/s), unless noise asks for more.
+    pub rate_deg_per_s: f64,
+    /// Shortest interval that counts (s), after `settle_s` was taken off its beginning.
+    pub least_s: f64,
+    /// Taken off the beginning of an interval (s).
+    pub settle_s: f64,
+}
+
+/// An interval of ticks, `first..end`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Interval {
+    /// First tick.
+    pub first: usize,
+    /// Tick behind the last.
+    pub end: usize,
+}
+
+/// Fewest ticks of a window.
+const FEWEST_TICKS: usize = 8;
+/// Standard deviations of noise that a still rate may be away.
+const RATE_SIGMAS: f64 = 6.0;
+/// Share of the run that is taken to be still where nothing is known.
+const QUIET_SHARE: f64 = 0.2;
+
+/// The still intervals of a run. `rest` is a stretch from its beginning (s) that is known to be still.
+#[must_use]
+pub fn still(track: &Track, limits: &StillLimits, rest: Option<f64>) -> Vec<Interval> {
+    let tick_s = track.tick_s();
+    let half = half_window(limits.window_s, tick_s);
+    let variance = sum_of(&track.outputs, |column| spread(column, half).1, track.len());
+    let in_rest = |values: &[f64]| -> f64 {
+        match rest {
+            Some(length_s) => {
+                let count = (0..values.len()).take_while(|tick| track.start_s(*tick) < length_s).count();
+                quantile(&values[..count.max(1).min(values.len())], 0.5)
+            }
+            None => quantile(values, QUIET_SHARE),
+        }
+    };
+    let limit = limits.factor * in_rest(&variance).max(least_variance(&track.outputs));
+    // False for no number too.
+    let calm: Vec<bool> = variance.iter().map(|value| *value <= limit).collect();
+    let turning = turning(track, limits, half, &calm);
+    let gap = |tick: usize| {
+        tick > 0 && (track.start_s(tick) - track.start_s(tick - 1)) > 1.5 * track.duration_s[tick - 1] + 1e-6
+    };
+    let mut found: Vec<Interval> = Vec::new();
+    let mut first = None;
+    for tick in 0..=track.len() {
+        let still = calm.get(tick).is_some_and(|calm| *calm) && !turning.get(tick).is_none_or(|turns| *turns);
+        if let Some(begin) = first.filter(|_| !still || gap(tick)) {
+            found.push(Interval { first: begin, end: tick });
+            first = None;
+        }
+        if still && first.is_none() {
+            first = Some(tick);
+        }
+    }
+    found.into_iter().filter_map(|interval| settled(track, interval, limits)).collect()
+}
+
+/// The interval without the time that the unit takes to settle; `None` where what is left is too short.
+fn settled(track: &Track, interval: Interval, limits: &StillLimits) -> Option<Interval> {
+    let begin = track.start_s(interval.first);
+    let settling = (interval.first..interval.end)
+        .take_while(|tick| track.start_s(*tick) < begin + limits.settle_s - 1e-9)
+        .count();
+    let first = interval.first + settling;
+    let length = track.duration_s[first..interval.end].iter().sum::<f64>();
+    (length >= limits.least_s - 1e-9).then_some(Interval { first, end: interval.end })
+}
+
+/// Ticks to either side of a window's middle.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "float-to-int `as` saturates")]
+fn half_window(window_s: f64, tick_s: f64) -> usize {
+    ((0.5 * window_s / tick_s).round() as usize).max(FEWEST_TICKS / 2)
+}
+
+/// Ticks at which the rate is not that of rest.
+fn turning(track: &Track, limits: &StillLimits, half: usize, calm: &[bool]) -> Vec<bool> {
+    let mut turning = vec![false; track.len()];
+    for column in &track.rate_deg_per_s {
+        let (mean, variance) = spread(column, half);
+        let of_calm = |values: &[f64]| -> Vec<f64> {
+            values.iter().zip(calm).filter(|(_, calm)| **calm).map(|(value, _)| *value).collect()
+        };
+        let rest = quantile(&of_calm(&mean), 0.5);
+        #[expect(clippy::cast_precision_loss, reason = "ticks of a window")]
+        let ticks = (2 * half + 1) as f64;
+        let noise = (quantile(&of_calm(&variance), QUIET_SHARE) / ticks).max(0.0).sqrt();
+        let limit = limits.rate_deg_per_s.max(RATE_SIGMAS * noise);
+        for (turns, mean) in turning.iter_mut().zip(&mean) {
+            *turns |= (mean - rest).abs() > limit;
+        }
+    }
+    turning
+}
+
+/// Mean and variance of a column over a window around each tick; where the window is cut by the run's end, over what is there.
+#[expect(clippy::cast_precision_loss, reason = "ticks of a window")]
+fn spread(column: &[f64], half: usize) -> (Vec<f64>, Vec<f64>) {
+    // Sums of squares would lose the variance beside a large mean.
+    let about = quantile(column, 0.5);
+    let mut sums = Vec::with_capacity(column.len() + 1);
+    let (mut first, mut second) = (0.0, 0.0);
+    sums.push((0.0, 0.0));
+    let mut broken_until = 0;
+    let mut broken = vec![false; column.len()];
+    for (tick, value) in column.iter().enumerate() {
+        let away = value - about;
+        if away.is_finite() {
+            first += away;
+            second += away * away;
+        } else {
+            let low = tick.saturating_sub(half).max(broken_until);
+            broken_until = (tick + half + 1).min(column.len());
+            broken[low..broken_until].fill(true);
+        }
+        sums.push((first, second));
+    }
+    let of = |tick: usize| {
+        if broken[tick] {
+            return (f64::NAN, f64::NAN);
+        }
+        let (low, high) = (tick.saturating_sub(half), (tick + half + 1).min(column.len()));
+        let count = (high - low) as f64;
+        let mean = (sums[high].0 - sums[low].0) / count;
+        let square = (sums[high].1 - sums[low].1) / count;
+        (about + mean, (square - mean * mean).max(0.0) * count / (count - 1.0).max(1.0))
+    };
+    (0..column.len()).map(of).unzip()
+}
+
+/// Sum over columns of what is made of each.
+fn sum_of(columns: &[Vec<f64>], of: impl Fn(&[f64]) -> Vec<f64>, length: usize) -> Vec<f64> {
+    let mut sum = vec![0.0; length];
+    for column in columns {
+        sum.iter_mut().zip(of(column)).for_each(|(sum, value)| *sum += value);
+    }
+    sum
+}
+
+/// Variance that is still whatever the noise: a hundred-thousandth of the range that the outputs go through.
+fn least_variance(columns: &[Vec<f64>]) -> f64 {
+    let range = |column: &Vec<f64>| quantile(column, 0.99) - quantile(column, 0.01);
+    let widest = columns.iter().map(range).fold(0.0, f64::max);
+    1e-10 * widest * widest
+}

@@ -1,0 +1,96 @@
+//! A table of times: which position was held from when to when.
+
+use std::path::Path;
+
+use isotherm_log::file::read_small_text;
+
+use super::plan::Plan;
+use super::pose::Pose;
+use super::still::Interval;
+use super::track::Track;
+use crate::error::Error;
+
+/// Rows of the table.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Times {
+    /// Start and end since the run's beginning (s), position, and the run's name where there are several.
+    pub rows: Vec<([f64; 2], String, Option<String>)>,
+}
+
+impl Times {
+    /// Reads `start_s,end_s,position` or `start_s,end_s,position,log` behind a line that says which.
+    ///
+    /// # Errors
+    /// [`Error::Log`] where it cannot be read, [`Error::Usage`] with what is wrong in it.
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        let text = read_small_text(path, "read the table of times")?;
+        let wrong = |line: usize, words: String| {
+            Error::Usage(format!("{}:{line}: {words}; a row is start_s,end_s,position[,log]", path.display()))
+        };
+        let mut rows = Vec::new();
+        let lines = text.lines().enumerate().map(|(index, line)| (index + 1, line.trim()));
+        let mut lines = lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
+        match lines.next() {
+            Some((_, "start_s,end_s,position" | "start_s,end_s,position,log")) => {}
+            other => {
+                return Err(wrong(other.map_or(1, |o| o.0), "the first line must name the columns".into()));
+            }
+        }
+        for (line, row) in lines {
+            let cells: Vec<&str> = row.split(',').map(str::trim).collect();
+            let (start, end, position, log) = match cells[..] {
+                [start, end, position] => (start, end, position, None),
+                [start, end, position, log] => (start, end, position, Some(log.to_owned())),
+                _ => return Err(wrong(line, format!("{} cells", cells.len()))),
+            };
+            let number = |cell: &str| {
+                let value: Option<f64> = cell.parse().ok().filter(|value: &f64| value.is_finite());
+                value.ok_or_else(|| wrong(line, format!("{cell:?} is no number of seconds")))
+            };
+            let span = [number(start)?, number(end)?];
+            if span[1] <= span[0] {
+                return Err(wrong(
+                    line,
+                    format!("it ends at {} s, before it starts at {} s", span[1], span[0]),
+                ));
+            }
+            rows.push((span, position.to_owned(), log));
+        }
+        Ok(Self { rows })
+    }
+
+    /// The poses of a run, with their positions' numbers.
+    ///
+    /// # Errors
+    /// Rows that do not fit the run or the plan.
+    pub fn poses(&self, track: &Track, run: usize, plan: &Plan) -> Result<Vec<(Pose, usize)>, Vec<String>> {
+        let mut reasons = Vec::new();
+        let mut found = Vec::new();
+        let own = |log: &Option<String>| log.as_ref().is_none_or(|log| *log == track.run);
+        for (span, name, _) in self.rows.iter().filter(|(.., log)| own(log)) {
+            let Some(position) = plan.index_of(name) else {
+                let names: Vec<&str> = plan.positions.iter().map(|position| position.name.as_str()).collect();
+                reasons.push(format!(
+                    "--times: {name:?} is no position of the plan, which has {}",
+                    names.join(", ")
+                ));
+                continue;
+            };
+            let within = |tick: &usize| {
+                let start = track.start_s(*tick);
+                start >= span[0] - 1e-9 && start + track.duration_s[*tick] <= span[1] + 1e-9
+            };
+            let ticks: Vec<usize> = (0..track.len()).filter(within).collect();
+            let (Some(first), Some(last)) = (ticks.first(), ticks.last()) else {
+                reasons.push(format!(
+                    "--times: {name} from {} to {} s has no tick of {}: times count from its first tick",
+                    span[0], span[1], track.run
+                ));
+                continue;
+            };
+            let interval = Interval { first: *first, end: last + 1 };
+            found.extend(Pose::of(track, run, &[interval]).into_iter().map(|pose| (pose, position)));
+        }
+        if reasons.is_empty() { Ok(found) } else { Err(reasons) }
+    }
+}

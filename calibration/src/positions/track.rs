@@ -1,0 +1,179 @@
+//! A run tick by tick, for finding where the unit stood still: accelerometer outputs, rates along the case axes, temperatures.
+
+use std::collections::BTreeMap;
+
+use isotherm_correction::sample::OutputKind;
+use isotherm_correction::units::AngularRate;
+use isotherm_log::offline::Loaded;
+
+use crate::error::Error;
+use crate::run::{Run, Watch};
+
+/// Ticks of a run, as columns of equal length.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Track {
+    /// Name of the run.
+    pub run: String,
+    /// Ends of the accelerometer ticks (ns on the producer's clock).
+    pub end_ns: Vec<i64>,
+    /// Their durations (s).
+    pub duration_s: Vec<f64>,
+    /// Output of each accelerometer: counts/s, V, m/s², or whatever the log's unit is.
+    pub outputs: Vec<Vec<f64>>,
+    /// Whether the outputs come from counts.
+    pub counts: bool,
+    /// Output of each gyro: rad/s, or counts/s.
+    pub gyros: Vec<Vec<f64>>,
+    /// Whether the gyros put out counts.
+    pub gyro_counts: bool,
+    /// Rate about each case axis with the document at hand (°/s).
+    pub rate_deg_per_s: [Vec<f64>; 3],
+    /// Specific force along each case axis with the document at hand (m/s²).
+    pub force_m_per_s2: [Vec<f64>; 3],
+    /// Smoothed temperature by channel, as the correction applies it (°C).
+    pub temperature_deg_c: BTreeMap<String, Vec<f64>>,
+}
+
+impl Track {
+    /// Reads a run, once as it stands and once through the service's own code.
+    ///
+    /// # Errors
+    /// As [`Run::series`] and [`Run::correct`]; [`Error::Refused`] without accelerometers.
+    pub fn of(run: &Run, loaded: &Loaded, mut watch: impl Watch) -> Result<Self, Error> {
+        let series = run.series(Lent(&mut watch))?;
+        let accels = &series.accels;
+        if accels.is_empty() {
+            return Err(Error::Refused(vec![format!(
+                "{} has no accelerometer ticks: positions need an accelerometer in the log and its mapping",
+                run.name
+            )]));
+        }
+        let mut gyro_ns = Vec::new();
+        let mut rates: [Vec<f64>; 3] = Default::default();
+        let mut forces: [Vec<f64>; 3] = Default::default();
+        let mut temperatures: BTreeMap<String, Vec<f64>> = BTreeMap::new();
+        run.correct(loaded, watch, |tick, unit| {
+            let duration_s = tick.duration.as_s();
+            gyro_ns.push(tick.end_time.as_ns());
+            for (column, angle) in rates.iter_mut().zip(tick.delta_angle) {
+                column.push(AngularRate::from_rad_per_s(angle / duration_s).as_deg_per_s());
+            }
+            for (column, velocity) in forces.iter_mut().zip(tick.delta_velocity) {
+                column.push(velocity / duration_s);
+            }
+            for channel in unit.channels() {
+                let column = temperatures.entry(channel.name.to_string()).or_default();
+                column.resize(gyro_ns.len() - 1, f64::NAN);
+                let good = channel.state.filter(|_| !channel.stale);
+                column.push(good.map_or(f64::NAN, |state| state.temperature));
+            }
+        })?;
+        temperatures.values_mut().for_each(|column| column.resize(gyro_ns.len(), f64::NAN));
+        let at = nearest(&accels.end_ns, &gyro_ns);
+        let taken = |column: &[f64]| -> Vec<f64> {
+            at.iter().map(|index| column.get(*index).copied().unwrap_or(f64::NAN)).collect()
+        };
+        let per_second = |columns: &[Vec<f64>], durations: &[f64], kind| -> Vec<Vec<f64>> {
+            let rate = |column: &Vec<f64>| column.iter().zip(durations).map(|(count, s)| count / s).collect();
+            columns
+                .iter()
+                .map(|column| if kind == Some(OutputKind::Counts) { rate(column) } else { column.clone() })
+                .collect()
+        };
+        let gyros = per_second(&series.gyros.readings, &series.gyros.duration_s, series.gyros.output);
+        let own = nearest(&accels.end_ns, &series.gyros.end_ns);
+        let of_own = |column: &Vec<f64>| -> Vec<f64> {
+            own.iter().map(|index| column.get(*index).copied().unwrap_or(f64::NAN)).collect()
+        };
+        Ok(Self {
+            run: run.name.clone(),
+            outputs: per_second(&accels.readings, &accels.duration_s, accels.output),
+            counts: accels.output == Some(OutputKind::Counts),
+            gyros: gyros.iter().map(of_own).collect(),
+            gyro_counts: series.gyros.output == Some(OutputKind::Counts),
+            rate_deg_per_s: rates.each_ref().map(|column| taken(column)),
+            force_m_per_s2: forces.each_ref().map(|column| taken(column)),
+            temperature_deg_c: temperatures
+                .iter()
+                .map(|(name, column)| (name.clone(), taken(column)))
+                .collect(),
+            end_ns: series.accels.end_ns,
+            duration_s: series.accels.duration_s,
+        })
+    }
+
+    /// Number of ticks.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.end_ns.len()
+    }
+
+    /// Whether there are none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.end_ns.is_empty()
+    }
+
+    /// Median duration of a tick (s).
+    #[must_use]
+    pub fn tick_s(&self) -> f64 {
+        quantile(&self.duration_s, 0.5)
+    }
+
+    /// Start of a tick since the run's beginning (s).
+    #[must_use]
+    #[expect(clippy::cast_precision_loss, reason = "a run is far below 2⁵³ ns")]
+    pub fn start_s(&self, tick: usize) -> f64 {
+        let (Some(first), Some(end)) = (self.end_ns.first(), self.end_ns.get(tick)) else { return f64::NAN };
+        let duration = |index: usize| self.duration_s.get(index).copied().unwrap_or(0.0);
+        (end - first) as f64 * 1e-9 + duration(0) - duration(tick)
+    }
+}
+
+/// A watch that is lent.
+struct Lent<'a, W: Watch>(&'a mut W);
+
+impl<W: Watch> Watch for Lent<'_, W> {
+    fn begin(&mut self, progress: isotherm_log::progress::Progress) {
+        self.0.begin(progress);
+    }
+
+    fn step(&mut self) {
+        self.0.step();
+    }
+
+    fn end(&mut self) {
+        self.0.end();
+    }
+}
+
+/// Index of the nearest of increasing times for each of other increasing times.
+fn nearest(of: &[i64], among: &[i64]) -> Vec<usize> {
+    let mut place = 0;
+    let distance = |index: usize, time: i64| among.get(index).map_or(i64::MAX, |at| (at - time).abs());
+    let step = |time: &i64| {
+        while place + 1 < among.len() && distance(place + 1, *time) <= distance(place, *time) {
+            place += 1;
+        }
+        place
+    };
+    of.iter().map(step).collect()
+}
+
+/// The value below which a share of the finite values lies; NaN without any.
+#[must_use]
+#[expect(
+    clippy::cast_precision_loss,
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "an index within the values"
+)]
+pub fn quantile(values: &[f64], share: f64) -> f64 {
+    let mut good: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
+    if good.is_empty() {
+        return f64::NAN;
+    }
+    let index = (share * (good.len() - 1) as f64).round() as usize;
+    let (_, value, _) = good.select_nth_unstable_by(index, f64::total_cmp);
+    *value
+}

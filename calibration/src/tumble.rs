@@ -1,0 +1,13 @@
+//! A unit tumbled by hand: accelerometers from |f| = g, gyros against the accelerometers (models §9).
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`accel`], [`gyro`] | the two fits |
+//! | [`analysis`] | from a run to both, and every reason not to |
+//! | [`document`], [`report`] | as a document; in words, with what the service leaves |
+
+pub mod accel;
+pub mod analysis;
+pub mod document;
+pub mod gyro;
+pub mod report;

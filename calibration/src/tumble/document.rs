@@ -1,0 +1,92 @@
+//! What was found of a tumbled unit, as a document.
+
+use isotherm_correction::units::AngularRate;
+use isotherm_protocol::document::{Curve, Document, Shape};
+
+use super::accel::AccelFit;
+use super::analysis::Tumble;
+use super::gyro::GyroFit;
+use crate::positions::document::{level, units};
+use crate::positions::temperature::value_at;
+use crate::written::tidy;
+
+/// Puts what was found into a document; gives what is to be said of it.
+///
+/// A tumble log has one temperature: curves over temperature keep their shape and go through what was found there.
+#[must_use]
+pub fn complete(document: &Document, tumble: &Tumble) -> (Document, Vec<String>) {
+    let mut document = document.clone();
+    let mut warnings = Vec::new();
+    let assumed = document.temperature.assumed_deg_c;
+    let temperature = |channel: Option<&String>| {
+        channel.and_then(|channel| tumble.mean_temperature(channel)).unwrap_or(assumed)
+    };
+    if let Some(accel) = &mut document.accel {
+        let units = units(accel.output);
+        for (index, sensor) in accel.sensor.iter_mut().enumerate() {
+            let deg_c = temperature(sensor.channel.as_ref());
+            let AccelFit { scale, bias, .. } = &tumble.accel;
+            if !level(sensor, scale[index], bias[index], deg_c, units) {
+                warnings.push(format!(
+                    "accelerometer {}: the old document's spline over temperature cannot be moved and is gone",
+                    sensor.name
+                ));
+            }
+        }
+        accel.orientation.rows = tumble.accel.rows.iter().map(|row| row.map(tidy)).collect();
+        if accel.orientation.thermal.take().is_some() {
+            warnings.push(
+                "the old document's slopes of the accelerometers' axes are gone: the case axes are new ones"
+                    .to_owned(),
+            );
+        }
+    }
+    if let Ok(gyro) = &tumble.gyro {
+        gyros(&mut document, gyro, &temperature);
+    }
+    (document, warnings)
+}
+
+/// Puts the gyros into the document.
+fn gyros(document: &mut Document, found: &GyroFit, temperature: &dyn Fn(Option<&String>) -> f64) {
+    for (index, sensor) in document.gyro.sensor.iter_mut().enumerate() {
+        let deg_c = temperature(sensor.channel.as_ref());
+        let error = sensor.increment_weight_error.as_ref().and_then(|curve| value_at(curve.shape(), deg_c));
+        let weight = found.weight[index];
+        sensor.increment_weight_rad_per_rad = Some(tidy(weight / (1.0 + error.unwrap_or(0.0) * 1e-6)));
+        let rest = AngularRate::from_rad_per_s(weight * found.rest[index]).as_deg_per_h();
+        let there = sensor.static_bias.take();
+        let old = there.as_ref().and_then(|curve| value_at(curve.shape(), deg_c));
+        sensor.static_bias = Some(match (there, old) {
+            (Some(curve), Some(old)) => curve.plus(tidy(rest - old)),
+            _ => Curve::new(Shape::Constant { value: tidy(rest) }),
+        });
+    }
+    document.gyro.orientation.rows = found.rows.iter().map(|row| row.map(tidy)).collect();
+    document.gyro.orientation.thermal = None;
+}
+
+/// The document that "before" stands for: the one that was given, or else one scale factor and one zero for all accelerometers.
+#[must_use]
+pub fn before(base: &Document, tumble: &Tumble, given: bool) -> Document {
+    let mut document = base.clone();
+    let mean = |values: [f64; 3]| tidy(values.iter().sum::<f64>() / 3.0);
+    if let Some(accel) = document.accel.as_mut().filter(|_| !given) {
+        let (scale_unit, bias_unit) = units(accel.output);
+        for sensor in &mut accel.sensor {
+            let constant = |value| Shape::Constant { value };
+            sensor.scale_factor = Curve::new(constant(mean(tumble.accel.scale))).in_unit(scale_unit);
+            sensor.bias = Some(Curve::new(constant(mean(tumble.accel.bias))).in_unit(bias_unit));
+        }
+    }
+    if let Ok(gyro) =
+        tumble.gyro.as_ref().map_err(|_| ()).and_then(|gyro| if given { Err(()) } else { Ok(gyro) })
+    {
+        // Without the mean at rest the gyros would be judged by their bias, which nobody leaves in.
+        for (sensor, rest) in document.gyro.sensor.iter_mut().zip(gyro.rest) {
+            let rest = AngularRate::from_rad_per_s(rest).as_deg_per_h();
+            sensor.static_bias = Some(Curve::new(Shape::Constant { value: tidy(rest) }));
+        }
+    }
+    document
+}

@@ -1,0 +1,198 @@
+//! What is said of a tumbled unit.
+
+use isotherm_log::plot::page::Table;
+use isotherm_protocol::document::{Document, Sample};
+use serde_json::json;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use super::accel::norm;
+use super::analysis::{Settings, Tumble, transitions};
+use super::gyro::angle_of;
+use crate::error::Error;
+use crate::means::Size;
+use crate::positions::budget::ARCSEC_PER_RAD;
+use crate::positions::pose::Pose;
+use crate::positions::track::Track;
+use crate::provenance::{command_line, origin};
+use crate::report::{Coefficient, Curve, Figure, FitReport, Verdict, residuals};
+
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// What a calibration leaves of the poses, by the service's own output.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Left {
+    /// |f| − g by pose (m/s²).
+    pub length: Vec<f64>,
+    /// Direction of f by pose.
+    pub direction: Vec<[f64; 3]>,
+    /// Angle between predicted and found direction by turn (°).
+    pub angle_deg: Vec<f64>,
+}
+
+impl Left {
+    /// Of the same ticks as the poses.
+    #[must_use]
+    pub fn of(track: &Track, poses: &[Pose], gravity: f64) -> Self {
+        let own: Vec<Pose> = poses.iter().map(|pose| Pose::over(track, pose.run, pose.interval)).collect();
+        let force: Vec<[f64; 3]> = own.iter().map(|pose| pose.force_m_per_s2).collect();
+        let turns = transitions(&own, |pose| pose.force_m_per_s2);
+        Self {
+            length: force.iter().map(|force| norm(*force) - gravity).collect(),
+            direction: force.iter().map(|force| force.map(|c| c / norm(*force))).collect(),
+            angle_deg: turns.iter().map(|turn| angle_of(track, turn).to_degrees()).collect(),
+        }
+    }
+}
+
+/// Everything that is said.
+#[must_use]
+pub fn report(
+    document: &Document,
+    tumble: &Tumble,
+    settings: &Settings,
+    [before, after]: [&Left; 2],
+) -> FitReport {
+    let mut report = FitReport::new("Accelerometers and gyros from a tumbled unit", &document.unit);
+    let sizes = |of: fn(&Left) -> &[f64]| [Size::of(of(before)), Size::of(of(after))];
+    let length = sizes(|left| &left.length);
+    let accel = Verdict::new("|f|−g", "m/s²", length).stated_as(Figure::Rms);
+    report.verdicts.push(accel.out_of_sample(Some([length[0], tumble.held_out])));
+    let gyro = Verdict::new("gyros", "°", sizes(|left| &left.angle_deg)).stated_as(Figure::Rms);
+    report.verdicts.push(match &tumble.gyro {
+        Ok(_) => gyro.remark(format!("{} turns between poses", after.angle_deg.len())),
+        Err(words) => Verdict::new("gyros", "°", [Size::default(); 2]).refused(words.clone()),
+    });
+    report.warnings.clone_from(&tumble.warnings);
+    report.notes.push(format!(
+        "{} poses, found with {} times the variance of the still start; g = {} m/s². z is the input axis of the third accelerometer, \
+         y lies in the plane of the second and third. Out of sample: each pose by a fit of all others.",
+        tumble.poses.len(),
+        tumble.factor,
+        settings.gravity
+    ));
+    report.coefficients = coefficients(document, tumble);
+    let time_s: Arc<[f64]> =
+        tumble.poses.iter().map(|pose| 0.5 * (pose.span_s[0] + pose.span_s[1])).collect();
+    report.residuals.push(Curve {
+        of: "|f|−g".to_owned(),
+        measure: "m/s²".to_owned(),
+        run: String::new(),
+        sample: Sample::In,
+        window_s: 0.0,
+        time_s,
+        temperature_deg_c: Vec::new(),
+        before: before.length.clone(),
+        after: after.length.clone(),
+    });
+    report.tables.push(("Poses".to_owned(), rows(tumble, after)));
+    report
+}
+
+fn rows(tumble: &Tumble, after: &Left) -> Table {
+    let head = ["pose", "from, s", "to, s", "x", "y", "z", "|f|−g, mm/s²"].map(str::to_owned).to_vec();
+    let poses = tumble.poses.iter().zip(&after.direction).zip(&after.length).enumerate();
+    let row = |(index, ((pose, direction), length)): (usize, ((&Pose, &[f64; 3]), &f64))| {
+        let mut row = vec![(index + 1).to_string()];
+        row.extend(pose.span_s.map(|time| format!("{time:.2}")));
+        row.extend(direction.map(|c| format!("{c:.3}")));
+        row.push(format!("{:.3}", length * 1e3));
+        row
+    };
+    Table { head, rows: poses.map(row).collect() }
+}
+
+fn coefficients(document: &Document, tumble: &Tumble) -> Vec<Coefficient> {
+    let accel = &tumble.accel;
+    let output = document.accel.as_ref().map_or("", |accel| match accel.output {
+        isotherm_protocol::document::AccelOutput::Counts => "counts/s",
+        isotherm_protocol::document::AccelOutput::Volts => "V or raw",
+        isotherm_protocol::document::AccelOutput::MetresPerSecondSquared => "m/s²",
+    });
+    let mut all = Vec::new();
+    for (axis, name) in AXES.iter().enumerate() {
+        let of = |what: &str| format!("accelerometer {name} {what}");
+        let per_output = 1.0 / accel.scale[axis];
+        let sigma = accel.sigma[axis];
+        all.push(Coefficient::new(
+            of("1/K"),
+            format!("m/s² per {output}"),
+            per_output,
+            Some(per_output.abs() * sigma),
+        ));
+        all.push(Coefficient::new(of("S"), output, accel.bias[axis], Some(accel.sigma[3 + axis])));
+    }
+    for (index, (row, column)) in [(0, 1), (0, 2), (1, 2)].into_iter().enumerate() {
+        let value = accel.rows[row][column] * ARCSEC_PER_RAD;
+        let name = format!("accelerometer {} along {}", AXES[row], AXES[column]);
+        all.push(Coefficient::new(name, "″", value, Some(accel.sigma[6 + index] * ARCSEC_PER_RAD)));
+    }
+    let Ok(gyro) = &tumble.gyro else { return all };
+    for (axis, name) in AXES.iter().enumerate() {
+        all.push(Coefficient::new(
+            format!("gyro {name} K"),
+            "rad/s per rad/s of the log",
+            gyro.weight[axis],
+            Some(gyro.sigma[axis]),
+        ));
+        all.push(Coefficient::new(
+            format!("gyro {name} at rest"),
+            "°/s",
+            (gyro.weight[axis] * gyro.rest[axis]).to_degrees(),
+            None,
+        ));
+        for (which, column) in (0..3).filter(|column| *column != axis).enumerate() {
+            all.push(Coefficient::new(
+                format!("gyro {name} along {}", AXES[column]),
+                "″",
+                gyro.rows[axis][column] * ARCSEC_PER_RAD,
+                Some(gyro.sigma[3 + 2 * axis + which] * ARCSEC_PER_RAD),
+            ));
+        }
+    }
+    all
+}
+
+/// States in the document where its numbers come from.
+///
+/// # Errors
+/// [`Error::Log`] where a log cannot be read for its digest.
+pub fn with_origin(
+    document: &mut Document,
+    tumble: &Tumble,
+    settings: &Settings,
+    report: &FitReport,
+    logs: &[PathBuf],
+) -> Result<(), Error> {
+    let mut origin = origin(logs, &command_line())?;
+    origin.method = Some("tumble: |f| = g over still poses; gyros against the accelerometers".to_owned());
+    origin.residual = residuals(&report.verdicts);
+    let coefficients: serde_json::Map<String, serde_json::Value> = report
+        .coefficients
+        .iter()
+        .map(|c| {
+            (c.name.clone(), json!({ "value": c.value, "sigma": c.sigma.unwrap_or(0.0), "unit": c.unit }))
+        })
+        .collect();
+    let covariance: Vec<Vec<f64>> =
+        tumble.accel.covariance.row_iter().map(|row| row.iter().copied().collect()).collect();
+    let old = document.origin.take().and_then(|old| old.details);
+    let mut details = old.unwrap_or_default();
+    let about = json!({
+        "gravity_m_per_s2": settings.gravity,
+        "poses": tumble.poses.len(),
+        "stillness_factor": tumble.factor,
+        "window_s": settings.limits.window_s,
+        "held_out_rms_m_per_s2": tumble.held_out.rms,
+        "verdict": report.headline(),
+        "warnings": report.warnings,
+        "coefficients": coefficients,
+        // Scale factors (relative), biases over K·g, angles xy, xz, yz (rad).
+        "accelerometer_covariance": covariance,
+    });
+    let about = toml::Value::try_from(about).map_err(|error| Error::Document(vec![error.to_string()]))?;
+    details.insert("tumble".to_owned(), about);
+    origin.details = Some(details);
+    document.origin = Some(origin);
+    Ok(())
+}

@@ -1,0 +1,323 @@
+//! `positions`: a simulated stand with its errors, from the log to the document.
+#![expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, reason = "counts of tests")]
+#![expect(clippy::unwrap_used, reason = "helpers of tests end the test where something is not as it must be")]
+
+#[path = "positions_stand/mod.rs"]
+#[expect(dead_code, reason = "other tests use the rest")]
+mod stand;
+
+use isotherm_calibration::positions::analysis::{Analysis, Settings, analyse};
+use isotherm_calibration::positions::document::complete;
+use isotherm_calibration::positions::judged::judge;
+use isotherm_calibration::positions::model::SMALL;
+use isotherm_calibration::positions::plan::Plan;
+use isotherm_calibration::positions::still::StillLimits;
+use isotherm_calibration::positions::times::Times;
+use isotherm_calibration::positions::track::Track;
+use isotherm_calibration::run::Run;
+use isotherm_calibration::written::Written;
+use isotherm_correction::unit::UnitSettings;
+use isotherm_log::offline::Offline;
+use nalgebra::{DMatrix, DVector};
+use stand::{ARCSEC, Dice, GRAVITY, HZ_PER_V, Stand};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+const POSITIONING: f64 = 5.385 * ARCSEC;
+const LEVELLING: f64 = 60.0 * ARCSEC;
+/// The housing is warmer than the chamber, and C follows it.
+const HOUSING_ABOVE_DEG_C: f64 = 2.0;
+
+fn settings(plan: Plan, times: Option<Times>) -> Settings {
+    Settings {
+        plan,
+        gravity: GRAVITY,
+        limits: StillLimits { window_s: 1.0, factor: 4.0, rate_deg_per_s: 0.2, least_s: 8.0, settle_s: 2.0 },
+        times,
+        positioning_rad: POSITIONING,
+        levelling_rad: LEVELLING,
+        channels: vec!["housing".to_owned()],
+        reference_deg_c: None,
+    }
+}
+
+/// Slow ticks and short holds, for many seeds: noise and errors of the stand are what they are at any tick rate.
+fn quick(seed: u64) -> Stand {
+    Stand {
+        errors: Dice::new(seed ^ 0xabcd).vector(LEVELLING),
+        positioning: POSITIONING,
+        tick_ns: 1_000_000_000,
+        hold_s: 20.0,
+        start_s: 0.0,
+        turn_deg_per_s: None,
+        seed,
+    }
+}
+
+fn times(plan: &Plan, log: &str, held: &[([f64; 2], usize)]) -> Times {
+    let row = |(span, position): &([f64; 2], usize)| {
+        (*span, plan.positions[*position].name.clone(), Some(log.to_owned()))
+    };
+    Times { rows: held.iter().map(row).collect() }
+}
+
+fn tracks(runs: &[Run], written: &Written) -> Vec<Track> {
+    runs.iter().map(|run| Track::of(run, &written.loaded, ()).unwrap()).collect()
+}
+
+/// Difference from the true axes at one power, as two angles per accelerometer.
+fn away(analysis: &Analysis, rows: &[[f64; 3]; 3], power: usize, quadratic: bool) -> DVector<f64> {
+    let fit = if quadratic { &analysis.quadratic.as_ref().unwrap().0 } else { &analysis.fit };
+    let angles = fit.sensors.iter().zip(&fit.guess).zip(rows).flat_map(|((sensor, guess), truth)| {
+        let error = [0, 1, 2].map(|i| sensor.axis[power][i] - truth[i]);
+        guess.across.map(|across| (0..3).map(|i| error[i] * across[i]).sum::<f64>())
+    });
+    DVector::from_iterator(6, angles)
+}
+
+fn chi_square(away: &DVector<f64>, covariance: DMatrix<f64>) -> f64 {
+    away.dot(&covariance.cholesky().unwrap().solve(away))
+}
+
+/// χ² of many seeds must be neither too large nor too small, in sum and in both tails.
+#[track_caller]
+fn plausible(what: &str, values: &[f64], degrees: f64) {
+    let sum: f64 = values.iter().sum();
+    let all = ChiSquared::new(degrees * values.len() as f64).unwrap();
+    let one = ChiSquared::new(degrees).unwrap();
+    let share = |low: f64, high: f64| values.iter().filter(|v| (low..high).contains(&one.cdf(**v))).count();
+    let (lower, upper) = (share(0.0, 0.05), share(0.95, 2.0));
+    let mean = sum / (degrees * values.len() as f64);
+    println!(
+        "{what}: χ² per degree {mean:.3}, p {:.4}; {lower} below 5 %, {upper} above 95 % of {}",
+        all.cdf(sum),
+        values.len()
+    );
+    assert!((0.001..0.999).contains(&all.cdf(sum)), "{what}: mean χ² per degree {mean}");
+    // Five in a hundred in each tail, within three and a half standard deviations.
+    let expected = 0.05 * values.len() as f64;
+    let room = 3.5 * (0.95 * expected).sqrt();
+    for count in [lower, upper] {
+        assert!((count as f64 - expected).abs() < room, "{what}: {count} in a tail, {expected} ± {room}");
+    }
+}
+
+#[test]
+fn twelve_positions_with_random_stand_errors_find_the_axes_within_their_covariance() {
+    let (plan, document) = (Plan::twelve(), Written::of(&stand::document()).unwrap());
+    let instrument = stand::instrument();
+    let truth = stand::true_rows(&instrument, 20.0 + HOUSING_ABOVE_DEG_C);
+    let (mut axes, mut stands, mut fits) = (Vec::new(), Vec::new(), Vec::new());
+    for seed in 0..200 {
+        let how = quick(seed);
+        let (events, held) = stand::log(&instrument, 20.0, &plan, &(0..12).collect::<Vec<_>>(), &how);
+        let runs = [stand::run("room", events)];
+        let settings = settings(plan.clone(), Some(times(&plan, "room", &held)));
+        let found = analyse(&tracks(&runs, &document), &document.document, &settings).unwrap();
+        let error = away(&found, &truth, 0, false);
+        axes.push(chi_square(&error, found.fit.axes_covariance(&plan, 0)));
+        let from = found.fit.solution.parameters.len() - 3;
+        let block = found.fit.solution.covariance.view((from, from), (3, 3)) * (SMALL * SMALL);
+        let errors = DVector::from_fn(3, |i, _| found.fit.stand[i].0 - how.errors[i]);
+        stands.push(chi_square(&errors, block.into_owned()));
+        fits.push(found.fit.solution.chi_square);
+        let sigma = found.fit.axis_sigma(&plan, 0, 0)[1] / ARCSEC;
+        assert!(sigma < 4.0, "{sigma}″: four positions for every element");
+    }
+    plausible("axes", &axes, 6.0);
+    plausible("stand", &stands, 3.0);
+    // 36 outputs and the prior of three errors, for fifteen parameters.
+    plausible("residuals", &fits, 24.0);
+}
+
+/// A unit whose axes go with temperature as they are told to, at five temperatures.
+fn over_temperature(seed: u64, bend: f64) -> (Analysis, [[f64; 3]; 3], [[f64; 3]; 3], [[f64; 3]; 3]) {
+    let plan = Plan::twelve();
+    let document = Written::of(&stand::document()).unwrap();
+    let level = stand::true_rows(&stand::instrument(), 20.0);
+    // Some ″/°C of silicon; the quadratic part is 40″ at the ends.
+    let slopes = [[0.0, 2.5e-5, -1.2e-5], [-0.9e-5, 0.0, 2.1e-5], [1.6e-5, -2.8e-5, 0.0]];
+    let bends = [[0.0, 8e-8, -5e-8], [-6e-8, 0.0, 7e-8], [5e-8, -8e-8, 0.0]]
+        .map(|row: [f64; 3]| row.map(|c| c * bend));
+    let (mut runs, mut rows) = (Vec::new(), Vec::new());
+    let errors = quick(seed).errors;
+    for (index, deg_c) in [-40.0, -10.0, 20.0, 45.0, 70.0].into_iter().enumerate() {
+        let away = deg_c + HOUSING_ABOVE_DEG_C - 20.0;
+        let axes = [0, 1, 2]
+            .map(|s| [0, 1, 2].map(|i| level[s][i] + slopes[s][i] * away + bends[s][i] * away * away));
+        let how = Stand { errors, ..quick(seed * 10 + index as u64 + 7) };
+        let order: Vec<usize> = (0..12).collect();
+        let (events, held) = stand::log(&stand::with_axes(&axes), deg_c, &plan, &order, &how);
+        let name = format!("at {deg_c}");
+        rows.extend(times(&plan, &name, &held).rows);
+        runs.push(stand::run(&name, events));
+    }
+    let settings = Settings { reference_deg_c: Some(20.0), ..settings(plan, Some(Times { rows })) };
+    (analyse(&tracks(&runs, &document), &document.document, &settings).unwrap(), level, slopes, bends)
+}
+
+#[test]
+fn linear_and_quadratic_axes_over_temperature_are_recovered() {
+    let plan = Plan::twelve();
+    let (mut straight, mut bent, mut slopes_of, mut bends_of) = (0, 0, Vec::new(), Vec::new());
+    for seed in 0..40 {
+        let (found, _, slopes, _) = over_temperature(seed, 0.0);
+        let scaled = slopes.map(|row| row.map(|c| c * found.half_deg_c));
+        slopes_of.push(chi_square(&away(&found, &scaled, 1, false), found.fit.axes_covariance(&plan, 1)));
+        straight += usize::from(found.quadratic.as_ref().unwrap().3 > 1e-3);
+        let (found, _, _, bends) = over_temperature(seed, 1.0);
+        let quadratic = found.quadratic.as_ref().unwrap();
+        bent += usize::from(quadratic.3 < 1e-3);
+        let scaled = bends.map(|row| row.map(|c| c * found.half_deg_c * found.half_deg_c));
+        bends_of.push(chi_square(&away(&found, &scaled, 2, true), quadratic.0.axes_covariance(&plan, 2)));
+    }
+    assert!(straight >= 39, "{straight} of 40 straight ones are seen as straight");
+    assert_eq!(bent, 40, "40″ at the ends are seen by every seed");
+    plausible("slopes", &slopes_of, 6.0);
+    plausible("quadratic terms", &bends_of, 6.0);
+    let (found, ..) = over_temperature(1, 1.0);
+    assert!(
+        found.warnings.iter().any(|words| words.contains("C bends with temperature")),
+        "{:?}",
+        found.warnings
+    );
+    assert!((found.widened - 1.0).abs() < 1e-12, "the quadratic form describes it: {}", found.widened);
+}
+
+/// Turns between the positions, poses found in the log, at 10 Hz.
+fn driven(seed: u64) -> Stand {
+    Stand { tick_ns: 100_000_000, hold_s: 14.0, turn_deg_per_s: Some(15.0), ..quick(seed) }
+}
+
+#[test]
+fn poses_are_found_and_known_though_some_are_missing_and_some_repeated() {
+    let (plan, document) = (Plan::twelve(), Written::of(&stand::document()).unwrap());
+    let instrument = stand::instrument();
+    let truth = stand::true_rows(&instrument, 20.0 + HOUSING_ABOVE_DEG_C);
+    let all: Vec<usize> = (0..12).collect();
+    let cases = [
+        ("all", all.clone(), 12, ""),
+        ("two missing", vec![0, 1, 2, 4, 5, 6, 7, 8, 9, 11], 10, "missing positions: X up a, Z down b"),
+        (
+            "one repeated",
+            vec![0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 2],
+            13,
+            "more than once, all of them used: Z down a",
+        ),
+        ("another order", vec![0, 4, 2, 3, 1, 7, 5, 6, 11, 9, 10, 8], 12, ""),
+        ("six", vec![0, 2, 3, 4, 5, 6], 6, "do not tell the stand's level from the axes"),
+    ];
+    for (name, order, count, words) in cases {
+        let (events, held) = stand::log(&instrument, 20.0, &plan, &order, &driven(5));
+        let runs = [stand::run("room", events)];
+        let found =
+            analyse(&tracks(&runs, &document), &document.document, &settings(plan.clone(), None)).unwrap();
+        assert_eq!(found.poses.len(), count, "{name}");
+        for ((pose, position, _), (span, planned)) in found.poses.iter().zip(&held) {
+            assert_eq!(position, planned, "{name}: {:?}", pose.span_s);
+            assert!(
+                pose.span_s[0] > span[0] && pose.span_s[1] < span[1] + 1e-6,
+                "{name}: {:?} in {span:?}",
+                pose.span_s
+            );
+        }
+        assert!(
+            words.is_empty() || found.warnings.iter().any(|w| w.contains(words)),
+            "{name}: {:?}",
+            found.warnings
+        );
+        let chi_square = chi_square(&away(&found, &truth, 0, false), found.fit.axes_covariance(&plan, 0));
+        assert!(chi_square < 22.5, "{name}: χ² {chi_square} with 6 degrees, 0.1 %");
+    }
+}
+
+#[test]
+fn the_document_gives_the_right_vectors_through_the_service_to_the_last_digit_that_is_stated() {
+    let (plan, base) = (Plan::twelve(), Written::of(&stand::document()).unwrap());
+    let instrument = stand::instrument();
+    let order: Vec<usize> = (0..12).collect();
+    let mut runs = Vec::new();
+    let mut logs = Vec::new();
+    for (index, deg_c) in [-30.0, 20.0, 60.0].into_iter().enumerate() {
+        let how = Stand { positioning: 0.0, seed: 90 + index as u64, ..driven(9) };
+        let (events, _) = stand::log(&instrument, deg_c, &plan, &order, &how);
+        logs.push(events.clone());
+        runs.push(stand::run(&format!("at {deg_c}"), events));
+    }
+    let exact = Settings { positioning_rad: 0.05 * ARCSEC, ..settings(plan.clone(), None) };
+    let found = analyse(&tracks(&runs, &base), &base.document, &exact).unwrap();
+    let (document, _) = complete(&base.document, &found, GRAVITY);
+    let written = Written::of(&document).unwrap();
+    let poses: Vec<_> = found.poses.iter().map(|(pose, position, _)| (pose.clone(), *position)).collect();
+    let errors = found.fit.stand.map(|(error, _)| error);
+    let (before, after) = (tracks(&runs, &base), tracks(&runs, &written));
+    let judged = judge(&plan, errors, GRAVITY, &poses, [&before, &after], &found.channels);
+    assert_eq!(judged.len(), 36);
+    for judgement in &judged {
+        // Noise of a mean over ten seconds is 1e-5 m/s², and what positions do not know of the stand is nothing.
+        assert!(judgement.error[1].iter().all(|e| e.abs() < 1e-4), "{judgement:?}");
+        assert!(judgement.error[0].iter().any(|e| e.abs() > 1e-2), "{judgement:?}");
+        assert!(judgement.length[1].abs() < 1e-4, "{judgement:?}");
+    }
+    // The same through the corrector once more, tick by tick.
+    for (judgement, (pose, position)) in judged.iter().zip(&poses) {
+        let mut unit = Offline::new(&written.loaded, UnitSettings::default());
+        let mut ticks = Vec::new();
+        for event in &logs[pose.run] {
+            unit.handle(event);
+            ticks.extend(unit.take());
+        }
+        unit.finish();
+        ticks.extend(unit.take());
+        let own = &ticks[pose.interval.first..pose.interval.end];
+        let seconds: f64 = own.iter().map(|tick| tick.duration.as_s()).sum();
+        let up = plan.up(&plan.positions[*position].attitude, errors);
+        for axis in 0..3 {
+            let mean = own.iter().map(|tick| tick.delta_velocity[axis]).sum::<f64>() / seconds;
+            let difference = mean - GRAVITY * up[axis] - judgement.error[1][axis];
+            assert!(difference.abs() < 1e-9 * GRAVITY, "axis {axis}: {difference}");
+        }
+    }
+    // Scale factors and biases are those of the simulated instrument.
+    for (sensor, truth) in found.fit.sensors.iter().zip(&instrument.accelerometers.unwrap().sensors) {
+        let (k, s) = (sensor.scale[0] / GRAVITY / HZ_PER_V, sensor.bias[0] / HZ_PER_V);
+        assert!((k / truth.scale_v_per_m_per_s2[0] - 1.0).abs() < 1e-5, "{k}");
+        assert!((s - truth.bias_v[0]).abs() < 1e-5, "{s} {}", truth.bias_v[0]);
+        let slope = sensor.scale[1] / sensor.scale[0] / found.half_deg_c;
+        assert!((slope / 1.1e-4 - 1.0).abs() < 1e-2, "{slope}");
+    }
+}
+
+#[test]
+fn what_cannot_be_fitted_is_refused_with_what_to_do() {
+    let (plan, document) = (Plan::twelve(), Written::of(&stand::document()).unwrap());
+    let instrument = stand::instrument();
+    let refused = |order: &[usize], how: &Stand, change: &dyn Fn(&mut Track)| {
+        let (events, _) = stand::log(&instrument, 20.0, &plan, order, how);
+        let mut tracks = tracks(&[stand::run("room", events)], &document);
+        tracks.iter_mut().for_each(change);
+        analyse(&tracks, &document.document, &settings(plan.clone(), None)).unwrap_err().join("\n")
+    };
+    let all: Vec<usize> = (0..12).collect();
+    let none = |_: &mut Track| {};
+    // Z is never up or down.
+    let flat = refused(&[0, 1, 3, 5, 6, 7, 9, 11], &driven(3), &none);
+    assert!(flat.contains("no position has z up, z down"), "{flat}");
+    let few = refused(&[0, 2, 3], &driven(3), &none);
+    assert!(few.contains("do not determine") || few.contains("no position has"), "{few}");
+    let short = refused(&all, &Stand { hold_s: 3.0, ..driven(3) }, &none);
+    assert!(short.contains("stands still nowhere") && short.contains("--least"), "{short}");
+    let dead = refused(&all, &driven(3), &|track| track.outputs[1].fill(0.0));
+    assert!(dead.contains("accelerometer y reads 0 in every tick"), "{dead}");
+    let gaps = refused(&all, &driven(3), &|track| {
+        track.outputs[2].iter_mut().step_by(20).for_each(|x| *x = f64::NAN)
+    });
+    assert!(gaps.contains("are no numbers"), "{gaps}");
+    let clipped = refused(&all, &driven(3), &|track| {
+        track.outputs[0].iter_mut().for_each(|x| *x = x.min(3e5));
+    });
+    assert!(clipped.contains("at its limit"), "{clipped}");
+    // A log without the turns, and not in the plan's order.
+    let jumps = Stand { turn_deg_per_s: None, ..driven(3) };
+    let lost = refused(&[0, 1, 2, 4, 5, 6, 7, 8, 9, 11], &jumps, &none);
+    assert!(lost.contains("--times"), "{lost}");
+}

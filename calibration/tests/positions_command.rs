@@ -1,0 +1,115 @@
+//! `positions` as its user calls it.
+#![expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, reason = "counts of tests")]
+#![expect(clippy::unwrap_used, reason = "helpers of tests end the test where something is not as it must be")]
+
+#[path = "positions_stand/mod.rs"]
+#[expect(dead_code, reason = "other tests use the rest")]
+mod stand;
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use isotherm_calibration::positions::plan::Plan;
+use isotherm_calibration::written::Written;
+use stand::{ARCSEC, Dice, Stand};
+
+/// A stand that turns the unit, ten ticks a second.
+fn driven(seed: u64) -> Stand {
+    Stand {
+        errors: Dice::new(seed).vector(60.0 * ARCSEC),
+        positioning: 5.385 * ARCSEC,
+        tick_ns: 100_000_000,
+        hold_s: 14.0,
+        start_s: 0.0,
+        turn_deg_per_s: Some(15.0),
+        seed,
+    }
+}
+
+/// Runs the command in a folder.
+fn calibrate(folder: &Path, args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_isotherm-calibrate")).current_dir(folder).args(args).output().unwrap()
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8(bytes.to_vec()).unwrap()
+}
+
+#[test]
+fn the_command_writes_the_document_and_says_what_it_did() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let order: Vec<usize> = (0..12).collect();
+    let mut logs = Vec::new();
+    for (name, deg_c) in [("cold", -20.0), ("room", 20.0), ("hot", 55.0)] {
+        let (events, _) = stand::log(&stand::instrument(), deg_c, &Plan::twelve(), &order, &driven(21));
+        let (csv, mapping) = stand::as_text(&events, true);
+        std::fs::write(at(&format!("{name}.csv")), csv).unwrap();
+        std::fs::write(at("mapping.toml"), mapping).unwrap();
+        logs.push(format!("{name}.csv"));
+    }
+    std::fs::write(at("base.toml"), Written::of(&stand::document()).unwrap().text).unwrap();
+    let common = ["--mapping", "mapping.toml", "--document", "base.toml", "--gravity", "9.8154"];
+    let call = |more: &[&str]| {
+        let mut args = vec!["positions", "cold.csv", "hot.csv"];
+        args.extend(common);
+        args.extend(more);
+        calibrate(folder.path(), &args)
+    };
+    let done = call(&["--out", "new.toml", "--html", "new.html", "--judge", "room.csv"]);
+    assert!(done.status.success(), "{}", text(&done.stderr));
+    let said = text(&done.stdout);
+    assert!(said.starts_with("accelerometer x: ") && said.contains("out of sample; accepted"), "{said}");
+    assert!(said.contains("stand δ1") && said.contains("Axes by temperature"), "{said}");
+    let page = std::fs::read_to_string(at("new.html")).unwrap();
+    assert!(page.contains("Axes over temperature") && page.contains("class=\"headline\""));
+    let written = Written::read(&at("new.toml")).unwrap();
+    let thermal = written.document.accel.as_ref().unwrap().orientation.thermal.as_ref().unwrap();
+    assert_eq!(
+        thermal.channels,
+        ["accel0", "accel1", "accel2"],
+        "the accelerometers' own where nothing else is said"
+    );
+    let origin = written.document.origin.as_ref().unwrap();
+    assert_eq!(
+        (origin.log.len(), origin.residual.len()),
+        (2, 8),
+        "two logs; three axes and |f| in and out of sample"
+    );
+    // The same bytes once more, and not over them without being asked.
+    let first = std::fs::read(at("new.toml")).unwrap();
+    let again = call(&["--out", "new.toml", "--html", "new.html", "--judge", "room.csv"]);
+    assert_eq!(again.status.code(), Some(2));
+    let again = call(&["--out", "new.toml", "--html", "new.html", "--judge", "room.csv", "--overwrite"]);
+    assert!(again.status.success());
+    let second = std::fs::read_to_string(at("new.toml")).unwrap();
+    assert_eq!(text(&first), second.replace(" --overwrite", ""));
+    // JSON instead of tables; a warning where nobody says what gravity is.
+    let json = calibrate(
+        folder.path(),
+        &["positions", "room.csv", "--mapping", "mapping.toml", "--document", "base.toml", "--json"],
+    );
+    let value: serde_json::Value = serde_json::from_slice(&json.stdout).unwrap();
+    assert!(value["warnings"].to_string().contains("state --gravity"), "{value}");
+    let wrong = call(&["--plan", "absent.toml"]);
+    assert!(!wrong.status.success() && text(&wrong.stderr).contains("absent.toml"));
+    let usage = call(&["--levelling", "0"]);
+    assert_eq!(usage.status.code(), Some(2));
+}
+
+#[test]
+fn the_budget_prints_the_examples_of_the_paper() {
+    let folder = tempfile::tempdir().unwrap();
+    let said = text(&calibrate(folder.path(), &["positions", "--budget"]).stdout);
+    for words in ["11.5", "10.6", "0.3″ for quartz", "1.2″ for silicon", "15.7″"] {
+        assert!(said.contains(words), "{words} is not in\n{said}");
+    }
+    let json = calibrate(
+        folder.path(),
+        &["positions", "--budget", "--json", "--axis-rate", "6", "--positioning", "1", "--run-out", "0"],
+    );
+    let value: serde_json::Value = serde_json::from_slice(&json.stdout).unwrap();
+    let stand = value["stand_arcsec"].as_f64().unwrap();
+    assert!((stand - 2.0 * 1.0_f64.hypot(2.0626)).abs() < 1e-3, "{value}");
+    assert!((value["temperature_arcsec"].as_f64().unwrap() - 1.2).abs() < 1e-12);
+}
