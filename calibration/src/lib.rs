@@ -10,6 +10,7 @@
 //! | [`nominal`], [`written`], [`provenance`] | a document: before a fit, on its way to a file, where its numbers come from |
 //! | [`drift`], [`allan`], [`spectrum`] | noise and drift of a static log |
 //! | [`impact`] | what a drift that is left means for navigation |
+//! | [`modes`] | drift polynomials and switch parameters of a mode-reversed laser gyro |
 //! | [`error`], [`cli`] | what can go wrong; the command line |
 
 pub mod allan;
@@ -20,6 +21,7 @@ pub mod error;
 mod fixture;
 pub mod impact;
 pub mod means;
+pub mod modes;
 pub mod nominal;
 pub mod provenance;
 pub mod run;
