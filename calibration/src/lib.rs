@@ -9,6 +9,7 @@
 //! | [`series`], [`means`] | a run as columns: raw readings; corrected outputs averaged over windows |
 //! | [`nominal`], [`written`], [`provenance`] | a document: before a fit, on its way to a file, where its numbers come from |
 //! | [`drift`], [`allan`], [`spectrum`] | noise and drift of a static log |
+//! | [`report`] | what a fit says: verdicts, before and after, coefficients; text, JSON and page |
 //! | [`impact`] | what a drift that is left means for navigation |
 //! | [`modes`] | drift polynomials and switch parameters of a mode-reversed laser gyro |
 //! | [`error`], [`cli`] | what can go wrong; the command line |
@@ -24,6 +25,7 @@ pub mod means;
 pub mod modes;
 pub mod nominal;
 pub mod provenance;
+pub mod report;
 pub mod run;
 pub mod series;
 pub mod spectrum;
