@@ -3,7 +3,12 @@
 mod bar;
 mod drift;
 mod impact;
+mod modes;
+mod output;
+mod place;
+mod rates;
 mod runs;
+mod units;
 
 use std::io::{self, Write};
 use std::process::ExitCode;
@@ -29,6 +34,8 @@ struct Cli {
 enum Command {
     Drift(drift::DriftArgs),
     Impact(impact::ImpactArgs),
+    Modes(modes::ModesArgs),
+    Rates(rates::RatesArgs),
     /// Print a completion script for a shell
     #[command(after_help = "Example:\n  isotherm-calibrate completions bash > isotherm-calibrate.bash")]
     Completions {
@@ -42,6 +49,8 @@ fn run(cli: Cli) -> Result<(), Error> {
     match cli.command {
         Command::Drift(args) => args.run(),
         Command::Impact(args) => args.run(),
+        Command::Modes(args) => args.run(),
+        Command::Rates(args) => args.run(),
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), "isotherm-calibrate", &mut script);

@@ -12,6 +12,7 @@
 //! | [`report`] | what a fit says: verdicts, before and after, coefficients; text, JSON and page |
 //! | [`impact`] | what a drift that is left means for navigation |
 //! | [`modes`] | drift polynomials and switch parameters of a mode-reversed laser gyro |
+//! | [`rates`] | scale factor, asymmetry, linearity and axes from a rate table |
 //! | [`error`], [`cli`] | what can go wrong; the command line |
 
 pub mod allan;
@@ -25,6 +26,7 @@ pub mod means;
 pub mod modes;
 pub mod nominal;
 pub mod provenance;
+pub mod rates;
 pub mod report;
 pub mod run;
 pub mod series;

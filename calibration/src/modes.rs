@@ -8,6 +8,7 @@
 //! | [`noise`] | white noise, whole counts and Markov drift of the means; least squares under it |
 //! | [`orders`], [`fit`] | orders by cross-validation; one gyro's coefficients |
 //! | [`checks`] | what a log must have |
+//! | [`judge`] | drift in running mode, before and after |
 //! | [`make`], [`document`] | the whole procedure; the document |
 //! | [`robust`] | middle and scatter |
 
@@ -16,6 +17,7 @@ pub mod checks;
 pub mod dither;
 pub mod document;
 pub mod fit;
+pub mod judge;
 pub mod make;
 mod minimum;
 pub mod noise;

@@ -81,6 +81,8 @@ pub struct Gathered {
     pub invalid: u64,
     /// Ticks whose temperature was missing or stale.
     pub stale: u64,
+    /// Ticks at which a channel of the document still had too few readings.
+    pub warming_up: u64,
     /// What the correction passed over.
     pub troubles: Troubles,
 }
@@ -97,7 +99,7 @@ pub struct Cut {
 }
 
 /// The document as it is for three gyros along their own input axes, the others as good as absent.
-fn along_input_axes(document: &Document, group: [usize; 3]) -> Document {
+pub(crate) fn along_input_axes(document: &Document, group: [usize; 3]) -> Document {
     let mut own = document.clone();
     let orientation = &mut own.gyro.orientation;
     let axis = |sensor: usize| group.iter().position(|member| *member == sensor);
@@ -251,6 +253,7 @@ impl Knife {
         let stale = flags(SensorFlags::STALE_TEMPERATURE);
         gathered.invalid += u64::from(invalid && !bare.flags.contains(TickFlags::INTERPOLATED));
         gathered.stale += u64::from(stale);
+        gathered.warming_up += u64::from(bare.flags.contains(TickFlags::WARM_UP));
         if bare.flags.intersects(UNSETTLED) || settling || invalid || stale || signs.is_none() || bare.missed > 0 {
             self.close(gathered);
             self.joined = false;
@@ -309,7 +312,7 @@ impl Knife {
 }
 
 /// Mean of the channels that the orientation follows, as they are applied now (°C).
-fn temperature(thermal: &OrientationThermal, unit: &Unit) -> f64 {
+pub(crate) fn temperature(thermal: &OrientationThermal, unit: &Unit) -> f64 {
     let states = unit.channels().filter(|channel| thermal.channels.iter().any(|name| *name == *channel.name));
     let (sum, count) = states
         .filter_map(|channel| channel.state)

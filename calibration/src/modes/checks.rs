@@ -117,6 +117,11 @@ pub fn behind(gathered: &Gathered, names: [&str; 3], count_arcsec: [f64; 3], ear
             "have no fresh temperature of a gyro",
             "does the document name the log's channels, and are stale_after_s, range_deg_c and the conversion right?",
         ),
+        (
+            gathered.warming_up,
+            "lack readings of a temperature channel that the document has",
+            "does the log have all channels of the document? Take those that it lacks out of the document",
+        ),
     ] {
         if real(count) > UNUSABLE * there {
             reasons.push(format!(

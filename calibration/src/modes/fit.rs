@@ -246,6 +246,6 @@ fn drop_rows(data: &mut Data, kept: &mut Vec<f64>, stretch: &mut Vec<usize>, far
 }
 
 /// °/h from rad/s.
-pub(super) fn deg_per_h(rad_per_s: f64) -> f64 {
+pub(crate) fn deg_per_h(rad_per_s: f64) -> f64 {
     AngularRate::from_rad_per_s(rad_per_s).as_deg_per_h()
 }

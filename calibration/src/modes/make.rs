@@ -11,7 +11,8 @@ use super::fit::{Asked, Given, GyroFit, fit};
 use super::servo::{self, Transient};
 use super::switches::Switches;
 use crate::error::Error;
-use crate::report::{Curve as Residual, FitReport, Rest, judge};
+use super::judge::judged;
+use crate::report::{Curve as Residual, FitReport};
 use crate::run::{Run, Watch};
 use crate::written::Written;
 
@@ -20,6 +21,9 @@ const CELLS: f64 = 400.0;
 const SHORTEST_S: f64 = 15.0;
 /// Time behind a switch that is left out where the servo is not known (s).
 const SETTLE_S: f64 = 0.5;
+
+/// Length of a window of the residuals, in whole reversal periods (s).
+const WINDOW_S: f64 = 600.0;
 
 /// What the fit starts from.
 #[derive(Debug, Clone)]
@@ -97,9 +101,11 @@ pub fn make<W: Watch>(wanted: &Wanted<'_>, mut watch: impl FnMut() -> W) -> Resu
     let reference_deg_c = wanted.reference_deg_c.unwrap_or_else(|| reference_of(wanted.base));
     #[expect(clippy::cast_precision_loss, reason = "ticks of a log are far below 2⁵³")]
     let length_s = switches.ticks as f64 * switches.tick_s;
+    // A switch loses its ticks, and the transient is over one tick later at the least.
+    let settle_s = SETTLE_S.max((f64::from(transition_ticks) + 1.5) * switches.tick_s);
     let cut = Cut {
         cell_s: (length_s / CELLS).max(SHORTEST_S),
-        settle_s: wanted.settle_s.unwrap_or(if known { 0.0 } else { SETTLE_S.min(0.2 * switches.period_s()) }),
+        settle_s: wanted.settle_s.unwrap_or(if known { 0.0 } else { settle_s }),
         reference_deg_c,
     };
     let mut gyros: Vec<Option<Result<GyroFit, String>>> = vec![None; switches.sensors];
@@ -158,7 +164,7 @@ pub fn make<W: Watch>(wanted: &Wanted<'_>, mut watch: impl FnMut() -> W) -> Resu
     let constants: Vec<Option<f64>> = (0..switches.sensors)
         .map(|sensor| wanted.place.is_none().then(|| base_constant(wanted.base, sensor, reference_deg_c)))
         .collect();
-    let window_s = 2.0 * switches.period_s();
+    let window_s = window_s(&switches, length_s);
     let mut made = Made {
         before: Written::of(&document::stripped(&bare, &servos, wanted.base, reference_deg_c))?,
         written: Written::of(&bare)?,
@@ -212,17 +218,13 @@ impl Made {
         earth: Option<[f64; 3]>,
         watch: &mut impl FnMut() -> W,
     ) -> Result<Vec<Residual>, Error> {
-        let rest = Rest {
-            rate_deg_per_h: earth.map(|rate| rate.map(super::fit::deg_per_h)),
-            force_m_per_s2: None,
-        };
+        let earth = earth.map(|rate| rate.map(super::fit::deg_per_h));
         let runs = wanted.runs.iter().map(|run| (run, Sample::In));
         let runs = runs.chain(wanted.judge.iter().map(|run| (run, Sample::Out)));
         let mut residuals = Vec::new();
         for (run, sample) in runs {
-            let pair = (&self.before.loaded, &self.written.loaded);
-            let judged = judge(run, sample, pair, (&self.written.document, &rest), self.window_s, watch())?;
-            residuals.extend(judged.curves.into_iter().filter(|curve| curve.of.starts_with("gyro")));
+            let pair = [&self.before, &self.written];
+            residuals.extend(judged(run, sample, pair, earth, self.window_s, &mut *watch)?);
         }
         Ok(residuals)
     }
@@ -232,6 +234,13 @@ impl Made {
     pub fn report(&self) -> FitReport {
         super::report::report(self)
     }
+}
+
+/// Whole reversal periods, ten minutes or a twelfth of the runs: what a switch costs in whole counts shall not hide the drift.
+fn window_s(switches: &Switches, length_s: f64) -> f64 {
+    let pair_s = 2.0 * switches.period_s();
+    let wanted_s = WINDOW_S.min(length_s / 12.0);
+    pair_s * libm::ceil(wanted_s / pair_s).max(1.0)
 }
 
 /// Three gyros at a time; the last three where the number is no multiple.

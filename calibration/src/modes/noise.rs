@@ -99,7 +99,7 @@ impl Data {
         // State (m, e·q at the end of the last cell) of the values and of every column, and its common covariance.
         let mut states = vec![[0.0_f64; 2]; width + 1];
         let mut p = [[markov, 0.0], [0.0, fraction]];
-        let mut last_s = None;
+        let mut last_s: Option<f64> = None;
         for row in 0..count {
             let (time_s, length_s) = (self.time_s[row], self.length_s[row]);
             if let Some(last_s) = last_s {

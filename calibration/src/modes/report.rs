@@ -119,7 +119,7 @@ fn transient(name: &str, servo: &ServoFit, report: &mut FitReport) {
         report.coefficients.push(Coefficient::new(name, unit, *value, Some(*sigma)));
     }
     let delay = servo.rest.delay_s.map_or_else(String::new, |delay_s| {
-        format!("; the filtered temperature is {} s behind the dither's", short(-delay_s))
+        format!("; the filtered temperature is {} s behind the dither's", short(delay_s))
     });
     report.notes.push(format!(
         "gyro {name}: behind {} switches the dither is low by {} Hz rms in the first tick{delay}.",

@@ -13,7 +13,7 @@ use crate::run::{Run, Watch};
 const BEFORE: usize = 16;
 /// Fewest and most ticks behind a switch that are kept, and the time that they should cover (s).
 const AFTER: [usize; 2] = [24, 400];
-const AFTER_S: f64 = 0.5;
+const AFTER_S: f64 = 1.0;
 /// Ticks behind a command among which the lost ones are looked for.
 const SEARCH: usize = 16;
 /// A reading this many standard deviations off is not the gyro's.

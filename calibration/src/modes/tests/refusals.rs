@@ -1,0 +1,1 @@
+//! Logs that cannot be used are refused, with every reason.
