@@ -80,7 +80,12 @@ impl OutputArgs {
         if refusals.is_empty() { Ok(()) } else { Err(Error::Refused(refusals)) }
     }
 
-    fn document(&self, mut document: Document, about: About<'_>, report: &FitReport) -> Result<Written, Error> {
+    fn document(
+        &self,
+        mut document: Document,
+        about: About<'_>,
+        report: &FitReport,
+    ) -> Result<Written, Error> {
         let mut origin = origin(about.logs, &command_line())?;
         origin.method = Some(about.method.to_owned());
         origin.range_deg_c = about.range_deg_c;
@@ -89,9 +94,11 @@ impl OutputArgs {
         let mut details = before.as_ref().and_then(|before| before.details.clone()).unwrap_or_default();
         if let Some(before) = before.filter(|before| before.tool.is_some() || before.method.is_some()) {
             // What the rest of the document rests on.
-            let log: Vec<_> = before.log.iter().map(|log| json!({ "name": log.name, "sha256": log.sha256 })).collect();
+            let log: Vec<_> =
+                before.log.iter().map(|log| json!({ "name": log.name, "sha256": log.sha256 })).collect();
             let earlier = json!({ "tool": before.tool.unwrap_or_default(), "method": before.method.unwrap_or_default(), "log": log });
-            let earlier = toml::Value::try_from(earlier).map_err(|error| Error::Document(vec![error.to_string()]))?;
+            let earlier =
+                toml::Value::try_from(earlier).map_err(|error| Error::Document(vec![error.to_string()]))?;
             details.insert("before".to_owned(), earlier);
         }
         details.insert(about.key.to_owned(), toml::Value::Table(about.details));

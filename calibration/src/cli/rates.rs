@@ -59,7 +59,10 @@ impl RatesArgs {
         let inputs = self.log.log.iter().chain(&self.document).chain(&self.steps);
         self.output.check(&inputs.map(PathBuf::as_path).collect::<Vec<&Path>>())?;
         if !(0.0..=1e6).contains(&self.table_ppm) {
-            return Err(Error::Usage(format!("--table-ppm is {}, must be from 0 to 1000000", self.table_ppm)));
+            return Err(Error::Usage(format!(
+                "--table-ppm is {}, must be from 0 to 1000000",
+                self.table_ppm
+            )));
         }
         let place = self.place.place()?;
         let base = self.document.as_deref().map(Written::read).transpose()?;
@@ -72,7 +75,9 @@ impl RatesArgs {
             None => {
                 let mut output = None;
                 let mut gyros = 0;
-                let Some(first) = runs.first() else { return Err(Error::Usage("no log is given".to_owned())) };
+                let Some(first) = runs.first() else {
+                    return Err(Error::Usage("no log is given".to_owned()));
+                };
                 first.gyro_ticks(Bar::reading(), |kind, tick| {
                     output = Some(kind);
                     gyros = tick.readings.len();
@@ -83,7 +88,8 @@ impl RatesArgs {
                         first.name
                     )));
                 }
-                let output = if output == Some(OutputKind::Counts) { GyroOutput::Counts } else { GyroOutput::Mean };
+                let output =
+                    if output == Some(OutputKind::Counts) { GyroOutput::Counts } else { GyroOutput::Mean };
                 nominal(&first.unit.to_string(), output)
             }
         };
@@ -111,9 +117,9 @@ impl RatesArgs {
     fn stated(&self, runs: usize) -> Result<Vec<Step>, Error> {
         match &self.steps {
             Some(path) => read(path, runs),
-            None if self.rates.is_empty() => {
-                Err(Error::Usage("what did the table do? Give --axis and --rates, or --steps FILE".to_owned()))
-            }
+            None if self.rates.is_empty() => Err(Error::Usage(
+                "what did the table do? Give --axis and --rates, or --steps FILE".to_owned(),
+            )),
             None => listed(&self.axis, &self.rates, runs),
         }
     }

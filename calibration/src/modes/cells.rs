@@ -106,8 +106,8 @@ pub(crate) fn along_input_axes(document: &Document, group: [usize; 3]) -> Docume
     let unit = |axis: usize| [0, 1, 2].map(|column| if column == axis { 1.0 } else { 0.0 });
     let count = own.gyro.sensor.len();
     orientation.rows = (0..count).map(|sensor| unit(axis(sensor).unwrap_or(0))).collect();
-    orientation.weights =
-        (count > 3).then(|| (0..count).map(|sensor| if axis(sensor).is_some() { 1.0 } else { 1e-24 }).collect());
+    orientation.weights = (count > 3)
+        .then(|| (0..count).map(|sensor| if axis(sensor).is_some() { 1.0 } else { 1e-24 }).collect());
     orientation.thermal = None;
     orientation.parity = None;
     own
@@ -122,7 +122,8 @@ fn documents(bare: &Document, group: [usize; 3], reference: f64) -> Result<Vec<L
         for sensor in &mut document.gyro.sensor {
             let mut coefficients = vec![0.0; power];
             coefficients.push(1.0);
-            sensor.static_bias = Some(Curve::new(Shape::Polynomial { reference, coefficients, range: ANY_DEG_C }));
+            sensor.static_bias =
+                Some(Curve::new(Shape::Polynomial { reference, coefficients, range: ANY_DEG_C }));
         }
         loaded.push(Written::of(&document)?.loaded);
     }
@@ -146,7 +147,8 @@ pub fn gather<W: Watch>(
     for (number, run) in runs.iter().enumerate() {
         #[expect(clippy::cast_precision_loss, reason = "few runs")]
         let begin_s = number as f64 * BETWEEN_RUNS_S;
-        let mut knife = Knife::new(cut, group, bare, begin_s, gathered.cells.last().map_or(0, |cell| cell.stretch + 1));
+        let mut knife =
+            Knife::new(cut, group, bare, begin_s, gathered.cells.last().map_or(0, |cell| cell.stretch + 1));
         let troubles = run.correct_together(&loaded, watch(), |raw, ticks, unit| {
             let Some(bare) = ticks.first() else { return };
             gathered.ticks[0] += 1;
@@ -254,7 +256,13 @@ impl Knife {
         gathered.invalid += u64::from(invalid && !bare.flags.contains(TickFlags::INTERPOLATED));
         gathered.stale += u64::from(stale);
         gathered.warming_up += u64::from(bare.flags.contains(TickFlags::WARM_UP));
-        if bare.flags.intersects(UNSETTLED) || settling || invalid || stale || signs.is_none() || bare.missed > 0 {
+        if bare.flags.intersects(UNSETTLED)
+            || settling
+            || invalid
+            || stale
+            || signs.is_none()
+            || bare.missed > 0
+        {
             self.close(gathered);
             self.joined = false;
             if bare.missed == 0 {

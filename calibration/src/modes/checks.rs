@@ -64,7 +64,10 @@ pub fn before(switches: &Switches, document: &Document, transition_ticks: Option
         }
     }
     if none > 0 && plus + minus > 0 && none > plus + minus {
-        reasons.push(format!("{none} of {} ticks state no lasing mode: map the log's mode column", switches.ticks));
+        reasons.push(format!(
+            "{none} of {} ticks state no lasing mode: map the log's mode column",
+            switches.ticks
+        ));
     }
     let stated = document.gyro.sensor.len();
     if switches.sensors != stated {
@@ -84,7 +87,7 @@ pub fn before(switches: &Switches, document: &Document, transition_ticks: Option
     let name = |sensor: &usize| document.gyro.sensor.get(*sensor).map_or("?", |sensor| sensor.name.as_str());
     for dead in switches.dead.iter().map(name) {
         reasons.push(format!(
-            "gyro {dead} gives the same reading in all {} ticks: it is dead, or its column is mapped wrongly",
+            "gyro {dead} gives the same reading, or no number, in all {} ticks: it is dead, or its column is mapped wrongly",
             switches.ticks
         ));
     }
@@ -100,7 +103,12 @@ pub fn before(switches: &Switches, document: &Document, transition_ticks: Option
 
 /// Reasons that show in the gathered cells.
 #[must_use]
-pub fn behind(gathered: &Gathered, names: [&str; 3], count_arcsec: [f64; 3], earth: Option<[f64; 3]>) -> Vec<String> {
+pub fn behind(
+    gathered: &Gathered,
+    names: [&str; 3],
+    count_arcsec: [f64; 3],
+    earth: Option<[f64; 3]>,
+) -> Vec<String> {
     let mut reasons = Vec::new();
     let [there, missing] = gathered.ticks.map(real);
     if missing > MISSING * (there + missing) {
@@ -111,7 +119,11 @@ pub fn behind(gathered: &Gathered, names: [&str; 3], count_arcsec: [f64; 3], ear
         ));
     }
     for (count, what, todo) in [
-        (gathered.invalid, "have a gyro reading that cannot be used", "look at the log with isotherm-replay info"),
+        (
+            gathered.invalid,
+            "have a gyro reading that cannot be used",
+            "look at the log with isotherm-replay info",
+        ),
         (
             gathered.stale,
             "have no fresh temperature of a gyro",
@@ -181,15 +193,18 @@ fn jump(seconds: &[Second], values: &[f64], floor: f64, by_mode: bool) -> Option
     // The median of |a − b| is 0.9539 standard deviations of either.
     let sigma = median(&steps) / 0.953_9;
     let limit = floor.max(SIGMAS * sigma);
-    let span = values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(*x), high.max(*x)]);
+    let span =
+        values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(*x), high.max(*x)]);
     if !(span[1] - span[0] > limit) {
         return None;
     }
     (0..seconds.len()).find_map(|index| {
         let second = seconds[index];
         let near = index.saturating_sub(NEIGHBOURS)..(index + NEIGHBOURS + 1).min(seconds.len());
-        let of_kind: Vec<f64> =
-            near.filter(|&other| !by_mode || seconds[other].mode == second.mode).map(|other| values[other]).collect();
+        let of_kind: Vec<f64> = near
+            .filter(|&other| !by_mode || seconds[other].mode == second.mode)
+            .map(|other| values[other])
+            .collect();
         let away = (values[index] - median(&of_kind)).abs();
         (away > limit).then_some((second, away, limit))
     })

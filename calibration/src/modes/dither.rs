@@ -30,13 +30,16 @@ pub struct Rest {
 pub fn fit(cells: &[Cell], place: usize, reference_deg_c: f64) -> Option<Rest> {
     let cells: Vec<&Cell> = cells.iter().filter(|cell| cell.dither_hz[place].is_finite()).collect();
     let temperature: Vec<f64> = cells.iter().map(|cell| cell.powers[0][place] + reference_deg_c).collect();
-    let (low, high) =
-        temperature.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), t| (low.min(*t), high.max(*t)));
+    let (low, high) = temperature
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), t| (low.min(*t), high.max(*t)));
     let rates = rates(&cells, &temperature);
     let moving = rates.iter().filter(|rate| rate.abs() > SLOWEST_DEG_C_PER_S).count() * 4 > rates.len();
     let largest = largest_order(high - low, &mut Vec::new()).min(MAX_ORDER);
     let data = |order: usize| {
-        let power = |j: usize| move |cell: &&Cell| if j == 0 { 1.0 } else { cell.powers[j.min(MAX_POWER) - 1][place] };
+        let power = |j: usize| {
+            move |cell: &&Cell| if j == 0 { 1.0 } else { cell.powers[j.min(MAX_POWER) - 1][place] }
+        };
         let mut columns: Vec<Vec<f64>> = (0..=order).map(|j| cells.iter().map(power(j)).collect()).collect();
         if order > 0 && moving {
             columns.push(rates.clone());
@@ -58,8 +61,8 @@ pub fn fit(cells: &[Cell], place: usize, reference_deg_c: f64) -> Option<Rest> {
         }
         let noise = data.noise();
         let solution = data.solve(noise)?;
-        let upper = data.solve(data.upper(noise))?;
-        let sigma = |index: usize| upper.covariance[(index, index)].sqrt();
+        let covariance = data.covariance(noise)?;
+        let sigma = |index: usize| covariance[(index, index)].sqrt();
         let highest = solution.coefficients[order];
         let variance = solution.covariance[(order, order)];
         if order > 0 && highest * highest < BETTER * variance {

@@ -71,15 +71,9 @@ pub fn fitted(stripped: &Document, made: &Made, constants: &[Option<f64>]) -> Do
     for ((sensor, found), constant) in document.gyro.sensor.iter_mut().zip(&made.gyros).zip(constants) {
         let Ok(found) = found else { continue };
         let reference = made.reference_deg_c;
-        sensor.static_bias = curve(found, Term::Static, reference).map(|curve| match constant {
-            Some(constant) => {
-                let own = found.of(Term::Static).first().copied().unwrap_or_default();
-                tidied(&curve.plus(constant - own))
-            }
-            None => curve,
-        });
-        sensor.magnetic_bias = curve(found, Term::Magnetic, reference);
-        sensor.slow_meander = curve(found, Term::Meander, MEANDER_REFERENCE_DEG_C);
+        sensor.static_bias = curve(found, Term::Static, reference, *constant);
+        sensor.magnetic_bias = curve(found, Term::Magnetic, reference, None);
+        sensor.slow_meander = curve(found, Term::Meander, MEANDER_REFERENCE_DEG_C, None);
     }
     document
 }
@@ -95,21 +89,19 @@ pub fn keep_old(document: &mut Document, base: &Document, gyros: &[Result<GyroFi
     }
 }
 
-fn curve<Q: Quantity>(found: &GyroFit, term: Term, reference: f64) -> Option<Curve<Q>> {
-    let coefficients: Vec<f64> = found.of(term).into_iter().map(tidy).collect();
+/// A term as a curve, its constant as it was found or as it is given.
+fn curve<Q: Quantity>(
+    found: &GyroFit,
+    term: Term,
+    reference: f64,
+    constant: Option<f64>,
+) -> Option<Curve<Q>> {
+    let mut coefficients: Vec<f64> = found.of(term).into_iter().map(tidy).collect();
     let range = widened(found.range_deg_c);
-    (!coefficients.is_empty()).then(|| Curve::new(Shape::Polynomial { reference, coefficients, range }))
-}
-
-fn tidied<Q: Quantity>(curve: &Curve<Q>) -> Curve<Q> {
-    match curve.shape() {
-        Shape::Polynomial { reference, coefficients, range } => Curve::new(Shape::Polynomial {
-            reference: *reference,
-            coefficients: coefficients.iter().copied().map(tidy).collect(),
-            range: *range,
-        }),
-        _ => curve.clone(),
+    if let (Some(first), Some(constant)) = (coefficients.first_mut(), constant) {
+        *first = tidy(constant);
     }
+    (!coefficients.is_empty()).then(|| Curve::new(Shape::Polynomial { reference, coefficients, range }))
 }
 
 fn widened([low, high]: [f64; 2]) -> [f64; 2] {
@@ -188,7 +180,8 @@ pub fn details(made: &Made) -> Table {
 }
 
 fn of_gyro(name: &str, fit: &Result<GyroFit, String>, servo: &Result<ServoFit, String>) -> Table {
-    let numbers = |values: &mut dyn Iterator<Item = f64>| Value::Array(values.map(|x| tidy(x).into()).collect());
+    let numbers =
+        |values: &mut dyn Iterator<Item = f64>| Value::Array(values.map(|x| tidy(x).into()).collect());
     let mut table = Table::new();
     table.insert("name".into(), name.into());
     match fit {
@@ -198,10 +191,14 @@ fn of_gyro(name: &str, fit: &Result<GyroFit, String>, servo: &Result<ServoFit, S
         Ok(fit) => {
             let names = fit.coefficients.iter().map(|one| format!("{}.{}", one.term.key(), one.power).into());
             table.insert("coefficient".into(), Value::Array(names.collect()));
-            table.insert("sigma_deg_per_h".into(), numbers(&mut fit.coefficients.iter().map(|one| one.sigma)));
+            table
+                .insert("sigma_deg_per_h".into(), numbers(&mut fit.coefficients.iter().map(|one| one.sigma)));
             let rows = fit.covariance.row_iter().map(|row| numbers(&mut row.iter().copied()));
             table.insert("covariance".into(), Value::Array(rows.collect()));
-            table.insert("angle_random_walk_deg_per_sqrt_h".into(), tidy(fit.noise.white.sqrt() / 60.0).into());
+            table.insert(
+                "angle_random_walk_deg_per_sqrt_h".into(),
+                tidy(fit.noise.white.sqrt() / 60.0).into(),
+            );
             if let Some([variance, time_s]) = fit.noise.markov {
                 table.insert("markov_sigma_deg_per_h".into(), tidy(variance.sqrt()).into());
                 table.insert("markov_correlation_time_h".into(), tidy(time_s / 3600.0).into());

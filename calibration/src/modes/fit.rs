@@ -124,19 +124,26 @@ pub struct Given<'a> {
 pub fn fit(given: Given<'_>, asked: Asked) -> Result<GyroFit, String> {
     let Given { cells, place, reference_deg_c, .. } = given;
     let temperature: Vec<f64> = cells.iter().map(|cell| cell.powers[0][place] + reference_deg_c).collect();
-    let (low, high) =
-        temperature.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), t| (low.min(*t), high.max(*t)));
+    let (low, high) = temperature
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), t| (low.min(*t), high.max(*t)));
     let mut remarks = Vec::new();
     let largest = largest_order(high - low, &mut remarks);
     let (mut data, mut kept) = (data(given, &temperature), temperature);
     let mut stretch: Vec<usize> = cells.iter().map(|cell| cell.stretch).collect();
-    let full = Model { static_order: largest, magnetic_order: largest, meander_order: given.has_meander.then_some(largest.min(MEANDER_ORDER)) };
+    let full = Model {
+        static_order: largest,
+        magnetic_order: largest,
+        meander_order: given.has_meander.then_some(largest.min(MEANDER_ORDER)),
+    };
     let before = data.len();
     let mut noise = Noise::default();
     for _ in 0..ROUNDS {
         let whole = data.with_columns(&full.columns());
         noise = whole.noise();
-        let solution = whole.solve(noise).ok_or("its terms cannot be told apart: are both modes seen at every temperature?")?;
+        let solution = whole
+            .solve(noise)
+            .ok_or("its terms cannot be told apart: are both modes seen at every temperature?")?;
         let white = whole.whitened(noise);
         let left = &white.value - &white.columns * &solution.coefficients;
         let far: Vec<bool> = left.iter().map(|x| x.abs() > FAR_SIGMAS).collect();
@@ -163,17 +170,18 @@ pub fn fit(given: Given<'_>, asked: Asked) -> Result<GyroFit, String> {
     let noise = own.noise();
     let singular = "its terms cannot be told apart: are both modes seen at every temperature?";
     let solution = own.solve(noise).ok_or(singular)?;
-    let upper = own.solve(own.upper(noise)).ok_or(singular)?;
+    let covariance = own.covariance(noise).ok_or(singular)?;
     let coefficients = model.terms().into_iter().enumerate().map(|(index, (term, power))| Fitted {
         term,
         power,
         value: solution.coefficients[index],
-        sigma: upper.covariance[(index, index)].sqrt(),
+        sigma: covariance[(index, index)].sqrt(),
     });
+    let coefficients = coefficients.collect();
     Ok(GyroFit {
-        coefficients: coefficients.collect(),
+        coefficients,
         model,
-        covariance: upper.covariance,
+        covariance,
         noise,
         range_deg_c: [low, high],
         cells: own.len(),
@@ -235,7 +243,8 @@ fn drop_rows(data: &mut Data, kept: &mut Vec<f64>, stretch: &mut Vec<usize>, far
     for row in 1..data.len() {
         data.joined[row] &= !far[row - 1];
     }
-    let keep = |values: &[f64]| values.iter().zip(far).filter(|(_, far)| !**far).map(|(value, _)| *value).collect();
+    let keep =
+        |values: &[f64]| values.iter().zip(far).filter(|(_, far)| !**far).map(|(value, _)| *value).collect();
     data.value = keep(&data.value);
     data.time_s = keep(&data.time_s);
     data.length_s = keep(&data.length_s);

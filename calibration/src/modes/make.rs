@@ -8,10 +8,10 @@ use super::checks;
 use super::dither;
 use super::document::{self, base_constant, reference_of};
 use super::fit::{Asked, Given, GyroFit, fit};
+use super::judge::judged;
 use super::servo::{self, Transient};
 use super::switches::Switches;
 use crate::error::Error;
-use super::judge::judged;
 use crate::report::{Curve as Residual, FitReport};
 use crate::run::{Run, Watch};
 use crate::written::Written;
@@ -142,9 +142,10 @@ pub fn make<W: Watch>(wanted: &Wanted<'_>, mut watch: impl FnMut() -> W) -> Resu
     let servos: Vec<Result<ServoFit, String>> = servos.into_iter().flatten().collect();
     if gyros.iter().all(Result::is_err) {
         let name = |sensor: usize| &wanted.base.gyro.sensor[sensor].name;
-        let reasons = gyros.iter().enumerate().filter_map(|(sensor, fit)| {
-            Some(format!("gyro {}: {}", name(sensor), fit.as_ref().err()?))
-        });
+        let reasons = gyros
+            .iter()
+            .enumerate()
+            .filter_map(|(sensor, fit)| Some(format!("gyro {}: {}", name(sensor), fit.as_ref().err()?)));
         return Err(Error::Refused(reasons.collect()));
     }
     if wanted.place.is_none() {
@@ -194,15 +195,18 @@ impl Made {
         self.written = Written::of(&document)?;
         self.residuals = self.judged(wanted, earth, watch)?;
         let verdicts = Residual::verdicts(&self.residuals);
-        let worse: Vec<String> = verdicts.iter().filter(|one| !one.accepted).map(|one| one.of.clone()).collect();
+        let worse: Vec<String> =
+            verdicts.iter().filter(|one| !one.accepted).map(|one| one.of.clone()).collect();
         if worse.is_empty() {
             return Ok(());
         }
         for (sensor, row) in wanted.base.gyro.orientation.rows.iter().enumerate() {
-            let main = (0..3).fold(0, |best, axis| if row[axis].abs() > row[best].abs() { axis } else { best });
+            let main =
+                (0..3).fold(0, |best, axis| if row[axis].abs() > row[best].abs() { axis } else { best });
             let axis = format!("gyro {}", ["x", "y", "z"][main]);
             if worse.contains(&axis) {
-                self.gyros[sensor] = Err(format!("its terms make {axis} worse than it was: it keeps the old ones"));
+                self.gyros[sensor] =
+                    Err(format!("its terms make {axis} worse than it was: it keeps the old ones"));
             }
         }
         let mut document = document::fitted(&self.before.document, self, constants);
@@ -296,10 +300,16 @@ fn earth_of(document: &Document, sensor: usize, cell: &Cell, earth: Option<[f64;
     earth.map_or(0.0, |earth| checks::earth_along(document::row(document, sensor, cell.axes_deg_c), earth))
 }
 
-fn check(gathered: &Gathered, bare: &Document, group: [usize; 3], earth: Option<[f64; 3]>) -> Result<(), Error> {
+fn check(
+    gathered: &Gathered,
+    bare: &Document,
+    group: [usize; 3],
+    earth: Option<[f64; 3]>,
+) -> Result<(), Error> {
     let names = group.map(|sensor| bare.gyro.sensor[sensor].name.as_str());
     let counts = group.map(|sensor| document::count_arcsec(bare, sensor));
-    let along = earth.map(|earth| group.map(|sensor| checks::earth_along(document::row(bare, sensor, f64::NAN), earth)));
+    let along = earth
+        .map(|earth| group.map(|sensor| checks::earth_along(document::row(bare, sensor, f64::NAN), earth)));
     let reasons = checks::behind(gathered, names, counts, along);
     if reasons.is_empty() { Ok(()) } else { Err(Error::Refused(reasons)) }
 }

@@ -14,9 +14,9 @@ pub(super) fn golden([low, high]: [f64; 2], f: impl Fn(f64) -> f64) -> (f64, f64
     const SECTION: f64 = 0.618_033_988_749_894_9;
     let step = (high - low) / f64::from(COARSE);
     let at = |index: u32| low + step * f64::from(index);
-    let best = (0..=COARSE).map(|index| (at(index), f(at(index)))).fold((low, f64::INFINITY), |best, now| {
-        if now.1 < best.1 { now } else { best }
-    });
+    let best = (0..=COARSE)
+        .map(|index| (at(index), f(at(index))))
+        .fold((low, f64::INFINITY), |best, now| if now.1 < best.1 { now } else { best });
     let (mut a, mut b) = ((best.0 - step).max(low), (best.0 + step).min(high));
     let (mut c, mut d) = (b - SECTION * (b - a), a + SECTION * (b - a));
     let (mut at_c, mut at_d) = (f(c), f(d));

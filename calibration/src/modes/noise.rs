@@ -17,10 +17,12 @@ use super::minimum::{golden, simplex};
 
 /// Variance of the fraction of a count.
 const FRACTION_VARIANCE: f64 = 1.0 / 12.0;
-/// Twice the gain of log-likelihood that a Markov drift must bring with its two parameters (χ², two degrees, 1 %).
-const MARKOV_GAIN: f64 = 9.2;
+/// Twice the gain of log-likelihood that a Markov drift must bring with its two parameters (χ², two degrees, 5 %).
+const MARKOV_GAIN: f64 = 6.0;
 /// Fall of the log-likelihood at two standard deviations of a parameter.
 const TWO_SIGMAS: f64 = 2.0;
+/// Steps of halving the way to a limit.
+const STEPS: usize = 12;
 /// Range of N² about its first guess, in powers of e.
 const WHITE_RANGE: [f64; 2] = [-14.0, 3.0];
 
@@ -133,10 +135,7 @@ impl Data {
                     columns[(row, column)] = innovation / sigma;
                 }
             }
-            p = [
-                [p[0][0] - gain[0] * ph[0], -gain[1] * ph[0]],
-                [0.0, fraction - gain[1] * fraction * per_s],
-            ];
+            p = [[p[0][0] - gain[0] * ph[0], -gain[1] * ph[0]], [0.0, fraction - gain[1] * fraction * per_s]];
             p[1][0] = p[0][1];
         }
         White { value, columns, log_variance }
@@ -171,7 +170,9 @@ impl Data {
         let norms = DVector::from_column_slice(&scale);
         Some(Solution {
             coefficients: scaled.component_div(&norms),
-            covariance: DMatrix::from_fn(scale.len(), scale.len(), |i, j| covariance[(i, j)] / (scale[i] * scale[j])),
+            covariance: DMatrix::from_fn(scale.len(), scale.len(), |i, j| {
+                covariance[(i, j)] / (scale[i] * scale[j])
+            }),
             chi_square,
             likelihood: -0.5 * (log_variance + log_determinant + chi_square),
         })
@@ -194,7 +195,10 @@ impl Data {
         let longest = libm::log(span_s.max(4.0 * typical_s));
         let full = |x: [f64; 3]| Noise {
             white: guess * libm::exp(x[0].clamp(WHITE_RANGE[0], WHITE_RANGE[1])),
-            markov: Some([guess / typical_s * libm::exp(x[1].clamp(-16.0, 6.0)), libm::exp(x[2].clamp(shortest, longest))]),
+            markov: Some([
+                guess / typical_s * libm::exp(x[1].clamp(-16.0, 6.0)),
+                libm::exp(x[2].clamp(shortest, longest)),
+            ]),
         };
         let mut best = (least - 0.5 * MARKOV_GAIN, plain);
         for share in [0.25, 0.6] {
@@ -207,30 +211,57 @@ impl Data {
         best.1
     }
 
-    /// The noise with its parameters at their upper limits: two standard deviations of their estimates.
+    /// The noise with its parameters at their limits, two standard deviations of their estimates: all variances larger, and
+    /// for a Markov drift, in its place, that drift larger, slower, or faster.
     #[must_use]
-    pub fn upper(&self, noise: Noise) -> Noise {
-        let limit = self.likelihood(noise) - TWO_SIGMAS;
-        let with = |factor: f64| Noise {
+    pub fn limits(&self, noise: Noise) -> Vec<Noise> {
+        let mut limits = vec![self.limit(noise, |factor| Noise {
             white: noise.white * factor,
             markov: noise.markov.map(|[variance, time_s]| [variance * factor, time_s]),
-        };
-        let (mut low, mut high) = (1.0, 2.0);
-        while self.likelihood(with(high)) > limit && high < 1e6 {
-            high *= 2.0;
+        })];
+        if let Some([variance, time_s]) = noise.markov {
+            let with = |variance: f64, time_s: f64| Noise { markov: Some([variance, time_s]), ..noise };
+            limits.push(self.limit(noise, |factor| with(variance * factor, time_s)));
+            limits.push(self.limit(noise, |factor| with(variance, time_s * factor)));
+            limits.push(self.limit(noise, |factor| with(variance, time_s / factor)));
         }
-        for _ in 0..30 {
+        limits
+    }
+
+    /// How far one direction of the parameters goes before the log-likelihood has fallen by two standard deviations' worth.
+    fn limit(&self, noise: Noise, with: impl Fn(f64) -> Noise) -> Noise {
+        const LARGEST: f64 = 1e4;
+        let limit = self.likelihood(noise) - TWO_SIGMAS;
+        let (mut low, mut high) = (1.0, 2.0);
+        while high < LARGEST && self.likelihood(with(high)) > limit {
+            (low, high) = (high, 2.0 * high);
+        }
+        for _ in 0..STEPS {
             let middle = 0.5 * (low + high);
             *if self.likelihood(with(middle)) > limit { &mut low } else { &mut high } = middle;
         }
         with(low)
     }
 
+    /// Covariance of the coefficients, each as uncertain as the limits of the noise leave it.
+    #[must_use]
+    pub fn covariance(&self, noise: Noise) -> Option<DMatrix<f64>> {
+        let own = self.solve(noise)?.covariance;
+        let mut wider = own.diagonal();
+        for limit in self.limits(noise) {
+            wider = wider.sup(&self.solve(limit)?.covariance.diagonal());
+        }
+        let factor = wider.component_div(&own.diagonal()).map(f64::sqrt);
+        Some(DMatrix::from_fn(own.nrows(), own.ncols(), |i, j| own[(i, j)] * factor[i] * factor[j]))
+    }
+
     /// Variance over a second by ordinary least squares.
     fn plain_variance(&self) -> f64 {
         let plain = Self { quantum: 0.0, ..self.clone() };
         let freedom = self.len().saturating_sub(self.columns.len()).max(1);
-        plain.solve(Noise { white: 1.0, markov: None }).map_or(1.0, |solution| solution.chi_square / real(freedom))
+        plain
+            .solve(Noise { white: 1.0, markov: None })
+            .map_or(1.0, |solution| solution.chi_square / real(freedom))
     }
 
     fn span_s(&self) -> f64 {

@@ -34,16 +34,20 @@ impl Model {
         let meander = 2 * magnetic;
         let mut columns: Vec<usize> = (0..=self.static_order).collect();
         columns.extend((0..=self.magnetic_order).map(|power| magnetic + power));
-        columns.extend(self.meander_order.into_iter().flat_map(|order| (0..=order).map(|power| meander + power)));
+        columns.extend(
+            self.meander_order.into_iter().flat_map(|order| (0..=order).map(|power| meander + power)),
+        );
         columns
     }
 
     /// Term and power of each column.
     #[must_use]
     pub fn terms(&self) -> Vec<(Term, usize)> {
-        let mut terms: Vec<(Term, usize)> = (0..=self.static_order).map(|power| (Term::Static, power)).collect();
+        let mut terms: Vec<(Term, usize)> =
+            (0..=self.static_order).map(|power| (Term::Static, power)).collect();
         terms.extend((0..=self.magnetic_order).map(|power| (Term::Magnetic, power)));
-        let meander = self.meander_order.into_iter().flat_map(|order| (0..=order).map(|power| (Term::Meander, power)));
+        let meander =
+            self.meander_order.into_iter().flat_map(|order| (0..=order).map(|power| (Term::Meander, power)));
         terms.extend(meander);
         terms
     }
@@ -73,7 +77,8 @@ impl Folds {
     /// Cooling and heating, where both cover the range; else pairs of stretches, every fifth in one fold.
     #[must_use]
     pub fn of(temperature: &[f64], time_s: &[f64], stretch: &[usize]) -> Self {
-        let pairs = || Self { of: stretch.iter().map(|number| number / 2 % FOLDS).collect(), directions: false };
+        let pairs =
+            || Self { of: stretch.iter().map(|number| number / 2 % FOLDS).collect(), directions: false };
         let mut direction = 0;
         let mut of = Vec::with_capacity(temperature.len());
         for row in 0..temperature.len() {
@@ -88,9 +93,10 @@ impl Folds {
             of.push(direction);
         }
         let span = |wanted: Option<usize>| {
-            let mine = temperature.iter().zip(&of).filter(|(_, of)| wanted.is_none_or(|wanted| wanted == **of));
-            let (low, high) =
-                mine.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (t, _)| (low.min(*t), high.max(*t)));
+            let mine =
+                temperature.iter().zip(&of).filter(|(_, of)| wanted.is_none_or(|wanted| wanted == **of));
+            let (low, high) = mine
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (t, _)| (low.min(*t), high.max(*t)));
             (high - low).max(0.0)
         };
         let whole = span(None);
@@ -123,7 +129,9 @@ pub fn choose(
 ) -> Result<(Model, Vec<Score>), String> {
     let limited = |name: &str, asked: Option<usize>, largest: usize, remarks: &mut Vec<String>| match asked {
         Some(order) if order > largest => {
-            remarks.push(format!("{name} order {order} was asked for, {largest} is the most that this run can tell"));
+            remarks.push(format!(
+                "{name} order {order} was asked for, {largest} is the most that this run can tell"
+            ));
             vec![largest]
         }
         Some(order) => vec![order],
@@ -146,7 +154,11 @@ pub fn choose(
         of_static.iter().flat_map(|&static_order| {
             let of_meander = &of_meander;
             of_magnetic.iter().flat_map(move |&magnetic_order| {
-                of_meander.iter().map(move |&meander_order| Model { static_order, magnetic_order, meander_order })
+                of_meander.iter().map(move |&meander_order| Model {
+                    static_order,
+                    magnetic_order,
+                    meander_order,
+                })
             })
         })
     };
@@ -156,10 +168,13 @@ pub fn choose(
     let count = folds.of.iter().max().map_or(1, |largest| largest + 1);
     let sums = sums(data, noise, folds, count);
     let mut scores: Vec<Score> = models()
-        .filter_map(|model| Some(Score { model, chi_square: score(&sums, &model.columns())?, count: data.len() }))
+        .filter_map(|model| {
+            Some(Score { model, chi_square: score(&sums, &model.columns())?, count: data.len() })
+        })
         .collect();
     scores.sort_by(|a, b| a.chi_square.total_cmp(&b.chi_square));
-    let best = scores.first().ok_or("no order of its terms can be cross-validated: take a longer run")?.chi_square;
+    let best =
+        scores.first().ok_or("no order of its terms can be cross-validated: take a longer run")?.chi_square;
     let near = scores.iter().filter(|score| score.chi_square <= best + BETTER);
     let chosen = near
         .min_by(|a, b| {
@@ -173,8 +188,9 @@ pub fn choose(
 fn sums(data: &Data, noise: Noise, folds: &Folds, count: usize) -> Vec<Sums> {
     let white = data.whitened(noise);
     let width = data.columns.len();
-    let mut sums: Vec<Sums> =
-        (0..count).map(|_| Sums { xx: DMatrix::zeros(width, width), xy: DVector::zeros(width), yy: 0.0 }).collect();
+    let mut sums: Vec<Sums> = (0..count)
+        .map(|_| Sums { xx: DMatrix::zeros(width, width), xy: DVector::zeros(width), yy: 0.0 })
+        .collect();
     for (row, fold) in folds.of.iter().enumerate() {
         if let Some(sums) = sums.get_mut(*fold) {
             let x = white.columns.row(row).transpose();
@@ -201,7 +217,8 @@ fn score(sums: &[Sums], columns: &[usize]) -> Option<f64> {
     let mut total = 0.0;
     for fold in sums.iter().filter(|fold| fold.yy > 0.0) {
         let (xx, xy) = (part(&fold.xx), some(&fold.xy));
-        let rest = DMatrix::from_fn(width, width, |i, j| (all_xx[(i, j)] - xx[(i, j)]) / (scale[i] * scale[j]));
+        let rest =
+            DMatrix::from_fn(width, width, |i, j| (all_xx[(i, j)] - xx[(i, j)]) / (scale[i] * scale[j]));
         let solved = rest.cholesky()?.solve(&(&all_xy - &xy).component_div(&scale));
         let beta = solved.component_div(&scale);
         total += fold.yy - 2.0 * beta.dot(&xy) + (&xx * &beta).dot(&beta);

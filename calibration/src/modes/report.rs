@@ -13,7 +13,8 @@ const MODELS: usize = 5;
 /// The report.
 pub(super) fn report(made: &Made) -> FitReport {
     let unit = made.written.document.unit.clone();
-    let mut report = FitReport::new("Mode-reversed laser gyro: drift polynomials and switch parameters", unit);
+    let mut report =
+        FitReport::new("Mode-reversed laser gyro: drift polynomials and switch parameters", unit);
     report.verdicts = Curve::verdicts(&made.residuals);
     report.residuals.clone_from(&made.residuals);
     report.warnings.clone_from(&made.warnings);
@@ -28,7 +29,8 @@ pub(super) fn report(made: &Made) -> FitReport {
         match made.servos.get(index) {
             Some(Ok(servo)) => transient(&sensor.name, servo, &mut report),
             Some(Err(reason)) => {
-                let old = if sensor.servo.is_some() { "the document's servo stays" } else { "no servo is written" };
+                let old =
+                    if sensor.servo.is_some() { "the document's servo stays" } else { "no servo is written" };
                 report.warnings.push(format!("gyro {}: {reason}; {old}", sensor.name));
             }
             None => {}

@@ -45,8 +45,7 @@ pub type Reason = String;
 /// # Errors
 /// Why it cannot be told.
 pub fn fit(behind: &[Behind], sensor: usize, lost: usize) -> Result<Transient, Reason> {
-    let rows: Vec<&[f64]> =
-        behind.iter().filter_map(|one| one.dither_hz.get(sensor)?.get(lost..)).collect();
+    let rows: Vec<&[f64]> = behind.iter().filter_map(|one| one.dither_hz.get(sensor)?.get(lost..)).collect();
     if rows.len() < LEAST[1] {
         return Err(format!(
             "{} switches have half-period counts behind them, {} are needed to tell the servo's time constant",
@@ -65,11 +64,15 @@ pub fn fit(behind: &[Behind], sensor: usize, lost: usize) -> Result<Transient, R
     let tick_s = behind.iter().map(|one| one.tick_s).sum::<f64>() / real(behind.len());
     let rest_of = |row: &[f64]| row[half..length].iter().sum::<f64>() / real(length - half);
     let rest_hz = rows.iter().map(|row| rest_of(row)).sum::<f64>() / real(rows.len());
-    let part = |row: &&[f64], from: usize| DVector::from_iterator(half, row[from..from + half].iter().map(|f| f - rest_hz));
+    let part = |row: &&[f64], from: usize| {
+        DVector::from_iterator(half, row[from..from + half].iter().map(|f| f - rest_hz))
+    };
     let decays: Vec<DVector<f64>> = rows.iter().map(|row| part(row, 0)).collect();
     let settled: Vec<DVector<f64>> = rows.iter().map(|row| part(row, half)).collect();
     let count = real(rows.len());
-    let energy = |direction: &DVector<f64>, of: &[DVector<f64>]| of.iter().map(|row| direction.dot(row).powi(2)).sum::<f64>();
+    let energy = |direction: &DVector<f64>, of: &[DVector<f64>]| {
+        of.iter().map(|row| direction.dot(row).powi(2)).sum::<f64>()
+    };
     let signal = |log_tau: f64| {
         let basis = Basis::of(log_tau, tick_s, half);
         energy(&basis.decay, &decays) - energy(&basis.decay, &settled)

@@ -89,7 +89,8 @@ impl Switches {
             eye.close(&mut found);
         }
         found.tick_s = if found.ticks == 0 { 0.0 } else { seconds / real(found.ticks) };
-        found.dead = (0..changed.len()).filter(|&sensor| !changed.get(sensor).is_some_and(|is| *is)).collect();
+        found.dead =
+            (0..changed.len()).filter(|&sensor| !changed.get(sensor).is_some_and(|is| *is)).collect();
         Ok(found)
     }
 
@@ -173,13 +174,17 @@ impl Eye {
     fn close(&mut self, found: &mut Switches) {
         let Some(behind) = self.behind.take() else { return };
         let sensors = behind.first().map_or(0, |tick| tick.readings.len());
-        let limits: Vec<Limits> = (0..sensors).map(|sensor| Limits::of(&self.before, &behind, sensor)).collect();
-        let lost = |tick: &GyroTick| limits.iter().enumerate().any(|(sensor, limits)| limits.beyond(tick, sensor));
+        let limits: Vec<Limits> =
+            (0..sensors).map(|sensor| Limits::of(&self.before, &behind, sensor)).collect();
+        let lost =
+            |tick: &GyroTick| limits.iter().enumerate().any(|(sensor, limits)| limits.beyond(tick, sensor));
         let seconds: f64 = behind.iter().map(|tick| tick.duration.as_s()).sum();
         found.behind.push(Behind {
             lost: behind.iter().take(SEARCH).map(lost).collect(),
             tick_s: seconds / real(behind.len().max(1) as u64),
-            dither_hz: (0..sensors).filter_map(|sensor| behind.iter().map(|tick| dither_hz(tick, sensor)).collect()).collect(),
+            dither_hz: (0..sensors)
+                .filter_map(|sensor| behind.iter().map(|tick| dither_hz(tick, sensor)).collect())
+                .collect(),
         });
         self.before.clear();
     }
@@ -195,8 +200,11 @@ struct Limits {
 impl Limits {
     /// From the ticks before it; the first switch of a run may have too few, then from the later ones behind it.
     fn of(before: &VecDeque<GyroTick>, behind: &[GyroTick], sensor: usize) -> Self {
-        let near: Vec<&GyroTick> =
-            if before.len() >= BEFORE / 2 { before.iter().collect() } else { behind.iter().skip(SEARCH).collect() };
+        let near: Vec<&GyroTick> = if before.len() >= BEFORE / 2 {
+            before.iter().collect()
+        } else {
+            behind.iter().skip(SEARCH).collect()
+        };
         let readings: Vec<f64> = near.iter().filter_map(|tick| tick.readings.get(sensor).copied()).collect();
         let differences: Vec<f64> = near.iter().filter_map(|tick| difference(tick, sensor)).collect();
         let sigma = scatter(&readings);
@@ -207,7 +215,9 @@ impl Limits {
     }
 
     fn beyond(&self, tick: &GyroTick, sensor: usize) -> bool {
-        let reading = tick.readings.get(sensor).is_none_or(|reading| !((reading - self.reading).abs() <= self.far));
+        // A reading that is no number is another trouble, which is told elsewhere.
+        let reading =
+            tick.readings.get(sensor).is_some_and(|reading| (reading - self.reading).abs() > self.far);
         let halves = match (self.difference, difference(tick, sensor)) {
             (Some(usual), Some(now)) => (now - usual).abs() > DITHER_SHARES[0] * usual.abs(),
             _ => false,

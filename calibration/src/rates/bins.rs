@@ -55,7 +55,11 @@ pub struct Binned {
 ///
 /// # Errors
 /// As [`Run::correct`].
-pub fn binned<W: Watch>(run: &Run, document: &Document, mut watch: impl FnMut() -> W) -> Result<Binned, Error> {
+pub fn binned<W: Watch>(
+    run: &Run,
+    document: &Document,
+    mut watch: impl FnMut() -> W,
+) -> Result<Binned, Error> {
     let sensors = document.gyro.sensor.len();
     let mut whole = Binned::default();
     let starts = (0..sensors).step_by(3).map(|start| start.min(sensors.saturating_sub(3)));
@@ -121,7 +125,9 @@ fn of_group(run: &Run, document: &Document, group: [usize; 3], watch: impl Watch
             let rate = angle.map(|sum| AngularRate::from_rad_per_s(sum / good_s).as_deg_per_h()).to_vec();
             binned.bins.push(Bin { begin_s, length_s, good_s, rate, broken, overrange });
             thermal.iter().for_each(|thermal| of_axes.add(temperature(thermal, unit)));
-            unit.channels().filter_map(|channel| channel.state).for_each(|state| of_all.add(state.temperature));
+            unit.channels()
+                .filter_map(|channel| channel.state)
+                .for_each(|state| of_all.add(state.temperature));
         }
     })?;
     binned.troubles = troubles;
@@ -172,6 +178,7 @@ pub fn means_within(
             }
         }
     })?;
-    let mean = |(sum, time_s): ([f64; 3], f64)| sum.map(|x| AngularRate::from_rad_per_s(x / time_s).as_deg_per_h());
+    let mean =
+        |(sum, time_s): ([f64; 3], f64)| sum.map(|x| AngularRate::from_rad_per_s(x / time_s).as_deg_per_h());
     Ok(sums.into_iter().map(mean).collect())
 }

@@ -41,7 +41,12 @@ pub fn fitted(
         if let (Some(axis), Some(row)) = (found.axis, document.gyro.orientation.rows.get_mut(sensor)) {
             let slopes = thermal.as_ref().and_then(|thermal| {
                 let away = deg_c? - thermal.reference_deg_c;
-                Some(thermal.slopes_arcsec_per_deg_c.get(sensor)?.map(|slope| Angle::from_arcsec(slope).as_rad() * away))
+                Some(
+                    thermal
+                        .slopes_arcsec_per_deg_c
+                        .get(sensor)?
+                        .map(|slope| Angle::from_arcsec(slope).as_rad() * away),
+                )
             });
             let slopes = slopes.unwrap_or_default();
             let at_reference = [0, 1, 2].map(|element| axis[element] - slopes[element]);
@@ -113,7 +118,8 @@ pub fn details(made: &Made) -> Table {
 }
 
 fn of_gyro(name: &str, found: &Result<GyroRates, String>, walk: f64) -> Table {
-    let numbers = |values: &mut dyn Iterator<Item = f64>| Value::Array(values.map(|x| tidy(x).into()).collect());
+    let numbers =
+        |values: &mut dyn Iterator<Item = f64>| Value::Array(values.map(|x| tidy(x).into()).collect());
     let mut table = Table::new();
     table.insert("name".into(), name.into());
     match found {
@@ -121,7 +127,10 @@ fn of_gyro(name: &str, found: &Result<GyroRates, String>, walk: f64) -> Table {
             table.insert("refused".into(), reason.as_str().into());
         }
         Ok(found) => {
-            table.insert("scale_factor_sigma_ppm".into(), tidy(1e6 * found.gain[1] / found.gain[0].abs()).into());
+            table.insert(
+                "scale_factor_sigma_ppm".into(),
+                tidy(1e6 * found.gain[1] / found.gain[0].abs()).into(),
+            );
             if let Some([value, sigma]) = found.asymmetry {
                 table.insert("asymmetry_ppm".into(), tidy(1e6 * value).into());
                 table.insert("asymmetry_sigma_ppm".into(), tidy(1e6 * sigma).into());

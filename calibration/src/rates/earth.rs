@@ -51,9 +51,8 @@ fn turned(vector: [f64; 3], rate_deg_per_h: [f64; 3], seconds: f64) -> ([f64; 3]
     ];
     let (sine, cosine) = libm::sincos(angle);
     let half = libm::sin(0.5 * angle);
-    let made = |of: f64, by: f64| {
-        [0, 1, 2].map(|i| axis[i] * along * (1.0 - of) + vector[i] * of - across[i] * by)
-    };
+    let made =
+        |of: f64, by: f64| [0, 1, 2].map(|i| axis[i] * along * (1.0 - of) + vector[i] * of - across[i] * by);
     (made(cosine, sine), made(sine / angle, 2.0 * half * half / angle))
 }
 

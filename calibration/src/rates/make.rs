@@ -119,7 +119,9 @@ pub fn make<W: Watch>(wanted: &Wanted<'_>, mut watch: impl FnMut() -> W) -> Resu
             *walk = white(wanted.base, &runs, &earth, sensor, axes[sensor].map(|x| x * gains[sensor]));
         }
         gyros = (0..sensors)
-            .map(|sensor| solve(&points(wanted, &runs, &rates, sensor, walk[sensor]), axes_of(wanted.base, sensor)))
+            .map(|sensor| {
+                solve(&points(wanted, &runs, &rates, sensor, walk[sensor]), axes_of(wanted.base, sensor))
+            })
             .collect();
         for (sensor, found) in gyros.iter().enumerate() {
             if let Ok(found) = found {
@@ -133,7 +135,10 @@ pub fn make<W: Watch>(wanted: &Wanted<'_>, mut watch: impl FnMut() -> W) -> Resu
     }
     if gyros.iter().all(Result::is_err) {
         let name = |sensor: usize| &wanted.base.gyro.sensor[sensor].name;
-        let of = gyros.iter().enumerate().filter_map(|(n, found)| Some(format!("gyro {}: {}", name(n), found.as_ref().err()?)));
+        let of = gyros
+            .iter()
+            .enumerate()
+            .filter_map(|(n, found)| Some(format!("gyro {}: {}", name(n), found.as_ref().err()?)));
         return Err(Error::Refused(of.collect()));
     }
     let temperatures: Vec<f64> = runs.iter().filter_map(|run| run.binned.temperature_deg_c).collect();
@@ -187,7 +192,11 @@ fn read<W: Watch>(
     let found = plateaus::find(&binned.bins, &counts);
     let own: Vec<Step> = wanted.steps.iter().filter(|step| step.run == number).copied().collect();
     if own.is_empty() {
-        return Ok(Err(format!("no step is stated of log {} ({}): name it in --steps, or leave it out", number + 1, run.name)));
+        return Ok(Err(format!(
+            "no step is stated of log {} ({}): name it in --steps, or leave it out",
+            number + 1,
+            run.name
+        )));
     }
     let matched = match matched(&own, &binned.bins, &found) {
         Ok(matched) => matched,
@@ -195,7 +204,8 @@ fn read<W: Watch>(
     };
     for one in &matched {
         let bins = binned.bins.get(one.plateau.bins[0]..one.plateau.bins[1]).unwrap_or_default();
-        let [good, all] = bins.iter().fold([0.0, 0.0], |[good, all], bin| [good + bin.good_s, all + bin.length_s]);
+        let [good, all] =
+            bins.iter().fold([0.0, 0.0], |[good, all], bin| [good + bin.good_s, all + bin.length_s]);
         let [from, to] = one.plateau.window_s;
         if good < (1.0 - LOST) * all {
             return Ok(Err(format!(
@@ -347,8 +357,15 @@ fn true_rates(runs: &[Turned], earth: &[Vec<[f64; 3]>]) -> Vec<Vec<[f64; 3]>> {
 }
 
 /// What a gyro showed in all steps, with the noise of the means.
-fn points(wanted: &Wanted<'_>, runs: &[Turned], rates: &[Vec<[f64; 3]>], sensor: usize, walk: f64) -> Vec<Point> {
-    let count = if wanted.base.gyro.output == GyroOutput::Counts { count_arcsec(wanted.base, sensor) } else { 0.0 };
+fn points(
+    wanted: &Wanted<'_>,
+    runs: &[Turned],
+    rates: &[Vec<[f64; 3]>],
+    sensor: usize,
+    walk: f64,
+) -> Vec<Point> {
+    let count =
+        if wanted.base.gyro.output == GyroOutput::Counts { count_arcsec(wanted.base, sensor) } else { 0.0 };
     let mut points = Vec::new();
     for (run, rates) in runs.iter().zip(rates) {
         for (one, rate) in run.matched.iter().zip(rates) {
@@ -360,7 +377,11 @@ fn points(wanted: &Wanted<'_>, runs: &[Turned], rates: &[Vec<[f64; 3]>], sensor:
             let variance = white + counted + table * table;
             // Readings without any noise are as good as their digits.
             let floor = 1e-9 * (1.0 + one.plateau.rate[sensor].abs());
-            points.push(Point { rate: *rate, shown: one.plateau.rate[sensor], sigma: variance.sqrt().max(floor) });
+            points.push(Point {
+                rate: *rate,
+                shown: one.plateau.rate[sensor],
+                sigma: variance.sqrt().max(floor),
+            });
         }
     }
     points

@@ -9,6 +9,9 @@ const REST: f64 = 0.5;
 /// Share by which a plateau may differ from its step, scale and axes being as good as unknown.
 const MISMATCH: f64 = 0.05;
 
+/// Share of the fastest plateau below which one is not worth telling.
+const SEEN: f64 = 0.01;
+
 /// A step with its plateau.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Matched {
@@ -28,8 +31,9 @@ pub fn matched(steps: &[Step], bins: &[Bin], plateaus: &[Plateau]) -> Result<Vec
     if steps.iter().all(|step| step.window_s.is_some()) {
         let of = |step: &Step| {
             let window = step.window_s.unwrap_or_default();
-            let plateau = within(bins, window)
-                .ok_or_else(|| format!("log {} has no ticks from {} s to {} s", step.run + 1, window[0], window[1]))?;
+            let plateau = within(bins, window).ok_or_else(|| {
+                format!("log {} has no ticks from {} s to {} s", step.run + 1, window[0], window[1])
+            })?;
             Ok(Matched { step: *step, plateau })
         };
         return steps.iter().map(of).collect();
@@ -48,12 +52,12 @@ pub fn matched(steps: &[Step], bins: &[Bin], plateaus: &[Plateau]) -> Result<Vec
     let moving: Vec<&Plateau> = plateaus.iter().filter(|plateau| size(plateau) > limit).collect();
     if turning.is_empty() || moving.len() != turning.len() {
         return Err(format!(
-            "log {}: {} steps of the table are stated, {} plateaus were found: {}. State all steps in their order, or their begin_s \
+            "log {}: {} steps of the table are stated, {} plateaus turn like the slowest of them or faster; found were {}. State all steps in their order, or their begin_s \
              and end_s with --steps",
             first.run + 1,
             turning.len(),
             moving.len(),
-            words(&moving)
+            words(&plateaus.iter().filter(|plateau| size(plateau) > SEEN * fastest).collect::<Vec<_>>())
         ));
     }
     let mut all: Vec<Matched> = turning
@@ -63,7 +67,12 @@ pub fn matched(steps: &[Step], bins: &[Bin], plateaus: &[Plateau]) -> Result<Vec
         .collect();
     check(&all)?;
     let rests = plateaus.iter().filter(|plateau| size(plateau) <= limit);
-    all.extend(rests.map(|plateau| Matched { step: Step { rate_deg_per_s: 0.0, ..*first }, plateau: plateau.clone() }));
+    all.extend(
+        rests.map(|plateau| Matched {
+            step: Step { rate_deg_per_s: 0.0, ..*first },
+            plateau: plateau.clone(),
+        }),
+    );
     all.sort_by_key(|one| one.plateau.bins[0]);
     Ok(all)
 }
@@ -75,10 +84,12 @@ fn check(all: &[Matched]) -> Result<(), String> {
     else {
         return Ok(());
     };
-    let per_rate: Vec<f64> = fastest.plateau.rate.iter().map(|rate| rate / fastest.step.rate_deg_per_s).collect();
+    let per_rate: Vec<f64> =
+        fastest.plateau.rate.iter().map(|rate| rate / fastest.step.rate_deg_per_s).collect();
     let norm: f64 = per_rate.iter().map(|x| x * x).sum();
     for one in all.iter().filter(|one| one.step.axis == fastest.step.axis) {
-        let along: f64 = one.plateau.rate.iter().zip(&per_rate).map(|(rate, per)| rate * per).sum::<f64>() / norm;
+        let along: f64 =
+            one.plateau.rate.iter().zip(&per_rate).map(|(rate, per)| rate * per).sum::<f64>() / norm;
         let away = (along - one.step.rate_deg_per_s).abs();
         let limit = MISMATCH * one.step.rate_deg_per_s.abs().max(0.1 * fastest.step.rate_deg_per_s.abs());
         if away > limit {

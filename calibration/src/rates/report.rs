@@ -16,12 +16,16 @@ const SEEN: f64 = 4.0;
 /// The report.
 pub(super) fn report(made: &Made) -> FitReport {
     let document = &made.written.document;
-    let mut report = FitReport::new("Rate table: scale factor, asymmetry, linearity, input axes", document.unit.clone());
+    let mut report =
+        FitReport::new("Rate table: scale factor, asymmetry, linearity, input axes", document.unit.clone());
     report.verdicts.clone_from(&made.verdicts);
     report.warnings.clone_from(&made.warnings);
     let turning = made.steps.iter().filter(|step| step.matched.step.rate_deg_per_s != 0.0).count();
-    let temperature = made.temperature_deg_c.map_or_else(String::new, |deg_c| format!(", mean temperature {deg_c:.1} °C"));
-    report.notes.push(format!("{turning} steps of the table and {} rests{temperature}.", made.steps.len() - turning));
+    let temperature =
+        made.temperature_deg_c.map_or_else(String::new, |deg_c| format!(", mean temperature {deg_c:.1} °C"));
+    report
+        .notes
+        .push(format!("{turning} steps of the table and {} rests{temperature}.", made.steps.len() - turning));
     report.notes.push(
         "Before and after are the errors of the corrected rate over the steps, Earth rate and mean error (bias) taken off. The \
          increment weight is that of the mean of positive and negative input; asymmetry and nonlinearity have no place in a \
@@ -67,7 +71,12 @@ fn coefficients(name: &str, found: &GyroRates, weight: Option<(f64, &str)>, repo
             // Near one the element itself says nothing about the angle.
             if of.abs() < 0.99 {
                 let arcsec = |rad: f64| Angle::from_rad(rad).as_arcsec();
-                add(&format!("input axis along {of_axis}", of_axis = element), "″", arcsec(*of), arcsec(sigma));
+                add(
+                    &format!("input axis along {of_axis}", of_axis = element),
+                    "″",
+                    arcsec(*of),
+                    arcsec(sigma),
+                );
             }
         }
     } else {
@@ -85,7 +94,8 @@ fn coefficients(name: &str, found: &GyroRates, weight: Option<(f64, &str)>, repo
 }
 
 fn linearity(made: &Made, index: usize, name: &str, found: &GyroRates, report: &mut FitReport) {
-    let axis = found.axis.or(made.written.document.gyro.orientation.rows.get(index).copied()).unwrap_or_default();
+    let axis =
+        found.axis.or(made.written.document.gyro.orientation.rows.get(index).copied()).unwrap_or_default();
     let input = |step: usize| -> f64 {
         made.steps.get(step).map_or(0.0, |step| step.rate.iter().zip(axis).map(|(a, b)| a * b).sum())
     };
@@ -97,7 +107,8 @@ fn linearity(made: &Made, index: usize, name: &str, found: &GyroRates, report: &
         let [from, to] = measured.matched.plateau.window_s;
         let own = input(step);
         worst = worst.max(left.abs());
-        let of_input = if own.abs() > 0.01 * full { format!("{:.2}", 1e6 * left / own.abs()) } else { "–".to_owned() };
+        let of_input =
+            if own.abs() > 0.01 * full { format!("{:.2}", 1e6 * left / own.abs()) } else { "–".to_owned() };
         rows.push(vec![
             (measured.matched.step.run + 1).to_string(),
             format!("{from:.1}…{to:.1}"),
@@ -108,12 +119,16 @@ fn linearity(made: &Made, index: usize, name: &str, found: &GyroRates, report: &
             format!("{:.3}", 1e6 * left / full),
         ]);
     }
-    let head = ["log", "window, s", "table, °/s", "input, °/s", "left, °/h", "ppm of input", "ppm of full scale"];
-    report.tables.push((
-        format!("Linearity of gyro {name}"),
-        Table { head: head.map(str::to_owned).to_vec(), rows },
-    ));
-    let chi = if found.chi_square.is_finite() { format!("χ² {:.2} per degree of freedom", found.chi_square) } else { "no step to spare".to_owned() };
+    let head =
+        ["log", "window, s", "table, °/s", "input, °/s", "left, °/h", "ppm of input", "ppm of full scale"];
+    report
+        .tables
+        .push((format!("Linearity of gyro {name}"), Table { head: head.map(str::to_owned).to_vec(), rows }));
+    let chi = if found.chi_square.is_finite() {
+        format!("χ² {:.2} per degree of freedom", found.chi_square)
+    } else {
+        "no step to spare".to_owned()
+    };
     report.notes.push(format!(
         "gyro {name}: linearity error at most {} ppm of full scale ({} °/s), {chi}.",
         short(1e6 * worst / full),
@@ -137,8 +152,12 @@ fn chart(made: &Made) -> Chart {
         let mut points: Vec<(f64, f64)> =
             made.steps.iter().zip(&found.left).map(|(step, left)| (input(&step.rate), *left)).collect();
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let series =
-            Series { name: "left".to_owned(), ink: Ink::First, form: Form::Dots, samples: Samples::points(points) };
+        let series = Series {
+            name: "left".to_owned(),
+            ink: Ink::First,
+            form: Form::Dots,
+            samples: Samples::points(points),
+        };
         Some(Panel {
             title: format!("gyro {}", sensor.name),
             unit: "°/h".to_owned(),

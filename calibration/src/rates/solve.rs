@@ -68,9 +68,12 @@ pub fn solve(points: &[Point], old: [f64; 3]) -> Result<GyroRates, String> {
     let most = points.iter().map(|point| along(point).abs()).fold(0.0, f64::max);
     let total = points.iter().map(|point| dot(point.rate, point.rate).sqrt()).fold(0.0, f64::max);
     if most < 0.1 * total {
-        return Err("its input axis is across all axes of the table: turn about an axis nearer to it".to_owned());
+        return Err(
+            "its input axis is across all axes of the table: turn about an axis nearer to it".to_owned()
+        );
     }
-    let both = [1.0, -1.0].into_iter().all(|sign| points.iter().any(|point| sign * along(point) > 0.2 * most));
+    let both =
+        [1.0, -1.0].into_iter().all(|sign| points.iter().any(|point| sign * along(point) > 0.2 * most));
     let build = |asymmetry: bool| {
         let width = columns(&points[0]).len() + 1 + usize::from(asymmetry);
         let row = |point: &Point| {
@@ -85,7 +88,8 @@ pub fn solve(points: &[Point], old: [f64; 3]) -> Result<GyroRates, String> {
         DMatrix::from_fn(points.len(), width, |i, j| rows[i][j] / points[i].sigma)
     };
     let y = DVector::from_iterator(points.len(), points.iter().map(|point| point.shown / point.sigma));
-    let wide = Some(build(true)).filter(|x| both && x.nrows() > x.ncols()).and_then(|x| least_squares(&x, &y));
+    let wide =
+        Some(build(true)).filter(|x| both && x.nrows() > x.ncols()).and_then(|x| least_squares(&x, &y));
     let asymmetric = wide.is_some();
     let narrow = || Some(build(false)).filter(|x| x.nrows() >= x.ncols()).and_then(|x| least_squares(&x, &y));
     let (beta, mut covariance, left) = wide.or_else(narrow).ok_or_else(|| {

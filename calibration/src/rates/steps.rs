@@ -67,7 +67,8 @@ pub fn axis(text: &str) -> Result<[f64; 3], String> {
     if let Some(axis) = named {
         return Ok(axis);
     }
-    let numbers: Vec<f64> = text.split(',').map(|part| part.trim().parse()).collect::<Result<_, _>>().unwrap_or_default();
+    let numbers: Vec<f64> =
+        text.split(',').map(|part| part.trim().parse()).collect::<Result<_, _>>().unwrap_or_default();
     match numbers.as_slice() {
         [x, y, z] => unit([*x, *y, *z]).ok_or_else(|| format!("axis {text:?} has no length")),
         _ => Err(format!("axis {text:?} must be x, y, z, -x, -y, -z or three numbers such as 0,0.6,0.8")),
@@ -94,7 +95,10 @@ pub fn listed(axes: &[String], rates: &[f64], runs: usize) -> Result<Vec<Step>, 
     for (run, text) in axes.iter().enumerate() {
         let axis = axis(text).map_err(Error::Usage)?;
         for rate in rates {
-            steps.push(checked(Step { run, axis, rate_deg_per_s: *rate, window_s: None }, runs).map_err(Error::Usage)?);
+            steps.push(
+                checked(Step { run, axis, rate_deg_per_s: *rate, window_s: None }, runs)
+                    .map_err(Error::Usage)?,
+            );
         }
     }
     Ok(steps)
@@ -108,15 +112,21 @@ pub fn read(path: &Path, runs: usize) -> Result<Vec<Step>, Error> {
     let text = read_small_text(path, "read the table of steps")?;
     let wrong = |what: String| Error::Usage(format!("{}: {what}", path.display()));
     let is_csv = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv"));
-    let rows = if is_csv { of_csv(&text) } else { toml::from_str::<File>(&text).map(|file| file.step).map_err(|e| e.to_string()) };
+    let rows = if is_csv {
+        of_csv(&text)
+    } else {
+        toml::from_str::<File>(&text).map(|file| file.step).map_err(|e| e.to_string())
+    };
     let rows = rows.map_err(wrong)?;
     if rows.is_empty() || rows.len() > MOST {
         return Err(wrong(format!("{} steps, must be 1 to {MOST}", rows.len())));
     }
     let step = |(index, row): (usize, Row)| {
         let axis = match &row.axis {
-            Axis::Name(name) => axis(name)?,
-            Axis::Vector(vector) => unit(*vector).ok_or("axis has no length")?,
+            Axis::Name(name) => axis(name).map_err(|what| format!("step {}: {what}", index + 1))?,
+            Axis::Vector(vector) => {
+                unit(*vector).ok_or_else(|| format!("step {}: axis has no length", index + 1))?
+            }
         };
         let window_s = match (row.begin_s, row.end_s) {
             (Some(begin), Some(end)) => Some([begin, end]),
@@ -124,7 +134,8 @@ pub fn read(path: &Path, runs: usize) -> Result<Vec<Step>, Error> {
             _ => return Err(format!("step {}: begin_s and end_s go together", index + 1)),
         };
         let log = row.log.unwrap_or(1);
-        let run = log.checked_sub(1).ok_or_else(|| format!("step {}: log is 0, the first log is 1", index + 1))?;
+        let run =
+            log.checked_sub(1).ok_or_else(|| format!("step {}: log is 0, the first log is 1", index + 1))?;
         let step = Step { run, axis, rate_deg_per_s: row.rate_deg_per_s, window_s };
         checked(step, runs).map_err(|what| format!("step {}: {what}", index + 1))
     };
@@ -133,7 +144,10 @@ pub fn read(path: &Path, runs: usize) -> Result<Vec<Step>, Error> {
 
 fn checked(step: Step, runs: usize) -> Result<Step, String> {
     if !(step.rate_deg_per_s.abs() <= FASTEST_DEG_PER_S) {
-        return Err(format!("rate is {} °/s, must be from −{FASTEST_DEG_PER_S} to {FASTEST_DEG_PER_S}", step.rate_deg_per_s));
+        return Err(format!(
+            "rate is {} °/s, must be from −{FASTEST_DEG_PER_S} to {FASTEST_DEG_PER_S}",
+            step.rate_deg_per_s
+        ));
     }
     if step.run >= runs {
         return Err(format!("log {} is named, {runs} were given", step.run + 1));
@@ -147,7 +161,8 @@ fn checked(step: Step, runs: usize) -> Result<Step, String> {
 }
 
 fn of_csv(text: &str) -> Result<Vec<Row>, String> {
-    let mut lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));
+    let mut lines =
+        text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));
     let (_, head) = lines.next().ok_or("it is empty")?;
     let head: Vec<&str> = head.split(',').map(str::trim).collect();
     for name in &head {
@@ -160,18 +175,26 @@ fn of_csv(text: &str) -> Result<Vec<Row>, String> {
     let row = |(index, line): (usize, &str)| {
         let fields: Vec<&str> = line.split(',').map(str::trim).collect();
         if fields.len() != head.len() {
-            return Err(format!("line {}: {} fields, the first line has {}", index + 1, fields.len(), head.len()));
+            return Err(format!(
+                "line {}: {} fields, the first line has {}",
+                index + 1,
+                fields.len(),
+                head.len()
+            ));
         }
         let field = |name: &str| {
             let place = head.iter().position(|column| *column == name)?;
             fields.get(place).copied().filter(|field| !field.is_empty())
         };
         let number = |name: &str| {
-            let parse = |text: &str| text.parse().map_err(|_| format!("line {}: {name} is {text:?}, no number", index + 1));
+            let parse = |text: &str| {
+                text.parse().map_err(|_| format!("line {}: {name} is {text:?}, no number", index + 1))
+            };
             field(name).map(parse).transpose()
         };
         let need = |name: &str| format!("line {}: {name} is missing", index + 1);
-        let log = field("log").map(|text| text.parse().map_err(|_| format!("line {}: log is {text:?}, no number", index + 1)));
+        let log = field("log")
+            .map(|text| text.parse().map_err(|_| format!("line {}: log is {text:?}, no number", index + 1)));
         Ok(Row {
             log: log.transpose()?,
             axis: Axis::Name(field("axis").ok_or_else(|| need("axis"))?.to_owned()),

@@ -117,3 +117,125 @@ fn scale_axes_and_bias_are_recovered_within_what_is_stated() {
     println!("{beyond} of {} beyond three standard errors, rms {rms:.3}", errors.len());
     assert!(beyond * 100 <= errors.len() && (0.7..1.15).contains(&rms), "{beyond} {rms}");
 }
+
+#[test]
+fn the_written_document_takes_the_errors_away_and_says_what_it_cannot_hold() {
+    // Two parts in ten thousand more with positive input: the asymmetry.
+    let distort = |reading: f64| if reading > 0.0 { reading * 1.0002 } else { reading };
+    let runs = [0, 1, 2].map(|axis: usize| run(700 + u64::try_from(axis).unwrap(), AXES[axis], distort));
+    let made = made(&runs, &steps(3), &place()).unwrap();
+    for found in made.gyros.iter().flatten() {
+        let [asymmetry, sigma] = found.asymmetry.unwrap();
+        assert!((asymmetry - 2e-4).abs() < 3.0 * sigma + 1e-6 && sigma < 5e-6, "{asymmetry} {sigma}");
+    }
+    let report = made.report();
+    println!("{}", report.to_text());
+    assert!(report.warnings.iter().any(|words| words.contains("positive and negative scale factor differ")));
+    for verdict in &report.verdicts {
+        let [before, after] = verdict.in_sample;
+        // What is left is half the asymmetry of 144 °/s, which the document cannot hold.
+        assert!(verdict.accepted && after.rms < 0.2 * before.rms && after.rms > 1.0, "{}", verdict.words());
+    }
+    let details = super::document::details(&made);
+    assert!(details["gyro"][0].get("asymmetry_ppm").is_some());
+}
+
+#[test]
+fn a_bent_gyro_is_told_from_noise() {
+    let bend = |reading: f64| reading * (1.0 + 3e-5 * reading * reading);
+    let runs = [0, 1, 2].map(|axis: usize| run(800 + u64::try_from(axis).unwrap(), AXES[axis], bend));
+    let made = made(&runs, &steps(3), &place()).unwrap();
+    assert!(made.gyros.iter().flatten().all(|found| found.widened && found.chi_square > 10.0));
+    assert!(made.report().warnings.iter().any(|words| words.contains("Nonlinearity")));
+}
+
+#[test]
+fn one_axis_gives_its_own_gyro_s_weight_and_no_other() {
+    let runs = [run(900, AXES[2], |reading| reading)];
+    let steps = listed(&["z".to_owned()], &RATES, 1).unwrap();
+    let made = made(&runs, &steps, &place()).unwrap();
+    assert!(made.gyros[0].is_err() && made.gyros[1].is_err());
+    let found = made.gyros[2].as_ref().unwrap();
+    assert!(found.axis.is_none());
+    let truth = {
+        let scenario = scenario(0);
+        let Gyros::Mems(gyros) = &scenario.instrument.gyros else { panic!() };
+        let away = Simulation::new(&scenario).unwrap().next().unwrap().truth.gyro_deg_c[2]
+            - gyros[2].reference_deg_c;
+        gyros[2].scale * (1.0 + gyros[2].scale_per_k[0] * away + gyros[2].scale_per_k[1] * away * away)
+    };
+    let error = (1.0 / found.gain[0] - truth) / (found.gain[1] * truth);
+    assert!(error.abs() < 3.0, "{error}");
+    let rows = &made.written.document.gyro.orientation.rows;
+    assert_eq!(rows[2].map(f64::to_bits), [0.0, 0.0, 1.0].map(f64::to_bits));
+}
+
+#[test]
+fn without_a_place_whole_turns_hold_the_earth_off() {
+    let made = made(&table(950), &steps(3), &[]).unwrap();
+    assert!(made.warnings.iter().any(|words| words.contains("whole turns")));
+    let gyros = {
+        let Gyros::Mems(gyros) = scenario(0).instrument.gyros else { panic!() };
+        gyros
+    };
+    for (found, gyro) in made.gyros.iter().zip(gyros) {
+        let weight = 1.0 / found.as_ref().unwrap().gain[0];
+        // The gyros are some degrees from their reference: 40 ppm/°C.
+        assert!((weight - gyro.scale).abs() < 5e-4, "{weight}");
+    }
+}
+
+#[test]
+fn steps_that_are_not_those_of_the_log_are_refused() {
+    let runs = [run(1, AXES[0], |reading| reading)];
+    let words = |rates: &[f64]| {
+        let steps = listed(&["x".to_owned()], rates, 1).unwrap();
+        made(&runs, &steps, &place()).map(|made| made.report().to_text()).unwrap_err().to_string()
+    };
+    let few = words(&[36.0, -36.0]);
+    assert!(
+        few.contains("2 steps of the table are stated, 3 plateaus") && few.contains("11.0…19.0 s at (35.9"),
+        "{few}"
+    );
+    let swapped = words(&[36.0, -36.0, 144.0, -72.0, 72.0, -144.0]);
+    assert!(swapped.contains("its step is stated as") && swapped.contains("order of the rates"), "{swapped}");
+    assert!(matches!(listed(&["x".to_owned()], &[1.0], 2), Err(Error::Usage(_))));
+}
+
+#[test]
+fn tables_of_steps_are_read_or_refused_with_their_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let read = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        super::steps::read(&path, 2)
+    };
+    let csv = read("a.csv", "log,axis,rate_deg_per_s,begin_s,end_s\n1,-z,10,1,2\n2,y,-5,,\n").unwrap();
+    assert_eq!(
+        csv[0],
+        Step { run: 0, axis: [0.0, 0.0, -1.0], rate_deg_per_s: 10.0, window_s: Some([1.0, 2.0]) }
+    );
+    assert_eq!((csv[1].run, csv[1].window_s), (1, None));
+    let toml = read("a.toml", "[[step]]\naxis = [0, 3.0, 4.0]\nrate_deg_per_s = 2.5\n").unwrap();
+    assert_eq!(toml[0].axis, [0.0, 0.6, 0.8]);
+    for (name, text, expected) in [
+        ("b.csv", "axis,rate\nz,1\n", "column \"rate\" is none of"),
+        ("c.csv", "axis,rate_deg_per_s\nz,fast\n", "line 2: rate_deg_per_s is \"fast\", no number"),
+        ("d.csv", "axis,rate_deg_per_s\nw,1\n", "step 1: axis \"w\" must be x, y, z"),
+        (
+            "e.toml",
+            "[[step]]\naxis = \"z\"\nrate_deg_per_s = 1\nlog = 3\n",
+            "step 1: log 3 is named, 2 were given",
+        ),
+        (
+            "f.toml",
+            "[[step]]\naxis = \"z\"\nrate_deg_per_s = 1\nbegin_s = 3\n",
+            "step 1: begin_s and end_s go together",
+        ),
+        ("g.csv", "", "it is empty"),
+    ] {
+        let error = read(name, text).unwrap_err();
+        assert_eq!(error.exit_code(), 2);
+        assert!(error.to_string().contains(expected), "{error}");
+    }
+}
