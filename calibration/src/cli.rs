@@ -11,6 +11,12 @@ mod validate;
 mod positions;
 mod runs;
 mod tumble;
+mod modes;
+mod output;
+mod place;
+mod rates;
+mod runs;
+mod units;
 
 use std::io::{self, Write};
 use std::process::ExitCode;
@@ -42,6 +48,8 @@ enum Command {
     Validate(validate::ValidateArgs),
     Positions(positions::PositionsArgs),
     Tumble(tumble::TumbleArgs),
+    Modes(modes::ModesArgs),
+    Rates(rates::RatesArgs),
     /// Print a completion script for a shell
     #[command(after_help = "Example:\n  isotherm-calibrate completions bash > isotherm-calibrate.bash")]
     Completions {
@@ -61,6 +69,8 @@ fn run(cli: Cli) -> Result<(), Error> {
         Command::Validate(args) => args.run(),
         Command::Positions(args) => args.run(),
         Command::Tumble(args) => args.run(),
+        Command::Modes(args) => args.run(),
+        Command::Rates(args) => args.run(),
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), "isotherm-calibrate", &mut script);

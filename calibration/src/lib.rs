@@ -16,6 +16,8 @@
 //! | [`show`] | a document in words and curves |
 //! | [`validate`] | a document judged on other logs |
 //! | [`positions`], [`tumble`] | accelerometers on a stand; a unit tumbled by hand |
+//! | [`modes`] | drift polynomials and switch parameters of a mode-reversed laser gyro |
+//! | [`rates`] | scale factor, asymmetry, linearity and axes from a rate table |
 //! | [`error`], [`cli`] | what can go wrong; the command line |
 
 pub mod allan;
@@ -28,9 +30,11 @@ mod fixture;
 pub mod impact;
 pub mod means;
 pub mod merge;
+pub mod modes;
 pub mod nominal;
 pub mod positions;
 pub mod provenance;
+pub mod rates;
 pub mod report;
 pub mod run;
 pub mod series;

@@ -1,5 +1,7 @@
 //! A run: what one log has of one unit, to be corrected again and again by the service's own code.
 
+mod together;
+
 use std::collections::BTreeSet;
 
 use isotherm_correction::sample::CorrectedTick;

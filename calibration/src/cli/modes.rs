@@ -1,0 +1,111 @@
+//! `isotherm-calibrate modes`.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use super::bar::Bar;
+use super::output::{About, OutputArgs};
+use super::place::PlaceArgs;
+use super::runs::LogArgs;
+use super::units::of_document;
+use crate::error::Error;
+use crate::modes::document::details;
+use crate::modes::fit::Asked;
+use crate::modes::make::{Wanted, make};
+use crate::written::Written;
+
+/// Magnetic and non-magnetic drift over temperature, slow meander and switch parameters of a mode-reversed laser gyro
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+    isotherm-calibrate modes chamber.mcap --document unit.toml --latitude 55.75 --heading 30 --out unit-modes.toml\n  \
+    isotherm-calibrate modes up.mcap down.mcap --judge other.mcap --document unit.toml --latitude 55.75 --heading 30 \
+    --html modes.html\n\n\
+    The runs are of one unit at rest, with mode reversal on, over the temperatures it is to work at. The document gives scale, axes, \
+    temperature channels and filter; its static, magnetic and slow-meander terms are replaced, with the transition ticks and the \
+    servo where the runs show them.")]
+pub(super) struct ModesArgs {
+    #[command(flatten)]
+    log: LogArgs,
+    /// Judge the constants on this log too, which they are not fitted to; may be repeated
+    #[arg(long, value_name = "LOG")]
+    judge: Vec<PathBuf>,
+    /// Calibration document (TOML) that the fit starts from
+    #[arg(long, short, value_name = "DOC")]
+    document: Option<PathBuf>,
+    #[command(flatten)]
+    place: PlaceArgs,
+    /// Order of the non-magnetic polynomial, 0 to 3; chosen by cross-validation without it
+    #[arg(long, value_name = "ORDER", value_parser = clap::value_parser!(u8).range(0..=3))]
+    static_order: Option<u8>,
+    /// Order of the magnetic polynomial, 0 to 3; chosen by cross-validation without it
+    #[arg(long, value_name = "ORDER", value_parser = clap::value_parser!(u8).range(0..=3))]
+    magnetic_order: Option<u8>,
+    /// Order of the slow meander, 0 or 1; chosen by cross-validation without it
+    #[arg(long, value_name = "ORDER", value_parser = clap::value_parser!(u8).range(0..=1))]
+    meander_order: Option<u8>,
+    /// Ticks that a switch loses, 1 to 3; found in the log without it
+    #[arg(long, value_name = "TICKS", value_parser = clap::value_parser!(u8).range(1..=3))]
+    transition_ticks: Option<u8>,
+    /// Leave out this much behind every switch (s); without it, as long as the servo's transient lasts
+    #[arg(long, value_name = "SECONDS")]
+    settle: Option<f64>,
+    /// Temperature that powers are taken about (°C); that of the document's biases without it, else 20
+    #[arg(long, value_name = "DEG_C", allow_negative_numbers = true)]
+    reference: Option<f64>,
+    #[command(flatten)]
+    output: OutputArgs,
+}
+
+impl ModesArgs {
+    /// Does what the command says.
+    pub(super) fn run(&self) -> Result<(), Error> {
+        let inputs = self.log.log.iter().chain(&self.judge).chain(&self.document);
+        self.output.check(&inputs.map(PathBuf::as_path).collect::<Vec<&Path>>())?;
+        if let Some(settle) = self.settle.filter(|settle| !(0.0..=3600.0).contains(settle)) {
+            return Err(Error::Usage(format!("--settle is {settle}, must be from 0 to 3600 s")));
+        }
+        let Some(document) = &self.document else {
+            return Err(Error::Usage(
+                "a mode-reversed gyro counts, and a log does not say what a count is worth: give --document with increment weights, \
+                 input axes, temperature channels and filter"
+                    .to_owned(),
+            ));
+        };
+        let place = self.place.place()?;
+        let base = Written::read(document)?;
+        let runs = of_document(&self.log.reading, &self.log.log, &base.loaded.unit)?;
+        let judge = if self.judge.is_empty() {
+            Vec::new()
+        } else {
+            of_document(&self.log.reading, &self.judge, &base.loaded.unit)?
+        };
+        let order = |order: Option<u8>| order.map(usize::from);
+        let made = make(
+            &Wanted {
+                runs: &runs,
+                judge: &judge,
+                base: &base.document,
+                place,
+                asked: Asked {
+                    static_order: order(self.static_order),
+                    magnetic_order: order(self.magnetic_order),
+                    meander_order: order(self.meander_order),
+                },
+                transition_ticks: self.transition_ticks,
+                settle_s: self.settle,
+                reference_deg_c: self.reference,
+            },
+            Bar::reading,
+        )?;
+        let ranges = made.gyros.iter().flatten().map(|fit| fit.range_deg_c);
+        let about = About {
+            method: "polynomials of the lasing modes by generalised least squares",
+            key: "modes",
+            details: details(&made),
+            range_deg_c: ranges.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]),
+            logs: &self.log.log,
+        };
+        self.output.write(&made.written, about, &made.report())
+    }
+}

@@ -1,0 +1,119 @@
+//! The arguments that say where a fit's document and report go.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use isotherm_log::file::refuse_overwriting;
+use isotherm_protocol::document::{Created, Document};
+use serde_json::json;
+use toml::Table;
+
+use super::print;
+use crate::error::Error;
+use crate::provenance::{command_line, origin};
+use crate::report::{FitReport, residuals};
+use crate::written::{Written, write_file};
+
+/// What a fit writes.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct OutputArgs {
+    /// Write the new document
+    #[arg(long, short, value_name = "NEW")]
+    out: Option<PathBuf>,
+    /// Replace documents and reports that are there already
+    #[arg(long)]
+    overwrite: bool,
+    /// Date that the new document states (YYYY-MM-DD); that of the old one without it
+    #[arg(long, value_name = "DATE", requires = "out")]
+    created: Option<String>,
+    /// Write the report with its diagrams as one HTML file
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
+    /// Print everything as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// What the document says of a fit beside its coefficients.
+pub(crate) struct About<'a> {
+    /// Method.
+    pub(crate) method: &'static str,
+    /// Name of its table in `origin.details`.
+    pub(crate) key: &'static str,
+    /// That table.
+    pub(crate) details: Table,
+    /// Range of temperature (°C).
+    pub(crate) range_deg_c: Option<[f64; 2]>,
+    /// Logs that it was fitted to.
+    pub(crate) logs: &'a [PathBuf],
+}
+
+impl OutputArgs {
+    /// Checks before anything is read; `inputs` may not be overwritten.
+    pub(crate) fn check(&self, inputs: &[&Path]) -> Result<(), Error> {
+        for out in self.out.iter().chain(&self.html) {
+            refuse_overwriting(out, inputs)?;
+            if out.exists() && !self.overwrite {
+                return Err(Error::Usage(format!(
+                    "{} is there already: give another name, or --overwrite",
+                    out.display()
+                )));
+            }
+        }
+        self.date().map(|_| ())
+    }
+
+    /// Writes document and page, prints the report, and ends with the reasons of what was refused.
+    pub(crate) fn write(&self, written: &Written, about: About<'_>, report: &FitReport) -> Result<(), Error> {
+        if let Some(out) = &self.out {
+            self.document(written.document.clone(), about, report)?.save(out, self.overwrite)?;
+        }
+        if let Some(html) = &self.html {
+            write_file(html, report.to_html().as_bytes(), self.overwrite)?;
+        }
+        if self.json {
+            print(format!("{}\n", report.to_json()).as_bytes())?;
+        } else {
+            print(report.to_text().as_bytes())?;
+        }
+        let refusals = report.refusals();
+        if refusals.is_empty() { Ok(()) } else { Err(Error::Refused(refusals)) }
+    }
+
+    fn document(
+        &self,
+        mut document: Document,
+        about: About<'_>,
+        report: &FitReport,
+    ) -> Result<Written, Error> {
+        let mut origin = origin(about.logs, &command_line())?;
+        origin.method = Some(about.method.to_owned());
+        origin.range_deg_c = about.range_deg_c;
+        origin.residual = residuals(&report.verdicts);
+        let before = document.origin.take();
+        let mut details = before.as_ref().and_then(|before| before.details.clone()).unwrap_or_default();
+        if let Some(before) = before.filter(|before| before.tool.is_some() || before.method.is_some()) {
+            // What the rest of the document rests on.
+            let log: Vec<_> =
+                before.log.iter().map(|log| json!({ "name": log.name, "sha256": log.sha256 })).collect();
+            let earlier = json!({ "tool": before.tool.unwrap_or_default(), "method": before.method.unwrap_or_default(), "log": log });
+            let earlier =
+                toml::Value::try_from(earlier).map_err(|error| Error::Document(vec![error.to_string()]))?;
+            details.insert("before".to_owned(), earlier);
+        }
+        details.insert(about.key.to_owned(), toml::Value::Table(about.details));
+        origin.details = Some(details);
+        document.origin = Some(origin);
+        if let Some(date) = self.date()? {
+            document.created = Some(date);
+        }
+        Written::of(&document)
+    }
+
+    fn date(&self) -> Result<Option<Created>, Error> {
+        let Some(text) = &self.created else { return Ok(None) };
+        let date = text.parse().ok().and_then(Created::new);
+        date.map(Some)
+            .ok_or_else(|| Error::Usage(format!("--created is {text:?}, must be a date such as 2026-11-22")))
+    }
+}

@@ -1,0 +1,126 @@
+//! `isotherm-calibrate rates`.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use isotherm_correction::sample::OutputKind;
+use isotherm_protocol::document::GyroOutput;
+
+use super::bar::Bar;
+use super::output::{About, OutputArgs};
+use super::place::PlaceArgs;
+use super::runs::LogArgs;
+use super::units::{of_document, of_only};
+use crate::error::Error;
+use crate::rates::document::{details, nominal};
+use crate::rates::make::{Wanted, make};
+use crate::rates::steps::{Step, listed, read};
+use crate::written::Written;
+
+/// Scale factor, asymmetry, linearity, input axes and bias of gyros from runs on a rate table
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+    isotherm-calibrate rates x.mcap y.mcap z.mcap --axis x --axis y --axis z --rates 10,-10,50,-50,100,-100 \
+    --document unit.toml --latitude 55.75 --heading 30 --pitch 0 --roll 0 --out unit-rates.toml\n  \
+    isotherm-calibrate rates table.mcap --steps table.csv --document unit.toml --remove-mean\n\n\
+    Plateaus of steady rate are found in the log, in the order of --rates; rests between them are found too. --steps names a CSV \
+    with the columns log, axis, rate_deg_per_s, begin_s, end_s (the first and the last two may be left out), or TOML with a \
+    [[step]] of the same keys for each. Latitude and attitude are those of the beginning of each log.")]
+pub(super) struct RatesArgs {
+    #[command(flatten)]
+    log: LogArgs,
+    /// Axis of the table in case axes (x, -y, … or 0,0.6,0.8); once for each log
+    #[arg(long, value_name = "AXIS", allow_hyphen_values = true, requires = "rates")]
+    axis: Vec<String>,
+    /// Rates of the table in their order (°/s), with commas
+    #[arg(long, value_name = "RATES", value_delimiter = ',', allow_hyphen_values = true, requires = "axis")]
+    rates: Vec<f64>,
+    /// Table of the steps (CSV or TOML)
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["axis", "rates"])]
+    steps: Option<PathBuf>,
+    /// Calibration document (TOML) that the fit starts from; nominal scale and axes without it
+    #[arg(long, short, value_name = "DOC")]
+    document: Option<PathBuf>,
+    #[command(flatten)]
+    place: PlaceArgs,
+    /// Standard deviation of the table's rates (ppm)
+    #[arg(long, value_name = "PPM", default_value_t = 0.0)]
+    table_ppm: f64,
+    /// Add what is left of the bias to the document's static bias
+    #[arg(long)]
+    with_bias: bool,
+    #[command(flatten)]
+    output: OutputArgs,
+}
+
+impl RatesArgs {
+    /// Does what the command says.
+    pub(super) fn run(&self) -> Result<(), Error> {
+        let inputs = self.log.log.iter().chain(&self.document).chain(&self.steps);
+        self.output.check(&inputs.map(PathBuf::as_path).collect::<Vec<&Path>>())?;
+        if !(0.0..=1e6).contains(&self.table_ppm) {
+            return Err(Error::Usage(format!(
+                "--table-ppm is {}, must be from 0 to 1000000",
+                self.table_ppm
+            )));
+        }
+        let place = self.place.place()?;
+        let base = self.document.as_deref().map(Written::read).transpose()?;
+        let runs = match &base {
+            Some(base) => of_document(&self.log.reading, &self.log.log, &base.loaded.unit)?,
+            None => of_only(&self.log.reading, &self.log.log)?,
+        };
+        let base = match base {
+            Some(base) => base.document,
+            None => {
+                let mut output = None;
+                let mut gyros = 0;
+                let Some(first) = runs.first() else {
+                    return Err(Error::Usage("no log is given".to_owned()));
+                };
+                first.gyro_ticks(Bar::reading(), |kind, tick| {
+                    output = Some(kind);
+                    gyros = tick.readings.len();
+                })?;
+                if gyros != 3 {
+                    return Err(Error::Usage(format!(
+                        "{} has {gyros} gyros: only three of them have nominal axes. Give --document",
+                        first.name
+                    )));
+                }
+                let output =
+                    if output == Some(OutputKind::Counts) { GyroOutput::Counts } else { GyroOutput::Mean };
+                nominal(&first.unit.to_string(), output)
+            }
+        };
+        let steps = self.stated(runs.len())?;
+        let place: Vec<_> = place.into_iter().collect();
+        let wanted = Wanted {
+            runs: &runs,
+            steps: &steps,
+            base: &base,
+            place: &place,
+            table_ppm: self.table_ppm,
+            with_bias: self.with_bias,
+        };
+        let made = make(&wanted, Bar::reading)?;
+        let about = About {
+            method: "rate table, weighted least squares",
+            key: "rates",
+            details: details(&made),
+            range_deg_c: made.temperature_deg_c.map(|deg_c| [deg_c, deg_c]),
+            logs: &self.log.log,
+        };
+        self.output.write(&made.written, about, &made.report())
+    }
+
+    fn stated(&self, runs: usize) -> Result<Vec<Step>, Error> {
+        match &self.steps {
+            Some(path) => read(path, runs),
+            None if self.rates.is_empty() => Err(Error::Usage(
+                "what did the table do? Give --axis and --rates, or --steps FILE".to_owned(),
+            )),
+            None => listed(&self.axis, &self.rates, runs),
+        }
+    }
+}

@@ -1,0 +1,30 @@
+//! Drift polynomials and switch parameters of a mode-reversed laser gyro, from a temperature run at rest [003; models §2, §5–§7].
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`switches`] | the raw ticks about the mode switches: lost ticks, dither |
+//! | [`servo`], [`dither`] | time constant of the perimeter servo; rest frequency over temperature |
+//! | [`cells`] | means between the switches beside the corrector's own columns |
+//! | [`noise`] | white noise, whole counts and Markov drift of the means; least squares under it |
+//! | [`orders`], [`fit`] | orders by cross-validation; one gyro's coefficients |
+//! | [`checks`] | what a log must have |
+//! | [`judge`] | drift in running mode, before and after |
+//! | [`make`], [`document`] | the whole procedure; the document |
+//! | [`robust`] | middle and scatter |
+
+pub mod cells;
+pub mod checks;
+pub mod dither;
+pub mod document;
+pub mod fit;
+pub mod judge;
+pub mod make;
+mod minimum;
+pub mod noise;
+pub mod orders;
+mod report;
+pub mod robust;
+pub mod servo;
+pub mod switches;
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,260 @@
+//! The fit of one gyro: which orders, which coefficients, how sure.
+
+use isotherm_correction::units::AngularRate;
+use nalgebra::DMatrix;
+
+use super::cells::{Cell, MAX_POWER};
+use super::noise::{Data, Noise, real};
+use super::orders::{self, Folds, Model, Score};
+
+/// Temperature that the slow meander's powers are taken about (°C) [003].
+pub const MEANDER_REFERENCE_DEG_C: f64 = 25.0;
+/// Largest order of the slow meander [003].
+pub const MEANDER_ORDER: usize = 1;
+/// Spans of temperature (°C) below which no power, and only the first, is fitted.
+const SPANS_DEG_C: [f64; 2] = [2.0, 8.0];
+/// A cell this many standard deviations off is left out.
+const FAR_SIGMAS: f64 = 6.0;
+/// Largest share of cells that may be left out.
+const FAR_SHARE: f64 = 0.1;
+/// Rounds of leaving out.
+const ROUNDS: usize = 3;
+
+/// A term of the model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Term {
+    /// Static bias.
+    Static,
+    /// Magnetic bias.
+    Magnetic,
+    /// Slow meander.
+    Meander,
+}
+
+impl Term {
+    /// Its key in the document.
+    #[must_use]
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::Static => "static_bias",
+            Self::Magnetic => "magnetic_bias",
+            Self::Meander => "slow_meander",
+        }
+    }
+}
+
+/// Orders as they were asked for; those that were not are chosen by cross-validation.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Asked {
+    /// Of the static bias.
+    pub static_order: Option<usize>,
+    /// Of the magnetic bias.
+    pub magnetic_order: Option<usize>,
+    /// Of the slow meander.
+    pub meander_order: Option<usize>,
+}
+
+/// One coefficient.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Fitted {
+    /// Of which term.
+    pub term: Term,
+    /// Of which power of temperature.
+    pub power: usize,
+    /// Its value (°/h per °Cʲ).
+    pub value: f64,
+    /// Its standard error.
+    pub sigma: f64,
+}
+
+/// What was found of one gyro.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GyroFit {
+    /// The orders.
+    pub model: Model,
+    /// The coefficients.
+    pub coefficients: Vec<Fitted>,
+    /// Their covariance, in the same order.
+    pub covariance: DMatrix<f64>,
+    /// The most likely noise.
+    pub noise: Noise,
+    /// Range of temperature (°C).
+    pub range_deg_c: [f64; 2],
+    /// Cells that it rests on.
+    pub cells: usize,
+    /// Cells that were left out for being far off.
+    pub left_out: usize,
+    /// Squared innovations per degree of freedom.
+    pub chi_square: f64,
+    /// The cross-validation; empty where all orders were given.
+    pub scores: Vec<Score>,
+    /// What is to be said of it.
+    pub remarks: Vec<String>,
+}
+
+impl GyroFit {
+    /// Coefficients of a term, lowest power first; empty where it is not in the model.
+    #[must_use]
+    pub fn of(&self, term: Term) -> Vec<f64> {
+        self.coefficients.iter().filter(|fitted| fitted.term == term).map(|fitted| fitted.value).collect()
+    }
+}
+
+/// What a fit of one gyro starts from.
+#[derive(Debug, Clone, Copy)]
+pub struct Given<'a> {
+    /// The cells.
+    pub cells: &'a [Cell],
+    /// Its place among the three of the cells.
+    pub place: usize,
+    /// Earth rate along its input axis by cell (°/h).
+    pub earth: &'a [f64],
+    /// One count (″); 0 for readings without steps.
+    pub count_arcsec: f64,
+    /// `T_ref` (°C).
+    pub reference_deg_c: f64,
+    /// Whether the meander's phase is known.
+    pub has_meander: bool,
+}
+
+/// Fits one gyro.
+///
+/// # Errors
+/// Why it cannot be.
+pub fn fit(given: Given<'_>, asked: Asked) -> Result<GyroFit, String> {
+    let Given { cells, place, reference_deg_c, .. } = given;
+    let temperature: Vec<f64> = cells.iter().map(|cell| cell.powers[0][place] + reference_deg_c).collect();
+    let (low, high) = temperature
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), t| (low.min(*t), high.max(*t)));
+    let mut remarks = Vec::new();
+    let largest = largest_order(high - low, &mut remarks);
+    let (mut data, mut kept) = (data(given, &temperature), temperature);
+    let mut stretch: Vec<usize> = cells.iter().map(|cell| cell.stretch).collect();
+    let full = Model {
+        static_order: largest,
+        magnetic_order: largest,
+        meander_order: given.has_meander.then_some(largest.min(MEANDER_ORDER)),
+    };
+    let before = data.len();
+    let mut noise = Noise::default();
+    for _ in 0..ROUNDS {
+        let whole = data.with_columns(&full.columns());
+        noise = whole.noise();
+        let solution = whole
+            .solve(noise)
+            .ok_or("its terms cannot be told apart: are both modes seen at every temperature?")?;
+        let white = whole.whitened(noise);
+        let left = &white.value - &white.columns * &solution.coefficients;
+        let far: Vec<bool> = left.iter().map(|x| x.abs() > FAR_SIGMAS).collect();
+        if !far.contains(&true) {
+            break;
+        }
+        drop_rows(&mut data, &mut kept, &mut stretch, &far);
+    }
+    let left_out = before - data.len();
+    if real(left_out) > FAR_SHARE * real(before) {
+        return Err(format!(
+            "{left_out} of {before} means are more than {FAR_SIGMAS} standard deviations off, {:.0} % are allowed: was the unit at \
+             rest? Cut the run with --start and --duration",
+            FAR_SHARE * 100.0
+        ));
+    }
+    let folds = Folds::of(&kept, &data.time_s, &stretch);
+    let (model, scores) = orders::choose(&data, noise, full, asked, &folds, &mut remarks)?;
+    let own = data.with_columns(&model.columns());
+    let width = own.columns.len();
+    if own.len() < 2 * width {
+        return Err(format!("{} means are too few for {width} coefficients: take a longer run", own.len()));
+    }
+    let noise = own.noise();
+    let singular = "its terms cannot be told apart: are both modes seen at every temperature?";
+    let solution = own.solve(noise).ok_or(singular)?;
+    let covariance = own.covariance(noise).ok_or(singular)?;
+    let coefficients = model.terms().into_iter().enumerate().map(|(index, (term, power))| Fitted {
+        term,
+        power,
+        value: solution.coefficients[index],
+        sigma: covariance[(index, index)].sqrt(),
+    });
+    let coefficients = coefficients.collect();
+    Ok(GyroFit {
+        coefficients,
+        model,
+        covariance,
+        noise,
+        range_deg_c: [low, high],
+        cells: own.len(),
+        left_out,
+        chi_square: solution.chi_square / real(own.len() - width),
+        scores,
+        remarks,
+    })
+}
+
+/// Largest order that a span of temperature allows.
+pub(super) fn largest_order(span_deg_c: f64, remarks: &mut Vec<String>) -> usize {
+    let [none, first] = SPANS_DEG_C;
+    let order = if span_deg_c < none {
+        0
+    } else if span_deg_c < first {
+        1
+    } else {
+        return MAX_POWER;
+    };
+    let what = if order == 0 { "only the constants are" } else { "nothing above the first order is" };
+    remarks.push(format!(
+        "temperature spans {span_deg_c:.1} °C only: {what} fitted ({none} °C are needed for the first order, {first} °C for \
+         higher ones); take a run over the whole range"
+    ));
+    order
+}
+
+/// Means less Earth rate, beside all columns: static, magnetic, meander, by powers.
+fn data(given: Given<'_>, temperature: &[f64]) -> Data {
+    let Given { cells, place, earth, count_arcsec, .. } = given;
+    let power = |cell: &Cell, power: usize| match power {
+        0 => 1.0,
+        _ => cell.powers.get(power - 1).map_or(0.0, |of| of[place]),
+    };
+    let mut columns: Vec<Vec<f64>> = Vec::new();
+    for j in 0..=MAX_POWER {
+        columns.push(cells.iter().map(|cell| power(cell, j)).collect());
+    }
+    for j in 0..=MAX_POWER {
+        columns.push(cells.iter().map(|cell| cell.mode * power(cell, j)).collect());
+    }
+    columns.push(cells.iter().map(|cell| cell.meander).collect());
+    let away = |(cell, deg_c): (&Cell, &f64)| cell.meander * (deg_c - MEANDER_REFERENCE_DEG_C);
+    columns.push(cells.iter().zip(temperature).map(away).collect());
+    Data {
+        value: cells.iter().zip(earth).map(|(cell, earth)| cell.rate[place] - earth).collect(),
+        columns,
+        time_s: cells.iter().map(|cell| cell.time_s).collect(),
+        length_s: cells.iter().map(|cell| cell.good_s).collect(),
+        joined: cells.iter().map(|cell| cell.joined).collect(),
+        // 1 °/h is 1″/s.
+        quantum: count_arcsec.abs(),
+    }
+}
+
+/// Takes rows out; what comes behind one touches nothing any more.
+fn drop_rows(data: &mut Data, kept: &mut Vec<f64>, stretch: &mut Vec<usize>, far: &[bool]) {
+    for row in 1..data.len() {
+        data.joined[row] &= !far[row - 1];
+    }
+    let keep =
+        |values: &[f64]| values.iter().zip(far).filter(|(_, far)| !**far).map(|(value, _)| *value).collect();
+    data.value = keep(&data.value);
+    data.time_s = keep(&data.time_s);
+    data.length_s = keep(&data.length_s);
+    data.columns = data.columns.iter().map(|column| keep(column)).collect();
+    *kept = keep(kept);
+    data.joined = data.joined.iter().zip(far).filter(|(_, far)| !**far).map(|(is, _)| *is).collect();
+    *stretch = stretch.iter().zip(far).filter(|(_, far)| !**far).map(|(is, _)| *is).collect();
+}
+
+/// °/h from rad/s.
+pub(crate) fn deg_per_h(rad_per_s: f64) -> f64 {
+    AngularRate::from_rad_per_s(rad_per_s).as_deg_per_h()
+}

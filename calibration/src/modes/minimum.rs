@@ -1,0 +1,79 @@
+//! Smallest value of a function of one or three numbers.
+
+/// Steps of the search along a line: 0.618^64 of the interval is left.
+const STEPS: usize = 64;
+/// Points of the coarse look at the interval.
+const COARSE: u32 = 12;
+/// Most steps of the simplex.
+const SIMPLEX_STEPS: usize = 160;
+/// Spread of the values at which the simplex has arrived.
+const ARRIVED: f64 = 1e-4;
+
+/// Place and value of the smallest value in an interval: a coarse look, then golden sections about the best.
+pub(super) fn golden([low, high]: [f64; 2], f: impl Fn(f64) -> f64) -> (f64, f64) {
+    const SECTION: f64 = 0.618_033_988_749_894_9;
+    let step = (high - low) / f64::from(COARSE);
+    let at = |index: u32| low + step * f64::from(index);
+    let best = (0..=COARSE)
+        .map(|index| (at(index), f(at(index))))
+        .fold((low, f64::INFINITY), |best, now| if now.1 < best.1 { now } else { best });
+    let (mut a, mut b) = ((best.0 - step).max(low), (best.0 + step).min(high));
+    let (mut c, mut d) = (b - SECTION * (b - a), a + SECTION * (b - a));
+    let (mut at_c, mut at_d) = (f(c), f(d));
+    for _ in 0..STEPS {
+        if b - a < 1e-6 {
+            break;
+        }
+        if at_c < at_d {
+            (b, d, at_d) = (d, c, at_c);
+            c = b - SECTION * (b - a);
+            at_c = f(c);
+        } else {
+            (a, c, at_c) = (c, d, at_d);
+            d = a + SECTION * (b - a);
+            at_d = f(d);
+        }
+    }
+    if at_c < at_d { (c, at_c) } else { (d, at_d) }
+}
+
+/// Place and value of the smallest value near a start, by the simplex of Nelder and Mead.
+pub(super) fn simplex(start: [f64; 3], steps: [f64; 3], f: impl Fn([f64; 3]) -> f64) -> ([f64; 3], f64) {
+    let mut points = vec![(start, f(start))];
+    for axis in 0..3 {
+        let mut point = start;
+        point[axis] += steps[axis];
+        points.push((point, f(point)));
+    }
+    for _ in 0..SIMPLEX_STEPS {
+        points.sort_by(|a, b| a.1.total_cmp(&b.1));
+        let (best, worst) = (points[0].1, points[3]);
+        if (worst.1 - best).abs() < ARRIVED {
+            break;
+        }
+        let centre = [0, 1, 2].map(|axis| (points[0].0[axis] + points[1].0[axis] + points[2].0[axis]) / 3.0);
+        let along = |share: f64| [0, 1, 2].map(|axis| centre[axis] + share * (centre[axis] - worst.0[axis]));
+        let reflected = (along(1.0), f(along(1.0)));
+        let mut next = reflected;
+        if reflected.1 < best {
+            let expanded = (along(2.0), f(along(2.0)));
+            if expanded.1 < reflected.1 {
+                next = expanded;
+            }
+        } else if reflected.1 >= points[2].1 {
+            let inside = along(if reflected.1 < worst.1 { 0.5 } else { -0.5 });
+            next = (inside, f(inside));
+        }
+        if next.1 < worst.1.min(reflected.1) || reflected.1 < points[2].1 {
+            points[3] = next;
+        } else {
+            let to = points[0].0;
+            for point in points.iter_mut().skip(1) {
+                point.0 = [0, 1, 2].map(|axis| 0.5 * (point.0[axis] + to[axis]));
+                point.1 = f(point.0);
+            }
+        }
+    }
+    points.sort_by(|a, b| a.1.total_cmp(&b.1));
+    points[0]
+}

@@ -1,0 +1,248 @@
+//! What a log says of its mode switches before anything is corrected: how many, how long the light is lost, and the
+//! dither frequency behind them.
+
+use std::collections::VecDeque;
+
+use isotherm_correction::sample::{GyroTick, LasingMode, OutputKind};
+
+use super::robust::{median, scatter};
+use crate::error::Error;
+use crate::run::{Run, Watch};
+
+/// Ticks before a switch that show what a reading is like.
+const BEFORE: usize = 16;
+/// Fewest and most ticks behind a switch that are kept, and the time that they should cover (s).
+const AFTER: [usize; 2] = [24, 400];
+const AFTER_S: f64 = 1.0;
+/// Ticks behind a command among which the lost ones are looked for.
+const SEARCH: usize = 16;
+/// A reading this many standard deviations off is not the gyro's.
+const FAR_SIGMAS: f64 = 8.0;
+/// Share of the dither's counts that a half-period difference may be off, and that a reading may be off.
+const DITHER_SHARES: [f64; 2] = [0.5, 0.1];
+/// Counts that a reading may be off where there is no dither to compare with.
+const FAR_COUNTS: f64 = 6.0;
+/// Share of the switches that must show a lost tick.
+const LOST_SHARE: f64 = 0.02;
+
+/// The ticks behind one switch.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Behind {
+    /// Whether a reading was not the gyro's, by ticks from the command on.
+    pub lost: Vec<bool>,
+    /// Mean duration of a tick (s).
+    pub tick_s: f64,
+    /// Dither frequency (Hz) by sensor and tick from the command on; empty where the instrument has no half-period counts.
+    pub dither_hz: Vec<Vec<f64>>,
+}
+
+/// All switches of some runs.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Switches {
+    /// What the readings are; `None` without ticks.
+    pub output: Option<OutputKind>,
+    /// Whether every reading is a whole number.
+    pub whole: bool,
+    /// Number of gyros.
+    pub sensors: usize,
+    /// Gyro ticks in all.
+    pub ticks: u64,
+    /// Mean duration of a tick (s).
+    pub tick_s: f64,
+    /// Ticks in the plus mode, in the minus mode, and without a mode.
+    pub of_mode: [u64; 3],
+    /// Ticks with a phase of the slow meander of each sign.
+    pub of_meander: [u64; 2],
+    /// Times between switches (s).
+    pub between_s: Vec<f64>,
+    /// What is behind each.
+    pub behind: Vec<Behind>,
+    /// Gyros whose reading never changed.
+    pub dead: Vec<usize>,
+}
+
+impl Switches {
+    /// Reads the raw ticks of some runs.
+    ///
+    /// # Errors
+    /// As [`Run::gyro_ticks`].
+    pub fn of<W: Watch>(runs: &[Run], mut watch: impl FnMut() -> W) -> Result<Self, Error> {
+        let mut found = Self { whole: true, ..Self::default() };
+        let mut seconds = 0.0;
+        let mut first: Option<Vec<f64>> = None;
+        let mut changed: Vec<bool> = Vec::new();
+        for run in runs {
+            let mut eye = Eye::default();
+            run.gyro_ticks(watch(), |output, tick| {
+                found.output.get_or_insert(output);
+                found.whole &= tick.readings.iter().all(|reading| reading.fract() == 0.0);
+                found.sensors = found.sensors.max(tick.readings.len());
+                found.ticks += 1;
+                seconds += tick.duration.as_s();
+                let first = first.get_or_insert_with(|| tick.readings.to_vec());
+                changed.resize(first.len(), false);
+                for (changed, (first, now)) in changed.iter_mut().zip(first.iter().zip(&tick.readings)) {
+                    *changed |= now.is_finite() && first.total_cmp(now).is_ne();
+                }
+                eye.take(tick, &mut found);
+            })?;
+            eye.close(&mut found);
+        }
+        found.tick_s = if found.ticks == 0 { 0.0 } else { seconds / real(found.ticks) };
+        found.dead =
+            (0..changed.len()).filter(|&sensor| !changed.get(sensor).is_some_and(|is| *is)).collect();
+        Ok(found)
+    }
+
+    /// Ticks that a switch loses: the last one behind the command that more than a chance few of the switches lose.
+    #[must_use]
+    pub fn transition_ticks(&self) -> usize {
+        let count = |tick: usize| {
+            let lost = self.behind.iter().filter(|behind| behind.lost.get(tick).is_some_and(|lost| *lost));
+            real(lost.count() as u64)
+        };
+        let least = (LOST_SHARE * real(self.behind.len() as u64)).max(1.0);
+        (0..SEARCH).rev().find(|&tick| count(tick) >= least).map_or(0, |tick| tick + 1)
+    }
+
+    /// Usual time between switches (s).
+    #[must_use]
+    pub fn period_s(&self) -> f64 {
+        median(&self.between_s)
+    }
+
+    /// Share by which one mode has more ticks than the other, 0…1.
+    #[must_use]
+    pub fn unbalance(&self) -> f64 {
+        let [plus, minus, _] = self.of_mode.map(real);
+        if plus + minus > 0.0 { (plus - minus).abs() / (plus + minus) } else { 1.0 }
+    }
+
+    /// Whether the producer says which phase the slow meander has.
+    #[must_use]
+    pub fn has_meander(&self) -> bool {
+        self.of_meander.iter().all(|ticks| *ticks > 0)
+    }
+}
+
+/// Watches the ticks of one run.
+#[derive(Debug, Default)]
+struct Eye {
+    mode: Option<LasingMode>,
+    switched_ns: Option<i64>,
+    before: VecDeque<GyroTick>,
+    behind: Option<Vec<GyroTick>>,
+}
+
+impl Eye {
+    fn take(&mut self, tick: &GyroTick, found: &mut Switches) {
+        let [plus, minus, none] = &mut found.of_mode;
+        *match tick.mode {
+            Some(LasingMode::Plus) => plus,
+            Some(LasingMode::Minus) => minus,
+            None => none,
+        } += 1;
+        if let Some(phase) = tick.meander {
+            let [plus, minus] = &mut found.of_meander;
+            *if phase == LasingMode::Plus { plus } else { minus } += 1;
+        }
+        if tick.mode.is_some() && self.mode.is_some() && tick.mode != self.mode {
+            self.close(found);
+            let now = tick.end_time.as_ns();
+            if let Some(before) = self.switched_ns {
+                #[expect(clippy::cast_precision_loss, reason = "a run is far below 2⁵³ ns")]
+                found.between_s.push((now - before) as f64 * 1e-9);
+            }
+            self.switched_ns = Some(now);
+            self.behind = Some(Vec::new());
+        }
+        self.mode = tick.mode.or(self.mode);
+        if let Some(behind) = &mut self.behind {
+            behind.push(tick.clone());
+            if behind.len() >= wanted(tick.duration.as_s()) {
+                self.close(found);
+            }
+        } else {
+            if self.before.len() == BEFORE {
+                self.before.pop_front();
+            }
+            self.before.push_back(tick.clone());
+        }
+    }
+
+    /// Ends what is behind a switch.
+    fn close(&mut self, found: &mut Switches) {
+        let Some(behind) = self.behind.take() else { return };
+        let sensors = behind.first().map_or(0, |tick| tick.readings.len());
+        let limits: Vec<Limits> =
+            (0..sensors).map(|sensor| Limits::of(&self.before, &behind, sensor)).collect();
+        let lost =
+            |tick: &GyroTick| limits.iter().enumerate().any(|(sensor, limits)| limits.beyond(tick, sensor));
+        let seconds: f64 = behind.iter().map(|tick| tick.duration.as_s()).sum();
+        found.behind.push(Behind {
+            lost: behind.iter().take(SEARCH).map(lost).collect(),
+            tick_s: seconds / real(behind.len().max(1) as u64),
+            dither_hz: (0..sensors)
+                .filter_map(|sensor| behind.iter().map(|tick| dither_hz(tick, sensor)).collect())
+                .collect(),
+        });
+        self.before.clear();
+    }
+}
+
+/// What readings of one gyro are like around a switch.
+struct Limits {
+    reading: f64,
+    far: f64,
+    difference: Option<f64>,
+}
+
+impl Limits {
+    /// From the ticks before it; the first switch of a run may have too few, then from the later ones behind it.
+    fn of(before: &VecDeque<GyroTick>, behind: &[GyroTick], sensor: usize) -> Self {
+        let near: Vec<&GyroTick> = if before.len() >= BEFORE / 2 {
+            before.iter().collect()
+        } else {
+            behind.iter().skip(SEARCH).collect()
+        };
+        let readings: Vec<f64> = near.iter().filter_map(|tick| tick.readings.get(sensor).copied()).collect();
+        let differences: Vec<f64> = near.iter().filter_map(|tick| difference(tick, sensor)).collect();
+        let sigma = scatter(&readings);
+        let difference = (!differences.is_empty()).then(|| median(&differences));
+        let floor = difference.map_or(FAR_COUNTS, |counts| DITHER_SHARES[1] * counts.abs());
+        let floor = if readings.iter().all(|reading| reading.fract() == 0.0) { floor } else { 0.0 };
+        Self { reading: median(&readings), far: floor.max(FAR_SIGMAS * sigma), difference }
+    }
+
+    fn beyond(&self, tick: &GyroTick, sensor: usize) -> bool {
+        // A reading that is no number is another trouble, which is told elsewhere.
+        let reading =
+            tick.readings.get(sensor).is_some_and(|reading| (reading - self.reading).abs() > self.far);
+        let halves = match (self.difference, difference(tick, sensor)) {
+            (Some(usual), Some(now)) => (now - usual).abs() > DITHER_SHARES[0] * usual.abs(),
+            _ => false,
+        };
+        reading || halves
+    }
+}
+
+fn difference(tick: &GyroTick, sensor: usize) -> Option<f64> {
+    tick.half_periods.get(sensor).map(|counts| f64::from(counts.positive) - f64::from(counts.negative))
+}
+
+/// Dither frequency of a gyro in a tick (Hz), where it has half-period counts (models §6).
+pub(super) fn dither_hz(tick: &GyroTick, sensor: usize) -> Option<f64> {
+    let seconds = tick.duration.as_s();
+    difference(tick, sensor).filter(|_| seconds > 0.0).map(|counts| counts / seconds)
+}
+
+/// How many ticks behind a switch are kept.
+fn wanted(tick_s: f64) -> usize {
+    let [least, most] = AFTER;
+    (least..most).find(|count| real(*count as u64) * tick_s >= AFTER_S).unwrap_or(most)
+}
+
+#[expect(clippy::cast_precision_loss, reason = "ticks of a log are far below 2⁵³")]
+pub(super) fn real(count: u64) -> f64 {
+    count as f64
+}

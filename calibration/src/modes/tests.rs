@@ -1,0 +1,5 @@
+//! Simulated Zeeman units through the whole procedure.
+
+mod fixture;
+mod recovery;
+mod refusals;

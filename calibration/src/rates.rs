@@ -1,0 +1,23 @@
+//! Scale factor, asymmetry, linearity, input axes and bias of gyros from runs on a rate table [IEEE 952, IEEE 647].
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`steps`] | what the table was told to do |
+//! | [`bins`] | what the gyros gave, in short means along their own input axes |
+//! | [`plateaus`] | where the table turned steadily |
+//! | [`matching`] | which plateau is which step |
+//! | [`earth`] | Earth rate in a case that turns |
+//! | [`solve`] | least squares over the steps, one gyro at a time |
+//! | [`make`], [`document`] | the whole procedure; the document |
+
+pub mod bins;
+pub mod document;
+pub mod earth;
+pub mod make;
+pub mod matching;
+pub mod plateaus;
+mod report;
+pub mod solve;
+pub mod steps;
+#[cfg(test)]
+mod tests;

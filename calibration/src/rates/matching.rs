@@ -1,0 +1,120 @@
+//! Which plateau is which step of the table.
+
+use super::bins::Bin;
+use super::plateaus::{Plateau, within};
+use super::steps::Step;
+
+/// Share of the smallest stated rate below which a plateau is a rest.
+const REST: f64 = 0.5;
+/// Share by which a plateau may differ from its step, scale and axes being as good as unknown.
+const MISMATCH: f64 = 0.05;
+
+/// Share of the fastest plateau below which one is not worth telling.
+const SEEN: f64 = 0.01;
+
+/// A step with its plateau.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Matched {
+    /// The step.
+    pub step: Step,
+    /// Its plateau.
+    pub plateau: Plateau,
+}
+
+/// Finds the steps of one run: those with a window by it, the others in the order of the plateaus. Rests between them are
+/// taken along as steps of rate zero.
+///
+/// # Errors
+/// What does not fit, with the plateaus that were found.
+pub fn matched(steps: &[Step], bins: &[Bin], plateaus: &[Plateau]) -> Result<Vec<Matched>, String> {
+    let Some(first) = steps.first() else { return Ok(Vec::new()) };
+    if steps.iter().all(|step| step.window_s.is_some()) {
+        let of = |step: &Step| {
+            let window = step.window_s.unwrap_or_default();
+            let plateau = within(bins, window).ok_or_else(|| {
+                format!("log {} has no ticks from {} s to {} s", step.run + 1, window[0], window[1])
+            })?;
+            Ok(Matched { step: *step, plateau })
+        };
+        return steps.iter().map(of).collect();
+    }
+    if steps.iter().any(|step| step.window_s.is_some()) {
+        return Err("either all steps of a log state begin_s and end_s, or none".to_owned());
+    }
+    let turning: Vec<&Step> = steps.iter().filter(|step| step.rate_deg_per_s != 0.0).collect();
+    let size = |plateau: &Plateau| plateau.rate.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let fastest = plateaus.iter().map(size).fold(0.0, f64::max);
+    let (least, most) = turning
+        .iter()
+        .map(|step| step.rate_deg_per_s.abs())
+        .fold((f64::INFINITY, 0.0_f64), |(least, most), rate| (least.min(rate), most.max(rate)));
+    let limit = REST * least / most * fastest;
+    let moving: Vec<&Plateau> = plateaus.iter().filter(|plateau| size(plateau) > limit).collect();
+    if turning.is_empty() || moving.len() != turning.len() {
+        return Err(format!(
+            "log {}: {} steps of the table are stated, {} plateaus turn like the slowest of them or faster; found were {}. State all steps in their order, or their begin_s \
+             and end_s with --steps",
+            first.run + 1,
+            turning.len(),
+            moving.len(),
+            words(&plateaus.iter().filter(|plateau| size(plateau) > SEEN * fastest).collect::<Vec<_>>())
+        ));
+    }
+    let mut all: Vec<Matched> = turning
+        .into_iter()
+        .zip(&moving)
+        .map(|(step, plateau)| Matched { step: *step, plateau: (*plateau).clone() })
+        .collect();
+    check(&all)?;
+    let rests = plateaus.iter().filter(|plateau| size(plateau) <= limit);
+    all.extend(
+        rests.map(|plateau| Matched {
+            step: Step { rate_deg_per_s: 0.0, ..*first },
+            plateau: plateau.clone(),
+        }),
+    );
+    all.sort_by_key(|one| one.plateau.bins[0]);
+    Ok(all)
+}
+
+/// Plateaus must be in proportion to their steps about each axis.
+fn check(all: &[Matched]) -> Result<(), String> {
+    let Some(fastest) =
+        all.iter().max_by(|a, b| a.step.rate_deg_per_s.abs().total_cmp(&b.step.rate_deg_per_s.abs()))
+    else {
+        return Ok(());
+    };
+    let per_rate: Vec<f64> =
+        fastest.plateau.rate.iter().map(|rate| rate / fastest.step.rate_deg_per_s).collect();
+    let norm: f64 = per_rate.iter().map(|x| x * x).sum();
+    for one in all.iter().filter(|one| one.step.axis == fastest.step.axis) {
+        let along: f64 =
+            one.plateau.rate.iter().zip(&per_rate).map(|(rate, per)| rate * per).sum::<f64>() / norm;
+        let away = (along - one.step.rate_deg_per_s).abs();
+        let limit = MISMATCH * one.step.rate_deg_per_s.abs().max(0.1 * fastest.step.rate_deg_per_s.abs());
+        if away > limit {
+            return Err(format!(
+                "log {}: the plateau of {:.1}…{:.1} s turns at {along:.4} °/s by the scale of the fastest one, its step is stated as \
+                 {} °/s; {limit:.4} °/s of difference are allowed. Is the order of the rates right?",
+                one.step.run + 1,
+                one.plateau.window_s[0],
+                one.plateau.window_s[1],
+                one.step.rate_deg_per_s
+            ));
+        }
+    }
+    Ok(())
+}
+
+fn words(plateaus: &[&Plateau]) -> String {
+    const MOST: usize = 12;
+    let one = |plateau: &&Plateau| {
+        let rates: Vec<String> = plateau.rate.iter().map(|rate| format!("{:.3}", rate / 3600.0)).collect();
+        format!("{:.1}…{:.1} s at ({}) °/s", plateau.window_s[0], plateau.window_s[1], rates.join(", "))
+    };
+    let mut list: Vec<String> = plateaus.iter().take(MOST).map(one).collect();
+    if plateaus.len() > MOST {
+        list.push(format!("and {} more", plateaus.len() - MOST));
+    }
+    if list.is_empty() { "none".to_owned() } else { list.join("; ") }
+}

@@ -1,0 +1,175 @@
+//! The report of the rates.
+
+use isotherm_correction::units::Angle;
+use isotherm_log::plot::page::{Axis, Chart, Content, Form, Ink, Panel, Samples, Series, Table};
+
+use super::make::Made;
+use super::solve::GyroRates;
+use crate::drift::figures::short;
+use crate::report::{Coefficient, FitReport};
+
+/// Height of a panel (CSS pixels).
+const HEIGHT: u32 = 220;
+/// Largest size of what is left, in its standard deviations, before it is called a nonlinearity.
+const SEEN: f64 = 4.0;
+
+/// The report.
+pub(super) fn report(made: &Made) -> FitReport {
+    let document = &made.written.document;
+    let mut report =
+        FitReport::new("Rate table: scale factor, asymmetry, linearity, input axes", document.unit.clone());
+    report.verdicts.clone_from(&made.verdicts);
+    report.warnings.clone_from(&made.warnings);
+    let turning = made.steps.iter().filter(|step| step.matched.step.rate_deg_per_s != 0.0).count();
+    let temperature =
+        made.temperature_deg_c.map_or_else(String::new, |deg_c| format!(", mean temperature {deg_c:.1} °C"));
+    report
+        .notes
+        .push(format!("{turning} steps of the table and {} rests{temperature}.", made.steps.len() - turning));
+    report.notes.push(
+        "Before and after are the errors of the corrected rate over the steps, Earth rate and mean error (bias) taken off. The \
+         increment weight is that of the mean of positive and negative input; asymmetry and nonlinearity have no place in a \
+         document and stand in origin.details."
+            .to_owned(),
+    );
+    for (index, sensor) in document.gyro.sensor.iter().enumerate() {
+        match made.gyros.get(index) {
+            Some(Ok(found)) => {
+                let weight = sensor
+                    .increment_weight_arcsec_per_count
+                    .map(|weight| (weight, "″/count"))
+                    .or(sensor.increment_weight_rad_per_rad.map(|weight| (weight, "rad/rad")));
+                coefficients(&sensor.name, found, weight, &mut report);
+                linearity(made, index, &sensor.name, found, &mut report);
+            }
+            Some(Err(reason)) => {
+                report.warnings.push(format!("gyro {}: {reason}; its weight and axis stay", sensor.name));
+            }
+            None => {}
+        }
+    }
+    report.charts.push(("Linearity".to_owned(), chart(made)));
+    report
+}
+
+fn coefficients(name: &str, found: &GyroRates, weight: Option<(f64, &str)>, report: &mut FitReport) {
+    let [gain, sigma] = found.gain;
+    let relative = sigma / gain.abs();
+    let mut add = |what: &str, unit: &str, value: f64, sigma: f64| {
+        report.coefficients.push(Coefficient::new(format!("gyro {name} {what}"), unit, value, Some(sigma)));
+    };
+    if let Some((weight, unit)) = weight {
+        add("increment weight", unit, weight, relative * weight.abs());
+    }
+    add("change of its weight", "ppm", 1e6 * (1.0 / gain.abs() - 1.0), 1e6 * relative);
+    if let Some([value, sigma]) = found.asymmetry {
+        add("scale factor asymmetry", "ppm", 1e6 * value, 1e6 * sigma);
+    }
+    add("bias left", "°/h", found.bias[0], found.bias[1]);
+    if let Some(axis) = found.axis {
+        for (element, (of, sigma)) in ["x", "y", "z"].iter().zip(axis.iter().zip(found.axis_sigma)) {
+            // Near one the element itself says nothing about the angle.
+            if of.abs() < 0.99 {
+                let arcsec = |rad: f64| Angle::from_rad(rad).as_arcsec();
+                add(
+                    &format!("input axis along {of_axis}", of_axis = element),
+                    "″",
+                    arcsec(*of),
+                    arcsec(sigma),
+                );
+            }
+        }
+    } else {
+        report.warnings.push(format!(
+            "gyro {name}: the steps turn about fewer than three directions: its input axis stays that of the document"
+        ));
+    }
+    if found.widened {
+        report.warnings.push(format!(
+            "gyro {name}: its steps scatter by {:.1} times what noise explains; standard errors are widened. Nonlinearity, or a \
+             table less steady than stated (--table-ppm)",
+            found.chi_square.sqrt()
+        ));
+    }
+}
+
+fn linearity(made: &Made, index: usize, name: &str, found: &GyroRates, report: &mut FitReport) {
+    let axis =
+        found.axis.or(made.written.document.gyro.orientation.rows.get(index).copied()).unwrap_or_default();
+    let input = |step: usize| -> f64 {
+        made.steps.get(step).map_or(0.0, |step| step.rate.iter().zip(axis).map(|(a, b)| a * b).sum())
+    };
+    let full = (0..made.steps.len()).map(|step| input(step).abs()).fold(0.0, f64::max);
+    let mut rows = Vec::new();
+    let mut worst = 0.0_f64;
+    for (step, left) in found.left.iter().enumerate() {
+        let Some(measured) = made.steps.get(step) else { continue };
+        let [from, to] = measured.matched.plateau.window_s;
+        let own = input(step);
+        worst = worst.max(left.abs());
+        let of_input =
+            if own.abs() > 0.01 * full { format!("{:.2}", 1e6 * left / own.abs()) } else { "–".to_owned() };
+        rows.push(vec![
+            (measured.matched.step.run + 1).to_string(),
+            format!("{from:.1}…{to:.1}"),
+            short(measured.matched.step.rate_deg_per_s),
+            short(own / 3600.0),
+            short(*left),
+            of_input,
+            format!("{:.3}", 1e6 * left / full),
+        ]);
+    }
+    let head =
+        ["log", "window, s", "table, °/s", "input, °/s", "left, °/h", "ppm of input", "ppm of full scale"];
+    report
+        .tables
+        .push((format!("Linearity of gyro {name}"), Table { head: head.map(str::to_owned).to_vec(), rows }));
+    let chi = if found.chi_square.is_finite() {
+        format!("χ² {:.2} per degree of freedom", found.chi_square)
+    } else {
+        "no step to spare".to_owned()
+    };
+    report.notes.push(format!(
+        "gyro {name}: linearity error at most {} ppm of full scale ({} °/s), {chi}.",
+        short(1e6 * worst / full),
+        short(full / 3600.0)
+    ));
+    if let Some([value, sigma]) = found.asymmetry.filter(|[value, sigma]| value.abs() > SEEN * sigma) {
+        report.warnings.push(format!(
+            "gyro {name}: positive and negative scale factor differ by {} ± {} ppm, which the document cannot hold",
+            short(1e6 * value),
+            short(1e6 * sigma)
+        ));
+    }
+}
+
+fn chart(made: &Made) -> Chart {
+    let panel = |(index, found): (usize, &Result<GyroRates, String>)| {
+        let found = found.as_ref().ok()?;
+        let sensor = made.written.document.gyro.sensor.get(index)?;
+        let axis = made.written.document.gyro.orientation.rows.get(index)?;
+        let input = |rate: &[f64; 3]| rate.iter().zip(axis).map(|(a, b)| a * b).sum::<f64>() / 3600.0;
+        let mut points: Vec<(f64, f64)> =
+            made.steps.iter().zip(&found.left).map(|(step, left)| (input(&step.rate), *left)).collect();
+        points.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let series = Series {
+            name: "left".to_owned(),
+            ink: Ink::First,
+            form: Form::Dots,
+            samples: Samples::points(points),
+        };
+        Some(Panel {
+            title: format!("gyro {}", sensor.name),
+            unit: "°/h".to_owned(),
+            height: HEIGHT,
+            logarithmic: false,
+            content: Content::Series(vec![series]),
+        })
+    };
+    Chart {
+        caption: "What the straight line leaves of each step, over the input rate.".to_owned(),
+        x: Axis::of("input rate", "°/s"),
+        panels: made.gyros.iter().enumerate().filter_map(panel).collect(),
+        marks: Vec::new(),
+    }
+}

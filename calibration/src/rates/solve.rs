@@ -1,0 +1,175 @@
+//! Least squares over the steps, one gyro at a time.
+//!
+//! With the weight and the biases of the document a gyro shows
+//!
+//! ```text
+//! u = h·ω + c·|h·ω|/|h| + b
+//! ```
+//!
+//! h = C·K_old/K: its direction is the input axis, its length says the weight; c the asymmetry, b what is left of the bias.
+
+use nalgebra::{DMatrix, DVector};
+
+/// Smallest share of the largest singular value that carries information.
+const SINGULAR: f64 = 1e-7;
+/// Standard deviations of its estimate by which χ² may be too large before the stated errors grow.
+const ALLOWED: f64 = 3.0;
+
+/// One step as a gyro saw it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Point {
+    /// True rate of the case relative to the stars (°/h).
+    pub rate: [f64; 3],
+    /// What the gyro showed (°/h).
+    pub shown: f64,
+    /// Standard deviation of that (°/h).
+    pub sigma: f64,
+}
+
+/// What was found of one gyro.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GyroRates {
+    /// K_old/K, with the sign of the document's input axis, and its standard error.
+    pub gain: [f64; 2],
+    /// Input axis in case axes; `None` where the steps do not span space.
+    pub axis: Option<[f64; 3]>,
+    /// Standard errors of its elements (rad).
+    pub axis_sigma: [f64; 3],
+    /// Scale factor with positive input less that with negative, in shares of their mean, and its standard error.
+    pub asymmetry: Option<[f64; 2]>,
+    /// What is left of the bias (°/h), and its standard error.
+    pub bias: [f64; 2],
+    /// Covariance of h (3), c where it was fitted, and b.
+    pub covariance: DMatrix<f64>,
+    /// What the fit leaves of each step (°/h).
+    pub left: Vec<f64>,
+    /// χ² per degree of freedom; no number where there is none to spare.
+    pub chi_square: f64,
+    /// Whether the standard errors were widened to cover what is left.
+    pub widened: bool,
+}
+
+/// Fits one gyro; `old` is its input axis in the document.
+///
+/// # Errors
+/// Why it cannot be.
+pub fn solve(points: &[Point], old: [f64; 3]) -> Result<GyroRates, String> {
+    let rank = rank(points);
+    if rank == 0 {
+        return Err("no step turns: scale needs rates of the table".to_owned());
+    }
+    let dot = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let spans = rank == 3;
+    // Where the steps do not span space the axis is that of the document, and its length alone is fitted.
+    let columns = |point: &Point| {
+        if spans { point.rate.to_vec() } else { vec![dot(old, point.rate)] }
+    };
+    let along = |point: &Point| dot(old, point.rate);
+    let most = points.iter().map(|point| along(point).abs()).fold(0.0, f64::max);
+    let total = points.iter().map(|point| dot(point.rate, point.rate).sqrt()).fold(0.0, f64::max);
+    if most < 0.1 * total {
+        return Err(
+            "its input axis is across all axes of the table: turn about an axis nearer to it".to_owned()
+        );
+    }
+    let both =
+        [1.0, -1.0].into_iter().all(|sign| points.iter().any(|point| sign * along(point) > 0.2 * most));
+    let build = |asymmetry: bool| {
+        let width = columns(&points[0]).len() + 1 + usize::from(asymmetry);
+        let row = |point: &Point| {
+            let mut row = columns(point);
+            if asymmetry {
+                row.push(along(point).abs());
+            }
+            row.push(1.0);
+            row
+        };
+        let rows: Vec<Vec<f64>> = points.iter().map(row).collect();
+        DMatrix::from_fn(points.len(), width, |i, j| rows[i][j] / points[i].sigma)
+    };
+    let y = DVector::from_iterator(points.len(), points.iter().map(|point| point.shown / point.sigma));
+    let wide =
+        Some(build(true)).filter(|x| both && x.nrows() > x.ncols()).and_then(|x| least_squares(&x, &y));
+    let asymmetric = wide.is_some();
+    let narrow = || Some(build(false)).filter(|x| x.nrows() >= x.ncols()).and_then(|x| least_squares(&x, &y));
+    let (beta, mut covariance, left) = wide.or_else(narrow).ok_or_else(|| {
+        format!("{} steps are too few, or too much alike: use rates of both signs, at least two sizes, and a rest", points.len())
+    })?;
+    let freedom = points.len() - beta.len();
+    #[expect(clippy::cast_precision_loss, reason = "few steps")]
+    let (chi_square, limit) = if freedom > 0 {
+        let freedom = freedom as f64;
+        (left.norm_squared() / freedom, 1.0 + ALLOWED * (2.0 / freedom).sqrt())
+    } else {
+        (f64::NAN, f64::INFINITY)
+    };
+    let widened = chi_square > limit;
+    if widened {
+        covariance *= chi_square;
+    }
+    let last = beta.len() - 1;
+    let (gain, gain_sigma, axis, axis_sigma) = if spans {
+        let h = [beta[0], beta[1], beta[2]];
+        let sign = if dot(h, old) < 0.0 { -1.0 } else { 1.0 };
+        let gain = sign * dot(h, h).sqrt();
+        let axis = h.map(|x| x / gain);
+        let of = |direction: [f64; 3]| {
+            let d = DVector::from_column_slice(&direction);
+            (covariance.view((0, 0), (3, 3)) * &d).dot(&d).max(0.0).sqrt()
+        };
+        let across = |element: usize| {
+            [0, 1, 2].map(|other| if other == element { 1.0 } else { 0.0 } - axis[element] * axis[other])
+        };
+        (gain, of(axis), Some(axis), [0, 1, 2].map(|element| of(across(element)) / gain.abs()))
+    } else {
+        (beta[0], covariance[(0, 0)].sqrt(), None, [f64::NAN; 3])
+    };
+    let place = last - 1;
+    let sigma = |index: usize| covariance[(index, index)].sqrt();
+    Ok(GyroRates {
+        gain: [gain, gain_sigma],
+        axis,
+        axis_sigma,
+        asymmetry: asymmetric.then(|| [2.0 * beta[place] / gain, 2.0 * sigma(place) / gain.abs()]),
+        bias: [beta[last] / gain.abs(), sigma(last) / gain.abs()],
+        left: left.iter().zip(points).map(|(left, point)| left * point.sigma / gain.abs()).collect(),
+        covariance,
+        chi_square,
+        widened,
+    })
+}
+
+/// Directions that the steps span.
+fn rank(points: &[Point]) -> usize {
+    let sum = points.iter().fold(nalgebra::Matrix3::zeros(), |sum, point| {
+        let rate = nalgebra::Vector3::from(point.rate);
+        sum + rate * rate.transpose()
+    });
+    let values = sum.symmetric_eigenvalues();
+    let largest = values.max();
+    // Rates of the Earth's size span nothing.
+    let least = (1e-4 * largest).max(1e6);
+    values.iter().filter(|value| **value > least).count()
+}
+
+/// Coefficients, covariance and what is left; `None` where a column tells nothing.
+fn least_squares(x: &DMatrix<f64>, y: &DVector<f64>) -> Option<(DVector<f64>, DMatrix<f64>, DVector<f64>)> {
+    let norms: Vec<f64> = x.column_iter().map(|column| column.norm()).collect();
+    if norms.iter().any(|norm| !(*norm > 0.0)) {
+        return None;
+    }
+    let scaled = DMatrix::from_fn(x.nrows(), x.ncols(), |i, j| x[(i, j)] / norms[j]);
+    let svd = scaled.svd(true, true);
+    if svd.singular_values.min() < SINGULAR * svd.singular_values.max() {
+        return None;
+    }
+    let solved = svd.solve(y, 0.0).ok()?;
+    let beta = DVector::from_fn(norms.len(), |j, _| solved[j] / norms[j]);
+    let v = svd.v_t.as_ref()?.transpose();
+    let inverse = DMatrix::from_fn(norms.len(), norms.len(), |i, j| {
+        let sum: f64 = (0..norms.len()).map(|k| v[(i, k)] * v[(j, k)] / svd.singular_values[k].powi(2)).sum();
+        sum / (norms[i] * norms[j])
+    });
+    let left = y - x * &beta;
+    Some((beta, inverse, left))
+}

@@ -1,0 +1,145 @@
+//! One run through several calibrations at once, each corrected tick beside the raw one.
+
+use std::collections::VecDeque;
+
+use isotherm_correction::sample::{CorrectedTick, GyroTick, OutputKind};
+use isotherm_correction::unit::{Unit, UnitSettings};
+use isotherm_log::message::Topic;
+use isotherm_log::offline::{Loaded, Offline};
+use isotherm_log::text::LogEvent;
+use isotherm_protocol::codec;
+use isotherm_protocol::key::RawStream;
+use isotherm_protocol::raw::GyroBatch;
+
+use super::{Run, Source, Troubles, Watch};
+use crate::error::Error;
+
+impl Run {
+    /// Its raw gyro ticks, in the order of the log.
+    ///
+    /// # Errors
+    /// [`Error::Log`] where the log cannot be read.
+    pub fn gyro_ticks(
+        &self,
+        mut watch: impl Watch,
+        mut each: impl FnMut(OutputKind, &GyroTick),
+    ) -> Result<(), Error> {
+        match &self.source {
+            Source::Events(events) => {
+                for event in events {
+                    if let LogEvent::Gyro { output, tick } = event {
+                        each(*output, tick);
+                    }
+                }
+            }
+            Source::Files { files, part } => {
+                let mut messages = files.open(part)?;
+                watch.begin(messages.progress());
+                while let Some(message) = messages.next_message()? {
+                    if let Topic::Raw(_, RawStream::Gyro) = &message.topic
+                        && let Ok(batch) = codec::decode::<GyroBatch>(&message.frame)
+                    {
+                        batch.to_core().for_each(|tick| each(batch.output(), &tick));
+                    }
+                    watch.step();
+                }
+                watch.end();
+            }
+        }
+        Ok(())
+    }
+
+    /// Corrects the run with several calibrations of the same channels and sensors at once. `each` sees every raw gyro
+    /// tick that was corrected, what each calibration made of it, and the unit of the first as it stands behind it.
+    ///
+    /// # Errors
+    /// As [`Run::correct`].
+    pub fn correct_together(
+        &self,
+        loaded: &[Loaded],
+        mut watch: impl Watch,
+        each: impl FnMut(&GyroTick, &[CorrectedTick], &Unit),
+    ) -> Result<Troubles, Error> {
+        let mut units = Together::new(loaded, each);
+        match &self.source {
+            Source::Events(events) => {
+                for event in events {
+                    if let LogEvent::Gyro { tick, .. } = event {
+                        units.raw.push_back(tick.clone());
+                    }
+                    units.units.iter_mut().for_each(|unit| unit.handle(event));
+                    units.give_out();
+                }
+            }
+            Source::Files { files, part } => {
+                let mut messages = files.open(part)?;
+                watch.begin(messages.progress());
+                while let Some(message) = messages.next_message()? {
+                    if let Topic::Raw(_, input) = &message.topic {
+                        if *input == RawStream::Gyro
+                            && let Ok(batch) = codec::decode::<GyroBatch>(&message.frame)
+                        {
+                            units.raw.extend(batch.to_core());
+                        }
+                        units.units.iter_mut().for_each(|unit| unit.receive(*input, &message.frame));
+                        units.give_out();
+                    }
+                    watch.step();
+                }
+                watch.end();
+            }
+        }
+        units.units.iter_mut().for_each(Offline::finish);
+        units.give_out();
+        let troubles = units.units.first().map(Offline::troubles).unwrap_or_default();
+        if units.count == 0 {
+            let mut reasons = vec![format!(
+                "{}: nothing of unit {} could be corrected: is the document for this unit, and the mapping right?",
+                self.name, self.unit
+            )];
+            reasons.extend(troubles);
+            return Err(Error::Refused(reasons));
+        }
+        Ok(troubles)
+    }
+}
+
+/// Units that are fed with the same readings.
+struct Together<F> {
+    units: Vec<Offline>,
+    raw: VecDeque<GyroTick>,
+    corrected: Vec<VecDeque<CorrectedTick>>,
+    each: F,
+    count: u64,
+}
+
+impl<F: FnMut(&GyroTick, &[CorrectedTick], &Unit)> Together<F> {
+    fn new(loaded: &[Loaded], each: F) -> Self {
+        let units: Vec<Offline> =
+            loaded.iter().map(|loaded| Offline::new(loaded, UnitSettings::default())).collect();
+        let corrected = units.iter().map(|_| VecDeque::new()).collect();
+        Self { units, raw: VecDeque::new(), corrected, each, count: 0 }
+    }
+
+    /// Gives out what all of them have.
+    fn give_out(&mut self) {
+        for (unit, ticks) in self.units.iter_mut().zip(&mut self.corrected) {
+            ticks.extend(unit.take());
+        }
+        while self.corrected.iter().all(|ticks| !ticks.is_empty()) {
+            let ticks: Vec<CorrectedTick> =
+                self.corrected.iter_mut().filter_map(VecDeque::pop_front).collect();
+            let (Some(first), Some(unit)) = (ticks.first(), self.units.first()) else { return };
+            let (sequence, end) = (first.sequence, first.end_time);
+            let found = self.raw.iter().position(|raw| raw.sequence == sequence && raw.end_time == end);
+            if let Some(found) = found {
+                // Ticks before it were refused, or came too late.
+                self.raw.drain(..found);
+                if let Some(raw) = self.raw.pop_front() {
+                    self.count += 1;
+                    (self.each)(&raw, &ticks, unit.unit());
+                }
+            }
+        }
+    }
+}
