@@ -9,6 +9,7 @@
 //! | [`series`], [`means`] | a run as columns: raw readings; corrected outputs averaged over windows |
 //! | [`nominal`], [`written`], [`provenance`] | a document: before a fit, on its way to a file, where its numbers come from |
 //! | [`drift`], [`allan`], [`spectrum`] | noise and drift of a static log |
+//! | [`report`] | what a fit says: verdicts, before and after, coefficients; text, JSON and page |
 //! | [`impact`] | what a drift that is left means for navigation |
 //! | [`error`], [`cli`] | what can go wrong; the command line |
 
@@ -22,6 +23,7 @@ pub mod impact;
 pub mod means;
 pub mod nominal;
 pub mod provenance;
+pub mod report;
 pub mod run;
 pub mod series;
 pub mod spectrum;

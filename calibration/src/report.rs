@@ -1,0 +1,161 @@
+//! The report of a fit, the same for all of them: verdict, before and after, coefficients, cross-validation, warnings.
+//!
+//! A fit fills a [`FitReport`]; what is said of it as text, as JSON and as a page is written here once. Its verdicts are
+//! also what the document states as its residuals ([`residuals`]), so that no two places can say different things.
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`verdict`] | what came of one sensor, and its sentence |
+//! | [`curve`] | before and after over time and temperature, taken from a corrected run |
+//! | [`batch`] | several units at once, and the table that closes them |
+//! | `page`, `json` | the report as a page and as JSON |
+
+pub mod batch;
+pub mod curve;
+mod json;
+mod page;
+#[cfg(test)]
+mod tests;
+pub mod verdict;
+
+use std::fmt::Write;
+
+use isotherm_log::plot::page::{Chart, Table};
+
+pub use batch::{BatchTable, in_parallel, of_unit};
+pub use curve::{Curve, Judged, Rest, judge};
+pub use verdict::{Figure, Verdict, residuals};
+
+use crate::drift::figures::{short, table};
+
+/// One fitted coefficient.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Coefficient {
+    /// What it is, such as "gyro x thermal_rate, run-up".
+    pub name: String,
+    /// Symbol of its unit of measure.
+    pub unit: String,
+    /// Its value.
+    pub value: f64,
+    /// Its standard error, where the fit knows one.
+    pub sigma: Option<f64>,
+}
+
+impl Coefficient {
+    /// A coefficient with its standard error.
+    #[must_use]
+    pub fn new(name: impl Into<String>, unit: impl Into<String>, value: f64, sigma: Option<f64>) -> Self {
+        Self { name: name.into(), unit: unit.into(), value, sigma }
+    }
+}
+
+/// What a fit has to say; lists that do not apply stay empty.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct FitReport {
+    /// What was done, such as "Thermal calibration, method joint".
+    pub title: String,
+    /// Serial of the unit.
+    pub unit: String,
+    /// What came of each sensor: the first line.
+    pub verdicts: Vec<Verdict>,
+    /// What is to be looked at, and what to do about it.
+    pub warnings: Vec<String>,
+    /// What was done, in sentences: logs, ranges, method, time constants.
+    pub notes: Vec<String>,
+    /// The coefficients.
+    pub coefficients: Vec<Coefficient>,
+    /// The cross-validation.
+    pub validation: Option<Table>,
+    /// Before and after, by sensor and run.
+    pub residuals: Vec<Curve>,
+    /// Further tables, each with its heading.
+    pub tables: Vec<(String, Table)>,
+    /// Further charts, each with its heading.
+    pub charts: Vec<(String, Chart)>,
+}
+
+impl FitReport {
+    /// A report with nothing in it but what was done to which unit.
+    #[must_use]
+    pub fn new(title: impl Into<String>, unit: impl Into<String>) -> Self {
+        Self { title: title.into(), unit: unit.into(), ..Self::default() }
+    }
+
+    /// The first line: every verdict, one sentence each.
+    #[must_use]
+    pub fn headline(&self) -> String {
+        verdict::headline(&self.verdicts)
+    }
+
+    /// Whether every sensor was accepted.
+    #[must_use]
+    pub fn accepted(&self) -> bool {
+        self.verdicts.iter().all(|verdict| verdict.accepted)
+    }
+
+    /// The refusals, for the end of a command.
+    #[must_use]
+    pub fn refusals(&self) -> Vec<String> {
+        let refused = self.verdicts.iter().filter(|verdict| !verdict.accepted);
+        refused.map(|verdict| format!("{}: {}: {}", self.unit, verdict.of, verdict.reason)).collect()
+    }
+
+    /// Everything as text, the verdict in the first line.
+    #[must_use]
+    pub fn to_text(&self) -> String {
+        let mut text = format!("{}\n\n{}, unit {}\n", self.headline(), self.title, self.unit);
+        self.notes.iter().for_each(|note| {
+            let _ = writeln!(text, "{note}");
+        });
+        self.warnings.iter().for_each(|warning| {
+            let _ = writeln!(text, "\nwarning: {warning}");
+        });
+        let own = [
+            ("Before and after", Some(verdict::rows(&self.verdicts))),
+            ("Coefficients, with their standard errors", Some(self.coefficient_rows())),
+            ("Cross-validation", self.validation.clone()),
+        ];
+        let further = self.tables.iter().map(|(heading, rows)| (heading.as_str(), Some(rows.clone())));
+        for (heading, rows) in own.into_iter().chain(further) {
+            if let Some(rows) = rows.filter(|rows| !rows.rows.is_empty()) {
+                let _ = writeln!(text, "\n{heading}\n{}", table(&rows.head, &rows.rows));
+            }
+        }
+        text
+    }
+
+    /// Coefficients as a table; the first column numbers them as the chart does.
+    fn coefficient_rows(&self) -> Table {
+        let head = ["", "coefficient", "value", "± σ", "value/σ", "unit"].map(str::to_owned).to_vec();
+        let row = |(index, coefficient): (usize, &Coefficient)| {
+            let Coefficient { name, unit, value, sigma } = coefficient;
+            let known = sigma.filter(|sigma| sigma.is_finite());
+            let ratio = known.filter(|sigma| *sigma > 0.0).map(|sigma| value.abs() / sigma);
+            let or_dash = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), short);
+            vec![
+                (index + 1).to_string(),
+                name.clone(),
+                stated(*value, known),
+                or_dash(known),
+                or_dash(ratio),
+                unit.clone(),
+            ]
+        };
+        Table { head, rows: self.coefficients.iter().enumerate().map(row).collect() }
+    }
+}
+
+/// A value to the digits that its standard error leaves meaning to, and one more.
+fn stated(value: f64, sigma: Option<f64>) -> String {
+    let Some(sigma) = sigma.filter(|sigma| *sigma > 0.0 && value != 0.0) else { return short(value) };
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 2 and 12")]
+    let digits = (libm::floor(libm::log10(value.abs() / sigma)) + 2.0).clamp(2.0, 12.0) as usize;
+    if (1e-3..1e6).contains(&value.abs()) {
+        #[expect(clippy::cast_possible_truncation, reason = "between -3 and 5")]
+        let whole = libm::floor(libm::log10(value.abs())) as i32 + 1;
+        let places = usize::try_from(i32::try_from(digits).unwrap_or(12) - whole).unwrap_or(0);
+        format!("{value:.places$}")
+    } else {
+        format!("{value:.*e}", digits - 1)
+    }
+}

@@ -1,0 +1,220 @@
+//! Before and after over time and temperature, taken from runs that the service's own code has corrected.
+
+use std::sync::Arc;
+
+use isotherm_log::offline::Loaded;
+use isotherm_protocol::document::{Document, Sample};
+
+use super::verdict::{Figure, Verdict};
+use crate::error::Error;
+use crate::means::{Means, Size};
+use crate::run::{Run, Troubles, Watch};
+
+/// Names of the case axes.
+pub(super) const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// One sensor or axis over one run, before and after. A window that either lacks is a gap in both.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Curve {
+    /// Of what, such as "gyro x", as its verdict names it.
+    pub of: String,
+    /// Symbol of the unit of measure.
+    pub measure: String,
+    /// The run's name.
+    pub run: String,
+    /// Whether the fit saw the run.
+    pub sample: Sample,
+    /// Distance of the values (s); 0 where they are not equally spaced, and there is no spectrum.
+    pub window_s: f64,
+    /// Time of each value since the run's beginning (s).
+    pub time_s: Arc<[f64]>,
+    /// Temperature of the time (°C); empty where none is known.
+    pub temperature_deg_c: Vec<f64>,
+    /// Without the fitted terms.
+    pub before: Vec<f64>,
+    /// With them.
+    pub after: Vec<f64>,
+}
+
+/// What a unit at rest would put out if it were without error. Where it is not known, the mean over the run is taken off,
+/// before and after each its own.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Rest {
+    /// Earth rate along the case axes (°/h).
+    pub rate_deg_per_h: Option<[f64; 3]>,
+    /// Specific force along the case axes (m/s²).
+    pub force_m_per_s2: Option<[f64; 3]>,
+}
+
+/// A run, corrected before and after.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Judged {
+    /// By axis: gyros first, then accelerometers; an axis without any good window is not there.
+    pub curves: Vec<Curve>,
+    /// What the corrections passed over.
+    pub troubles: Troubles,
+}
+
+/// Corrects a run with two calibrations and lays the outputs side by side along the case axes, averaged over windows.
+///
+/// # Errors
+/// As [`Run::correct`].
+pub fn judge(
+    run: &Run,
+    sample: Sample,
+    (before, after): (&Loaded, &Loaded),
+    (document, rest): (&Document, &Rest),
+    window_s: f64,
+    mut watch: impl Watch,
+) -> Result<Judged, Error> {
+    let before = Means::of(run, before, window_s, Again(&mut watch))?;
+    let after = Means::of(run, after, window_s, Again(&mut watch))?;
+    let mut troubles = after.troubles.clone();
+    troubles.extend(before.troubles.iter().filter(|words| !after.troubles.contains(words)).cloned());
+    let curves = Curve::of_means(&run.name, sample, [&before, &after], document, rest);
+    Ok(Judged { curves, troubles })
+}
+
+/// A watch that is lent.
+struct Again<'a, W: Watch>(&'a mut W);
+
+impl<W: Watch> Watch for Again<'_, W> {
+    fn begin(&mut self, progress: isotherm_log::progress::Progress) {
+        self.0.begin(progress);
+    }
+
+    fn step(&mut self) {
+        self.0.step();
+    }
+
+    fn end(&mut self) {
+        self.0.end();
+    }
+}
+
+impl Curve {
+    /// The curves of two corrections of the same run; the document tells which temperature channel an axis follows.
+    #[must_use]
+    pub fn of_means(
+        run: &str,
+        sample: Sample,
+        [before, after]: [&Means; 2],
+        document: &Document,
+        rest: &Rest,
+    ) -> Vec<Self> {
+        let time_s: Arc<[f64]> = after.time_s.as_slice().into();
+        let axis_of = |gyro: bool, axis: usize| {
+            let (values, truth) = if gyro {
+                ([before.rate(axis), after.rate(axis)], rest.rate_deg_per_h)
+            } else {
+                ([before.force(axis), after.force(axis)], rest.force_m_per_s2)
+            };
+            let truth = truth.and_then(|truth| truth.get(axis).copied());
+            let [before, after_values] = common(values, truth)?;
+            let channel = channel_of(document, gyro, axis);
+            let temperature = channel.and_then(|channel| after.temperature_deg_c.get(&channel).cloned());
+            let kind = if gyro { "gyro" } else { "accelerometer" };
+            Some(Self {
+                of: format!("{kind} {}", AXES.get(axis)?),
+                measure: if gyro { "°/h" } else { "m/s²" }.to_owned(),
+                run: run.to_owned(),
+                sample,
+                window_s: after.window_s,
+                time_s: Arc::clone(&time_s),
+                temperature_deg_c: temperature.unwrap_or_default(),
+                before,
+                after: after_values,
+            })
+        };
+        let axes = [true, false].into_iter().flat_map(|gyro| (0..3).map(move |axis| (gyro, axis)));
+        axes.filter_map(|(gyro, axis)| axis_of(gyro, axis)).collect()
+    }
+
+    /// Sizes before and after.
+    #[must_use]
+    pub fn sizes(&self) -> [Size; 2] {
+        [Size::of(&self.before), Size::of(&self.after)]
+    }
+
+    /// One verdict for each sensor of some curves, in the order of their first appearance, over all runs in and out of
+    /// sample together. Accepted where the rms of the deciding sample has not grown.
+    #[must_use]
+    pub fn verdicts(curves: &[Self]) -> Vec<Verdict> {
+        let mut names: Vec<&Self> = Vec::new();
+        for curve in curves {
+            if names.iter().all(|named| named.of != curve.of) {
+                names.push(curve);
+            }
+        }
+        let sizes = |of: &str, sample: Sample| {
+            let mine = || curves.iter().filter(|curve| curve.of == of && curve.sample == sample);
+            let all = |values: fn(&Self) -> &[f64]| {
+                Size::of(&mine().flat_map(|curve| values(curve).iter().copied()).collect::<Vec<_>>())
+            };
+            mine().next().map(|_| [all(|curve| &curve.before), all(|curve| &curve.after)])
+        };
+        let verdict = |named: &Self| {
+            let inside = sizes(&named.of, Sample::In).unwrap_or_default();
+            let outside = sizes(&named.of, Sample::Out);
+            let verdict = Verdict::new(&named.of, &named.measure, inside).out_of_sample(outside);
+            let [before, after] = verdict.deciding();
+            if after.rms <= before.rms {
+                return verdict;
+            }
+            let grown = format!(
+                "rms grows from {} to {} {}",
+                Figure::Rms.words(&before),
+                Figure::Rms.words(&after),
+                verdict.measure
+            );
+            verdict.refused(grown)
+        };
+        names.into_iter().map(verdict).collect()
+    }
+}
+
+impl Figure {
+    fn words(self, size: &Size) -> String {
+        crate::drift::figures::short(self.of(size))
+    }
+}
+
+/// Both where both are numbers, less what a unit without error would put out, or less the mean of each; `None` without any.
+#[expect(clippy::cast_precision_loss, reason = "windows of a log are far below 2⁵³")]
+fn common([before, after]: [&[f64]; 2], truth: Option<f64>) -> Option<[Vec<f64>; 2]> {
+    let pairs: Vec<(f64, f64)> = before
+        .iter()
+        .zip(after)
+        .map(|(a, b)| if a.is_finite() && b.is_finite() { (*a, *b) } else { (f64::NAN, f64::NAN) })
+        .collect();
+    let good: Vec<&(f64, f64)> = pairs.iter().filter(|(a, _)| a.is_finite()).collect();
+    if good.is_empty() {
+        return None;
+    }
+    let mean = |of: fn(&(f64, f64)) -> f64| {
+        truth.unwrap_or_else(|| good.iter().map(|pair| of(pair)).sum::<f64>() / good.len() as f64)
+    };
+    let (before, after) = (mean(|pair| pair.0), mean(|pair| pair.1));
+    Some([pairs.iter().map(|(a, _)| a - before).collect(), pairs.iter().map(|(_, b)| b - after).collect()])
+}
+
+/// The channel that the sensor follows which looks along a case axis more than the others do.
+#[must_use]
+pub fn channel_of(document: &Document, gyro: bool, axis: usize) -> Option<String> {
+    let along = |rows: &[[f64; 3]]| {
+        let part = |row: &[f64; 3]| row.get(axis).copied().unwrap_or(0.0).abs();
+        let largest = |best: (usize, f64), (index, row): (usize, &[f64; 3])| {
+            if part(row) > best.1 { (index, part(row)) } else { best }
+        };
+        rows.iter().enumerate().fold((0, 0.0), largest).0
+    };
+    let first = document.temperature.channel.first().map(|channel| channel.name.clone());
+    let own = if gyro {
+        let sensor = document.gyro.sensor.get(along(&document.gyro.orientation.rows));
+        sensor.and_then(|sensor| sensor.channel.clone())
+    } else {
+        let accel = document.accel.as_ref()?;
+        accel.sensor.get(along(&accel.orientation.rows)).and_then(|sensor| sensor.channel.clone())
+    };
+    own.or(first)
+}

@@ -1,0 +1,75 @@
+//! The report as JSON.
+
+use isotherm_log::plot::page::Table;
+use isotherm_protocol::document::Sample;
+use serde_json::{Value, json};
+
+use super::verdict::Verdict;
+use super::{Coefficient, Curve, FitReport};
+use crate::means::Size;
+
+impl FitReport {
+    /// Everything but the curves themselves, of which the sizes are there.
+    #[must_use]
+    pub fn to_json(&self) -> Value {
+        let coefficient =
+            |c: &Coefficient| json!({ "name": c.name, "unit": c.unit, "value": c.value, "sigma": c.sigma });
+        let curve = |curve: &Curve| {
+            json!({
+                "of": curve.of,
+                "measure": curve.measure,
+                "run": curve.run,
+                "sample": if curve.sample == Sample::In { "in" } else { "out" },
+                "sizes": sizes(curve.sizes()),
+            })
+        };
+        let further = |(heading, rows): &(String, Table)| (heading.clone(), of_table(rows));
+        json!({
+            "title": self.title,
+            "unit": self.unit,
+            "verdict": self.headline(),
+            "accepted": self.accepted(),
+            "verdicts": self.verdicts.iter().map(Verdict::to_json).collect::<Vec<_>>(),
+            "warnings": self.warnings,
+            "notes": self.notes,
+            "coefficients": self.coefficients.iter().map(coefficient).collect::<Vec<_>>(),
+            "validation": self.validation.as_ref().map(of_table),
+            "residuals": self.residuals.iter().map(curve).collect::<Vec<_>>(),
+            "tables": self.tables.iter().map(further).collect::<serde_json::Map<_, _>>(),
+        })
+    }
+}
+
+impl Verdict {
+    /// As JSON.
+    #[must_use]
+    pub fn to_json(&self) -> Value {
+        json!({
+            "of": self.of,
+            "measure": self.measure,
+            "words": self.words(),
+            "accepted": self.accepted,
+            "reason": self.reason,
+            "times_smaller": self.factor(),
+            "in_sample": sizes(self.in_sample),
+            "out_of_sample": self.out_of_sample.map(sizes),
+        })
+    }
+}
+
+fn sizes([before, after]: [Size; 2]) -> Value {
+    let size = |size: Size| {
+        json!({
+            "count": size.count,
+            "mean": size.mean,
+            "rms": size.rms,
+            "standard_deviation": size.deviation,
+            "peak_to_peak": size.peak_to_peak,
+        })
+    };
+    json!({ "before": size(before), "after": size(after) })
+}
+
+fn of_table(table: &Table) -> Value {
+    json!({ "head": table.head, "rows": table.rows })
+}

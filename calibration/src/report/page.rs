@@ -1,0 +1,287 @@
+//! The report as a page.
+
+use std::collections::BTreeSet;
+
+use isotherm_log::plot::page::{Axis, Chart, Content, Form, Ink, Mark, Page, Panel, Samples, Series, Table};
+use isotherm_protocol::document::Sample;
+
+use super::{Coefficient, Curve, FitReport, stated, verdict};
+use crate::spectrum::Spectrum;
+
+/// Most points of a curve on the page; of more, the smallest and the largest of each group are there.
+const POINTS: usize = 4096;
+/// Height of a panel of curves (CSS pixels).
+const HEIGHT: u32 = 170;
+/// Height of a panel of coefficients.
+const LOW: u32 = 110;
+/// Standard errors that an error bar reaches to either side: 95 %.
+const BAR: f64 = 1.96;
+
+impl FitReport {
+    /// The report as a page that needs nothing beside it.
+    #[must_use]
+    pub fn to_html(&self) -> String {
+        let mut page = Page::new(&format!("{}, unit {}", self.title, self.unit));
+        page.headline(&self.headline());
+        self.notes.iter().for_each(|note| page.paragraph(note));
+        if !self.warnings.is_empty() {
+            page.heading("Warnings");
+            self.warnings.iter().for_each(|warning| page.paragraph(warning));
+        }
+        section(&mut page, "Before and after", &verdict::rows(&self.verdicts));
+        self.over_time(&mut page);
+        self.over_temperature(&mut page);
+        for (heading, chart) in &self.charts {
+            page.heading(heading);
+            page.chart(chart);
+        }
+        if !self.coefficients.is_empty() {
+            page.heading("Coefficients");
+            if let Some(chart) = coefficients(&self.coefficients) {
+                page.chart(&chart);
+            }
+            page.table(&self.coefficient_rows());
+        }
+        if let Some(validation) = &self.validation {
+            section(&mut page, "Cross-validation", validation);
+        }
+        if let Some(chart) = spectrum(&self.residuals) {
+            page.heading("Spectrum of what is left");
+            page.chart(&chart);
+        }
+        self.tables.iter().for_each(|(heading, rows)| section(&mut page, heading, rows));
+        page.to_html()
+    }
+
+    fn over_time(&self, page: &mut Page) {
+        let runs: BTreeSet<(&str, bool)> = self.residuals.iter().map(of_run).collect();
+        if !runs.is_empty() {
+            page.heading("Over time");
+        }
+        for run in runs {
+            let curves: Vec<&Curve> = self.residuals.iter().filter(|curve| of_run(curve) == run).collect();
+            let mut panels: Vec<Panel> = curves
+                .iter()
+                .map(|curve| {
+                    let over = |values: &[f64]| thin(curve.time_s.iter().copied(), values);
+                    panel(
+                        &curve.of,
+                        &curve.measure,
+                        pair(over(&curve.before), over(&curve.after), Form::Line),
+                    )
+                })
+                .collect();
+            panels.extend(temperatures(&curves));
+            page.chart(&Chart {
+                caption: format!("{}, {}: what is left before and after.", run.0, sample_words(run.1)),
+                x: Axis::of("time since the run's beginning", "s"),
+                panels,
+                marks: Vec::new(),
+            });
+        }
+    }
+
+    fn over_temperature(&self, page: &mut Page) {
+        let known = |curve: &&Curve| curve.temperature_deg_c.iter().any(|t| t.is_finite());
+        if self.residuals.iter().any(|curve| known(&curve)) {
+            page.heading("Over temperature");
+        }
+        for outside in [false, true] {
+            let curves: Vec<&Curve> = self
+                .residuals
+                .iter()
+                .filter(known)
+                .filter(|curve| (curve.sample == Sample::Out) == outside)
+                .collect();
+            let mut names: Vec<(&str, &str)> = Vec::new();
+            for curve in &curves {
+                if !names.iter().any(|(of, _)| *of == curve.of) {
+                    names.push((&curve.of, &curve.measure));
+                }
+            }
+            if names.is_empty() {
+                continue;
+            }
+            let panel_of = |(of, measure): (&str, &str)| {
+                let (mut before, mut after) = (Vec::new(), Vec::new());
+                for curve in curves.iter().filter(|curve| curve.of == of) {
+                    let over = |values: &[f64]| thin(curve.temperature_deg_c.iter().copied(), values);
+                    before.extend(over(&curve.before));
+                    after.extend(over(&curve.after));
+                }
+                panel(of, measure, pair(before, after, Form::Dots))
+            };
+            page.chart(&Chart {
+                caption: format!("All runs {}: what is left before and after.", sample_words(outside)),
+                x: Axis::of("temperature", "°C"),
+                panels: names.into_iter().map(panel_of).collect(),
+                marks: Vec::new(),
+            });
+        }
+    }
+}
+
+/// A heading with its table, if there is anything in it.
+fn section(page: &mut Page, heading: &str, table: &Table) {
+    if !table.rows.is_empty() {
+        page.heading(heading);
+        page.table(table);
+    }
+}
+
+/// Run, and whether it is out of sample: those of the fit come first.
+fn of_run(curve: &Curve) -> (&str, bool) {
+    (&curve.run, curve.sample == Sample::Out)
+}
+
+fn sample_words(outside: bool) -> &'static str {
+    if outside { "out of sample" } else { "in sample" }
+}
+
+fn panel(title: &str, unit: &str, content: Vec<Series>) -> Panel {
+    let content = Content::Series(content);
+    Panel { title: title.to_owned(), unit: unit.to_owned(), height: HEIGHT, logarithmic: false, content }
+}
+
+fn pair(before: Vec<(f64, f64)>, after: Vec<(f64, f64)>, form: Form) -> Vec<Series> {
+    let series = |name: &str, ink, points| Series {
+        name: name.to_owned(),
+        ink,
+        form,
+        samples: Samples::points(points),
+    };
+    vec![series("before", Ink::Raw, before), series("after", Ink::Corrected, after)]
+}
+
+/// The different temperatures of a run's curves.
+fn temperatures(curves: &[&Curve]) -> Option<Panel> {
+    let mut shown: Vec<&Curve> = Vec::new();
+    for curve in curves.iter().filter(|curve| !curve.temperature_deg_c.is_empty()) {
+        let bits = |curve: &Curve| curve.temperature_deg_c.iter().map(|t| t.to_bits()).collect::<Vec<_>>();
+        if shown.iter().all(|other| bits(other) != bits(curve)) {
+            shown.push(curve);
+        }
+    }
+    let series = |(curve, ink): (&&Curve, Ink)| Series {
+        name: if shown.len() > 1 { format!("of {}", curve.of) } else { "temperature".to_owned() },
+        ink,
+        form: Form::Line,
+        samples: Samples::points(thin(curve.time_s.iter().copied(), &curve.temperature_deg_c)),
+    };
+    let series: Vec<Series> = shown.iter().zip(Ink::several()).map(series).collect();
+    (!series.is_empty()).then(|| Panel { height: LOW, ..panel("temperature", "°C", series) })
+}
+
+/// Points, or the smallest and the largest of each group of them where they are many.
+fn thin(places: impl Iterator<Item = f64>, values: &[f64]) -> Vec<(f64, f64)> {
+    let points: Vec<(f64, f64)> = places.zip(values.iter().copied()).collect();
+    if points.len() <= POINTS {
+        return points;
+    }
+    let ends = |group: &[(f64, f64)]| {
+        let indexed = || group.iter().enumerate().filter(|(_, point)| point.1.is_finite());
+        let low = indexed().min_by(|a, b| a.1.1.total_cmp(&b.1.1));
+        let high = indexed().max_by(|a, b| a.1.1.total_cmp(&b.1.1));
+        let mut ends: Vec<(usize, &(f64, f64))> = low.into_iter().chain(high).collect();
+        ends.sort_by_key(|(index, _)| *index);
+        ends.into_iter().map(|(_, point)| *point).collect::<Vec<_>>()
+    };
+    points.chunks(points.len().div_ceil(POINTS / 2)).flat_map(ends).collect()
+}
+
+/// Coefficients with error bars, those of one unit of measure in one panel; `None` where none has a standard error.
+fn coefficients(all: &[Coefficient]) -> Option<Chart> {
+    let mut units: Vec<&str> = Vec::new();
+    for coefficient in all {
+        if !units.contains(&coefficient.unit.as_str()) {
+            units.push(&coefficient.unit);
+        }
+    }
+    #[expect(clippy::cast_precision_loss, reason = "there are few")]
+    let place = |index: usize| (index + 1) as f64;
+    let of_unit = |unit: &str| {
+        let mine = || all.iter().enumerate().filter(move |(_, coefficient)| coefficient.unit == unit);
+        let values = mine().map(|(index, coefficient)| (place(index), coefficient.value));
+        let bars = mine().filter_map(|(index, coefficient)| {
+            let half = BAR * coefficient.sigma.filter(|sigma| sigma.is_finite())?;
+            let (low, high) = (coefficient.value - half, coefficient.value + half);
+            Some([(place(index), low), (place(index), high), (place(index), f64::NAN)])
+        });
+        let zero = [(place(0), 0.0), (place(all.len().saturating_sub(1)), 0.0)];
+        let series = |name: &str, ink, form, points: Vec<(f64, f64)>| Series {
+            name: name.to_owned(),
+            ink,
+            form,
+            samples: Samples::points(points),
+        };
+        let content = vec![
+            series("zero", Ink::Faint, Form::Line, zero.to_vec()),
+            series("95 %", Ink::Alert, Form::Line, bars.flatten().collect()),
+            series("value", Ink::Corrected, Form::Dots, values.collect()),
+        ];
+        let title = if unit.is_empty() { "without unit" } else { unit };
+        Panel { height: LOW, ..panel(title, unit, content) }
+    };
+    let mark = |(index, c): (usize, &Coefficient)| Mark {
+        x: place(index),
+        kind: "coefficient".to_owned(),
+        words: match c.sigma {
+            Some(sigma) => {
+                format!("{}: {} ± {} {}", c.name, stated(c.value, c.sigma), super::short(sigma), c.unit)
+            }
+            None => format!("{}: {} {}", c.name, stated(c.value, None), c.unit),
+        },
+        ink: Ink::Faint,
+    };
+    all.iter().any(|coefficient| coefficient.sigma.is_some()).then(|| Chart {
+        caption: "Coefficients by their number in the table; bars hold 95 %.".to_owned(),
+        x: Axis::of("number of the coefficient", ""),
+        panels: units.into_iter().map(of_unit).collect(),
+        marks: all.iter().enumerate().map(mark).collect(),
+    })
+}
+
+/// Spectra before and after of each sensor: out of sample where there is such a run.
+fn spectrum(curves: &[Curve]) -> Option<Chart> {
+    let outside = curves.iter().any(|curve| curve.sample == Sample::Out);
+    let deciding: Vec<&Curve> = curves
+        .iter()
+        .filter(|curve| (curve.sample == Sample::Out) == outside && curve.window_s > 0.0)
+        .collect();
+    let mut names: Vec<&Curve> = Vec::new();
+    for curve in &deciding {
+        if names.iter().all(|named| named.of != curve.of) {
+            names.push(curve);
+        }
+    }
+    let panel_of = |named: &Curve| {
+        let of = |values: fn(&Curve) -> &[f64]| {
+            let same = |curve: &&&Curve| {
+                curve.of == named.of && curve.window_s.to_bits() == named.window_s.to_bits()
+            };
+            let pieces: Vec<&[f64]> =
+                deciding.iter().filter(same).flat_map(|curve| pieces(values(curve))).collect();
+            let spectrum = Spectrum::of(&pieces, 0.0, named.window_s)?;
+            Some(spectrum.points().map(|(hz, density)| (hz, density.sqrt())).collect::<Vec<_>>())
+        };
+        let unit = format!("{}/√Hz", named.measure);
+        let content = pair(of(|curve| &curve.before)?, of(|curve| &curve.after)?, Form::Line);
+        Some(Panel { logarithmic: true, ..panel(&named.of, &unit, content) })
+    };
+    let panels: Vec<Panel> = names.into_iter().filter_map(panel_of).collect();
+    (!panels.is_empty()).then(|| Chart {
+        caption: format!(
+            "Square root of the power spectral density of the window means, {}: a slope to the left is what temperature still \
+             does, a level is noise.",
+            sample_words(outside)
+        ),
+        x: Axis { label: "frequency".to_owned(), unit: "Hz".to_owned(), logarithmic: true },
+        panels,
+        marks: Vec::new(),
+    })
+}
+
+/// Stretches without a gap.
+fn pieces(values: &[f64]) -> impl Iterator<Item = &[f64]> {
+    values.split(|value| !value.is_finite()).filter(|piece| !piece.is_empty())
+}

@@ -1,0 +1,130 @@
+use std::path::Path;
+
+use isotherm_protocol::document::{Document, Sample};
+
+use super::*;
+use crate::fixture::simulated;
+use crate::means::Size;
+use crate::nominal::nominal;
+use crate::written::Written;
+
+fn size(peak_to_peak: f64) -> Size {
+    Size { count: 10, rms: 0.25 * peak_to_peak, peak_to_peak, ..Size::default() }
+}
+
+fn verdict() -> Verdict {
+    Verdict::new("gyro x", "°/h", [size(1.5), size(0.15)]).out_of_sample(Some([size(1.68), size(0.17)]))
+}
+
+#[test]
+fn a_verdict_says_what_came_of_it() {
+    let words = verdict().words();
+    assert_eq!(words, "gyro x: 1.68 → 0.170 °/h peak to peak out of sample; accepted");
+    let words = verdict().refused("nothing beats its mean").words();
+    assert!(words.ends_with("out of sample; refused: nothing beats its mean"), "{words}");
+    let words =
+        Verdict::new("accelerometer z", "m/s²", [size(4.0), size(2.0)]).stated_as(Figure::Rms).words();
+    assert_eq!(words, "accelerometer z: 1.00 → 0.500 m/s² rms in sample; accepted");
+    let words =
+        Verdict::new("gyro y", "°/h", <[Size; 2]>::default()).refused("all readings are zero").words();
+    assert_eq!(words, "gyro y: refused: all readings are zero");
+}
+
+#[test]
+fn a_document_states_the_sizes_of_the_verdicts() {
+    let stated = residuals(&[verdict(), Verdict::new("axis", "″", [size(1.0), size(0.1)])]);
+    assert_eq!(stated.len(), 2, "an angle has no residual in a document: {stated:?}");
+    assert_eq!((stated[0].of.as_str(), stated[0].sample), ("gyro.x", Sample::In));
+    assert_eq!((stated[1].sample, stated[1].peak_to_peak_after), (Sample::Out, Some(0.17)));
+}
+
+#[test]
+fn a_report_says_the_same_in_every_form() {
+    let mut report = FitReport::new("Thermal calibration, method joint", "FOG-0001");
+    report.verdicts = vec![verdict(), Verdict::new("gyro y", "°/h", [size(1.0), size(2.0)]).refused("worse")];
+    report.warnings.push("only one plateau < 3 °C wide".into());
+    report.coefficients = vec![
+        Coefficient::new("gyro x static_bias c0", "°/h", 1.234_567, Some(0.001)),
+        Coefficient::new("gyro x static_bias c1", "°/h/°C", -2.5e-5, None),
+    ];
+    let time_s: std::sync::Arc<[f64]> = (0..20_000).map(f64::from).collect::<Vec<_>>().into();
+    let wave: Vec<f64> = time_s.iter().map(|t| libm::sin(t * 1e-3)).collect();
+    report.residuals.push(Curve {
+        of: "gyro x".into(),
+        measure: "°/h".into(),
+        run: "chamber.mcap".into(),
+        sample: Sample::Out,
+        window_s: 1.0,
+        temperature_deg_c: time_s.iter().map(|t| t * 1e-3).collect(),
+        time_s,
+        after: wave.iter().map(|value| 0.1 * value).collect(),
+        before: wave,
+    });
+    let text = report.to_text();
+    assert!(
+        text.starts_with("gyro x: 1.68 → 0.170 °/h peak to peak out of sample; accepted. gyro y:"),
+        "{text}"
+    );
+    assert!(
+        text.contains("1.2346") && text.contains("-2.50e-5") && text.contains("warning: only one"),
+        "{text}"
+    );
+    let json = report.to_json();
+    assert_eq!(json["accepted"], false);
+    assert_eq!(json["verdict"], report.headline());
+    assert_eq!(json["verdicts"][0]["out_of_sample"]["after"]["peak_to_peak"], 0.17);
+    assert_eq!(json["coefficients"][1]["sigma"], serde_json::Value::Null);
+    let html = report.to_html();
+    for part in
+        ["class=\"headline\">gyro x", "plateau &lt; 3", "Over temperature", "Spectrum of what is left"]
+    {
+        assert!(html.contains(part), "{part}");
+    }
+    assert!(html.len() < 600_000, "{}", html.len());
+    assert_eq!(report.refusals(), ["FOG-0001: gyro y: worse"]);
+}
+
+#[test]
+fn judging_a_run_shows_what_the_terms_do() {
+    let scenario = isotherm_simulator::presets::mems_chamber(3);
+    let scenario = isotherm_simulator::Scenario { duration_s: 60.0, ..scenario };
+    let run = simulated(&scenario, |_| ());
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/calibration/MEMS-0001.toml");
+    let after = Written::read(Path::new(path)).unwrap();
+    let before = Written::of(&nominal(&after.document)).unwrap();
+    let judged = |rest: Rest| {
+        let pair = (&before.loaded, &after.loaded);
+        judge(&run, Sample::Out, pair, (&after.document, &rest), 5.0, ()).unwrap()
+    };
+    let means = judged(Rest::default());
+    let names: Vec<&str> = means.curves.iter().map(|curve| curve.of.as_str()).collect();
+    assert_eq!(names[..3], ["gyro x", "gyro y", "gyro z"]);
+    assert_eq!(names.len(), 6);
+    for curve in &means.curves {
+        let [before, after] = curve.sizes();
+        assert!(before.mean.abs() < 1e-9 && after.mean.abs() < 1e-9, "{curve:?}");
+        assert_eq!((curve.time_s.len(), curve.temperature_deg_c.len(), after.count), (12, 12, 12));
+    }
+    let document: &Document = &after.document;
+    assert_eq!(curve::channel_of(document, true, 0), document.gyro.sensor[0].channel);
+    let truth = judged(Rest { rate_deg_per_h: Some([0.0; 3]), force_m_per_s2: None });
+    let [before, after] = truth.curves[0].sizes();
+    assert!(before.mean.abs() > 2.0 * after.mean.abs(), "the bias is taken away: {before:?} {after:?}");
+    assert_eq!(Curve::verdicts(&truth.curves).len(), 6);
+}
+
+#[test]
+fn a_batch_keeps_its_order_and_ends_with_one_table() {
+    let items: Vec<u64> = (0..50).collect();
+    let squares = in_parallel(&items, |_| (), |item| item * item);
+    assert_eq!(squares, items.iter().map(|item| item * item).collect::<Vec<_>>());
+    let mut batch = BatchTable::default();
+    batch.add("A", Ok(vec![verdict(), verdict().refused("worse")]));
+    batch.add("B", Err("no raw ticks".into()));
+    assert_eq!(batch.counts(), [1, 1, 1]);
+    let text = batch.to_text();
+    let first = "2 units: 1 of 2 sensors accepted, 1 of the units came to nothing.";
+    assert!(text.starts_with(first) && text.contains("failed: no raw ticks"), "{text}");
+    assert_eq!(batch.to_json()["units"][1]["failed"], "no raw ticks");
+    assert_eq!(of_unit(Path::new("out/fit.html"), "B"), Path::new("out/fit-B.html"));
+}
