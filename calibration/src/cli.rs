@@ -4,6 +4,7 @@ mod bar;
 mod drift;
 mod impact;
 mod runs;
+mod thermal;
 
 use std::io::{self, Write};
 use std::process::ExitCode;
@@ -29,6 +30,7 @@ struct Cli {
 enum Command {
     Drift(drift::DriftArgs),
     Impact(impact::ImpactArgs),
+    Thermal(thermal::ThermalArgs),
     /// Print a completion script for a shell
     #[command(after_help = "Example:\n  isotherm-calibrate completions bash > isotherm-calibrate.bash")]
     Completions {
@@ -42,6 +44,7 @@ fn run(cli: Cli) -> Result<(), Error> {
     match cli.command {
         Command::Drift(args) => args.run(),
         Command::Impact(args) => args.run(),
+        Command::Thermal(args) => args.run(),
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), "isotherm-calibrate", &mut script);

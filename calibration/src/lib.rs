@@ -11,6 +11,7 @@
 //! | [`drift`], [`allan`], [`spectrum`] | noise and drift of a static log |
 //! | [`report`] | what a fit says: verdicts, before and after, coefficients; text, JSON and page |
 //! | [`impact`] | what a drift that is left means for navigation |
+//! | [`thermal`] | bias over temperature from runs at rest |
 //! | [`error`], [`cli`] | what can go wrong; the command line |
 
 pub mod allan;
@@ -27,4 +28,5 @@ pub mod report;
 pub mod run;
 pub mod series;
 pub mod spectrum;
+pub mod thermal;
 pub mod written;

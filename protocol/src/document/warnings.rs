@@ -45,10 +45,6 @@ pub(super) fn warnings(r: &Reader<'_>, document: &Document) -> Vec<Problem> {
                 &mut found,
             );
             ranges.compare(&path, "bias", sensor.channel.as_deref(), sensor.bias.as_ref(), &mut found);
-            if !sensor.lag.is_empty() && sensor.channel.is_none() {
-                let why = "has no effect: the accelerometer follows no temperature channel";
-                found.push(r.warning(&join(&path, "lag"), why));
-            }
             let board = sensor.board_channel.as_deref();
             ranges.compare(&path, "board_ratio_error", board, sensor.board_ratio_error.as_ref(), &mut found);
         }
