@@ -17,6 +17,7 @@ mod place;
 mod rates;
 mod runs;
 mod units;
+mod thermal;
 
 use std::io::{self, Write};
 use std::process::ExitCode;
@@ -50,6 +51,7 @@ enum Command {
     Tumble(tumble::TumbleArgs),
     Modes(modes::ModesArgs),
     Rates(rates::RatesArgs),
+    Thermal(thermal::ThermalArgs),
     /// Print a completion script for a shell
     #[command(after_help = "Example:\n  isotherm-calibrate completions bash > isotherm-calibrate.bash")]
     Completions {
@@ -71,6 +73,7 @@ fn run(cli: Cli) -> Result<(), Error> {
         Command::Tumble(args) => args.run(),
         Command::Modes(args) => args.run(),
         Command::Rates(args) => args.run(),
+        Command::Thermal(args) => args.run(),
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), "isotherm-calibrate", &mut script);

@@ -18,6 +18,7 @@
 //! | [`positions`], [`tumble`] | accelerometers on a stand; a unit tumbled by hand |
 //! | [`modes`] | drift polynomials and switch parameters of a mode-reversed laser gyro |
 //! | [`rates`] | scale factor, asymmetry, linearity and axes from a rate table |
+//! | [`thermal`] | bias over temperature from runs at rest |
 //! | [`error`], [`cli`] | what can go wrong; the command line |
 
 pub mod allan;
@@ -42,4 +43,5 @@ pub mod show;
 pub mod spectrum;
 pub mod validate;
 pub mod tumble;
+pub mod thermal;
 pub mod written;

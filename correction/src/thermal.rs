@@ -5,6 +5,7 @@
 
 mod accel;
 mod gyro;
+mod lag;
 mod ramp;
 
 pub use accel::{AccelModel, AccelTerms, AccelThermal};

@@ -51,6 +51,7 @@ pub fn plain_accel() -> AccelParts {
         board_channel: None,
         scale_factor: constant(1.0),
         bias: None,
+        lags: Vec::new(),
         board_ratio: None,
         input_limit: 1e6,
     }

@@ -50,7 +50,7 @@ pub(super) fn compile(parts: &CalibrationParts) -> Result<Calibration, Vec<Defec
             .accels
             .iter()
             .enumerate()
-            .filter_map(|(i, accel)| accel_model(&mut checker, i, accel, channels))
+            .filter_map(|(i, accel)| accel_model(&mut checker, i, accel, &filter, parts))
             .collect();
         if parts.accel_orientation.is_none() {
             checker.push(Section::AccelOrientation, "rows", DefectKind::Missing { needed_by: "accel" });

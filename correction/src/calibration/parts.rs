@@ -94,12 +94,12 @@ pub struct BranchedParts {
     pub braking: CurveParts,
 }
 
-/// One thermal lag (models §2, §8): `g(T)·(T − L_τ[T])/τ`.
+/// One thermal lag (models §2, §8) of a gyro's or an accelerometer's bias: `g(T)·(T − L_τ[T])/τ`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LagParts {
     /// τ (s), at least the filter's grid step.
     pub time_constant_s: f64,
-    /// g over temperature (rad/s per °C/s, that is rad/°C).
+    /// g over temperature (a gyro's: rad/s per °C/s, that is rad/°C; an accelerometer's: output units per °C/s).
     pub gain: CurveParts,
 }
 
@@ -112,7 +112,7 @@ pub struct TrendParts {
     pub interval_s: [f64; 2],
 }
 
-/// One accelerometer (models §3): `f = (U − S(T))·r(T_board)/K(T)`.
+/// One accelerometer (models §3): `f = (U − S(T) − lags)·r(T_board)/K(T)`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AccelParts {
     /// Index of the temperature channel of the sensor; `None`: the assumed temperature holds for ever.
@@ -123,6 +123,8 @@ pub struct AccelParts {
     pub scale_factor: CurveParts,
     /// S over temperature, in output units (V, counts/s or m/s²).
     pub bias: Option<CurveParts>,
+    /// Thermal lags of the bias, their gains in output units per °C/s; at most [`crate::thermal::MAX_LAGS`].
+    pub lags: Vec<LagParts>,
     /// r over the board's temperature (dimensionless); 1 at the calibration temperature.
     pub board_ratio: Option<CurveParts>,
     /// Outputs of this magnitude and above are flagged overrange (counts per tick, or output units).

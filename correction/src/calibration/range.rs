@@ -2,7 +2,7 @@
 
 use super::Calibration;
 use crate::curve::Curve;
-use crate::thermal::GyroModel;
+use crate::thermal::{AccelModel, GyroModel};
 
 /// A range that reaches further on both sides is that of a constant, which was fitted to no temperature at all (°C).
 const NO_TEMPERATURE_DEG_C: f64 = 1e6;
@@ -19,7 +19,7 @@ impl Calibration {
         let accels = self.accels.iter().filter(|accel| accel.channel == Some(channel));
         let boards = self.accels.iter().filter(|accel| accel.board_channel == Some(channel));
         let curves = (gyros.flat_map(GyroModel::curves_over_temperature))
-            .chain(accels.flat_map(|accel| [&accel.scale_factor, &accel.bias]))
+            .chain(accels.flat_map(AccelModel::curves_over_temperature))
             .chain(boards.map(|accel| &accel.board_ratio));
         let axes = [
             (Some(&self.gyro_orientation), &self.gyro_orientation_channels),

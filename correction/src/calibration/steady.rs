@@ -85,10 +85,10 @@ impl Calibration {
         }
         let (mut accel_bias, mut accel_scale) = (Sensors::new(), Sensors::new());
         for accel in &self.accels {
-            let temperature = state(accel.channel).temperature;
+            let (bias, scale_factor) = accel.steady(&state(accel.channel), &self.filter);
             let ratio = accel.board_ratio.at(state(accel.board_channel).temperature).value;
-            let scale = accel.scale_factor.at(temperature).value / ratio;
-            accel_bias.push(accel.bias.at(temperature).value / scale);
+            let scale = scale_factor / ratio;
+            accel_bias.push(bias / scale);
             accel_scale.push(scale);
         }
         let gyro_temperature = mean(&self.gyro_orientation_channels);

@@ -73,6 +73,7 @@ fn parts() -> CalibrationParts {
         board_channel: Some(2),
         scale_factor: polynomial(&[2.0, 1e-4], [-40.0, 65.0]),
         bias: Some(polynomial(&[bias, 1e-4], [-35.0, 70.0])),
+        lags: Vec::new(),
         board_ratio: Some(polynomial(&[1.0, 2e-5], [-30.0, 85.0])),
         input_limit: 1e3,
     };

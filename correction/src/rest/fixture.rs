@@ -51,6 +51,7 @@ pub(crate) fn calibration(output: OutputKind, count: f64, accels: bool) -> Calib
             range: [-40.0, 80.0],
         },
         bias: None,
+        lags: Vec::new(),
         board_ratio: None,
         input_limit: 1e9,
     };

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use alloc::vec::Vec;
 
+use super::lag::{Lag, advance, settled};
 use super::ramp::Follower;
 use crate::calibration::{BranchArgument, GyroParts};
 use crate::channel::{ThermalFilter, ThermalState};
@@ -12,8 +13,7 @@ use crate::curve::{Curve, CurveError};
 use crate::servo::{Servo, ServoError};
 use crate::units::{Span, Timestamp};
 
-/// Most thermal lags of one gyro.
-pub const MAX_LAGS: usize = 8;
+pub use super::lag::MAX_LAGS;
 
 /// A gyro, compiled.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -74,10 +74,7 @@ impl GyroModel {
         );
         let mut lags = Vec::with_capacity(parts.lags.len());
         for lag in &parts.lags {
-            if let Some(gain) = curve("lags", Some(&lag.gain)) {
-                let decay = libm::exp(-filter.grid_step.as_s() / lag.time_constant_s);
-                lags.push(Lag { decay, per_second: 1.0 / lag.time_constant_s, gain });
-            }
+            lags.extend(curve("lags", Some(&lag.gain)).map(|gain| Lag::new(lag.time_constant_s, gain, filter)));
         }
         let servo = match parts.servo.as_ref().map(Servo::new) {
             None => None,
@@ -112,14 +109,8 @@ impl GyroModel {
 
 impl GyroModel {
     /// The terms on a ramp that has lasted for long, so that every lag has settled on it.
-    ///
-    /// From one grid point to the next a lag d = T − L becomes (d + Ṫ·step)·decay; it stays where it is at
-    /// d = Ṫ·step·decay/(1 − decay), which is τ·Ṫ for a short step.
     pub(crate) fn steady(&self, thermal: &ThermalState, filter: &ThermalFilter) -> GyroTerms {
-        let mut lagged = [thermal.temperature; MAX_LAGS];
-        for (lag, lagged) in self.lags.iter().zip(&mut lagged) {
-            *lagged -= thermal.rate * filter.grid_step.as_s() * lag.decay / (1.0 - lag.decay);
-        }
+        let lagged = settled(&self.lags, thermal, filter);
         let ([increment_weight, bias, magnetic, meander], _) =
             evaluate(self, thermal, &lagged, filter.branch_dead_band);
         GyroTerms { increment_weight, bias, magnetic, meander }
@@ -165,16 +156,6 @@ impl Branched {
         let value = weight * up.value + (1.0 - weight) * down.value;
         (value, (up.clamped && weight > 0.0) || (down.clamped && weight < 1.0))
     }
-}
-
-/// One thermal lag, compiled for the filter's grid step.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Lag {
-    /// e^(−step/τ).
-    decay: f64,
-    /// 1/τ (1/s).
-    per_second: f64,
-    gain: Curve,
 }
 
 /// Polynomial of the time since turn-on, held outside its interval.
@@ -253,9 +234,7 @@ impl GyroThermal {
 
     /// Moves the lags on by one grid point.
     pub fn grid_point(&mut self, model: &GyroModel, thermal: &ThermalState) {
-        for (lag, lagged) in model.lags.iter().zip(&mut self.lagged) {
-            *lagged = thermal.temperature + (*lagged - thermal.temperature) * lag.decay;
-        }
+        advance(&model.lags, &mut self.lagged, thermal.temperature);
     }
 
     /// Evaluates every term and turns towards the result, `over` a sample interval from `start` on.

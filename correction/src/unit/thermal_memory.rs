@@ -131,6 +131,15 @@ impl ThermalMemory {
                 thermal.carry_lags(model, (old_model, kept));
             }
         }
+        let models = calibration.accels.iter().zip(&old.accels);
+        for ((model, old_model), (thermal, kept)) in
+            models.zip(self.accels.iter_mut().zip(&old_memory.accels))
+        {
+            let followed = model.channel.and_then(|index| calibration.channels.get(index));
+            if followed == old_model.channel.and_then(|index| old.channels.get(index)) {
+                thermal.carry_lags(model, (old_model, kept));
+            }
+        }
     }
 
     /// Goes on with what a swap did not change, on its way as it is: a swap to the same coefficients is no event.
@@ -188,9 +197,14 @@ impl ThermalMemory {
             counters.temperature_unknown_channel += 1;
             return;
         };
-        let gyros = &mut self.gyros;
+        let (gyros, accels) = (&mut self.gyros, &mut self.accels);
         let verdict = memory.read(channel, &calibration.filter, reading.time, reading.raw, |state| {
             for (model, thermal) in calibration.gyros.iter().zip(&mut *gyros) {
+                if model.channel == Some(index) {
+                    thermal.grid_point(model, state);
+                }
+            }
+            for (model, thermal) in calibration.accels.iter().zip(&mut *accels) {
                 if model.channel == Some(index) {
                     thermal.grid_point(model, state);
                 }
@@ -217,6 +231,11 @@ impl ThermalMemory {
 
     fn restart_lags(&mut self, calibration: &Calibration, channel: usize, temperature: f64) {
         for (model, thermal) in calibration.gyros.iter().zip(&mut self.gyros) {
+            if model.channel == Some(channel) {
+                thermal.restart(temperature);
+            }
+        }
+        for (model, thermal) in calibration.accels.iter().zip(&mut self.accels) {
             if model.channel == Some(channel) {
                 thermal.restart(temperature);
             }

@@ -19,7 +19,8 @@ pub(super) fn check(r: &mut Reader<'_>, document: &Document) {
     names(r, "gyro.sensor", document.gyro.sensor.iter().map(|sensor| sensor.name.as_str()));
     for (i, sensor) in document.gyro.sensor.iter().enumerate() {
         gyro(r, &element("gyro.sensor", i), sensor, channels);
-        lags(r, &element("gyro.sensor", i), sensor, document.temperature.filter.as_ref());
+        let taus = sensor.lag.iter().map(|lag| (lag.time_constant_s, &lag.gain));
+        lags(r, &element("gyro.sensor", i), taus, document.temperature.filter.as_ref());
     }
     orientation(r, "gyro", &document.gyro.orientation, document.gyro.sensor.len(), channels);
     filter(r, document);
@@ -27,6 +28,8 @@ pub(super) fn check(r: &mut Reader<'_>, document: &Document) {
         names(r, "accel.sensor", section.sensor.iter().map(|sensor| sensor.name.as_str()));
         for (i, sensor) in section.sensor.iter().enumerate() {
             accel(r, &element("accel.sensor", i), sensor, channels);
+            let taus = sensor.lag.iter().map(|lag| (lag.time_constant_s, &lag.gain));
+            lags(r, &element("accel.sensor", i), taus, document.temperature.filter.as_ref());
         }
         orientation(r, "accel", &section.orientation, section.sensor.len(), channels);
     }
@@ -102,13 +105,18 @@ fn gyro(r: &mut Reader<'_>, path: &str, sensor: &GyroSensor, channels: Option<&[
     );
 }
 
-fn lags(r: &mut Reader<'_>, path: &str, sensor: &GyroSensor, filter: Option<&Filter>) {
-    for (i, lag) in sensor.lag.iter().enumerate() {
+fn lags<'l, Q: Quantity>(
+    r: &mut Reader<'_>,
+    path: &str,
+    lags: impl Iterator<Item = (f64, &'l Curve<Q>)>,
+    filter: Option<&Filter>,
+) {
+    for (i, (tau, gain)) in lags.enumerate() {
         let path = element(&join(path, "lag"), i);
-        curve(r, &join(&path, "gain"), Some(&lag.gain));
+        curve(r, &join(&path, "gain"), Some(gain));
         let Some(Filter { grid_step_s, .. }) = filter else { continue };
-        if lag.time_constant_s < *grid_step_s && !r.is_damaged("temperature.filter.grid_step_s") {
-            let (tau, path) = (lag.time_constant_s, join(&path, "time_constant_s"));
+        if tau < *grid_step_s && !r.is_damaged("temperature.filter.grid_step_s") {
+            let path = join(&path, "time_constant_s");
             report(
                 r,
                 &path,

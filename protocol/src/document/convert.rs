@@ -14,7 +14,7 @@ use isotherm_correction::servo::{ServoForm, ServoParts};
 use super::curve::{Curve, Quantity};
 use super::measure::{ARCSEC, Argument, DEG_PER_H, DEG_PER_S, DEG_PER_SQRT_H, HOUR};
 use super::types::{
-    AccelOutput, AccelSensor, Branches, Channel, Document, Drift, GyroOutput, GyroSensor, Lag, ModeReversal,
+    AccelLag, AccelOutput, AccelSensor, Branches, Channel, Document, Drift, GyroOutput, GyroSensor, Lag, ModeReversal,
     Orientation, SelfTest, Servo, ServoKind, Temperature, Trend,
 };
 use super::values::HUGE;
@@ -127,6 +127,7 @@ impl Document {
             board_channel: sensor.board_channel.as_ref().map(|name| self.channel_index(name)),
             scale_factor: sensor.scale_factor.to_parts(0.0),
             bias: sensor.bias.as_ref().map(|curve| curve.to_parts(0.0)),
+            lags: sensor.lag.iter().map(accel_lag).collect(),
             board_ratio: sensor.board_ratio_error.as_ref().map(|curve| curve.to_parts(1.0)),
             input_limit: input_limit.unwrap_or(HUGE),
         }
@@ -196,6 +197,10 @@ fn branched<Q: Quantity>(branches: &Branches<Curve<Q>>) -> BranchedParts {
 }
 
 fn lag(lag: &Lag) -> LagParts {
+    LagParts { time_constant_s: lag.time_constant_s, gain: lag.gain.to_parts(0.0) }
+}
+
+fn accel_lag(lag: &AccelLag) -> LagParts {
     LagParts { time_constant_s: lag.time_constant_s, gain: lag.gain.to_parts(0.0) }
 }
 

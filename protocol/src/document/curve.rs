@@ -52,6 +52,8 @@ quantities! {
     ScaleFactor: [CountsPerSPerMPerS2, VPerMPerS2, MPerS2PerMPerS2] over [DegC];
     /// Bias of an accelerometer, in units of its output.
     OutputBias: [CountsPerS, V, MPerS2] over [DegC];
+    /// Gain of a thermal lag of an accelerometer, in units of its output per °C/s.
+    OutputLagGain: [CountsPerSPerDegCPerS, VPerDegCPerS, MPerS2PerDegCPerS] over [DegC];
 }
 
 /// A curve of one quantity over temperature or one of its derivatives, in the units of its keys.

@@ -40,6 +40,12 @@ pub enum Unit {
     V,
     /// m/s².
     MPerS2,
+    /// (counts/s)/(°C/s).
+    CountsPerSPerDegCPerS,
+    /// V/(°C/s).
+    VPerDegCPerS,
+    /// (m/s²)/(°C/s).
+    MPerS2PerDegCPerS,
 }
 
 impl Unit {
@@ -58,6 +64,9 @@ impl Unit {
             Self::CountsPerS => "counts_per_s",
             Self::V => "v",
             Self::MPerS2 => "m_per_s2",
+            Self::CountsPerSPerDegCPerS => "counts_per_s_per_deg_c_per_s",
+            Self::VPerDegCPerS => "v_per_deg_c_per_s",
+            Self::MPerS2PerDegCPerS => "m_per_s2_per_deg_c_per_s",
         }
     }
 
@@ -76,6 +85,9 @@ impl Unit {
             Self::CountsPerS => "counts/s",
             Self::V => "V",
             Self::MPerS2 => "m/s²",
+            Self::CountsPerSPerDegCPerS => "(counts/s)/(°C/s)",
+            Self::VPerDegCPerS => "V/(°C/s)",
+            Self::MPerS2PerDegCPerS => "(m/s²)/(°C/s)",
         }
     }
 

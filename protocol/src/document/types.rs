@@ -9,7 +9,7 @@ mod gyro;
 mod origin;
 mod self_test;
 
-pub use accel::{Accel, AccelOrientation, AccelOutput, AccelParity, AccelSensor};
+pub use accel::{Accel, AccelLag, AccelOrientation, AccelOutput, AccelParity, AccelSensor};
 pub use drift::Drift;
 pub use gyro::{
     Branches, Gyro, GyroOrientation, GyroOutput, GyroParity, GyroSensor, Lag, Servo, ServoKind, Trend,

@@ -94,6 +94,7 @@ fn bare() -> Document {
         input_limit_m_per_s2: None,
         scale_factor: Curve::new(Shape::Constant { value: 1.0 }).in_unit(Unit::MPerS2PerMPerS2),
         bias: None,
+        lag: Vec::new(),
         board_ratio_error: None,
     };
     Document {

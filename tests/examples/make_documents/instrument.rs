@@ -127,6 +127,7 @@ pub(crate) fn accelerometers(block: &Accelerometers) -> Accel {
             scale_factor: polynomial(reference, &sensor.scale_v_per_m_per_s2.map(|k| k * per_output))
                 .in_unit(scale_unit),
             bias: Some(polynomial(reference, &sensor.bias_v.map(|s| s * per_output)).in_unit(bias_unit)),
+            lag: Vec::new(),
             board_ratio_error: Some(scale_error(reference, [first, second])),
         }
     });

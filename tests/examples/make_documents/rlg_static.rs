@@ -45,6 +45,7 @@ pub(crate) fn make(data: &Path) -> Result<Document, Failure> {
         input_limit_m_per_s2: None,
         scale_factor: Curve::new(Shape::Constant { value: counts_per_s }).in_unit(Unit::CountsPerSPerMPerS2),
         bias: None,
+        lag: Vec::new(),
         board_ratio_error: None,
     };
     Ok(Document {

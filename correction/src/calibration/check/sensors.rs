@@ -22,10 +22,7 @@ pub(super) fn gyro_model(
     checker.channel(section, "channel", gyro.channel, parts.channels.len());
     checker.within(section, "increment_weight", gyro.increment_weight.abs(), f64::MIN_POSITIVE, HUGE);
     checker.within(section, "input_limit", gyro.input_limit, f64::MIN_POSITIVE, HUGE);
-    checker.count(section, "lags", gyro.lags.len(), 0, MAX_LAGS);
-    for LagParts { time_constant_s, .. } in &gyro.lags {
-        checker.within(section, "lags.time_constant_s", *time_constant_s, parts.filter.grid_step_s, 1e7);
-    }
+    lags(checker, section, &gyro.lags, parts);
     if let Some(TrendParts { coefficients, interval_s }) = &gyro.trend {
         checker.count(section, "trend.coefficients", coefficients.len(), 1, 3);
         for &c in coefficients {
@@ -59,21 +56,32 @@ pub(super) fn accel_model(
     checker: &mut Checker,
     index: usize,
     accel: &AccelParts,
-    channels: usize,
+    filter: &ThermalFilter,
+    parts: &CalibrationParts,
 ) -> Option<AccelModel> {
     let section = Section::Accel(index);
-    checker.channel(section, "channel", accel.channel, channels);
-    checker.channel(section, "board_channel", accel.board_channel, channels);
+    checker.channel(section, "channel", accel.channel, parts.channels.len());
+    checker.channel(section, "board_channel", accel.board_channel, parts.channels.len());
     if accel.board_channel.is_none() && accel.board_ratio.is_some() {
         checker.push(section, "board_channel", DefectKind::Missing { needed_by: "board_ratio" });
     }
     checker.within(section, "input_limit", accel.input_limit, f64::MIN_POSITIVE, HUGE);
-    let model =
-        AccelModel::new(accel, &mut |field, error| checker.push(section, field, DefectKind::Curve(error)))?;
+    lags(checker, section, &accel.lags, parts);
+    let model = AccelModel::new(accel, filter, &mut |field, error| {
+        checker.push(section, field, DefectKind::Curve(error));
+    })?;
     if let Some(at) = sign_change(&model.scale_factor) {
         checker.push(section, "scale_factor", DefectKind::Zero { at });
     }
     Some(model)
+}
+
+/// Number and time constants of a sensor's lags.
+fn lags(checker: &mut Checker, section: Section, lags: &[LagParts], parts: &CalibrationParts) {
+    checker.count(section, "lags", lags.len(), 0, MAX_LAGS);
+    for LagParts { time_constant_s, .. } in lags {
+        checker.within(section, "lags.time_constant_s", *time_constant_s, parts.filter.grid_step_s, 1e7);
+    }
 }
 
 /// First place on a grid over the curve's range where it is zero or has changed its sign.

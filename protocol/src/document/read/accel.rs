@@ -1,10 +1,12 @@
 //! The walk through `[accel]`.
 
+use isotherm_correction::thermal::MAX_LAGS;
+
 use super::super::common::{name, name_opt};
 use super::super::curve::Curve;
 use super::super::measure::Unit;
 use super::super::reader::{Reader, Table};
-use super::super::types::{Accel, AccelOutput, AccelParity, AccelSensor};
+use super::super::types::{Accel, AccelLag, AccelOutput, AccelParity, AccelSensor};
 use super::super::values::Limits;
 use super::{SENSORS, confirm_ticks, orientation};
 
@@ -61,6 +63,7 @@ fn sensor(r: &mut Reader<'_>, mut table: Table<'_>, output: Option<AccelOutput>)
     let board_channel = name_opt(r, &mut table, "board_channel");
     let scale_factor = table.table(r, "scale_factor");
     let bias = table.table_opt(r, "bias");
+    let lags = table.tables(r, "lag", (0, MAX_LAGS));
     let board_ratio_error = table.table_opt(r, "board_ratio_error");
     table.finish(r);
 
@@ -69,6 +72,7 @@ fn sensor(r: &mut Reader<'_>, mut table: Table<'_>, output: Option<AccelOutput>)
         Some(_) => (scale_factor, bias),
         None => (scale_factor.into_stand_in(), bias.map(Table::into_stand_in)),
     };
+    let stated = units.is_some();
     let (scale_factor_unit, bias_unit) = units.unwrap_or((Unit::CountsPerSPerMPerS2, Unit::CountsPerS));
     AccelSensor {
         name,
@@ -79,8 +83,22 @@ fn sensor(r: &mut Reader<'_>, mut table: Table<'_>, output: Option<AccelOutput>)
         input_limit_m_per_s2,
         scale_factor: Curve::read(r, scale_factor, scale_factor_unit),
         bias: bias.map(|table| Curve::read(r, table, bias_unit)),
+        lag: lags.into_iter().map(|table| lag(r, table, bias_unit, stated)).collect(),
         board_ratio_error: board_ratio_error.map(|table| Curve::read(r, table, Unit::Ppm)),
     }
+}
+
+fn lag(r: &mut Reader<'_>, mut table: Table<'_>, bias: Unit, stated: bool) -> AccelLag {
+    let time_constant_s = table.number(r, "time_constant_s", Limits::Within(1e-3, 1e7));
+    let gain = table.table(r, "gain");
+    table.finish(r);
+    let unit = match bias {
+        Unit::V => Unit::VPerDegCPerS,
+        Unit::MPerS2 => Unit::MPerS2PerDegCPerS,
+        _ => Unit::CountsPerSPerDegCPerS,
+    };
+    let gain = if stated { gain } else { gain.into_stand_in() };
+    AccelLag { time_constant_s, gain: Curve::read(r, gain, unit) }
 }
 
 fn parity(r: &mut Reader<'_>, mut table: Table<'_>) -> AccelParity {

@@ -3,10 +3,10 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::super::curve::{Curve, OutputBias, Relative, ScaleFactor};
+use super::super::curve::{Curve, OutputBias, OutputLagGain, Relative, ScaleFactor};
 use super::Orientation;
 
-/// The accelerometers of the unit: `f = (U − S(T))·r(T_board)/K(T)`.
+/// The accelerometers of the unit: `f = (U − S(T) − lags)·r(T_board)/K(T)`.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Accelerometers")]
 pub struct Accel {
@@ -69,10 +69,25 @@ pub struct AccelSensor {
     /// S(T): output at no specific force; subtracted. Source: models §3, 001 (z1…z3).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bias: Option<Curve<OutputBias>>,
+    /// Thermal lags of the bias: `Σ g(T)·(T − L_τ[T])/τ`, `L_τ` being a first-order low-pass; subtracted. Source: models §2, §8.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[schemars(default, length(max = 8))]
+    pub lag: Vec<AccelLag>,
     /// `r(T_board) − 1`: scale factor of the board at the calibration temperature over that at `T_board`, less one.
     /// Source: models §3, 001 (y1…y3).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub board_ratio_error: Option<Curve<Relative>>,
+}
+
+/// One thermal lag of an accelerometer's bias.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(deny_unknown_fields, title = "Thermal lag of an accelerometer")]
+pub struct AccelLag {
+    /// τ; not below `temperature.grid_step_s`.
+    #[schemars(range(min = 0.001, max = 1e7))]
+    pub time_constant_s: f64,
+    /// g(T).
+    pub gain: Curve<OutputLagGain>,
 }
 
 /// Detection and exclusion of a failed accelerometer.

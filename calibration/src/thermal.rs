@@ -1,0 +1,34 @@
+//! Bias over temperature from runs at rest (models §8).
+//!
+//! One linear model serves all methods; they differ in which terms they offer and in how they find the numbers. The
+//! columns of the model are what the service itself subtracts for a coefficient of one, and what is reported is what
+//! the service makes of the whole log with the written document.
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`settings`] | what may be asked for |
+//! | [`bare`] | the unit without the terms that are fitted; a nominal document for a log without one |
+//! | [`samples`], [`checks`] | a run as windows, and what must hold of it |
+//! | [`columns`] | what one unit of each term subtracts, from the corrector |
+//! | [`branches`] | plateaus, ramps, and the pieces that cross-validation leaves out |
+//! | [`solve`] | weighted, regularised, robust linear least squares |
+//! | [`model`] | which terms a sensor has, and their place in the document |
+//! | [`sequential`], [`search`], [`select`] | 000's procedure; time constants; cross-validation |
+//! | [`fit`] | from runs to a document and its report |
+
+pub mod bare;
+pub mod branches;
+pub mod checks;
+pub mod columns;
+pub mod fit;
+pub mod model;
+mod outcome;
+pub mod samples;
+pub mod search;
+pub mod select;
+pub mod sequential;
+pub mod settings;
+pub mod solve;
+
+pub use fit::{Fitted, fit};
+pub use settings::{Method, Settings, Site, Terms};

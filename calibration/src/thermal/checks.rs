@@ -1,0 +1,201 @@
+//! What must hold of a run before anything is fitted to it; every refusal says what to do.
+
+use isotherm_correction::sample::OutputKind;
+use isotherm_correction::units::STANDARD_GRAVITY_M_PER_S2;
+
+use super::samples::Samples;
+use super::solve::median;
+use crate::series::{Series, Ticks};
+
+/// Mean rate of a gyro at rest beyond which it does not rest, or its unit is wrong (°/s): Earth's rate and the bias of a poor
+/// micromechanical gyro stay below.
+const FASTEST_DEG_PER_S: f64 = 20.0;
+/// How far the mean specific force may be from one g.
+const GRAVITY: [f64; 2] = [0.9, 1.1];
+/// Fewest readings of a tick series for which anything can be said.
+const FEWEST: usize = 100;
+/// Smallest range of temperature that is worth a fit (°C).
+pub const SMALLEST_RANGE_DEG_C: f64 = 5.0;
+/// Share of readings that may be no number, or of time that may be missing, before a warning.
+const SMALL_SHARE: f64 = 0.001;
+
+/// What was found: nothing can be done without the first, the second is to be looked at.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Findings {
+    /// Refusals of the whole run.
+    pub refusals: Vec<String>,
+    /// Warnings.
+    pub warnings: Vec<String>,
+    /// Sensors that cannot be fitted, gyros first, each with why.
+    pub dead: Vec<(bool, usize, String)>,
+}
+
+/// Median distance of times (s).
+#[must_use]
+pub fn median_step_s(times_ns: &[i64]) -> f64 {
+    #[expect(clippy::cast_precision_loss, reason = "steps of a log")]
+    let mut steps: Vec<f64> = times_ns.windows(2).map(|pair| pair[1].saturating_sub(pair[0]) as f64 * 1e-9).collect();
+    median(&mut steps).unwrap_or(0.0)
+}
+
+/// Looks at the raw readings of a run.
+#[must_use]
+pub fn raw(name: &str, series: &Series) -> Findings {
+    let mut found = Findings::default();
+    for (gyro, kind, ticks) in [(true, "gyro", &series.gyros), (false, "accelerometer", &series.accels)] {
+        if ticks.is_empty() {
+            continue;
+        }
+        for (index, readings) in ticks.readings.iter().enumerate() {
+            sensor(&mut found, name, (gyro, kind, index), readings);
+        }
+        gaps(&mut found, name, kind, ticks);
+    }
+    if series.gyros.len() < FEWEST {
+        found.refusals.push(format!(
+            "{name}: {} gyro ticks are too few for a thermal fit, at least {FEWEST} are needed: is the whole log given?",
+            series.gyros.len()
+        ));
+    }
+    if series.gyros.output == Some(OutputKind::Mean) {
+        rates(&mut found, name, &series.gyros);
+    }
+    if series.bad_frames > 0 {
+        found.warnings.push(format!(
+            "{name}: {} frames could not be read and are left out; isotherm-replay recover may save them",
+            series.bad_frames
+        ));
+    }
+    for (channel, readings) in &series.temperatures {
+        thermometer(&mut found, name, channel, readings);
+    }
+    found
+}
+
+#[expect(clippy::cast_precision_loss, reason = "readings of a log are far below 2⁵³")]
+fn sensor(found: &mut Findings, name: &str, (gyro, kind, index): (bool, &str, usize), readings: &[f64]) {
+    let bad = readings.iter().filter(|reading| !reading.is_finite()).count();
+    let share = bad as f64 / readings.len().max(1) as f64;
+    if share > 0.5 {
+        let why = format!(
+            "{name}: {kind} {index}: {:.0} % of its readings are no numbers: check the sensor, and the column in the mapping",
+            100.0 * share
+        );
+        found.refusals.push(why);
+        return;
+    }
+    if bad > 0 {
+        found.warnings.push(format!(
+            "{name}: {kind} {index}: {bad} readings are no numbers ({:.3} %); the windows with them are left out",
+            100.0 * share
+        ));
+    }
+    let first = readings.iter().find(|reading| reading.is_finite());
+    if let Some(first) = first
+        && readings.iter().filter(|r| r.is_finite()).all(|reading| (reading - first).abs() <= 0.0)
+    {
+        let what = if *first == 0.0 { "reads zero".to_owned() } else { format!("reads {first}") };
+        let why = format!("it {what} throughout: dead, not connected, or the wrong column");
+        found.dead.push((gyro, index, why));
+    }
+}
+
+fn gaps(found: &mut Findings, name: &str, kind: &str, ticks: &Ticks) {
+    let step = median_step_s(&ticks.end_ns);
+    let mut missing = 0.0;
+    let (mut count, mut longest, mut at) = (0, 0.0, 0.0);
+    let first = ticks.end_ns.first().copied().unwrap_or_default();
+    for pair in ticks.end_ns.windows(2) {
+        #[expect(clippy::cast_precision_loss, reason = "steps of a log")]
+        let (gap, since) = (pair[1].saturating_sub(pair[0]) as f64 * 1e-9, pair[0].saturating_sub(first) as f64 * 1e-9);
+        if gap > 3.0 * step {
+            count += 1;
+            missing += gap - step;
+            if gap > longest {
+                (longest, at) = (gap, since);
+            }
+        }
+    }
+    #[expect(clippy::cast_precision_loss, reason = "steps of a log")]
+    let whole = ticks.end_ns.last().copied().unwrap_or_default().saturating_sub(first) as f64 * 1e-9;
+    if count > 0 && (missing > SMALL_SHARE * whole || longest > 60.0) {
+        found.warnings.push(format!(
+            "{name}: {count} gaps in the {kind} ticks, {missing:.1} s in all, the longest {longest:.1} s at {at:.0} s: lags and \
+             derivatives are poor behind a gap; leave it out with --start and --duration where it matters"
+        ));
+    }
+}
+
+/// Gyros with a rate output must be near rest.
+fn rates(found: &mut Findings, name: &str, ticks: &Ticks) {
+    for (index, readings) in ticks.readings.iter().enumerate() {
+        let mut sizes: Vec<f64> = readings.iter().filter(|r| r.is_finite()).map(|r| r.abs().to_degrees()).collect();
+        let Some(usual) = median(&mut sizes) else { continue };
+        if usual > FASTEST_DEG_PER_S {
+            found.refusals.push(format!(
+                "{name}: gyro {index} reads {usual:.1} °/s in the median, at most {FASTEST_DEG_PER_S} °/s is rest: does the unit move, \
+                 are columns swapped, or is the unit of measure in the mapping wrong ({:.3} as °/s, {:.3} as °/h)?",
+                usual.to_radians(),
+                usual.to_radians() / 3600.0
+            ));
+        }
+    }
+}
+
+fn thermometer(found: &mut Findings, name: &str, channel: &str, readings: &crate::series::Channel) {
+    let good: Vec<f64> = readings.raw.iter().copied().filter(|raw| raw.is_finite()).collect();
+    let bad = readings.raw.len() - good.len();
+    if 2 * good.len() < readings.raw.len() || good.len() < 10 {
+        found.refusals.push(format!(
+            "{name}: temperature channel {channel:?} has {} readings of which {bad} are no numbers: check the thermometer and its column",
+            readings.raw.len()
+        ));
+        return;
+    }
+    if bad > 0 {
+        found.warnings.push(format!("{name}: temperature channel {channel:?}: {bad} readings are no numbers and are passed over"));
+    }
+    // A temperature moves slowly: from reading to reading it changes by a small share of what it does over the run.
+    let (low, high) = good.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), t| (l.min(*t), h.max(*t)));
+    let mut steps: Vec<f64> = good.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
+    let usual = median(&mut steps).unwrap_or(0.0);
+    if high > low && usual > 0.05 * (high - low) {
+        found.refusals.push(format!(
+            "{name}: temperature channel {channel:?} jumps by {usual:.3} from reading to reading, over a range of {:.3}: that is no \
+             temperature; are columns swapped in the mapping?",
+            high - low
+        ));
+    }
+}
+
+/// Looks at a run that went through the corrector: the accelerometers must feel about one g.
+#[must_use]
+pub fn corrected(samples: &Samples) -> Findings {
+    let warnings = samples.troubles.iter().map(|words| format!("{}: {words}", samples.name)).collect();
+    let mut found = Findings { warnings, ..Findings::default() };
+    let mean = |values: &Vec<f64>| {
+        let mut good: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
+        median(&mut good)
+    };
+    if samples.forces.len() == 3 {
+        let forces: Option<Vec<f64>> = samples.forces.iter().map(mean).collect();
+        if let Some(forces) = forces {
+            let size = forces.iter().map(|f| f * f).sum::<f64>().sqrt();
+            let share = size / STANDARD_GRAVITY_M_PER_S2;
+            if !(GRAVITY[0]..=GRAVITY[1]).contains(&share) {
+                let guess = if (0.9..1.1).contains(&size) {
+                    ": the readings seem to be in g, but are taken as m/s²"
+                } else if (900.0..1100.0).contains(&size) {
+                    ": the readings seem to be in mg, but are taken as m/s²"
+                } else {
+                    ": is the unit at rest, are columns swapped, is the unit of measure in the mapping right?"
+                };
+                found.refusals.push(format!(
+                    "{}: the specific force is {size:.3} m/s², at rest it must be near {STANDARD_GRAVITY_M_PER_S2:.3}{guess}",
+                    samples.name
+                ));
+            }
+        }
+    }
+    found
+}

@@ -1,0 +1,183 @@
+//! A run as windows: what each sensor put out without the terms of the fit, and when.
+
+use std::collections::BTreeMap;
+
+use isotherm_correction::sample::{ChannelName, TemperatureReading};
+use isotherm_correction::units::Timestamp;
+use isotherm_protocol::document::{Curve, Document, Shape};
+
+use super::bare::along_axes;
+use crate::error::Error;
+use crate::means::Means;
+use crate::run::{Run, Troubles, Watch};
+use crate::series::Series;
+use crate::written::Written;
+
+/// One run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Samples {
+    /// What the run is called.
+    pub name: String,
+    /// Begin of the first tick (ns on the producer's clock).
+    pub start_ns: i64,
+    /// Length of a window (s).
+    pub window_s: f64,
+    /// Middle of each window since the start (s).
+    pub time_s: Vec<f64>,
+    /// Mean rate of each gyro (°/h); a window that is not whole has no number.
+    pub gyros: Vec<Vec<f64>>,
+    /// Mean output of each accelerometer less nothing but what its scale needs: specific force (m/s²).
+    pub forces: Vec<Vec<f64>>,
+    /// Specific force (m/s²) that one unit of each accelerometer's output stands for.
+    pub responses: Vec<Vec<f64>>,
+    /// Temperature readings by channel.
+    pub temperatures: BTreeMap<String, Vec<TemperatureReading>>,
+    /// What the correction passed over.
+    pub troubles: Troubles,
+}
+
+impl Samples {
+    /// Takes a run through the corrector with the bare document.
+    ///
+    /// # Errors
+    /// As [`Run::correct`], and [`Error::Document`].
+    pub fn of(
+        run: &Run,
+        series: &Series,
+        bare: &Document,
+        window_s: f64,
+        mut watch: impl Watch,
+    ) -> Result<Self, Error> {
+        let gyro_count = bare.gyro.sensor.len();
+        let accel_count = bare.accel.as_ref().map_or(0, |accel| accel.sensor.len());
+        let patterns = gyro_count.max(accel_count).div_ceil(3);
+        let mut pass = |document: &Document| -> Result<Vec<Means>, Error> {
+            (0..patterns)
+                .map(|pattern| {
+                    let written = Written::of(&along_axes(document, pattern))?;
+                    Means::of(run, &written.loaded, window_s, Again(&mut watch))
+                })
+                .collect()
+        };
+        let plain = pass(bare)?;
+        let rates: Vec<[&[f64]; 3]> = plain.iter().map(|means| [0, 1, 2].map(|axis| means.rate(axis))).collect();
+        let forces: Vec<[&[f64]; 3]> = plain.iter().map(|means| [0, 1, 2].map(|axis| means.force(axis))).collect();
+        let of_forces = by_sensor(&forces, accel_count);
+        let mut responses = Vec::new();
+        if accel_count > 0 {
+            let biased = pass(&with_unit_bias(bare))?;
+            let biased: Vec<[&[f64]; 3]> =
+                biased.iter().map(|means| [0, 1, 2].map(|axis| means.force(axis))).collect();
+            let biased = by_sensor(&biased, accel_count);
+            let difference = |(plain, biased): (&Vec<f64>, &Vec<f64>)| {
+                plain.iter().zip(biased).map(|(plain, biased)| plain - biased).collect()
+            };
+            responses = of_forces.iter().zip(&biased).map(difference).collect();
+        }
+        let (first, troubles) = match plain.first() {
+            Some(first) => (first.time_s.clone(), first.troubles.clone()),
+            None => (Vec::new(), Vec::new()),
+        };
+        Ok(Self {
+            name: run.name.clone(),
+            start_ns: start_ns(series),
+            window_s,
+            time_s: first,
+            gyros: by_sensor(&rates, gyro_count),
+            forces: of_forces,
+            responses,
+            temperatures: readings(series),
+            troubles,
+        })
+    }
+}
+
+/// A watch that is lent.
+struct Again<'a, W: Watch>(&'a mut W);
+
+impl<W: Watch> Watch for Again<'_, W> {
+    fn begin(&mut self, progress: isotherm_log::progress::Progress) {
+        self.0.begin(progress);
+    }
+
+    fn step(&mut self) {
+        self.0.step();
+    }
+
+    fn end(&mut self) {
+        self.0.end();
+    }
+}
+
+/// Begin of the first gyro tick (ns).
+#[must_use]
+pub fn start_ns(series: &Series) -> i64 {
+    #[expect(clippy::cast_possible_truncation, reason = "a tick is at most some seconds")]
+    let first = series.gyros.duration_s.first().map_or(0, |length| (length * 1e9) as i64);
+    series.gyros.end_ns.first().map_or(0, |end| end.saturating_sub(first))
+}
+
+/// The temperature readings of a series by channel.
+#[must_use]
+pub fn readings(series: &Series) -> BTreeMap<String, Vec<TemperatureReading>> {
+    let channel = |(name, channel): (&String, &crate::series::Channel)| {
+        let known = ChannelName::from(name).ok()?;
+        let pairs = channel.time_ns.iter().zip(&channel.raw);
+        let readings = pairs.map(|(time, raw)| TemperatureReading { channel: known, time: Timestamp::from_ns(*time), raw: *raw });
+        Some((name.clone(), readings.collect()))
+    };
+    series.temperatures.iter().filter_map(channel).collect()
+}
+
+/// A constant bias of one output unit on every accelerometer.
+fn with_unit_bias(bare: &Document) -> Document {
+    let mut document = bare.clone();
+    for sensor in document.accel.iter_mut().flat_map(|accel| &mut accel.sensor) {
+        let unit = super::model::output_unit(sensor.scale_factor.unit());
+        sensor.bias = Some(Curve::new(Shape::Constant { value: 1.0 }).in_unit(unit));
+    }
+    document
+}
+
+/// The outputs of single sensors from the means of those that share an axis.
+///
+/// An axis with G sensors has m₀ = Σs/G, and m_p with the p-th turned round: s_p = G·(m₀ − m_p)/2.
+fn by_sensor(patterns: &[[&[f64]; 3]], count: usize) -> Vec<Vec<f64>> {
+    let mut sensors = vec![Vec::new(); count];
+    for axis in 0..3.min(count) {
+        let mine: Vec<usize> = (axis..count).step_by(3).collect();
+        #[expect(clippy::cast_precision_loss, reason = "at most three")]
+        let shared = mine.len() as f64;
+        let Some(mean) = patterns.first().map(|pattern| pattern[axis]) else { continue };
+        let mut rest: Vec<f64> = mean.iter().map(|mean| shared * mean).collect();
+        for (pattern, sensor) in patterns.iter().skip(1).zip(mine.iter().skip(1)) {
+            let turned = pattern[axis];
+            let own: Vec<f64> = mean.iter().zip(turned).map(|(all, turned)| 0.5 * shared * (all - turned)).collect();
+            rest.iter_mut().zip(&own).for_each(|(rest, own)| *rest -= own);
+            sensors[*sensor] = own;
+        }
+        sensors[axis] = rest;
+    }
+    sensors
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sensors_that_share_an_axis_are_told_apart() {
+        let truth = [1.0, 2.0, 3.0, 40.0, 50.0, 60.0, 700.0];
+        let mean = |pattern: usize, axis: usize| {
+            let mine: Vec<usize> = (axis..truth.len()).step_by(3).collect();
+            let sign = |sensor: usize| if pattern > 0 && sensor / 3 == pattern { -1.0 } else { 1.0 };
+            mine.iter().map(|&sensor| sign(sensor) * truth[sensor]).sum::<f64>() / mine.len() as f64
+        };
+        let means: Vec<[Vec<f64>; 3]> = (0..3).map(|p| [0, 1, 2].map(|axis| vec![mean(p, axis)])).collect();
+        let patterns: Vec<[&[f64]; 3]> =
+            means.iter().map(|axes| [&axes[0][..], &axes[1][..], &axes[2][..]]).collect();
+        for (found, truth) in by_sensor(&patterns, 7).iter().zip(truth) {
+            assert!((found[0] - truth).abs() < 1e-12, "{found:?} {truth}");
+        }
+    }
+}

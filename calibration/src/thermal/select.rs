@@ -1,0 +1,208 @@
+//! Cross-validation: which terms survive on stretches that they were not fitted to.
+
+use super::branches::History;
+use super::columns::{Columns, Term};
+use super::model::{Dynamics, Spec};
+use super::solve::{Solution, once, solve};
+
+/// Score of a larger model, as a share of that of a smaller one, above which the smaller one is kept.
+const NO_BETTER: f64 = 0.97;
+/// Likewise for the drift with time, which stays out of the document and must be plain to be believed.
+const PLAIN_DRIFT: f64 = 0.85;
+/// Largest share of the mean's score with which an axis is accepted.
+pub const WORTH_IT: f64 = 0.9;
+
+/// How many times what is usual a temperature may count.
+const CROWDED: f64 = 3.0;
+/// Windows of a log for each block that a score is averaged over, and the most that a block may have.
+const WINDOWS_PER_BLOCK: usize = 200;
+const LONGEST_BLOCK: usize = 10;
+
+/// One sensor's windows over all runs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Target {
+    /// What is to be explained, in the units of the coefficients.
+    pub values: Vec<f64>,
+    /// Weight of each window.
+    pub weights: Vec<f64>,
+    /// By window: its run.
+    pub run: Vec<usize>,
+    /// By window: time since its run's beginning as a share of the run, −0.5 to 0.5.
+    pub share: Vec<f64>,
+    /// Whether the level is known; otherwise each run has one of its own.
+    pub level: bool,
+}
+
+/// One tried model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tried {
+    /// The model.
+    pub spec: Spec,
+    /// Number of its coefficients in the document.
+    pub count: usize,
+    /// Root mean square of what it leaves on stretches that it did not see.
+    pub score: f64,
+}
+
+/// What cross-validation came to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Choice {
+    /// Score of the mean.
+    pub mean: f64,
+    /// Every model, in the order in which they were tried.
+    pub tried: Vec<Tried>,
+    /// Index of the chosen one; `None` where nothing could be judged.
+    pub chosen: Option<usize>,
+}
+
+impl Choice {
+    /// The chosen model.
+    #[must_use]
+    pub fn best(&self) -> Option<&Tried> {
+        self.chosen.and_then(|index| self.tried.get(index))
+    }
+}
+
+impl Target {
+    /// Columns that take part in the fit and stay out of the document: a level for each run, and a drift with time.
+    fn nuisance(&self, trend: bool) -> Vec<Vec<f64>> {
+        let runs = self.run.last().map_or(0, |last| last + 1);
+        let only = |of: usize, value: &dyn Fn(usize) -> f64| {
+            (0..self.run.len()).map(|row| if self.run[row] == of { value(row) } else { 0.0 }).collect()
+        };
+        let levels = (0..if self.level { 0 } else { runs }).map(|of| only(of, &|_| 1.0));
+        let drifts = (0..if trend { runs } else { 0 }).map(|of| only(of, &|row| self.share[row]));
+        levels.chain(drifts).collect()
+    }
+
+    /// Solves for a model; the coefficients come in the order of its terms, those that stay out of the document behind.
+    #[must_use]
+    pub fn solve(&self, columns: &Columns<'_>, spec: &Spec, robust: bool) -> Option<Solution> {
+        let nuisance = self.nuisance(spec.trend);
+        let terms = spec.terms(self.level);
+        let all: Vec<&[f64]> =
+            terms.iter().map(|term| columns.get(*term)).chain(nuisance.iter().map(Vec::as_slice)).collect();
+        if robust { solve(&all, &self.values, &self.weights) } else { once(&all, &self.values, &self.weights) }
+    }
+
+    /// Root mean square of what a model leaves on pieces that were left out one by one, over temperatures that the others have
+    /// too. `None` where too little can be judged.
+    #[must_use]
+    pub fn score(&self, columns: &Columns<'_>, spec: &Spec, history: &History, temperature: &[f64]) -> Option<f64> {
+        let nuisance = self.nuisance(spec.trend);
+        let terms = spec.terms(self.level);
+        let all: Vec<&[f64]> =
+            terms.iter().map(|term| columns.get(*term)).chain(nuisance.iter().map(Vec::as_slice)).collect();
+        let pieces = history.piece.iter().max().map_or(0, |last| last + 1);
+        // White noise is in every model alike: averaged over some windows it no longer hides which of them is better.
+        let block = (self.values.len() / WINDOWS_PER_BLOCK).clamp(1, LONGEST_BLOCK);
+        let (mut square, mut weight, mut judged) = (0.0, 0.0, 0);
+        for left_out in 0..pieces {
+            let mut weights = self.weights.clone();
+            let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+            for (row, weight) in weights.iter_mut().enumerate() {
+                if history.piece[row] == left_out {
+                    *weight = 0.0;
+                } else if *weight > 0.0 && temperature[row].is_finite() {
+                    low = low.min(temperature[row]);
+                    high = high.max(temperature[row]);
+                }
+            }
+            let rows: Vec<usize> = (0..self.values.len())
+                .filter(|&row| {
+                    history.piece[row] == left_out
+                        && self.weights[row] > 0.0
+                        && self.values[row].is_finite()
+                        && (low..=high).contains(&temperature[row])
+                })
+                .collect();
+            if rows.len() < 3 {
+                continue;
+            }
+            let residual = if all.is_empty() {
+                self.values.clone()
+            } else {
+                let Some(solution) = once(&all, &self.values, &weights) else { continue };
+                solution.residual
+            };
+            for block in rows.chunks(block) {
+                let good = || block.iter().filter(|&&row| residual[row].is_finite());
+                let share: f64 = good().map(|&row| self.weights[row]).sum();
+                if share > 0.0 {
+                    let mean = good().map(|&row| self.weights[row] * residual[row]).sum::<f64>() / share;
+                    square += share * mean * mean;
+                    weight += share;
+                }
+            }
+            judged += 1;
+        }
+        (judged >= 2 && weight > 0.0).then(|| (square / weight).sqrt())
+    }
+
+    /// Scores the models of all degrees and dynamics and chooses the smallest that is as good as the best.
+    #[must_use]
+    pub fn choose(
+        &self,
+        columns: &Columns<'_>,
+        (degrees, dynamics): (&[usize], &[Dynamics]),
+        (history, temperature): (&History, &[f64]),
+    ) -> Choice {
+        let constant = Spec::default();
+        let mean = self.score(columns, &constant, history, temperature).unwrap_or(f64::NAN);
+        let mut tried = Vec::new();
+        let mut try_one = |spec: Spec| {
+            let score = self.score(columns, &spec, history, temperature)?;
+            let count = spec.terms(self.level).len();
+            tried.push(Tried { spec, count, score });
+            Some(score)
+        };
+        for dynamics in dynamics {
+            for &degree in degrees {
+                try_one(Spec { degree, dynamics: dynamics.clone(), trend: false });
+            }
+        }
+        let mut chosen = smallest(&tried);
+        if let Some(best) = chosen.and_then(|index| tried.get(index)).cloned()
+            && let Some(score) = self.score(columns, &Spec { trend: true, ..best.spec.clone() }, history, temperature)
+        {
+            tried.push(Tried { spec: Spec { trend: true, ..best.spec }, count: best.count, score });
+            if score < PLAIN_DRIFT * best.score {
+                chosen = Some(tried.len() - 1);
+            }
+        }
+        Choice { mean, tried, chosen }
+    }
+}
+
+/// The smallest model that is hardly worse than the best.
+fn smallest(tried: &[Tried]) -> Option<usize> {
+    let best = tried.iter().map(|tried| tried.score).fold(f64::INFINITY, f64::min);
+    let good = tried.iter().enumerate().filter(|(_, tried)| tried.score * NO_BETTER <= best);
+    good.min_by(|(_, a), (_, b)| (a.count, a.score).partial_cmp(&(b.count, b.score)).unwrap_or(std::cmp::Ordering::Equal))
+        .map(|(index, _)| index)
+}
+
+/// Weights that keep slow parts from dominating: no temperature counts for more than [`CROWDED`] times what is usual, so that a hold of
+/// hours weighs no more than some passes. Limited to a tenth, because what a plateau knows well is not to be thrown away.
+#[must_use]
+pub fn equal_temperature(temperature: &[f64], [low, high]: [f64; 2]) -> Vec<f64> {
+    const BINS: f64 = 25.0;
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 25")]
+    let bin = |t: f64| ((t - low) / (high - low).max(1e-9) * BINS).clamp(0.0, BINS - 1.0) as usize;
+    let mut counts = [0.0_f64; 25];
+    for t in temperature.iter().filter(|t| t.is_finite()) {
+        counts[bin(*t)] += 1.0;
+    }
+    let mut filled: Vec<f64> = counts.iter().copied().filter(|count| *count > 0.0).collect();
+    let usual = CROWDED * super::solve::median(&mut filled).unwrap_or(1.0);
+    let weight =
+        |t: &f64| if t.is_finite() { (usual / counts[bin(*t)].max(1.0)).clamp(0.1, 1.0) } else { 0.0 };
+    temperature.iter().map(weight).collect()
+}
+
+/// All terms that some models have.
+#[must_use]
+pub fn terms_of(degrees: &[usize], dynamics: &[Dynamics]) -> Vec<Term> {
+    let highest = degrees.iter().copied().max().unwrap_or(0);
+    (0..=highest).map(Term::Static).chain(dynamics.iter().flat_map(|d| d.terms.iter().copied())).collect()
+}

@@ -1,0 +1,179 @@
+//! Weighted, regularised, robust linear least squares.
+
+use nalgebra::{DMatrix, DVector};
+
+/// Share of a column's own weight that the ridge adds: it only holds what the data leave open.
+const RIDGE: f64 = 1e-9;
+/// Passes of the reweighting.
+const PASSES: usize = 4;
+/// Distance from the residual's neighbours at which a window counts for nothing (robust standard deviations).
+const BISQUARE: f64 = 7.0;
+/// Neighbours on either side that a window is compared with.
+const NEIGHBOURS: usize = 3;
+
+/// What came of a fit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Solution {
+    /// Coefficients in the order of the columns.
+    pub coefficients: Vec<f64>,
+    /// Their standard errors, with the correlation of the residual in time taken into account.
+    pub sigmas: Vec<f64>,
+    /// Residual in every row; not a number where the target is none.
+    pub residual: Vec<f64>,
+    /// Weighted root mean square of the residual.
+    pub rms: f64,
+    /// Rows that were given less than half of their weight as outliers.
+    pub outliers: usize,
+}
+
+/// Coefficients with which the columns add up best to the target, each row with its weight; rows whose target or
+/// column is no number, or whose weight is zero, take no part. Spikes lose their weight. `None` without enough rows.
+#[must_use]
+pub fn solve(columns: &[&[f64]], target: &[f64], weights: &[f64]) -> Option<Solution> {
+    let mut robust = vec![1.0; target.len()];
+    let mut last = None;
+    for _ in 0..PASSES {
+        let rows: Vec<f64> = weights.iter().zip(&robust).map(|(w, r)| w * r).collect();
+        let solution = once(columns, target, &rows)?;
+        let next = spikes(&solution.residual, weights);
+        let still = robust.iter().zip(&next).all(|(a, b)| (a - b).abs() < 1e-3);
+        robust = next;
+        last = Some(solution);
+        if still {
+            break;
+        }
+    }
+    let mut solution = last?;
+    solution.outliers = robust.iter().zip(weights).filter(|(r, w)| **r < 0.5 && **w > 0.0).count();
+    Some(solution)
+}
+
+/// One weighted solution.
+#[must_use]
+pub fn once(columns: &[&[f64]], target: &[f64], weights: &[f64]) -> Option<Solution> {
+    let good: Vec<usize> = (0..target.len())
+        .filter(|&row| {
+            target[row].is_finite() && weights[row] > 0.0 && columns.iter().all(|column| column[row].is_finite())
+        })
+        .collect();
+    let (rows, count) = (good.len(), columns.len());
+    if count == 0 || rows < 2 * count + 3 {
+        return None;
+    }
+    let norm = |column: &&[f64]| {
+        let square: f64 = good.iter().map(|&row| weights[row] * column[row] * column[row]).sum();
+        square.sqrt()
+    };
+    let norms: Vec<f64> = columns.iter().map(norm).collect();
+    let scale = |norm: f64| if norm > 1e-300 { 1.0 / norm } else { 0.0 };
+    let ridge = RIDGE.sqrt();
+    let matrix = DMatrix::from_fn(rows + count, count, |i, j| match good.get(i) {
+        Some(&row) => weights[row].sqrt() * columns[j][row] * scale(norms[j]),
+        None => f64::from(u8::from(i - rows == j)) * ridge,
+    });
+    let right = DVector::from_fn(rows + count, |i, _| good.get(i).map_or(0.0, |&row| weights[row].sqrt() * target[row]));
+    let qr = matrix.qr();
+    let r = qr.r();
+    let projected = qr.q().transpose() * right;
+    let scaled = r.solve_upper_triangular(&projected)?;
+    let coefficients: Vec<f64> = scaled.iter().zip(&norms).map(|(c, norm)| c * scale(*norm)).collect();
+    let residual: Vec<f64> = (0..target.len())
+        .map(|row| columns.iter().zip(&coefficients).fold(target[row], |rest, (column, c)| rest - c * column[row]))
+        .collect();
+    let weight: f64 = good.iter().map(|&row| weights[row]).sum();
+    let square: f64 = good.iter().map(|&row| weights[row] * residual[row] * residual[row]).sum();
+    let inverse = r.solve_upper_triangular(&DMatrix::identity(count, count))?;
+    #[expect(clippy::cast_precision_loss, reason = "rows of a fit are far below 2⁵³")]
+    let (free, all) = ((rows - count) as f64, rows as f64);
+    let variance = square / weight * all / free * (weight / all) * inflation(&residual, &good);
+    let sigmas = (0..count).map(|j| (variance * inverse.row(j).norm_squared()).sqrt() * scale(norms[j])).collect();
+    let finite = coefficients.iter().all(|c| c.is_finite());
+    finite.then(|| Solution { coefficients, sigmas, residual, rms: (square / weight).sqrt(), outliers: 0 })
+}
+
+/// By how much the variance of a coefficient grows because neighbouring residuals resemble each other.
+fn inflation(residual: &[f64], good: &[usize]) -> f64 {
+    let pairs = good.iter().zip(good.iter().skip(1)).filter(|(a, b)| **b == **a + 1);
+    let (mut cross, mut square) = (0.0, 0.0);
+    for (a, b) in pairs {
+        cross += residual[*a] * residual[*b];
+        square += 0.5 * (residual[*a] * residual[*a] + residual[*b] * residual[*b]);
+    }
+    let rho = if square > 0.0 { (cross / square).clamp(0.0, 0.98) } else { 0.0 };
+    (1.0 + rho) / (1.0 - rho)
+}
+
+/// Weights that take spikes out: a residual is held against the median of its neighbours, so that what a model leaves over
+/// minutes keeps its weight, however large it is.
+fn spikes(residual: &[f64], weights: &[f64]) -> Vec<f64> {
+    let near = |row: usize| {
+        let from = row.saturating_sub(NEIGHBOURS);
+        let to = (row + NEIGHBOURS + 1).min(residual.len());
+        let others = (from..to).filter(|&other| other != row && residual[other].is_finite());
+        let mut others: Vec<f64> = others.map(|other| residual[other]).collect();
+        median(&mut others)
+    };
+    let away: Vec<f64> = (0..residual.len()).map(|row| near(row).map_or(f64::NAN, |near| residual[row] - near)).collect();
+    let known = away.iter().zip(weights).filter(|(away, weight)| away.is_finite() && **weight > 0.0);
+    let mut sizes: Vec<f64> = known.map(|(away, _)| away.abs()).collect();
+    let sigma = median(&mut sizes).map_or(0.0, |middle| 1.4826 * middle);
+    let weight = |away: &f64| {
+        if !away.is_finite() || sigma <= 0.0 {
+            return 1.0;
+        }
+        let share = away / (BISQUARE * sigma);
+        if share.abs() >= 1.0 { 0.0 } else { (1.0 - share * share) * (1.0 - share * share) }
+    };
+    // Within four deviations nothing is a spike, and noise keeps its full weight.
+    away.iter().map(|away| if away.abs() <= 4.0 * sigma { 1.0 } else { weight(away) }).collect()
+}
+
+/// The middle value; the mean of the two middle ones where their number is even.
+pub(super) fn median(values: &mut [f64]) -> Option<f64> {
+    if values.is_empty() {
+        return None;
+    }
+    values.sort_unstable_by(f64::total_cmp);
+    let middle = values.len() / 2;
+    Some(if values.len() % 2 == 1 { values[middle] } else { 0.5 * (values[middle - 1] + values[middle]) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn spikes_cost_nothing_and_the_sigmas_are_honest() {
+        let rows = 400;
+        let x: Vec<f64> = (0..rows).map(|i| f64::from(i) / 400.0).collect();
+        let ones = vec![1.0; 400];
+        let mut seed = 1_u64;
+        let mut noise = || {
+            let mut sum = 0.0;
+            for _ in 0..12 {
+                seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                sum += (seed >> 11) as f64 / 9_007_199_254_740_992.0;
+            }
+            sum - 6.0
+        };
+        let mut target: Vec<f64> = x.iter().map(|x| 3.0 - 2.0 * x + 0.1 * noise()).collect();
+        for spike in [7, 100, 101, 320] {
+            target[spike] += 50.0;
+        }
+        target[50] = f64::NAN;
+        let solution = solve(&[&ones, &x], &target, &ones).unwrap();
+        assert!((solution.coefficients[0] - 3.0).abs() < 4.0 * solution.sigmas[0], "{solution:?}");
+        assert!((solution.coefficients[1] + 2.0).abs() < 4.0 * solution.sigmas[1]);
+        assert!(solution.sigmas[1] < 0.05 && solution.sigmas[1] > 0.01, "{:?}", solution.sigmas);
+        assert_eq!(solution.outliers, 4);
+    }
+
+    #[test]
+    fn what_cannot_be_told_apart_stays_finite_and_too_few_rows_are_refused() {
+        let ones = vec![1.0; 20];
+        let target = vec![2.0; 20];
+        let solution = solve(&[&ones, &ones], &target, &ones).unwrap();
+        assert!((solution.coefficients.iter().sum::<f64>() - 2.0).abs() < 1e-6);
+        assert!(solve(&[&ones[..4], &ones[..4]], &target[..4], &ones[..4]).is_none());
+    }
+}

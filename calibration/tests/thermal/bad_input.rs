@@ -1,0 +1,187 @@
+//! Logs that do not allow what is asked for: every one is refused, or warned of, in words that say what to do.
+
+use isotherm_calibration::error::Error;
+use isotherm_calibration::run::Run;
+use isotherm_calibration::thermal::{Fitted, Method, Settings, fit};
+use isotherm_correction::sample::{AccelTick, GyroTick, OutputKind, TemperatureReading};
+use isotherm_correction::units::{Span, Timestamp};
+use isotherm_log::offline::unit_id;
+use isotherm_log::text::LogEvent;
+use isotherm_protocol::document::Origin;
+
+/// A made-up unit: what one second of it reads.
+struct Second {
+    rates: [f64; 3],
+    forces: [f64; 3],
+    deg_c: f64,
+}
+
+/// 20 → −10 → 40 → 20 °C with holds, and biases that follow.
+fn deg_c(second: u32) -> f64 {
+    let t = f64::from(second);
+    match second {
+        0..600 => 20.0,
+        600..1500 => 20.0 - (t - 600.0) / 30.0,
+        1500..2400 => -10.0,
+        2400..3900 => -10.0 + (t - 2400.0) / 30.0,
+        3900..4800 => 40.0,
+        _ => 40.0 - (t - 4800.0) / 30.0,
+    }
+}
+
+fn usual(second: u32) -> Second {
+    let t = deg_c(second);
+    let noise = |k: u32| (f64::from((second * 7919 + k * 104_729) % 1000) / 1000.0 - 0.5) * 2e-6;
+    let rate = 1e-5 * (t - 15.0) + 1e-7 * t * t;
+    Second {
+        rates: [rate + noise(1), -rate + noise(2), 0.5 * rate + noise(3)],
+        forces: [0.01 * t * 0.01 + noise(4), 0.002 * t * 0.01 + noise(5), -9.81 - 0.001 * t + noise(6)],
+        deg_c: t + noise(7),
+    }
+}
+
+fn run(seconds: std::ops::Range<u32>, read: impl Fn(u32) -> Second) -> Run {
+    let mut events = Vec::new();
+    for (sequence, second) in (0..).zip(seconds) {
+        let Second { rates, forces, deg_c } = read(second);
+        let end_time = Timestamp::from_ns(i64::from(second + 1) * 1_000_000_000);
+        let duration = Span::from_s(1.0);
+        let channel = isotherm_correction::sample::ChannelName::from("imu").unwrap();
+        let time = Timestamp::from_ns(i64::from(second) * 1_000_000_000);
+        events.push(LogEvent::Temperature(TemperatureReading { channel, time, raw: deg_c }));
+        let readings = forces.into_iter().collect();
+        events.push(LogEvent::Accel { output: OutputKind::Mean, tick: AccelTick { sequence, end_time, duration, readings } });
+        let tick = GyroTick {
+            sequence,
+            end_time,
+            duration,
+            readings: rates.into_iter().collect(),
+            mode: None,
+            switch_command: false,
+            meander: None,
+            half_periods: Default::default(),
+            series: 0,
+        };
+        events.push(LogEvent::Gyro { output: OutputKind::Mean, tick });
+    }
+    Run::of_events("made up".to_owned(), unit_id("UNIT").unwrap(), events)
+}
+
+fn tried(run: Run, method: Method) -> Result<Fitted, Error> {
+    fit(None, (&[run], &[]), &Settings { method, ..Settings::default() }, Origin::default(), ())
+}
+
+#[track_caller]
+fn refused(run: Run, words: &[&str]) {
+    let error = tried(run, Method::Joint).expect_err("must be refused").to_string();
+    assert!(words.iter().all(|word| error.contains(word)), "{error}");
+}
+
+#[test]
+fn a_sound_log_is_fitted() {
+    let made = tried(run(0..5400, usual), Method::Joint).unwrap();
+    assert!(made.report.accepted(), "{}", made.report.to_text());
+    assert!(made.report.verdicts.iter().all(|verdict| verdict.factor().unwrap() > 5.0), "{}", made.report.to_text());
+    assert!(made.report.warnings.is_empty(), "{:?}", made.report.warnings);
+}
+
+#[test]
+fn constant_temperature_is_refused() {
+    refused(run(0..3000, |s| Second { deg_c: 20.0 + 1e-3 * f64::from(s % 7), ..usual(s) }), &["5 °C", "run the chamber"]);
+}
+
+#[test]
+fn swapped_columns_are_refused() {
+    // The z accelerometer where a gyro should be.
+    let swapped = run(0..3000, |s| {
+        let Second { mut rates, mut forces, deg_c } = usual(s);
+        std::mem::swap(&mut rates[2], &mut forces[2]);
+        Second { rates, forces, deg_c }
+    });
+    refused(swapped, &["gyro 2", "columns swapped"]);
+    let noise = run(0..3000, |s| Second { deg_c: 30.0 * f64::from((s * 7919) % 97) / 97.0, ..usual(s) });
+    refused(noise, &["no temperature", "columns swapped"]);
+}
+
+#[test]
+fn wrong_units_are_refused() {
+    let in_g = run(0..5400, |s| Second { forces: usual(s).forces.map(|f| f / 9.81), ..usual(s) });
+    refused(in_g, &["seem to be in g", "m/s²"]);
+    let degrees_as_radians = run(0..5400, |s| Second { rates: usual(s).rates.map(|r| r + 0.5), ..usual(s) });
+    refused(degrees_as_radians, &["unit of measure"]);
+    let kelvin_times_ten = run(0..5400, |s| Second { deg_c: 10.0 * (usual(s).deg_c + 273.15), ..usual(s) });
+    refused(kelvin_times_ten, &["no temperature in °C"]);
+}
+
+#[test]
+fn a_dead_sensor_is_refused_and_the_others_are_fitted() {
+    let zero = run(0..5400, |s| {
+        let mut second = usual(s);
+        second.rates[1] = 0.0;
+        second
+    });
+    let made = tried(zero, Method::Joint).unwrap();
+    let of = |name: &str| made.report.verdicts.iter().find(|verdict| verdict.of == name).unwrap();
+    assert!(!of("gyro y").accepted && of("gyro y").reason.contains("reads zero throughout"), "{:?}", of("gyro y"));
+    assert!(of("gyro x").accepted && of("gyro z").accepted);
+    assert!(made.written.document.gyro.sensor[1].static_bias.is_none());
+}
+
+#[test]
+fn readings_that_are_no_numbers_are_told_or_refused() {
+    let some = run(0..5400, |s| {
+        let mut second = usual(s);
+        if s % 500 == 250 {
+            second.rates[0] = f64::NAN;
+        }
+        second
+    });
+    let made = tried(some, Method::Joint).unwrap();
+    assert!(made.report.warnings.iter().any(|words| words.contains("are no numbers")), "{:?}", made.report.warnings);
+    assert!(made.report.accepted());
+    let all = run(0..5400, |s| Second { rates: [f64::NAN, 0.0, 0.0], ..usual(s) });
+    refused(all, &["no numbers", "check the sensor"]);
+}
+
+#[test]
+fn one_direction_and_too_few_plateaus_are_told() {
+    let upwards = || run(2400..3900, usual);
+    let made = tried(upwards(), Method::Joint).unwrap();
+    let told = |words: &str| made.report.warnings.iter().any(|warning| warning.contains(words));
+    assert!(told("one way only") && told("plateaus"), "{:?}", made.report.warnings);
+    assert!(made.written.document.gyro.sensor.iter().all(|gyro| gyro.lag.is_empty() && gyro.thermal_rate.is_none()));
+    let made = tried(upwards(), Method::Sequential).unwrap();
+    assert!(made.report.verdicts.iter().all(|verdict| !verdict.accepted && verdict.reason.contains("both ways")));
+}
+
+#[test]
+fn gaps_are_told() {
+    let seconds: Vec<u32> = (0..5400).filter(|second| !(2000..2200).contains(second)).collect();
+    let holed = run_at(&seconds);
+    let made = tried(holed, Method::Joint).unwrap();
+    assert!(made.report.warnings.iter().any(|words| words.contains("gaps")), "{:?}", made.report.warnings);
+}
+
+/// The seconds of a list only.
+fn run_at(seconds: &[u32]) -> Run {
+    let mut events = Vec::new();
+    for &second in seconds {
+        let Second { rates, deg_c, .. } = usual(second);
+        let time = Timestamp::from_ns(i64::from(second) * 1_000_000_000);
+        let channel = isotherm_correction::sample::ChannelName::from("imu").unwrap();
+        events.push(LogEvent::Temperature(TemperatureReading { channel, time, raw: deg_c }));
+        let tick = GyroTick {
+            sequence: u64::from(second),
+            end_time: Timestamp::from_ns(i64::from(second + 1) * 1_000_000_000),
+            duration: Span::from_s(1.0),
+            readings: rates.into_iter().collect(),
+            mode: None,
+            switch_command: false,
+            meander: None,
+            half_periods: Default::default(),
+            series: 0,
+        };
+        events.push(LogEvent::Gyro { output: OutputKind::Mean, tick });
+    }
+    Run::of_events("with a gap".to_owned(), unit_id("UNIT").unwrap(), events)
+}

@@ -1,0 +1,88 @@
+//! The fit and the service agree: the residual in the report is what the corrector makes of the log with the document.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use isotherm_calibration::run::Run;
+use isotherm_calibration::thermal::{Method, Settings, fit};
+use isotherm_correction::unit::UnitSettings;
+use isotherm_log::mapping::Mapping;
+use isotherm_log::offline::{Offline, load_calibration, unit_id};
+use isotherm_log::part::{LogFiles, Part};
+use isotherm_log::text::LogReader;
+use isotherm_protocol::document::{Origin, Sample};
+use isotherm_simulator::chamber::Profile;
+use isotherm_simulator::presets::fibre_optic_chamber;
+use isotherm_simulator::{Scenario, Simulation};
+
+const MAPPING: &str = "version = 1\n[[file]]\nname = \"log.csv\"\ndelimiter = \"comma\"\nheader = true\n\
+    [file.time]\ncolumn = \"t\"\nunit = \"us\"\nmarks = \"end\"\nduration = \"measured\"\ntick_ms = 1000.0\n\
+    [file.gyro]\noutput = \"mean\"\nsensors = [{ column = \"x\", unit = \"rad_per_s\" }, { column = \"y\", unit = \"rad_per_s\" }, \
+    { column = \"z\", unit = \"rad_per_s\" }]\n\
+    [[file.temperature]]\nchannel = \"coil\"\ncolumn = \"deg_c\"\nunit = \"deg_c\"\n";
+
+/// A short chamber run of the simulated coil as a text log.
+pub(crate) fn text_log(folder: &Path) -> (std::path::PathBuf, Mapping) {
+    let chamber = Profile::constant(20.0).hold(20.0).ramp(-10.0, 2.0).hold(40.0).ramp(40.0, 2.0).hold(40.0).ramp(20.0, 2.0);
+    let scenario = Scenario { tick_ns: 1_000_000_000, ..fibre_optic_chamber(5, chamber) };
+    let mut text = "t,x,y,z,deg_c\n".to_owned();
+    let mut deg_c = f64::NAN;
+    for step in Simulation::new(&scenario).unwrap() {
+        if let Some(reading) = step.temperatures.iter().find(|reading| &reading.channel[..] == "gyro0") {
+            deg_c = (reading.raw - 1.5) * 100.0;
+        }
+        let [x, y, z] = [0, 1, 2].map(|i| step.gyro.readings[i]);
+        let _ = writeln!(text, "{},{x:e},{y:e},{z:e},{deg_c}", step.gyro.end_time.as_ns() / 1000);
+    }
+    let (log, mapping) = (folder.join("log.csv"), folder.join("mapping.toml"));
+    std::fs::write(&log, text).unwrap();
+    std::fs::write(&mapping, MAPPING).unwrap();
+    (log, Mapping::load(&mapping).unwrap())
+}
+
+pub(crate) fn run_of(log: &Path, mapping: &Mapping) -> Run {
+    let unit = unit_id("UNIT").unwrap();
+    let files = LogFiles::Text {
+        paths: vec![log.to_path_buf()],
+        mapping: Box::new(mapping.clone()),
+        unit: unit.clone(),
+        batch_ticks: 512,
+    };
+    Run::new("log".to_owned(), unit, files, &Part::default())
+}
+
+#[test]
+fn the_residual_of_the_report_is_that_of_the_service() {
+    let folder = tempfile::tempdir().unwrap();
+    let (log, mapping) = text_log(folder.path());
+    for method in [Method::Sequential, Method::Joint, Method::Lag] {
+        let run = run_of(&log, &mapping);
+        let settings = Settings { method, ..Settings::default() };
+        let made = fit(None, (&[run], &[]), &settings, Origin::default(), ()).unwrap();
+        let out = folder.path().join(format!("{}.toml", method.name()));
+        made.written.save(&out, false).unwrap();
+        assert!(made.report.verdicts.iter().any(|verdict| verdict.accepted), "{}", made.report.to_text());
+
+        // As isotherm-replay correct does it: the document from its file, the log event by event.
+        let mut unit = Offline::new(&load_calibration(&out).unwrap(), UnitSettings::default());
+        for event in LogReader::open(&mapping, &[log.clone()]).unwrap() {
+            unit.handle(&event.unwrap());
+        }
+        unit.finish();
+        let ticks = unit.take();
+        let residuals = &made.written.document.origin.as_ref().unwrap().residual;
+        for (axis, name) in ["gyro.x", "gyro.y", "gyro.z"].into_iter().enumerate() {
+            let mut means = Vec::new();
+            for window in ticks.chunks(10).filter(|window| window.len() == 10) {
+                let (angle, time) = window
+                    .iter()
+                    .fold((0.0, 0.0), |(a, t), tick| (a + tick.delta_angle[axis], t + tick.duration.as_s()));
+                means.push((angle / time).to_degrees() * 3600.0);
+            }
+            let mean = means.iter().sum::<f64>() / means.len() as f64;
+            let rms = (means.iter().map(|m| (m - mean) * (m - mean)).sum::<f64>() / means.len() as f64).sqrt();
+            let stated = residuals.iter().find(|r| r.of == name && r.sample == Sample::In).unwrap().rms_after;
+            assert!((stated / rms - 1.0).abs() < 1e-9, "{method:?} {name}: {stated} {rms}");
+        }
+    }
+}
