@@ -31,7 +31,7 @@ configs:
 purity:
     .ci/run purity
 
-# Check the Python subscriber against the Rust side
+# Check the Python subscriber, and recordings with what others read in them, against the Rust side
 python:
     .ci/run python
 

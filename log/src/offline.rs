@@ -8,6 +8,7 @@
 //! | [`sums`] | their figures |
 
 mod parallel;
+mod published;
 pub mod rows;
 pub mod sums;
 mod unit;

@@ -44,17 +44,24 @@ pub struct Part {
 impl LogFiles {
     /// Opens a part of the log.
     ///
-    /// A recording's time is that of reception, counted from its first message, and its messages are taken whole. A text
-    /// log's time is that of its rows, and its ticks are taken one by one: see [`crate::text::Window`].
+    /// A recording's time is that of reception, counted from its first message, and its messages are taken whole; chunks that
+    /// lie before the part are passed over unread. A text log's time is that of its rows, and its ticks are taken one by one: see [`crate::text::Window`].
     ///
     /// # Errors
     /// [`Error::File`]; for a text log as [`crate::text::LogReader::open`].
     pub fn open(&self, part: &Part) -> Result<Messages, Error> {
+        let mut beginning_ns = None;
         let (log, window) = match self {
             Self::Recordings(paths) => {
                 let window =
                     (part.start > Span::ZERO || part.end.is_some()).then_some((part.start, part.end));
-                (Log::recordings(paths)?, window)
+                let mut before_ns = 0;
+                if part.start > Span::ZERO {
+                    beginning_ns = Log::recordings(paths)?.next_message()?.map(|message| message.received_ns);
+                    let start_ns = u64::try_from(part.start.as_ns()).unwrap_or(0);
+                    before_ns = beginning_ns.map_or(0, |beginning| beginning.saturating_add(start_ns));
+                }
+                (Log::recordings_at(paths, before_ns)?, window)
             }
             Self::Text { paths, mapping, unit, batch_ticks } => {
                 let options = TextOptions {
@@ -69,7 +76,7 @@ impl LogFiles {
                 (Log::text(paths, options)?, None)
             }
         };
-        Ok(Messages { log, units: part.units.clone(), window, beginning_ns: None, over: false })
+        Ok(Messages { log, units: part.units.clone(), window, beginning_ns, over: false })
     }
 }
 

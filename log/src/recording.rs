@@ -19,6 +19,7 @@ mod reader;
 mod record;
 pub mod recover;
 mod schema;
+mod skip;
 mod writer;
 
 #[cfg(test)]

@@ -78,13 +78,21 @@ impl Log {
     /// # Errors
     /// [`Error::File`].
     pub fn recordings(paths: &[PathBuf]) -> Result<Self, Error> {
+        Self::recordings_at(paths, 0)
+    }
+
+    /// Likewise, for who needs no message that was received before a time: see [`RecordingReader::open_at`].
+    ///
+    /// # Errors
+    /// [`Error::File`].
+    pub fn recordings_at(paths: &[PathBuf], before_ns: u64) -> Result<Self, Error> {
         let mut total = 0;
         for path in paths {
             let length = std::fs::metadata(path).map(|metadata| metadata.len());
             total += length.map_err(|source| Error::file(path, "open the recording", source))?;
         }
         let read = Arc::new(AtomicU64::new(0));
-        let reader = RecordingReader::open(paths, Arc::clone(&read))?;
+        let reader = RecordingReader::open_at(paths, before_ns, Arc::clone(&read))?;
         Ok(Self { source: Source::Recording(Box::new(reader)), progress: Progress::new(read, total) })
     }
 

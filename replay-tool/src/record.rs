@@ -32,6 +32,7 @@ use zenoh::sample::SampleKind;
 
 use crate::error::Error;
 use files::Files;
+use inquiry::Question;
 use queue::Queue;
 use report::{fill, finish};
 use scribe::{Scribe, Told};
@@ -44,6 +45,9 @@ pub use topics::{TopicFilter, is_first, key_expressions};
 
 /// How often the figures are shown.
 const WATCH_INTERVAL: Duration = Duration::from_millis(250);
+/// How long after the beginning of a file, or of a service, it is asked for everything once more. Links between producers, service
+/// and recorder take up to a second or so; what the first memory had heard before the recorder did is in no file.
+const ASK_AGAIN: Duration = Duration::from_secs(2);
 /// How long the topics must be silent behind the last service's end.
 const SILENCE: Duration = Duration::from_millis(500);
 /// How long a session may take to close.
@@ -175,19 +179,28 @@ async fn on_session(
     let mut ticks = interval(WATCH_INTERVAL);
     ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
     let mut silence = Silence::default();
+    let mut repeat_from = None;
+    let ask = |repeat_from: &mut Option<Instant>| {
+        let _ = questions.send(Question::Everything);
+        *repeat_from = Some(Instant::now());
+    };
     report.ended_by = loop {
         tokio::select! {
             () = stop.asked() => break EndedBy::Signal,
-            () = after(options.duration, begun) => break EndedBy::Duration,
+            () = after(options.duration, Some(begun)) => break EndedBy::Duration,
+            () = after(Some(ASK_AGAIN), repeat_from) => {
+                let _ = questions.send(Question::Everything);
+                repeat_from = None;
+            }
             Some(told) = told.recv() => match told {
-                Told::Begun => drop(questions.send(())),
+                Told::Begun => ask(&mut repeat_from),
                 Told::Warning(words) => report.warnings.push(words),
                 Told::Failed => break EndedBy::Failure,
             },
             Some(life) = lives.recv() => {
                 if life.note(&mut alive, &mut report) {
                     // It may not have heard of the subscriptions when its first units began.
-                    let _ = questions.send(());
+                    ask(&mut repeat_from);
                 }
             }
             Some(words) = answers.recv() => report.warnings.push(words),
@@ -201,14 +214,18 @@ async fn on_session(
             }
         }
     };
-    // What is on its way to a callback comes in before the subscription has ended.
-    for subscriber in subscribers {
-        let _ = subscriber.undeclare().await;
+    if report.ended_by != EndedBy::Failure {
+        // Proves what was recorded since the last memory, and is all there is of a recording that was shorter than the links took.
+        let _ = questions.send(Question::Memory);
     }
     drop((questions, life));
     let finished = async {
-        // The last file needs its answers as the others do.
+        // The last file needs its answers as the others do; and what a memory has heard is recorded with it.
         let _ = timeout(options.query_limit, asker).await;
+        // What is on its way to a callback comes in before the subscription has ended.
+        for subscriber in subscribers {
+            let _ = subscriber.undeclare().await;
+        }
         queue.close();
         tokio::task::spawn_blocking(move || thread.join()).await
     };
@@ -257,9 +274,9 @@ async fn subscribe(
     Ok(subscribers)
 }
 
-/// Ends that long after the beginning; never where no time is given.
-async fn after(duration: Option<Duration>, begun: Instant) {
-    match duration.and_then(|duration| begun.checked_add(duration)) {
+/// Ends that long after the beginning; never where one of them is not given.
+async fn after(duration: Option<Duration>, begun: Option<Instant>) {
+    match duration.zip(begun).and_then(|(duration, begun)| begun.checked_add(duration)) {
         Some(end) => tokio::time::sleep_until(end).await,
         None => std::future::pending().await,
     }

@@ -2,18 +2,21 @@
 
 use isotherm_correction::unit::UnitSettings;
 use isotherm_protocol::codec;
-use isotherm_protocol::corrected::CorrectedBatch;
 use isotherm_protocol::digest::Digest;
 use isotherm_protocol::journal::{JournalEntry, JournalEvent, split};
 use isotherm_protocol::key::UnitId;
 use isotherm_protocol::stream::UnitStream;
 use serde::Serialize;
 
+use super::published::Published;
 use super::rows::{write_frame, write_tick};
 use super::sums::{Summary, Sums};
-use crate::diff::{Account, Comparison, DiffOptions, LogTick, Side, ticks_of};
+use crate::diff::{Account, Comparison, DiffOptions, LogTick, Side};
 use crate::message::{Message, Topic};
 use crate::replica::{Changes, Done, Outline, Replica, ReplicaReport, entry_words};
+
+/// Most corrected ticks that are left with the stream.
+const MOST_READY: usize = 4096;
 
 /// What is made of corrected ticks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -102,6 +105,7 @@ impl UnitReport {
 pub(super) struct UnitWork {
     replica: Replica,
     by_journal: bool,
+    published: Published,
     taker: Taker,
 }
 
@@ -142,42 +146,43 @@ impl UnitWork {
             output: Output::default(),
             frame: Vec::new(),
         };
-        Self { replica, by_journal, taker }
+        Self { replica, by_journal, published: Published::default(), taker }
     }
 
     /// Takes a message of the unit.
     pub(super) fn take(&mut self, message: Message) {
-        if let (Topic::Corrected(_), Some(comparison)) = (&message.topic, &mut self.taker.comparison) {
-            // What cannot be read is missing.
-            let batch = codec::decode::<CorrectedBatch>(&message.frame).ok();
-            let ticks = batch.and_then(|batch| ticks_of(&batch).ok());
-            let ticks = ticks.into_iter().flat_map(|ticks| ticks.ticks);
-            ticks.for_each(|tick| comparison.push(Side::B, tick));
+        if let (Topic::Corrected(_), Some(_)) = (&message.topic, &self.taker.comparison) {
+            self.published.push(message.frame.clone());
         }
         self.replica.take(message);
         self.go_on();
     }
 
     fn go_on(&mut self) {
-        let Self { replica, taker, .. } = self;
+        let Self { replica, taker, published, .. } = self;
         while let Some(done) = replica.step(&mut |stream| taker.take(stream)) {
             taker.note(&done);
-            // What was made before the part is given out to nobody, tick by tick.
-            if taker.received_ns < taker.from_ns
-                && let Some(stream) = replica.stream_mut()
-            {
+            let Some(stream) = replica.stream_mut() else { continue };
+            // What was made before the part is given out to nobody, tick by tick. And frames that waited for an entry are many.
+            let many = stream.ready().len() >= MOST_READY;
+            if many || taker.received_ns < taker.from_ns {
                 taker.take(stream);
+            }
+            if many && let Some(comparison) = &mut taker.comparison {
+                published.compare(comparison, false);
             }
         }
     }
 
     /// What has been made since it was last asked.
     pub(super) fn output(&mut self) -> Output {
-        let Self { replica, taker, .. } = self;
+        let Self { replica, taker, published, .. } = self;
         if let Some(stream) = replica.stream_mut() {
             taker.take(stream);
         }
-        taker.comparison.iter_mut().for_each(Comparison::advance);
+        if let Some(comparison) = &mut taker.comparison {
+            published.compare(comparison, false);
+        }
         std::mem::take(&mut taker.output)
     }
 
@@ -187,7 +192,10 @@ impl UnitWork {
         self.go_on();
     }
 
-    pub(super) fn report(self) -> UnitReport {
+    pub(super) fn report(mut self) -> UnitReport {
+        if let Some(comparison) = &mut self.taker.comparison {
+            self.published.compare(comparison, true);
+        }
         let counters = self.replica.stream().map(UnitStream::counters).unwrap_or_default();
         let counters = counters.into_iter().filter(|counter| counter.value > 0);
         UnitReport {

@@ -1,6 +1,6 @@
 //! Reading a recording from front to back, in constant memory.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, VecDeque};
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::PathBuf;
@@ -13,6 +13,7 @@ use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOp
 use serde::Serialize;
 
 use super::record::{LONGEST_RECORD, parse};
+use super::skip::{Front, pass_over};
 use super::{Attachment, CHANNELS, MESSAGE_ENCODING, Metadata};
 use crate::error::Error;
 use crate::message::{Message, Topic};
@@ -42,6 +43,8 @@ impl RecordingReport {
 pub struct RecordingReader {
     /// Files still to be opened, the next one last.
     waiting: Vec<PathBuf>,
+    /// Chunks whose messages were all received before this are passed over where a file begins with them (ns).
+    before_ns: u64,
     current: Option<Opened>,
     read: Arc<AtomicU64>,
     report: RecordingReport,
@@ -54,6 +57,8 @@ struct Opened {
     path: PathBuf,
     file: File,
     reader: LinearReader,
+    /// From the part that was passed over.
+    found: VecDeque<Found>,
     /// Topics by channel; `None` for channels of something else.
     topics: HashMap<u16, Option<Topic>>,
     /// The last whole file's end has been seen.
@@ -72,8 +77,21 @@ impl RecordingReader {
     /// # Errors
     /// [`Error::File`] where the first cannot be opened or is no MCAP file.
     pub fn open(paths: &[PathBuf], read: Arc<AtomicU64>) -> Result<Self, Error> {
+        Self::open_at(paths, 0, read)
+    }
+
+    /// Likewise, for who needs no message that was received before a time (ns since 1970-01-01 UTC).
+    ///
+    /// Whole chunks of such messages at the front of a file are passed over unread: they are in no message, and in no count of
+    /// the report. What stands beside the chunks is read all the same, and messages of the first chunk that has a later one
+    /// come with it.
+    ///
+    /// # Errors
+    /// As [`RecordingReader::open`].
+    pub fn open_at(paths: &[PathBuf], before_ns: u64, read: Arc<AtomicU64>) -> Result<Self, Error> {
         let mut reader = Self {
             waiting: paths.iter().rev().cloned().collect(),
+            before_ns,
             current: None,
             read,
             report: RecordingReport::default(),
@@ -128,13 +146,14 @@ impl RecordingReader {
 
     /// Goes on to the next file.
     fn advance(&mut self) -> Result<(), Error> {
-        self.current = self.waiting.pop().map(Opened::open).transpose()?;
+        let next = self.waiting.pop();
+        self.current = next.map(|path| Opened::open(path, self.before_ns, &self.read)).transpose()?;
         Ok(())
     }
 }
 
 /// One record that is of use.
-enum Found {
+pub(super) enum Found {
     /// A message; `None` for one of something else.
     Message(Option<Message>),
     Attachment(Attachment),
@@ -148,7 +167,7 @@ enum Stop {
 }
 
 impl Opened {
-    fn open(path: PathBuf) -> Result<Self, Error> {
+    fn open(path: PathBuf, before_ns: u64, read: &AtomicU64) -> Result<Self, Error> {
         let failed = |source| Error::file(&path, "open the recording", source);
         let mut file = File::open(&path).map_err(failed)?;
         let mut magic = [0; 8];
@@ -161,11 +180,21 @@ impl Opened {
             .with_prevalidate_chunk_crcs(true)
             .with_record_length_limit(LONGEST_RECORD);
         let reader = LinearReader::new_with_options(options);
-        Ok(Self { path, file, reader, topics: HashMap::new(), ended: false })
+        let mut front = Front { at: length as u64, ..Front::default() };
+        if before_ns > 0 {
+            front = pass_over(&mut file, before_ns)
+                .map_err(|source| Error::file(&path, "read the recording", source))?;
+        }
+        let Front { found, topics, at } = front;
+        read.fetch_add(at, Ordering::Relaxed);
+        Ok(Self { path, file, reader, found: found.into(), topics, ended: false })
     }
 
     /// The next record that is of use; `None` at the end.
     fn next(&mut self, read: &AtomicU64) -> Result<Option<Found>, Stop> {
+        if let Some(found) = self.found.pop_front() {
+            return Ok(Some(found));
+        }
         loop {
             let Some(event) = self.reader.next_event() else {
                 // The library is content where a file ends between two records.
@@ -193,7 +222,11 @@ impl Opened {
 }
 
 /// Takes what is of use in a record.
-fn take(record: Record<'_>, topics: &mut HashMap<u16, Option<Topic>>, ended: &mut bool) -> Option<Found> {
+pub(super) fn take(
+    record: Record<'_>,
+    topics: &mut HashMap<u16, Option<Topic>>,
+    ended: &mut bool,
+) -> Option<Found> {
     match record {
         Record::Channel(channel) => {
             let ours = channel.message_encoding == MESSAGE_ENCODING;

@@ -1,10 +1,11 @@
 //! Recordings written and read back, whole and cut.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use isotherm_correction::sample::ChannelName;
+use isotherm_correction::units::Span;
 use isotherm_protocol::codec;
 use isotherm_protocol::key::{RawStream, UnitId};
 use isotherm_protocol::raw::{TemperatureBatch, TemperatureTick};
@@ -12,6 +13,8 @@ use isotherm_protocol::raw::{TemperatureBatch, TemperatureTick};
 use super::*;
 use crate::error::Error;
 use crate::message::{Message, Topic};
+use crate::part::{LogFiles, Part};
+use crate::source::LogReport;
 
 fn message(serial: &str, time_ns: i64, received_ns: u64) -> Message {
     let channels = [ChannelName::from("board").unwrap()].into_iter().collect();
@@ -92,6 +95,59 @@ fn a_file_cut_anywhere_is_read_to_its_last_whole_chunk() {
         assert!(words.contains("cut.mcap") || first.len() == 500, "{length}: {words}");
     }
     assert_eq!(most, 500);
+}
+
+/// The messages of a part of recordings, and how many were read for it.
+fn part_of(paths: &[PathBuf], start_ns: i64) -> (Vec<Message>, u64) {
+    let part = Part { start: Span::from_ns(start_ns), ..Part::default() };
+    let mut part = LogFiles::Recordings(paths.to_vec()).open(&part).unwrap();
+    let mut messages = Vec::new();
+    while let Some(message) = part.next_message().unwrap() {
+        messages.push(message);
+    }
+    let LogReport::Recording(report) = part.report() else { unreachable!("it is a recording") };
+    assert_eq!(part.log().recording().unwrap().take_attachments().len(), paths.len());
+    (messages, report.messages)
+}
+
+#[test]
+fn from_a_later_start_the_same_messages_come_and_chunks_before_it_are_passed_over() {
+    let folder = tempfile::tempdir().unwrap();
+    let (a, b) = (folder.path().join("a.mcap"), folder.path().join("b.mcap"));
+    // A unit that comes late, a clock that falls back for a while, and the next file of the row.
+    let mut first = messages();
+    first.extend((500..900).map(|n| message("C-3", n, 7_000 + n.unsigned_abs())));
+    first.iter_mut().skip(600).take(100).for_each(|message| message.received_ns -= 300);
+    let second: Vec<_> = (900..1200).map(|n| message("C-3", n, 7_000 + n.unsigned_abs())).collect();
+    write(&a, &first);
+    write(&b, &second);
+    let all: Vec<_> = first.into_iter().chain(second).collect();
+    let files = [a.clone(), b];
+    for start in (0..1250).step_by(7).chain([899, 900, 901, 1199, 1200]) {
+        let (messages, read) = part_of(&files, start);
+        let later = |message: &&Message| message.received_ns >= 7_000 + start.unsigned_abs();
+        assert_eq!(messages, all.iter().filter(later).cloned().collect::<Vec<_>>(), "{start}");
+        // A chunk has some twenty messages.
+        let most = if start < 400 { 1200 } else { 1200 + 400 - start.unsigned_abs() };
+        assert!(read <= most, "{start}: {read} messages were read");
+    }
+    assert!(part_of(&files, 1190).1 < 60, "of 1200");
+
+    // Cut short, it is read as far as without.
+    let bytes = std::fs::read(&a).unwrap();
+    for length in (bytes.len() / 3..bytes.len()).step_by(203) {
+        std::fs::write(&a, &bytes[..length]).unwrap();
+        let (whole, reader) = read(&[&a]);
+        let part = Part { start: Span::from_ns(350), ..Part::default() };
+        let mut part = LogFiles::Recordings(vec![a.clone()]).open(&part).unwrap();
+        let mut later = whole.iter().filter(|message| message.received_ns >= 7_350);
+        while let Some(message) = part.next_message().unwrap() {
+            assert_eq!(Some(&message), later.next(), "{length}");
+        }
+        assert_eq!(later.next(), None, "{length}");
+        let LogReport::Recording(report) = part.report() else { unreachable!("it is a recording") };
+        assert_eq!(report.cut_short, reader.report().cut_short, "{length}");
+    }
 }
 
 #[test]

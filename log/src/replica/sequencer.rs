@@ -18,6 +18,8 @@ use isotherm_protocol::journal::JournalEntry;
 use isotherm_protocol::key::Input;
 use isotherm_protocol::stream::Heard;
 
+use anchor::Search;
+
 use super::notice::Notice;
 use super::outline::{Mark, MarkKind, Outline, Place};
 
@@ -99,6 +101,8 @@ pub struct Sequencer {
     given: [VecDeque<u32>; Input::ALL.len()],
     /// Sequence number of the first corrected tick that came behind the entry that the next stream begins with.
     published: Option<u64>,
+    /// For the memory that the next stream begins with.
+    search: Search,
     out: VecDeque<Deed>,
     now_ns: u64,
     over: bool,
@@ -134,6 +138,7 @@ impl Sequencer {
             to_go: [None; Input::ALL.len()],
             given: Default::default(),
             published: None,
+            search: Search::default(),
             out: VecDeque::new(),
             now_ns: 0,
             over: false,
@@ -249,6 +254,10 @@ impl Sequencer {
 
     /// Goes on towards the next entry of the same stream; `false` where more must come first.
     fn approach(&mut self) -> bool {
+        if self.ends_behind_the_log() {
+            self.marks.clear();
+            return true;
+        }
         for input in Input::ALL {
             self.look_for_place(input);
         }

@@ -83,6 +83,34 @@ fn a_recorder_that_hears_the_producer_only_after_it_asked_begins_with_the_next_m
 }
 
 #[test]
+fn a_memory_that_has_heard_more_than_a_recorder_got_before_its_end_is_no_loss() {
+    let mut session = Session::new();
+    session.ticks(300);
+    session.memory();
+    session.ticks(300);
+    let (before, heard) = (session.recorded.len(), session.recording());
+    // On their way when the recorder ends, and what is made of them too; the answer is faster.
+    session.ticks(20);
+    session.recorded.truncate(before);
+    session.memory();
+    assert!(session.recorded.len() > before, "the memory is in the recording");
+    let (account, report) = replay(&session.recording(), Changes::default());
+    assert_eq!(kinds(&report), Vec::<&str>::new(), "{report:#?}");
+    assert!(account.agrees() && report.memories_equal == 1, "{account:#?} {report:#?}");
+    assert_eq!(account.ticks, replay(&heard, Changes::default()).0.ticks);
+    // A frame lost before the last one is a loss all the same.
+    let mut session = Session::new();
+    session.way = |input, sequence| match (input, sequence) {
+        (Input::Raw(RawStream::Gyro), 250..253) => Way::Service,
+        _ => Way::Both,
+    };
+    session.ticks(300);
+    session.memory();
+    let (_, report) = replay(&session.recording(), Changes::default());
+    assert_eq!(kinds(&report), ["not recorded", "other memory"], "{report:#?}");
+}
+
+#[test]
 fn what_the_recorder_lost_is_said_and_the_memory_puts_it_right() {
     let lost: fn(Input, u64) -> Way = |input, sequence| match (input, sequence) {
         (Input::Raw(RawStream::Gyro), 250..253) => Way::Service,

@@ -21,18 +21,37 @@ use super::topics::of_units;
 const HISTORY_ENTRIES: u32 = 10_000;
 
 /// What is asked for.
-const KEYS: [&str; 4] = [key::ALL_JOURNALS, key::ALL_CALIBRATION, key::ALL_CONFIGURATIONS, key::ALL_HISTORY];
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Question {
+    /// The memory of units.
+    Memory,
+    /// Everything that a file needs.
+    Everything,
+}
 
-/// Asks for the memory of units, their documents and histories, and the configurations of services; what was not answered
-/// in time, in words.
+impl Question {
+    /// The keys of the answers, memories first.
+    const fn keys(self) -> &'static [&'static str] {
+        match self {
+            Self::Memory => &[key::ALL_JOURNALS],
+            Self::Everything => {
+                &[key::ALL_JOURNALS, key::ALL_CALIBRATION, key::ALL_CONFIGURATIONS, key::ALL_HISTORY]
+            }
+        }
+    }
+}
+
+/// Asks for the memory of units, and with [`Question::Everything`] for their documents and histories and the configurations
+/// of services; what was not answered in time, in words.
 pub(super) async fn ask(
     session: &Session,
+    question: Question,
     units: &[UnitId],
     limit: Duration,
     queue: &Queue,
 ) -> Result<Vec<String>, BusError> {
     let mut unanswered = Vec::new();
-    for keys in KEYS {
+    for &keys in question.keys() {
         let expressions =
             if keys == key::ALL_CONFIGURATIONS { of_units(keys, &[]) } else { of_units(keys, units) };
         for expression in expressions {

@@ -12,8 +12,9 @@ use zenoh::Session;
 use zenoh::pubsub::Subscriber;
 use zenoh::sample::SampleKind;
 
+use super::inquiry::{self, Question};
 use super::queue::Queue;
-use super::{RecordOptions, RecordReport, ServiceWait, Stop, inquiry};
+use super::{RecordOptions, RecordReport, ServiceWait, Stop};
 use crate::error::Error;
 
 /// How long one wait for a service takes where it is repeated.
@@ -118,23 +119,25 @@ pub(super) async fn follow_services(
         .map_err(|source| BusError::Declare { key: key::ALL_SERVICES_ALIVE.to_owned(), source })
 }
 
-/// Starts the task that asks services, once for all requests that have come meanwhile; it ends with the requests.
+/// Starts the task that asks services, once for all questions that have come meanwhile; it ends with the questions.
 pub(super) fn start_asker(
     session: &Session,
     options: &RecordOptions,
     queue: &Arc<Queue>,
-) -> (JoinHandle<()>, UnboundedSender<()>, UnboundedReceiver<String>) {
-    let (questions, mut asked) = unbounded_channel();
+) -> (JoinHandle<()>, UnboundedSender<Question>, UnboundedReceiver<String>) {
+    let (questions, mut asked) = unbounded_channel::<Question>();
     let (answer, answers) = unbounded_channel();
     let (session, queue, units) = (session.clone(), Arc::clone(queue), options.units.clone());
     let (limit, without) = (options.query_limit, options.service == ServiceWait::Without);
     let task = tokio::spawn(async move {
-        while asked.recv().await.is_some() {
-            while asked.try_recv().is_ok() {}
+        while let Some(mut question) = asked.recv().await {
+            while let Ok(other) = asked.try_recv() {
+                question = question.max(other);
+            }
             if without {
                 continue;
             }
-            match inquiry::ask(&session, &units, limit, &queue).await {
+            match inquiry::ask(&session, question, &units, limit, &queue).await {
                 Ok(words) => words.into_iter().for_each(|words| drop(answer.send(words))),
                 Err(error) => drop(answer.send(error.to_string())),
             }

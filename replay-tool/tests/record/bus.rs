@@ -18,16 +18,16 @@ use zenoh::qos::{CongestionControl, Priority};
 
 use crate::common::{replay, shell_example, temperature};
 
-const LIMIT: Duration = Duration::from_secs(30);
+pub(crate) const LIMIT: Duration = Duration::from_secs(30);
 
 /// A session that recorders connect to.
-struct Bench {
-    session: Session,
+pub(crate) struct Bench {
+    pub(crate) session: Session,
     folder: tempfile::TempDir,
 }
 
 /// A recorder in a process of its own; killed when dropped.
-struct Recorder(Child);
+pub(crate) struct Recorder(Child);
 
 impl Drop for Recorder {
     fn drop(&mut self) {
@@ -38,13 +38,13 @@ impl Drop for Recorder {
 
 impl Recorder {
     /// Stops it as an operator would.
-    fn interrupt(&self) {
+    pub(crate) fn interrupt(&self) {
         let asked = Command::new("kill").args(["-INT", &self.0.id().to_string()]).status();
         assert!(asked.unwrap().success());
     }
 
     /// Waits for its end: exit code, what it printed.
-    fn end(mut self) -> (Option<i32>, Value, String) {
+    pub(crate) fn end(mut self) -> (Option<i32>, Value, String) {
         let mut errors = String::new();
         self.0.stderr.take().unwrap().read_to_string(&mut errors).unwrap();
         let mut summary = String::new();
@@ -55,23 +55,26 @@ impl Recorder {
 }
 
 impl Bench {
-    async fn new() -> Self {
+    pub(crate) async fn new() -> Self {
         let session = open(&SessionOptions::default()).await.unwrap();
         Self { session, folder: tempfile::tempdir().unwrap() }
     }
 
-    fn path(&self, name: &str) -> PathBuf {
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
 
-    /// A recorder of whatever is published here; `prefix` stands in front of the command in a shell.
+    /// A recorder of whatever is published here, without a service; `prefix` stands in front of the command in a shell.
     fn record(&self, prefix: &str, arguments: &[&str]) -> Recorder {
+        self.start(prefix, &[&["--no-service"], arguments].concat())
+    }
+
+    /// A recorder with other arguments.
+    pub(crate) fn start(&self, prefix: &str, arguments: &[&str]) -> Recorder {
         let program = env!("CARGO_BIN_EXE_isotherm-replay");
         let locator = locators(&self.session).remove(0);
-        let line = format!(
-            "{prefix} exec {program} record --no-service --json --connect {locator} {}",
-            arguments.join(" ")
-        );
+        let line =
+            format!("{prefix} exec {program} record --json --connect {locator} {}", arguments.join(" "));
         let child = Command::new("sh")
             .args(["-c", &line])
             .current_dir(self.folder.path())
@@ -93,13 +96,13 @@ impl Bench {
         publisher
     }
 
-    async fn end(self) {
+    pub(crate) async fn end(self) {
         close(self.session, LIMIT).await.unwrap();
     }
 }
 
 /// The frames of a file or several by key, in their order, and the metadata.
-fn read(paths: &[PathBuf]) -> (BTreeMap<String, Vec<Vec<u8>>>, Vec<Metadata>) {
+pub(crate) fn read(paths: &[PathBuf]) -> (BTreeMap<String, Vec<Vec<u8>>>, Vec<Metadata>) {
     let mut reader = RecordingReader::open(paths, Arc::default()).unwrap();
     let (mut frames, mut before) = (BTreeMap::<_, Vec<_>>::new(), 0);
     while let Some(message) = reader.next_message().unwrap() {

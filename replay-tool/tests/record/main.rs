@@ -8,4 +8,5 @@
 
 mod bus;
 mod common;
+mod memory;
 mod recover;

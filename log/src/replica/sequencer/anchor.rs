@@ -1,5 +1,5 @@
 //! Where in a recording a stream begins: behind the last frame that its memory has heard, or at the first frame that a
-//! new unit was given.
+//! new unit was given. And where the recording ends before what a last memory has heard.
 
 use std::collections::VecDeque;
 
@@ -13,6 +13,15 @@ use crate::replica::outline::{Mark, MarkKind};
 /// How long before an entry that a stream begins with frames are kept for it (ns).
 const KEPT_NS: u64 = 5_000_000_000;
 
+/// How far the frames that wait were looked through for those that a memory has heard last.
+#[derive(Debug, Default)]
+pub(super) struct Search {
+    mark: Option<Mark>,
+    order: u64,
+    /// By [`Input::index`].
+    found: [bool; Input::ALL.len()],
+}
+
 impl Sequencer {
     /// Goes on towards an entry that another stream begins with; `false` where more must come first.
     pub(super) fn anchor(&mut self) -> bool {
@@ -22,7 +31,7 @@ impl Sequencer {
             // Of the stream before, or of none.
             return self.give_oldest();
         }
-        if !self.over && self.now_ns <= received_ns.saturating_add(NEAR_NS) {
+        if !self.over && self.now_ns <= received_ns.saturating_add(NEAR_NS) && !self.is_certain() {
             return false;
         }
         let Some(mark) = self.marks.front().cloned() else { return false };
@@ -38,6 +47,31 @@ impl Sequencer {
         }
         self.given.iter_mut().for_each(VecDeque::clear);
         self.carry_out(true)
+    }
+
+    /// Whether nothing that is still to come can change where the stream begins: a log that was played as fast as it went has
+    /// millions of ticks within [`NEAR_NS`].
+    fn is_certain(&mut self) -> bool {
+        let Some(mark) = self.marks.front() else { return false };
+        if mark.kind == MarkKind::Began {
+            return self.oldest(|_| true).is_some_and(|(_, oldest)| self.begins_with(oldest, mark));
+        }
+        if self.search.mark.as_ref() != Some(mark) {
+            self.search = Search { mark: Some(mark.clone()), ..Search::default() };
+        }
+        let Search { order, found, .. } = &mut self.search;
+        for ((found, heard), frames) in found.iter_mut().zip(&mark.heard).zip(&self.waiting) {
+            let mut fresh = frames.iter().rev().take_while(|frame| frame.order > *order);
+            *found |= heard.frames == 0 || fresh.any(|frame| frame.crc() == heard.crc);
+        }
+        *order = self.order;
+        self.now_ns > mark.received_ns && found.iter().all(|found| *found)
+    }
+
+    /// Whether a recording, or a unit, begins with a new stream: then every frame is the stream's.
+    fn begins_with(&self, oldest: &Frame, mark: &Mark) -> bool {
+        let fresh = self.unheard == 0 && self.standing.is_none();
+        fresh && oldest.received_ns.saturating_add(NEAR_NS) >= mark.received_ns
     }
 
     /// Place, among the entries to come, of a memory to begin with instead of `mark`.
@@ -95,10 +129,7 @@ impl Sequencer {
     /// For each input the order of the first frame that a new unit was given.
     fn before_first(&self, mark: &Mark) -> [u64; Input::ALL.len()] {
         let Some((_, oldest)) = self.oldest(|_| true) else { return [0; Input::ALL.len()] };
-        // A recording, or a unit, that begins with the stream: everything is the stream's.
-        let began_with_it = oldest.received_ns.saturating_add(NEAR_NS) >= mark.received_ns;
-        let fresh = self.unheard == 0 && self.standing.is_none();
-        if began_with_it && fresh {
+        if self.begins_with(oldest, mark) {
             return [0; Input::ALL.len()];
         }
         let by_sequence = self.published.and_then(|sequence| self.first_gyro_frame(mark, sequence));
@@ -130,5 +161,22 @@ impl Sequencer {
         let received_ns = frames.iter().find(|frame| frame.order == first)?.received_ns;
         let near = together.filter(|frame| frame.received_ns + 1_000_000 >= received_ns);
         near.map(|frame| frame.order).min()
+    }
+
+    /// Whether the last entry is a memory that has heard more than was recorded, up to a frame that is not in the recording.
+    ///
+    /// A recorder asks before it ends: what was on its way to it then is no loss, and no tick rests on that memory.
+    pub(super) fn ends_behind_the_log(&self) -> bool {
+        let last = self.marks.front().filter(|mark| mark.kind == MarkKind::Memory && self.marks.len() == 1);
+        let Some(mark) = last.filter(|_| self.over) else { return false };
+        let behind = |index: usize| {
+            let (Some(want), Some(waiting)) = (mark.heard.get(index), self.waiting.get(index)) else {
+                return false;
+            };
+            let open = self.to_go.get(index).is_some_and(Option::is_none);
+            let more = open && self.distance(index).is_some_and(|frames| frames > waiting.len() as u64);
+            more && waiting.iter().all(|frame| frame.crc() != want.crc)
+        };
+        (0..Input::ALL.len()).any(behind)
     }
 }
