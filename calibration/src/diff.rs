@@ -12,6 +12,7 @@ use isotherm_correction::calibration::Steady;
 use isotherm_correction::units::{Angle, AngularRate, SpecificForce};
 use isotherm_protocol::control::DocumentChange;
 use isotherm_protocol::document::difference;
+use nalgebra::Vector3;
 use serde::Serialize;
 
 use crate::error::Error;
@@ -262,9 +263,6 @@ fn ppm([before, after]: [f64; 2]) -> f64 {
 
 /// Angle between two axes (″).
 fn angle(old: [f64; 3], new: [f64; 3]) -> f64 {
-    let [a, b, c] = old;
-    let [x, y, z] = new;
-    let cross = [b * z - c * y, c * x - a * z, a * y - b * x];
-    let sine = cross.iter().map(|part| part * part).sum::<f64>().sqrt();
-    Angle::from_rad(libm::atan2(sine, a * x + b * y + c * z)).as_arcsec()
+    let [old, new] = [old, new].map(Vector3::from);
+    Angle::from_rad(libm::atan2(old.cross(&new).norm(), old.dot(&new))).as_arcsec()
 }

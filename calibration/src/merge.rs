@@ -6,22 +6,23 @@
 //! K1 away, and that is told. Where two parts have made the same otherwise, neither is taken: the keys are told, and the
 //! user decides.
 
+mod check;
 mod origin;
 mod sections;
 #[cfg(test)]
 mod tests;
+mod words;
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use isotherm_protocol::document::Document;
-use serde_json::{Value as Json, json};
 use toml::Value;
 
 use crate::error::Error;
-use crate::report::Sheet;
 use crate::show::terms::tree;
 use crate::written::Written;
-use sections::{Sections, build, group, is_about, sections};
+use check::{check, same_unit};
+use sections::{Sections, build, group, sections};
 
 /// A document with the name that it is called by.
 #[derive(Debug, Clone)]
@@ -173,18 +174,15 @@ impl Picked {
     }
 
     fn set(&mut self, key: &str, from: &str, value: Option<&Value>) {
-        match value {
-            Some(value) => {
-                self.sections.insert(key.to_owned(), value.clone());
-                self.from.insert(key.to_owned(), from.to_owned());
-            }
-            None => {
-                if self.sections.remove(key).is_some() {
-                    self.gone.push((key.to_owned(), from.to_owned()));
-                }
-                self.from.remove(key);
-            }
+        if let Some(value) = value {
+            self.sections.insert(key.to_owned(), value.clone());
+            self.from.insert(key.to_owned(), from.to_owned());
+            return;
         }
+        if self.sections.remove(key).is_some() {
+            self.gone.push((key.to_owned(), from.to_owned()));
+        }
+        self.from.remove(key);
     }
 
     /// Terms of Ṫ, T̈ and lags hold with the filter that they were fitted with, and with no other.
@@ -231,123 +229,5 @@ fn conflict(key: &str, said: &[(String, Option<Value>)], chosen: Option<&Take>) 
             names.join(" and "),
             said.first().map_or("", |(name, _)| name)
         ),
-    }
-}
-
-/// Refuses documents that are not of one unit, or of other sensors.
-fn same_unit(base: &Named, parts: &[Named]) -> Result<(), Error> {
-    let shape = |named: &Named| {
-        let document = &named.written.document;
-        let gyros: Vec<String> = document.gyro.sensor.iter().map(|sensor| sensor.name.clone()).collect();
-        let accels = document.accel.as_ref().map(|accel| {
-            let names = accel.sensor.iter().map(|sensor| sensor.name.clone()).collect::<Vec<_>>();
-            (names, format!("{:?}", accel.output))
-        });
-        (document.unit.clone(), gyros, format!("{:?}", document.gyro.output), accels)
-    };
-    let (unit, gyros, output, accels) = shape(base);
-    let mut reasons = Vec::new();
-    for part in parts {
-        let (other, part_gyros, part_output, part_accels) = shape(part);
-        for (key, here, there) in [
-            ("unit", unit.clone(), other),
-            ("gyro.sensor", gyros.join(", "), part_gyros.join(", ")),
-            ("gyro.output", output.clone(), part_output),
-        ] {
-            if here != there {
-                reasons.push(differing(key, &here, &base.name, &there, &part.name));
-            }
-        }
-        if let (Some((names, output)), Some((part_names, part_output))) = (&accels, &part_accels) {
-            if names != part_names {
-                reasons.push(differing(
-                    "accel.sensor",
-                    &names.join(", "),
-                    &base.name,
-                    &part_names.join(", "),
-                    &part.name,
-                ));
-            }
-            if output != part_output {
-                reasons.push(differing("accel.output", output, &base.name, part_output, &part.name));
-            }
-        }
-    }
-    if reasons.is_empty() { Ok(()) } else { Err(Error::Refused(reasons)) }
-}
-
-fn differing(key: &str, here: &str, base: &str, there: &str, part: &str) -> String {
-    format!(
-        "{key} is {here} in {base} and {there} in {part}: only documents of one unit with the same sensors go together"
-    )
-}
-
-/// Refuses choices that choose nothing, and documents of the same name.
-fn check(base: &Named, parts: &[Named], take: &[Take]) -> Result<(), Error> {
-    let names: Vec<&str> = parts.iter().chain([base]).map(|document| document.name.as_str()).collect();
-    let distinct: BTreeSet<&&str> = names.iter().collect();
-    if distinct.len() < names.len() {
-        return Err(Error::Usage(format!(
-            "the documents are told by their names, and two have the same: {}. Rename one",
-            names.join(", ")
-        )));
-    }
-    for choice in take {
-        if !names.contains(&choice.from.as_str()) {
-            return Err(Error::Usage(format!(
-                "--take {}={} names no document of this merge: {}",
-                choice.key,
-                choice.from,
-                names.join(", ")
-            )));
-        }
-        if is_about(&choice.key) {
-            return Err(Error::Usage(format!(
-                "--take {}: of origin, note and date nothing can be chosen",
-                choice.key
-            )));
-        }
-    }
-    Ok(())
-}
-
-impl Merged {
-    /// What was done, as text.
-    #[must_use]
-    pub fn sheet(&self, name: &str) -> Sheet {
-        let documents: BTreeSet<&String> = self.taken.iter().map(|(_, from)| from).collect();
-        let mut sheet = Sheet {
-            title: format!("Merge of {name}"),
-            headline: format!(
-                "{name}: {} sections of {} documents, no conflict{}.",
-                self.taken.len(),
-                documents.len(),
-                if self.gone.is_empty() { String::new() } else { format!(", {} left out", self.gone.len()) }
-            ),
-            ..Sheet::default()
-        };
-        sheet.notes = self.warnings.iter().map(|warning| format!("warning: {warning}")).collect();
-        let row = |(key, from): &(String, String)| vec![key.clone(), from.clone()];
-        sheet.table("Taken", &["section", "from"], self.taken.iter().map(row).collect());
-        sheet.table(
-            "Left out, because the part does without",
-            &["section", "by"],
-            self.gone.iter().map(row).collect(),
-        );
-        sheet
-    }
-
-    /// What was done, as JSON.
-    #[must_use]
-    pub fn to_json(&self, name: &str) -> Json {
-        let map = |pairs: &[(String, String)]| -> serde_json::Map<String, Json> {
-            pairs.iter().map(|(key, from)| (key.clone(), json!(from))).collect()
-        };
-        json!({
-            "verdict": self.sheet(name).headline,
-            "taken": map(&self.taken),
-            "left_out": map(&self.gone),
-            "warnings": self.warnings,
-        })
     }
 }

@@ -72,7 +72,7 @@ pub fn show(name: &str, written: &Written) -> Result<Shown, Error> {
     Ok(Shown { sheet, json })
 }
 
-/// "gyro x static_bias".
+/// The term as people call it: "gyro x lag of 300 s".
 pub(crate) fn title(term: &Term) -> String {
     format!("{} {} {}", if term.kind == "gyro" { "gyro" } else { "accelerometer" }, term.sensor, term.name)
 }
@@ -105,12 +105,12 @@ fn over_temperature(sheet: &mut Sheet, terms: &[Term], range: [f64; 2]) {
             ranges.reduce(|[a, b], [c, d]| [a.min(c), b.max(d)]).unwrap_or_default()
         };
         let at = places(range, COLUMNS);
-        let mut head = vec!["".to_owned()];
+        let mut head = vec![String::new()];
         head.extend(at.iter().map(|x| format!("{} {argument}", short(*x))));
         let row = |term: &Term| {
             let cell = |x: &f64| {
-                let (value, held) = term.at(*x);
-                if held { format!("({})", short(value)) } else { short(value) }
+                let (value, clamped) = term.at(*x);
+                if clamped { format!("({})", short(value)) } else { short(value) }
             };
             std::iter::once(format!("{}, {}", title(term), term.unit)).chain(at.iter().map(cell)).collect()
         };
@@ -133,7 +133,7 @@ pub(crate) fn steady(written: &Written, temperature: f64, ramp_deg_c_per_min: f6
 /// The sums of all terms.
 fn sums(sheet: &mut Sheet, written: &Written, range: [f64; 2]) {
     let at = places(range, COLUMNS);
-    let mut head = vec!["".to_owned()];
+    let mut head = vec![String::new()];
     head.extend(at.iter().map(|x| format!("{} °C", short(*x))));
     let mut rows = Vec::new();
     let mut row = |name: String, of: &dyn Fn(f64) -> Option<f64>| {

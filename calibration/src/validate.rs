@@ -8,15 +8,15 @@
 mod coverage;
 mod runs;
 
-use isotherm_correction::earth::Place;
-use isotherm_correction::units::AngularRate;
+use isotherm_correction::earth::{LEVELLING_TOLERANCE, Place};
+use isotherm_correction::units::{AngularRate, STANDARD_GRAVITY_M_PER_S2};
 use isotherm_protocol::document::{Curve as DocumentCurve, Document, Problem, Quantity, Sample, Shape};
 
 use crate::drift::figures::short;
 use crate::error::Error;
 use crate::means::{Means, Size};
 use crate::nominal::nominal;
-use crate::report::{Curve, FitReport, Rest};
+use crate::report::{Curve, FitReport, Rest, Verdict};
 use crate::run::Watch;
 use crate::show::terms::tree;
 use crate::written::Written;
@@ -34,6 +34,10 @@ pub struct Wanted {
 
 /// By how much a figure may grow and still count as the same: rounding of sums.
 const SAME: f64 = 1e-9;
+/// Share of the deviation of the most lively axis below which a sensor is dead: what is left comes through the axes.
+const DEAD: f64 = 1e-3;
+/// Share of windows that should be whole.
+const WHOLE: f64 = 0.9;
 /// Largest range of a mean rate of a unit that counts as being at rest (°/h): 5 °/s.
 const REST_RATE_DEG_PER_H: f64 = 18_000.0;
 /// Largest angle between mean specific forces of a unit that counts as being at rest (sine).
@@ -102,7 +106,9 @@ pub fn validate(
         at_rest(&run.name, &after)?;
         let rest = rest(&run.name, &after, wanted.place.as_ref())?;
         let sample = if log.known { Sample::In } else { Sample::Out };
-        report.residuals.extend(Curve::of_means(&run.name, sample, [&nominal, &after], document, &rest));
+        let curves = Curve::of_means(&run.name, sample, [&nominal, &after], document, &rest);
+        report.warnings.extend(doubts(&run.name, &curves, &after));
+        report.residuals.extend(curves);
         report.warnings.extend(after.troubles.iter().map(|words| format!("{}: {words}", run.name)));
         if log.known {
             report.warnings.push(format!(
@@ -112,13 +118,21 @@ pub fn validate(
         }
     }
     report.verdicts = Curve::verdicts(&report.residuals);
-    for verdict in &mut report.verdicts {
+    let liveliest = |of: &Verdict| {
+        let alike = report.verdicts.iter().filter(|verdict| verdict.measure == of.measure);
+        alike.map(|verdict| verdict.deciding()[0].deviation).fold(0.0, f64::max)
+    };
+    let limits: Vec<f64> = report.verdicts.iter().map(|verdict| DEAD * liveliest(verdict)).collect();
+    for (verdict, limit) in report.verdicts.iter_mut().zip(limits) {
         let [before, after] = verdict.deciding();
         if after.rms > before.rms && after.rms <= before.rms * (1.0 + SAME) {
             verdict.accepted = true;
             verdict.reason.clear();
         }
-        if verdict.accepted && (after.rms - before.rms).abs() <= before.rms * SAME {
+        if before.count > 1 && before.deviation <= limit {
+            *verdict =
+                verdict.clone().refused("it does not change: the sensor is dead, or its column is wrong");
+        } else if verdict.accepted && (after.rms - before.rms).abs() <= before.rms * SAME {
             "the document changes nothing of it".clone_into(&mut verdict.reason);
         }
     }
@@ -127,6 +141,35 @@ pub fn validate(
     report.warnings.extend(coverage.warnings());
     report.tables.extend(coverage.tables());
     Ok(report)
+}
+
+/// What a run's curves show of sensors that do not work, and of gaps.
+fn doubts(name: &str, curves: &[Curve], means: &Means) -> Vec<String> {
+    let mut doubts = Vec::new();
+    let force = [0, 1, 2].map(|axis| Size::of(means.force(axis)));
+    if force.iter().all(|size| size.count > 0) {
+        let length = force.iter().map(|size| size.mean * size.mean).sum::<f64>().sqrt();
+        if (length / STANDARD_GRAVITY_M_PER_S2 - 1.0).abs() > LEVELLING_TOLERANCE {
+            doubts.push(format!(
+                "{name}: the mean specific force is {} m/s², gravity is 9.76 to 9.84: are the unit of the columns, their order, and \
+                 the document right?",
+                short(length)
+            ));
+        }
+    }
+    for curve in curves {
+        let of = &curve.of;
+        let [before, _] = curve.sizes();
+        #[expect(clippy::cast_precision_loss, reason = "windows of a log are far below 2⁵³")]
+        let share = before.count as f64 / curve.before.len().max(1) as f64;
+        if share < WHOLE {
+            doubts.push(format!(
+                "{name}: {of}: {:.0} % of the windows have gaps or flags and are left out",
+                (1.0 - share) * 100.0
+            ));
+        }
+    }
+    doubts
 }
 
 /// Refuses a run in which the unit was moved: what is left would be its motion.

@@ -34,10 +34,11 @@ fn every_document_that_is_shipped_can_be_shown() {
     let html = pages.path().join("page.html").display().to_string();
     let mut count = 0;
     for entry in std::fs::read_dir(folder()).unwrap() {
-        let path = entry.unwrap().path().display().to_string();
-        if !path.ends_with(".toml") {
+        let path = entry.unwrap().path();
+        if path.extension().is_none_or(|extension| extension != "toml") {
             continue;
         }
+        let path = path.display().to_string();
         count += 1;
         let output = calibrate(&["show", &path, "--html", &html]);
         assert!(output.status.success(), "{path}: {}", String::from_utf8_lossy(&output.stderr));

@@ -16,6 +16,7 @@ use isotherm_log::part::{LogFiles, Part};
 use isotherm_log::text::LogEvent;
 use isotherm_protocol::document::{Document, Shape};
 use isotherm_simulator::Simulation;
+use isotherm_simulator::failure::{FailingSensor, Failure, Fault};
 use serde_json::Value;
 use simulated_logs::{fibre_optic, record, write_text};
 
@@ -55,7 +56,7 @@ fn a_good_document_is_accepted_and_a_bad_one_is_not() {
     let good = document().display().to_string();
     // White noise is the most of what is left in shorter windows.
     let arguments =
-        ["validate", &good, &path("judge.mcap"), "--window", "100", "--json", "--html", &path("judge.html")];
+        ["validate", &good, &path("judge.mcap"), "--window", "50", "--json", "--html", &path("judge.html")];
     let report = json(&arguments);
     assert_eq!(report["accepted"], true);
     for gyro in 0..3 {
@@ -211,6 +212,11 @@ fn what_cannot_be_judged_is_refused_in_words() {
         2,
         "latitude is 95°",
     );
+    // A dead gyro: not moving at all is no merit.
+    let mut dead = fibre_optic(5, "FOG-0001", 600.0);
+    dead.failures.push(Failure { sensor: FailingSensor::Gyro(1), at_s: 0.0, fault: Fault::Stuck });
+    record(Path::new(&path("dead.mcap")), &dead);
+    refused(&["validate", &good, &path("dead.mcap")], 1, "gyro y: it does not change: the sensor is dead");
     refused(&["validate", &good, &path("none.mcap")], 1, "none.mcap");
     refused(&["validate", &good, &path("none.csv")], 1, "none.csv");
 }

@@ -66,6 +66,9 @@ pub(super) struct ValidateArgs {
     json: bool,
 }
 
+/// Documents with their names, by serial.
+type Documents = BTreeMap<String, (String, Written)>;
+
 /// One unit of a batch.
 struct Work {
     name: String,
@@ -95,10 +98,10 @@ impl ValidateArgs {
             bar.finish();
             reports
         };
-        match reports.len() {
-            1 => self.one(reports.into_iter().next().unwrap_or_else(|| Err(nothing()))?),
-            _ => self.several(&work, reports),
+        if reports.len() > 1 {
+            return self.several(&work, &reports);
         }
+        self.one(&reports.into_iter().next().unwrap_or_else(|| Err(nothing()))?)
     }
 
     fn wanted(&self) -> Result<Wanted, Error> {
@@ -122,7 +125,7 @@ impl ValidateArgs {
     }
 
     /// Documents by serial, and whether they are of a folder.
-    fn documents(&self) -> Result<(BTreeMap<String, (String, Written)>, bool), Error> {
+    fn documents(&self) -> Result<(Documents, bool), Error> {
         let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         if !self.document.is_dir() {
             let written = Written::read(&self.document)?;
@@ -137,7 +140,7 @@ impl ValidateArgs {
             }
         }
         paths.sort();
-        let mut documents: BTreeMap<String, (String, Written)> = BTreeMap::new();
+        let mut documents = Documents::new();
         for path in paths {
             let written = Written::read(&path)?;
             let unit = written.document.unit.clone();
@@ -154,7 +157,7 @@ impl ValidateArgs {
 
     fn work(
         &self,
-        mut documents: BTreeMap<String, (String, Written)>,
+        mut documents: Documents,
         folder: bool,
         fallback: Option<&UnitId>,
     ) -> Result<Vec<Work>, Error> {
@@ -198,7 +201,7 @@ impl ValidateArgs {
         self.log.iter().filter(of_run).filter(|path| path.is_file()).cloned().collect()
     }
 
-    fn one(&self, report: FitReport) -> Result<(), Error> {
+    fn one(&self, report: &FitReport) -> Result<(), Error> {
         if let Some(html) = &self.html {
             write_file(html, report.to_html().as_bytes(), true)?;
         }
@@ -207,10 +210,10 @@ impl ValidateArgs {
         end(report.refusals())
     }
 
-    fn several(&self, work: &[Work], reports: Vec<Result<FitReport, Error>>) -> Result<(), Error> {
+    fn several(&self, work: &[Work], reports: &[Result<FitReport, Error>]) -> Result<(), Error> {
         let mut batch = BatchTable::default();
         let (mut refusals, mut all) = (Vec::new(), Vec::new());
-        for (work, report) in work.iter().zip(&reports) {
+        for (work, report) in work.iter().zip(reports) {
             match report {
                 Ok(report) => {
                     if let Some(html) = &self.html {

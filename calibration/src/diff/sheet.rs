@@ -101,6 +101,7 @@ impl Changes {
             cells.push(format!("{:.1}", axis.largest_arcsec));
             cells.push(
                 match axis.significance {
+                    _ if axis.turned_arcsec <= 0.0 => "as it was",
                     None => "not known",
                     Some(sigmas) if sigmas > BEYOND => "turned",
                     Some(_) => "within the uncertainty",

@@ -6,6 +6,7 @@ use isotherm_log::plot::page::{Axis, Chart, Content, Form, Ink, Panel, Samples, 
 use super::about::ARCSEC;
 use super::terms::Term;
 use super::{RAMPS, places, ramp_words, steady};
+use crate::means::Size;
 use crate::report::Sheet;
 use crate::written::Written;
 
@@ -106,7 +107,7 @@ fn sums(written: &Written, range: [f64; 2]) -> Vec<Panel> {
     // What is constant stands in the table.
     let varies = |panel: &Panel| match &panel.content {
         Content::Series(curves) => curves.iter().any(|curve| match &curve.samples {
-            Samples::Points { y, .. } => y.iter().any(|value| y.first().is_some_and(|first| value != first)),
+            Samples::Points { y, .. } => Size::of(y).peak_to_peak > 0.0,
             Samples::Bins { .. } => true,
         }),
         Content::Lanes(_) => true,

@@ -69,8 +69,9 @@ pub(crate) fn write_text(log: &Path, mapping: &Path, scenario: &Scenario) {
         text.push('\n');
     }
     std::fs::write(log, text).unwrap();
-    let sensors = |from: usize, unit: &str| -> String {
-        (from..from + 3).map(|column| format!("{{ column = {column}, unit = \"{unit}\" }}, ")).collect()
+    let sensors = |from: usize, unit: &str| {
+        let one = |column| format!("{{ column = {column}, unit = \"{unit}\" }}");
+        [from, from + 1, from + 2].map(one).join(", ")
     };
     let accels = match scenario.instrument.accel_output_kind().unwrap() {
         isotherm_correction::sample::OutputKind::Counts => ("counts", "counts"),
