@@ -31,7 +31,7 @@ struct Cli {
 enum Command {
     Drift(drift::DriftArgs),
     Impact(impact::ImpactArgs),
-    Positions(positions::PositionsArgs),
+    Positions(Box<positions::PositionsArgs>),
     Tumble(tumble::TumbleArgs),
     /// Print a completion script for a shell
     #[command(after_help = "Example:\n  isotherm-calibrate completions bash > isotherm-calibrate.bash")]

@@ -158,6 +158,6 @@ fn whitening(model: &Model<'_>, start: &[f64], taken: &Taken, weights: &Weights)
     }
     let lower = covariance.cholesky().map(|cholesky| cholesky.l());
     lower
-        .and_then(|lower| lower.try_inverse())
+        .and_then(DMatrix::try_inverse)
         .unwrap_or_else(|| DMatrix::from_element(count, count, f64::NAN))
 }

@@ -3,6 +3,8 @@
 //! The stand's kinematics are written out here a second time, with rotation matrices from north, east, down to the case, so that
 //! the plan's own formula is not what it is tested with.
 
+pub(crate) mod judging;
+
 use std::collections::BTreeMap;
 
 use isotherm_calibration::positions::plan::{Attitude, Plan};
