@@ -12,22 +12,30 @@
 //! | [`report`] | what a fit says: verdicts, before and after, coefficients; text, JSON and page |
 //! | [`impact`] | what a drift that is left means for navigation |
 //! | [`positions`], [`tumble`] | accelerometers on a stand; a unit tumbled by hand |
+//! | [`diff`] | what has changed between two documents |
+//! | [`merge`] | parts of a calibration in one document |
+//! | [`show`] | a document in words and curves |
+//! | [`validate`] | a document judged on other logs |
 //! | [`error`], [`cli`] | what can go wrong; the command line |
 
 pub mod allan;
 pub mod cli;
+pub mod diff;
 pub mod drift;
 pub mod error;
 #[cfg(test)]
 mod fixture;
 pub mod impact;
 pub mod means;
+pub mod merge;
 pub mod nominal;
 pub mod positions;
 pub mod provenance;
 pub mod report;
 pub mod run;
 pub mod series;
+pub mod show;
 pub mod spectrum;
 pub mod tumble;
+pub mod validate;
 pub mod written;
