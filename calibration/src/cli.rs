@@ -4,12 +4,11 @@ mod bar;
 mod diff;
 mod drift;
 mod impact;
+mod merge;
 mod positions;
 mod runs;
-mod tumble;
-mod merge;
-mod runs;
 mod show;
+mod tumble;
 mod validate;
 
 use std::io::{self, Write};

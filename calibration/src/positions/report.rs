@@ -36,7 +36,7 @@ pub fn report(
     }
     report.verdicts =
         Curve::verdicts(&report.residuals).into_iter().map(|v| v.stated_as(Figure::Rms)).collect();
-    let length = Verdict::new("|f| − g", "m/s²", lengths(inside.judged)).stated_as(Figure::Rms);
+    let length = Verdict::new("|f|−g", "m/s²", lengths(inside.judged)).stated_as(Figure::Rms);
     report.verdicts.push(length.out_of_sample(outside.map(|set| lengths(set.judged))));
     report.warnings.clone_from(&analysis.warnings);
     report.notes = notes(analysis, settings);

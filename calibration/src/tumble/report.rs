@@ -43,7 +43,10 @@ impl Left {
             length: force.iter().map(|force| norm(*force) - gravity).collect(),
             direction: force.iter().map(|force| force.map(|c| c / norm(*force))).collect(),
             angle_deg: turns.iter().map(|turn| angle_of(track, turn).to_degrees()).collect(),
-            turn_s: turns.iter().map(|turn| track.start_s(usize::midpoint(turn.ticks[0], turn.ticks[1]))).collect(),
+            turn_s: turns
+                .iter()
+                .map(|turn| track.start_s(usize::midpoint(turn.ticks[0], turn.ticks[1])))
+                .collect(),
         }
     }
 }
