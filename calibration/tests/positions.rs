@@ -48,8 +48,11 @@ fn twelve_positions_with_random_stand_errors_find_the_axes_within_their_covarian
     plausible("residuals", &fits, 24.0);
 }
 
-/// A unit whose axes go with temperature as they are told to, at five temperatures.
-fn over_temperature(seed: u64, bend: f64) -> (Analysis, [[f64; 3]; 3], [[f64; 3]; 3], [[f64; 3]; 3]) {
+/// One row per accelerometer.
+type Rows = [[f64; 3]; 3];
+
+/// A unit whose axes go with temperature as they are told to, at five temperatures; slopes and bends.
+fn over_temperature(seed: u64, bend: f64) -> (Analysis, [Rows; 2]) {
     let plan = Plan::twelve();
     let document = Written::of(&stand::document()).unwrap();
     let level = stand::true_rows(&stand::instrument(), 20.0);
@@ -71,7 +74,7 @@ fn over_temperature(seed: u64, bend: f64) -> (Analysis, [[f64; 3]; 3], [[f64; 3]
         runs.push(stand::run(&name, events));
     }
     let settings = Settings { reference_deg_c: Some(20.0), ..settings(plan, Some(Times { rows })) };
-    (analyse(&tracks(&runs, &document), &document.document, &settings).unwrap(), level, slopes, bends)
+    (analyse(&tracks(&runs, &document), &document.document, &settings).unwrap(), [slopes, bends])
 }
 
 #[test]
@@ -79,11 +82,11 @@ fn linear_and_quadratic_axes_over_temperature_are_recovered() {
     let plan = Plan::twelve();
     let (mut straight, mut bent, mut slopes_of, mut bends_of) = (0, 0, Vec::new(), Vec::new());
     for seed in 0..40 {
-        let (found, _, slopes, _) = over_temperature(seed, 0.0);
+        let (found, [slopes, _]) = over_temperature(seed, 0.0);
         let scaled = slopes.map(|row| row.map(|c| c * found.half_deg_c));
         slopes_of.push(chi_square(&away(&found, &scaled, 1, false), found.fit.axes_covariance(&plan, 1)));
         straight += usize::from(found.quadratic.as_ref().unwrap().3 > 1e-3);
-        let (found, _, _, bends) = over_temperature(seed, 1.0);
+        let (found, [_, bends]) = over_temperature(seed, 1.0);
         let quadratic = found.quadratic.as_ref().unwrap();
         bent += usize::from(quadratic.3 < 1e-3);
         let scaled = bends.map(|row| row.map(|c| c * found.half_deg_c * found.half_deg_c));
@@ -190,9 +193,9 @@ fn the_document_gives_the_right_vectors_through_the_service_to_the_last_digit_th
         let own = &ticks[pose.interval.first..pose.interval.end];
         let seconds: f64 = own.iter().map(|tick| tick.duration.as_s()).sum();
         let up = plan.up(&plan.positions[*position].attitude, errors);
-        for axis in 0..3 {
+        for (axis, up) in up.iter().enumerate() {
             let mean = own.iter().map(|tick| tick.delta_velocity[axis]).sum::<f64>() / seconds;
-            let difference = mean - GRAVITY * up[axis] - judgement.error[1][axis];
+            let difference = mean - GRAVITY * up - judgement.error[1][axis];
             assert!(difference.abs() < 1e-9 * GRAVITY, "axis {axis}: {difference}");
         }
     }
@@ -228,7 +231,7 @@ fn what_cannot_be_fitted_is_refused_with_what_to_do() {
     let dead = refused(&all, &driven(3), &|track| track.outputs[1].fill(0.0));
     assert!(dead.contains("accelerometer y reads 0 in every tick"), "{dead}");
     let gaps = refused(&all, &driven(3), &|track| {
-        track.outputs[2].iter_mut().step_by(20).for_each(|x| *x = f64::NAN)
+        track.outputs[2].iter_mut().step_by(20).for_each(|x| *x = f64::NAN);
     });
     assert!(gaps.contains("are no numbers"), "{gaps}");
     let clipped = refused(&all, &driven(3), &|track| {

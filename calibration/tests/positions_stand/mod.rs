@@ -217,10 +217,10 @@ pub(crate) fn through(
             let seen = UnitQuaternion::from_rotation_matrix(&seen);
             if let Some((axis, angle)) = seen.axis_angle() {
                 // Components of what stands still turn the other way.
-                let ticks = (angle.to_degrees() / speed / tick_s).ceil().max(1.0) as i64;
-                let rate = angle.to_degrees() / (ticks as f64 * tick_s);
+                let length = (angle.to_degrees() / speed / tick_s).ceil().max(1.0) as i64;
+                let rate = angle.to_degrees() / (length as f64 * tick_s);
                 let path = Path::ConstantRate { axis: (-axis.into_inner()).into(), rate_deg_per_s: rate };
-                play(motion(before).along(path), ticks, &mut events);
+                play(motion(before).along(path), length, &mut events);
             }
         }
         let hold_s = if index == 0 { stand.hold_s + stand.start_s } else { stand.hold_s };
@@ -250,7 +250,9 @@ pub(crate) fn as_text(events: &[LogEvent], counts: bool) -> (String, String) {
             temperatures.insert(reading.channel.to_string(), f64::NAN);
         }
     }
-    temperatures.keys().for_each(|name| write!(text, ",{name}").unwrap());
+    for name in temperatures.keys() {
+        write!(text, ",{name}").unwrap();
+    }
     text.push('\n');
     let mut force = [0.0; 3];
     for event in events {
@@ -262,7 +264,9 @@ pub(crate) fn as_text(events: &[LogEvent], counts: bool) -> (String, String) {
             LogEvent::Gyro { tick, .. } => {
                 write!(text, "{}", tick.end_time.as_ns()).unwrap();
                 tick.readings.iter().chain(&force).for_each(|value| write!(text, ",{value}").unwrap());
-                temperatures.values().for_each(|value| write!(text, ",{value}").unwrap());
+                for value in temperatures.values() {
+                    write!(text, ",{value}").unwrap();
+                }
                 text.push('\n');
             }
         }
