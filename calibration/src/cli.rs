@@ -5,11 +5,9 @@ mod diff;
 mod drift;
 mod impact;
 mod merge;
-mod runs;
-mod show;
-mod validate;
 mod positions;
 mod runs;
+mod show;
 mod tumble;
 mod modes;
 mod output;
@@ -18,6 +16,7 @@ mod rates;
 mod runs;
 mod units;
 mod thermal;
+mod validate;
 
 use std::io::{self, Write};
 use std::process::ExitCode;
@@ -44,6 +43,8 @@ enum Command {
     Diff(diff::DiffArgs),
     Drift(drift::DriftArgs),
     Impact(impact::ImpactArgs),
+    Positions(Box<positions::PositionsArgs>),
+    Tumble(tumble::TumbleArgs),
     Merge(merge::MergeArgs),
     Show(show::ShowArgs),
     Validate(validate::ValidateArgs),
@@ -66,6 +67,8 @@ fn run(cli: Cli) -> Result<(), Error> {
         Command::Diff(args) => args.run(),
         Command::Drift(args) => args.run(),
         Command::Impact(args) => args.run(),
+        Command::Positions(args) => args.run(),
+        Command::Tumble(args) => args.run(),
         Command::Merge(args) => args.run(),
         Command::Show(args) => args.run(),
         Command::Validate(args) => args.run(),

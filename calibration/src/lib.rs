@@ -11,6 +11,7 @@
 //! | [`drift`], [`allan`], [`spectrum`] | noise and drift of a static log |
 //! | [`report`] | what a fit says: verdicts, before and after, coefficients; text, JSON and page |
 //! | [`impact`] | what a drift that is left means for navigation |
+//! | [`positions`], [`tumble`] | accelerometers on a stand; a unit tumbled by hand |
 //! | [`diff`] | what has changed between two documents |
 //! | [`merge`] | parts of a calibration in one document |
 //! | [`show`] | a document in words and curves |
@@ -41,7 +42,7 @@ pub mod run;
 pub mod series;
 pub mod show;
 pub mod spectrum;
-pub mod validate;
 pub mod tumble;
 pub mod thermal;
+pub mod validate;
 pub mod written;

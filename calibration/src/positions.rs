@@ -8,13 +8,14 @@
 //! | [`plan`], [`times`], [`matching`], [`faults`] | positions of a stand; when which was held; which pose is which; sensors that are no use |
 //! | [`model`], [`fit`] | the outputs as a function of what is to be found; finding it |
 //! | [`temperature`], [`doubts`] | levels and channels; what is doubtful about a result |
-//! | [`analysis`], [`document`], [`provenance`], [`judged`], [`report`] | from runs to a result; as a document, with where it comes from; what it leaves; in words |
+//! | [`analysis`], [`document`], [`provenance`], [`judged`], [`report`], [`charts`] | from runs to a result; as a document, with where it comes from; what it leaves; in words and diagrams |
 //! | [`budget`] | what a planned calibration will come to |
 //! | [`solve`] | nonlinear least squares with covariance |
 
 pub mod analysis;
 pub mod bare;
 pub mod budget;
+pub mod charts;
 pub mod document;
 pub mod doubts;
 pub mod faults;

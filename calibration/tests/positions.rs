@@ -11,95 +11,14 @@ use isotherm_calibration::positions::document::complete;
 use isotherm_calibration::positions::judged::judge;
 use isotherm_calibration::positions::model::SMALL;
 use isotherm_calibration::positions::plan::Plan;
-use isotherm_calibration::positions::still::StillLimits;
 use isotherm_calibration::positions::times::Times;
 use isotherm_calibration::positions::track::Track;
-use isotherm_calibration::run::Run;
 use isotherm_calibration::written::Written;
 use isotherm_correction::unit::UnitSettings;
 use isotherm_log::offline::Offline;
-use nalgebra::{DMatrix, DVector};
-use stand::{ARCSEC, Dice, GRAVITY, HZ_PER_V, Stand};
-use statrs::distribution::{ChiSquared, ContinuousCDF};
-
-const POSITIONING: f64 = 5.385 * ARCSEC;
-const LEVELLING: f64 = 60.0 * ARCSEC;
-/// The housing is warmer than the chamber, and C follows it.
-const HOUSING_ABOVE_DEG_C: f64 = 2.0;
-
-fn settings(plan: Plan, times: Option<Times>) -> Settings {
-    Settings {
-        plan,
-        gravity: GRAVITY,
-        limits: StillLimits { window_s: 1.0, factor: 4.0, rate_deg_per_s: 0.2, least_s: 8.0, settle_s: 2.0 },
-        times,
-        positioning_rad: POSITIONING,
-        levelling_rad: LEVELLING,
-        channels: vec!["housing".to_owned()],
-        reference_deg_c: None,
-    }
-}
-
-/// Slow ticks and short holds, for many seeds: noise and errors of the stand are what they are at any tick rate.
-fn quick(seed: u64) -> Stand {
-    Stand {
-        errors: Dice::new(seed ^ 0xabcd).vector(LEVELLING),
-        positioning: POSITIONING,
-        tick_ns: 1_000_000_000,
-        hold_s: 20.0,
-        start_s: 0.0,
-        turn_deg_per_s: None,
-        seed,
-    }
-}
-
-fn times(plan: &Plan, log: &str, held: &[([f64; 2], usize)]) -> Times {
-    let row = |(span, position): &([f64; 2], usize)| {
-        (*span, plan.positions[*position].name.clone(), Some(log.to_owned()))
-    };
-    Times { rows: held.iter().map(row).collect() }
-}
-
-fn tracks(runs: &[Run], written: &Written) -> Vec<Track> {
-    runs.iter().map(|run| Track::of(run, &written.loaded, ()).unwrap()).collect()
-}
-
-/// Difference from the true axes at one power, as two angles per accelerometer.
-fn away(analysis: &Analysis, rows: &[[f64; 3]; 3], power: usize, quadratic: bool) -> DVector<f64> {
-    let fit = if quadratic { &analysis.quadratic.as_ref().unwrap().0 } else { &analysis.fit };
-    let angles = fit.sensors.iter().zip(&fit.guess).zip(rows).flat_map(|((sensor, guess), truth)| {
-        let error = [0, 1, 2].map(|i| sensor.axis[power][i] - truth[i]);
-        guess.across.map(|across| (0..3).map(|i| error[i] * across[i]).sum::<f64>())
-    });
-    DVector::from_iterator(6, angles)
-}
-
-fn chi_square(away: &DVector<f64>, covariance: DMatrix<f64>) -> f64 {
-    away.dot(&covariance.cholesky().unwrap().solve(away))
-}
-
-/// χ² of many seeds must be neither too large nor too small, in sum and in both tails.
-#[track_caller]
-fn plausible(what: &str, values: &[f64], degrees: f64) {
-    let sum: f64 = values.iter().sum();
-    let all = ChiSquared::new(degrees * values.len() as f64).unwrap();
-    let one = ChiSquared::new(degrees).unwrap();
-    let share = |low: f64, high: f64| values.iter().filter(|v| (low..high).contains(&one.cdf(**v))).count();
-    let (lower, upper) = (share(0.0, 0.05), share(0.95, 2.0));
-    let mean = sum / (degrees * values.len() as f64);
-    println!(
-        "{what}: χ² per degree {mean:.3}, p {:.4}; {lower} below 5 %, {upper} above 95 % of {}",
-        all.cdf(sum),
-        values.len()
-    );
-    assert!((0.001..0.999).contains(&all.cdf(sum)), "{what}: mean χ² per degree {mean}");
-    // Five in a hundred in each tail, within three and a half standard deviations.
-    let expected = 0.05 * values.len() as f64;
-    let room = 3.5 * (0.95 * expected).sqrt();
-    for count in [lower, upper] {
-        assert!((count as f64 - expected).abs() < room, "{what}: {count} in a tail, {expected} ± {room}");
-    }
-}
+use nalgebra::DVector;
+use stand::judging::{HOUSING_ABOVE_DEG_C, away, chi_square, plausible, quick, settings, times, tracks};
+use stand::{ARCSEC, GRAVITY, HZ_PER_V, Stand};
 
 #[test]
 fn twelve_positions_with_random_stand_errors_find_the_axes_within_their_covariance() {
@@ -129,8 +48,11 @@ fn twelve_positions_with_random_stand_errors_find_the_axes_within_their_covarian
     plausible("residuals", &fits, 24.0);
 }
 
-/// A unit whose axes go with temperature as they are told to, at five temperatures.
-fn over_temperature(seed: u64, bend: f64) -> (Analysis, [[f64; 3]; 3], [[f64; 3]; 3], [[f64; 3]; 3]) {
+/// One row per accelerometer.
+type Rows = [[f64; 3]; 3];
+
+/// A unit whose axes go with temperature as they are told to, at five temperatures; slopes and bends.
+fn over_temperature(seed: u64, bend: f64) -> (Analysis, [Rows; 2]) {
     let plan = Plan::twelve();
     let document = Written::of(&stand::document()).unwrap();
     let level = stand::true_rows(&stand::instrument(), 20.0);
@@ -152,7 +74,7 @@ fn over_temperature(seed: u64, bend: f64) -> (Analysis, [[f64; 3]; 3], [[f64; 3]
         runs.push(stand::run(&name, events));
     }
     let settings = Settings { reference_deg_c: Some(20.0), ..settings(plan, Some(Times { rows })) };
-    (analyse(&tracks(&runs, &document), &document.document, &settings).unwrap(), level, slopes, bends)
+    (analyse(&tracks(&runs, &document), &document.document, &settings).unwrap(), [slopes, bends])
 }
 
 #[test]
@@ -160,11 +82,11 @@ fn linear_and_quadratic_axes_over_temperature_are_recovered() {
     let plan = Plan::twelve();
     let (mut straight, mut bent, mut slopes_of, mut bends_of) = (0, 0, Vec::new(), Vec::new());
     for seed in 0..40 {
-        let (found, _, slopes, _) = over_temperature(seed, 0.0);
+        let (found, [slopes, _]) = over_temperature(seed, 0.0);
         let scaled = slopes.map(|row| row.map(|c| c * found.half_deg_c));
         slopes_of.push(chi_square(&away(&found, &scaled, 1, false), found.fit.axes_covariance(&plan, 1)));
         straight += usize::from(found.quadratic.as_ref().unwrap().3 > 1e-3);
-        let (found, _, _, bends) = over_temperature(seed, 1.0);
+        let (found, [_, bends]) = over_temperature(seed, 1.0);
         let quadratic = found.quadratic.as_ref().unwrap();
         bent += usize::from(quadratic.3 < 1e-3);
         let scaled = bends.map(|row| row.map(|c| c * found.half_deg_c * found.half_deg_c));
@@ -271,9 +193,9 @@ fn the_document_gives_the_right_vectors_through_the_service_to_the_last_digit_th
         let own = &ticks[pose.interval.first..pose.interval.end];
         let seconds: f64 = own.iter().map(|tick| tick.duration.as_s()).sum();
         let up = plan.up(&plan.positions[*position].attitude, errors);
-        for axis in 0..3 {
+        for (axis, up) in up.iter().enumerate() {
             let mean = own.iter().map(|tick| tick.delta_velocity[axis]).sum::<f64>() / seconds;
-            let difference = mean - GRAVITY * up[axis] - judgement.error[1][axis];
+            let difference = mean - GRAVITY * up - judgement.error[1][axis];
             assert!(difference.abs() < 1e-9 * GRAVITY, "axis {axis}: {difference}");
         }
     }
@@ -309,7 +231,7 @@ fn what_cannot_be_fitted_is_refused_with_what_to_do() {
     let dead = refused(&all, &driven(3), &|track| track.outputs[1].fill(0.0));
     assert!(dead.contains("accelerometer y reads 0 in every tick"), "{dead}");
     let gaps = refused(&all, &driven(3), &|track| {
-        track.outputs[2].iter_mut().step_by(20).for_each(|x| *x = f64::NAN)
+        track.outputs[2].iter_mut().step_by(20).for_each(|x| *x = f64::NAN);
     });
     assert!(gaps.contains("are no numbers"), "{gaps}");
     let clipped = refused(&all, &driven(3), &|track| {

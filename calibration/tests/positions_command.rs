@@ -61,6 +61,7 @@ fn the_command_writes_the_document_and_says_what_it_did() {
     let said = text(&done.stdout);
     assert!(said.starts_with("accelerometer x: ") && said.contains("out of sample; accepted"), "{said}");
     assert!(said.contains("stand δ1") && said.contains("Axes by temperature"), "{said}");
+    println!("{said}");
     let page = std::fs::read_to_string(at("new.html")).unwrap();
     assert!(page.contains("Axes over temperature") && page.contains("class=\"headline\""));
     let written = Written::read(&at("new.toml")).unwrap();

@@ -38,7 +38,6 @@ use steps::{first_document, judged, tracks};
     isotherm-calibrate positions stand.mcap --plan my-plan.toml --gravity 9.8154 --times held.csv\n\n\
     Still poses are found in the logs and known by the gyros' turns between them. Every set of positions works that shows each axis up \
     and down; nine or more tell the stand's errors from the axes.")]
-#[expect(clippy::struct_excessive_bools, reason = "switches of a command line")]
 pub(super) struct PositionsArgs {
     /// Recordings (.mcap), or the files of a text log in the order of its mapping: each temperature may be a log of its own
     #[arg(value_name = "LOG", required_unless_present = "budget")]
@@ -120,6 +119,9 @@ pub(super) struct PositionsArgs {
     #[arg(long)]
     json: bool,
 }
+
+/// Positions that the fit has not seen, judged, with the names of their runs.
+type Unseen = (Vec<Judgement>, Vec<String>);
 
 /// A fit with its report.
 struct Made {
@@ -266,11 +268,11 @@ impl PositionsArgs {
         }
         let before =
             Written::of(&before(&base.document, &analysis, settings.gravity, self.document.is_some()))?;
-        let bare = Written::of(&document)?;
+        let after = Written::of(&document)?;
         let inside: Vec<(Pose, usize)> =
             analysis.poses.iter().map(|(pose, position, _)| (pose.clone(), *position)).collect();
-        let judged = judged(&settings, &analysis, &inside, &runs, [&before, &bare])?;
-        let outside = self.outside(&settings, &analysis, [&before, &bare, &base])?;
+        let judged = judged(&settings, &analysis, &inside, &runs, [&before, &after])?;
+        let outside = self.outside(&settings, &analysis, [&before, &after, &base])?;
         let name = |runs: &[Run]| -> Vec<String> { runs.iter().map(|run| run.name.clone()).collect() };
         let names = name(&runs);
         let outside_set =
@@ -287,7 +289,7 @@ impl PositionsArgs {
         settings: &Settings,
         analysis: &Analysis,
         [before, after, base]: [&Written; 3],
-    ) -> Result<Option<(Vec<Judgement>, Vec<String>)>, Error> {
+    ) -> Result<Option<Unseen>, Error> {
         if self.judge.is_empty() {
             return Ok(None);
         }

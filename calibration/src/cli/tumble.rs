@@ -124,7 +124,7 @@ impl TumbleArgs {
         };
         let before = left(&Written::of(&before(&base.document, &tumble, self.document.is_some()))?)?;
         let after = left(&Written::of(&document)?)?;
-        let report = report(&document, &tumble, &settings, [&before, &after]);
+        let report = report(&document, &tumble, &settings, &run.name, [&before, &after]);
         with_origin(&mut document, &tumble, &settings, &report, &self.log.log)?;
         let written = Written::of(&document)?;
         if let Some(out) = &self.out {

@@ -116,30 +116,30 @@ pub fn analyse(tracks: &[Track], document: &Document, settings: &Settings) -> Re
         positioning_rad: settings.positioning_rad,
         levelling_rad: settings.levelling_rad,
     };
-    let plan = &settings.plan;
-    let guess = guesses(plan, &taken, sensors).map_err(|bad| spread(plan, &taken, &bad))?;
+    let stand = &settings.plan;
+    let guess = guesses(stand, &taken, sensors).map_err(|bad| spread(stand, &taken, &bad))?;
     let most = levels_deg_c.len() - 1;
     let degrees = Degrees { sensor: most.min(2), axes: most.min(1) };
-    let found = fit(plan, &taken, &guess, &weights, degrees).map_err(|why| vec![no_solution(&why)])?;
+    let found = fit(stand, &taken, &guess, &weights, degrees).map_err(|why| vec![no_solution(&why)])?;
     let quadratic = (most >= 2)
-        .then(|| fit(plan, &taken, &guess, &weights, Degrees { axes: 2, ..degrees }).ok())
+        .then(|| fit(stand, &taken, &guess, &weights, Degrees { axes: 2, ..degrees }).ok())
         .flatten()
         .map(|quadratic| {
-            let (chi_square, terms) = quadratic_terms(&quadratic, plan);
+            let (chi_square, terms) = quadratic_terms(&quadratic, stand);
             let accident = survival(chi_square, terms);
             (quadratic, chi_square, terms, accident)
         });
     let best = quadratic.as_ref().filter(|found| found.3 < ACCIDENT).map_or(&found, |found| &found.0);
     let widened = widening(best, &mut warnings);
-    let bent = quadratic.as_ref().is_some_and(|found| found.3 < ACCIDENT);
-    if bent {
+    let curved = quadratic.as_ref().is_some_and(|found| found.3 < ACCIDENT);
+    if curved {
         warnings.push(
             "C bends with temperature: the quadratic terms are no accident. The document holds the best straight line; the report \
              has both, and what the line leaves"
                 .to_owned(),
         );
     }
-    few(plan, &taken, levels_deg_c.len(), settings, &mut warnings);
+    few(stand, &taken, levels_deg_c.len(), settings, &mut warnings);
     if !known && !document.temperature.channel.is_empty() {
         warnings.push(
             "the temperature channels have gaps or none is followed by the accelerometers: all positions count as one temperature"
@@ -147,7 +147,7 @@ pub fn analyse(tracks: &[Track], document: &Document, settings: &Settings) -> Re
         );
     }
     let of_level =
-        (0..levels_deg_c.len()).map(|level| one_level(plan, &taken, &guess, &weights, level)).collect();
+        (0..levels_deg_c.len()).map(|level| one_level(stand, &taken, &guess, &weights, level)).collect();
     let poses = poses.into_iter().zip(&level_of).map(|((pose, position), level)| (pose, position, *level));
     let analysis = Analysis {
         poses: poses.collect(),
@@ -168,14 +168,14 @@ pub fn analyse(tracks: &[Track], document: &Document, settings: &Settings) -> Re
     Ok(analysis)
 }
 
+/// Poses with their positions' numbers, and what is to be said of them.
+pub type Found = (Vec<(Pose, usize)>, Vec<String>);
+
 /// The poses of all runs that are positions of the plan, with the position's number.
 ///
 /// # Errors
 /// What is wrong with each run.
-pub fn positions(
-    tracks: &[Track],
-    settings: &Settings,
-) -> Result<(Vec<(Pose, usize)>, Vec<String>), Vec<String>> {
+pub fn positions(tracks: &[Track], settings: &Settings) -> Result<Found, Vec<String>> {
     let mut found = Vec::new();
     let mut warnings = Vec::new();
     let mut reasons = Vec::new();

@@ -30,7 +30,7 @@ pub struct Budget {
     pub temperature_deg_c: [f64; 2],
     /// Error of the measured temperature (°C).
     pub temperature_error_deg_c: f64,
-    /// k_C: how fast an axis turns (″/°C).
+    /// `k_C`: how fast an axis turns (″/°C).
     pub axis_arcsec_per_deg_c: f64,
 }
 
@@ -51,7 +51,7 @@ impl Default for Budget {
     }
 }
 
-/// k_C of 004 for accelerometers of quartz and of silicon (″/°C).
+/// `k_C` of 004 for accelerometers of quartz and of silicon (″/°C).
 pub const TYPICAL_ARCSEC_PER_DEG_C: [(&str, f64); 2] = [("quartz", 1.5), ("silicon", 6.0)];
 
 impl Budget {

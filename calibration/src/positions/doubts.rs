@@ -122,7 +122,7 @@ pub(super) fn sound(analysis: &Analysis) -> Result<(), Vec<String>> {
     let per_sensor = fit.solution.parameters.len().saturating_sub(3) / fit.guess.len().max(1);
     let bad = |sensor: usize| {
         let sigma = fit.solution.sigma(sensor * per_sensor) * model::SMALL * analysis.widened;
-        (!(sigma <= LARGEST_SIGMA)).then(|| {
+        (sigma.is_nan() || sigma > LARGEST_SIGMA).then(|| {
             format!(
                 "accelerometer {}: its scale factor is known to {:.2} % only, at most {} % is a result: look at its residuals, and at \
                  its mapping",

@@ -157,7 +157,5 @@ fn whitening(model: &Model<'_>, start: &[f64], taken: &Taken, weights: &Weights)
         covariance += &change * change.transpose() * (sigma * sigma);
     }
     let lower = covariance.cholesky().map(|cholesky| cholesky.l());
-    lower
-        .and_then(|lower| lower.try_inverse())
-        .unwrap_or_else(|| DMatrix::from_element(count, count, f64::NAN))
+    lower.and_then(DMatrix::try_inverse).unwrap_or_else(|| DMatrix::from_element(count, count, f64::NAN))
 }

@@ -171,9 +171,9 @@ pub(crate) fn seen(turn: Vector3<f64>) -> Matrix3<f64> {
     if size == 0.0 {
         return Matrix3::identity();
     }
-    let (sine, cosine) = libm::sincos(size);
+    let (sin, cos) = libm::sincos(size);
     let axis = turn / size;
-    Matrix3::identity() * cosine - axis.cross_matrix() * sine + axis * axis.transpose() * (1.0 - cosine)
+    Matrix3::identity() * cos - axis.cross_matrix() * sin + axis * axis.transpose() * (1.0 - cos)
 }
 
 /// Stand to case in a position: columns are the stand's base axes in case axes. Without a stand, none.

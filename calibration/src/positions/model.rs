@@ -154,7 +154,7 @@ impl Model<'_> {
     /// Outputs of all accelerometers under a direction of "up".
     #[must_use]
     pub fn outputs_under(&self, parameters: &[f64], taken: &Taken, up: [f64; 3]) -> Vec<f64> {
-        let (s, c) = (self.degrees.sensor + 1, self.degrees.axes + 1);
+        let (own, axes) = (self.degrees.sensor + 1, self.degrees.axes + 1);
         let output = |(index, guess): (usize, &Guess)| {
             let p =
                 parameters.get(index * self.of_sensor()..(index + 1) * self.of_sensor()).unwrap_or_default();
@@ -162,9 +162,10 @@ impl Model<'_> {
             let at = |from: usize, count: usize, x: f64| {
                 p[from..from + count].iter().rev().fold(0.0, |sum, coefficient| sum * x + coefficient)
             };
-            let scale = guess.scale * (1.0 + at(0, s, t) * SMALL);
-            let bias = guess.bias + guess.scale * at(s, s, t) * SMALL;
-            let (a, b) = (at(2 * s, c, taken.axes_t) * SMALL, at(2 * s + c, c, taken.axes_t) * SMALL);
+            let scale = guess.scale * (1.0 + at(0, own, t) * SMALL);
+            let bias = guess.bias + guess.scale * at(own, own, t) * SMALL;
+            let (a, b) =
+                (at(2 * own, axes, taken.axes_t) * SMALL, at(2 * own + axes, axes, taken.axes_t) * SMALL);
             let [first, second] = guess.across;
             let along: f64 = (0..3).map(|i| (guess.axis[i] + a * first[i] + b * second[i]) * up[i]).sum();
             let ratio = taken.ratio.get(index).copied().unwrap_or(1.0);
@@ -176,22 +177,22 @@ impl Model<'_> {
     /// What the parameters say of each accelerometer, rows of C at the reference of length one.
     #[must_use]
     pub fn state(&self, parameters: &[f64]) -> Vec<Sensor> {
-        let (s, c) = (self.degrees.sensor + 1, self.degrees.axes + 1);
+        let (own, axes) = (self.degrees.sensor + 1, self.degrees.axes + 1);
         let sensor = |(index, guess): (usize, &Guess)| {
             let p =
                 parameters.get(index * self.of_sensor()..(index + 1) * self.of_sensor()).unwrap_or_default();
             let [first, second] = guess.across;
             let row = |power: usize| {
-                let (a, b) = (p[2 * s + power] * SMALL, p[2 * s + c + power] * SMALL);
-                let own = if power == 0 { 1.0 } else { 0.0 };
-                [0, 1, 2].map(|i| own * guess.axis[i] + a * first[i] + b * second[i])
+                let (a, b) = (p[2 * own + power] * SMALL, p[2 * own + axes + power] * SMALL);
+                let along = if power == 0 { 1.0 } else { 0.0 };
+                [0, 1, 2].map(|i| along * guess.axis[i] + a * first[i] + b * second[i])
             };
-            let rows: Vec<[f64; 3]> = (0..c).map(row).collect();
+            let rows: Vec<[f64; 3]> = (0..axes).map(row).collect();
             let length = libm::sqrt(rows[0].iter().map(|x| x * x).sum());
             let one = |power: usize| if power == 0 { 1.0 } else { 0.0 };
             Sensor {
-                scale: (0..s).map(|j| guess.scale * (one(j) + p[j] * SMALL) * length).collect(),
-                bias: (0..s).map(|j| one(j) * guess.bias + guess.scale * p[s + j] * SMALL).collect(),
+                scale: (0..own).map(|j| guess.scale * (one(j) + p[j] * SMALL) * length).collect(),
+                bias: (0..own).map(|j| one(j) * guess.bias + guess.scale * p[own + j] * SMALL).collect(),
                 axis: rows.iter().map(|row| row.map(|x| x / length)).collect(),
             }
         };

@@ -1,18 +1,15 @@
 //! What is said of a calibration on a stand.
 
-use isotherm_log::plot::page::{Axis, Chart, Content, Form, Ink, Panel, Samples, Series, Table};
+use isotherm_log::plot::page::Table;
 use isotherm_protocol::document::{Document, Sample};
 
 use super::analysis::{Analysis, Settings};
 use super::budget::ARCSEC_PER_RAD;
+use super::charts::{AXES, across, axes_chart, bend, left_chart, shown};
 use super::fit::Fit;
 use super::judged::{Judgement, curves, lengths};
 use crate::drift::figures::short;
 use crate::report::{Coefficient, Curve, Figure, FitReport, Verdict};
-
-const AXES: [&str; 3] = ["x", "y", "z"];
-/// Points of a curve over temperature.
-const POINTS: u32 = 60;
 
 /// A set of judged positions with the names of its runs.
 #[derive(Debug, Clone, Copy)]
@@ -39,12 +36,13 @@ pub fn report(
     }
     report.verdicts =
         Curve::verdicts(&report.residuals).into_iter().map(|v| v.stated_as(Figure::Rms)).collect();
-    let length = Verdict::new("|f| − g", "m/s²", lengths(inside.judged)).stated_as(Figure::Rms);
+    let length = Verdict::new("|f|−g", "m/s²", lengths(inside.judged)).stated_as(Figure::Rms);
     report.verdicts.push(length.out_of_sample(outside.map(|set| lengths(set.judged))));
     report.warnings.clone_from(&analysis.warnings);
     report.notes = notes(analysis, settings);
     let names = names(document, analysis.fit.guess.len());
     report.coefficients = coefficients(document, analysis, settings, &names);
+    report.charts.push(("What is left".to_owned(), left_chart(settings, inside.judged)));
     report.tables.push(("Positions".to_owned(), position_rows(settings, inside)));
     if analysis.levels_deg_c.len() > 1 {
         report.tables.push(("Axes by temperature, ″".to_owned(), level_rows(analysis, settings, &names)));
@@ -94,39 +92,6 @@ fn notes(analysis: &Analysis, settings: &Settings) -> Vec<String> {
         ));
     }
     notes
-}
-
-/// Largest distance between the quadratic and the linear C over the range (rad).
-#[must_use]
-pub fn bend(analysis: &Analysis) -> f64 {
-    let Some((quadratic, ..)) = &analysis.quadratic else { return 0.0 };
-    let mut largest: f64 = 0.0;
-    for deg_c in over(analysis) {
-        let x = (deg_c - analysis.reference_deg_c) / analysis.half_deg_c;
-        for (bent, straight) in quadratic.sensors.iter().zip(&analysis.fit.sensors) {
-            let (a, b) = (at(&bent.axis, x), at(&straight.axis, x));
-            let away = libm::sqrt((0..3).map(|i| (a[i] - b[i]) * (a[i] - b[i])).sum());
-            largest = largest.max(away);
-        }
-    }
-    largest
-}
-
-/// Temperatures over the range.
-fn over(analysis: &Analysis) -> Vec<f64> {
-    let [low, high] = analysis.range_deg_c;
-    (0..=POINTS).map(|k| low + (high - low) * f64::from(k) / f64::from(POINTS)).collect()
-}
-
-/// A row of C at a scaled temperature.
-fn at(axis: &[[f64; 3]], x: f64) -> [f64; 3] {
-    axis.iter().rev().fold([0.0; 3], |sum, row| [0, 1, 2].map(|i| sum[i] * x + row[i]))
-}
-
-/// Elements of a row that say where the axis points: all but the largest.
-fn across(row: [f64; 3]) -> impl Iterator<Item = usize> {
-    let largest = (0..3).fold(0, |best, i| if row[i].abs() > row[best].abs() { i } else { best });
-    (0..3).filter(move |i| *i != largest)
 }
 
 fn coefficients(
@@ -215,12 +180,6 @@ fn position_rows(settings: &Settings, set: Set<'_>) -> Table {
     Table { head: head.to_vec(), rows: set.judged.iter().map(row).collect() }
 }
 
-/// Elements that are shown over temperature: sensor, element.
-fn shown(analysis: &Analysis) -> Vec<(usize, usize)> {
-    let sensors = analysis.fit.sensors.iter().enumerate();
-    sensors.flat_map(|(index, sensor)| across(sensor.axis[0]).map(move |i| (index, i))).collect()
-}
-
 fn level_rows(analysis: &Analysis, settings: &Settings, names: &[String]) -> Table {
     let shown = shown(analysis);
     let head = std::iter::once("°C".to_owned())
@@ -236,54 +195,4 @@ fn level_rows(analysis: &Analysis, settings: &Settings, names: &[String]) -> Tab
         std::iter::once(format!("{deg_c:.2}")).chain(shown.iter().map(cell)).collect()
     };
     Table { head, rows: analysis.levels_deg_c.iter().zip(&analysis.of_level).map(row).collect() }
-}
-
-fn axes_chart(analysis: &Analysis, settings: &Settings, names: &[String]) -> Chart {
-    let panel = |(index, i): (usize, usize)| {
-        let curve = |fit: &Fit| -> Vec<(f64, f64)> {
-            let value = |deg_c: f64| {
-                let x = (deg_c - analysis.reference_deg_c) / analysis.half_deg_c;
-                (deg_c, at(&fit.sensors[index].axis, x)[i] * ARCSEC_PER_RAD)
-            };
-            over(analysis).into_iter().map(value).collect()
-        };
-        let by_level = analysis.levels_deg_c.iter().zip(&analysis.of_level).filter_map(|(deg_c, fit)| {
-            Some((*deg_c, fit.as_ref()?.sensors[index].axis[0][i] * ARCSEC_PER_RAD))
-        });
-        let bar = |(deg_c, fit): (&f64, &Option<Fit>)| {
-            let fit = fit.as_ref()?;
-            let value = fit.sensors[index].axis[0][i] * ARCSEC_PER_RAD;
-            let sigma = fit.axis_sigma(&settings.plan, index, 0)[i] * ARCSEC_PER_RAD * analysis.widened;
-            Some([(*deg_c, value - 1.96 * sigma), (*deg_c, value + 1.96 * sigma), (*deg_c, f64::NAN)])
-        };
-        let bars = analysis.levels_deg_c.iter().zip(&analysis.of_level).filter_map(bar).flatten();
-        let series = |name: &str, ink, form, points: Vec<(f64, f64)>| Series {
-            name: name.to_owned(),
-            ink,
-            form,
-            samples: Samples::points(points),
-        };
-        let mut content = vec![
-            series("each temperature", Ink::Raw, Form::Dots, by_level.collect()),
-            series("95 %", Ink::Faint, Form::Line, bars.collect()),
-            series("linear", Ink::Second, Form::Line, curve(&analysis.fit)),
-        ];
-        if let Some((quadratic, ..)) = &analysis.quadratic {
-            content.push(series("quadratic", Ink::Third, Form::Line, curve(quadratic)));
-        }
-        Panel {
-            title: format!("accelerometer {} along {}", names[index], AXES[i]),
-            unit: "″".to_owned(),
-            height: 150,
-            logarithmic: false,
-            content: Content::Series(content),
-        }
-    };
-    Chart {
-        caption: "Elements of C over temperature: each temperature by itself, and the line of the document."
-            .to_owned(),
-        x: Axis::of("temperature", "°C"),
-        panels: shown(analysis).into_iter().map(panel).collect(),
-        marks: Vec::new(),
-    }
 }

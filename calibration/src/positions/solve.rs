@@ -167,15 +167,15 @@ mod tests {
         let found = solve(&[1.0, 1.0], residuals).unwrap();
         assert!((found.parameters[0] - 2.0).abs() < 1e-9 && (found.parameters[1] - 0.7).abs() < 1e-9);
         // The normal matrix by hand.
-        let (mut a, mut b, mut c) = (0.0, 0.0, 0.0);
+        let mut normal = [0.0; 3];
         for t in &times {
             let e = libm::exp(-0.7 * t);
             let (x, y) = (e / 0.01, -2.0 * t * e / 0.01);
-            (a, b, c) = (a + x * x, b + x * y, c + y * y);
+            normal = [normal[0] + x * x, normal[1] + x * y, normal[2] + y * y];
         }
-        let determinant = a * c - b * b;
-        assert!((found.covariance[(0, 0)] / (c / determinant) - 1.0).abs() < 1e-6);
-        assert!((found.covariance[(0, 1)] / (-b / determinant) - 1.0).abs() < 1e-6);
+        let determinant = normal[0] * normal[2] - normal[1] * normal[1];
+        assert!((found.covariance[(0, 0)] / (normal[2] / determinant) - 1.0).abs() < 1e-6);
+        assert!((found.covariance[(0, 1)] / (-normal[1] / determinant) - 1.0).abs() < 1e-6);
         assert_eq!(found.degrees, 48);
     }
 

@@ -55,8 +55,8 @@ pub fn value_at(shape: &Shape, x: f64) -> Option<f64> {
             let (first, last) = (knots.first()?, knots.last()?);
             let x = x.max(first[0]).min(last[0]);
             let pair = knots.windows(2).find(|pair| x <= pair[1][0])?;
-            let share = (x - pair[0][0]) / (pair[1][0] - pair[0][0]);
-            Some(pair[0][1] + share * (pair[1][1] - pair[0][1]))
+            let part = (x - pair[0][0]) / (pair[1][0] - pair[0][0]);
+            Some(pair[0][1] + part * (pair[1][1] - pair[0][1]))
         }
         Shape::Spline { .. } => None,
     }

@@ -68,7 +68,9 @@ impl Track {
                 column.push(good.map_or(f64::NAN, |state| state.temperature));
             }
         })?;
-        temperatures.values_mut().for_each(|column| column.resize(gyro_ns.len(), f64::NAN));
+        for column in temperatures.values_mut() {
+            column.resize(gyro_ns.len(), f64::NAN);
+        }
         let at = nearest(&accels.end_ns, &gyro_ns);
         let taken = |column: &[f64]| -> Vec<f64> {
             at.iter().map(|index| column.get(*index).copied().unwrap_or(f64::NAN)).collect()

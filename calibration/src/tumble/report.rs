@@ -1,6 +1,6 @@
 //! What is said of a tumbled unit.
 
-use isotherm_log::plot::page::Table;
+use isotherm_log::plot::page::{Axis, Chart, Content, Form, Ink, Panel, Samples, Series, Table};
 use isotherm_protocol::document::{Document, Sample};
 use serde_json::json;
 use std::path::PathBuf;
@@ -28,6 +28,8 @@ pub struct Left {
     pub direction: Vec<[f64; 3]>,
     /// Angle between predicted and found direction by turn (°).
     pub angle_deg: Vec<f64>,
+    /// Middle of each turn since the run's beginning (s).
+    pub turn_s: Vec<f64>,
 }
 
 impl Left {
@@ -41,16 +43,21 @@ impl Left {
             length: force.iter().map(|force| norm(*force) - gravity).collect(),
             direction: force.iter().map(|force| force.map(|c| c / norm(*force))).collect(),
             angle_deg: turns.iter().map(|turn| angle_of(track, turn).to_degrees()).collect(),
+            turn_s: turns
+                .iter()
+                .map(|turn| track.start_s(usize::midpoint(turn.ticks[0], turn.ticks[1])))
+                .collect(),
         }
     }
 }
 
-/// Everything that is said.
+/// Everything that is said of a run.
 #[must_use]
 pub fn report(
     document: &Document,
     tumble: &Tumble,
     settings: &Settings,
+    run: &str,
     [before, after]: [&Left; 2],
 ) -> FitReport {
     let mut report = FitReport::new("Accelerometers and gyros from a tumbled unit", &document.unit);
@@ -77,7 +84,7 @@ pub fn report(
     report.residuals.push(Curve {
         of: "|f|−g".to_owned(),
         measure: "m/s²".to_owned(),
-        run: String::new(),
+        run: run.to_owned(),
         sample: Sample::In,
         window_s: 0.0,
         time_s,
@@ -85,8 +92,35 @@ pub fn report(
         before: before.length.clone(),
         after: after.length.clone(),
     });
+    report.charts.push(("What is left".to_owned(), left_chart(tumble, after)));
     report.tables.push(("Poses".to_owned(), rows(tumble, after)));
     report
+}
+
+/// What is left by itself: beside what was there before, it is a line at zero.
+fn left_chart(tumble: &Tumble, after: &Left) -> Chart {
+    let middle = |pose: &Pose| 0.5 * (pose.span_s[0] + pose.span_s[1]);
+    let times = tumble.poses.iter().map(middle);
+    let own: Vec<(f64, f64)> = times.zip(after.length.iter().map(|length| length * 1e3)).collect();
+    let turns: Vec<(f64, f64)> = after.turn_s.iter().copied().zip(after.angle_deg.iter().copied()).collect();
+    let panel = |title: &str, unit: &str, points: Vec<(f64, f64)>| Panel {
+        title: title.to_owned(),
+        unit: unit.to_owned(),
+        height: 170,
+        logarithmic: false,
+        content: Content::Series(vec![Series {
+            name: "after".to_owned(),
+            ink: Ink::Corrected,
+            form: Form::Dots,
+            samples: Samples::points(points),
+        }]),
+    };
+    Chart {
+        caption: "|f| − g of each pose, and the angle by which the gyros miss the direction of gravity after each turn.".to_owned(),
+        x: Axis::of("time since the run's beginning", "s"),
+        panels: vec![panel("|f|−g", "mm/s²", own), panel("gyros", "°", turns)],
+        marks: Vec::new(),
+    }
 }
 
 fn rows(tumble: &Tumble, after: &Left) -> Table {

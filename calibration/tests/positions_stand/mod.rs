@@ -3,6 +3,8 @@
 //! The stand's kinematics are written out here a second time, with rotation matrices from north, east, down to the case, so that
 //! the plan's own formula is not what it is tested with.
 
+pub(crate) mod judging;
+
 use std::collections::BTreeMap;
 
 use isotherm_calibration::positions::plan::{Attitude, Plan};
@@ -215,10 +217,10 @@ pub(crate) fn through(
             let seen = UnitQuaternion::from_rotation_matrix(&seen);
             if let Some((axis, angle)) = seen.axis_angle() {
                 // Components of what stands still turn the other way.
-                let ticks = (angle.to_degrees() / speed / tick_s).ceil().max(1.0) as i64;
-                let rate = angle.to_degrees() / (ticks as f64 * tick_s);
+                let length = (angle.to_degrees() / speed / tick_s).ceil().max(1.0) as i64;
+                let rate = angle.to_degrees() / (length as f64 * tick_s);
                 let path = Path::ConstantRate { axis: (-axis.into_inner()).into(), rate_deg_per_s: rate };
-                play(motion(before).along(path), ticks, &mut events);
+                play(motion(before).along(path), length, &mut events);
             }
         }
         let hold_s = if index == 0 { stand.hold_s + stand.start_s } else { stand.hold_s };
@@ -248,7 +250,9 @@ pub(crate) fn as_text(events: &[LogEvent], counts: bool) -> (String, String) {
             temperatures.insert(reading.channel.to_string(), f64::NAN);
         }
     }
-    temperatures.keys().for_each(|name| write!(text, ",{name}").unwrap());
+    for name in temperatures.keys() {
+        write!(text, ",{name}").unwrap();
+    }
     text.push('\n');
     let mut force = [0.0; 3];
     for event in events {
@@ -260,7 +264,9 @@ pub(crate) fn as_text(events: &[LogEvent], counts: bool) -> (String, String) {
             LogEvent::Gyro { tick, .. } => {
                 write!(text, "{}", tick.end_time.as_ns()).unwrap();
                 tick.readings.iter().chain(&force).for_each(|value| write!(text, ",{value}").unwrap());
-                temperatures.values().for_each(|value| write!(text, ",{value}").unwrap());
+                for value in temperatures.values() {
+                    write!(text, ",{value}").unwrap();
+                }
                 text.push('\n');
             }
         }
