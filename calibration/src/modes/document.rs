@@ -38,12 +38,12 @@ pub fn bare(base: &Document, transition_ticks: u8, servos: &[Option<Servo>]) -> 
 /// costs the same before and after.
 #[must_use]
 pub fn stripped(
-    bare: &Document,
+    without_terms: &Document,
     servos: &[Result<ServoFit, String>],
     base: &Document,
     reference_deg_c: f64,
 ) -> Document {
-    let mut document = bare.clone();
+    let mut document = without_terms.clone();
     for ((sensor, found), old) in document.gyro.sensor.iter_mut().zip(servos).zip(&base.gyro.sensor) {
         sensor.servo = match found {
             Ok(found) => Some(servo(found, old, reference_deg_c)),

@@ -250,7 +250,7 @@ fn window_s(switches: &Switches, length_s: f64) -> f64 {
 /// Three gyros at a time; the last three where the number is no multiple.
 fn groups(sensors: usize) -> Vec<[usize; 3]> {
     let starts = (0..sensors / 3).map(|group| 3 * group);
-    let last = (sensors % 3 != 0).then(|| sensors.saturating_sub(3));
+    let last = (!sensors.is_multiple_of(3)).then(|| sensors.saturating_sub(3));
     starts.chain(last).map(|start| [start, start + 1, start + 2]).collect()
 }
 

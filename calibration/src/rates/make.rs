@@ -103,7 +103,9 @@ pub fn make<W: Watch>(wanted: &Wanted<'_>, mut watch: impl FnMut() -> W) -> Resu
              --latitude, --heading, --pitch and --roll of the beginning of each log"
                 .to_owned(),
         );
-        runs.iter_mut().for_each(|run| whole_turns(run, &mut warnings));
+        for run in &mut runs {
+            whole_turns(run, &mut warnings);
+        }
     }
     let sensors = wanted.base.gyro.sensor.len();
     let mut walk = vec![0.0; sensors];
@@ -142,7 +144,7 @@ pub fn make<W: Watch>(wanted: &Wanted<'_>, mut watch: impl FnMut() -> W) -> Resu
         return Err(Error::Refused(of.collect()));
     }
     let temperatures: Vec<f64> = runs.iter().filter_map(|run| run.binned.temperature_deg_c).collect();
-    let axes_deg_c = runs.iter().filter_map(|run| run.binned.axes_deg_c).next();
+    let axes_deg_c = runs.iter().find_map(|run| run.binned.axes_deg_c);
     let written = Written::of(&document::fitted(wanted.base, &gyros, axes_deg_c, wanted.with_bias))?;
     let mut steps: Vec<Measured> = runs
         .iter()
@@ -299,7 +301,7 @@ fn white(base: &Document, runs: &[Turned], earth: &[Vec<[f64; 3]>], sensor: usiz
     (white * upper).sqrt() / 60.0
 }
 
-/// First guess of K_old/K along the document's axes.
+/// First guess of `K_old/K` along the document's axes.
 fn first_gains(runs: &[Turned], axes: &[[f64; 3]]) -> Vec<f64> {
     let steps: Vec<&Matched> = runs.iter().flat_map(|run| &run.matched).collect();
     axes.iter()
@@ -320,8 +322,8 @@ fn first_gains(runs: &[Turned], axes: &[[f64; 3]]) -> Vec<f64> {
 /// Mean of the Earth's rate in case axes over each bin of each run (°/h); none where it is not known.
 fn earth_in_bins(runs: &[Turned], axes: &[[f64; 3]], gains: &[f64], biases: &[f64]) -> Vec<Vec<[f64; 3]>> {
     let sum = axes.iter().fold(nalgebra::Matrix3::zeros(), |sum, axis| {
-        let axis = nalgebra::Vector3::from(*axis);
-        sum + axis * axis.transpose()
+        let row = nalgebra::Vector3::from(*axis);
+        sum + row * row.transpose()
     });
     let inverse = sum.try_inverse().unwrap_or_else(nalgebra::Matrix3::identity);
     let turning = |bin: &Bin| {
