@@ -1,6 +1,7 @@
 //! The command line: arguments in, exit code out.
 
 mod bar;
+mod diff;
 mod drift;
 mod impact;
 mod modes;
@@ -9,6 +10,10 @@ mod place;
 mod rates;
 mod runs;
 mod units;
+mod merge;
+mod runs;
+mod show;
+mod validate;
 
 use std::io::{self, Write};
 use std::process::ExitCode;
@@ -32,10 +37,14 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Diff(diff::DiffArgs),
     Drift(drift::DriftArgs),
     Impact(impact::ImpactArgs),
     Modes(modes::ModesArgs),
     Rates(rates::RatesArgs),
+    Merge(merge::MergeArgs),
+    Show(show::ShowArgs),
+    Validate(validate::ValidateArgs),
     /// Print a completion script for a shell
     #[command(after_help = "Example:\n  isotherm-calibrate completions bash > isotherm-calibrate.bash")]
     Completions {
@@ -47,10 +56,14 @@ enum Command {
 /// Runs the command that the arguments name.
 fn run(cli: Cli) -> Result<(), Error> {
     match cli.command {
+        Command::Diff(args) => args.run(),
         Command::Drift(args) => args.run(),
         Command::Impact(args) => args.run(),
         Command::Modes(args) => args.run(),
         Command::Rates(args) => args.run(),
+        Command::Merge(args) => args.run(),
+        Command::Show(args) => args.run(),
+        Command::Validate(args) => args.run(),
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), "isotherm-calibrate", &mut script);

@@ -13,10 +13,15 @@
 //! | [`impact`] | what a drift that is left means for navigation |
 //! | [`modes`] | drift polynomials and switch parameters of a mode-reversed laser gyro |
 //! | [`rates`] | scale factor, asymmetry, linearity and axes from a rate table |
+//! | [`diff`] | what has changed between two documents |
+//! | [`merge`] | parts of a calibration in one document |
+//! | [`show`] | a document in words and curves |
+//! | [`validate`] | a document judged on other logs |
 //! | [`error`], [`cli`] | what can go wrong; the command line |
 
 pub mod allan;
 pub mod cli;
+pub mod diff;
 pub mod drift;
 pub mod error;
 #[cfg(test)]
@@ -24,11 +29,14 @@ mod fixture;
 pub mod impact;
 pub mod means;
 pub mod modes;
+pub mod merge;
 pub mod nominal;
 pub mod provenance;
 pub mod rates;
 pub mod report;
 pub mod run;
 pub mod series;
+pub mod show;
 pub mod spectrum;
+pub mod validate;
 pub mod written;

@@ -8,12 +8,16 @@
 //! | [`verdict`] | what came of one sensor, and its sentence |
 //! | [`curve`] | before and after over time and temperature, taken from a corrected run |
 //! | [`batch`] | several units at once, and the table that closes them |
+//! | [`sheet`] | a line, tables and charts where nothing was fitted |
+//! | [`sigma`] | standard errors as documents keep them |
 //! | `page`, `json` | the report as a page and as JSON |
 
 pub mod batch;
 pub mod curve;
 mod json;
 mod page;
+pub mod sheet;
+pub mod sigma;
 #[cfg(test)]
 mod tests;
 pub mod verdict;
@@ -24,6 +28,8 @@ use isotherm_log::plot::page::{Chart, Table};
 
 pub use batch::{BatchTable, in_parallel, of_unit};
 pub use curve::{Curve, Judged, Rest, judge};
+pub use sheet::Sheet;
+pub use sigma::Sigmas;
 pub use verdict::{Figure, Verdict, residuals};
 
 use crate::drift::figures::{short, table};

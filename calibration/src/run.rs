@@ -12,7 +12,9 @@ use isotherm_log::part::{LogFiles, Part};
 use isotherm_log::progress::Progress;
 use isotherm_log::source::Log;
 use isotherm_log::text::LogEvent;
-use isotherm_protocol::key::UnitId;
+use isotherm_protocol::codec;
+use isotherm_protocol::key::{RawStream, UnitId};
+use isotherm_protocol::raw::{AccelBatch, GyroBatch};
 
 use crate::error::Error;
 use crate::series::Series;
@@ -108,7 +110,14 @@ impl Run {
                 watch.begin(messages.progress());
                 while let Some(message) = messages.next_message()? {
                     if let Topic::Raw(_, input) = &message.topic {
-                        unit.receive(*input, &message.frame);
+                        // Tick by tick: behind a whole frame the unit, and its temperatures, stand at the frame's end.
+                        match events(*input, &message.frame) {
+                            Some(events) => events.iter().for_each(|event| {
+                                unit.handle(event);
+                                give_out(&mut unit);
+                            }),
+                            None => unit.receive(*input, &message.frame),
+                        }
                         give_out(&mut unit);
                     }
                     watch.step();
@@ -128,6 +137,23 @@ impl Run {
             return Err(Error::Refused(reasons));
         }
         Ok(troubles)
+    }
+}
+
+/// What a frame of raw readings holds, one by one; `None` where it holds something else, or cannot be read.
+fn events(input: RawStream, frame: &[u8]) -> Option<Vec<LogEvent>> {
+    match input {
+        RawStream::Gyro => {
+            let batch: GyroBatch = codec::decode(frame).ok()?;
+            let output = batch.output();
+            Some(batch.to_core().map(|tick| LogEvent::Gyro { output, tick }).collect())
+        }
+        RawStream::Accel => {
+            let batch: AccelBatch = codec::decode(frame).ok()?;
+            let output = batch.output();
+            Some(batch.to_core().map(|tick| LogEvent::Accel { output, tick }).collect())
+        }
+        _ => None,
     }
 }
 

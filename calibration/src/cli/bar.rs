@@ -31,6 +31,19 @@ impl Bar {
         bar
     }
 
+    /// Over so many things, done one by one.
+    pub(crate) fn counting(what: &'static str, total: usize) -> Self {
+        let bar = Self::new("{bar:30} {pos}/{len} {msg}");
+        bar.drawn.set_length(total as u64);
+        bar.drawn.set_message(what);
+        bar
+    }
+
+    /// So many are done; from any thread.
+    pub(crate) fn at(&self, done: usize) {
+        self.drawn.set_position(done as u64);
+    }
+
     fn new(template: &str) -> Self {
         let terminal = io::stderr().is_terminal();
         let target =

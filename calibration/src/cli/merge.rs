@@ -1,0 +1,90 @@
+//! `isotherm-calibrate merge`.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use isotherm_log::file::refuse_overwriting;
+use isotherm_protocol::document::Created;
+
+use super::print;
+use crate::error::Error;
+use crate::merge::{Merged, Named, Take, merge};
+use crate::written::Written;
+
+/// Put parts of a calibration that different commands have made into one document
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+    isotherm-calibrate merge nominal.toml thermal.toml positions.toml --out unit.toml\n  \
+    isotherm-calibrate merge nominal.toml a.toml b.toml --take gyro.sensor.x=b.toml --out unit.toml\n\n\
+    Each part is compared with BASE, the document that the fits started from: what it states otherwise, it has made. What two \
+    parts have made differently is told by key, and nothing is written before --take decides.")]
+pub(super) struct MergeArgs {
+    /// The document that the parts were made from
+    #[arg(value_name = "BASE")]
+    base: PathBuf,
+    /// Documents that each have a part of the calibration
+    #[arg(required = true, value_name = "PART")]
+    part: Vec<PathBuf>,
+    /// The new document
+    #[arg(long, short, value_name = "NEW")]
+    out: PathBuf,
+    /// Take a key, and all keys that begin with it, from this document; may be given several times, the last one decides
+    #[arg(long, value_name = "KEY=DOC", value_parser = choice)]
+    take: Vec<Take>,
+    /// Write over a file that is there
+    #[arg(long)]
+    overwrite: bool,
+    /// Date that the new document states (YYYY-MM-DD); that of BASE without it
+    #[arg(long, value_name = "DATE")]
+    created: Option<String>,
+    /// Print what was taken from where as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+impl MergeArgs {
+    /// Does what the command says.
+    pub(super) fn run(&self) -> Result<(), Error> {
+        let inputs: Vec<&Path> = self.part.iter().chain([&self.base]).map(PathBuf::as_path).collect();
+        refuse_overwriting(&self.out, &inputs)?;
+        if self.out.exists() && !self.overwrite {
+            let out = self.out.display();
+            return Err(Error::Usage(format!("{out} is there already: give another name, or --overwrite")));
+        }
+        let base = named(&self.base)?;
+        let parts = self.part.iter().map(|path| named(path)).collect::<Result<Vec<_>, _>>()?;
+        let mut merged: Merged = merge(&base, &parts, &self.take)?;
+        if let Some(created) = &self.created {
+            let date = created.parse().ok().and_then(Created::new);
+            let date = date.ok_or_else(|| {
+                Error::Usage(format!("--created is {created:?}, must be a date such as 2026-11-22"))
+            })?;
+            let mut document = merged.written.document.clone();
+            document.created = Some(date);
+            merged.written = Written::of(&document)?;
+        }
+        merged.written.save(&self.out, self.overwrite)?;
+        let name = name_of(&self.out);
+        let text =
+            if self.json { format!("{}\n", merged.to_json(&name)) } else { merged.sheet(&name).to_text() };
+        print(text.as_bytes())
+    }
+}
+
+fn named(path: &Path) -> Result<Named, Error> {
+    Ok(Named { name: name_of(path), written: Written::read(path)? })
+}
+
+fn name_of(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// Reads KEY=DOC.
+fn choice(text: &str) -> Result<Take, String> {
+    match text.split_once('=') {
+        Some((key, from)) if !key.is_empty() && !from.is_empty() => {
+            Ok(Take { key: key.to_owned(), from: name_of(Path::new(from)) })
+        }
+        _ => Err("must be a key and a document, such as gyro.sensor.x=thermal.toml".into()),
+    }
+}

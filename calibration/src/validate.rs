@@ -1,0 +1,232 @@
+//! A document judged on logs that it was not made from.
+//!
+//! Every run is corrected twice by the service's own code: with the document, and with what is left of it when everything
+//! that knows of temperature, bias or mode is taken out ("nominal"). Along each case axis what is left is averaged over
+//! windows; an axis that the document makes larger than the nominal one is refused. A log whose digest stands in the
+//! document's origin counts as in sample, and decides nothing where another is there.
+
+mod coverage;
+mod runs;
+
+use isotherm_correction::earth::Place;
+use isotherm_correction::units::AngularRate;
+use isotherm_protocol::document::{Curve as DocumentCurve, Document, Problem, Quantity, Sample, Shape};
+
+use crate::drift::figures::short;
+use crate::error::Error;
+use crate::means::{Means, Size};
+use crate::nominal::nominal;
+use crate::report::{Curve, FitReport, Rest};
+use crate::run::Watch;
+use crate::show::terms::tree;
+use crate::written::Written;
+use coverage::Coverage;
+pub use runs::{JudgedLog, digests};
+
+/// How a document is judged.
+#[derive(Debug, Clone, Copy)]
+pub struct Wanted {
+    /// Length of the windows (s).
+    pub window_s: f64,
+    /// Where the unit is and how it stands, where that is known.
+    pub place: Option<Place>,
+}
+
+/// By how much a figure may grow and still count as the same: rounding of sums.
+const SAME: f64 = 1e-9;
+/// Largest range of a mean rate of a unit that counts as being at rest (°/h): 5 °/s.
+const REST_RATE_DEG_PER_H: f64 = 18_000.0;
+/// Largest angle between mean specific forces of a unit that counts as being at rest (sine).
+const REST_TILT: f64 = 0.035;
+
+/// The document without what knows of temperature, bias or mode; accelerometers keep scale factor and bias as they are at
+/// the temperature that is assumed without a reading.
+///
+/// # Errors
+/// [`Error::Document`]: it does not hold without them, which would be a mistake here.
+pub fn before(document: &Document) -> Result<Written, Error> {
+    let mut bare = nominal(document);
+    let at = document.temperature.assumed_deg_c;
+    if let Some(accel) = &mut bare.accel {
+        accel.orientation.thermal = None;
+        for sensor in &mut accel.sensor {
+            sensor.board_ratio_error = None;
+            sensor.scale_factor = held(&sensor.scale_factor, at);
+            sensor.bias = sensor.bias.as_ref().map(|bias| held(bias, at));
+        }
+    }
+    // Terms of accelerometers that only some versions of the document have.
+    let mut tree = tree(&bare)?;
+    let sensors = tree.get_mut("accel").and_then(|accel| accel.get_mut("sensor")?.as_array_mut());
+    for sensor in sensors.into_iter().flatten().filter_map(toml::Value::as_table_mut) {
+        sensor.remove("lag");
+    }
+    let words = |problems: Vec<Problem>| Error::Document(problems.iter().map(ToString::to_string).collect());
+    Written::of(&Document::parse(&tree.to_string(), None).map_err(words)?.document)
+}
+
+/// A curve held at its value at one temperature.
+fn held<Q: Quantity>(curve: &DocumentCurve<Q>, at: f64) -> DocumentCurve<Q> {
+    match crate::show::terms::value(curve.shape(), at) {
+        Some(value) => DocumentCurve::new(Shape::Constant { value }).in_unit(curve.unit()),
+        None => curve.clone(),
+    }
+}
+
+/// Judges a document on the runs of one unit.
+///
+/// # Errors
+/// [`Error::Refused`] where the runs do not allow it: of another unit, nothing in them, not at rest.
+pub fn validate(
+    name: &str,
+    written: &Written,
+    logs: &[JudgedLog],
+    wanted: Wanted,
+    mut watch: impl Watch,
+) -> Result<FitReport, Error> {
+    let document = &written.document;
+    let bare = before(document)?;
+    let mut report = FitReport::new(format!("Judgement of {name}"), document.unit.clone());
+    let mut coverage = Coverage::of(written);
+    for log in logs {
+        let run = &log.run;
+        if run.unit.to_string() != document.unit {
+            return Err(Error::Refused(vec![format!(
+                "{} is of unit {}, {name} is for unit {}: give the log with its own document",
+                run.name, run.unit, document.unit
+            )]));
+        }
+        let after = Means::of(run, &written.loaded, wanted.window_s, runs::Lent(&mut watch))?;
+        let nominal = Means::of(run, &bare.loaded, wanted.window_s, runs::Lent(&mut watch))?;
+        coverage.count(run, written, runs::Lent(&mut watch))?;
+        at_rest(&run.name, &after)?;
+        let rest = rest(&run.name, &after, wanted.place.as_ref())?;
+        let sample = if log.known { Sample::In } else { Sample::Out };
+        report.residuals.extend(Curve::of_means(&run.name, sample, [&nominal, &after], document, &rest));
+        report.warnings.extend(after.troubles.iter().map(|words| format!("{}: {words}", run.name)));
+        if log.known {
+            report.warnings.push(format!(
+                "{} is among the logs that the document was made from: what it shows is in sample",
+                run.name
+            ));
+        }
+    }
+    report.verdicts = Curve::verdicts(&report.residuals);
+    for verdict in &mut report.verdicts {
+        let [before, after] = verdict.deciding();
+        if after.rms > before.rms && after.rms <= before.rms * (1.0 + SAME) {
+            verdict.accepted = true;
+            verdict.reason.clear();
+        }
+        if verdict.accepted && (after.rms - before.rms).abs() <= before.rms * SAME {
+            "the document changes nothing of it".clone_into(&mut verdict.reason);
+        }
+    }
+    missing(document, &mut report)?;
+    report.notes = notes(&report.residuals, logs, wanted);
+    report.warnings.extend(coverage.warnings());
+    report.tables.extend(coverage.tables());
+    Ok(report)
+}
+
+/// Refuses a run in which the unit was moved: what is left would be its motion.
+fn at_rest(name: &str, means: &Means) -> Result<(), Error> {
+    let refuse = |what: String| {
+        Err(Error::Refused(vec![format!(
+            "{name}: the unit was not at rest: {what}. Cut the log to where it was, with --start and --duration"
+        )]))
+    };
+    for (axis, of) in ["x", "y", "z"].into_iter().enumerate() {
+        let range = Size::of(means.rate(axis)).peak_to_peak;
+        if range > REST_RATE_DEG_PER_H {
+            return refuse(format!(
+                "the mean rate about {of} covers {} °/s, at most 5 °/s are drift",
+                short(range / 3600.0)
+            ));
+        }
+    }
+    let mean = [0, 1, 2].map(|axis| Size::of(means.force(axis)).mean);
+    let length = |v: [f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let [a, b, c] = mean;
+    let forces = means.force(0).iter().zip(means.force(1)).zip(means.force(2));
+    let sines =
+        forces.filter(|((x, y), z)| x.is_finite() && y.is_finite() && z.is_finite()).map(|((x, y), z)| {
+            length([b * z - c * y, c * x - a * z, a * y - b * x]) / (length(mean) * length([*x, *y, *z]))
+        });
+    let largest = sines.filter(|sine| sine.is_finite()).fold(0.0, f64::max);
+    if largest > REST_TILT {
+        let degrees = libm::asin(largest.min(1.0)).to_degrees();
+        return refuse(format!("the specific force turns by {} °, at most 2 ° are drift", short(degrees)));
+    }
+    Ok(())
+}
+
+/// What the unit would put out without error.
+fn rest(name: &str, means: &Means, place: Option<&Place>) -> Result<Rest, Error> {
+    let Some(place) = place else { return Ok(Rest::default()) };
+    let force = [0, 1, 2].map(|axis| Size::of(means.force(axis)));
+    let known = force.iter().all(|size| size.count > 0);
+    let rate = place.earth_rate_in_case(known.then(|| force.map(|size| size.mean)));
+    let Some(rate) = rate else {
+        return Err(Error::Refused(vec![format!(
+            "{name}: the unit cannot be levelled: {}. Give --roll and --pitch, or leave --latitude and --heading out, and each \
+             mean is taken off",
+            if known {
+                "its mean specific force is not 1 g, or x points up or down"
+            } else {
+                "it has no accelerometers"
+            }
+        )]));
+    };
+    let rate = rate.map(|rate| AngularRate::from_rad_per_s(rate).as_deg_per_h());
+    Ok(Rest { rate_deg_per_h: Some(rate), force_m_per_s2: None })
+}
+
+/// Axes that nothing can be said of.
+fn missing(document: &Document, report: &mut FitReport) -> Result<(), Error> {
+    let accels = document.accel.is_some().then_some("accelerometer");
+    for kind in ["gyro"].into_iter().chain(accels) {
+        let has = |axis: &str| report.verdicts.iter().any(|verdict| verdict.of == format!("{kind} {axis}"));
+        let gone: Vec<&str> = ["x", "y", "z"].into_iter().filter(|axis| !has(axis)).collect();
+        if !gone.is_empty() {
+            let (axes, with) = (gone.join(", "), gone.len());
+            report.warnings.push(format!(
+                "{kind} {axes}: no window is whole and without flags, nothing can be said of {}: look at the flags with \
+                 isotherm-replay correct, and choose a shorter --window where the log has gaps",
+                if with == 1 { "it" } else { "them" }
+            ));
+        }
+    }
+    if report.verdicts.is_empty() {
+        return Err(Error::Refused(std::mem::take(&mut report.warnings)));
+    }
+    Ok(())
+}
+
+/// What was done, in sentences.
+fn notes(curves: &[Curve], logs: &[JudgedLog], wanted: Wanted) -> Vec<String> {
+    let names = |known: bool| -> Vec<String> {
+        logs.iter().filter(|log| log.known == known).map(|log| log.run.name.clone()).collect()
+    };
+    let (outside, inside) = (names(false), names(true));
+    let length = |curve: &Curve| curve.time_s.last().copied().unwrap_or(0.0);
+    let hours = curves.iter().filter(|curve| curve.of == "gyro x").map(length).sum::<f64>() / 3600.0;
+    let mut notes = vec![format!(
+        "Before is nominal: the document without what knows of temperature, bias or mode. Means over {} s, {} h.",
+        short(wanted.window_s),
+        short(hours)
+    )];
+    if !outside.is_empty() {
+        notes.push(format!("Out of sample: {}.", outside.join(", ")));
+    }
+    if !inside.is_empty() {
+        notes.push(format!("In sample, the document was made from them: {}.", inside.join(", ")));
+    }
+    notes.push(match wanted.place {
+        Some(_) => "Earth rate is taken off the rates; of each specific force its mean over the run.".to_owned(),
+        None => "Of each axis its mean over the run is taken off, before and after each its own: a constant bias is not judged. \
+                 With --latitude and --heading it is, of the gyros."
+            .to_owned(),
+    });
+    notes
+}

@@ -1,0 +1,185 @@
+//! What of the fitted range of temperature the logs cover, and how often it was left.
+
+use isotherm_correction::sample::SensorFlags;
+use isotherm_log::plot::page::Table;
+
+use crate::drift::figures::short;
+use crate::error::Error;
+use crate::run::{Run, Watch};
+use crate::written::Written;
+
+/// Share of the fitted range that a judgement should cover.
+const ENOUGH: f64 = 0.5;
+/// Share of ticks outside the fitted range that is worth a warning.
+const CLAMPED: f64 = 0.001;
+
+/// One channel.
+#[derive(Debug)]
+struct ChannelRange {
+    name: String,
+    fitted: Option<[f64; 2]>,
+    seen: Option<[f64; 2]>,
+    rate: Option<[f64; 2]>,
+}
+
+/// One sensor.
+#[derive(Debug)]
+struct Sensor {
+    name: String,
+    ticks: u64,
+    clamped: u64,
+    stale: u64,
+    invalid: u64,
+}
+
+/// What the runs cover.
+#[derive(Debug)]
+pub(super) struct Coverage {
+    channels: Vec<ChannelRange>,
+    gyros: Vec<Sensor>,
+    accels: Vec<Sensor>,
+}
+
+impl Coverage {
+    /// Of a document, nothing seen yet.
+    pub(super) fn of(written: &Written) -> Self {
+        let calibration = &written.loaded.calibration;
+        let channel = |(index, channel): (usize, &isotherm_correction::channel::Channel)| ChannelRange {
+            name: channel.name().to_string(),
+            fitted: calibration.range_of(index),
+            seen: None,
+            rate: None,
+        };
+        let sensor = |kind: &str, name: &str| Sensor {
+            name: format!("{kind} {name}"),
+            ticks: 0,
+            clamped: 0,
+            stale: 0,
+            invalid: 0,
+        };
+        let document = &written.document;
+        let accels = document.accel.iter().flat_map(|accel| &accel.sensor);
+        Self {
+            channels: calibration.channels().iter().enumerate().map(channel).collect(),
+            gyros: document.gyro.sensor.iter().map(|gyro| sensor("gyro", &gyro.name)).collect(),
+            accels: accels.map(|accel| sensor("accelerometer", &accel.name)).collect(),
+        }
+    }
+
+    /// Goes through a run tick by tick.
+    pub(super) fn count(&mut self, run: &Run, written: &Written, watch: impl Watch) -> Result<(), Error> {
+        let (channels, gyros, accels) = (&mut self.channels, &mut self.gyros, &mut self.accels);
+        run.correct(&written.loaded, watch, |tick, unit| {
+            let flagged = gyros.iter_mut().zip(&tick.gyro_flags);
+            for (sensor, flags) in flagged.chain(accels.iter_mut().zip(&tick.accel_flags)) {
+                sensor.ticks += 1;
+                sensor.clamped += u64::from(flags.contains(SensorFlags::CLAMPED_TEMPERATURE));
+                sensor.stale += u64::from(flags.contains(SensorFlags::STALE_TEMPERATURE));
+                sensor.invalid += u64::from(!flags.contains(SensorFlags::VALID));
+            }
+            for (channel, report) in channels.iter_mut().zip(unit.channels()) {
+                if let Some(state) = report.state.filter(|_| !report.stale) {
+                    widen(&mut channel.seen, state.temperature);
+                    if !report.warming_up {
+                        widen(&mut channel.rate, state.rate);
+                    }
+                }
+            }
+        })?;
+        Ok(())
+    }
+
+    /// Share of a channel's fitted range that was seen; `None` where nothing was fitted over its temperature.
+    fn covered(channel: &ChannelRange) -> Option<f64> {
+        let [low, high] = channel.fitted.filter(|[low, high]| high > low)?;
+        let Some([from, to]) = channel.seen else { return Some(0.0) };
+        Some(((to.min(high) - from.max(low)) / (high - low)).clamp(0.0, 1.0))
+    }
+
+    /// What is to be looked at.
+    pub(super) fn warnings(&self) -> Vec<String> {
+        let mut warnings = Vec::new();
+        for channel in &self.channels {
+            let name = &channel.name;
+            let Some([from, to]) = channel.seen else {
+                warnings.push(format!(
+                    "temperature channel {name}: no readings, what follows it stood at the assumed temperature throughout: is the \
+                     channel in the log, under this name?"
+                ));
+                continue;
+            };
+            let Some(share) = Self::covered(channel).filter(|share| *share < ENOUGH) else { continue };
+            let [low, high] = channel.fitted.unwrap_or_default();
+            warnings.push(format!(
+                "temperature channel {name}: the logs cover {from:.1}…{to:.1} °C, {:.0} % of the fitted {low:.1}…{high:.1} °C: nothing \
+                 is said of the rest",
+                share * 100.0
+            ));
+        }
+        for sensor in self.gyros.iter().chain(&self.accels) {
+            let name = &sensor.name;
+            let shares = [
+                (sensor.clamped, "outside the fitted range of temperature, where terms are held at its end"),
+                (sensor.stale, "without a fresh temperature"),
+                (sensor.invalid, "without a valid reading"),
+            ];
+            for (count, what) in shares {
+                if sensor.share(count) > CLAMPED {
+                    warnings
+                        .push(format!("{name}: {:.1} % of the ticks {what}", sensor.share(count) * 100.0));
+                }
+            }
+        }
+        warnings
+    }
+
+    /// Ranges, and shares of flagged ticks.
+    pub(super) fn tables(&self) -> Vec<(String, Table)> {
+        let range = |range: Option<[f64; 2]>, digits: usize| {
+            range.map_or_else(|| "–".to_owned(), |[low, high]| format!("{low:.digits$}…{high:.digits$}"))
+        };
+        let channel = |channel: &ChannelRange| {
+            let rate = channel.rate.map(|rate| rate.map(|rate| rate * 60.0));
+            vec![
+                channel.name.clone(),
+                range(channel.seen, 1),
+                range(channel.fitted, 1),
+                Self::covered(channel)
+                    .map_or_else(|| "–".to_owned(), |share| format!("{:.0} %", share * 100.0)),
+                range(rate, 2),
+            ]
+        };
+        let sensor = |sensor: &Sensor| {
+            let share = |count| format!("{} %", short(sensor.share(count) * 100.0));
+            vec![
+                sensor.name.clone(),
+                sensor.ticks.to_string(),
+                share(sensor.clamped),
+                share(sensor.stale),
+                share(sensor.invalid),
+            ]
+        };
+        let head = |words: &[&str]| words.iter().map(|word| (*word).to_owned()).collect();
+        let channels = Table {
+            head: head(&["channel", "seen, °C", "fitted, °C", "covered", "rate, °C/min"]),
+            rows: self.channels.iter().map(channel).collect(),
+        };
+        let sensors = Table {
+            head: head(&["sensor", "ticks", "clamped", "temperature stale", "not valid"]),
+            rows: self.gyros.iter().chain(&self.accels).map(sensor).collect(),
+        };
+        vec![("Temperature".to_owned(), channels), ("Flags".to_owned(), sensors)]
+    }
+}
+
+impl Sensor {
+    #[expect(clippy::cast_precision_loss, reason = "ticks of logs are far below 2⁵³")]
+    fn share(&self, count: u64) -> f64 {
+        if self.ticks == 0 { 0.0 } else { count as f64 / self.ticks as f64 }
+    }
+}
+
+fn widen(range: &mut Option<[f64; 2]>, value: f64) {
+    let [low, high] = range.unwrap_or([value; 2]);
+    *range = Some([low.min(value), high.max(value)]);
+}

@@ -1,0 +1,150 @@
+//! `show`, `diff` and `merge`, as their user calls them.
+#![expect(clippy::unwrap_used, reason = "helpers of tests end the test where something is not as it must be")]
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use isotherm_calibration::written::Written;
+use isotherm_protocol::document::{Curve, Document, Shape};
+use serde_json::Value;
+
+fn calibrate(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_isotherm-calibrate")).args(arguments).output().unwrap()
+}
+
+fn json(arguments: &[&str]) -> Value {
+    let output = calibrate(arguments);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+fn folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/calibration")
+}
+
+fn save(path: &str, change: impl FnOnce(&mut Document)) {
+    let mut document = Written::read(&folder().join("MEMS-0001.toml")).unwrap().document;
+    change(&mut document);
+    Written::of(&document).unwrap().save(Path::new(path), true).unwrap();
+}
+
+#[test]
+fn every_document_that_is_shipped_can_be_shown() {
+    let pages = tempfile::tempdir().unwrap();
+    let html = pages.path().join("page.html").display().to_string();
+    let mut count = 0;
+    for entry in std::fs::read_dir(folder()).unwrap() {
+        let path = entry.unwrap().path().display().to_string();
+        if !path.ends_with(".toml") {
+            continue;
+        }
+        count += 1;
+        let output = calibrate(&["show", &path, "--html", &html]);
+        assert!(output.status.success(), "{path}: {}", String::from_utf8_lossy(&output.stderr));
+        let text = String::from_utf8(output.stdout).unwrap();
+        let page = std::fs::read_to_string(&html).unwrap();
+        let first = text.lines().next().unwrap();
+        assert!(first.contains(": calibration of unit ") && page.contains(first), "{first}");
+        assert!(text.contains("\nInput axes in case axes\n"), "{path}");
+    }
+    assert!(count >= 5, "{count}");
+}
+
+#[test]
+fn shown_values_are_those_of_the_document() {
+    let path = folder().join("example-full.toml").display().to_string();
+    let shown = json(&["show", &path, "--json"]);
+    assert_eq!(shown["document"]["unit"], "EXAMPLE-0001");
+    let terms = shown["terms"].as_array().unwrap();
+    let of = |sensor: &str, name: &str| {
+        let mine = |term: &&Value| term["sensor"] == sensor && term["term"] == name && term["kind"] == "gyro";
+        terms.iter().find(mine).unwrap()
+    };
+    let bias = of("x", "static_bias");
+    for point in bias["points"].as_array().unwrap() {
+        let [t, value] = [0, 1].map(|index| point[index].as_f64().unwrap());
+        let tau = t.clamp(-40.0, 70.0) - 25.0;
+        assert!((value - (1.284 - 0.0131 * tau + 0.00021 * tau * tau)).abs() < 1e-9, "{point}");
+    }
+    assert_eq!(of("s", "lag of 45 s")["unit"], "(°/h)/(°C/s)");
+    assert_eq!(of("s", "thermal_rate run-up")["argument"], "°C/s");
+    let text = String::from_utf8(calibrate(&["show", &path]).stdout).unwrap();
+    assert!(
+        text.contains("1.284 − 0.0131·(T − 25) + 2.1e-4·(T − 25)²") || text.contains("0.00021·(T − 25)²"),
+        "{text}"
+    );
+}
+
+#[test]
+fn diff_tells_what_has_changed() {
+    let files = tempfile::tempdir().unwrap();
+    let path = |name: &str| files.path().join(name).display().to_string();
+    save(&path("before.toml"), |_| ());
+    save(&path("after.toml"), |document| {
+        document.accel.as_mut().unwrap().orientation.rows[2][0] += 50.0 / 206_265.0;
+        document.gyro.sensor[0].static_bias = Some(Curve::new(Shape::Constant { value: 9.0 }));
+    });
+    let (before, after, html) = (path("before.toml"), path("after.toml"), path("diff.html"));
+    let changes = json(&["diff", &before, &after, "--axis-sigma", "5", "--json", "--html", &html]);
+    let axis =
+        changes["axes"].as_array().unwrap().iter().find(|axis| axis["of"] == "accelerometer z").unwrap();
+    assert!((axis["turned_arcsec"].as_f64().unwrap() - 50.0).abs() < 0.1, "{axis}");
+    assert!((axis["significance"].as_f64().unwrap() - 50.0 / 50.0_f64.sqrt()).abs() < 0.1, "{axis}");
+    let verdict = changes["verdict"].as_str().unwrap();
+    assert!(verdict.contains("50.0 ± 7.1 ″ (accelerometer z); beyond 3 σ: accelerometer z"), "{verdict}");
+    assert!(std::fs::read_to_string(&html).unwrap().contains("gyro x bias"));
+    let same = calibrate(&["diff", &before, &before]);
+    assert!(String::from_utf8_lossy(&same.stdout).contains("state the same."));
+    assert_eq!(calibrate(&["diff", &before, &after, "--axis-sigma", "-1"]).status.code(), Some(2));
+}
+
+#[test]
+fn merge_puts_parts_together_or_says_what_is_in_the_way() {
+    let files = tempfile::tempdir().unwrap();
+    let path = |name: &str| files.path().join(name).display().to_string();
+    let bias = |value: f64| {
+        move |document: &mut Document| {
+            document.gyro.sensor[0].static_bias = Some(Curve::new(Shape::Constant { value }));
+        }
+    };
+    let axes =
+        |document: &mut Document| document.accel.as_mut().unwrap().orientation.rows[0] = [1.0, 2e-5, 0.0];
+    save(&path("base.toml"), |_| ());
+    save(&path("thermal.toml"), bias(4.0));
+    save(&path("other.toml"), bias(5.0));
+    save(&path("positions.toml"), axes);
+    let (base, thermal, other, positions, new) = (
+        path("base.toml"),
+        path("thermal.toml"),
+        path("other.toml"),
+        path("positions.toml"),
+        path("new.toml"),
+    );
+    let merged = json(&["merge", &base, &thermal, &positions, "--out", &new, "--json"]);
+    assert_eq!(merged["taken"]["gyro.sensor.x.static_bias"], "thermal.toml");
+    assert_eq!(merged["taken"]["accel.orientation.rows"], "positions.toml");
+    let mut expected = Written::read(Path::new(&base)).unwrap().document;
+    bias(4.0)(&mut expected);
+    axes(&mut expected);
+    let document = Written::read(Path::new(&new)).unwrap().document;
+    assert_eq!((&document.gyro, &document.accel), (&expected.gyro, &expected.accel));
+    // A merged document goes into the next merge, with all that it says of itself.
+    let again = path("again.toml");
+    let twice = calibrate(&["merge", &new, &base, "--out", &again]);
+    assert!(twice.status.success(), "{}", String::from_utf8_lossy(&twice.stderr));
+    assert!(std::fs::read_to_string(&again).unwrap().contains("positions.toml"));
+    // Never over a file that is there, nor with a conflict.
+    let arguments = ["merge", &base, &thermal, &other, "--out", &path("conflict.toml")];
+    let conflict = calibrate(&arguments);
+    assert_eq!(conflict.status.code(), Some(1));
+    let stderr = String::from_utf8_lossy(&conflict.stderr).into_owned();
+    assert!(
+        stderr.contains("gyro.sensor.x.static_bias: made differently by thermal.toml and other.toml"),
+        "{stderr}"
+    );
+    assert!(!Path::new(&path("conflict.toml")).exists());
+    let decided = calibrate(&[&arguments[..], &["--take", "gyro.sensor.x=other.toml"]].concat());
+    assert!(decided.status.success(), "{}", String::from_utf8_lossy(&decided.stderr));
+    assert_eq!(calibrate(&["merge", &base, &thermal, "--out", &new]).status.code(), Some(2));
+    assert_eq!(calibrate(&["merge", &base, &base, "--out", &path("x.toml")]).status.code(), Some(2));
+}

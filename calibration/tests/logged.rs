@@ -1,0 +1,154 @@
+//! `drift` and `impact` on logs of corrected and raw ticks, as their user calls them.
+#![expect(clippy::unwrap_used, reason = "helpers of tests end the test where something is not as it must be")]
+
+mod simulated_logs;
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use isotherm_calibration::run::Run;
+use isotherm_calibration::written::Written;
+use isotherm_log::message::{Message, Topic};
+use isotherm_log::offline::rows::{write_header, write_tick};
+use isotherm_log::offline::{Offline, unit_id};
+use isotherm_log::part::{LogFiles, Part};
+use isotherm_log::recording::{RecordingOptions, RecordingReader, RecordingWriter};
+use serde_json::Value;
+use simulated_logs::{fibre_optic, record, write_text};
+
+fn calibrate(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_isotherm-calibrate")).args(arguments).output().unwrap()
+}
+
+fn json(arguments: &[&str]) -> Value {
+    let output = calibrate(arguments);
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+fn document() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/calibration/FOG-0001.toml")
+}
+
+/// A recording of the simulated unit, and its ticks corrected as CSV and as a recording.
+fn logs(folder: &Path) -> [String; 3] {
+    let path = |name: &str| folder.join(name);
+    let raw = path("raw.mcap");
+    record(&raw, &fibre_optic(7, "FOG-0001", 9000.0));
+    let unit = unit_id("FOG-0001").unwrap();
+    let loaded = Written::read(&document()).unwrap().loaded;
+    let run = Run::new("raw".into(), unit.clone(), LogFiles::Recordings(vec![raw.clone()]), &Part::default());
+    let mut csv = Vec::new();
+    write_header(&mut csv).unwrap();
+    run.correct(&loaded, (), |tick, _| write_tick(&mut csv, tick).unwrap()).unwrap();
+    std::fs::write(path("corrected.csv"), csv).unwrap();
+    // As the service records what it publishes.
+    let mut stream = Offline::new(&loaded, isotherm_correction::unit::UnitSettings::default());
+    let mut reader = RecordingReader::open(std::slice::from_ref(&raw), std::sync::Arc::default()).unwrap();
+    let mut writer = RecordingWriter::create(&path("corrected.mcap"), RecordingOptions::default()).unwrap();
+    let mut received_ns = 0;
+    let mut give_out = |stream: &mut Offline, received_ns: u64| {
+        let mut frame = Vec::new();
+        while stream.next_frame(&mut frame) {
+            let topic = Topic::Corrected(unit.clone());
+            writer.write(&Message { topic, received_ns, frame: std::mem::take(&mut frame) }).unwrap();
+        }
+    };
+    while let Some(message) = reader.next_message().unwrap() {
+        let Topic::Raw(_, input) = message.topic else { continue };
+        received_ns = message.received_ns;
+        stream.receive(input, &message.frame);
+        give_out(&mut stream, received_ns);
+    }
+    stream.finish();
+    give_out(&mut stream, received_ns);
+    writer.finish().unwrap();
+    [raw, path("corrected.csv"), path("corrected.mcap")].map(|path| path.display().to_string())
+}
+
+/// Mean and N of each sensor.
+fn figures(report: &Value) -> Vec<[f64; 2]> {
+    let of = |sensor: &Value| {
+        let noise = &sensor["noise"]["N"];
+        [sensor["mean"].as_f64().unwrap(), noise["value"].as_f64().or(noise["below"].as_f64()).unwrap()]
+    };
+    report["sensors"].as_array().unwrap().iter().map(of).collect()
+}
+
+#[test]
+fn drift_says_the_same_of_a_log_in_every_form() {
+    let folder = tempfile::tempdir().unwrap();
+    let [raw, csv, mcap] = logs(folder.path());
+    let document = document().display().to_string();
+    let mut means = Vec::new();
+    for accelerometers in [&[][..], &["--accelerometers"]] {
+        let of = |arguments: &[&str]| json(&[&["drift"], arguments, accelerometers, &["--json"]].concat());
+        let corrected_by = of(&[&raw, "--document", &document]);
+        assert_eq!(corrected_by["corrected"], true);
+        let by_csv = of(&[&csv]);
+        let by_mcap = of(&[&mcap, "--corrected"]);
+        assert_eq!(figures(&by_csv), figures(&by_mcap));
+        assert_eq!(figures(&corrected_by), figures(&by_mcap));
+        assert_eq!(by_csv["measure"], if accelerometers.is_empty() { "deg/h" } else { "m/s2" });
+        means.push(figures(&by_csv));
+    }
+    let (rates, forces) = (&means[0], &means[1]);
+    // Gravity is along z, and Earth rate is about the axes of a unit that looks to 30° at 55.75° north.
+    assert!((forces[2][0].abs() - 9.815).abs() < 0.02 && forces[0][0].abs() < 0.05, "{forces:?}");
+    let north = 15.041 * 55.75_f64.to_radians().cos();
+    assert!((rates[0][0] - north * 30.0_f64.to_radians().cos()).abs() < 0.1, "{rates:?}");
+    assert!((rates[1][0].abs() - north * 30.0_f64.to_radians().sin()).abs() < 0.1, "{rates:?}");
+}
+
+#[test]
+fn drift_reads_text_logs_by_their_mapping() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let scenario = isotherm_simulator::presets::mems_chamber(4);
+    let scenario =
+        isotherm_simulator::Scenario { duration_s: 300.0, tick_ns: 100_000_000, start_ns: 0, ..scenario };
+    record(Path::new(&path("log.mcap")), &scenario);
+    write_text(Path::new(&path("log.csv")), Path::new(&path("mapping.toml")), &scenario);
+    for accelerometers in [&[][..], &["--accelerometers"]] {
+        let text =
+            [&["drift", &path("log.csv"), "--mapping", &path("mapping.toml"), "--json"], accelerometers];
+        let recorded = [&["drift", &path("log.mcap"), "--json"], accelerometers];
+        let (text, recorded) = (figures(&json(&text.concat())), figures(&json(&recorded.concat())));
+        for (a, b) in text.iter().flatten().zip(recorded.iter().flatten()) {
+            assert!((a / b - 1.0).abs() < 1e-3, "{text:?} {recorded:?}");
+        }
+    }
+}
+
+#[test]
+fn impact_sails_the_drift_of_a_log() {
+    let folder = tempfile::tempdir().unwrap();
+    let [raw, csv, mcap] = logs(folder.path());
+    // The document of the unit, with what the estimator is to expect of another.
+    let expected = Written::read(&document().with_file_name("ZLG-0001.toml")).unwrap().document;
+    let mut unit = Written::read(&document()).unwrap().document;
+    for (gyro, other) in unit.gyro.sensor.iter_mut().zip(expected.gyro.sensor) {
+        gyro.drift = other.drift;
+    }
+    let document = folder.path().join("unit.toml").display().to_string();
+    Written::of(&unit).unwrap().save(Path::new(&document), false).unwrap();
+    let sail = |log: &str, more: &[&str]| {
+        json(&[&["impact", log, "--calibration-hours", "1", "--json"], more].concat())["rows"].clone()
+    };
+    let by_csv = sail(&csv, &[]);
+    assert_eq!(by_csv.as_array().unwrap().len(), 3);
+    for row in by_csv.as_array().unwrap() {
+        let radial = row["figures"]["radial_largest_m"].as_f64().unwrap();
+        assert!(radial > 0.0 && radial < 20_000.0, "{row}");
+    }
+    assert_eq!(by_csv, sail(&mcap, &[]));
+    let of_unit = sail(&csv, &["--document", &document]);
+    assert_eq!(of_unit, sail(&raw, &["--document", &document]));
+    assert_ne!(of_unit, by_csv, "the estimator expects something else");
+    // A log that is too short for the calibration is refused in words.
+    let short = calibrate(&["impact", &csv, "--calibration-hours", "3", "--document", &document]);
+    assert_eq!(short.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&short.stderr).contains("--calibration-hours"));
+    let raw_alone = calibrate(&["impact", &raw, "--calibration-hours", "1"]);
+    assert!(!raw_alone.status.success());
+}

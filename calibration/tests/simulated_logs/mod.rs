@@ -1,0 +1,96 @@
+//! Small simulated logs as files.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use isotherm_log::message::{Message, Topic};
+use isotherm_log::offline::unit_id;
+use isotherm_log::recording::{RecordingOptions, RecordingWriter};
+use isotherm_protocol::raw::Batcher;
+use isotherm_simulator::{Scenario, Simulation};
+
+/// The fibre-optic unit through the beginning of the judging profile, one tick a second.
+pub(crate) fn fibre_optic(seed: u64, unit: &str, seconds: f64) -> Scenario {
+    let profile = isotherm_simulator::presets::judging_profile();
+    let scenario = isotherm_simulator::presets::fibre_optic_chamber(seed, profile);
+    Scenario { unit: unit.into(), duration_s: seconds, tick_ns: 1_000_000_000, ..scenario }
+}
+
+/// Writes a scenario as a recording, 256 ticks a message.
+pub(crate) fn record(path: &Path, scenario: &Scenario) {
+    let unit = unit_id(&scenario.unit).unwrap();
+    let mut writer = RecordingWriter::create(path, RecordingOptions::default()).unwrap();
+    let mut batcher = Batcher::new(256);
+    let output = scenario.instrument.gyros.output_kind();
+    let accel_output = scenario.instrument.accel_output_kind();
+    let mut write = |batcher: &mut Batcher| {
+        while let Some(frame) = batcher.next_frame() {
+            let topic = Topic::Raw(unit.clone(), frame.stream);
+            let received_ns = u64::try_from(frame.time.as_ns()).unwrap();
+            writer.write(&Message { topic, received_ns, frame: frame.frame }).unwrap();
+        }
+    };
+    for step in Simulation::new(scenario).unwrap() {
+        for reading in step.temperatures {
+            batcher.temperature(reading).unwrap();
+        }
+        if let (Some(output), Some(tick)) = (accel_output, step.accel) {
+            batcher.accel(output, tick).unwrap();
+        }
+        batcher.gyro(output, step.gyro).unwrap();
+        write(&mut batcher);
+    }
+    batcher.flush().unwrap();
+    write(&mut batcher);
+    writer.finish().unwrap();
+}
+
+/// Writes a scenario as a text log with the mapping that reads it: mean rates in rad/s, accelerometers and temperatures as
+/// they are.
+pub(crate) fn write_text(log: &Path, mapping: &Path, scenario: &Scenario) {
+    let mut text = String::new();
+    let mut channels = Vec::new();
+    let mut temperatures: Vec<f64> = Vec::new();
+    for step in Simulation::new(scenario).unwrap() {
+        for reading in &step.temperatures {
+            let name = reading.channel.to_string();
+            let place = channels.iter().position(|channel| *channel == name).unwrap_or_else(|| {
+                channels.push(name);
+                temperatures.push(0.0);
+                channels.len() - 1
+            });
+            temperatures[place] = reading.raw;
+        }
+        write!(text, "{}", step.gyro.end_time.as_ns()).unwrap();
+        let accel = step.accel.unwrap();
+        for value in step.gyro.readings.iter().chain(accel.readings.iter()).chain(&temperatures) {
+            write!(text, ",{value:?}").unwrap();
+        }
+        text.push('\n');
+    }
+    std::fs::write(log, text).unwrap();
+    let sensors = |from: usize, unit: &str| -> String {
+        (from..from + 3).map(|column| format!("{{ column = {column}, unit = \"{unit}\" }}, ")).collect()
+    };
+    let accels = match scenario.instrument.accel_output_kind().unwrap() {
+        isotherm_correction::sample::OutputKind::Counts => ("counts", "counts"),
+        isotherm_correction::sample::OutputKind::Mean => ("mean", "raw"),
+    };
+    let mut words = format!(
+        "version = 1\n[[file]]\ndelimiter = \"comma\"\n[file.time]\ncolumn = 1\nunit = \"ns\"\ntick_ms = {}\n\
+         [file.gyro]\noutput = \"mean\"\nsensors = [{}]\n[file.accel]\noutput = \"{}\"\nsensors = [{}]\n",
+        scenario.tick_ns / 1_000_000,
+        sensors(2, "rad_per_s"),
+        accels.0,
+        sensors(5, accels.1),
+    );
+    for (index, channel) in channels.iter().enumerate() {
+        write!(
+            words,
+            "[[file.temperature]]\nchannel = \"{channel}\"\ncolumn = {}\nunit = \"raw\"\n",
+            index + 8
+        )
+        .unwrap();
+    }
+    std::fs::write(mapping, words).unwrap();
+}

@@ -1,0 +1,216 @@
+//! `validate`: a document judged on logs, as its user calls it.
+#![expect(clippy::unwrap_used, reason = "helpers of tests end the test where something is not as it must be")]
+
+mod simulated_logs;
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use isotherm_calibration::means::Means;
+use isotherm_calibration::provenance::origin;
+use isotherm_calibration::run::Run;
+use isotherm_calibration::written::Written;
+use isotherm_correction::sample::OutputKind;
+use isotherm_log::offline::unit_id;
+use isotherm_log::part::{LogFiles, Part};
+use isotherm_log::text::LogEvent;
+use isotherm_protocol::document::{Document, Shape};
+use isotherm_simulator::Simulation;
+use serde_json::Value;
+use simulated_logs::{fibre_optic, record, write_text};
+
+/// Length of the runs: a hold, and most of a ramp.
+const SECONDS: f64 = 3600.0;
+
+fn calibrate(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_isotherm-calibrate")).args(arguments).output().unwrap()
+}
+
+fn json(arguments: &[&str]) -> Value {
+    let output = calibrate(arguments);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+fn words(output: &Output) -> (Option<i32>, String, String) {
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    (output.status.code(), text(&output.stdout), text(&output.stderr))
+}
+
+fn document() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/calibration/FOG-0001.toml")
+}
+
+fn save(path: &Path, change: impl FnOnce(&mut Document)) {
+    let mut changed = Written::read(&document()).unwrap().document;
+    change(&mut changed);
+    Written::of(&changed).unwrap().save(path, true).unwrap();
+}
+
+#[test]
+fn a_good_document_is_accepted_and_a_bad_one_is_not() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    record(Path::new(&path("judge.mcap")), &fibre_optic(5, "FOG-0001", SECONDS));
+    let good = document().display().to_string();
+    // White noise is the most of what is left in shorter windows.
+    let arguments =
+        ["validate", &good, &path("judge.mcap"), "--window", "100", "--json", "--html", &path("judge.html")];
+    let report = json(&arguments);
+    assert_eq!(report["accepted"], true);
+    for gyro in 0..3 {
+        let verdict = &report["verdicts"][gyro];
+        assert!(verdict["times_smaller"].as_f64().unwrap() > 3.0, "{verdict}");
+        assert!(verdict["words"].as_str().unwrap().ends_with("out of sample; accepted"), "{verdict}");
+    }
+    let html = std::fs::read_to_string(path("judge.html")).unwrap();
+    assert!(html.contains("Spectrum of what is left") && html.contains("Over temperature"));
+    assert_eq!(calibrate(&arguments).stdout, calibrate(&arguments).stdout, "the same bytes");
+    // With the place known, the bias itself is judged.
+    let place = ["--latitude", "55.75", "--heading", "30"];
+    let placed = json(&[&arguments[..6], &place].concat());
+    for gyro in 0..3 {
+        let after = &placed["verdicts"][gyro]["out_of_sample"]["after"];
+        assert!(after["mean"].as_f64().unwrap().abs() < 0.1, "{after}");
+    }
+    // The sign of a bias the wrong way round.
+    save(Path::new(&path("bad.toml")), |document| {
+        for lag in &mut document.gyro.sensor[0].lag {
+            let Shape::Polynomial { reference, coefficients, range } = lag.gain.shape().clone() else {
+                continue;
+            };
+            let coefficients = coefficients.iter().map(|c| -c).collect();
+            lag.gain =
+                isotherm_protocol::document::Curve::new(Shape::Polynomial { reference, coefficients, range });
+        }
+    });
+    let (code, stdout, stderr) = words(&calibrate(&["validate", &path("bad.toml"), &path("judge.mcap")]));
+    assert_eq!(code, Some(1));
+    let first = stdout.lines().next().unwrap();
+    assert!(first.starts_with("gyro x: ") && first.contains("refused: rms grows from"), "{first}");
+    assert!(stderr.contains("FOG-0001: gyro x: rms grows from"), "{stderr}");
+}
+
+#[test]
+fn a_log_that_the_document_was_made_from_is_in_sample() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    record(Path::new(&path("known.mcap")), &fibre_optic(5, "FOG-0001", SECONDS));
+    save(Path::new(&path("unit.toml")), |document| {
+        let of_log = origin(&[PathBuf::from(path("known.mcap"))], "test").unwrap();
+        document.origin.get_or_insert_default().log = of_log.log;
+    });
+    let report = json(&["validate", &path("unit.toml"), &path("known.mcap"), "--json"]);
+    assert!(report["verdict"].as_str().unwrap().contains("peak to peak in sample; accepted"));
+    assert_eq!(report["verdicts"][0]["out_of_sample"], Value::Null);
+    let warnings = report["warnings"].to_string();
+    assert!(warnings.contains("known.mcap is among the logs that the document was made from"), "{warnings}");
+}
+
+#[test]
+fn several_units_end_with_one_table() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    std::fs::create_dir(path("documents")).unwrap();
+    let mut logs = Vec::new();
+    for (seed, unit) in [(1, "FOG-0001"), (2, "FOG-0002"), (3, "FOG-0003")] {
+        let log = path(&format!("{unit}.mcap"));
+        record(Path::new(&log), &fibre_optic(seed, unit, 1500.0));
+        logs.push(log);
+        save(Path::new(&path(&format!("documents/{unit}.toml"))), |document| document.unit = unit.into());
+    }
+    let html = path("batch.html");
+    let mut arguments = vec!["validate".to_owned(), path("documents")];
+    arguments.extend(logs);
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let report = json(&[arguments.as_slice(), &["--json", "--html", &html]].concat());
+    assert_eq!(report["batch"]["verdict"], "3 units: 18 of 18 sensors accepted.");
+    let units: Vec<&str> = (0..3).map(|unit| report["reports"][unit]["unit"].as_str().unwrap()).collect();
+    assert_eq!(units, ["FOG-0001", "FOG-0002", "FOG-0003"]);
+    assert!(Path::new(&path("batch-FOG-0002.html")).exists() && Path::new(&html).exists());
+    // A unit without a document does not stop the others.
+    std::fs::remove_file(path("documents/FOG-0002.toml")).unwrap();
+    let (code, stdout, stderr) = words(&calibrate(&arguments));
+    assert_eq!(code, Some(1));
+    assert!(
+        stdout.contains("3 units: 12 of 12 sensors accepted, 1 of the units came to nothing."),
+        "{stdout}"
+    );
+    assert!(stderr.contains("FOG-0002: no document of the folder is for unit FOG-0002"), "{stderr}");
+}
+
+#[test]
+fn a_text_log_says_the_same_as_a_recording() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let scenario = isotherm_simulator::presets::mems_chamber(4);
+    let mut scenario = isotherm_simulator::Scenario { duration_s: 1500.0, tick_ns: 500_000_000, ..scenario };
+    scenario.start_ns = 0;
+    record(Path::new(&path("judge.mcap")), &scenario);
+    write_text(Path::new(&path("judge.csv")), Path::new(&path("mapping.toml")), &scenario);
+    let document = document().with_file_name("MEMS-0001.toml").display().to_string();
+    let recorded = json(&["validate", &document, &path("judge.mcap"), "--json"]);
+    let written =
+        json(&["validate", &document, &path("judge.csv"), "--mapping", &path("mapping.toml"), "--json"]);
+    for (a, b) in recorded["verdicts"].as_array().unwrap().iter().zip(written["verdicts"].as_array().unwrap())
+    {
+        for end in ["before", "after"] {
+            let of = |verdict: &Value| verdict["out_of_sample"][end]["rms"].as_f64().unwrap();
+            // A row of the text has the temperature of the row, a recording that of the reading's own time.
+            assert!((of(a) / of(b) - 1.0).abs() < 0.03, "{a} {b}");
+        }
+    }
+}
+
+#[test]
+fn temperatures_of_a_recording_are_those_of_their_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("judge.mcap");
+    let scenario = fibre_optic(5, "FOG-0001", SECONDS);
+    record(&path, &scenario);
+    let unit = unit_id("FOG-0001").unwrap();
+    let files = LogFiles::Recordings(vec![path]);
+    let recorded = Run::new("recorded".into(), unit.clone(), files, &Part::default());
+    let mut events = Vec::new();
+    for step in Simulation::new(&scenario).unwrap() {
+        events.extend(step.temperatures.into_iter().map(LogEvent::Temperature));
+        if let (Some(output), Some(tick)) = (scenario.instrument.accel_output_kind(), step.accel) {
+            events.push(LogEvent::Accel { output, tick });
+        }
+        events.push(LogEvent::Gyro { output: OutputKind::Mean, tick: step.gyro });
+    }
+    let in_memory = Run::of_events("recorded".into(), unit, events);
+    let loaded = Written::read(&document()).unwrap().loaded;
+    let [a, b] = [&recorded, &in_memory].map(|run| Means::of(run, &loaded, 10.0, ()).unwrap());
+    assert_eq!(a, b);
+}
+
+#[test]
+fn what_cannot_be_judged_is_refused_in_words() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let good = document().display().to_string();
+    let refused = |arguments: &[&str], code: i32, word: &str| {
+        let (got, _, stderr) = words(&calibrate(arguments));
+        assert!(got == Some(code) && stderr.contains(word), "{arguments:?} {got:?}: {stderr}");
+    };
+    record(Path::new(&path("other.mcap")), &fibre_optic(5, "FOG-0009", 200.0));
+    refused(&["validate", &good, &path("other.mcap")], 1, "other.mcap is of unit FOG-0009");
+    let mut moving = fibre_optic(5, "FOG-0001", 200.0);
+    moving.motion = moving.motion.along(isotherm_simulator::motion::Path::Sine {
+        axis: [1.0, 0.0, 0.0],
+        amplitude_deg: 20.0,
+        frequency_hz: 0.01,
+        phase_deg: 0.0,
+    });
+    record(Path::new(&path("moving.mcap")), &moving);
+    refused(&["validate", &good, &path("moving.mcap")], 1, "the unit was not at rest");
+    refused(&["validate", &good, &path("moving.mcap"), "--window", "0"], 2, "--window is 0");
+    refused(
+        &["validate", &good, &path("moving.mcap"), "--latitude", "95", "--heading", "0"],
+        2,
+        "latitude is 95°",
+    );
+    refused(&["validate", &good, &path("none.mcap")], 1, "none.mcap");
+    refused(&["validate", &good, &path("none.csv")], 1, "none.csv");
+}
