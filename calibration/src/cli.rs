@@ -4,15 +4,14 @@ mod bar;
 mod diff;
 mod drift;
 mod impact;
+mod merge;
 mod modes;
 mod output;
 mod place;
 mod rates;
 mod runs;
-mod units;
-mod merge;
-mod runs;
 mod show;
+mod units;
 mod validate;
 
 use std::io::{self, Write};

@@ -12,7 +12,7 @@ use super::place::PlaceArgs;
 use super::runs::LogArgs;
 use super::units::{of_document, of_only};
 use crate::error::Error;
-use crate::rates::document::{details, nominal};
+use crate::rates::document::{details, nominal, sigmas};
 use crate::rates::make::{Wanted, make};
 use crate::rates::steps::{Step, listed, read};
 use crate::run::Run;
@@ -91,6 +91,7 @@ impl RatesArgs {
             method: "rate table, weighted least squares",
             key: "rates",
             details: details(&made),
+            sigmas: sigmas(&made),
             range_deg_c: made.temperature_deg_c.map(|deg_c| [deg_c, deg_c]),
             logs: &self.log.log,
         };

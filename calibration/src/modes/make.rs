@@ -1,9 +1,9 @@
 //! The whole procedure: look at the switches, gather, fit, write, judge.
 
 use isotherm_correction::earth::Place;
-use isotherm_protocol::document::{Curve, Document, Sample, Servo, ServoKind, Shape};
+use isotherm_protocol::document::{Document, Sample};
 
-use super::cells::{Cell, Cut, Gathered, gather};
+use super::cells::{Cut, gather};
 use super::checks;
 use super::dither;
 use super::document::{self, base_constant, reference_of};

@@ -12,7 +12,13 @@ use crate::modes::document::count_arcsec;
 
 /// White noise of a gyro from second differences of its bins within steps (°/√h), less what the Earth's turning shows along
 /// its `gain`.
-pub(super) fn white(base: &Document, runs: &[Turned], earth: &[Vec<[f64; 3]>], sensor: usize, gain: [f64; 3]) -> f64 {
+pub(super) fn white(
+    base: &Document,
+    runs: &[Turned],
+    earth: &[Vec<[f64; 3]>],
+    sensor: usize,
+    gain: [f64; 3],
+) -> f64 {
     let count = count_arcsec(base, sensor);
     let (mut sum, mut number) = (0.0, 0.0);
     for (run, earth) in runs.iter().zip(earth) {
@@ -59,7 +65,12 @@ pub(super) fn first_gains(runs: &[Turned], axes: &[[f64; 3]]) -> Vec<f64> {
 }
 
 /// Mean of the Earth's rate in case axes over each bin of each run (°/h); none where it is not known.
-pub(super) fn earth_in_bins(runs: &[Turned], axes: &[[f64; 3]], gains: &[f64], biases: &[f64]) -> Vec<Vec<[f64; 3]>> {
+pub(super) fn earth_in_bins(
+    runs: &[Turned],
+    axes: &[[f64; 3]],
+    gains: &[f64],
+    biases: &[f64],
+) -> Vec<Vec<[f64; 3]>> {
     let sum = axes.iter().fold(nalgebra::Matrix3::zeros(), |sum, axis| {
         let row = nalgebra::Vector3::from(*axis);
         sum + row * row.transpose()

@@ -12,7 +12,7 @@ use crate::run::{Run, Watch};
 
 /// Share of a step's ticks that may be lost.
 const LOST: f64 = 0.05;
-/// Largest share of a turn, in whole turns, that is left at the end of a step where the Earth is not known.
+/// A whole turn (°).
 const TURN_DEG: f64 = 360.0;
 
 /// One run with its steps.

@@ -83,7 +83,13 @@ impl Knife {
     }
 
     #[expect(clippy::cast_precision_loss, reason = "a run is far below 2⁵³ ns")]
-    pub(super) fn take(&mut self, raw: &GyroTick, ticks: &[CorrectedTick], unit: &Unit, gathered: &mut Gathered) {
+    pub(super) fn take(
+        &mut self,
+        raw: &GyroTick,
+        ticks: &[CorrectedTick],
+        unit: &Unit,
+        gathered: &mut Gathered,
+    ) {
         let Some(bare) = ticks.first() else { return };
         let begin_ns = bare.end_time.as_ns().saturating_sub(bare.duration.as_ns());
         let first_ns = *self.first_ns.get_or_insert(begin_ns);
