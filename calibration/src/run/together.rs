@@ -75,7 +75,7 @@ impl Run {
                         match super::events(*input, &message.frame) {
                             Some(events) => events.iter().for_each(|event| units.take(event)),
                             None => {
-                                units.units.iter_mut().for_each(|unit| unit.receive(*input, &message.frame))
+                                units.units.iter_mut().for_each(|unit| unit.receive(*input, &message.frame));
                             }
                         }
                         units.give_out();
