@@ -14,6 +14,7 @@ mod output;
 mod place;
 mod rates;
 mod runs;
+mod show;
 mod units;
 mod thermal;
 mod validate;
@@ -53,6 +54,11 @@ enum Command {
     Modes(modes::ModesArgs),
     Rates(rates::RatesArgs),
     Thermal(thermal::ThermalArgs),
+    Modes(modes::ModesArgs),
+    Rates(rates::RatesArgs),
+    Merge(merge::MergeArgs),
+    Show(show::ShowArgs),
+    Validate(validate::ValidateArgs),
     /// Print a completion script for a shell
     #[command(after_help = "Example:\n  isotherm-calibrate completions bash > isotherm-calibrate.bash")]
     Completions {
@@ -77,6 +83,11 @@ fn run(cli: Cli) -> Result<(), Error> {
         Command::Modes(args) => args.run(),
         Command::Rates(args) => args.run(),
         Command::Thermal(args) => args.run(),
+        Command::Modes(args) => args.run(),
+        Command::Rates(args) => args.run(),
+        Command::Merge(args) => args.run(),
+        Command::Show(args) => args.run(),
+        Command::Validate(args) => args.run(),
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), "isotherm-calibrate", &mut script);

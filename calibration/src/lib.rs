@@ -12,6 +12,8 @@
 //! | [`report`] | what a fit says: verdicts, before and after, coefficients; text, JSON and page |
 //! | [`impact`] | what a drift that is left means for navigation |
 //! | [`positions`], [`tumble`] | accelerometers on a stand; a unit tumbled by hand |
+//! | [`modes`] | drift polynomials and switch parameters of a mode-reversed laser gyro |
+//! | [`rates`] | scale factor, asymmetry, linearity and axes from a rate table |
 //! | [`diff`] | what has changed between two documents |
 //! | [`merge`] | parts of a calibration in one document |
 //! | [`show`] | a document in words and curves |

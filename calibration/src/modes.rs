@@ -22,6 +22,7 @@ pub mod make;
 mod minimum;
 pub mod noise;
 pub mod orders;
+mod prepare;
 mod report;
 pub mod robust;
 pub mod servo;

@@ -13,9 +13,12 @@
 pub mod bins;
 pub mod document;
 pub mod earth;
+mod judge;
 pub mod make;
 pub mod matching;
+mod measure;
 pub mod plateaus;
+mod read;
 mod report;
 pub mod solve;
 pub mod steps;

@@ -10,7 +10,7 @@ use super::place::PlaceArgs;
 use super::runs::LogArgs;
 use super::units::of_document;
 use crate::error::Error;
-use crate::modes::document::details;
+use crate::modes::document::{details, sigmas};
 use crate::modes::fit::Asked;
 use crate::modes::make::{Wanted, make};
 use crate::written::Written;
@@ -103,6 +103,7 @@ impl ModesArgs {
             method: "polynomials of the lasing modes by generalised least squares",
             key: "modes",
             details: details(&made),
+            sigmas: sigmas(&made),
             range_deg_c: ranges.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]),
             logs: &self.log.log,
         };

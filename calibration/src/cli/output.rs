@@ -11,6 +11,7 @@ use toml::Table;
 use super::print;
 use crate::error::Error;
 use crate::provenance::{command_line, origin};
+use crate::report::Sigmas;
 use crate::report::{FitReport, residuals};
 use crate::written::{Written, write_file};
 
@@ -42,6 +43,8 @@ pub(crate) struct About<'a> {
     pub(crate) key: &'static str,
     /// That table.
     pub(crate) details: Table,
+    /// Standard errors, as what compares documents reads them.
+    pub(crate) sigmas: Sigmas,
     /// Range of temperature (°C).
     pub(crate) range_deg_c: Option<[f64; 2]>,
     /// Logs that it was fitted to.
@@ -102,6 +105,7 @@ impl OutputArgs {
             details.insert("before".to_owned(), earlier);
         }
         details.insert(about.key.to_owned(), toml::Value::Table(about.details));
+        about.sigmas.write(&mut details);
         origin.details = Some(details);
         document.origin = Some(origin);
         if let Some(date) = self.date()? {

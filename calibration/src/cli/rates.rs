@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use isotherm_correction::sample::OutputKind;
-use isotherm_protocol::document::GyroOutput;
+use isotherm_protocol::document::{Document, GyroOutput};
 
 use super::bar::Bar;
 use super::output::{About, OutputArgs};
@@ -12,9 +12,10 @@ use super::place::PlaceArgs;
 use super::runs::LogArgs;
 use super::units::{of_document, of_only};
 use crate::error::Error;
-use crate::rates::document::{details, nominal};
+use crate::rates::document::{details, nominal, sigmas};
 use crate::rates::make::{Wanted, make};
 use crate::rates::steps::{Step, listed, read};
+use crate::run::Run;
 use crate::written::Written;
 
 /// Scale factor, asymmetry, linearity, input axes and bias of gyros from runs on a rate table
@@ -70,28 +71,10 @@ impl RatesArgs {
             Some(base) => of_document(&self.log.reading, &self.log.log, &base.loaded.unit)?,
             None => of_only(&self.log.reading, &self.log.log)?,
         };
-        let base = match base {
-            Some(base) => base.document,
-            None => {
-                let mut output = None;
-                let mut gyros = 0;
-                let Some(first) = runs.first() else {
-                    return Err(Error::Usage("no log is given".to_owned()));
-                };
-                first.gyro_ticks(Bar::reading(), |kind, tick| {
-                    output = Some(kind);
-                    gyros = tick.readings.len();
-                })?;
-                if gyros != 3 {
-                    return Err(Error::Usage(format!(
-                        "{} has {gyros} gyros: only three of them have nominal axes. Give --document",
-                        first.name
-                    )));
-                }
-                let output =
-                    if output == Some(OutputKind::Counts) { GyroOutput::Counts } else { GyroOutput::Mean };
-                nominal(&first.unit.to_string(), output)
-            }
+        let base = match (base, runs.first()) {
+            (Some(base), _) => base.document,
+            (None, Some(first)) => without_document(first)?,
+            (None, None) => return Err(Error::Usage("no log is given".to_owned())),
         };
         let steps = self.stated(runs.len())?;
         let place: Vec<_> = place.into_iter().collect();
@@ -108,6 +91,7 @@ impl RatesArgs {
             method: "rate table, weighted least squares",
             key: "rates",
             details: details(&made),
+            sigmas: sigmas(&made),
             range_deg_c: made.temperature_deg_c.map(|deg_c| [deg_c, deg_c]),
             logs: &self.log.log,
         };
@@ -123,4 +107,22 @@ impl RatesArgs {
             None => listed(&self.axis, &self.rates, runs),
         }
     }
+}
+
+/// A nominal document for a log of three gyros.
+fn without_document(run: &Run) -> Result<Document, Error> {
+    let mut output = None;
+    let mut gyros = 0;
+    run.gyro_ticks(Bar::reading(), |kind, tick| {
+        output = Some(kind);
+        gyros = tick.readings.len();
+    })?;
+    if gyros != 3 {
+        return Err(Error::Usage(format!(
+            "{} has {gyros} gyros: only three of them have nominal axes. Give --document",
+            run.name
+        )));
+    }
+    let output = if output == Some(OutputKind::Counts) { GyroOutput::Counts } else { GyroOutput::Mean };
+    Ok(nominal(&run.unit.to_string(), output))
 }

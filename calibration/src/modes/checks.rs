@@ -195,14 +195,14 @@ fn jump(seconds: &[Second], values: &[f64], floor: f64, by_mode: bool) -> Option
     let limit = floor.max(SIGMAS * sigma);
     let span =
         values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(*x), high.max(*x)]);
-    if !(span[1] - span[0] > limit) {
+    if span[1] - span[0] <= limit {
         return None;
     }
     (0..seconds.len()).find_map(|index| {
         let second = seconds[index];
         let near = index.saturating_sub(NEIGHBOURS)..(index + NEIGHBOURS + 1).min(seconds.len());
         let of_kind: Vec<f64> = near
-            .filter(|&other| !by_mode || seconds[other].mode == second.mode)
+            .filter(|&other| !by_mode || seconds[other].mode.total_cmp(&second.mode).is_eq())
             .map(|other| values[other])
             .collect();
         let away = (values[index] - median(&of_kind)).abs();

@@ -9,6 +9,8 @@ use super::noise::Data;
 
 /// Squared standard errors that the highest coefficient must be away from zero.
 const BETTER: f64 = 4.0;
+/// Standard errors that the delay must be away from zero to be told.
+const SEEN: f64 = 3.0;
 /// Largest order of the rest frequency.
 const MAX_ORDER: usize = 2;
 /// Smallest rate of temperature (°C/s) at which its delay can be told.
@@ -69,7 +71,11 @@ pub fn fit(cells: &[Cell], place: usize, reference_deg_c: f64) -> Option<Rest> {
             return None;
         }
         let slope = if order > 0 { solution.coefficients[1] } else { 0.0 };
-        let delay = solution.coefficients.get(order + 1).filter(|_| slope != 0.0).map(|rate| rate / slope);
+        let delay = solution
+            .coefficients
+            .get(order + 1)
+            .filter(|rate| slope != 0.0 && rate.abs() > SEEN * sigma(order + 1))
+            .map(|rate| rate / slope);
         Some(Rest {
             coefficients: (0..=order).map(|index| [solution.coefficients[index], sigma(index)]).collect(),
             range_deg_c: [low, high],

@@ -8,6 +8,7 @@ use toml::{Table, Value};
 
 use super::fit::{GyroFit, MEANDER_REFERENCE_DEG_C, Term};
 use super::make::{Made, ServoFit};
+use crate::report::Sigmas;
 use crate::written::tidy;
 
 /// Multiples of τ after which the servo's transient counts as settled: e⁻¹⁶ of it is left.
@@ -38,12 +39,12 @@ pub fn bare(base: &Document, transition_ticks: u8, servos: &[Option<Servo>]) -> 
 /// costs the same before and after.
 #[must_use]
 pub fn stripped(
-    bare: &Document,
+    without_terms: &Document,
     servos: &[Result<ServoFit, String>],
     base: &Document,
     reference_deg_c: f64,
 ) -> Document {
-    let mut document = bare.clone();
+    let mut document = without_terms.clone();
     for ((sensor, found), old) in document.gyro.sensor.iter_mut().zip(servos).zip(&base.gyro.sensor) {
         sensor.servo = match found {
             Ok(found) => Some(servo(found, old, reference_deg_c)),
@@ -164,6 +165,22 @@ pub fn row(document: &Document, sensor: usize, deg_c: f64) -> [f64; 3] {
         }
     }
     row
+}
+
+/// Standard errors of the terms.
+#[must_use]
+pub fn sigmas(made: &Made) -> Sigmas {
+    let mut sigmas = Sigmas::default();
+    for (sensor, found) in made.written.document.gyro.sensor.iter().zip(&made.gyros) {
+        for term in [Term::Static, Term::Magnetic, Term::Meander] {
+            let own = found.iter().flat_map(|fit| &fit.coefficients).filter(|one| one.term == term);
+            let of_term: Vec<f64> = own.map(|one| tidy(one.sigma)).collect();
+            if !of_term.is_empty() {
+                sigmas.put("gyro", &sensor.name, term.key(), of_term);
+            }
+        }
+    }
+    sigmas
 }
 
 /// What goes into `origin.details`: standard errors, covariance, noise, switch parameters.

@@ -57,10 +57,10 @@ impl Running {
     fn close(&mut self, window: &Window, unit: &Unit, channels: &[Option<String>; 3]) {
         let Some(begin_s) = window.begin_s else { return };
         self.time_s.push(begin_s + 0.5 * window.length_s);
-        for axis in 0..3 {
+        for (axis, wanted) in channels.iter().enumerate() {
             let rate = AngularRate::from_rad_per_s(window.angle[axis] / window.length_s).as_deg_per_h();
             self.rate_deg_per_h[axis].push(if window.broken { f64::NAN } else { rate });
-            let own = unit.channels().find(|channel| channels[axis].as_deref() == Some(&*channel.name));
+            let own = unit.channels().find(|channel| wanted.as_deref() == Some(&*channel.name));
             let deg_c = own.and_then(|channel| channel.state).map_or(f64::NAN, |state| state.temperature);
             self.temperature_deg_c[axis].push(deg_c);
         }

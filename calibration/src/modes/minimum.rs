@@ -10,31 +10,27 @@ const SIMPLEX_STEPS: usize = 160;
 const ARRIVED: f64 = 1e-4;
 
 /// Place and value of the smallest value in an interval: a coarse look, then golden sections about the best.
-pub(super) fn golden([low, high]: [f64; 2], f: impl Fn(f64) -> f64) -> (f64, f64) {
+pub(super) fn golden([low, high]: [f64; 2], value: impl Fn(f64) -> f64) -> (f64, f64) {
     const SECTION: f64 = 0.618_033_988_749_894_9;
     let step = (high - low) / f64::from(COARSE);
-    let at = |index: u32| low + step * f64::from(index);
-    let best = (0..=COARSE)
-        .map(|index| (at(index), f(at(index))))
-        .fold((low, f64::INFINITY), |best, now| if now.1 < best.1 { now } else { best });
-    let (mut a, mut b) = ((best.0 - step).max(low), (best.0 + step).min(high));
-    let (mut c, mut d) = (b - SECTION * (b - a), a + SECTION * (b - a));
-    let (mut at_c, mut at_d) = (f(c), f(d));
+    let coarse = (0..=COARSE).map(|index| low + step * f64::from(index)).map(|place| (place, value(place)));
+    let best = coarse.fold((low, f64::INFINITY), |best, now| if now.1 < best.1 { now } else { best });
+    let at = |place: f64| (place, value(place));
+    let [mut left, mut right] = [(best.0 - step).max(low), (best.0 + step).min(high)];
+    let mut inner = [at(right - SECTION * (right - left)), at(left + SECTION * (right - left))];
     for _ in 0..STEPS {
-        if b - a < 1e-6 {
+        if right - left < 1e-6 {
             break;
         }
-        if at_c < at_d {
-            (b, d, at_d) = (d, c, at_c);
-            c = b - SECTION * (b - a);
-            at_c = f(c);
+        if inner[0].1 < inner[1].1 {
+            right = inner[1].0;
+            inner = [at(right - SECTION * (right - left)), inner[0]];
         } else {
-            (a, c, at_c) = (c, d, at_d);
-            d = a + SECTION * (b - a);
-            at_d = f(d);
+            left = inner[0].0;
+            inner = [inner[1], at(left + SECTION * (right - left))];
         }
     }
-    if at_c < at_d { (c, at_c) } else { (d, at_d) }
+    if inner[0].1 < inner[1].1 { inner[0] } else { inner[1] }
 }
 
 /// Place and value of the smallest value near a start, by the simplex of Nelder and Mead.

@@ -108,12 +108,16 @@ impl Data {
                 let decay = libm::exp(-(time_s - last_s) / correlation_s);
                 p[0][0] = decay * decay * p[0][0] + markov * (1.0 - decay * decay);
                 p[0][1] *= decay;
-                states.iter_mut().for_each(|state| state[0] *= decay);
+                for state in &mut states {
+                    state[0] *= decay;
+                }
             }
             if !self.joined[row] {
                 p[1][1] = fraction;
                 p[0][1] = 0.0;
-                states.iter_mut().for_each(|state| state[1] = 0.0);
+                for state in &mut states {
+                    state[1] = 0.0;
+                }
             }
             last_s = Some(time_s);
             // y = m + (e_new − e_old)·q/L + v/L
@@ -146,7 +150,7 @@ impl Data {
     pub fn solve(&self, noise: Noise) -> Option<Solution> {
         let White { value, mut columns, log_variance } = self.whitened(noise);
         let scale: Vec<f64> = columns.column_iter().map(|column| column.norm()).collect();
-        if scale.iter().any(|norm| !(*norm > 0.0)) {
+        if scale.iter().any(|norm| norm.is_nan() || *norm <= 0.0) {
             return None;
         }
         for (mut column, norm) in columns.column_iter_mut().zip(&scale) {

@@ -208,18 +208,18 @@ fn score(sums: &[Sums], columns: &[usize]) -> Option<f64> {
     let width = columns.len();
     let part = |xx: &DMatrix<f64>| DMatrix::from_fn(width, width, |i, j| xx[(columns[i], columns[j])]);
     let some = |xy: &DVector<f64>| DVector::from_fn(width, |i, _| xy[columns[i]]);
-    let all_xx = sums.iter().fold(DMatrix::zeros(width, width), |sum, fold| sum + part(&fold.xx));
-    let all_xy = sums.iter().fold(DVector::zeros(width), |sum, fold| sum + some(&fold.xy));
-    let scale = all_xx.diagonal().map(f64::sqrt);
-    if scale.iter().any(|x| !(*x > 0.0)) {
+    let squares = sums.iter().fold(DMatrix::zeros(width, width), |sum, fold| sum + part(&fold.xx));
+    let products = sums.iter().fold(DVector::zeros(width), |sum, fold| sum + some(&fold.xy));
+    let scale = squares.diagonal().map(f64::sqrt);
+    if scale.iter().any(|x| x.is_nan() || *x <= 0.0) {
         return None;
     }
     let mut total = 0.0;
     for fold in sums.iter().filter(|fold| fold.yy > 0.0) {
         let (xx, xy) = (part(&fold.xx), some(&fold.xy));
         let rest =
-            DMatrix::from_fn(width, width, |i, j| (all_xx[(i, j)] - xx[(i, j)]) / (scale[i] * scale[j]));
-        let solved = rest.cholesky()?.solve(&(&all_xy - &xy).component_div(&scale));
+            DMatrix::from_fn(width, width, |i, j| (squares[(i, j)] - xx[(i, j)]) / (scale[i] * scale[j]));
+        let solved = rest.cholesky()?.solve(&(&products - &xy).component_div(&scale));
         let beta = solved.component_div(&scale);
         total += fold.yy - 2.0 * beta.dot(&xy) + (&xx * &beta).dot(&beta);
     }

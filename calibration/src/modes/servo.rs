@@ -1,6 +1,6 @@
 //! Time constant of the perimeter servo from the dither frequency behind the switches (models §6).
 //!
-//! Behind each switch f_k = f0 − a·q^k, k counting the ticks behind the lost ones and q = e^(−2Δt/τ): a tick's mean of an
+//! Behind each switch f(k) = f0 − a·q^k, k counting the ticks behind the lost ones and q = e^(−2Δt/τ): a tick's mean of an
 //! exponential is again one. f0 and a are different for every switch, q is common to all. For a given q both are linear,
 //! so only τ is searched for (separable least squares).
 //!
@@ -88,7 +88,7 @@ pub fn fit(behind: &[Behind], sensor: usize, lost: usize) -> Result<Transient, R
     let across = energy(&found.turn, &settled) / count;
     let relative = (across / -least).sqrt() / found.bend;
     let inside = log_tau > range[0] + 0.01 && log_tau < range[1] - 0.01;
-    if !(relative < COARSEST) || !inside {
+    if relative.is_nan() || relative >= COARSEST || !inside {
         return Err(format!(
             "the servo's time constant cannot be told from {} switches at ticks of {tick_s:.4} s",
             rows.len()

@@ -75,7 +75,11 @@ impl Switches {
             let mut eye = Eye::default();
             run.gyro_ticks(watch(), |output, tick| {
                 found.output.get_or_insert(output);
-                found.whole &= tick.readings.iter().all(|reading| reading.fract() == 0.0);
+                found.whole &= tick
+                    .readings
+                    .iter()
+                    .filter(|reading| reading.is_finite())
+                    .all(|reading| reading.fract() == 0.0);
                 found.sensors = found.sensors.max(tick.readings.len());
                 found.ticks += 1;
                 seconds += tick.duration.as_s();
@@ -210,7 +214,12 @@ impl Limits {
         let sigma = scatter(&readings);
         let difference = (!differences.is_empty()).then(|| median(&differences));
         let floor = difference.map_or(FAR_COUNTS, |counts| DITHER_SHARES[1] * counts.abs());
-        let floor = if readings.iter().all(|reading| reading.fract() == 0.0) { floor } else { 0.0 };
+        let floor =
+            if readings.iter().filter(|reading| reading.is_finite()).all(|reading| reading.fract() == 0.0) {
+                floor
+            } else {
+                0.0
+            };
         Self { reading: median(&readings), far: floor.max(FAR_SIGMAS * sigma), difference }
     }
 

@@ -124,7 +124,9 @@ fn of_group(run: &Run, document: &Document, group: [usize; 3], watch: impl Watch
             let Sums { begin_s, length_s, good_s, angle, broken, overrange } = std::mem::take(&mut sums);
             let rate = angle.map(|sum| AngularRate::from_rad_per_s(sum / good_s).as_deg_per_h()).to_vec();
             binned.bins.push(Bin { begin_s, length_s, good_s, rate, broken, overrange });
-            thermal.iter().for_each(|thermal| of_axes.add(temperature(thermal, unit)));
+            if let Some(thermal) = &thermal {
+                of_axes.add(temperature(thermal, unit));
+            }
             unit.channels()
                 .filter_map(|channel| channel.state)
                 .for_each(|state| of_all.add(state.temperature));

@@ -8,6 +8,7 @@ use toml::{Table, Value};
 
 use super::make::Made;
 use super::solve::GyroRates;
+use crate::report::Sigmas;
 use crate::written::tidy;
 
 /// Temperature of a document without channels (°C).
@@ -100,6 +101,22 @@ pub fn nominal(unit: &str, output: GyroOutput) -> Document {
         mode_reversal: None,
         self_test: None,
     }
+}
+
+/// Standard errors of weights and axes.
+#[must_use]
+pub fn sigmas(made: &Made) -> Sigmas {
+    let mut sigmas = Sigmas::default();
+    for (sensor, found) in made.written.document.gyro.sensor.iter().zip(&made.gyros) {
+        let Ok(found) = found else { continue };
+        let ppm = tidy(1e6 * found.gain[1] / found.gain[0].abs());
+        sigmas.put("gyro", &sensor.name, "increment_weight_ppm", vec![ppm]);
+        if found.axis.is_some() {
+            let arcsec = found.axis_sigma.map(|sigma| tidy(Angle::from_rad(sigma).as_arcsec()));
+            sigmas.put("gyro", &sensor.name, "axis_arcsec", arcsec.to_vec());
+        }
+    }
+    sigmas
 }
 
 /// What goes into `origin.details`: standard errors, and what a document has no place for.

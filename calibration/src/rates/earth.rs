@@ -49,11 +49,11 @@ fn turned(vector: [f64; 3], rate_deg_per_h: [f64; 3], seconds: f64) -> ([f64; 3]
         axis[2] * vector[0] - axis[0] * vector[2],
         axis[0] * vector[1] - axis[1] * vector[0],
     ];
-    let (sine, cosine) = libm::sincos(angle);
+    let [sin, cos] = [libm::sin(angle), libm::cos(angle)];
     let half = libm::sin(0.5 * angle);
     let made =
         |of: f64, by: f64| [0, 1, 2].map(|i| axis[i] * along * (1.0 - of) + vector[i] * of - across[i] * by);
-    (made(cosine, sine), made(sine / angle, 2.0 * half * half / angle))
+    (made(cos, sin), made(sin / angle, 2.0 * half * half / angle))
 }
 
 #[cfg(test)]

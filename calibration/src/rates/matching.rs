@@ -87,7 +87,8 @@ fn check(all: &[Matched]) -> Result<(), String> {
     let per_rate: Vec<f64> =
         fastest.plateau.rate.iter().map(|rate| rate / fastest.step.rate_deg_per_s).collect();
     let norm: f64 = per_rate.iter().map(|x| x * x).sum();
-    for one in all.iter().filter(|one| one.step.axis == fastest.step.axis) {
+    for one in all.iter().filter(|one| one.step.axis.map(f64::to_bits) == fastest.step.axis.map(f64::to_bits))
+    {
         let along: f64 =
             one.plateau.rate.iter().zip(&per_rate).map(|(rate, per)| rate * per).sum::<f64>() / norm;
         let away = (along - one.step.rate_deg_per_s).abs();

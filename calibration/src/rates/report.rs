@@ -71,12 +71,7 @@ fn coefficients(name: &str, found: &GyroRates, weight: Option<(f64, &str)>, repo
             // Near one the element itself says nothing about the angle.
             if of.abs() < 0.99 {
                 let arcsec = |rad: f64| Angle::from_rad(rad).as_arcsec();
-                add(
-                    &format!("input axis along {of_axis}", of_axis = element),
-                    "″",
-                    arcsec(*of),
-                    arcsec(sigma),
-                );
+                add(&format!("input axis along {element}"), "″", arcsec(*of), arcsec(sigma));
             }
         }
     } else {

@@ -6,7 +6,7 @@
 //! u = h·ω + c·|h·ω|/|h| + b
 //! ```
 //!
-//! h = C·K_old/K: its direction is the input axis, its length says the weight; c the asymmetry, b what is left of the bias.
+//! h = C·`K_old`/K: its direction is the input axis, its length says the weight; c the asymmetry, b what is left of the bias.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -29,7 +29,7 @@ pub struct Point {
 /// What was found of one gyro.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GyroRates {
-    /// K_old/K, with the sign of the document's input axis, and its standard error.
+    /// `K_old`/K, with the sign of the document's input axis, and its standard error.
     pub gain: [f64; 2],
     /// Input axis in case axes; `None` where the steps do not span space.
     pub axis: Option<[f64; 3]>,
@@ -155,7 +155,7 @@ fn rank(points: &[Point]) -> usize {
 /// Coefficients, covariance and what is left; `None` where a column tells nothing.
 fn least_squares(x: &DMatrix<f64>, y: &DVector<f64>) -> Option<(DVector<f64>, DMatrix<f64>, DVector<f64>)> {
     let norms: Vec<f64> = x.column_iter().map(|column| column.norm()).collect();
-    if norms.iter().any(|norm| !(*norm > 0.0)) {
+    if norms.iter().any(|norm| norm.is_nan() || *norm <= 0.0) {
         return None;
     }
     let scaled = DMatrix::from_fn(x.nrows(), x.ncols(), |i, j| x[(i, j)] / norms[j]);

@@ -84,16 +84,16 @@ fn unit(axis: [f64; 3]) -> Option<[f64; 3]> {
 ///
 /// # Errors
 /// [`Error::Usage`].
-pub fn listed(axes: &[String], rates: &[f64], runs: usize) -> Result<Vec<Step>, Error> {
-    if axes.len() != runs {
+pub fn listed(names: &[String], rates: &[f64], runs: usize) -> Result<Vec<Step>, Error> {
+    if names.len() != runs {
         return Err(Error::Usage(format!(
             "{runs} logs and {} times --axis: state the table's axis of each log, in their order",
-            axes.len()
+            names.len()
         )));
     }
     let mut steps = Vec::new();
-    for (run, text) in axes.iter().enumerate() {
-        let axis = axis(text).map_err(Error::Usage)?;
+    for (run, name) in names.iter().enumerate() {
+        let axis = axis(name).map_err(Error::Usage)?;
         for rate in rates {
             steps.push(
                 checked(Step { run, axis, rate_deg_per_s: *rate, window_s: None }, runs)
@@ -143,7 +143,7 @@ pub fn read(path: &Path, runs: usize) -> Result<Vec<Step>, Error> {
 }
 
 fn checked(step: Step, runs: usize) -> Result<Step, String> {
-    if !(step.rate_deg_per_s.abs() <= FASTEST_DEG_PER_S) {
+    if !(-FASTEST_DEG_PER_S..=FASTEST_DEG_PER_S).contains(&step.rate_deg_per_s) {
         return Err(format!(
             "rate is {} °/s, must be from −{FASTEST_DEG_PER_S} to {FASTEST_DEG_PER_S}",
             step.rate_deg_per_s

@@ -217,7 +217,7 @@ fn tables_of_steps_are_read_or_refused_with_their_line() {
     );
     assert_eq!((csv[1].run, csv[1].window_s), (1, None));
     let toml = read("a.toml", "[[step]]\naxis = [0, 3.0, 4.0]\nrate_deg_per_s = 2.5\n").unwrap();
-    assert_eq!(toml[0].axis, [0.0, 0.6, 0.8]);
+    assert_eq!(toml[0].axis.map(f64::to_bits), [0.0, 0.6, 0.8].map(f64::to_bits));
     for (name, text, expected) in [
         ("b.csv", "axis,rate\nz,1\n", "column \"rate\" is none of"),
         ("c.csv", "axis,rate_deg_per_s\nz,fast\n", "line 2: rate_deg_per_s is \"fast\", no number"),

@@ -64,11 +64,7 @@ impl Run {
         match &self.source {
             Source::Events(events) => {
                 for event in events {
-                    if let LogEvent::Gyro { tick, .. } = event {
-                        units.raw.push_back(tick.clone());
-                    }
-                    units.units.iter_mut().for_each(|unit| unit.handle(event));
-                    units.give_out();
+                    units.take(event);
                 }
             }
             Source::Files { files, part } => {
@@ -76,12 +72,12 @@ impl Run {
                 watch.begin(messages.progress());
                 while let Some(message) = messages.next_message()? {
                     if let Topic::Raw(_, input) = &message.topic {
-                        if *input == RawStream::Gyro
-                            && let Ok(batch) = codec::decode::<GyroBatch>(&message.frame)
-                        {
-                            units.raw.extend(batch.to_core());
+                        match super::events(*input, &message.frame) {
+                            Some(events) => events.iter().for_each(|event| units.take(event)),
+                            None => {
+                                units.units.iter_mut().for_each(|unit| unit.receive(*input, &message.frame));
+                            }
                         }
-                        units.units.iter_mut().for_each(|unit| unit.receive(*input, &message.frame));
                         units.give_out();
                     }
                     watch.step();
@@ -119,6 +115,14 @@ impl<F: FnMut(&GyroTick, &[CorrectedTick], &Unit)> Together<F> {
             loaded.iter().map(|loaded| Offline::new(loaded, UnitSettings::default())).collect();
         let corrected = units.iter().map(|_| VecDeque::new()).collect();
         Self { units, raw: VecDeque::new(), corrected, each, count: 0 }
+    }
+
+    fn take(&mut self, event: &LogEvent) {
+        if let LogEvent::Gyro { tick, .. } = event {
+            self.raw.push_back(tick.clone());
+        }
+        self.units.iter_mut().for_each(|unit| unit.handle(event));
+        self.give_out();
     }
 
     /// Gives out what all of them have.

@@ -1,0 +1,115 @@
+//! A run on the table: its bins and its steps.
+
+use super::bins::{BIN_S, Binned, binned};
+use super::make::Wanted;
+use super::matching::{Matched, matched};
+use super::plateaus;
+use super::steps::Step;
+use crate::error::Error;
+use crate::modes::document::count_arcsec;
+use crate::modes::fit::deg_per_h;
+use crate::run::{Run, Watch};
+
+/// Share of a step's ticks that may be lost.
+const LOST: f64 = 0.05;
+/// A whole turn (°).
+const TURN_DEG: f64 = 360.0;
+
+/// One run with its steps.
+pub(super) struct Turned {
+    pub(super) binned: Binned,
+    pub(super) matched: Vec<Matched>,
+    pub(super) earth_start: Option<[f64; 3]>,
+}
+
+/// Reads one run and finds its steps; the inner error is a reason to refuse.
+pub(super) fn read<W: Watch>(
+    wanted: &Wanted<'_>,
+    number: usize,
+    run: &Run,
+    watch: &mut impl FnMut() -> W,
+    warnings: &mut Vec<String>,
+) -> Result<Result<Turned, String>, Error> {
+    let binned = binned(run, wanted.base, &mut *watch)?;
+    warnings.extend(binned.troubles.iter().map(|words| format!("{}: {words}", run.name)));
+    let counts: Vec<f64> =
+        (0..wanted.base.gyro.sensor.len()).map(|sensor| count_arcsec(wanted.base, sensor) / BIN_S).collect();
+    let found = plateaus::find(&binned.bins, &counts);
+    let own: Vec<Step> = wanted.steps.iter().filter(|step| step.run == number).copied().collect();
+    if own.is_empty() {
+        return Ok(Err(format!(
+            "no step is stated of log {} ({}): name it in --steps, or leave it out",
+            number + 1,
+            run.name
+        )));
+    }
+    let matched = match matched(&own, &binned.bins, &found) {
+        Ok(matched) => matched,
+        Err(reason) => return Ok(Err(reason)),
+    };
+    for one in &matched {
+        let bins = binned.bins.get(one.plateau.bins[0]..one.plateau.bins[1]).unwrap_or_default();
+        let [good, all] =
+            bins.iter().fold([0.0, 0.0], |[good, all], bin| [good + bin.good_s, all + bin.length_s]);
+        let [from, to] = one.plateau.window_s;
+        if good < (1.0 - LOST) * all {
+            return Ok(Err(format!(
+                "log {}: {:.1} % of the step of {from:.1}…{to:.1} s cannot be used, {:.0} % may be lost: cut it with --steps",
+                number + 1,
+                100.0 * (1.0 - good / all),
+                100.0 * LOST
+            )));
+        }
+        if bins.iter().any(|bin| bin.overrange) {
+            return Ok(Err(format!(
+                "log {}: a gyro is at its input limit in the step of {from:.1}…{to:.1} s ({} °/s): leave the step out, or turn slower",
+                number + 1,
+                one.step.rate_deg_per_s
+            )));
+        }
+    }
+    let place = wanted.place.get(number).or(wanted.place.first());
+    let earth_start = match place.map(|place| place.earth_rate_in_case(binned.first_force)) {
+        None => None,
+        Some(Some(rate)) => Some(rate.map(deg_per_h)),
+        Some(None) => {
+            return Ok(Err(format!(
+                "log {}: the unit cannot be levelled at its beginning: give --pitch and --roll of that moment",
+                number + 1
+            )));
+        }
+    };
+    Ok(Ok(Turned { binned, matched, earth_start }))
+}
+
+/// Cuts steps to whole turns, so that the Earth's horizontal part averages out.
+pub(super) fn whole_turns(run: &mut Turned, warnings: &mut Vec<String>) {
+    for one in &mut run.matched {
+        let [begin, end] = one.plateau.bins;
+        let bins = run.binned.bins.get(begin..end).unwrap_or_default();
+        let length_s: f64 = bins.iter().map(|bin| bin.length_s).sum();
+        let turns = libm::floor(one.step.rate_deg_per_s.abs() * length_s / TURN_DEG);
+        if one.step.rate_deg_per_s == 0.0 {
+            continue;
+        }
+        if turns < 1.0 {
+            warnings.push(format!(
+                "the step of {} °/s from {:.1} s on is less than a turn: up to the Earth's 15 °/h of its rate is left",
+                one.step.rate_deg_per_s, one.plateau.window_s[0]
+            ));
+            continue;
+        }
+        let wanted_s = turns * TURN_DEG / one.step.rate_deg_per_s.abs();
+        let mut taken = 0.0;
+        let count = bins.iter().take_while(|bin| {
+            taken += bin.length_s;
+            taken <= wanted_s + 0.5 * bin.length_s
+        });
+        let count = count.count().max(1);
+        one.plateau.bins = [begin, begin + count];
+        if let Some(last) = bins.get(count - 1) {
+            one.plateau.window_s[1] = last.begin_s + last.length_s;
+        }
+        one.plateau.rate = plateaus::mean(&bins[..count]);
+    }
+}
