@@ -31,7 +31,7 @@ use crate::drift::figures::{short, table};
 /// One fitted coefficient.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Coefficient {
-    /// What it is, such as "gyro x thermal_rate, run-up".
+    /// What it is, such as "gyro x thermal rate, run-up".
     pub name: String,
     /// Symbol of its unit of measure.
     pub unit: String,
