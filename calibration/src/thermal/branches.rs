@@ -12,7 +12,7 @@ const PLATEAU_S: f64 = 180.0;
 /// Windows on either side that a slope is taken over.
 const REACH: usize = 6;
 /// Pieces of a branch, by temperature.
-pub const PIECES: usize = 3;
+pub const PIECES: usize = 4;
 
 /// A stretch of nearly constant temperature.
 #[derive(Debug, Clone, Copy, PartialEq)]
