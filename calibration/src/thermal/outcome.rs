@@ -46,8 +46,13 @@ impl Found {
     pub(super) fn chosen(choice: Choice, spec: &Spec, solution: &Solution, level: bool) -> Self {
         let terms = spec.terms(level).into_iter().zip(solution.coefficients.iter().zip(&solution.sigmas));
         let mut remarks = Vec::new();
-        if solution.outliers > 0 {
-            remarks.push(format!("{} windows were left out as spikes", solution.outliers));
+        // A few are the fit's own business; more are somebody's.
+        if 10 * solution.outliers > solution.residual.len() {
+            remarks.push(format!(
+                "{} of {} windows were left out as spikes: look at the log, something disturbs the sensor",
+                solution.outliers,
+                solution.residual.len()
+            ));
         }
         if spec.trend {
             remarks.push(
@@ -163,6 +168,9 @@ impl Outcome {
             again = false;
         };
         self.say(&mut verdicts);
+        for (sensor, _, found) in self.found.iter().filter(|(_, _, found)| found.refused.is_none()) {
+            self.warnings.extend(found.remarks.iter().map(|words| format!("{}: {words}", sensor.name)));
+        }
         let mut document = document;
         document.origin = Some(self.origin(origin, &verdicts));
         let written = Written::of(&document)?;
@@ -244,9 +252,7 @@ impl Outcome {
                 *verdict = verdict.clone().refused(why.clone());
             } else {
                 verdict.accepted = true;
-                let mut words = vec![found.words.clone()];
-                words.extend(found.remarks.iter().cloned());
-                *verdict = verdict.clone().remark(words.join("; "));
+                *verdict = verdict.clone().remark(found.words.clone());
             }
         }
     }

@@ -198,7 +198,10 @@ impl Target {
         let mut drifting: Vec<Tried> = Vec::new();
         for one in tried {
             let name = &one.spec.dynamics.name;
-            if drifting.iter().any(|done| done.spec.dynamics.name == *name) {
+            // Without a dynamic term a drift takes what a lag has left, and the next run pays for it.
+            if one.spec.dynamics.terms.is_empty()
+                || drifting.iter().any(|done| done.spec.dynamics.name == *name)
+            {
                 continue;
             }
             let same = tried.iter().filter(|other| other.spec.dynamics.name == *name);
