@@ -219,6 +219,7 @@ fn between_turns(temperature: &[f64], stands_out: f64) -> Vec<[usize; 2]> {
 }
 
 #[cfg(test)]
+#[expect(clippy::cast_precision_loss, reason = "small numbers")]
 mod tests {
     use super::*;
 

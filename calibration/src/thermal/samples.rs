@@ -169,6 +169,7 @@ fn by_sensor(patterns: &[[&[f64]; 3]], count: usize) -> Vec<Vec<f64>> {
 }
 
 #[cfg(test)]
+#[expect(clippy::cast_precision_loss, reason = "small numbers")]
 mod tests {
     use super::*;
 

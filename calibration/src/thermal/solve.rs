@@ -147,6 +147,7 @@ pub(super) fn median(values: &mut [f64]) -> Option<f64> {
 }
 
 #[cfg(test)]
+#[expect(clippy::cast_precision_loss, reason = "small numbers")]
 mod tests {
     use super::*;
 
