@@ -20,7 +20,9 @@ pub mod bare;
 pub mod branches;
 pub mod checks;
 pub mod columns;
+mod filter;
 pub mod fit;
+mod known;
 pub mod model;
 mod outcome;
 pub mod samples;
@@ -29,6 +31,8 @@ pub mod select;
 pub mod sequential;
 pub mod settings;
 pub mod solve;
+mod target;
+mod told;
 
 pub use fit::{Fitted, fit};
 pub use settings::{Method, Settings, Site, Terms};

@@ -1,9 +1,9 @@
 //! `isotherm-calibrate thermal`.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use isotherm_correction::earth::Place;
 use isotherm_correction::units::Span;
 use isotherm_log::file::refuse_overwriting;
 use isotherm_protocol::document::Created;
@@ -79,7 +79,7 @@ pub(super) struct ThermalArgs {
     /// Pitch of the case's x axis above the horizon (°)
     #[arg(long, value_name = "DEG", requires_all = ["roll", "latitude"], allow_negative_numbers = true)]
     pitch: Option<f64>,
-    /// Take the mean of each run off, because its attitude is not known; so it is without --latitude, too
+    /// Take the mean of each run off, as it is done without --latitude
     #[arg(long, conflicts_with = "latitude")]
     remove_mean: bool,
     /// Windows of the fit (s)
@@ -130,7 +130,7 @@ impl ThermalArgs {
             let runs = (only.runs.as_slice(), only.judges.as_slice());
             let base = only.base.as_ref().map(|base| &base.document);
             let fitted = fit(base, runs, &settings, origin, Bar::at_work("fitting"))?;
-            self.give_out(&fitted, |path| path.to_path_buf())?;
+            self.give_out(&fitted, Path::to_path_buf)?;
             let report = &fitted.report;
             if self.json {
                 print(format!("{}\n", report.to_json()).as_bytes())?;
@@ -138,7 +138,11 @@ impl ThermalArgs {
                 print(report.to_text().as_bytes())?;
             }
             let refusals = report.refusals();
-            return if refusals.is_empty() || self.accept_partial { Ok(()) } else { Err(Error::Refused(refusals)) };
+            return if refusals.is_empty() || self.accept_partial {
+                Ok(())
+            } else {
+                Err(Error::Refused(refusals))
+            };
         }
         self.batch(&work, &settings, &origin)
     }
@@ -150,12 +154,17 @@ impl ThermalArgs {
         origin: &isotherm_protocol::document::Origin,
     ) -> Result<(), Error> {
         let bar = Bar::at_work("fitting units");
-        let made = in_parallel(work, |_| (), |one| {
-            let runs = (one.runs.as_slice(), one.judges.as_slice());
-            let fitted = fit(one.base.as_ref().map(|base| &base.document), runs, settings, origin.clone(), ())?;
-            self.give_out(&fitted, |path| of_unit(path, one.unit.as_str()))?;
-            Ok::<_, Error>(fitted)
-        });
+        let made = in_parallel(
+            work,
+            |_| (),
+            |one| {
+                let runs = (one.runs.as_slice(), one.judges.as_slice());
+                let fitted =
+                    fit(one.base.as_ref().map(|base| &base.document), runs, settings, origin.clone(), ())?;
+                self.give_out(&fitted, |path| of_unit(path, one.unit.as_str()))?;
+                Ok::<_, Error>(fitted)
+            },
+        );
         bar.finish();
         let mut table = BatchTable::default();
         let (mut refusals, mut reports) = (Vec::new(), Vec::new());
@@ -194,7 +203,12 @@ impl ThermalArgs {
     /// The units with their documents and runs.
     fn work(&self) -> Result<Vec<Work>, Error> {
         let folder = self.document.as_ref().filter(|path| path.is_dir());
-        let single = self.document.as_ref().filter(|path| !path.is_dir()).map(|path| Written::read(path)).transpose()?;
+        let single = self
+            .document
+            .as_ref()
+            .filter(|path| !path.is_dir())
+            .map(|path| Written::read(path))
+            .transpose()?;
         let fallback = single.as_ref().map(|written| written.loaded.unit.clone());
         let units = self.log.reading.runs(&self.log.log, fallback.as_ref())?;
         let judging = Reading {
@@ -202,8 +216,11 @@ impl ThermalArgs {
             duration: self.judge_duration.map(Span::from_s),
             ..self.log.reading.clone()
         };
-        let mut judges =
-            if self.judge.is_empty() { Default::default() } else { judging.runs(&self.judge, fallback.as_ref())? };
+        let mut judges = if self.judge.is_empty() {
+            BTreeMap::default()
+        } else {
+            judging.runs(&self.judge, fallback.as_ref())?
+        };
         let several = units.len() > 1;
         let mut work = Vec::new();
         for (unit, runs) in units {
@@ -281,26 +298,8 @@ impl ThermalArgs {
     fn site(&self) -> Result<Site, Error> {
         let (Some(latitude), Some(heading)) = (self.latitude, self.heading) else { return Ok(Site::Unknown) };
         let tilt = self.pitch.zip(self.roll).map(|(pitch, roll)| [pitch, roll]);
-        let words = |errors: Vec<isotherm_correction::earth::PlaceError>| {
+        Site::at(latitude, heading, tilt).map_err(|errors| {
             Error::Usage(errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
-        };
-        let place = Place::new(latitude, heading, tilt).map_err(words)?;
-        // At the pole the Earth turns about the vertical: where that axis is in the case, there gravity is.
-        let force_m_per_s2 = match tilt {
-            None => None,
-            Some(tilt) => {
-                let up = Place::new(90.0, heading, Some(tilt)).map_err(words)?.earth_rate_in_case(None);
-                let rate = isotherm_correction::earth::EARTH_RATE.as_rad_per_s();
-                up.map(|up| up.map(|part| part / rate * normal_gravity(latitude)))
-            }
-        };
-        Ok(Site::Known { place, force_m_per_s2 })
+        })
     }
-}
-
-/// Normal gravity on the ellipsoid (m/s²): Somigliana's formula, WGS 84.
-fn normal_gravity(latitude_deg: f64) -> f64 {
-    let sine = libm::sin(latitude_deg.to_radians());
-    let square = sine * sine;
-    9.780_325_335_9 * (1.0 + 1.931_852_652_41e-3 * square) / libm::sqrt(1.0 - 6.694_379_990_13e-3 * square)
 }

@@ -2,8 +2,8 @@
 
 use isotherm_correction::sample::OutputKind;
 use isotherm_protocol::document::{
-    Accel, AccelOutput, AccelSensor, Channel, Curve, Document, Filter, Gyro, GyroOutput, GyroSensor, Orientation, Shape,
-    Temperature, Unit,
+    Accel, AccelOutput, AccelSensor, Channel, Curve, Document, Filter, Gyro, GyroOutput, GyroSensor,
+    Orientation, Shape, Temperature, Unit,
 };
 
 use super::checks::median_step_s;
@@ -105,7 +105,8 @@ pub fn nominal_of(series: &Series) -> Result<Document, Error> {
     if names.is_empty() || (0..3).any(|index| channel_of("gyro", index).is_none()) {
         let list = names.iter().map(|name| name.as_str()).collect::<Vec<_>>().join(", ");
         return Err(Error::Refused(vec![if names.is_empty() {
-            "the log has no temperature: a thermal fit needs at least one channel; name it in the mapping".to_owned()
+            "the log has no temperature: a thermal fit needs at least one channel; name it in the mapping"
+                .to_owned()
         } else {
             format!(
                 "which temperature channel each gyro follows cannot be told from their names ({list}): give a document that says so \
@@ -117,8 +118,17 @@ pub fn nominal_of(series: &Series) -> Result<Document, Error> {
     Ok(document(series, &channel_of, has_accel))
 }
 
-fn document(series: &Series, channel_of: &dyn Fn(&str, usize) -> Option<String>, has_accel: bool) -> Document {
-    let unit_rows = || Orientation { rows: vec![[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], weights: None, thermal: None, parity: None };
+fn document(
+    series: &Series,
+    channel_of: &dyn Fn(&str, usize) -> Option<String>,
+    has_accel: bool,
+) -> Document {
+    let unit_rows = || Orientation {
+        rows: vec![[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+        weights: None,
+        thermal: None,
+        parity: None,
+    };
     let orientation = unit_rows();
     let gyro = |(index, name): (usize, &&str)| GyroSensor {
         name: (*name).to_owned(),
@@ -163,7 +173,8 @@ fn document(series: &Series, channel_of: &dyn Fn(&str, usize) -> Option<String>,
             spike_limit_deg_c: spike_limit(&readings.raw),
         })
         .collect();
-    let step = series.temperatures.values().map(|channel| median_step_s(&channel.time_ns)).fold(0.0, f64::max);
+    let step =
+        series.temperatures.values().map(|channel| median_step_s(&channel.time_ns)).fold(0.0, f64::max);
     Document {
         schema: isotherm_protocol::document::CURRENT_SCHEMA,
         unit: series.unit.to_string(),
@@ -171,7 +182,11 @@ fn document(series: &Series, channel_of: &dyn Fn(&str, usize) -> Option<String>,
         note: None,
         origin: None,
         temperature: Temperature { assumed_deg_c: 25.0, filter: Some(filter(step)), channel: channels },
-        gyro: Gyro { output: GyroOutput::Mean, sensor: AXES.iter().enumerate().map(gyro).collect(), orientation },
+        gyro: Gyro {
+            output: GyroOutput::Mean,
+            sensor: AXES.iter().enumerate().map(gyro).collect(),
+            orientation,
+        },
         accel: has_accel.then(|| Accel {
             output: AccelOutput::MetresPerSecondSquared,
             sensor: AXES.iter().enumerate().map(accel).collect(),
@@ -186,8 +201,8 @@ fn document(series: &Series, channel_of: &dyn Fn(&str, usize) -> Option<String>,
 #[must_use]
 pub fn filter(step_s: f64) -> Filter {
     // Readings about a second apart belong on a grid of a second.
-    let steps = [0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 60.0];
-    let grid = steps.into_iter().find(|step| *step > 0.8 * step_s).unwrap_or(60.0);
+    let grids = [0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 60.0];
+    let grid = grids.into_iter().find(|step| *step > 0.8 * step_s).unwrap_or(60.0);
     Filter {
         grid_step_s: grid,
         smoothing_s: 10.0 * grid,
@@ -199,8 +214,12 @@ pub fn filter(step_s: f64) -> Filter {
 
 /// A spike limit that the log's own slope does not touch.
 fn spike_limit(raw: &[f64]) -> f64 {
-    let mut steps: Vec<f64> =
-        raw.iter().zip(raw.iter().skip(1)).map(|(a, b)| (b - a).abs()).filter(|step| step.is_finite()).collect();
+    let mut steps: Vec<f64> = raw
+        .iter()
+        .zip(raw.iter().skip(1))
+        .map(|(a, b)| (b - a).abs())
+        .filter(|step| step.is_finite())
+        .collect();
     steps.sort_unstable_by(f64::total_cmp);
     let high = steps.get(steps.len() * 99 / 100).copied().unwrap_or(0.0);
     if high > 0.2 { libm::ceil(10.0 * high) } else { 2.0 }

@@ -12,7 +12,7 @@ const PLATEAU_S: f64 = 180.0;
 /// Windows on either side that a slope is taken over.
 const REACH: usize = 6;
 /// Pieces of a branch, by temperature.
-pub const PIECES: usize = 3;
+pub const PIECES: usize = 4;
 
 /// A stretch of nearly constant temperature.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -59,7 +59,8 @@ impl History {
         let (low, high) = all().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), t| (l.min(t), h.max(t)));
         let mut history = Self { range_deg_c: [low, high], ..Self::default() };
         let slopes: Vec<Vec<f64>> = runs.iter().map(|(t, window)| slopes(t, *window)).collect();
-        let mut sizes: Vec<f64> = slopes.iter().flatten().filter(|s| s.is_finite()).map(|s| s.abs()).collect();
+        let mut sizes: Vec<f64> =
+            slopes.iter().flatten().filter(|s| s.is_finite()).map(|s| s.abs()).collect();
         sizes.sort_unstable_by(f64::total_cmp);
         let fastest = sizes.get(sizes.len() * 98 / 100).copied().unwrap_or(0.0);
         let limit = (PLATEAU_SHARE * fastest).min(PLATEAU_DEG_C_PER_S);
@@ -101,7 +102,8 @@ impl History {
             let (index, piece) = (self.ramps.len(), self.ramps.len() * PIECES);
             let part = &temperature[from..to];
             let known = || part.iter().copied().filter(|t| t.is_finite());
-            let (low, high) = known().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), t| (l.min(t), h.max(t)));
+            let (low, high) =
+                known().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), t| (l.min(t), h.max(t)));
             for &t in part {
                 #[expect(
                     clippy::cast_possible_truncation,
@@ -109,7 +111,8 @@ impl History {
                     clippy::cast_precision_loss,
                     reason = "a share of a few"
                 )]
-                let third = ((t - low) / (high - low).max(1e-9) * PIECES as f64).clamp(0.0, PIECES as f64 - 1.0) as usize;
+                let third = ((t - low) / (high - low).max(1e-9) * PIECES as f64)
+                    .clamp(0.0, PIECES as f64 - 1.0) as usize;
                 self.piece.push(piece + third);
                 self.ramp.push(index);
             }
@@ -137,7 +140,9 @@ impl History {
     #[must_use]
     pub fn both_directions(&self) -> bool {
         let span = 0.2 * (self.range_deg_c[1] - self.range_deg_c[0]);
-        let moves = |sign: f64| self.ramps.iter().any(|ramp| sign * (ramp.from_to_deg_c[1] - ramp.from_to_deg_c[0]) > span);
+        let moves = |sign: f64| {
+            self.ramps.iter().any(|ramp| sign * (ramp.from_to_deg_c[1] - ramp.from_to_deg_c[0]) > span)
+        };
         moves(1.0) && moves(-1.0)
     }
 
@@ -214,6 +219,7 @@ fn between_turns(temperature: &[f64], stands_out: f64) -> Vec<[usize; 2]> {
 }
 
 #[cfg(test)]
+#[expect(clippy::cast_precision_loss, reason = "small numbers")]
 mod tests {
     use super::*;
 

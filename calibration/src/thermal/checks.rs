@@ -34,7 +34,8 @@ pub struct Findings {
 #[must_use]
 pub fn median_step_s(times_ns: &[i64]) -> f64 {
     #[expect(clippy::cast_precision_loss, reason = "steps of a log")]
-    let mut steps: Vec<f64> = times_ns.windows(2).map(|pair| pair[1].saturating_sub(pair[0]) as f64 * 1e-9).collect();
+    let mut steps: Vec<f64> =
+        times_ns.windows(2).map(|pair| pair[1].saturating_sub(pair[0]) as f64 * 1e-9).collect();
     median(&mut steps).unwrap_or(0.0)
 }
 
@@ -107,7 +108,8 @@ fn gaps(found: &mut Findings, name: &str, kind: &str, ticks: &Ticks) {
     let first = ticks.end_ns.first().copied().unwrap_or_default();
     for pair in ticks.end_ns.windows(2) {
         #[expect(clippy::cast_precision_loss, reason = "steps of a log")]
-        let (gap, since) = (pair[1].saturating_sub(pair[0]) as f64 * 1e-9, pair[0].saturating_sub(first) as f64 * 1e-9);
+        let (gap, since) =
+            (pair[1].saturating_sub(pair[0]) as f64 * 1e-9, pair[0].saturating_sub(first) as f64 * 1e-9);
         if gap > 3.0 * step {
             count += 1;
             missing += gap - step;
@@ -129,7 +131,8 @@ fn gaps(found: &mut Findings, name: &str, kind: &str, ticks: &Ticks) {
 /// Gyros with a rate output must be near rest.
 fn rates(found: &mut Findings, name: &str, ticks: &Ticks) {
     for (index, readings) in ticks.readings.iter().enumerate() {
-        let mut sizes: Vec<f64> = readings.iter().filter(|r| r.is_finite()).map(|r| r.abs().to_degrees()).collect();
+        let mut sizes: Vec<f64> =
+            readings.iter().filter(|r| r.is_finite()).map(|r| r.abs().to_degrees()).collect();
         let Some(usual) = median(&mut sizes) else { continue };
         if usual > FASTEST_DEG_PER_S {
             found.refusals.push(format!(
@@ -153,13 +156,16 @@ fn thermometer(found: &mut Findings, name: &str, channel: &str, readings: &crate
         return;
     }
     if bad > 0 {
-        found.warnings.push(format!("{name}: temperature channel {channel:?}: {bad} readings are no numbers and are passed over"));
+        found.warnings.push(format!(
+            "{name}: temperature channel {channel:?}: {bad} readings are no numbers and are passed over"
+        ));
     }
     // A temperature moves slowly: from reading to reading it changes by a small share of what it does over the run.
-    let (low, high) = good.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), t| (l.min(*t), h.max(*t)));
+    let (low, high) =
+        good.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), t| (l.min(*t), h.max(*t)));
     let mut steps: Vec<f64> = good.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
     let usual = median(&mut steps).unwrap_or(0.0);
-    if high > low && usual > 0.05 * (high - low) {
+    if usual > 0.5 && usual > 0.05 * (high - low) {
         found.refusals.push(format!(
             "{name}: temperature channel {channel:?} jumps by {usual:.3} from reading to reading, over a range of {:.3}: that is no \
              temperature; are columns swapped in the mapping?",

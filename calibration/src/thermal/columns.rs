@@ -7,14 +7,14 @@
 
 use std::collections::BTreeMap;
 
-use isotherm_correction::sample::{GyroTick, OutputKind, TemperatureReading};
+use isotherm_correction::sample::{GyroTick, OutputKind, Sensors, TemperatureReading};
 use isotherm_correction::unit::UnitSettings;
 use isotherm_correction::units::{AngularRate, Span, Timestamp};
 use isotherm_log::offline::Offline;
 use isotherm_log::text::LogEvent;
 use isotherm_protocol::document::{
-    Argument, Branches, Channel, Curve, Document, Filter, Gyro, GyroOutput, GyroSensor, Lag, Orientation, Quantity,
-    Shape, Temperature,
+    Argument, Branches, Channel, Curve, Document, Filter, Gyro, GyroOutput, GyroSensor, Lag, Orientation,
+    Quantity, Shape, Temperature,
 };
 
 use super::samples::Samples;
@@ -41,7 +41,7 @@ pub enum Term {
     Rate(Branch, usize),
     /// (T − reference)ʲ·T̈.
     Acceleration(Branch, usize),
-    /// (T − reference)ʲ·(T − L_τ)/τ, τ in milliseconds.
+    /// `(T − reference)ʲ·(T − L_τ)/τ`, τ in milliseconds.
     Lag(u64, usize),
 }
 
@@ -185,7 +185,7 @@ impl Basis {
                 mode: None,
                 switch_command: false,
                 meander: None,
-                half_periods: Default::default(),
+                half_periods: Sensors::default(),
                 series: 0,
             };
             sequence += 1;
@@ -221,7 +221,8 @@ impl<'a> Windows<'a> {
         while self.run.time_s.get(self.at).is_some_and(|window| window + half < middle) {
             self.at += 1;
         }
-        if let (Some(window), Some((sums, length))) = (self.run.time_s.get(self.at), self.sums.get_mut(self.at))
+        if let (Some(window), Some((sums, length))) =
+            (self.run.time_s.get(self.at), self.sums.get_mut(self.at))
             && (window - middle).abs() <= half
         {
             sums.iter_mut().zip(angle).for_each(|(sum, angle)| *sum -= angle);
@@ -232,7 +233,11 @@ impl<'a> Windows<'a> {
     fn means(self) -> [Vec<f64>; 3] {
         let mean = |axis: usize| {
             let mean = |(sums, length): &([f64; 3], f64)| {
-                if *length > 0.0 { AngularRate::from_rad_per_s(sums[axis] / length).as_deg_per_h() } else { f64::NAN }
+                if *length > 0.0 {
+                    AngularRate::from_rad_per_s(sums[axis] / length).as_deg_per_h()
+                } else {
+                    f64::NAN
+                }
             };
             self.sums.iter().map(mean).collect()
         };
@@ -258,7 +263,8 @@ impl<'a> Columns<'a> {
     /// # Errors
     /// [`Error::Document`].
     pub fn make(&mut self, terms: &[Term]) -> Result<(), Error> {
-        let mut wanted: Vec<Term> = terms.iter().filter(|term| !self.known.contains_key(term)).copied().collect();
+        let mut wanted: Vec<Term> =
+            terms.iter().filter(|term| !self.known.contains_key(term)).copied().collect();
         wanted.sort_unstable();
         wanted.dedup();
         for group in wanted.chunks(3) {

@@ -74,9 +74,10 @@ pub fn described(term: Term, output: &str) -> (String, String) {
         Term::Rate(on, j) => {
             (format!("thermal rate{}, power {j}", branch(on)), format!("({output})/(°C/s){}", power(j)))
         }
-        Term::Acceleration(on, j) => {
-            (format!("thermal acceleration{}, power {j}", branch(on)), format!("({output})/(°C/s²){}", power(j)))
-        }
+        Term::Acceleration(on, j) => (
+            format!("thermal acceleration{}, power {j}", branch(on)),
+            format!("({output})/(°C/s²){}", power(j)),
+        ),
         Term::Lag(tau, j) => {
             (format!("lag of {} s, power {j}", seconds(tau)), format!("({output})/(°C/s){}", power(j)))
         }
@@ -128,10 +129,13 @@ fn of_lag(found: &[(Term, f64)], tau: u64) -> Vec<(usize, f64)> {
 
 /// Puts found coefficients (°/h and so on) into a gyro that has none of these terms.
 pub fn put_gyro(sensor: &mut GyroSensor, basis: &Basis, found: &[(Term, f64)]) {
-    sensor.static_bias = curve(basis, &powers(found, |term| match term {
-        Term::Static(power) => Some(power),
-        _ => None,
-    }));
+    sensor.static_bias = curve(
+        basis,
+        &powers(found, |term| match term {
+            Term::Static(power) => Some(power),
+            _ => None,
+        }),
+    );
     sensor.thermal_rate = branches(basis, found, |term| match term {
         Term::Rate(branch, power) => Some((branch, power)),
         _ => None,
@@ -140,7 +144,8 @@ pub fn put_gyro(sensor: &mut GyroSensor, basis: &Basis, found: &[(Term, f64)]) {
         Term::Acceleration(branch, power) => Some((branch, power)),
         _ => None,
     });
-    let lag = |tau: u64| Some(Lag { time_constant_s: seconds(tau), gain: curve(basis, &of_lag(found, tau))? });
+    let lag =
+        |tau: u64| Some(Lag { time_constant_s: seconds(tau), gain: curve(basis, &of_lag(found, tau))? });
     sensor.lag = taus(found).into_iter().filter_map(lag).collect();
 }
 
@@ -150,7 +155,8 @@ fn branches<Q: Quantity>(
     of: impl Fn(Term) -> Option<(Branch, usize)>,
 ) -> Option<Branches<Curve<Q>>> {
     let side = |side: Branch| {
-        let found = powers(found, |term| of(term).filter(|(on, _)| *on == Branch::Both || *on == side).map(|x| x.1));
+        let found =
+            powers(found, |term| of(term).filter(|(on, _)| *on == Branch::Both || *on == side).map(|x| x.1));
         curve(basis, &found)
     };
     match (side(Branch::RunUp), side(Branch::Braking)) {

@@ -1,18 +1,16 @@
 //! What a thermal fit came to: the document, its verdicts, its report.
 
-use isotherm_log::plot::page::Table;
 use isotherm_protocol::document::{Document, Filter, Origin, Sample};
 
 use super::branches::History;
 use super::columns::{Basis, Term};
 use super::fit::{Fitted, Lent, Sensor};
-use super::model::{Spec, described, put_accel, put_gyro};
+use super::model::{Spec, put_accel, put_gyro};
 use super::select::{Choice, WORTH_IT};
 use super::settings::{Settings, Site};
 use super::solve::Solution;
-use crate::drift::figures::short;
 use crate::error::Error;
-use crate::report::{Coefficient, Curve, FitReport, Figure, Rest, Verdict, judge, residuals};
+use crate::report::{Curve, Figure, Rest, Verdict, judge};
 use crate::run::{Run, Watch};
 use crate::written::Written;
 
@@ -40,14 +38,21 @@ impl Found {
         if left <= WORTH_IT * mean {
             return Self { terms, words: "plateaus, then Ṫ±, then T̈±".to_owned(), ..Self::default() };
         }
-        Self::refused(&format!("nothing beats its mean: the terms leave {left:.3e}, the mean {mean:.3e}, in sample"))
+        Self::refused(&format!(
+            "nothing beats its mean: the terms leave {left:.3e}, the mean {mean:.3e}, in sample"
+        ))
     }
 
     pub(super) fn chosen(choice: Choice, spec: &Spec, solution: &Solution, level: bool) -> Self {
         let terms = spec.terms(level).into_iter().zip(solution.coefficients.iter().zip(&solution.sigmas));
         let mut remarks = Vec::new();
-        if solution.outliers > 0 {
-            remarks.push(format!("{} windows were left out as spikes", solution.outliers));
+        // A few are the fit's own business; more are somebody's.
+        if 10 * solution.outliers > solution.residual.len() {
+            remarks.push(format!(
+                "{} of {} windows were left out as spikes: look at the log, something disturbs the sensor",
+                solution.outliers,
+                solution.residual.len()
+            ));
         }
         if spec.trend {
             remarks.push(
@@ -71,19 +76,19 @@ impl Found {
 pub(super) struct Outcome {
     pub(super) bare: Document,
     pub(super) warnings: Vec<String>,
-    base: Document,
-    filter: Filter,
-    settings: Settings,
-    found: Vec<(Sensor, Basis, Found)>,
-    notes: Vec<String>,
-    range_deg_c: [f64; 2],
-    rate_range_deg_c_per_s: [f64; 2],
+    pub(super) base: Document,
+    pub(super) filter: Filter,
+    pub(super) settings: Settings,
+    pub(super) found: Vec<(Sensor, Basis, Found)>,
+    pub(super) notes: Vec<String>,
+    pub(super) range_deg_c: [f64; 2],
+    pub(super) rate_range_deg_c_per_s: [f64; 2],
 }
 
 impl Outcome {
-    pub(super) fn new(base: &Document, bare: Document, filter: Filter, settings: &Settings) -> Self {
+    pub(super) fn new(base: &Document, without: Document, filter: Filter, settings: &Settings) -> Self {
         Self {
-            bare,
+            bare: without,
             warnings: Vec::new(),
             base: base.clone(),
             filter,
@@ -119,7 +124,10 @@ impl Outcome {
             .map(|plateau| format!("{:.1} °C for {:.0} min", plateau.deg_c, plateau.length_s / 60.0))
             .collect();
         let plateaus = if plateaus.is_empty() { "none".to_owned() } else { plateaus.join(", ") };
-        self.notes.push(format!("Channel {name}: {low:.1} to {high:.1} °C; ramps {}; plateaus {plateaus}.", ramps.join(", ")));
+        self.notes.push(format!(
+            "Channel {name}: {low:.1} to {high:.1} °C; ramps {}; plateaus {plateaus}.",
+            ramps.join(", ")
+        ));
     }
 
     /// Writes the document, judges it, and takes out what made an axis worse.
@@ -138,9 +146,10 @@ impl Outcome {
             let document = self.document();
             let written = Written::of(&document)?;
             let (mut curves, mut troubles) = (Vec::new(), Vec::new());
-            let both = runs.iter().map(|run| (run, Sample::In)).chain(judges.iter().map(|run| (run, Sample::Out)));
+            let both =
+                runs.iter().map(|run| (run, Sample::In)).chain(judges.iter().map(|run| (run, Sample::Out)));
             for (run, sample) in both {
-                let judged = judge(
+                let both_ways = judge(
                     run,
                     sample,
                     (&before.loaded, &written.loaded),
@@ -148,8 +157,8 @@ impl Outcome {
                     window_s,
                     Lent(&mut watch),
                 )?;
-                troubles.extend(judged.troubles.iter().map(|words| format!("{}: {words}", run.name)));
-                curves.extend(judged.curves);
+                troubles.extend(both_ways.troubles.iter().map(|words| format!("{}: {words}", run.name)));
+                curves.extend(both_ways.curves);
             }
             let verdicts = Curve::verdicts(&curves);
             let worse = self.take_out(&verdicts);
@@ -159,6 +168,9 @@ impl Outcome {
             again = false;
         };
         self.say(&mut verdicts);
+        for (sensor, _, found) in self.found.iter().filter(|(_, _, found)| found.refused.is_none()) {
+            self.warnings.extend(found.remarks.iter().map(|words| format!("{}: {words}", sensor.name)));
+        }
         let mut document = document;
         document.origin = Some(self.origin(origin, &verdicts));
         let written = Written::of(&document)?;
@@ -182,7 +194,8 @@ impl Outcome {
     fn document(&self) -> Document {
         let mut document = self.plain();
         for (sensor, basis, found) in &self.found {
-            let terms: Vec<(Term, f64)> = found.terms.iter().map(|(term, value, _)| (*term, *value)).collect();
+            let terms: Vec<(Term, f64)> =
+                found.terms.iter().map(|(term, value, _)| (*term, *value)).collect();
             if sensor.gyro {
                 let Some(gyro) = document.gyro.sensor.get_mut(sensor.index) else { continue };
                 match self.base.gyro.sensor.get(sensor.index).filter(|_| found.refused.is_some()) {
@@ -235,78 +248,13 @@ impl Outcome {
             verdict.figure = Figure::Rms;
             let mine = self.found.iter().find(|(sensor, ..)| axis_name(sensor).as_ref() == Some(&verdict.of));
             let Some((_, _, found)) = mine else { continue };
-            match &found.refused {
-                Some(why) => *verdict = verdict.clone().refused(why.clone()),
-                None => {
-                    verdict.accepted = true;
-                    let mut words = vec![found.words.clone()];
-                    words.extend(found.remarks.iter().cloned());
-                    *verdict = verdict.clone().remark(words.join("; "));
-                }
-            }
-        }
-    }
-
-    fn origin(&self, origin: Origin, verdicts: &[Verdict]) -> Origin {
-        let mut details = toml::Table::new();
-        let mut figures = toml::Table::new();
-        for (sensor, _, found) in &self.found {
-            let mut of_sensor = toml::Table::new();
-            of_sensor.insert("model".into(), found.words.clone().into());
             if let Some(why) = &found.refused {
-                of_sensor.insert("refused".into(), why.clone().into());
-            }
-            let sigmas = found.terms.iter().map(|(term, value, sigma)| {
-                let (name, unit) = described(*term, output(sensor));
-                let row = [("of", name.into()), ("unit", unit.into()), ("value", (*value).into()), ("sigma", (*sigma).into())];
-                toml::Value::Table(row.into_iter().map(|(key, value): (&str, toml::Value)| (key.to_owned(), value)).collect())
-            });
-            of_sensor.insert("coefficient".into(), toml::Value::Array(sigmas.collect()));
-            if let Some((choice, best)) = found.choice.as_ref().and_then(|choice| Some((choice, choice.best()?))) {
-                let mut validation = toml::Table::new();
-                validation.insert("left_of_mean".into(), choice.mean.into());
-                validation.insert("left".into(), best.score.into());
-                of_sensor.insert("cross_validation".into(), validation.into());
-            }
-            figures.insert(sensor.name.clone(), of_sensor.into());
-        }
-        details.insert("sensors".into(), figures.into());
-        details.insert("fit_window_s".into(), self.settings.fit_window_s.into());
-        details.insert("smoothing_s".into(), self.filter.smoothing_s.into());
-        details.insert("derivative_step_s".into(), self.filter.derivative_step_s.into());
-        details.insert("mean_removed".into(), (self.settings.site == Site::Unknown).into());
-        Origin {
-            method: Some(self.settings.method.name().to_owned()),
-            range_deg_c: Some(self.range_deg_c.map(|t| libm::round(10.0 * t) / 10.0)),
-            rate_range_deg_c_per_s: Some(self.rate_range_deg_c_per_s.map(|r| libm::round(1e5 * r) / 1e5)),
-            residual: residuals(verdicts),
-            details: Some(details),
-            ..origin
-        }
-    }
-
-    fn report(self, verdicts: Vec<Verdict>, curves: Vec<Curve>) -> FitReport {
-        let title = format!("Thermal calibration, method {}", self.settings.method.name());
-        let mut report = FitReport::new(title, self.base.unit.clone());
-        report.verdicts = verdicts;
-        report.warnings = self.warnings;
-        report.notes = self.notes;
-        report.notes.push(format!(
-            "Temperature is smoothed over {} s and differentiated over {} s on a grid of {} s: this filter belongs to the coefficients.",
-            self.filter.smoothing_s, self.filter.derivative_step_s, self.filter.grid_step_s
-        ));
-        if self.settings.site == Site::Unknown {
-            report.notes.push("The mean of each run is taken off: nothing is known of Earth rate and gravity along the axes.".into());
-        }
-        for (sensor, _, found) in &self.found {
-            for (term, value, sigma) in &found.terms {
-                let (name, unit) = described(*term, output(sensor));
-                report.coefficients.push(Coefficient::new(format!("{} {name}", sensor.name), unit, *value, Some(*sigma)));
+                *verdict = verdict.clone().refused(why.clone());
+            } else {
+                verdict.accepted = true;
+                *verdict = verdict.clone().remark(found.words.clone());
             }
         }
-        report.validation = validation(&self.found);
-        report.residuals = curves;
-        report
     }
 }
 
@@ -314,39 +262,4 @@ impl Outcome {
 fn axis_name(sensor: &Sensor) -> Option<String> {
     let axis = ["x", "y", "z"].get(sensor.index)?;
     Some(format!("{} {axis}", if sensor.gyro { "gyro" } else { "accelerometer" }))
-}
-
-/// Unit of a sensor's bias.
-fn output(sensor: &Sensor) -> &'static str {
-    if sensor.gyro { "°/h" } else { "output" }
-}
-
-/// The best model of each kind of dynamics, by sensor.
-fn validation(found: &[(Sensor, Basis, Found)]) -> Option<Table> {
-    let head = ["sensor", "model", "coefficients", "left where it was not fitted", "of the mean's", ""];
-    let mut rows = Vec::new();
-    for (sensor, _, found) in found {
-        let Some(choice) = &found.choice else { continue };
-        let mut seen: Vec<(&str, bool)> = Vec::new();
-        for tried in &choice.tried {
-            let kind = (tried.spec.dynamics.name.as_str(), tried.spec.trend);
-            if seen.contains(&kind) {
-                continue;
-            }
-            seen.push(kind);
-            let same = choice.tried.iter().filter(|other| (other.spec.dynamics.name.as_str(), other.spec.trend) == kind);
-            let chosen = choice.best().filter(|best| (best.spec.dynamics.name.as_str(), best.spec.trend) == kind);
-            let best = chosen.or_else(|| same.min_by(|a, b| a.score.total_cmp(&b.score)));
-            let Some(best) = best else { continue };
-            rows.push(vec![
-                sensor.name.clone(),
-                best.spec.words(),
-                best.count.to_string(),
-                short(best.score),
-                format!("{:.0} %", 100.0 * best.score / choice.mean),
-                if chosen.is_some() && found.refused.is_none() { "chosen".to_owned() } else { String::new() },
-            ]);
-        }
-    }
-    (!rows.is_empty()).then(|| Table { head: head.map(str::to_owned).to_vec(), rows })
 }

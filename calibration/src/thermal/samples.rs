@@ -60,8 +60,10 @@ impl Samples {
                 .collect()
         };
         let plain = pass(bare)?;
-        let rates: Vec<[&[f64]; 3]> = plain.iter().map(|means| [0, 1, 2].map(|axis| means.rate(axis))).collect();
-        let forces: Vec<[&[f64]; 3]> = plain.iter().map(|means| [0, 1, 2].map(|axis| means.force(axis))).collect();
+        let rates: Vec<[&[f64]; 3]> =
+            plain.iter().map(|means| [0, 1, 2].map(|axis| means.rate(axis))).collect();
+        let forces: Vec<[&[f64]; 3]> =
+            plain.iter().map(|means| [0, 1, 2].map(|axis| means.force(axis))).collect();
         let of_forces = by_sensor(&forces, accel_count);
         let mut responses = Vec::new();
         if accel_count > 0 {
@@ -123,7 +125,11 @@ pub fn readings(series: &Series) -> BTreeMap<String, Vec<TemperatureReading>> {
     let channel = |(name, channel): (&String, &crate::series::Channel)| {
         let known = ChannelName::from(name).ok()?;
         let pairs = channel.time_ns.iter().zip(&channel.raw);
-        let readings = pairs.map(|(time, raw)| TemperatureReading { channel: known, time: Timestamp::from_ns(*time), raw: *raw });
+        let readings = pairs.map(|(time, raw)| TemperatureReading {
+            channel: known,
+            time: Timestamp::from_ns(*time),
+            raw: *raw,
+        });
         Some((name.clone(), readings.collect()))
     };
     series.temperatures.iter().filter_map(channel).collect()
@@ -141,7 +147,7 @@ fn with_unit_bias(bare: &Document) -> Document {
 
 /// The outputs of single sensors from the means of those that share an axis.
 ///
-/// An axis with G sensors has m₀ = Σs/G, and m_p with the p-th turned round: s_p = G·(m₀ − m_p)/2.
+/// An axis with G sensors has `m_0 = Σs/G`, and `m_p` with the p-th turned round: `s_p = G·(m_0 − m_p)/2`.
 fn by_sensor(patterns: &[[&[f64]; 3]], count: usize) -> Vec<Vec<f64>> {
     let mut sensors = vec![Vec::new(); count];
     for axis in 0..3.min(count) {
@@ -152,7 +158,8 @@ fn by_sensor(patterns: &[[&[f64]; 3]], count: usize) -> Vec<Vec<f64>> {
         let mut rest: Vec<f64> = mean.iter().map(|mean| shared * mean).collect();
         for (pattern, sensor) in patterns.iter().skip(1).zip(mine.iter().skip(1)) {
             let turned = pattern[axis];
-            let own: Vec<f64> = mean.iter().zip(turned).map(|(all, turned)| 0.5 * shared * (all - turned)).collect();
+            let own: Vec<f64> =
+                mean.iter().zip(turned).map(|(all, turned)| 0.5 * shared * (all - turned)).collect();
             rest.iter_mut().zip(&own).for_each(|(rest, own)| *rest -= own);
             sensors[*sensor] = own;
         }
@@ -162,6 +169,7 @@ fn by_sensor(patterns: &[[&[f64]; 3]], count: usize) -> Vec<Vec<f64>> {
 }
 
 #[cfg(test)]
+#[expect(clippy::cast_precision_loss, reason = "small numbers")]
 mod tests {
     use super::*;
 

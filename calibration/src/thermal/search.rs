@@ -13,10 +13,10 @@ use super::model::{Dynamics, Spec};
 use super::select::Target;
 use crate::error::Error;
 
-/// Shortest time constant, in grid steps and in windows.
+/// Shortest time constant, in grid steps.
 const SHORTEST_GRID_STEPS: f64 = 3.0;
-/// Longest, as a share of the longest run, and at all (s).
-const LONGEST_SHARE: f64 = 0.25;
+/// Longest, as a share of the longest run (a longer one cannot be told from a drift with time), and at all (s).
+const LONGEST_SHARE: f64 = 0.1;
 const LONGEST_S: f64 = 3000.0;
 /// Points of the grid.
 const POINTS: usize = 16;
@@ -26,8 +26,10 @@ const COUNTS: [usize; 5] = [1, 2, 3, 5, 7];
 const DEGREE: usize = 3;
 /// Time constants of the fixed ladder (s), short and long.
 const SHORT_LADDER: [f64; 3] = [20.0, 100.0, 500.0];
-const SINGLE: [f64; 3] = [30.0, 100.0, 300.0];
+
 const LONG_LADDER: [f64; 5] = [12.0, 30.0, 75.0, 190.0, 480.0];
+/// Time constants that the joint method offers alone (s).
+const SINGLE: [f64; 3] = [30.0, 100.0, 300.0];
 
 /// Lags with gains of some degree in temperature.
 #[must_use]
@@ -63,7 +65,9 @@ pub fn ladders(gyro: bool, grid_step_s: f64, history: &History) -> Vec<Dynamics>
         ];
         all.push(named("Ṫ±, T̈±", &by_branch));
     }
-    let fit = |ladder: &[f64]| ladder.iter().map(|tau| tau.max(SHORTEST_GRID_STEPS * grid_step_s)).collect::<Vec<_>>();
+    let fit = |ladder: &[f64]| {
+        ladder.iter().map(|tau| tau.max(SHORTEST_GRID_STEPS * grid_step_s)).collect::<Vec<_>>()
+    };
     all.extend(SINGLE.map(|tau| lags(&fit(&[tau]), 0)));
     if history.tells_dynamics() {
         all.extend([&SHORT_LADDER[..], &LONG_LADDER[..]].map(|ladder| lags(&fit(ladder), 0)));
@@ -92,7 +96,6 @@ pub fn searched(
     let grid = ladder([shortest, longest], POINTS);
     columns.make(&(0..=DEGREE).map(Term::Static).collect::<Vec<_>>())?;
     columns.make(&grid.iter().map(|tau| Term::Lag(millis(*tau), 0)).collect::<Vec<_>>())?;
-    // What a level plateau or a third pass fixes is needed before a gain may change with temperature.
     let gains = usize::from(history.tells_dynamics());
     for count in COUNTS.into_iter().take(if history.tells_dynamics() { COUNTS.len() } else { 1 }) {
         let mut best: Option<(f64, Vec<f64>)> = None;
@@ -118,7 +121,9 @@ pub fn searched(
 /// Sum over the sensors of the logarithm of what is left.
 fn cost(columns: &Columns<'_>, targets: &[&Target], taus: &[f64]) -> f64 {
     let spec = Spec { degree: DEGREE, dynamics: lags(taus, 0), trend: false };
-    let left = |target: &&Target| target.solve(columns, &spec, false).map_or(0.0, |solution| libm::log(solution.rms));
+    let left = |target: &&Target| {
+        target.solve(columns, &spec, false).map_or(0.0, |solution| libm::log(solution.rms))
+    };
     targets.iter().map(left).sum()
 }
 

@@ -6,9 +6,9 @@ use super::model::{Dynamics, Spec};
 use super::solve::{Solution, once, solve};
 
 /// Score of a larger model, as a share of that of a smaller one, above which the smaller one is kept.
-const NO_BETTER: f64 = 0.97;
+const NO_BETTER: f64 = 0.985;
 /// Likewise for the drift with time, which stays out of the document and must be plain to be believed.
-const PLAIN_DRIFT: f64 = 0.85;
+const PLAIN_DRIFT: f64 = 0.8;
 /// Largest share of the mean's score with which an axis is accepted.
 pub const WORTH_IT: f64 = 0.9;
 
@@ -82,13 +82,23 @@ impl Target {
         let terms = spec.terms(self.level);
         let all: Vec<&[f64]> =
             terms.iter().map(|term| columns.get(*term)).chain(nuisance.iter().map(Vec::as_slice)).collect();
-        if robust { solve(&all, &self.values, &self.weights) } else { once(&all, &self.values, &self.weights) }
+        if robust {
+            solve(&all, &self.values, &self.weights)
+        } else {
+            once(&all, &self.values, &self.weights)
+        }
     }
 
     /// Root mean square of what a model leaves on pieces that were left out one by one, over temperatures that the others have
     /// too. `None` where too little can be judged.
     #[must_use]
-    pub fn score(&self, columns: &Columns<'_>, spec: &Spec, history: &History, temperature: &[f64]) -> Option<f64> {
+    pub fn score(
+        &self,
+        columns: &Columns<'_>,
+        spec: &Spec,
+        history: &History,
+        temperature: &[f64],
+    ) -> Option<f64> {
         let nuisance = self.nuisance(spec.trend);
         let terms = spec.terms(self.level);
         let all: Vec<&[f64]> =
@@ -162,15 +172,46 @@ impl Target {
             }
         }
         let mut chosen = smallest(&tried);
-        if let Some(best) = chosen.and_then(|index| tried.get(index)).cloned()
-            && let Some(score) = self.score(columns, &Spec { trend: true, ..best.spec.clone() }, history, temperature)
-        {
-            tried.push(Tried { spec: Spec { trend: true, ..best.spec }, count: best.count, score });
-            if score < PLAIN_DRIFT * best.score {
-                chosen = Some(tried.len() - 1);
-            }
+        if let Some(least) = chosen.and_then(|index| tried.get(index)).map(|best| best.score) {
+            let drifting = self.with_drift(columns, &tried, (history, temperature));
+            let first = tried.len();
+            tried.extend(drifting);
+            let plain = |(index, tried): (usize, &Tried)| {
+                (tried.score < PLAIN_DRIFT * least).then_some((index, tried.score))
+            };
+            let best =
+                tried.iter().enumerate().skip(first).filter_map(plain).min_by(|a, b| a.1.total_cmp(&b.1));
+            chosen = best.map_or(chosen, |(index, _)| Some(index));
         }
         Choice { mean, tried, chosen }
+    }
+}
+
+impl Target {
+    /// The best model of each kind of dynamics once more, beside a drift with time.
+    fn with_drift(
+        &self,
+        columns: &Columns<'_>,
+        tried: &[Tried],
+        (history, temperature): (&History, &[f64]),
+    ) -> Vec<Tried> {
+        let mut drifting: Vec<Tried> = Vec::new();
+        for one in tried {
+            let name = &one.spec.dynamics.name;
+            // Without a dynamic term a drift takes what a lag has left, and the next run pays for it.
+            if one.spec.dynamics.terms.is_empty()
+                || drifting.iter().any(|done| done.spec.dynamics.name == *name)
+            {
+                continue;
+            }
+            let same = tried.iter().filter(|other| other.spec.dynamics.name == *name);
+            let Some(best) = same.min_by(|a, b| a.score.total_cmp(&b.score)) else { continue };
+            let spec = Spec { trend: true, ..best.spec.clone() };
+            if let Some(score) = self.score(columns, &spec, history, temperature) {
+                drifting.push(Tried { spec, count: best.count, score });
+            }
+        }
+        drifting
     }
 }
 
@@ -178,8 +219,10 @@ impl Target {
 fn smallest(tried: &[Tried]) -> Option<usize> {
     let best = tried.iter().map(|tried| tried.score).fold(f64::INFINITY, f64::min);
     let good = tried.iter().enumerate().filter(|(_, tried)| tried.score * NO_BETTER <= best);
-    good.min_by(|(_, a), (_, b)| (a.count, a.score).partial_cmp(&(b.count, b.score)).unwrap_or(std::cmp::Ordering::Equal))
-        .map(|(index, _)| index)
+    good.min_by(|(_, a), (_, b)| {
+        (a.count, a.score).partial_cmp(&(b.count, b.score)).unwrap_or(std::cmp::Ordering::Equal)
+    })
+    .map(|(index, _)| index)
 }
 
 /// Weights that keep slow parts from dominating: no temperature counts for more than [`CROWDED`] times what is usual, so that a hold of

@@ -32,6 +32,9 @@ pub fn degree(history: &History) -> usize {
 }
 
 /// Finds the coefficients of one sensor: `steps` are the terms of each step after the plateaus.
+///
+/// # Errors
+/// Why the log does not allow it, and what to do.
 pub fn find(columns: &Columns<'_>, target: &Target, history: &History, steps: &[Vec<Term>]) -> Found {
     let levels = history.levels();
     if levels < 2 {
@@ -54,15 +57,19 @@ pub fn find(columns: &Columns<'_>, target: &Target, history: &History, steps: &[
     let all: Vec<&[f64]> =
         statics.iter().map(|term| columns.get(*term)).chain(levels.iter().map(Vec::as_slice)).collect();
     let solution = solve(&all, &target.values, &resting).ok_or("too few windows on plateaus")?;
-    let mut found: Vec<(Term, f64, f64)> =
-        statics.iter().enumerate().map(|(i, term)| (*term, solution.coefficients[i], solution.sigmas[i])).collect();
+    let mut found: Vec<(Term, f64, f64)> = statics
+        .iter()
+        .enumerate()
+        .map(|(i, term)| (*term, solution.coefficients[i], solution.sigmas[i]))
+        .collect();
     let rest = solution.residual;
     let mut parts: Vec<Vec<(Term, f64, f64)>> =
         steps.iter().map(|terms| terms.iter().map(|term| (*term, 0.0, 0.0)).collect()).collect();
     for _ in 0..ROUNDS {
         let mut still = true;
         for step in 0..parts.len() {
-            let others = parts.iter().enumerate().filter(|(other, _)| *other != step).flat_map(|(_, part)| part);
+            let others =
+                parts.iter().enumerate().filter(|(other, _)| *other != step).flat_map(|(_, part)| part);
             let mut left = rest.clone();
             for (term, value, _) in others {
                 left.iter_mut().zip(columns.get(*term)).for_each(|(left, column)| *left -= value * column);
@@ -93,7 +100,8 @@ pub fn left(columns: &Columns<'_>, target: &Target, found: &[(Term, f64, f64)]) 
     let runs = target.run.last().map_or(0, |last| last + 1);
     let (mut square, mut weight) = (0.0, 0.0);
     for run in 0..runs {
-        let rows = || (0..residual.len()).filter(move |&row| target.run[row] == run && target.weights[row] > 0.0);
+        let rows =
+            || (0..residual.len()).filter(move |&row| target.run[row] == run && target.weights[row] > 0.0);
         let good = || rows().filter(|&row| residual[row].is_finite());
         let all: f64 = good().map(|row| target.weights[row]).sum();
         let mean = if target.level || all <= 0.0 {
@@ -101,7 +109,9 @@ pub fn left(columns: &Columns<'_>, target: &Target, found: &[(Term, f64, f64)]) 
         } else {
             good().map(|row| target.weights[row] * residual[row]).sum::<f64>() / all
         };
-        square += good().map(|row| target.weights[row] * (residual[row] - mean) * (residual[row] - mean)).sum::<f64>();
+        square += good()
+            .map(|row| target.weights[row] * (residual[row] - mean) * (residual[row] - mean))
+            .sum::<f64>();
         weight += all;
     }
     if weight > 0.0 { (square / weight).sqrt() } else { f64::NAN }

@@ -1,6 +1,6 @@
 //! What may be asked of a thermal fit.
 
-use isotherm_correction::earth::Place;
+use isotherm_correction::earth::{EARTH_RATE, Place, PlaceError};
 use isotherm_protocol::document::Created;
 
 /// How the coefficients are found.
@@ -48,6 +48,34 @@ pub enum Site {
         /// Specific force at rest in case axes (m/s²), where pitch and roll were stated.
         force_m_per_s2: Option<[f64; 3]>,
     },
+}
+
+impl Site {
+    /// A place by latitude and heading (°), and pitch and roll (°) where they are known.
+    ///
+    /// # Errors
+    /// Every angle that is no number or outside its range.
+    pub fn at(
+        latitude_deg: f64,
+        heading_deg: f64,
+        tilt_deg: Option<[f64; 2]>,
+    ) -> Result<Self, Vec<PlaceError>> {
+        let place = Place::new(latitude_deg, heading_deg, tilt_deg)?;
+        // At the pole the Earth turns about the vertical: where that axis is in the case, there gravity is.
+        let up = match tilt_deg {
+            Some(tilt) => Place::new(90.0, heading_deg, Some(tilt))?.earth_rate_in_case(None),
+            None => None,
+        };
+        let gravity = normal_gravity(latitude_deg) / EARTH_RATE.as_rad_per_s();
+        Ok(Self::Known { place, force_m_per_s2: up.map(|up| up.map(|part| part * gravity)) })
+    }
+}
+
+/// Normal gravity on the ellipsoid (m/s²): Somigliana's formula, WGS 84.
+fn normal_gravity(latitude_deg: f64) -> f64 {
+    let sine = libm::sin(latitude_deg.to_radians());
+    let square = sine * sine;
+    9.780_325_335_9 * (1.0 + 1.931_852_652_41e-3 * square) / libm::sqrt(1.0 - 6.694_379_990_13e-3 * square)
 }
 
 /// All of it.

@@ -53,7 +53,9 @@ pub fn solve(columns: &[&[f64]], target: &[f64], weights: &[f64]) -> Option<Solu
 pub fn once(columns: &[&[f64]], target: &[f64], weights: &[f64]) -> Option<Solution> {
     let good: Vec<usize> = (0..target.len())
         .filter(|&row| {
-            target[row].is_finite() && weights[row] > 0.0 && columns.iter().all(|column| column[row].is_finite())
+            target[row].is_finite()
+                && weights[row] > 0.0
+                && columns.iter().all(|column| column[row].is_finite())
         })
         .collect();
     let (rows, count) = (good.len(), columns.len());
@@ -71,14 +73,18 @@ pub fn once(columns: &[&[f64]], target: &[f64], weights: &[f64]) -> Option<Solut
         Some(&row) => weights[row].sqrt() * columns[j][row] * scale(norms[j]),
         None => f64::from(u8::from(i - rows == j)) * ridge,
     });
-    let right = DVector::from_fn(rows + count, |i, _| good.get(i).map_or(0.0, |&row| weights[row].sqrt() * target[row]));
+    let right = DVector::from_fn(rows + count, |i, _| {
+        good.get(i).map_or(0.0, |&row| weights[row].sqrt() * target[row])
+    });
     let qr = matrix.qr();
     let r = qr.r();
     let projected = qr.q().transpose() * right;
     let scaled = r.solve_upper_triangular(&projected)?;
     let coefficients: Vec<f64> = scaled.iter().zip(&norms).map(|(c, norm)| c * scale(*norm)).collect();
     let residual: Vec<f64> = (0..target.len())
-        .map(|row| columns.iter().zip(&coefficients).fold(target[row], |rest, (column, c)| rest - c * column[row]))
+        .map(|row| {
+            columns.iter().zip(&coefficients).fold(target[row], |rest, (column, c)| rest - c * column[row])
+        })
         .collect();
     let weight: f64 = good.iter().map(|&row| weights[row]).sum();
     let square: f64 = good.iter().map(|&row| weights[row] * residual[row] * residual[row]).sum();
@@ -86,7 +92,8 @@ pub fn once(columns: &[&[f64]], target: &[f64], weights: &[f64]) -> Option<Solut
     #[expect(clippy::cast_precision_loss, reason = "rows of a fit are far below 2⁵³")]
     let (free, all) = ((rows - count) as f64, rows as f64);
     let variance = square / weight * all / free * (weight / all) * inflation(&residual, &good);
-    let sigmas = (0..count).map(|j| (variance * inverse.row(j).norm_squared()).sqrt() * scale(norms[j])).collect();
+    let sigmas =
+        (0..count).map(|j| (variance * inverse.row(j).norm_squared()).sqrt() * scale(norms[j])).collect();
     let finite = coefficients.iter().all(|c| c.is_finite());
     finite.then(|| Solution { coefficients, sigmas, residual, rms: (square / weight).sqrt(), outliers: 0 })
 }
@@ -113,7 +120,8 @@ fn spikes(residual: &[f64], weights: &[f64]) -> Vec<f64> {
         let mut others: Vec<f64> = others.map(|other| residual[other]).collect();
         median(&mut others)
     };
-    let away: Vec<f64> = (0..residual.len()).map(|row| near(row).map_or(f64::NAN, |near| residual[row] - near)).collect();
+    let away: Vec<f64> =
+        (0..residual.len()).map(|row| near(row).map_or(f64::NAN, |near| residual[row] - near)).collect();
     let known = away.iter().zip(weights).filter(|(away, weight)| away.is_finite() && **weight > 0.0);
     let mut sizes: Vec<f64> = known.map(|(away, _)| away.abs()).collect();
     let sigma = median(&mut sizes).map_or(0.0, |middle| 1.4826 * middle);
@@ -139,6 +147,7 @@ pub(super) fn median(values: &mut [f64]) -> Option<f64> {
 }
 
 #[cfg(test)]
+#[expect(clippy::cast_precision_loss, reason = "small numbers")]
 mod tests {
     use super::*;
 

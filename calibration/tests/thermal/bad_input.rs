@@ -50,7 +50,10 @@ fn run(seconds: std::ops::Range<u32>, read: impl Fn(u32) -> Second) -> Run {
         let time = Timestamp::from_ns(i64::from(second) * 1_000_000_000);
         events.push(LogEvent::Temperature(TemperatureReading { channel, time, raw: deg_c }));
         let readings = forces.into_iter().collect();
-        events.push(LogEvent::Accel { output: OutputKind::Mean, tick: AccelTick { sequence, end_time, duration, readings } });
+        events.push(LogEvent::Accel {
+            output: OutputKind::Mean,
+            tick: AccelTick { sequence, end_time, duration, readings },
+        });
         let tick = GyroTick {
             sequence,
             end_time,
@@ -81,13 +84,20 @@ fn refused(run: Run, words: &[&str]) {
 fn a_sound_log_is_fitted() {
     let made = tried(run(0..5400, usual), Method::Joint).unwrap();
     assert!(made.report.accepted(), "{}", made.report.to_text());
-    assert!(made.report.verdicts.iter().all(|verdict| verdict.factor().unwrap() > 5.0), "{}", made.report.to_text());
+    assert!(
+        made.report.verdicts.iter().all(|verdict| verdict.factor().unwrap() > 5.0),
+        "{}",
+        made.report.to_text()
+    );
     assert!(made.report.warnings.is_empty(), "{:?}", made.report.warnings);
 }
 
 #[test]
 fn constant_temperature_is_refused() {
-    refused(run(0..3000, |s| Second { deg_c: 20.0 + 1e-3 * f64::from(s % 7), ..usual(s) }), &["5 °C", "run the chamber"]);
+    refused(
+        run(0..3000, |s| Second { deg_c: 20.0 + 1e-3 * f64::from(s % 7), ..usual(s) }),
+        &["5 °C", "run the chamber"],
+    );
 }
 
 #[test]
@@ -122,7 +132,11 @@ fn a_dead_sensor_is_refused_and_the_others_are_fitted() {
     });
     let made = tried(zero, Method::Joint).unwrap();
     let of = |name: &str| made.report.verdicts.iter().find(|verdict| verdict.of == name).unwrap();
-    assert!(!of("gyro y").accepted && of("gyro y").reason.contains("reads zero throughout"), "{:?}", of("gyro y"));
+    assert!(
+        !of("gyro y").accepted && of("gyro y").reason.contains("reads zero throughout"),
+        "{:?}",
+        of("gyro y")
+    );
     assert!(of("gyro x").accepted && of("gyro z").accepted);
     assert!(made.written.document.gyro.sensor[1].static_bias.is_none());
 }
@@ -137,7 +151,11 @@ fn readings_that_are_no_numbers_are_told_or_refused() {
         second
     });
     let made = tried(some, Method::Joint).unwrap();
-    assert!(made.report.warnings.iter().any(|words| words.contains("are no numbers")), "{:?}", made.report.warnings);
+    assert!(
+        made.report.warnings.iter().any(|words| words.contains("are no numbers")),
+        "{:?}",
+        made.report.warnings
+    );
     assert!(made.report.accepted());
     let all = run(0..5400, |s| Second { rates: [f64::NAN, 0.0, 0.0], ..usual(s) });
     refused(all, &["no numbers", "check the sensor"]);
@@ -149,9 +167,18 @@ fn one_direction_and_too_few_plateaus_are_told() {
     let made = tried(upwards(), Method::Joint).unwrap();
     let told = |words: &str| made.report.warnings.iter().any(|warning| warning.contains(words));
     assert!(told("one way only") && told("plateaus"), "{:?}", made.report.warnings);
-    assert!(made.written.document.gyro.sensor.iter().all(|gyro| gyro.lag.is_empty() && gyro.thermal_rate.is_none()));
+    assert!(
+        made.written
+            .document
+            .gyro
+            .sensor
+            .iter()
+            .all(|gyro| gyro.lag.is_empty() && gyro.thermal_rate.is_none())
+    );
     let made = tried(upwards(), Method::Sequential).unwrap();
-    assert!(made.report.verdicts.iter().all(|verdict| !verdict.accepted && verdict.reason.contains("both ways")));
+    assert!(
+        made.report.verdicts.iter().all(|verdict| !verdict.accepted && verdict.reason.contains("both ways"))
+    );
 }
 
 #[test]

@@ -19,14 +19,18 @@ fn log() -> Option<PathBuf> {
     let beside = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data");
     let folder = std::env::var_os("ISOTHERM_DATA").map_or_else(|| PathBuf::from(beside), PathBuf::from);
     let other = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data"));
-    [folder, other].into_iter().map(|folder| folder.join("chamber-mems/chamber.tsv")).find(|path| path.exists())
+    [folder, other]
+        .into_iter()
+        .map(|folder| folder.join("chamber-mems/chamber.tsv"))
+        .find(|path| path.exists())
 }
 
 fn part(path: &std::path::Path, from_s: f64, to_s: Option<f64>) -> Run {
     let mapping = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/mappings/chamber-mems.toml");
     let mapping = Box::new(Mapping::load(mapping.as_ref()).unwrap());
     let unit = unit_id("CHAMBER-MEMS").unwrap();
-    let files = LogFiles::Text { paths: vec![path.to_path_buf()], mapping, unit: unit.clone(), batch_ticks: 512 };
+    let files =
+        LogFiles::Text { paths: vec![path.to_path_buf()], mapping, unit: unit.clone(), batch_ticks: 512 };
     let part = Part { start: Span::from_s(from_s), end: to_s.map(Span::from_s), ..Part::default() };
     Run::new("chamber".to_owned(), unit, files, &part)
 }
@@ -43,7 +47,11 @@ fn out_of_sample(path: &std::path::Path, written: &Written) -> [[f64; 2]; 6] {
     let means = |run: &Run| Means::of(run, &written.loaded, 10.0, ()).unwrap();
     let (train, judge) = (means(&part(path, 30.0, Some(TURN_S))), means(&part(path, TURN_S, None)));
     let column = |means: &Means, axis: usize| -> Vec<f64> {
-        if axis < 3 { means.rate(axis).iter().map(|r| r / 3600.0).collect() } else { means.force(axis - 3).to_vec() }
+        if axis < 3 {
+            means.rate(axis).iter().map(|r| r / 3600.0).collect()
+        } else {
+            means.force(axis - 3).to_vec()
+        }
     };
     [0, 1, 2, 3, 4, 5].map(|axis| {
         let level = Size::of(&column(&train, axis)).mean;
@@ -79,6 +87,11 @@ fn real_chamber_log_needs_data() {
                 deviation / RAW[axis]
             );
             assert!(deviation <= 1.001 * RAW[axis], "{method:?} axis {axis}: {deviation:e}");
+            // gyro x steps without a change of temperature and is refused; gyro y and the accelerometers y and z gain most.
+            if method == Method::Joint && axis > 0 {
+                assert!(rms <= BETTER[axis], "axis {axis}: {rms:e}");
+                assert!(![1, 4, 5].contains(&axis) || rms <= 0.5 * CUBIC[axis], "axis {axis}: {rms:e}");
+            }
         }
     }
 }

@@ -23,7 +23,13 @@ const MAPPING: &str = "version = 1\n[[file]]\nname = \"log.csv\"\ndelimiter = \"
 
 /// A short chamber run of the simulated coil as a text log.
 pub(crate) fn text_log(folder: &Path) -> (std::path::PathBuf, Mapping) {
-    let chamber = Profile::constant(20.0).hold(20.0).ramp(-10.0, 2.0).hold(40.0).ramp(40.0, 2.0).hold(40.0).ramp(20.0, 2.0);
+    let chamber = Profile::constant(20.0)
+        .hold(20.0)
+        .ramp(-10.0, 2.0)
+        .hold(40.0)
+        .ramp(40.0, 2.0)
+        .hold(40.0)
+        .ramp(20.0, 2.0);
     let scenario = Scenario { tick_ns: 1_000_000_000, ..fibre_optic_chamber(5, chamber) };
     let mut text = "t,x,y,z,deg_c\n".to_owned();
     let mut deg_c = f64::NAN;
@@ -80,7 +86,8 @@ fn the_residual_of_the_report_is_that_of_the_service() {
                 means.push((angle / time).to_degrees() * 3600.0);
             }
             let mean = means.iter().sum::<f64>() / means.len() as f64;
-            let rms = (means.iter().map(|m| (m - mean) * (m - mean)).sum::<f64>() / means.len() as f64).sqrt();
+            let rms =
+                (means.iter().map(|m| (m - mean) * (m - mean)).sum::<f64>() / means.len() as f64).sqrt();
             let stated = residuals.iter().find(|r| r.of == name && r.sample == Sample::In).unwrap().rms_after;
             assert!((stated / rms - 1.0).abs() < 1e-9, "{method:?} {name}: {stated} {rms}");
         }

@@ -1,0 +1,131 @@
+//! What is said of a thermal fit: the origin in the document, and the report.
+
+use isotherm_log::plot::page::Table;
+use isotherm_protocol::document::Origin;
+
+use super::columns::Basis;
+use super::fit::Sensor;
+use super::model::described;
+use super::outcome::{Found, Outcome};
+use super::settings::Site;
+use crate::drift::figures::short;
+use crate::report::{Coefficient, Curve, FitReport, Verdict, residuals};
+
+impl Outcome {
+    pub(super) fn origin(&self, origin: Origin, verdicts: &[Verdict]) -> Origin {
+        let mut details = toml::Table::new();
+        let mut figures = toml::Table::new();
+        for (sensor, _, found) in &self.found {
+            let mut of_sensor = toml::Table::new();
+            of_sensor.insert("model".into(), found.words.clone().into());
+            if let Some(why) = &found.refused {
+                of_sensor.insert("refused".into(), why.clone().into());
+            }
+            let sigmas = found.terms.iter().map(|(term, value, sigma)| {
+                let (name, unit) = described(*term, output(sensor));
+                let row = [
+                    ("of", name.into()),
+                    ("unit", unit.into()),
+                    ("value", (*value).into()),
+                    ("sigma", (*sigma).into()),
+                ];
+                toml::Value::Table(
+                    row.into_iter()
+                        .map(|(key, value): (&str, toml::Value)| (key.to_owned(), value))
+                        .collect(),
+                )
+            });
+            of_sensor.insert("coefficient".into(), toml::Value::Array(sigmas.collect()));
+            if let Some((choice, best)) =
+                found.choice.as_ref().and_then(|choice| Some((choice, choice.best()?)))
+            {
+                let mut validation = toml::Table::new();
+                validation.insert("left_of_mean".into(), choice.mean.into());
+                validation.insert("left".into(), best.score.into());
+                of_sensor.insert("cross_validation".into(), validation.into());
+            }
+            figures.insert(sensor.name.clone(), of_sensor.into());
+        }
+        details.insert("sensors".into(), figures.into());
+        details.insert("fit_window_s".into(), self.settings.fit_window_s.into());
+        details.insert("smoothing_s".into(), self.filter.smoothing_s.into());
+        details.insert("derivative_step_s".into(), self.filter.derivative_step_s.into());
+        details.insert("mean_removed".into(), (self.settings.site == Site::Unknown).into());
+        Origin {
+            method: Some(self.settings.method.name().to_owned()),
+            range_deg_c: Some(self.range_deg_c.map(|t| libm::round(10.0 * t) / 10.0)),
+            rate_range_deg_c_per_s: Some(self.rate_range_deg_c_per_s.map(|r| libm::round(1e5 * r) / 1e5)),
+            residual: residuals(verdicts),
+            details: Some(details),
+            ..origin
+        }
+    }
+
+    pub(super) fn report(self, verdicts: Vec<Verdict>, curves: Vec<Curve>) -> FitReport {
+        let title = format!("Thermal calibration, method {}", self.settings.method.name());
+        let mut report = FitReport::new(title, self.base.unit.clone());
+        report.verdicts = verdicts;
+        report.warnings = self.warnings;
+        report.notes = self.notes;
+        report.notes.push(format!(
+            "Temperature is smoothed over {} s and differentiated over {} s on a grid of {} s: this filter belongs to the coefficients.",
+            self.filter.smoothing_s, self.filter.derivative_step_s, self.filter.grid_step_s
+        ));
+        if self.settings.site == Site::Unknown {
+            report.notes.push("The mean of each run is taken off: nothing is known of Earth rate and gravity along the axes.".into());
+        }
+        for (sensor, _, found) in &self.found {
+            for (term, value, sigma) in &found.terms {
+                let (name, unit) = described(*term, output(sensor));
+                report.coefficients.push(Coefficient::new(
+                    format!("{} {name}", sensor.name),
+                    unit,
+                    *value,
+                    Some(*sigma),
+                ));
+            }
+        }
+        report.validation = validation(&self.found);
+        report.residuals = curves;
+        report
+    }
+}
+
+/// Unit of a sensor's bias.
+fn output(sensor: &Sensor) -> &'static str {
+    if sensor.gyro { "°/h" } else { "output" }
+}
+
+/// The best model of each kind of dynamics, by sensor.
+fn validation(found: &[(Sensor, Basis, Found)]) -> Option<Table> {
+    let head = ["sensor", "model", "coefficients", "left where it was not fitted", "of the mean's", ""];
+    let mut rows = Vec::new();
+    for (sensor, _, found) in found {
+        let Some(choice) = &found.choice else { continue };
+        let mut seen: Vec<(&str, bool)> = Vec::new();
+        for tried in &choice.tried {
+            let kind = (tried.spec.dynamics.name.as_str(), tried.spec.trend);
+            if seen.contains(&kind) {
+                continue;
+            }
+            seen.push(kind);
+            let same = choice
+                .tried
+                .iter()
+                .filter(|other| (other.spec.dynamics.name.as_str(), other.spec.trend) == kind);
+            let chosen =
+                choice.best().filter(|best| (best.spec.dynamics.name.as_str(), best.spec.trend) == kind);
+            let best = chosen.or_else(|| same.min_by(|a, b| a.score.total_cmp(&b.score)));
+            let Some(best) = best else { continue };
+            rows.push(vec![
+                sensor.name.clone(),
+                best.spec.words(),
+                best.count.to_string(),
+                short(best.score),
+                format!("{:.0} %", 100.0 * best.score / choice.mean),
+                if chosen.is_some() && found.refused.is_none() { "chosen".to_owned() } else { String::new() },
+            ]);
+        }
+    }
+    (!rows.is_empty()).then(|| Table { head: head.map(str::to_owned).to_vec(), rows })
+}
