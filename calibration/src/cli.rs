@@ -5,18 +5,16 @@ mod diff;
 mod drift;
 mod impact;
 mod merge;
-mod positions;
-mod runs;
-mod show;
-mod tumble;
 mod modes;
 mod output;
 mod place;
+mod positions;
 mod rates;
 mod runs;
 mod show;
-mod units;
 mod thermal;
+mod tumble;
+mod units;
 mod validate;
 
 use std::io::{self, Write};
@@ -44,21 +42,15 @@ enum Command {
     Diff(diff::DiffArgs),
     Drift(drift::DriftArgs),
     Impact(impact::ImpactArgs),
-    Positions(Box<positions::PositionsArgs>),
-    Tumble(tumble::TumbleArgs),
     Merge(merge::MergeArgs),
-    Show(show::ShowArgs),
-    Validate(validate::ValidateArgs),
+    Modes(modes::ModesArgs),
     Positions(positions::PositionsArgs),
-    Tumble(tumble::TumbleArgs),
-    Modes(modes::ModesArgs),
     Rates(rates::RatesArgs),
-    Thermal(thermal::ThermalArgs),
-    Modes(modes::ModesArgs),
-    Rates(rates::RatesArgs),
-    Merge(merge::MergeArgs),
     Show(show::ShowArgs),
+    Thermal(thermal::ThermalArgs),
+    Tumble(tumble::TumbleArgs),
     Validate(validate::ValidateArgs),
+    Positions(Box<positions::PositionsArgs>),
     /// Print a completion script for a shell
     #[command(after_help = "Example:\n  isotherm-calibrate completions bash > isotherm-calibrate.bash")]
     Completions {
@@ -73,20 +65,13 @@ fn run(cli: Cli) -> Result<(), Error> {
         Command::Diff(args) => args.run(),
         Command::Drift(args) => args.run(),
         Command::Impact(args) => args.run(),
-        Command::Positions(args) => args.run(),
-        Command::Tumble(args) => args.run(),
         Command::Merge(args) => args.run(),
-        Command::Show(args) => args.run(),
-        Command::Validate(args) => args.run(),
-        Command::Positions(args) => args.run(),
-        Command::Tumble(args) => args.run(),
         Command::Modes(args) => args.run(),
+        Command::Positions(args) => args.run(),
         Command::Rates(args) => args.run(),
+        Command::Show(args) => args.run(),
         Command::Thermal(args) => args.run(),
-        Command::Modes(args) => args.run(),
-        Command::Rates(args) => args.run(),
-        Command::Merge(args) => args.run(),
-        Command::Show(args) => args.run(),
+        Command::Tumble(args) => args.run(),
         Command::Validate(args) => args.run(),
         Command::Completions { shell } => {
             let mut script = Vec::new();

@@ -11,9 +11,6 @@
 //! | [`drift`], [`allan`], [`spectrum`] | noise and drift of a static log |
 //! | [`report`] | what a fit says: verdicts, before and after, coefficients; text, JSON and page |
 //! | [`impact`] | what a drift that is left means for navigation |
-//! | [`positions`], [`tumble`] | accelerometers on a stand; a unit tumbled by hand |
-//! | [`modes`] | drift polynomials and switch parameters of a mode-reversed laser gyro |
-//! | [`rates`] | scale factor, asymmetry, linearity and axes from a rate table |
 //! | [`diff`] | what has changed between two documents |
 //! | [`merge`] | parts of a calibration in one document |
 //! | [`show`] | a document in words and curves |
@@ -44,7 +41,7 @@ pub mod run;
 pub mod series;
 pub mod show;
 pub mod spectrum;
-pub mod tumble;
 pub mod thermal;
+pub mod tumble;
 pub mod validate;
 pub mod written;
