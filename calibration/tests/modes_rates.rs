@@ -133,7 +133,9 @@ fn modes_are_fitted_judged_written_and_reported() {
     assert_eq!(details["gyro"].as_array().unwrap().len(), 3);
     assert!(details["gyro"][0]["covariance"].is_array());
     let page = std::fs::read_to_string(&html).unwrap();
-    assert!(page.contains("<svg") && page.contains("Cross-validation") && page.contains("gyro z"));
+    assert!(
+        page.contains("Over temperature") && page.contains("Cross-validation") && page.contains("gyro z")
+    );
 
     // The same again, to the byte; and JSON says what the text says.
     let again = place("again.toml");
