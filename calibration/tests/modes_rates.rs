@@ -133,7 +133,9 @@ fn modes_are_fitted_judged_written_and_reported() {
     assert_eq!(details["gyro"].as_array().unwrap().len(), 3);
     assert!(details["gyro"][0]["covariance"].is_array());
     let page = std::fs::read_to_string(&html).unwrap();
-    assert!(page.contains("<svg") && page.contains("Cross-validation") && page.contains("gyro z"));
+    assert!(
+        page.contains("Over temperature") && page.contains("Cross-validation") && page.contains("gyro z")
+    );
 
     // The same again, to the byte; and JSON says what the text says.
     let again = place("again.toml");
@@ -153,7 +155,7 @@ fn modes_are_fitted_judged_written_and_reported() {
     assert!(fails(&["modes", text(&run), "--remove-mean"], 2).contains("give --document"));
     assert!(fails(&[&fit[..], &["--out", text(&out)]].concat(), 2).contains("--overwrite"));
     let other = ["modes", text(&run), "--document", text(&base), "--remove-mean", "--unit", "NOBODY"];
-    assert!(fails(&other, 1).contains("NOBODY"));
+    assert!(fails(&other, 1).contains("is --unit right?"));
 }
 
 /// A run on the table: a rest before every step of whole turns.
