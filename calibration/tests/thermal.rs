@@ -1,5 +1,13 @@
 //! Thermal fits on simulated coils: what the methods reach out of sample, on profiles that they were not fitted to.
 
+#![expect(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::cast_precision_loss,
+    clippy::default_trait_access,
+    reason = "a test stops where something is missing, and its numbers are small"
+)]
+
 #[path = "thermal/bad_input.rs"]
 mod bad_input;
 #[path = "thermal/chamber.rs"]
@@ -99,10 +107,13 @@ fn methods_reach_what_they_must_on_a_simulated_coil() {
     }
 }
 
+/// Another coil.
+type Change = fn(&mut isotherm_simulator::fibre_optic::FibreOpticGyro);
+
 #[test]
 #[ignore = "a survey by hand"]
 fn other_coils() {
-    let variants: [(&str, fn(&mut isotherm_simulator::fibre_optic::FibreOpticGyro)); 4] = [
+    let variants: [(&str, Change); 4] = [
         ("thick", |g| {
             g.coil.layers = 48;
             g.coil.conductivity_w_per_m_k = 0.15;

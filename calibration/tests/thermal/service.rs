@@ -71,7 +71,7 @@ fn the_residual_of_the_report_is_that_of_the_service() {
 
         // As isotherm-replay correct does it: the document from its file, the log event by event.
         let mut unit = Offline::new(&load_calibration(&out).unwrap(), UnitSettings::default());
-        for event in LogReader::open(&mapping, &[log.clone()]).unwrap() {
+        for event in LogReader::open(&mapping, std::slice::from_ref(&log)).unwrap() {
             unit.handle(&event.unwrap());
         }
         unit.finish();
