@@ -44,13 +44,12 @@ enum Command {
     Impact(impact::ImpactArgs),
     Merge(merge::MergeArgs),
     Modes(modes::ModesArgs),
-    Positions(positions::PositionsArgs),
+    Positions(Box<positions::PositionsArgs>),
     Rates(rates::RatesArgs),
     Show(show::ShowArgs),
     Thermal(thermal::ThermalArgs),
     Tumble(tumble::TumbleArgs),
     Validate(validate::ValidateArgs),
-    Positions(Box<positions::PositionsArgs>),
     /// Print a completion script for a shell
     #[command(after_help = "Example:\n  isotherm-calibrate completions bash > isotherm-calibrate.bash")]
     Completions {
