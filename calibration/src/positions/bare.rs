@@ -66,17 +66,14 @@ pub fn bare(series: &Series, accel_output: AccelOutput, created: Option<Created>
         AccelOutput::Volts => Unit::VPerMPerS2,
         AccelOutput::MetresPerSecondSquared => Unit::MPerS2PerMPerS2,
     };
-    let gyro = names().map(|(index, name)| bare_gyro(name, follows("gyro", index)));
+    let gyro = names().map(|(index, name)| GyroSensor {
+        channel: follows("gyro", index),
+        increment_weight_rad_per_rad: Some(1.0),
+        ..GyroSensor::bare(name)
+    });
     let accel = names().map(|(index, name)| AccelSensor {
-        name: name.to_owned(),
         channel: follows("accel", index),
-        board_channel: None,
-        input_limit_counts_per_tick: None,
-        input_limit_v: None,
-        input_limit_m_per_s2: None,
-        scale_factor: Curve::new(Shape::Constant { value: 1.0 }).in_unit(scale_unit),
-        bias: None,
-        board_ratio_error: None,
+        ..AccelSensor::bare(name, Curve::new(Shape::Constant { value: 1.0 }).in_unit(scale_unit))
     });
     Ok(Document {
         schema: CURRENT_SCHEMA,
@@ -95,8 +92,8 @@ pub fn bare(series: &Series, accel_output: AccelOutput, created: Option<Created>
             }),
             channel: channels.clone(),
         },
-        gyro: Gyro { output: GyroOutput::Mean, sensor: gyro.collect(), orientation: along() },
-        accel: Some(Accel { output: accel_output, sensor: accel.collect(), orientation: along() }),
+        gyro: Gyro { output: GyroOutput::Mean, sensor: gyro.collect(), orientation: Orientation::along_case_axes() },
+        accel: Some(Accel { output: accel_output, sensor: accel.collect(), orientation: Orientation::along_case_axes() }),
         mode_reversal: None,
         self_test: None,
     })
@@ -108,36 +105,4 @@ fn follows(channels: &[Channel], kind: &str, index: usize) -> Option<String> {
     let named = channels.iter().find(|channel| channel.name == own);
     let only = channels.first().filter(|_| channels.len() == 1);
     named.or(only).map(|channel| channel.name.clone())
-}
-
-/// A gyro that is passed on as it stands.
-fn bare_gyro(name: &str, channel: Option<String>) -> GyroSensor {
-    GyroSensor {
-        name: name.to_owned(),
-        channel,
-        increment_weight_arcsec_per_count: None,
-        increment_weight_rad_per_rad: Some(1.0),
-        input_limit_counts_per_tick: None,
-        input_limit_deg_per_s: None,
-        increment_weight_error: None,
-        static_bias: None,
-        magnetic_bias: None,
-        slow_meander: None,
-        thermal_rate: None,
-        thermal_acceleration: None,
-        lag: Vec::new(),
-        trend: None,
-        servo: None,
-        drift: None,
-    }
-}
-
-/// Three sensors along the case axes.
-fn along<P>() -> Orientation<P> {
-    Orientation {
-        rows: vec![[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
-        weights: None,
-        thermal: None,
-        parity: None,
-    }
 }

@@ -63,22 +63,9 @@ pub fn fitted(
 pub fn nominal(unit: &str, output: GyroOutput) -> Document {
     let weight = |wanted: GyroOutput| (output == wanted).then_some(1.0);
     let sensor = |name: &str| GyroSensor {
-        name: name.to_owned(),
-        channel: None,
         increment_weight_arcsec_per_count: weight(GyroOutput::Counts),
         increment_weight_rad_per_rad: weight(GyroOutput::Mean),
-        input_limit_counts_per_tick: None,
-        input_limit_deg_per_s: None,
-        increment_weight_error: None,
-        static_bias: None,
-        magnetic_bias: None,
-        slow_meander: None,
-        thermal_rate: None,
-        thermal_acceleration: None,
-        lag: Vec::new(),
-        trend: None,
-        servo: None,
-        drift: None,
+        ..GyroSensor::bare(name)
     };
     Document {
         schema: 1,
@@ -90,12 +77,7 @@ pub fn nominal(unit: &str, output: GyroOutput) -> Document {
         gyro: Gyro {
             output,
             sensor: ["x", "y", "z"].map(sensor).to_vec(),
-            orientation: Orientation {
-                rows: vec![[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
-                weights: None,
-                thermal: None,
-                parity: None,
-            },
+            orientation: Orientation::along_case_axes(),
         },
         accel: None,
         mode_reversal: None,

@@ -123,42 +123,17 @@ fn document(
     channel_of: &dyn Fn(&str, usize) -> Option<String>,
     has_accel: bool,
 ) -> Document {
-    let unit_rows = || Orientation {
-        rows: vec![[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
-        weights: None,
-        thermal: None,
-        parity: None,
-    };
-    let orientation = unit_rows();
     let gyro = |(index, name): (usize, &&str)| GyroSensor {
-        name: (*name).to_owned(),
         channel: channel_of("gyro", index),
-        increment_weight_arcsec_per_count: None,
         increment_weight_rad_per_rad: Some(1.0),
-        input_limit_counts_per_tick: None,
-        input_limit_deg_per_s: None,
-        increment_weight_error: None,
-        static_bias: None,
-        magnetic_bias: None,
-        slow_meander: None,
-        thermal_rate: None,
-        thermal_acceleration: None,
-        lag: Vec::new(),
-        trend: None,
-        servo: None,
-        drift: None,
+        ..GyroSensor::bare(name)
     };
     let accel = |(index, name): (usize, &&str)| AccelSensor {
-        name: (*name).to_owned(),
         channel: channel_of("accel", index),
-        board_channel: None,
-        input_limit_counts_per_tick: None,
-        input_limit_v: None,
-        input_limit_m_per_s2: None,
-        scale_factor: Curve::new(Shape::Constant { value: 1.0 }).in_unit(Unit::MPerS2PerMPerS2),
-        bias: None,
-        lag: Vec::new(),
-        board_ratio_error: None,
+        ..AccelSensor::bare(
+            name,
+            Curve::new(Shape::Constant { value: 1.0 }).in_unit(Unit::MPerS2PerMPerS2),
+        )
     };
     let mut used: Vec<String> = (0..3).filter_map(|index| channel_of("gyro", index)).collect();
     if has_accel {
@@ -185,12 +160,12 @@ fn document(
         gyro: Gyro {
             output: GyroOutput::Mean,
             sensor: AXES.iter().enumerate().map(gyro).collect(),
-            orientation,
+            orientation: Orientation::along_case_axes(),
         },
         accel: has_accel.then(|| Accel {
             output: AccelOutput::MetresPerSecondSquared,
             sensor: AXES.iter().enumerate().map(accel).collect(),
-            orientation: Orientation { rows: unit_rows().rows, weights: None, thermal: None, parity: None },
+            orientation: Orientation::along_case_axes(),
         }),
         mode_reversal: None,
         self_test: None,

@@ -97,22 +97,9 @@ impl Basis {
     fn document(&self, terms: &[Option<Term>; 3]) -> Document {
         let sensor = |(index, term): (usize, &Option<Term>)| {
             let mut gyro = GyroSensor {
-                name: index.to_string(),
                 channel: Some(self.channel.name.clone()),
-                increment_weight_arcsec_per_count: None,
                 increment_weight_rad_per_rad: Some(1.0),
-                input_limit_counts_per_tick: None,
-                input_limit_deg_per_s: None,
-                increment_weight_error: None,
-                static_bias: None,
-                magnetic_bias: None,
-                slow_meander: None,
-                thermal_rate: None,
-                thermal_acceleration: None,
-                lag: Vec::new(),
-                trend: None,
-                servo: None,
-                drift: None,
+                ..GyroSensor::bare(&index.to_string())
             };
             match *term {
                 None => {}
@@ -142,12 +129,7 @@ impl Basis {
             gyro: Gyro {
                 output: GyroOutput::Mean,
                 sensor: terms.iter().enumerate().map(sensor).collect(),
-                orientation: Orientation {
-                    rows: vec![[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
-                    weights: None,
-                    thermal: None,
-                    parity: None,
-                },
+                orientation: Orientation::along_case_axes(),
             },
             accel: None,
             mode_reversal: None,

@@ -4,6 +4,7 @@
 //! `docs/calibration-document.md`; "Source:" names the paper or section that the term comes from.
 
 mod accel;
+mod bare;
 mod drift;
 mod gyro;
 mod origin;

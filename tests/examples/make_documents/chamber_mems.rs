@@ -79,23 +79,14 @@ pub(crate) fn make(data: &Path) -> Result<Document, Failure> {
 
 /// The unit without a bias: everything stands as it was logged.
 fn bare() -> Document {
-    let along = || vec![[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let gyro = |name: &&str| GyroSensor {
         channel: Some(CHANNEL.into()),
         increment_weight_rad_per_rad: Some(1.0),
         ..bare_gyro(0, name)
     };
     let accel = |name: &&str| AccelSensor {
-        name: (*name).into(),
         channel: Some(CHANNEL.into()),
-        board_channel: None,
-        input_limit_counts_per_tick: None,
-        input_limit_v: None,
-        input_limit_m_per_s2: None,
-        scale_factor: Curve::new(Shape::Constant { value: 1.0 }).in_unit(Unit::MPerS2PerMPerS2),
-        bias: None,
-        lag: Vec::new(),
-        board_ratio_error: None,
+        ..AccelSensor::bare(name, Curve::new(Shape::Constant { value: 1.0 }).in_unit(Unit::MPerS2PerMPerS2))
     };
     Document {
         note: Some(NOTE.into()),
@@ -118,12 +109,12 @@ fn bare() -> Document {
         gyro: Gyro {
             output: GyroOutput::Mean,
             sensor: AXES.iter().map(gyro).collect(),
-            orientation: Orientation { rows: along(), weights: None, thermal: None, parity: None },
+            orientation: Orientation::along_case_axes(),
         },
         accel: Some(Accel {
             output: AccelOutput::MetresPerSecondSquared,
             sensor: AXES.iter().map(accel).collect(),
-            orientation: Orientation { rows: along(), weights: None, thermal: None, parity: None },
+            orientation: Orientation::along_case_axes(),
         }),
         ..document("CHAMBER-MEMS")
     }

@@ -54,24 +54,7 @@ pub(crate) fn scale_error<Q: Quantity>(reference: f64, [first, second]: [f64; 2]
 
 /// A gyro without any term.
 pub(crate) fn bare_gyro(index: usize, name: &str) -> GyroSensor {
-    GyroSensor {
-        name: name.into(),
-        channel: Some(format!("gyro{index}")),
-        increment_weight_arcsec_per_count: None,
-        increment_weight_rad_per_rad: None,
-        input_limit_counts_per_tick: None,
-        input_limit_deg_per_s: None,
-        increment_weight_error: None,
-        static_bias: None,
-        magnetic_bias: None,
-        slow_meander: None,
-        thermal_rate: None,
-        thermal_acceleration: None,
-        lag: Vec::new(),
-        trend: None,
-        servo: None,
-        drift: None,
-    }
+    GyroSensor { channel: Some(format!("gyro{index}")), ..GyroSensor::bare(name) }
 }
 
 /// All temperature channels of an instrument.
@@ -118,17 +101,14 @@ pub(crate) fn accelerometers(block: &Accelerometers) -> Accel {
         let reference = sensor.reference_deg_c;
         let [_, first, second] = sensor.board_ratio;
         AccelSensor {
-            name: name.into(),
             channel: Some(format!("accel{index}")),
             board_channel: Some(BOARD.into()),
-            input_limit_counts_per_tick: None,
-            input_limit_v: None,
-            input_limit_m_per_s2: None,
-            scale_factor: polynomial(reference, &sensor.scale_v_per_m_per_s2.map(|k| k * per_output))
-                .in_unit(scale_unit),
             bias: Some(polynomial(reference, &sensor.bias_v.map(|s| s * per_output)).in_unit(bias_unit)),
-            lag: Vec::new(),
             board_ratio_error: Some(scale_error(reference, [first, second])),
+            ..AccelSensor::bare(
+                name,
+                polynomial(reference, &sensor.scale_v_per_m_per_s2.map(|k| k * per_output)).in_unit(scale_unit),
+            )
         }
     });
     Accel { output, sensor: sensors.collect(), orientation: orientation(&block.orientation) }

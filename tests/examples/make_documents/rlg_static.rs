@@ -29,25 +29,14 @@ gravity at its place, 9.7955 m/s\u{b2}, to some \u{b5}g. Axes: x right, y forwar
 /// # Errors
 /// Where the log cannot be read.
 pub(crate) fn make(data: &Path) -> Result<Document, Failure> {
-    let along = || vec![[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let counts_per_s = tidy(1.0 / (ACCEL_MICRO_G_S * 1e-6 * G_M_PER_S2));
     let gyro = |name: &&str| GyroSensor {
         channel: None,
         increment_weight_arcsec_per_count: Some(GYRO_ARCSEC),
         ..bare_gyro(0, name)
     };
-    let accel = |name: &&str| AccelSensor {
-        name: (*name).into(),
-        channel: None,
-        board_channel: None,
-        input_limit_counts_per_tick: None,
-        input_limit_v: None,
-        input_limit_m_per_s2: None,
-        scale_factor: Curve::new(Shape::Constant { value: counts_per_s }).in_unit(Unit::CountsPerSPerMPerS2),
-        bias: None,
-        lag: Vec::new(),
-        board_ratio_error: None,
-    };
+    let accel = |name: &&str| 
+        AccelSensor::bare(name, Curve::new(Shape::Constant { value: counts_per_s }).in_unit(Unit::CountsPerSPerMPerS2));
     Ok(Document {
         note: Some(NOTE.into()),
         origin: Some(Origin {
@@ -58,12 +47,12 @@ pub(crate) fn make(data: &Path) -> Result<Document, Failure> {
         gyro: Gyro {
             output: GyroOutput::Counts,
             sensor: AXES.iter().map(gyro).collect(),
-            orientation: Orientation { rows: along(), weights: None, thermal: None, parity: None },
+            orientation: Orientation::along_case_axes(),
         },
         accel: Some(Accel {
             output: AccelOutput::Counts,
             sensor: AXES.iter().map(accel).collect(),
-            orientation: Orientation { rows: along(), weights: None, thermal: None, parity: None },
+            orientation: Orientation::along_case_axes(),
         }),
         ..document("RLG-STATIC")
     })
