@@ -54,8 +54,8 @@ pub use problem::Problem;
 pub use reference::reference;
 pub use schema::schema;
 pub use types::{
-    Accel, AccelLag, AccelOrientation, AccelOutput, AccelParity, AccelSensor, Branches, Channel, Created, Document,
-    Drift, Filter, Gyro, GyroOrientation, GyroOutput, GyroParity, GyroSensor, Lag, Log, Measure,
+    Accel, AccelLag, AccelOrientation, AccelOutput, AccelParity, AccelSensor, Branches, Channel, Created,
+    Document, Drift, Filter, Gyro, GyroOrientation, GyroOutput, GyroParity, GyroSensor, Lag, Log, Measure,
     ModeReversal, Orientation, OrientationThermal, Origin, Residual, Sample, SelfTest, SelfTestCounter,
     SelfTestVoltage, Servo, ServoKind, Temperature, Trend,
 };

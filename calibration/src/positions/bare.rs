@@ -92,8 +92,16 @@ pub fn bare(series: &Series, accel_output: AccelOutput, created: Option<Created>
             }),
             channel: channels.clone(),
         },
-        gyro: Gyro { output: GyroOutput::Mean, sensor: gyro.collect(), orientation: Orientation::along_case_axes() },
-        accel: Some(Accel { output: accel_output, sensor: accel.collect(), orientation: Orientation::along_case_axes() }),
+        gyro: Gyro {
+            output: GyroOutput::Mean,
+            sensor: gyro.collect(),
+            orientation: Orientation::along_case_axes(),
+        },
+        accel: Some(Accel {
+            output: accel_output,
+            sensor: accel.collect(),
+            orientation: Orientation::along_case_axes(),
+        }),
         mode_reversal: None,
         self_test: None,
     })

@@ -130,10 +130,7 @@ fn document(
     };
     let accel = |(index, name): (usize, &&str)| AccelSensor {
         channel: channel_of("accel", index),
-        ..AccelSensor::bare(
-            name,
-            Curve::new(Shape::Constant { value: 1.0 }).in_unit(Unit::MPerS2PerMPerS2),
-        )
+        ..AccelSensor::bare(name, Curve::new(Shape::Constant { value: 1.0 }).in_unit(Unit::MPerS2PerMPerS2))
     };
     let mut used: Vec<String> = (0..3).filter_map(|index| channel_of("gyro", index)).collect();
     if has_accel {

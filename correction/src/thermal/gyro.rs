@@ -74,7 +74,9 @@ impl GyroModel {
         );
         let mut lags = Vec::with_capacity(parts.lags.len());
         for lag in &parts.lags {
-            lags.extend(curve("lags", Some(&lag.gain)).map(|gain| Lag::new(lag.time_constant_s, gain, filter)));
+            lags.extend(
+                curve("lags", Some(&lag.gain)).map(|gain| Lag::new(lag.time_constant_s, gain, filter)),
+            );
         }
         let servo = match parts.servo.as_ref().map(Servo::new) {
             None => None,

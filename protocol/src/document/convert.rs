@@ -14,8 +14,8 @@ use isotherm_correction::servo::{ServoForm, ServoParts};
 use super::curve::{Curve, Quantity};
 use super::measure::{ARCSEC, Argument, DEG_PER_H, DEG_PER_S, DEG_PER_SQRT_H, HOUR};
 use super::types::{
-    AccelLag, AccelOutput, AccelSensor, Branches, Channel, Document, Drift, GyroOutput, GyroSensor, Lag, ModeReversal,
-    Orientation, SelfTest, Servo, ServoKind, Temperature, Trend,
+    AccelLag, AccelOutput, AccelSensor, Branches, Channel, Document, Drift, GyroOutput, GyroSensor, Lag,
+    ModeReversal, Orientation, SelfTest, Servo, ServoKind, Temperature, Trend,
 };
 use super::values::HUGE;
 

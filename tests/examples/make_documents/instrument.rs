@@ -107,7 +107,8 @@ pub(crate) fn accelerometers(block: &Accelerometers) -> Accel {
             board_ratio_error: Some(scale_error(reference, [first, second])),
             ..AccelSensor::bare(
                 name,
-                polynomial(reference, &sensor.scale_v_per_m_per_s2.map(|k| k * per_output)).in_unit(scale_unit),
+                polynomial(reference, &sensor.scale_v_per_m_per_s2.map(|k| k * per_output))
+                    .in_unit(scale_unit),
             )
         }
     });

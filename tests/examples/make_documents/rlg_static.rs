@@ -35,8 +35,12 @@ pub(crate) fn make(data: &Path) -> Result<Document, Failure> {
         increment_weight_arcsec_per_count: Some(GYRO_ARCSEC),
         ..bare_gyro(0, name)
     };
-    let accel = |name: &&str| 
-        AccelSensor::bare(name, Curve::new(Shape::Constant { value: counts_per_s }).in_unit(Unit::CountsPerSPerMPerS2));
+    let accel = |name: &&str| {
+        AccelSensor::bare(
+            name,
+            Curve::new(Shape::Constant { value: counts_per_s }).in_unit(Unit::CountsPerSPerMPerS2),
+        )
+    };
     Ok(Document {
         note: Some(NOTE.into()),
         origin: Some(Origin {
