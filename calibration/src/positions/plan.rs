@@ -111,7 +111,7 @@ impl Plan {
         let is_csv = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv"));
         file::read(&text, is_csv).map_err(|words| {
             Error::Usage(format!(
-                "{name}: {words}; a plan is \"twelve\", \"six\", or a file as docs/calibration.md shows"
+                "{name}: {words}; a plan is \"twelve\", \"six\", or a file as docs/calibration/positions.md shows"
             ))
         })
     }
