@@ -32,6 +32,7 @@ use serde::Serialize;
 pub use documents::{Documents, JournalAccount};
 pub use place::is_being_written;
 pub use reader::{RecordingReader, RecordingReport};
+pub(crate) use record::chunk_records;
 pub use recover::recover;
 pub use writer::{RecordingOptions, RecordingWriter};
 

@@ -7,11 +7,10 @@ use std::collections::HashMap;
 use std::fs::File;
 use std::io::{self, BufReader, ErrorKind, Read, Seek, SeekFrom};
 
-use mcap::read::ChunkReader;
 use mcap::records::{Record, op};
 
 use super::reader::{Found, take};
-use super::record::{LONGEST_RECORD, parse};
+use super::record::{LONGEST_RECORD, chunk_records, parse};
 use crate::message::Topic;
 
 /// Opcode and length in front of a record.
@@ -117,16 +116,9 @@ impl Walk<'_> {
     fn channels(&mut self, length: u64) -> io::Result<Option<()>> {
         self.go_to(self.front.at + RECORD_HEADER as u64)?;
         let Some(bytes) = self.body(length)? else { return Ok(None) };
-        let Ok(Record::Chunk { header, data }) = parse(op::CHUNK, &bytes) else { return Ok(None) };
-        let Ok(records) = ChunkReader::new(header, &data) else { return Ok(None) };
-        for record in records {
-            match record {
-                Ok(record @ Record::Channel(_)) => {
-                    let _ = take(record, &mut self.front.topics, &mut self.ended);
-                }
-                Ok(_) => {}
-                Err(_) => return Ok(None),
-            }
+        let Ok(records) = chunk_records(&bytes) else { return Ok(None) };
+        for record in records.into_iter().filter(|record| matches!(record, Record::Channel(_))) {
+            let _ = take(record, &mut self.front.topics, &mut self.ended);
         }
         Ok(Some(()))
     }

@@ -18,7 +18,7 @@ use mcap::records::{Channel, Record, op};
 use super::outline::{Mark, Outline, Outlines, UnitOutline};
 use crate::error::Error;
 use crate::message::Topic;
-use crate::recording::{MAGIC, MESSAGE_ENCODING};
+use crate::recording::{MAGIC, MESSAGE_ENCODING, chunk_records};
 
 /// Longest record that is read whole (bytes): chunks beyond this are not of a recorder.
 const LONGEST_RECORD: u64 = 1 << 28;
@@ -161,16 +161,9 @@ impl Recording {
         self.file.seek(SeekFrom::Start(chunk.start))?;
         let bytes = self.read(chunk.length)?;
         self.file.seek(SeekFrom::Start(back))?;
-        let Some(Ok(Record::Chunk { header, data })) =
-            bytes.as_deref().map(|bytes| mcap::parse_record(op::CHUNK, bytes))
-        else {
-            return Ok(());
-        };
         // What is damaged will be told by who reads it for its messages.
-        let Ok(records) = mcap::read::ChunkReader::new(header, &data) else { return Ok(()) };
-        for record in records.map_while(Result::ok) {
-            self.take(&record, found);
-        }
+        let records = bytes.and_then(|bytes| chunk_records(&bytes).ok());
+        records.iter().flatten().for_each(|record| self.take(record, found));
         Ok(())
     }
 

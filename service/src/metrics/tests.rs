@@ -18,9 +18,9 @@ use crate::registrar::Board;
 use checker::Page;
 use client::{connect, get, read};
 
-#[path = "../../tests/metrics/checker.rs"]
+#[path = "../../tests/service/metrics/checker.rs"]
 mod checker;
-#[path = "../../tests/metrics/client.rs"]
+#[path = "../../tests/service/metrics/client.rs"]
 mod client;
 
 const LIMIT: Duration = Duration::from_secs(30);

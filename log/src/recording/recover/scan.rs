@@ -6,11 +6,10 @@ use std::path::Path;
 
 use mcap::McapError;
 use mcap::records::{Record, op};
-use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use serde::Serialize;
 
 use crate::error::Error;
-use crate::recording::record::{LONGEST_RECORD, metadata_length, parse};
+use crate::recording::record::{LONGEST_RECORD, chunk_records, metadata_length, parse};
 use crate::recording::{MAGIC, METADATA};
 
 /// Opcode and length of a record.
@@ -211,33 +210,9 @@ fn whole(opcode: u8, data: &[u8]) -> Result<Piece, String> {
         return Err("a metadata record is damaged: its lengths do not go together".to_owned());
     }
     if opcode == op::CHUNK {
-        return records(data).map(Piece::Chunk).map_err(damaged);
+        return chunk_records(data).map(Piece::Chunk).map_err(damaged);
     }
     Ok(Piece::Record(parse(opcode, data).map_err(damaged)?.into_owned()))
-}
-
-/// The records of a chunk, of all of them or of none.
-fn records(data: &[u8]) -> Result<Vec<Record<'static>>, McapError> {
-    // Not the library's own reader of chunks: it takes every length in a damaged one for true, and memory for it.
-    let options = LinearReaderOptions::default()
-        .with_skip_start_magic(true)
-        .with_skip_end_magic(true)
-        .with_prevalidate_chunk_crcs(true)
-        .with_record_length_limit(LONGEST_RECORD);
-    let mut reader = LinearReader::new_with_options(options);
-    let length = (data.len() as u64).to_le_bytes();
-    let mut chunk = [op::CHUNK].as_slice().chain(length.as_slice()).chain(data);
-    let mut records = Vec::new();
-    while let Some(event) = reader.next_event() {
-        match event? {
-            LinearReadEvent::ReadRequest(_) => {
-                let count = chunk.read(reader.insert(WINDOW))?;
-                reader.notify_read(count);
-            }
-            LinearReadEvent::Record { opcode, data } => records.push(parse(opcode, data)?.into_owned()),
-        }
-    }
-    Ok(records)
 }
 
 /// Whether the format knows it, or leaves it to others.

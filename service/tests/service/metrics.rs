@@ -1,7 +1,5 @@
 //! Metrics and health of a running service, over real HTTP connections.
 
-#![expect(clippy::unwrap_used, clippy::panic, reason = "a test may panic, its helpers included")]
-
 mod checker;
 mod client;
 mod served;

@@ -6,7 +6,7 @@ use isotherm_protocol::key;
 use isotherm_protocol::service_status::{FolderState, ServiceStatus};
 use isotherm_protocol::status::Status;
 
-use crate::stand::{Folders, LIMIT, Stand, UNIT, assert_accepted, document};
+use super::stand::{Folders, LIMIT, Stand, UNIT, assert_accepted, document};
 
 #[tokio::test(flavor = "multi_thread")]
 async fn the_service_tells_of_units_folder_store_and_swaps_and_is_alive() {

@@ -11,7 +11,7 @@ use isotherm_protocol::overlay::Overlay;
 use isotherm_protocol::status::PreLaunchVerdict;
 use isotherm_service::Settings;
 
-use crate::stand::{Folders, LIMIT, Stand, UNIT, assert_accepted, document, unit_id};
+use super::stand::{Folders, LIMIT, Stand, UNIT, assert_accepted, document, unit_id};
 
 const EARTH_RAD_PER_S: f64 = 7.292_115e-5;
 

@@ -3,7 +3,7 @@
 use isotherm_protocol::control::{Schedule, SwapOptions, SwapOutcome};
 use isotherm_protocol::history::{AuditEvent, Withdrawn};
 
-use crate::stand::{Folders, Stand, TICK_NS, UNIT, assert_accepted, document};
+use super::stand::{Folders, Stand, TICK_NS, UNIT, assert_accepted, document};
 
 fn at(schedule: Schedule) -> SwapOptions {
     SwapOptions { schedule, ..SwapOptions::default() }

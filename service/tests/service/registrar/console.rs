@@ -5,7 +5,7 @@ use std::process::Output;
 use isotherm_bus::locators;
 use isotherm_protocol::history::AuditEvent;
 
-use crate::stand::{Folders, Stand, UNIT, document};
+use super::stand::{Folders, Stand, UNIT, document};
 
 /// Runs `isotherm` with nothing in its environment, as cron would.
 async fn isotherm(stand: &Stand, arguments: &[&str]) -> Output {

@@ -6,8 +6,8 @@ use isotherm_protocol::history::AuditEvent;
 use isotherm_protocol::signature::{Existing, PrivateKey, sign};
 use isotherm_service::{ServiceError, Settings, start};
 
-use crate::folder::until_service;
-use crate::stand::{Folders, LIMIT, Stand, UNIT, assert_accepted, document};
+use super::folder::until_service;
+use super::stand::{Folders, LIMIT, Stand, UNIT, assert_accepted, document};
 
 /// Refusals that were written down.
 async fn refusals(stand: &Stand) -> usize {

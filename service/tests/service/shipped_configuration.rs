@@ -1,7 +1,5 @@
 //! Every configuration file that is shipped loads and says what its comments say.
 
-#![expect(clippy::unwrap_used, reason = "a test may panic, its helpers included")]
-
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 

@@ -5,7 +5,7 @@ use isotherm_protocol::digest::Digest;
 use isotherm_protocol::history::{AuditEvent, Source};
 use isotherm_protocol::key;
 
-use crate::stand::{Folders, Stand, UNIT, assert_accepted, assert_refused, document, unit_id};
+use super::stand::{Folders, Stand, UNIT, assert_accepted, assert_refused, document, unit_id};
 
 fn by_ann() -> SwapOptions {
     SwapOptions { by: "ann".to_owned(), ..SwapOptions::default() }

@@ -1,12 +1,5 @@
 //! `isotherm status` and `isotherm top` against a service process, as an operator runs them.
 
-#![expect(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    reason = "a test may panic, its helpers included"
-)]
-
 use std::io::{BufRead, BufReader, Read, Write};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};

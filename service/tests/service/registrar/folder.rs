@@ -6,7 +6,7 @@ use isotherm_protocol::control::SwapOptions;
 use isotherm_protocol::history::{AuditEvent, Source};
 use isotherm_protocol::service_status::ServiceStatus;
 
-use crate::stand::{Folders, LIMIT, Stand, UNIT, assert_accepted, document};
+use super::stand::{Folders, LIMIT, Stand, UNIT, assert_accepted, document};
 
 /// Waits until the service's own status says something.
 pub(crate) async fn until_service(stand: &Stand, said: impl Fn(&ServiceStatus) -> bool) -> ServiceStatus {

@@ -1,7 +1,5 @@
 //! The service in this process, a raw producer and a consumer on sessions of their own.
 
-#![expect(clippy::unwrap_used, clippy::expect_used, reason = "a test may panic, its helpers included")]
-
 use std::time::Duration;
 
 use isotherm_bus::{Consumer, Producer, ProducerOptions, SessionOptions, close, locators, open, presence};
@@ -94,7 +92,7 @@ async fn no_tick_of_a_unit_that_appears_is_lost_for_a_subscriber_that_was_there(
 #[tokio::test(flavor = "multi_thread")]
 async fn calibrated_units_run_and_others_pass_through() {
     let folder = tempfile::tempdir().unwrap();
-    let text = include_str!("../../config/calibration/example-full.toml");
+    let text = include_str!("../../../config/calibration/example-full.toml");
     let parsed = isotherm_protocol::document::Document::parse(text, None).unwrap();
     std::fs::write(folder.path().join("any-name.toml"), text).unwrap();
     std::fs::write(folder.path().join("bad.toml"), "schema = 1").unwrap();

@@ -5,7 +5,7 @@ use isotherm_protocol::control::SwapOptions;
 use isotherm_protocol::history::{AuditEvent, CommandRecord};
 use isotherm_service::Settings;
 
-use crate::stand::{Folders, Stand, UNIT, assert_accepted, document};
+use super::stand::{Folders, Stand, UNIT, assert_accepted, document};
 
 #[tokio::test(flavor = "multi_thread")]
 async fn commands_move_a_unit_from_state_to_state_and_are_written_down() {
@@ -67,7 +67,7 @@ async fn a_unit_may_begin_in_standby_and_a_self_test_has_its_report() {
     let mut stand = Stand::start(settings).await;
     assert_accepted(&stand.swap(UNIT, &document(UNIT, 1.0), &SwapOptions::default()).await, 1);
     stand.send(UNIT, 20).await;
-    while stand.service.totals().unit(&crate::stand::unit_id(UNIT)).ticks_in < 20 {
+    while stand.service.totals().unit(&super::stand::unit_id(UNIT)).ticks_in < 20 {
         tokio::task::yield_now().await;
     }
     let reply = stand.command(UNIT, r#"{"command":"self-test"}"#).await;

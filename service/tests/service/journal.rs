@@ -1,8 +1,6 @@
 //! A log alone is enough: what a recorder hears on the raw topics and in the journal gives the service's output again, to
 //! the bit, from the beginning and from any memory on.
 
-#![expect(clippy::unwrap_used, clippy::expect_used, reason = "a test may panic, its helpers included")]
-
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -25,7 +23,7 @@ use zenoh::qos::{CongestionControl, Priority};
 use zenoh::query::ConsolidationMode;
 
 const LIMIT: Duration = Duration::from_secs(30);
-const EXAMPLE: &str = include_str!("../../config/calibration/example-full.toml");
+const EXAMPLE: &str = include_str!("../../../config/calibration/example-full.toml");
 /// The last tick that is sent.
 const LAST: u64 = 60 + 6 * 400 - 1;
 const TICK_NS: i64 = 5_000_000;

@@ -1,7 +1,5 @@
 //! `isotherm serve` as a process: readiness, signals, exit codes, totals, log.
 
-#![expect(clippy::unwrap_used, reason = "a test may panic, its helpers included")]
-
 use std::io::{BufRead, BufReader, Read};
 use std::process::{Child, ChildStdout, Command, Output, Stdio};
 use std::time::Duration;
@@ -159,7 +157,7 @@ fn strict_start_refuses_bad_documents_and_names_every_problem() {
     let folder = tempfile::tempdir().unwrap();
     let units = folder.path().join("units");
     std::fs::create_dir(&units).unwrap();
-    let good = include_str!("../../config/calibration/example-full.toml");
+    let good = include_str!("../../../config/calibration/example-full.toml");
     std::fs::write(units.join("a.toml"), good).unwrap();
     std::fs::write(units.join("b.toml"), good).unwrap();
     std::fs::write(units.join("c.toml"), "schema = 1\nunit = 7\n").unwrap();

@@ -7,7 +7,7 @@ use isotherm_protocol::signature::{Existing, PrivateKey, sign};
 use isotherm_service::Settings;
 use isotherm_service::config::Severity;
 
-use crate::stand::{Folders, Stand, UNIT, assert_accepted, assert_refused, document};
+use super::stand::{Folders, Stand, UNIT, assert_accepted, assert_refused, document};
 
 const PLAIN: SwapOptions = SwapOptions {
     by: String::new(),

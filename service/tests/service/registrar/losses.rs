@@ -3,8 +3,8 @@
 use isotherm_protocol::control::SwapOptions;
 use isotherm_protocol::service_status::ServiceStatus;
 
-use crate::folder::until_service;
-use crate::stand::{Folders, Stand, UNIT, assert_accepted, assert_refused, audit_file, document};
+use super::folder::until_service;
+use super::stand::{Folders, Stand, UNIT, assert_accepted, assert_refused, audit_file, document};
 
 fn plain() -> SwapOptions {
     SwapOptions::default()

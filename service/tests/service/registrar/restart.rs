@@ -7,7 +7,7 @@ use isotherm_protocol::control::{Schedule, SwapOptions};
 use isotherm_protocol::history::{AuditEvent, Source};
 use isotherm_service::ServiceError;
 
-use crate::stand::{Folders, Stand, UNIT, assert_accepted, assert_refused, audit_file, document};
+use super::stand::{Folders, Stand, UNIT, assert_accepted, assert_refused, audit_file, document};
 
 fn plain() -> SwapOptions {
     SwapOptions::default()

@@ -3,8 +3,8 @@
 use isotherm_protocol::control::SwapOptions;
 use isotherm_protocol::history::AuditEvent;
 
-use crate::folder::until_service;
-use crate::stand::{Folders, Stand, UNIT, assert_accepted, document};
+use super::folder::until_service;
+use super::stand::{Folders, Stand, UNIT, assert_accepted, document};
 
 /// A service with a document in `a.toml`, as revision 1, and another one by bus, as revision 2.
 async fn swapped_by_bus(folders: &Folders) -> Stand {

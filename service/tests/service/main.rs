@@ -1,0 +1,26 @@
+//! The running service: one test program, because every one that opens sessions takes half a minute to build.
+//!
+//! | file | holds |
+//! |---|---|
+//! | `loopback` | raw in, corrected out, over real sessions |
+//! | `registrar` | swaps and commands, whichever way they come in |
+//! | `journal` | a log alone is enough for the same bits again |
+//! | `metrics` | metrics and health over HTTP |
+//! | `console_status` | what `isotherm status` and `top` show of it |
+//! | `serve_command` | the program itself: start, stop, signals |
+//! | `shipped_configuration` | the Zenoh configurations that are shipped |
+
+#![expect(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "a test may panic, its helpers included"
+)]
+
+mod console_status;
+mod journal;
+mod loopback;
+mod metrics;
+mod registrar;
+mod serve_command;
+mod shipped_configuration;
