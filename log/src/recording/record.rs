@@ -85,11 +85,6 @@ mod tests {
             }
         }
     }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
 
     /// A chunk without compression and CRC that holds these bytes.
     fn chunk(records: &[u8]) -> Vec<u8> {
