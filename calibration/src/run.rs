@@ -55,7 +55,7 @@ impl Run {
     /// Its readings as columns.
     ///
     /// # Errors
-    /// As [`Series::read`].
+    /// [`Error::Log`]; as [`Series::take_message`].
     pub fn series(&self, mut watch: impl Watch) -> Result<Series, Error> {
         let mut series = Series::empty(self.unit.clone());
         match &self.source {

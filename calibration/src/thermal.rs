@@ -14,7 +14,7 @@
 //! | [`solve`] | weighted, regularised, robust linear least squares |
 //! | [`model`] | which terms a sensor has, and their place in the document |
 //! | [`sequential`], [`search`], [`select`] | 000's procedure; time constants; cross-validation |
-//! | [`fit`] | from runs to a document and its report |
+//! | [`mod@fit`] | from runs to a document and its report |
 
 pub mod bare;
 pub mod branches;

@@ -7,9 +7,9 @@ use super::cells::{Cell, MAX_POWER};
 use super::noise::{Data, Noise, real};
 use super::orders::{self, Folds, Model, Score};
 
-/// Temperature that the slow meander's powers are taken about (°C) [003].
+/// Temperature that the slow meander's powers are taken about (°C) (003).
 pub const MEANDER_REFERENCE_DEG_C: f64 = 25.0;
-/// Largest order of the slow meander [003].
+/// Largest order of the slow meander (003).
 pub const MEANDER_ORDER: usize = 1;
 /// Spans of temperature (°C) below which no power, and only the first, is fitted.
 const SPANS_DEG_C: [f64; 2] = [2.0, 8.0];

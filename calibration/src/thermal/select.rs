@@ -225,7 +225,7 @@ fn smallest(tried: &[Tried]) -> Option<usize> {
     .map(|(index, _)| index)
 }
 
-/// Weights that keep slow parts from dominating: no temperature counts for more than [`CROWDED`] times what is usual, so that a hold of
+/// Weights that keep slow parts from dominating: no temperature counts for more than `CROWDED` times what is usual, so that a hold of
 /// hours weighs no more than some passes. Limited to a tenth, because what a plateau knows well is not to be thrown away.
 #[must_use]
 pub fn equal_temperature(temperature: &[f64], [low, high]: [f64; 2]) -> Vec<f64> {
