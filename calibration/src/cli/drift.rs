@@ -4,12 +4,11 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use isotherm_log::diff::is_csv;
-use isotherm_log::file::refuse_overwriting;
 use isotherm_log::offline::load_calibration;
-use isotherm_protocol::document::Created;
 use serde_json::json;
 
 use super::bar::Bar;
+use super::output::{check_outputs, date};
 use super::print;
 use super::runs::LogArgs;
 use crate::drift::analysis::{Wanted, analyse};
@@ -140,16 +139,7 @@ impl DriftArgs {
             }
         }
         let inputs: Vec<&Path> = self.log.log.iter().chain(&self.document).map(PathBuf::as_path).collect();
-        for out in self.out.iter().chain(&self.html) {
-            refuse_overwriting(out, &inputs)?;
-        }
-        match &self.out {
-            Some(out) if out.exists() && !self.overwrite => Err(Error::Usage(format!(
-                "{} is there already: give another name, or --overwrite",
-                out.display()
-            ))),
-            _ => Ok(()),
-        }
+        check_outputs(self.out.as_deref(), self.html.as_deref(), &inputs, self.overwrite)
     }
 
     fn columns(&self) -> Result<Columns, Error> {
@@ -180,10 +170,7 @@ impl DriftArgs {
         // What the document says of the constant part holds, unless something else was stated.
         put(&mut document, &report.parameters, self.initial_sigma.is_none())?;
         if let Some(created) = &self.created {
-            let date = created.parse().ok().and_then(Created::new);
-            document.created = Some(date.ok_or_else(|| {
-                Error::Usage(format!("--created is {created:?}, must be a date such as 2026-11-22"))
-            })?);
+            document.created = Some(date(created)?);
         }
         let of_log = origin(&self.log.log, &command_line())?;
         let mut whole = document.origin.take().unwrap_or_default();

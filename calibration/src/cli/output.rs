@@ -56,12 +56,7 @@ impl OutputArgs {
     pub(crate) fn check(&self, inputs: &[&Path]) -> Result<(), Error> {
         for out in self.out.iter().chain(&self.html) {
             refuse_overwriting(out, inputs)?;
-            if out.exists() && !self.overwrite {
-                return Err(Error::Usage(format!(
-                    "{} is there already: give another name, or --overwrite",
-                    out.display()
-                )));
-            }
+            keep(out, self.overwrite)?;
         }
         self.date().map(|_| ())
     }
@@ -115,9 +110,36 @@ impl OutputArgs {
     }
 
     fn date(&self) -> Result<Option<Created>, Error> {
-        let Some(text) = &self.created else { return Ok(None) };
-        let date = text.parse().ok().and_then(Created::new);
-        date.map(Some)
-            .ok_or_else(|| Error::Usage(format!("--created is {text:?}, must be a date such as 2026-11-22")))
+        self.created.as_deref().map(date).transpose()
     }
+}
+
+/// Checks before anything is read: no output may fall on an input, and a document that is there stays without `overwrite`.
+pub(super) fn check_outputs(
+    out: Option<&Path>,
+    html: Option<&Path>,
+    inputs: &[&Path],
+    overwrite: bool,
+) -> Result<(), Error> {
+    for output in out.into_iter().chain(html) {
+        refuse_overwriting(output, inputs)?;
+    }
+    out.map_or(Ok(()), |out| keep(out, overwrite))
+}
+
+/// Leaves a file alone that is there, unless it may be written over.
+fn keep(out: &Path, overwrite: bool) -> Result<(), Error> {
+    if out.exists() && !overwrite {
+        return Err(Error::Usage(format!(
+            "{} is there already: give another name, or --overwrite",
+            out.display()
+        )));
+    }
+    Ok(())
+}
+
+/// The date that a document is to state.
+pub(super) fn date(text: &str) -> Result<Created, Error> {
+    let date = text.parse().ok().and_then(Created::new);
+    date.ok_or_else(|| Error::Usage(format!("--created is {text:?}, must be a date such as 2026-11-22")))
 }

@@ -6,9 +6,9 @@ mod steps;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use isotherm_log::file::refuse_overwriting;
 use isotherm_protocol::document::AccelOutput;
 
+use super::output::{check_outputs, date};
 use super::print;
 use super::runs::Reading;
 use crate::error::Error;
@@ -27,7 +27,6 @@ use crate::report::FitReport;
 use crate::run::Run;
 use crate::written::{Written, write_file};
 use planned::PlannedArgs;
-pub(super) use steps::date;
 use steps::{first_document, judged, tracks};
 
 /// Axes, scale factors and biases of accelerometers from positions of a stand, at one temperature or several
@@ -179,16 +178,7 @@ impl PositionsArgs {
             (self.log.iter().chain(&self.judge).chain(&self.document).chain(&self.times))
                 .map(PathBuf::as_path)
                 .collect();
-        for out in self.out.iter().chain(&self.html) {
-            refuse_overwriting(out, &inputs)?;
-        }
-        match &self.out {
-            Some(out) if out.exists() && !self.overwrite => Err(Error::Usage(format!(
-                "{} is there already: give another name, or --overwrite",
-                out.display()
-            ))),
-            _ => Ok(()),
-        }
+        check_outputs(self.out.as_deref(), self.html.as_deref(), &inputs, self.overwrite)
     }
 
     fn print_budget(&self, plan: &Plan) -> Result<(), Error> {

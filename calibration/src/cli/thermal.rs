@@ -5,11 +5,10 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use isotherm_correction::units::Span;
-use isotherm_log::file::refuse_overwriting;
-use isotherm_protocol::document::Created;
 use isotherm_protocol::key::UnitId;
 
 use super::bar::Bar;
+use super::output::{check_outputs, date};
 use super::print;
 use super::runs::{LogArgs, Reading};
 use crate::error::Error;
@@ -249,16 +248,7 @@ impl ThermalArgs {
     fn check(&self) -> Result<(), Error> {
         let inputs: Vec<&Path> =
             self.log.log.iter().chain(&self.judge).chain(&self.document).map(PathBuf::as_path).collect();
-        for out in self.out.iter().chain(&self.html) {
-            refuse_overwriting(out, &inputs)?;
-        }
-        match &self.out {
-            Some(out) if out.exists() && !self.overwrite => Err(Error::Usage(format!(
-                "{} is there already: give another name, or --overwrite",
-                out.display()
-            ))),
-            _ => Ok(()),
-        }
+        check_outputs(self.out.as_deref(), self.html.as_deref(), &inputs, self.overwrite)
     }
 
     fn settings(&self) -> Result<Settings, Error> {
@@ -274,12 +264,7 @@ impl ThermalArgs {
                 return Err(Error::Usage(format!("{name} is {value} s, must be from {low} to {high} s")));
             }
         }
-        let created = match &self.created {
-            None => None,
-            Some(text) => Some(text.parse().ok().and_then(Created::new).ok_or_else(|| {
-                Error::Usage(format!("--created is {text:?}, must be a date such as 2026-11-22"))
-            })?),
-        };
+        let created = self.created.as_deref().map(date).transpose()?;
         Ok(Settings {
             method: match self.method {
                 MethodArg::Sequential => Method::Sequential,

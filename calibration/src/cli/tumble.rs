@@ -4,11 +4,10 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use isotherm_correction::sample::OutputKind;
-use isotherm_log::file::refuse_overwriting;
 use isotherm_protocol::document::AccelOutput;
 
 use super::bar::Bar;
-use super::positions::date;
+use super::output::{check_outputs, date};
 use super::print;
 use super::runs::LogArgs;
 use crate::error::Error;
@@ -156,16 +155,7 @@ impl TumbleArgs {
             }
         }
         let inputs: Vec<&Path> = self.log.log.iter().chain(&self.document).map(PathBuf::as_path).collect();
-        for out in self.out.iter().chain(&self.html) {
-            refuse_overwriting(out, &inputs)?;
-        }
-        match &self.out {
-            Some(out) if out.exists() && !self.overwrite => Err(Error::Usage(format!(
-                "{} is there already: give another name, or --overwrite",
-                out.display()
-            ))),
-            _ => Ok(()),
-        }
+        check_outputs(self.out.as_deref(), self.html.as_deref(), &inputs, self.overwrite)
     }
 
     /// A document where there is none.

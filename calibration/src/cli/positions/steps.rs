@@ -1,9 +1,10 @@
 //! Steps on the way from runs to a judged document.
 
 use isotherm_correction::sample::OutputKind;
-use isotherm_protocol::document::{AccelOutput, Created, Document};
+use isotherm_protocol::document::{AccelOutput, Document};
 
 use crate::cli::bar::Bar;
+use crate::cli::output::date;
 use crate::error::Error;
 use crate::positions::analysis::{Analysis, Settings};
 use crate::positions::bare::bare;
@@ -23,12 +24,6 @@ pub(super) fn first_document(
     let series = run.series(Bar::reading())?;
     let counts = series.accels.output == Some(OutputKind::Counts);
     bare(&series, if counts { AccelOutput::Counts } else { output }, created.map(date).transpose()?)
-}
-
-/// A date.
-pub(in crate::cli) fn date(text: &str) -> Result<Created, Error> {
-    let date = text.parse().ok().and_then(Created::new);
-    date.ok_or_else(|| Error::Usage(format!("--created is {text:?}, must be a date such as 2026-11-22")))
 }
 
 /// Runs tick by tick, corrected with a document.
