@@ -1,0 +1,130 @@
+//! The command line.
+
+use std::io::{self, Write};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use comfy_table::presets::NOTHING;
+use comfy_table::{CellAlignment, Table};
+
+use crate::error::Error;
+use crate::instructions::{self, Figures};
+use crate::kernel;
+
+/// How fast Isotherm is, as ratios to named references
+#[derive(Debug, Parser)]
+#[command(name = "isotherm-bench", version)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Time per tick of every kernel, beside what an autopilot does per sample
+    Kernel {
+        /// Rounds; every kernel runs once in each
+        #[arg(long, default_value_t = 101)]
+        rounds: usize,
+        /// Print JSON
+        #[arg(long)]
+        json: bool,
+    },
+    /// Instructions per tick of every kernel, compared with the committed figures (needs valgrind)
+    Instructions {
+        /// The committed figures
+        #[arg(long, default_value = "bench/instructions.json")]
+        figures: PathBuf,
+        /// Write the figures instead of comparing with them
+        #[arg(long)]
+        bless: bool,
+        /// Print JSON
+        #[arg(long)]
+        json: bool,
+    },
+    /// Run one kernel once: what `instructions` counts
+    #[command(hide = true)]
+    Pass {
+        /// Which one
+        index: usize,
+    },
+}
+
+fn run(command: Command) -> Result<String, Error> {
+    match command {
+        Command::Kernel { rounds, json } => {
+            let rows = kernel::measure(rounds)?;
+            if json {
+                return Ok(as_json(&rows));
+            }
+            let mut table = plain(&["kernel", "ns per tick", "quartiles", "of autopilot"]);
+            for row in rows {
+                let [low, high] = row.quartiles_ns;
+                table.add_row([
+                    row.name.to_owned(),
+                    format!("{:.1}", row.ns_per_tick),
+                    format!("{low:.1}…{high:.1}"),
+                    format!("{:.2}×", row.ratio_to_peer),
+                ]);
+            }
+            Ok(format!("{table}\n"))
+        }
+        Command::Instructions { figures: path, bless, json } => {
+            let counted = instructions::count()?;
+            let printed = if json {
+                as_json(&counted)
+            } else {
+                let mut table = plain(&["kernel", "instructions per tick"]);
+                for (name, figure) in &counted.per_tick {
+                    table.add_row([name.clone(), format!("{figure:.1}")]);
+                }
+                format!("{table}\n")
+            };
+            if bless {
+                counted.write(&path)?;
+                return Ok(printed);
+            }
+            let committed = Figures::read(&path)?;
+            if committed.architecture == counted.architecture {
+                counted.compare(&committed, &path)?;
+            } else {
+                let _ = writeln!(
+                    io::stderr(),
+                    "isotherm-bench: {} is of {}, this is {}: nothing was compared",
+                    path.display(),
+                    committed.architecture,
+                    counted.architecture
+                );
+            }
+            Ok(printed)
+        }
+        Command::Pass { index } => instructions::pass(index).map(|()| String::new()),
+    }
+}
+
+fn as_json(value: &impl serde::Serialize) -> String {
+    serde_json::to_string_pretty(value).map_or_else(|error| error.to_string(), |text| text + "\n")
+}
+
+fn plain(head: &[&str]) -> Table {
+    let mut table = Table::new();
+    table.load_preset(NOTHING).set_header(head);
+    table.column_iter_mut().skip(1).for_each(|column| column.set_cell_alignment(CellAlignment::Right));
+    table
+}
+
+/// Runs the program.
+pub(crate) fn main() -> ExitCode {
+    match run(Cli::parse().command) {
+        Ok(text) => {
+            // A reader that has gone away is no error.
+            let _ = io::stdout().write_all(text.as_bytes());
+            ExitCode::SUCCESS
+        }
+        Err(error) => {
+            let _ = writeln!(io::stderr(), "isotherm-bench: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}

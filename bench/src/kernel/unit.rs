@@ -1,0 +1,235 @@
+//! Units of several kinds through the state machine, on simulated ticks.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use isotherm_correction::calibration::Calibration;
+use isotherm_correction::navigation::NavigationStep;
+use isotherm_correction::sample::{AccelTick, CorrectedTick, GyroTick, OutputKind, SensorFlags, TemperatureReading, TickFlags};
+use isotherm_correction::unit::{Event, Unit, UnitSettings};
+use isotherm_protocol::document::Document;
+use isotherm_simulator::{Scenario, Simulation, presets};
+
+use super::Kernel;
+use crate::error::Error;
+
+/// Ticks of a pass: two switches of a unit that reverses its mode every two minutes at 200 Hz.
+const TICKS: usize = 48_000;
+/// Gyro ticks in one event.
+const BATCH: usize = 8;
+/// Largest mean error of the rate over a pass (rad/s): 1 °/h, far below what is left out where a term is missing.
+const LARGEST_RATE_ERROR: f64 = 4.85e-6;
+
+/// What is handed over at once.
+#[derive(Debug)]
+struct Bundle {
+    temperatures: Vec<TemperatureReading>,
+    accels: Vec<AccelTick>,
+    gyros: Vec<GyroTick>,
+}
+
+/// A unit and its ticks.
+#[derive(Debug)]
+pub(crate) struct UnitCase {
+    name: &'static str,
+    settings: UnitSettings,
+    calibration: Arc<Calibration>,
+    output: OutputKind,
+    accel_output: OutputKind,
+    bundles: Vec<Bundle>,
+    truth: [f64; 3],
+    /// Whether the calibration is the one that fits the simulated unit.
+    fits: bool,
+}
+
+/// All kinds of units.
+pub(crate) fn unit_cases() -> Result<Vec<UnitCase>, Error> {
+    let mems = || presets::mems_chamber(1);
+    // Four ticks are a step that there is.
+    let step = NavigationStep::new(4, true).unwrap_or_default();
+    let navigation = UnitSettings { navigation: step, ..UnitSettings::default() };
+    Ok(vec![
+        UnitCase::new("identity", "MEMS-0001.toml", strip_all, &mems(), false)?,
+        UnitCase::new("static bias, scale, orientation", "MEMS-0001.toml", |_| {}, &mems(), true)?,
+        UnitCase::new("Zeeman: every term, a switch each 24 000 ticks", "ZLG-0001.toml", |_| {}, &presets::zeeman_rest(1), true)?,
+        UnitCase::new(
+            "fibre-optic: six lags per gyro",
+            "FOG-0001.toml",
+            |_| {},
+            &presets::fibre_optic_chamber(1, presets::judging_profile()),
+            true,
+        )?,
+        UnitCase::new("six skewed sensors, parity", "MEMS-0001.toml", skew, &presets::skewed_six(1, None), false)?,
+        UnitCase { settings: navigation, ..UnitCase::new("coning and sculling, 4 ticks", "MEMS-0001.toml", |_| {}, &mems(), true)? },
+    ])
+}
+
+/// Nothing but unit scale along the case axes.
+fn strip_all(document: &mut Document) {
+    for sensor in &mut document.gyro.sensor {
+        sensor.increment_weight_error = None;
+        sensor.static_bias = None;
+    }
+    document.gyro.orientation.thermal = None;
+    for accel in document.accel.iter_mut() {
+        accel.orientation.thermal = None;
+        for sensor in &mut accel.sensor {
+            sensor.bias = None;
+            sensor.board_ratio_error = None;
+        }
+    }
+}
+
+/// Three more sensors of each kind, along the axes of a dodecahedron as the simulated unit has them.
+fn skew(document: &mut Document) {
+    let rows = isotherm_simulator::orientation::Orientation::dodecahedron().rows;
+    let gyros = document.gyro.sensor.clone();
+    document.gyro.sensor = gyros.iter().chain(&gyros).cloned().zip(0..).map(|(sensor, index)| renamed(sensor, index)).collect();
+    document.gyro.orientation.rows.clone_from(&rows);
+    document.gyro.orientation.thermal = None;
+    for accel in document.accel.iter_mut() {
+        let sensors = accel.sensor.clone();
+        accel.sensor = sensors.iter().chain(&sensors).cloned().collect();
+        for (index, sensor) in accel.sensor.iter_mut().enumerate() {
+            sensor.name = format!("a{index}");
+        }
+        accel.orientation.rows.clone_from(&rows);
+        accel.orientation.thermal = None;
+    }
+}
+
+fn renamed(mut sensor: isotherm_protocol::document::GyroSensor, index: usize) -> isotherm_protocol::document::GyroSensor {
+    sensor.name = format!("g{index}");
+    sensor
+}
+
+/// A shipped document.
+fn path(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/calibration").join(name)
+}
+
+impl UnitCase {
+    fn new(
+        name: &'static str,
+        document: &str,
+        change: impl FnOnce(&mut Document),
+        scenario: &Scenario,
+        fits: bool,
+    ) -> Result<Self, Error> {
+        let path = path(document);
+        let text = std::fs::read_to_string(&path).map_err(|source| Error::file(&path, source))?;
+        let invalid = |what: String| Error::Invalid { path: path.clone(), what };
+        let mut document = Document::parse(&text, None).map_err(|found| invalid(format!("{found:?}")))?.document;
+        change(&mut document);
+        let calibration = Calibration::new(&document.to_parts()).map_err(|defects| invalid(format!("{defects:?}")))?;
+        let mut bundles: Vec<Bundle> = Vec::new();
+        let mut truth = [0.0; 3];
+        let steps = Simulation::new(scenario).map_err(|error| invalid(error.to_string()))?;
+        for (index, step) in steps.take(TICKS).enumerate() {
+            if index % BATCH == 0 {
+                bundles.push(Bundle { temperatures: Vec::new(), accels: Vec::new(), gyros: Vec::new() });
+            }
+            truth.iter_mut().zip(step.truth.delta_angle).for_each(|(sum, delta)| *sum += delta);
+            if let Some(bundle) = bundles.last_mut() {
+                bundle.temperatures.extend(step.temperatures);
+                bundle.accels.extend(step.accel);
+                bundle.gyros.push(step.gyro);
+            }
+        }
+        Ok(Self {
+            name,
+            settings: UnitSettings::default(),
+            calibration: Arc::new(calibration),
+            output: scenario.instrument.gyros.output_kind(),
+            accel_output: scenario.instrument.accel_output_kind().unwrap_or(OutputKind::Mean),
+            bundles,
+            truth,
+            fits,
+        })
+    }
+
+    /// Hands everything over; `emit` sees every corrected tick.
+    fn drive(&self, emit: &mut dyn FnMut(&CorrectedTick)) {
+        let mut unit = Unit::new(self.settings);
+        unit.install(Arc::clone(&self.calibration), 1);
+        for bundle in &self.bundles {
+            if !bundle.temperatures.is_empty() {
+                unit.handle(Event::Temperature(&bundle.temperatures), emit);
+            }
+            for accel in bundle.accels.chunks(BATCH) {
+                unit.handle(Event::Accel { output: self.accel_output, ticks: accel }, emit);
+            }
+            unit.handle(Event::Gyro { output: self.output, ticks: &bundle.gyros }, emit);
+        }
+        unit.handle(Event::Flush, emit);
+    }
+}
+
+impl Kernel for UnitCase {
+    fn name(&self) -> &'static str {
+        self.name
+    }
+
+    fn ticks(&self) -> usize {
+        self.bundles.iter().map(|bundle| bundle.gyros.len()).sum()
+    }
+
+    #[inline(never)]
+    fn pass(&mut self) -> f64 {
+        let mut sum = 0.0;
+        self.drive(&mut |tick| {
+            let [x, y, z] = tick.delta_angle;
+            let [u, v, w] = tick.delta_velocity;
+            sum += x + y + z + u + v + w;
+        });
+        sum
+    }
+
+    /// Every tick once and in order, sound as far as its calibration fits, and the angle that was really turned through.
+    #[expect(clippy::cast_precision_loss, reason = "some ten thousand ticks")]
+    fn check(&mut self) -> Result<(), Error> {
+        let (mut count, mut last, mut disorder, mut unsound) = (0_u64, None::<u64>, 0_u64, 0_u64);
+        let (mut angle, mut seconds) = ([0.0; 3], 0.0);
+        self.drive(&mut |tick| {
+            count += u64::from(tick.ticks);
+            disorder += u64::from(last.is_some_and(|last| tick.sequence != last + u64::from(tick.ticks)) || tick.missed > 0);
+            last = Some(tick.sequence);
+            let flagged = tick.flags.intersects(TickFlags::INTERPOLATED | TickFlags::WARM_UP);
+            let sound = tick.gyro_flags.iter().chain(&tick.accel_flags).all(|flags| flags.contains(SensorFlags::VALID));
+            unsound += u64::from(!sound && !flagged);
+            angle.iter_mut().zip(tick.delta_angle).for_each(|(sum, delta)| *sum += delta);
+            seconds += tick.duration.as_s();
+        });
+        let case = self.name;
+        let wrong = |what, value: f64, limit: f64| {
+            if value > limit { Err(Error::Wrong { case, what, value, limit }) } else { Ok(()) }
+        };
+        wrong("number of ticks that are missing or too many", (count as f64 - self.ticks() as f64).abs(), 0.0)?;
+        wrong("number of ticks out of order", disorder as f64, 0.0)?;
+        if self.fits {
+            wrong("number of unsound ticks", unsound as f64, 0.0)?;
+            let errors = angle.iter().zip(self.truth).map(|(angle, truth)| (angle - truth).abs() / seconds);
+            wrong("mean error of the rate (rad/s)", errors.fold(0.0, f64::max), LARGEST_RATE_ERROR)?;
+        }
+        Ok(())
+    }
+}
+
+impl UnitCase {
+    /// The first ticks of the unit in order, for cases that only encode and decode them.
+    pub(crate) fn gyro_ticks(&self) -> impl Iterator<Item = &GyroTick> {
+        self.bundles.iter().flat_map(|bundle| &bundle.gyros)
+    }
+
+    /// What the readings of its gyros stand for.
+    pub(crate) fn output(&self) -> OutputKind {
+        self.output
+    }
+
+    /// Every corrected tick.
+    pub(crate) fn corrected(&self) -> Vec<CorrectedTick> {
+        let mut ticks = Vec::with_capacity(TICKS);
+        self.drive(&mut |tick| ticks.push(tick.clone()));
+        ticks
+    }
+}

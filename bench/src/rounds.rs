@@ -1,0 +1,48 @@
+//! Interleaved rounds: every case once in every round, so that what the machine does otherwise falls on all alike.
+
+use std::time::Instant;
+
+/// What one case took, by round.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Times {
+    /// Seconds of each round, sorted.
+    sorted_s: Vec<f64>,
+}
+
+impl Times {
+    /// Median (s).
+    pub(crate) fn median_s(&self) -> f64 {
+        self.quantile_s(0.5)
+    }
+
+    /// A quantile (s), 0…1.
+    #[expect(
+        clippy::cast_precision_loss,
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a place among some hundred rounds"
+    )]
+    pub(crate) fn quantile_s(&self, share: f64) -> f64 {
+        let last = self.sorted_s.len().saturating_sub(1) as f64;
+        self.sorted_s.get((share * last).round() as usize).copied().unwrap_or(f64::NAN)
+    }
+}
+
+/// Runs every case once in each of so many rounds, after one that is not counted.
+pub(crate) fn interleaved<T>(cases: &mut [T], rounds: usize, mut run: impl FnMut(&mut T)) -> Vec<Times> {
+    let mut times: Vec<Vec<f64>> = cases.iter().map(|_| Vec::with_capacity(rounds)).collect();
+    for round in 0..=rounds {
+        for (case, times) in cases.iter_mut().zip(&mut times) {
+            let begin = Instant::now();
+            run(case);
+            if round > 0 {
+                times.push(begin.elapsed().as_secs_f64());
+            }
+        }
+    }
+    let sorted = |mut times: Vec<f64>| {
+        times.sort_by(f64::total_cmp);
+        Times { sorted_s: times }
+    };
+    times.into_iter().map(sorted).collect()
+}
