@@ -193,7 +193,16 @@ impl ChannelMemory {
     /// Whether the value is missing, held over a rejected reading, or older than its limit at `time`.
     #[must_use]
     pub fn stale(&self, filter: &ThermalFilter, time: Timestamp) -> bool {
-        self.rejected || self.last.is_none_or(|(last, _)| time.since(last) > filter.stale_after)
+        time > self.fresh_until(filter)
+    }
+
+    /// The last time at which the value does not count as stale; before all time where it does already.
+    #[must_use]
+    pub fn fresh_until(&self, filter: &ThermalFilter) -> Timestamp {
+        match self.last {
+            Some((last, _)) if !self.rejected => last + filter.stale_after,
+            _ => Timestamp::from_ns(i64::MIN),
+        }
     }
 
     /// Forgets time, as after a step of the producer's clock.

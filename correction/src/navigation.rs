@@ -111,8 +111,12 @@ impl StepSum {
         &mut self,
         step: &NavigationStep,
         tick: &CorrectedTick,
-        emit: &mut impl FnMut(CorrectedTick),
+        emit: &mut dyn FnMut(&CorrectedTick),
     ) {
+        if step.ticks <= 1 && !step.coning_sculling && self.open.is_none() {
+            emit(tick);
+            return;
+        }
         let breaks = tick.missed > 0 || tick.flags.intersects(TickFlags::GAP | TickFlags::RESTART);
         let differs = self.open.as_ref().is_some_and(|open| {
             let changed = open.flags.symmetric_difference(tick.flags);
@@ -154,7 +158,7 @@ impl StepSum {
     }
 
     /// Closes the open step, if there is one, and emits it.
-    pub fn flush(&mut self, step: &NavigationStep, emit: &mut impl FnMut(CorrectedTick)) {
+    pub fn flush(&mut self, step: &NavigationStep, emit: &mut dyn FnMut(&CorrectedTick)) {
         let coning = core::mem::take(&mut self.coning);
         let sculling = core::mem::take(&mut self.sculling);
         let Some(mut sum) = self.open.take() else {
@@ -166,7 +170,7 @@ impl StepSum {
             sum.delta_angle = plus(sum.delta_angle, coning);
             sum.flags |= TickFlags::CONING_SCULLING;
         }
-        emit(sum);
+        emit(&sum);
     }
 }
 

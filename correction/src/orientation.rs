@@ -180,16 +180,14 @@ impl Orientation {
         }
         // √W·C = Q·R, hence (CᵀWC)⁻¹CᵀW = R⁻¹·Qᵀ·√W; the condition number is not squared this way.
         let (q, r) = orthonormal_columns(&self.weighted(rows))?;
-        let mut matrix = [[0.0; MAX_SENSORS]; 3];
-        let [row_x, row_y, row_z] = &mut matrix;
-        let columns = row_x.iter_mut().zip(row_y).zip(row_z);
-        for ((((x, y), z), q), root_weight) in columns.zip(&q).zip(&self.root_weights) {
+        let mut columns = [[0.0; 3]; MAX_SENSORS];
+        for (([x, y, z], q), root_weight) in columns.iter_mut().zip(&q).zip(&self.root_weights) {
             let b = q.map(|q| q * root_weight);
             *z = b[2] / r[2][2];
             *y = (b[1] - r[1][2] * *z) / r[1][1];
             *x = (b[0] - r[0][1] * *y - r[0][2] * *z) / r[0][0];
         }
-        Some(Inverse { matrix, mask })
+        Some(Inverse { columns, mask })
     }
 
     /// What the sensors read for the vector `v` in case axes: s = C(T)·v (unit of `v`).
@@ -250,10 +248,11 @@ fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// A compiled C(T)⁺: three rows of one coefficient per sensor.
+/// A compiled C(T)⁺.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Inverse {
-    matrix: [[f64; MAX_SENSORS]; 3],
+    /// What one unit of each sensor's reading gives along the case axes.
+    columns: [[f64; 3]; MAX_SENSORS],
     mask: SensorMask,
 }
 
@@ -270,11 +269,32 @@ impl Inverse {
     /// missing count as zero.
     #[must_use]
     pub fn apply(&self, readings: &[f64]) -> [f64; 3] {
-        self.matrix.map(|row| {
-            let products = row.iter().zip(readings).enumerate();
-            let used = products.filter(|(index, _)| self.mask.contains(*index));
-            used.fold(0.0, |sum, (_, (c, s))| sum + c * s)
-        })
+        let mut sum = [0.0; 3];
+        for (index, (column, s)) in self.columns.iter().zip(readings).enumerate() {
+            if self.mask.contains(index) {
+                sum.iter_mut().zip(column).for_each(|(sum, c)| *sum += c * s);
+            }
+        }
+        sum
+    }
+
+    /// What [`lerp`](Self::lerp) to `other` and then [`apply`](Self::apply) give, without the matrix in between.
+    #[must_use]
+    pub fn lerp_apply(&self, other: &Self, u: f64, readings: &[f64]) -> [f64; 3] {
+        if !self.leads_to(other, u) {
+            return other.apply(readings);
+        }
+        let u = u.max(0.0);
+        let mut sum = [0.0; 3];
+        for (index, ((column, target), s)) in
+            self.columns.iter().zip(&other.columns).zip(readings).enumerate()
+        {
+            if self.mask.contains(index) {
+                let between = column.iter().zip(target).map(|(c, target)| c + (target - c) * u);
+                sum.iter_mut().zip(between).for_each(|(sum, c)| *sum += c * s);
+            }
+        }
+        sum
     }
 
     /// The matrix a fraction `u` of the way from this one to `other`, u clamped to 0…1.
@@ -283,17 +303,22 @@ impl Inverse {
     /// blend would still use the sensor that was just taken out.
     #[must_use]
     pub fn lerp(&self, other: &Self, u: f64) -> Self {
-        if self.mask != other.mask || u.is_nan() || u >= 1.0 {
+        if !self.leads_to(other, u) {
             return *other;
         }
         let u = u.max(0.0);
-        let mut matrix = self.matrix;
-        for (row, target) in matrix.iter_mut().zip(&other.matrix) {
-            for (c, target) in row.iter_mut().zip(target) {
+        let mut columns = self.columns;
+        for (column, target) in columns.iter_mut().zip(&other.columns) {
+            for (c, target) in column.iter_mut().zip(target) {
                 *c += (target - *c) * u;
             }
         }
-        Self { matrix, mask: self.mask }
+        Self { columns, mask: self.mask }
+    }
+
+    /// Whether there is a way from this matrix to `other`, and `u` is not at its end yet.
+    fn leads_to(&self, other: &Self, u: f64) -> bool {
+        self.mask == other.mask && u < 1.0
     }
 }
 

@@ -40,7 +40,7 @@ pub use settings::{DURATION_RANGE_S, PreLaunchError, PreLaunchLimits, PreLaunchS
 
 use crate::calibration::Calibration;
 use crate::earth::Place;
-use crate::observation::Observation;
+use crate::observation::{GyroSeen, Observation};
 use crate::orientation::Orientation;
 use crate::rest::{Rest, RestMonitor};
 use crate::sample::{LasingMode, OutputKind, SensorFlags, Sensors, TickFlags};
@@ -195,13 +195,7 @@ impl PreLaunch {
             if observation.missed > 0 {
                 run.cut();
             }
-            let flags = observation.gyro_flags.get(index).copied().unwrap_or_default();
-            let values = (
-                observation.gyro_rates.get(index),
-                observation.gyro_biases.get(index),
-                observation.gyro_temperatures_deg_c.get(index),
-            );
-            let (Some(&rate), Some(&bias), Some(&temperature_deg_c)) = values else {
+            let Some(&GyroSeen { rate, bias, temperature_deg_c, flags, .. }) = observation.gyros.get(index) else {
                 run.bad();
                 continue;
             };

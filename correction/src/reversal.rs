@@ -27,7 +27,7 @@ pub use parts::{
     ReversalParts,
 };
 
-use crate::sample::{LasingMode, MAX_SENSORS, Sensors, TickFlags};
+use crate::sample::{LasingMode, MAX_SENSORS, TickFlags};
 use crate::units::{Span, Timestamp};
 
 /// A reading farther than this many tick durations from the ticks to be bridged says nothing about them.
@@ -120,7 +120,7 @@ impl Substitution {
         &mut self,
         reversal: &Reversal,
         input: TickInput,
-        increments: &mut Sensors<f64>,
+        increments: &mut [f64],
     ) -> TickFlags {
         let mut flags = TickFlags::empty();
         if input.restart {
@@ -174,7 +174,7 @@ impl Substitution {
         &mut self,
         reversal: Reversal,
         input: &TickInput,
-        increments: &mut Sensors<f64>,
+        increments: &mut [f64],
         flags: &mut TickFlags,
     ) -> bool {
         let mut resolved = true;
@@ -202,7 +202,7 @@ impl Substitution {
         &mut self,
         reversal: Reversal,
         input: &TickInput,
-        increments: &mut Sensors<f64>,
+        increments: &mut [f64],
         flags: &mut TickFlags,
     ) -> bool {
         let reading = Reading::new(input.end_time, input.duration, increments);

@@ -17,6 +17,7 @@ mod axes;
 mod change;
 mod correct;
 mod counters;
+mod footing;
 mod gyro_intake;
 mod health;
 mod operating;
@@ -108,6 +109,9 @@ pub struct Unit {
     /// End of the first tick since the unit appeared or its producer restarted.
     turn_on: Option<Timestamp>,
     last_end: Timestamp,
+    /// Where a tick is corrected: no memory, only a place.
+    #[serde(skip)]
+    corrected: CorrectedTick,
 }
 
 impl Unit {
@@ -129,6 +133,7 @@ impl Unit {
             restart_due: false,
             turn_on: None,
             last_end: Timestamp::default(),
+            corrected: CorrectedTick::default(),
         }
     }
 
@@ -180,7 +185,8 @@ impl Unit {
         match event {
             Event::Gyro { output, ticks } => {
                 let mut starts_anew = false;
-                for tick in ticks {
+                let passed = self.pass_straight(output, ticks, emit);
+                for tick in ticks.iter().skip(passed) {
                     self.counters.gyro_ticks_in += 1;
                     let due = self.pending.as_ref().is_some_and(|change| change.at.is_due(tick));
                     if self.fits(due, output, tick.readings.len(), |c| (c.gyro_output(), c.gyro_count())) {
@@ -228,7 +234,7 @@ impl Unit {
             }
             Event::Flush => {
                 self.release(true, emit);
-                self.steps.flush(&self.settings.navigation, &mut |tick| emit(&tick));
+                self.steps.flush(&self.settings.navigation, emit);
             }
         }
     }

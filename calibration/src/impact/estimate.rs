@@ -4,7 +4,7 @@
 //! residual rate of each gyro in, a reference each minute while the true rate is known, what it would subtract out.
 
 use isotherm_correction::drift::{DriftEstimator, DriftModel, DriftParts, DriftSettings, Reference};
-use isotherm_correction::observation::Observation;
+use isotherm_correction::observation::{GyroSeen, Observation};
 use isotherm_correction::sample::{SensorFlags, Sensors};
 use isotherm_correction::units::{Span, Timestamp};
 
@@ -64,13 +64,13 @@ pub fn residual(
         for (axis, estimator) in estimators.iter_mut().enumerate() {
             let known = index < aiding.calibration_ticks || (axis < 2 && aiding.level_afterwards);
             estimator.advance(end, false, &project);
+            let gyro =
+                GyroSeen { rate: measured[axis], flags: SensorFlags::VALID, ..GyroSeen::default() };
             let observation = Observation {
                 end_time: end,
                 duration: tick,
                 settled: true,
-                gyro_rates: std::iter::once(measured[axis]).collect(),
-                gyro_biases: std::iter::once(0.0).collect(),
-                gyro_flags: std::iter::once(SensorFlags::VALID).collect(),
+                gyros: std::iter::once(gyro).collect(),
                 ..Observation::default()
             };
             of_tick[axis] -= estimator.subtrahend(0, end);

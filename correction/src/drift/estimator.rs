@@ -8,7 +8,7 @@ use super::DriftModel;
 use super::filter::{Measured, Verdict};
 use super::gyro::{DriftEstimate, GyroDrift, grid_cell};
 use super::reference::{Reference, ReferenceCounters, ReferenceRefusal, Waiting};
-use super::ring::{NoMean, cell_end};
+use super::ring::{Covered, NoMean, cell_end};
 use crate::observation::Observation;
 use crate::sample::{SensorFlags, Sensors};
 use crate::units::{Span, Timestamp};
@@ -248,15 +248,14 @@ impl DriftEstimator {
         }
         let end = observation.end_time;
         let start = end - observation.duration;
-        let readings =
-            observation.gyro_rates.iter().zip(&observation.gyro_biases).zip(&observation.gyro_flags);
-        for (gyro, ((rate, bias), flags)) in self.gyros.iter_mut().zip(readings) {
+        let covered = Covered::new(start, end);
+        for (gyro, seen) in self.gyros.iter_mut().zip(&observation.gyros) {
             let Some(gyro) = gyro else { continue };
             gyro.filter.start(start);
-            gyro.ring.reach(end);
-            let residual = rate - bias;
-            if observation.settled && flags.contains(SensorFlags::VALID) && residual.is_finite() {
-                gyro.ring.add(start, end, residual);
+            gyro.ring.reach(&covered);
+            let residual = seen.rate - seen.bias;
+            if observation.settled && seen.flags.contains(SensorFlags::VALID) && residual.is_finite() {
+                gyro.ring.add(&covered, residual);
             }
         }
         self.observed_until = Some(end);

@@ -46,6 +46,22 @@ pub(super) struct Mean {
     pub(super) variance: f64,
 }
 
+/// The cells that one tick covers: alike for every gyro.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Covered {
+    start: Timestamp,
+    end: Timestamp,
+    first: i64,
+    last: i64,
+}
+
+impl Covered {
+    /// Of a tick from `start` to `end`.
+    pub(super) fn new(start: Timestamp, end: Timestamp) -> Self {
+        Self { start, end, first: first_number(start), last: last_number(end) }
+    }
+}
+
 /// Why there is no mean over a span.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum NoMean {
@@ -73,9 +89,12 @@ impl Ring {
         self.newest = None;
     }
 
-    /// Makes room up to the cell that holds `end`, without anything observed.
-    pub(super) fn reach(&mut self, end: Timestamp) {
-        let number = last_number(end);
+    /// Makes room up to the last cell of a tick, without anything observed.
+    pub(super) fn reach(&mut self, tick: &Covered) {
+        let number = tick.last;
+        if self.newest == Some(number) {
+            return;
+        }
         let before = self.newest.unwrap_or(i64::MIN);
         let oldest_new = before.saturating_add(1).max(number.saturating_sub(cells_kept() - 1));
         for new in oldest_new..=number {
@@ -87,10 +106,10 @@ impl Ring {
     }
 
     /// Shares the mean rate (rad/s) of a tick out to the cells that it covers. Call [`reach`](Self::reach) first.
-    pub(super) fn add(&mut self, start: Timestamp, end: Timestamp, rate: f64) {
+    pub(super) fn add(&mut self, tick: &Covered, rate: f64) {
         let oldest = self.oldest();
-        for number in first_number(start).max(oldest)..=last_number(end) {
-            let covered_s = overlap(number, start, end).as_s();
+        for number in tick.first.max(oldest)..=tick.last {
+            let covered_s = overlap(number, tick.start, tick.end).as_s();
             if let Some(cell) = self.cells.get_mut(slot(number)) {
                 cell.angle_rad += rate * covered_s;
                 cell.observed_s += covered_s;

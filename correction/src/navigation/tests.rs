@@ -31,9 +31,9 @@ fn summed(step: NavigationStep, ticks: &[CorrectedTick]) -> Vec<CorrectedTick> {
     let mut steps = Vec::new();
     let mut sum = StepSum::new();
     for tick in ticks {
-        sum.push(&step, tick, &mut |step| steps.push(step));
+        sum.push(&step, tick, &mut |step| steps.push(step.clone()));
     }
-    sum.flush(&step, &mut |step| steps.push(step));
+    sum.flush(&step, &mut |step| steps.push(step.clone()));
     steps
 }
 

@@ -184,20 +184,18 @@ impl SelfTest {
     pub fn observe(&mut self, seen: &Observation) -> bool {
         let start = *self.start.get_or_insert(seen.end_time - seen.duration);
         self.end = seen.end_time;
-        let readings = seen.gyro_readings.iter().zip(&seen.gyro_flags);
-        for (liveness, (reading, flags)) in self.gyros.iter_mut().zip(readings) {
+        for (liveness, gyro) in self.gyros.iter_mut().zip(&seen.gyros) {
             // Over a mode switch a gyro may well give nothing.
             if seen.settled || self.ticks == 0 {
-                liveness.observe(*reading, *flags, self.ticks == 0, seen.end_time);
+                liveness.observe(gyro.reading, gyro.flags, self.ticks == 0, seen.end_time);
             } else {
                 *liveness = Liveness { since: seen.end_time, live: liveness.live + 1, ..*liveness };
             }
         }
         self.ticks += 1;
-        if !seen.accel_readings.is_empty() {
-            let readings = seen.accel_readings.iter().zip(&seen.accel_flags);
-            for (liveness, (reading, flags)) in self.accels.iter_mut().zip(readings) {
-                liveness.observe(*reading, *flags, self.accel_ticks == 0, seen.end_time);
+        if !seen.accels.is_empty() {
+            for (liveness, accel) in self.accels.iter_mut().zip(&seen.accels) {
+                liveness.observe(accel.reading, accel.flags, self.accel_ticks == 0, seen.end_time);
             }
             self.accel_ticks += 1;
         }

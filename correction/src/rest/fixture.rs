@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 use crate::calibration::{AccelParts, Calibration, CalibrationParts, GyroParts};
 use crate::channel::ThermalFilterParts;
 use crate::curve::CurveParts;
-use crate::observation::Observation;
+use crate::observation::{GyroSeen, Observation};
 use crate::operation::SelfTestParts;
 use crate::orientation::OrientationParts;
 use crate::sample::{LasingMode, OutputKind, SensorFlags};
@@ -137,16 +137,20 @@ impl Still {
         let force = FORCE_M_PER_S2.map(|force| force + force_walk * self.normal() / root);
         // Any bias will do: it is in the rate and subtracted again.
         let bias = 1e-5 * middle_s;
+        let gyro = |rate: f64| GyroSeen {
+            rate: rate + bias,
+            bias,
+            temperature_deg_c: 20.0 + middle_s / 300.0,
+            flags: SensorFlags::VALID,
+            ..GyroSeen::default()
+        };
         Observation {
             sequence: u64::from(self.ticks),
             end_time: Timestamp::default() + Span::from_s(self.now_s()),
             duration: Span::from_s(self.tick_s),
             mode,
             settled: true,
-            gyro_rates: rate.iter().map(|rate| rate + bias).collect(),
-            gyro_biases: [bias; 3].into_iter().collect(),
-            gyro_temperatures_deg_c: [20.0 + middle_s / 300.0; 3].into_iter().collect(),
-            gyro_flags: [SensorFlags::VALID; 3].into_iter().collect(),
+            gyros: rate.into_iter().map(gyro).collect(),
             angular_rate: rate,
             specific_force: Some(force),
             ..Observation::default()

@@ -4,6 +4,7 @@ use core::f64::consts::{PI, TAU};
 use proptest::prelude::*;
 
 use super::*;
+use crate::sample::Sensors;
 
 const ARCSEC: f64 = PI / 180.0 / 3600.0;
 const TICK_NS: i64 = 5_000_000;

@@ -18,7 +18,8 @@ pub(super) struct Axes {
     mask: SensorMask,
     from: Option<Inverse>,
     to: Option<Inverse>,
-    excluded: SensorMask,
+    /// Sensors that the parity check has not excluded.
+    included: SensorMask,
     parity: ParityCheck,
 }
 
@@ -35,7 +36,7 @@ impl Axes {
             mask,
             from: inverse,
             to: inverse,
-            excluded: SensorMask::NONE,
+            included: mask,
             parity: ParityCheck::new(),
         }
     }
@@ -73,15 +74,8 @@ impl Axes {
     }
 
     /// Sensors that the parity check has not excluded.
-    pub(super) fn included(&self, orientation: &Orientation) -> SensorMask {
-        (0..orientation.sensors())
-            .filter(|&i| self.excluded.contains(i))
-            .fold(SensorMask::all(orientation.sensors()), SensorMask::without)
-    }
-
-    /// Whether a sensor is excluded.
-    pub(super) fn is_excluded(&self, sensor: usize) -> bool {
-        self.excluded.contains(sensor)
+    pub(super) fn included(&self) -> SensorMask {
+        self.included
     }
 
     /// Resolves case axes from the sensors of `mask`; `None` where they do not span the space.
@@ -99,7 +93,8 @@ impl Axes {
             self.from = orientation.inverse(now, mask);
             self.to = orientation.inverse(self.target, mask);
         }
-        self.at(time).map(|inverse| inverse.apply(readings))
+        let (from, to) = (self.from.as_ref()?, self.to.as_ref()?);
+        Some(from.lerp_apply(to, self.temperature.share(time), readings))
     }
 
     /// Temperature that the orientation follows (°C).
@@ -122,7 +117,7 @@ impl Axes {
     ) -> ParityVerdict {
         let verdict = self.parity.check(orientation, self.target, mask, rates);
         if let Some(sensor) = verdict.exclude {
-            self.excluded = self.excluded.with(sensor);
+            self.included = self.included.without(sensor);
         }
         verdict
     }

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use super::axes::Axes;
 use super::counters::Counters;
-use super::gyro_intake::Released;
+use super::release::Released;
 use super::health::SensorHealth;
 use super::slew::Slew;
 use super::thermal_memory::{ThermalMemory, Waiting};
@@ -21,7 +21,7 @@ use crate::drift::{DriftEstimator, DriftSettings};
 use crate::observation::Observation;
 use crate::orientation::{Inverse, Orientation, SensorMask};
 use crate::reversal::Substitution;
-use crate::sample::{AccelTick, CorrectedTick, GyroTick, SensorFlags, Sensors, TickFlags};
+use crate::sample::{AccelTick, CorrectedTick, GyroTick, MAX_SENSORS, SensorFlags, Sensors, TickFlags};
 use crate::servo::ServoMemory;
 use crate::units::{Span, Timestamp};
 
@@ -150,61 +150,49 @@ impl Corrector {
     pub(super) fn correct(
         &mut self,
         calibration: &Calibration,
-        released: &Released,
+        released: &Released<'_>,
         turn_on: Timestamp,
         accel: Option<&AccelTick>,
         (waiting, delay): (&mut Waiting, Span),
         counters: &mut Counters,
-    ) -> CorrectedTick {
-        let tick = &released.tick;
+        out: &mut CorrectedTick,
+    ) {
+        let tick = released.tick;
         if released.restart {
-            self.thermal.restart();
+            self.thermal.restart(calibration);
             self.servo.reset();
             self.slew = None;
         }
         self.thermal.advance(calibration, waiting, delay, tick.end_time, counters);
-        let orientation = &calibration.gyro_orientation;
-        let temperature_deg_c = self.thermal.gyro_axes.temperature_deg_c(tick.end_time);
-        let project = |rate| orientation.forward(temperature_deg_c, rate);
+        let axes = &self.thermal.gyro_axes;
+        let project = |rate| {
+            calibration.gyro_orientation.forward(axes.temperature_deg_c(tick.end_time), rate)
+        };
         self.drift.advance(tick.end_time, released.restart, &project);
         self.slew_share = self.slew.as_ref().map_or(0.0, |slew| slew.share(tick.end_time));
         if self.slew_share <= 0.0 {
             self.slew = None;
         }
 
-        let mut out = CorrectedTick {
-            sequence: tick.sequence,
-            end_time: tick.end_time,
-            duration: tick.duration,
-            ticks: 1,
-            mode: tick.mode,
-            ..CorrectedTick::default()
-        };
-        if self.thermal.warming_up(calibration) {
-            out.flags |= TickFlags::WARM_UP;
-        }
-        self.forget_last_tick();
-        self.gyros(calibration, released, tick.end_time.seconds_from(turn_on), &mut out, counters);
-        self.accels(calibration, tick.end_time, accel, &mut out, counters);
-        self.note(released, &out);
+        out.sequence = tick.sequence;
+        out.end_time = tick.end_time;
+        out.duration = tick.duration;
+        out.ticks = 1;
+        out.mode = tick.mode;
+        out.delta_velocity = [0.0; 3];
+        out.gyro_parity.clear();
+        out.accel_parity.clear();
+        out.flags = TickFlags::empty();
+        out.flags.set(TickFlags::WARM_UP, self.thermal.footings.warming_up);
+        self.gyros(calibration, released, tick.end_time.seconds_from(turn_on), out, counters);
+        self.accels(calibration, tick.end_time, accel, out, counters);
+        self.note(released, out);
         self.drift.observe(&self.seen);
-        out
-    }
-
-    /// Empties what the sensors' loops fill.
-    fn forget_last_tick(&mut self) {
-        let seen = &mut self.seen;
-        seen.gyro_rates.clear();
-        seen.gyro_biases.clear();
-        seen.gyro_drifts.clear();
-        seen.gyro_temperatures_deg_c.clear();
-        seen.accel_readings.clear();
-        seen.specific_force = None;
     }
 
     /// Completes the observation of the tick and the sensors' health.
-    fn note(&mut self, released: &Released, out: &CorrectedTick) {
-        let tick = &released.tick;
+    fn note(&mut self, released: &Released<'_>, out: &CorrectedTick) {
+        let tick = released.tick;
         let per_second = 1.0 / tick.duration.as_s();
         let seen = &mut self.seen;
         seen.sequence = tick.sequence;
@@ -212,9 +200,6 @@ impl Corrector {
         seen.duration = tick.duration;
         seen.missed = released.missed;
         seen.mode = tick.mode;
-        seen.gyro_readings.clone_from(&tick.readings);
-        seen.gyro_flags.clone_from(&out.gyro_flags);
-        seen.accel_flags.clone_from(&out.accel_flags);
         seen.angular_rate = out.delta_angle.map(|angle| angle * per_second);
         seen.flags = out.flags;
         seen.flags.set(TickFlags::RESTART, released.restart);
@@ -230,8 +215,7 @@ impl Corrector {
         let time = self.seen.end_time;
         let gyros = self.thermal.gyro_axes.in_use(time);
         let accels = self.thermal.accel_axes.as_ref().and_then(|axes| axes.in_use(time));
-        let rates = self.seen.gyro_biases.iter().zip(&self.seen.gyro_drifts);
-        let rates: Sensors<f64> = rates.map(|(bias, drift)| bias + drift).collect();
+        let rates: Sensors<f64> = self.seen.gyros.iter().map(|gyro| gyro.bias + gyro.drift).collect();
         let forces: Sensors<f64> = (0..calibration.accels.len())
             .filter_map(|i| self.accel_terms(i, time))
             .map(|terms| terms.bias * terms.ratio * terms.per_scale_factor)
@@ -240,6 +224,13 @@ impl Corrector {
             angular_rate: gyros.map_or([0.0; 3], |(_, inverse)| inverse.apply(&rates)),
             specific_force: accels.map_or([0.0; 3], |(_, inverse)| inverse.apply(&forces)),
         }
+    }
+}
+
+/// Gives a list one place per sensor; what stands in them is left, to be overwritten.
+fn of_length<T: Copy + Default>(list: &mut Sensors<T>, sensors: usize) {
+    if list.len() != sensors {
+        *list = core::iter::repeat_n(T::default(), sensors.min(MAX_SENSORS)).collect();
     }
 }
 
@@ -254,7 +245,7 @@ fn resolve(
     if let Some(vector) = axes.resolve(orientation, mask, readings, time) {
         return (vector, true);
     }
-    let included = axes.included(orientation);
+    let included = axes.included();
     (axes.resolve(orientation, included, readings, time).unwrap_or_default(), false)
 }
 

@@ -46,9 +46,9 @@ pub(super) struct Front<'a> {
     pub(super) restart: bool,
 }
 
-/// A tick on its way into the correction.
-#[derive(Debug, Clone)]
-pub(super) struct Released {
+/// A tick that has left.
+#[derive(Debug)]
+pub(super) struct Left {
     pub(super) tick: GyroTick,
     pub(super) output: OutputKind,
     pub(super) missed: u64,
@@ -103,6 +103,30 @@ impl Admission {
 }
 
 impl GyroIntake {
+    /// Whether a tick goes on where the last one left off, with nothing waiting: it need not wait either.
+    pub(super) fn goes_straight(&self, tick: &GyroTick) -> bool {
+        let (Some(newest), Some(last), Some(series)) = (self.newest, self.last, self.series) else {
+            return false;
+        };
+        let next = last.wrapping_add(1);
+        let in_order = tick.sequence == next && newest.sequence == last && tick.series == series && next > 0;
+        let step_ns = tick.end_time.as_ns().saturating_sub(newest.end_time.as_ns());
+        let duration_ns = tick.duration.as_ns();
+        in_order
+            && (1..=MAX_DURATION.as_ns()).contains(&duration_ns)
+            && (1..=MAX_STEP.as_ns()).contains(&step_ns)
+            && step_ns >= duration_ns / 2
+            && self.pending.is_empty()
+    }
+
+    /// Remembers a tick that [goes straight](Self::goes_straight) through.
+    pub(super) fn went_straight(&mut self, tick: &GyroTick) {
+        self.jump = None;
+        self.newest = Some(Newest { sequence: tick.sequence, end_time: tick.end_time });
+        self.released = self.released << 1 | 1;
+        self.last = Some(tick.sequence);
+    }
+
     /// Takes one tick of a batch; whether it starts a new series.
     pub(super) fn admit(&mut self, tick: &GyroTick, output: OutputKind, counters: &mut Counters) -> bool {
         if tick.duration == Span::ZERO || tick.duration > MAX_DURATION {
@@ -278,7 +302,7 @@ impl GyroIntake {
     }
 
     /// Releases the front tick.
-    pub(super) fn release(&mut self) -> Option<Released> {
+    pub(super) fn release(&mut self) -> Option<Left> {
         let Pending { tick, output, restart, refused_before, .. } = self.pending.pop_front()?;
         self.restarts_pending -= usize::from(restart);
         let missed = match self.distance(&tick) {
@@ -293,7 +317,7 @@ impl GyroIntake {
         };
         self.released = kept | 1;
         self.last = Some(tick.sequence);
-        Some(Released { tick, output, missed, restart })
+        Some(Left { tick, output, missed, restart })
     }
 
     /// How many ticks wait.

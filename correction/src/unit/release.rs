@@ -1,10 +1,19 @@
 //! Ticks leave the unit: what fits the calibration, which tick need not wait any longer, and what is said with it.
 
 use super::accel_intake::Match;
-use super::gyro_intake::Released;
+use super::gyro_intake::Left;
 use super::{Uncalibrated, Unit, correct};
 use crate::calibration::Calibration;
-use crate::sample::{AccelTick, CorrectedTick, OutputKind, TickFlags};
+use crate::sample::{AccelTick, CorrectedTick, GyroTick, OutputKind, TickFlags};
+
+/// A tick on its way into the correction.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Released<'a> {
+    pub(super) tick: &'a GyroTick,
+    pub(super) output: OutputKind,
+    pub(super) missed: u64,
+    pub(super) restart: bool,
+}
 
 impl Unit {
     /// Checks kind and number of readings against the calibration, if there is one: the one in force, or the one that waits.
@@ -38,6 +47,44 @@ impl Unit {
         waiting.is_some_and(|waiting| (waiting.accel_output(), waiting.accel_count()) == (output, sensors))
     }
 
+    /// Gives out the first ticks of a batch that need not wait at all, as they are: each goes on where the one before it
+    /// left off, and its accelerometers are at hand. How many.
+    ///
+    /// What comes out is what [`release`](Self::release) gives once they have been admitted.
+    pub(super) fn pass_straight(
+        &mut self,
+        output: OutputKind,
+        ticks: &[GyroTick],
+        emit: &mut dyn FnMut(&CorrectedTick),
+    ) -> usize {
+        let takes = |active: &super::Active| {
+            let calibration = &active.calibration;
+            (calibration.gyro_output(), calibration.gyro_count(), calibration.accel_count() > 0)
+        };
+        let Some((need_output, need_sensors, expects_accel)) = self.active.as_ref().map(takes) else { return 0 };
+        if output != need_output || self.pending.is_some() {
+            return 0;
+        }
+        let mut passed = 0;
+        for tick in ticks {
+            if tick.readings.len() != need_sensors || !self.gyros.goes_straight(tick) {
+                break;
+            }
+            let accel = match self.accels.take(tick, &mut self.counters) {
+                Match::Found(accel, output) => Some((accel, output)),
+                Match::NotYet if expects_accel => break,
+                Match::NotYet => None,
+            };
+            self.counters.gyro_ticks_in += 1;
+            self.gyros.went_straight(tick);
+            self.accels.gyro_released(tick.end_time);
+            let released = Released { tick, output, missed: 0, restart: false };
+            self.correct_and_give_out(released, accel.as_ref(), emit);
+            passed += 1;
+        }
+        passed
+    }
+
     /// Gives out every tick that need not wait any longer.
     pub(super) fn release(&mut self, flushing: bool, emit: &mut dyn FnMut(&CorrectedTick)) {
         while let Some(front) = self.gyros.front(self.settings.pairing_window, flushing) {
@@ -52,29 +99,29 @@ impl Unit {
                 Match::NotYet if expects_accel && !front.expired => return,
                 Match::NotYet => None,
             };
-            let Some(released) = self.gyros.release() else { return };
-            self.accels.gyro_released(released.tick.end_time);
+            let Some(Left { tick, output, missed, restart }) = self.gyros.release() else { return };
+            self.accels.gyro_released(tick.end_time);
             // The run that a sequence number or a time was meant for is over with a restart.
-            if let Some(change) =
-                self.pending.take_if(|change| released.restart || change.at.is_due(&released.tick))
-            {
+            if let Some(change) = self.pending.take_if(|change| restart || change.at.is_due(&tick)) {
                 self.take_effect(change);
             }
-            // A swap since it came may have changed what fits.
-            let accel = accel.filter(|(accel, output)| {
-                self.fits(false, *output, accel.readings.len(), |c| (c.accel_output(), c.accel_count()))
-            });
-            self.give_out(released, accel.as_ref().map(|(accel, _)| accel), emit);
+            let released = Released { tick: &tick, output, missed, restart };
+            self.correct_and_give_out(released, accel.as_ref(), emit);
         }
     }
 
     /// Corrects one tick and gives it out.
-    fn give_out(
+    fn correct_and_give_out(
         &mut self,
-        mut released: Released,
-        accel: Option<&AccelTick>,
+        mut released: Released<'_>,
+        accel: Option<&(AccelTick, OutputKind)>,
         emit: &mut dyn FnMut(&CorrectedTick),
     ) {
+        // A swap since it came may have changed what fits.
+        let accel = accel.filter(|(accel, output)| {
+            self.fits(false, *output, accel.readings.len(), |c| (c.accel_output(), c.accel_count()))
+        });
+        let accel = accel.map(|(accel, _)| accel);
         self.last_end = released.tick.end_time;
         if released.restart {
             self.waiting.restart(self.last_end);
@@ -87,21 +134,23 @@ impl Unit {
         let (unseen, restart_unseen) = core::mem::take(&mut self.unseen);
         released.missed = released.missed.saturating_add(unseen);
         released.restart |= restart_unseen;
-        let Released { tick, output, .. } = &released;
+        let Released { tick, output, .. } = released;
         // A swap since it came may have changed what fits.
-        let fits = self.fits(false, *output, tick.readings.len(), |c| (c.gyro_output(), c.gyro_count()));
+        let fits = self.fits(false, output, tick.readings.len(), |c| (c.gyro_output(), c.gyro_count()));
         let turn_on = *self.turn_on.get_or_insert(tick.end_time);
         let settings = &self.settings;
         let mut held = false;
-        let corrected = match &mut self.active {
+        let corrected = &mut self.corrected;
+        match &mut self.active {
             Some(active) if fits => {
-                let mut corrected = active.corrector.correct(
+                active.corrector.correct(
                     &active.calibration,
                     &released,
                     turn_on,
                     accel,
                     (&mut self.waiting, settings.temperature_delay),
                     &mut self.counters,
+                    corrected,
                 );
                 corrected.revision = active.revision;
                 let temperature =
@@ -112,16 +161,15 @@ impl Unit {
                     // What is refused is counted.
                     let _ = active.corrector.drift.submit_at_rest(&reference);
                 }
-                Some(corrected)
             }
-            Some(_) => None,
+            Some(_) => {}
             None => {
                 held = settings.uncalibrated == Uncalibrated::Hold;
-                Some(correct::pass_through(tick, accel))
+                *corrected = correct::pass_through(tick, accel);
             }
-        };
+        }
         held |= !self.operating.state().is_running();
-        let Some(mut corrected) = corrected.filter(|_| !held) else {
+        if held || (self.active.is_some() && !fits) {
             self.unannounced = missed.saturating_add(1);
             self.restart_due = restart;
             if self.active.is_none() || !fits {
@@ -129,7 +177,7 @@ impl Unit {
             }
             self.counters.ticks_held += u64::from(held);
             return;
-        };
+        }
         corrected.missed = missed;
         if corrected.missed > 0 {
             corrected.flags |= TickFlags::GAP;
@@ -140,6 +188,6 @@ impl Unit {
             corrected.flags |= TickFlags::RESTART;
         }
         self.counters.ticks_out += 1;
-        self.steps.push(&settings.navigation, &corrected, &mut |tick| emit(&tick));
+        self.steps.push(&settings.navigation, corrected, emit);
     }
 }

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::axes::Axes;
 use super::counters::Counters;
+use super::footing::Footings;
 use crate::calibration::Calibration;
 use crate::channel::{ChannelMemory, ThermalState, Verdict};
 use crate::sample::{ChannelName, TemperatureReading};
@@ -64,12 +65,14 @@ impl Waiting {
 /// Memory of everything that follows temperature; made for one calibration.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct ThermalMemory {
-    channels: Vec<ChannelMemory>,
+    pub(super) channels: Vec<ChannelMemory>,
     updated: Vec<Option<Timestamp>>,
     pub(super) gyros: Vec<GyroThermal>,
     pub(super) accels: Vec<AccelThermal>,
     pub(super) gyro_axes: Axes,
     pub(super) accel_axes: Option<Axes>,
+    /// What changes with a reading only, so that a tick need not gather it anew.
+    pub(super) footings: Footings,
 }
 
 impl ThermalMemory {
@@ -105,6 +108,7 @@ impl ThermalMemory {
                 .accel_orientation
                 .as_ref()
                 .map(|o| Axes::new(o, calibration.filter.assumed_deg_c)),
+            footings: Footings::default(),
         };
         for index in 0..memory.channels.len() {
             if let Some(state) = memory.channels.get(index).and_then(ChannelMemory::state) {
@@ -118,6 +122,7 @@ impl ThermalMemory {
         if let Some((old, old_memory)) = before.filter(|(old, _)| old.same_thermal_basis(calibration)) {
             memory.carry_unchanged(calibration, (old, old_memory));
         }
+        memory.footings = Footings::of(calibration, &memory);
         memory
     }
 
@@ -178,8 +183,13 @@ impl ThermalMemory {
         end_time: Timestamp,
         counters: &mut Counters,
     ) {
+        let mut any = false;
         while let Some(reading) = waiting.pop_before(end_time, delay) {
             self.read(calibration, &reading, delay, counters);
+            any = true;
+        }
+        if any {
+            self.footings = Footings::of(calibration, self);
         }
     }
 
@@ -276,25 +286,14 @@ impl ThermalMemory {
     }
 
     /// Forgets time, after a step of the producer's clock.
-    pub(super) fn restart(&mut self) {
+    pub(super) fn restart(&mut self, calibration: &Calibration) {
         self.channels.iter_mut().for_each(ChannelMemory::restart);
         self.updated.iter_mut().for_each(|updated| *updated = None);
         self.gyros.iter_mut().for_each(GyroThermal::settle);
         self.accels.iter_mut().for_each(AccelThermal::settle);
         self.gyro_axes.settle();
         self.accel_axes.iter_mut().for_each(Axes::settle);
-    }
-
-    /// Smoothed temperature of a channel (°C); the assumed one without a channel or before its first reading.
-    pub(super) fn temperature(&self, calibration: &Calibration, channel: Option<usize>) -> f64 {
-        let state = channel.and_then(|channel| self.channels.get(channel)).and_then(ChannelMemory::state);
-        state.map_or(calibration.filter.assumed_deg_c, |state| state.temperature)
-    }
-
-    /// Whether the temperature of a channel is missing, rejected or too old at `time`.
-    pub(super) fn stale(&self, calibration: &Calibration, channel: Option<usize>, time: Timestamp) -> bool {
-        let memory = channel.and_then(|channel| self.channels.get(channel));
-        memory.is_some_and(|memory| memory.stale(&calibration.filter, time))
+        self.footings = Footings::of(calibration, self);
     }
 
     /// Smoothed temperature of the channel of a name (°C), where it is neither missing nor stale.
@@ -307,11 +306,6 @@ impl ThermalMemory {
         let index = calibration.channels.iter().position(|channel| channel.name() == name)?;
         let memory = self.channels.get(index).filter(|memory| !memory.stale(&calibration.filter, time))?;
         memory.state().map(|state| state.temperature)
-    }
-
-    /// Whether any channel is still warming up.
-    pub(super) fn warming_up(&self, calibration: &Calibration) -> bool {
-        self.channels.iter().any(|memory| memory.warming_up(&calibration.filter))
     }
 
     /// Every channel as it stands at `time`.

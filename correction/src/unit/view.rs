@@ -63,7 +63,7 @@ impl Unit {
     #[must_use]
     pub fn observation(&self) -> Option<&Observation> {
         let seen = self.active.as_ref().map(|active| &active.corrector.seen);
-        seen.filter(|seen| !seen.gyro_rates.is_empty())
+        seen.filter(|seen| !seen.gyros.is_empty())
     }
 
     /// Account of each gyro, in the order of the calibration; empty without one.

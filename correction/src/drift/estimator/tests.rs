@@ -2,6 +2,7 @@ use alloc::vec::Vec;
 
 use super::super::{DriftParts, SUBTRACTION_RAMP};
 use super::*;
+use crate::observation::GyroSeen;
 use crate::sample::TickFlags;
 
 const SECOND: Span = Span::from_ms(1_000);
@@ -55,12 +56,17 @@ impl Bench {
 
     fn tick_with(&mut self, change: impl Fn(&mut Observation)) {
         self.end = self.end + TICK;
+        let gyro = |i: usize| GyroSeen {
+            rate: EARTH[i] + DRIFT[i] + 3e-5,
+            bias: 3e-5,
+            flags: SensorFlags::VALID,
+            ..GyroSeen::default()
+        };
         let mut observation = Observation {
             end_time: self.end,
             duration: TICK,
             settled: true,
-            gyro_rates: plain([0, 1, 2].map(|i| EARTH[i] + DRIFT[i] + 3e-5)),
-            gyro_flags: core::iter::repeat_n(SensorFlags::VALID, 3).collect(),
+            gyros: [0, 1, 2].map(gyro).into_iter().collect(),
             ..Observation::default()
         };
         change(&mut observation);
@@ -68,8 +74,7 @@ impl Bench {
         self.end = observation.end_time;
         self.estimator.advance(self.end, restart, &plain);
         let subtracted = [0, 1, 2].map(|i| self.estimator.subtrahend(i, self.end));
-        observation.gyro_biases = subtracted.iter().map(|_| 3e-5).collect();
-        observation.gyro_drifts = subtracted.into_iter().collect();
+        observation.gyros.iter_mut().zip(subtracted).for_each(|(gyro, drift)| gyro.drift = drift);
         self.estimator.observe(&observation);
         self.subtracted.push(subtracted);
     }
@@ -203,16 +208,16 @@ fn readings_that_say_nothing_take_no_part() {
             // A mode switch now and then, one reading beyond its limit, one that is no number, a gyro that is excluded.
             if k % 300 == 0 {
                 observation.settled = false;
-                observation.gyro_rates.iter_mut().for_each(|rate| *rate = 5.0);
+                observation.gyros.iter_mut().for_each(|gyro| gyro.rate = 5.0);
             }
             if k == 700 {
-                observation.gyro_flags[0] = SensorFlags::OVERRANGE;
-                observation.gyro_rates[0] = 1e3;
+                observation.gyros[0].flags = SensorFlags::OVERRANGE;
+                observation.gyros[0].rate = 1e3;
             }
             if k == 701 {
-                observation.gyro_rates[0] = f64::NAN;
+                observation.gyros[0].rate = f64::NAN;
             }
-            observation.gyro_flags[2] = SensorFlags::EXCLUDED;
+            observation.gyros[2].flags = SensorFlags::EXCLUDED;
         });
     }
     let estimate = bench.estimator.estimate(0).unwrap();

@@ -1,8 +1,11 @@
 //! The accelerometers' part of a tick: bias, scale factor, board ratio, case axes.
 
-use super::{Corrector, resolve};
+use super::{Corrector, of_length, resolve};
 use crate::calibration::Calibration;
-use crate::sample::{AccelTick, CorrectedTick, MIN_SENSORS, OutputKind, SensorFlags, Sensors, TickFlags};
+use crate::observation::AccelSeen;
+use crate::sample::{
+    AccelTick, CorrectedTick, MAX_SENSORS, MIN_SENSORS, OutputKind, SensorFlags, TickFlags,
+};
 use crate::thermal::AccelTerms;
 use crate::unit::counters::Counters;
 use crate::units::Timestamp;
@@ -24,31 +27,44 @@ impl Corrector {
         out: &mut CorrectedTick,
         counters: &mut Counters,
     ) {
-        let Some(orientation) = &calibration.accel_orientation else { return };
+        self.seen.specific_force = None;
+        let Some(orientation) = &calibration.accel_orientation else {
+            self.seen.accels.clear();
+            out.accel_flags.clear();
+            return;
+        };
         let Some(tick) = accel else {
+            self.seen.accels.clear();
             out.flags |= TickFlags::ACCELEROMETER_MISSING | TickFlags::VELOCITY_INVALID;
-            out.accel_flags.extend(core::iter::repeat_n(SensorFlags::empty(), calibration.accel_count()));
+            of_length(&mut out.accel_flags, calibration.accels.len());
+            out.accel_flags.fill(SensorFlags::empty());
             counters.accel_missing += 1;
             return;
         };
         let duration_s = tick.duration.as_s();
         let Some(axes) = &self.thermal.accel_axes else { return };
-        let mut mask = axes.included(orientation);
-        let mut forces = Sensors::<f64>::new();
-        for (i, model) in calibration.accels.iter().enumerate() {
-            let stale = self.thermal.stale(calibration, model.channel, time)
-                || self.thermal.stale(calibration, model.board_channel, time);
-            let mut flags = SensorFlags::VALID;
-            let thermal = self.thermal.accels.get(i);
-            let clamped = thermal.is_some_and(crate::thermal::AccelThermal::clamped);
-            flags.set(SensorFlags::CLAMPED_TEMPERATURE, clamped || axes.clamped());
-            flags.set(SensorFlags::STALE_TEMPERATURE, stale);
-            flags.set(SensorFlags::EXCLUDED, axes.is_excluded(i));
+        let included = axes.included();
+        let mut mask = included;
+        let mut forces = [0.0; MAX_SENSORS];
+        let count = calibration.accels.len();
+        let forces = forces.get_mut(..count).unwrap_or_default();
+        of_length(&mut self.seen.accels, count);
+        of_length(&mut out.accel_flags, count);
+        let of_sensors = forces.iter_mut().zip(&mut out.accel_flags);
+        for (i, (model, (force, flags))) in calibration.accels.iter().zip(of_sensors).enumerate() {
+            let (Some(terms), Some(footing), Some(last_force)) = (
+                self.accel_terms(i, time),
+                self.thermal.footings.accels.get(i),
+                self.last_forces.get_mut(i),
+            ) else {
+                continue;
+            };
+            *flags = footing.flags(time);
+            flags.set(SensorFlags::EXCLUDED, !included.contains(i));
             let reading = tick.readings.get(i).copied().unwrap_or(f64::NAN);
-            let Some(terms) = self.accel_terms(i, time) else { continue };
-            let force = if reading.is_finite() {
+            *force = if reading.is_finite() {
                 if reading.abs() >= model.input_limit {
-                    flags |= SensorFlags::OVERRANGE;
+                    *flags |= SensorFlags::OVERRANGE;
                     counters.overrange_readings += 1;
                 }
                 let reading = reading.clamp(-model.input_limit, model.input_limit);
@@ -57,37 +73,37 @@ impl Corrector {
                     OutputKind::Mean => reading,
                 })
             } else {
-                flags |= SensorFlags::NOT_FINITE;
+                *flags |= SensorFlags::NOT_FINITE;
                 counters.not_finite_readings += 1;
-                self.last_forces.get(i).copied().unwrap_or(0.0)
+                *last_force
             };
             if flags.intersects(SensorFlags::OVERRANGE | SensorFlags::NOT_FINITE) {
                 mask = mask.without(i);
-                flags -= SensorFlags::VALID;
-            } else if let Some(last) = self.last_forces.get_mut(i) {
-                *last = force;
+                *flags -= SensorFlags::VALID;
+            } else {
+                *last_force = *force;
             }
             if flags.contains(SensorFlags::EXCLUDED) {
-                flags -= SensorFlags::VALID;
+                *flags -= SensorFlags::VALID;
             }
-            forces.push(force);
-            out.accel_flags.push(flags);
+            if let Some(seen) = self.seen.accels.get_mut(i) {
+                *seen = AccelSeen { reading, flags: *flags };
+            }
         }
         let Some(axes) = &mut self.thermal.accel_axes else { return };
         if orientation.sensors() > MIN_SENSORS {
-            let verdict = axes.watch(orientation, mask, &forces);
+            let verdict = axes.watch(orientation, mask, forces);
             out.accel_parity = verdict.residuals;
             if verdict.exceeded {
                 out.flags |= TickFlags::PARITY_EXCEEDED;
             }
             counters.sensors_excluded += u64::from(verdict.exclude.is_some());
         }
-        let (force, trusted) = resolve(axes, orientation, mask, &forces, time);
+        let (force, trusted) = resolve(axes, orientation, mask, forces, time);
         let slewed_from = self.slew.as_ref().and_then(|slew| slew.accel_axes.as_ref());
-        let force = crate::unit::slew::axes(force, slewed_from, mask, &forces, self.slew_share);
+        let force = crate::unit::slew::axes(force, slewed_from, mask, forces, self.slew_share);
         out.delta_velocity = force.map(|f| f * duration_s);
         out.flags.set(TickFlags::VELOCITY_INVALID, !trusted);
-        self.seen.accel_readings.clone_from(&tick.readings);
         self.seen.specific_force = trusted.then_some(force);
     }
 }

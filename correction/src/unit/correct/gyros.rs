@@ -1,15 +1,16 @@
 //! The gyros' part of a tick: scale, bias, servo transient, substitution, case axes.
 
-use super::{Corrector, resolve};
+use super::{Corrector, of_length, resolve};
 use crate::calibration::Calibration;
+use crate::observation::GyroSeen;
 use crate::reversal::{Substitution, TickInput};
 use crate::sample::{
-    CorrectedTick, GyroTick, LasingMode, MIN_SENSORS, OutputKind, SensorFlags, Sensors, TickFlags,
+    CorrectedTick, GyroTick, LasingMode, MAX_SENSORS, MIN_SENSORS, OutputKind, SensorFlags, TickFlags,
 };
 use crate::servo::{ServoTick, Transient};
-use crate::thermal::{GyroModel, GyroTerms, GyroThermal};
+use crate::thermal::{GyroModel, GyroTerms};
 use crate::unit::counters::Counters;
-use crate::unit::gyro_intake::Released;
+use crate::unit::release::Released;
 use crate::units::Timestamp;
 
 impl Corrector {
@@ -31,12 +32,12 @@ impl Corrector {
     pub(super) fn gyros(
         &mut self,
         calibration: &Calibration,
-        released: &Released,
+        released: &Released<'_>,
         since_turn_on_s: f64,
         out: &mut CorrectedTick,
         counters: &mut Counters,
     ) {
-        let tick = &released.tick;
+        let tick = released.tick;
         let duration_s = tick.duration.as_s();
         let input = TickInput {
             end_time: tick.end_time,
@@ -49,16 +50,29 @@ impl Corrector {
         let lost = calibration.reversal.as_ref().is_some_and(|r| self.substitution.is_lost(r, &input));
         self.servo.advance(lost, tick.end_time, tick.duration);
 
-        let mut mask = self.thermal.gyro_axes.included(&calibration.gyro_orientation);
-        let mut increments = Sensors::<f64>::new();
-        for (i, model) in calibration.gyros.iter().enumerate() {
-            let Some(terms) = self.gyro_terms(i, model, tick.end_time, since_turn_on_s) else { continue };
+        let included = self.thermal.gyro_axes.included();
+        let mut mask = included;
+        let (mut increments, mut rates) = ([0.0; MAX_SENSORS], [0.0; MAX_SENSORS]);
+        let count = calibration.gyros.len();
+        let increments = increments.get_mut(..count).unwrap_or_default();
+        let rates = rates.get_mut(..count).unwrap_or_default();
+        of_length(&mut self.seen.gyros, count);
+        of_length(&mut out.gyro_flags, count);
+        let of_sensors = increments.iter_mut().zip(&mut *rates).zip(&mut out.gyro_flags);
+        for (i, (model, ((increment, rate), flags))) in calibration.gyros.iter().zip(of_sensors).enumerate() {
+            let (Some(terms), Some(footing), Some(last_rate)) = (
+                self.gyro_terms(i, model, tick.end_time, since_turn_on_s),
+                self.thermal.footings.gyros.get(i).copied(),
+                self.last_rates.get_mut(i),
+            ) else {
+                continue;
+            };
             let mut bias = bias(&terms, tick);
             if let (Some(servo), false) = (&model.servo, lost) {
                 let servo_tick = ServoTick {
                     end_time: tick.end_time,
                     duration: tick.duration,
-                    temperature_deg_c: self.thermal.temperature(calibration, model.channel),
+                    temperature_deg_c: footing.temperature_deg_c,
                     scale_rad_per_count: terms.increment_weight,
                     half_periods: tick.half_periods.get(i).copied(),
                 };
@@ -72,14 +86,15 @@ impl Corrector {
                 }
             }
             let drift = self.drift.subtrahend(i, tick.end_time);
-            let mut flags = self.temperature_flags(calibration, i, model, tick.end_time);
+            *flags = footing.flags(tick.end_time);
+            flags.set(SensorFlags::EXCLUDED, !included.contains(i));
 
             let reading = tick.readings.get(i).copied().unwrap_or(f64::NAN);
-            let increment = if lost {
+            *increment = if lost {
                 0.0
             } else if reading.is_finite() {
                 if reading.abs() >= model.input_limit {
-                    flags |= SensorFlags::OVERRANGE;
+                    *flags |= SensorFlags::OVERRANGE;
                     counters.overrange_readings += 1;
                 }
                 // Beyond its limit a reading says no more than the limit, and stays finite whatever it is.
@@ -87,29 +102,30 @@ impl Corrector {
                 scaled(calibration.gyro_output, reading, terms.increment_weight, duration_s)
                     - (bias + drift) * duration_s
             } else {
-                flags |= SensorFlags::NOT_FINITE;
+                *flags |= SensorFlags::NOT_FINITE;
                 counters.not_finite_readings += 1;
-                self.last_rates.get(i).copied().unwrap_or(0.0) * duration_s
+                *last_rate * duration_s
             };
+            // Before the substitution: the angle that it restores is a lump, not a rate.
+            *rate = *increment / duration_s;
             if lost
                 || flags.intersects(SensorFlags::OVERRANGE | SensorFlags::NOT_FINITE | SensorFlags::EXCLUDED)
             {
-                flags -= SensorFlags::VALID;
+                *flags -= SensorFlags::VALID;
+                if flags.intersects(SensorFlags::OVERRANGE | SensorFlags::NOT_FINITE) {
+                    mask = mask.without(i);
+                }
+            } else {
+                *last_rate = *rate;
             }
-            if flags.intersects(SensorFlags::OVERRANGE | SensorFlags::NOT_FINITE) {
-                mask = mask.without(i);
+            if let Some(seen) = self.seen.gyros.get_mut(i) {
+                let temperature_deg_c = footing.temperature_deg_c;
+                let rate = *rate + (bias + drift);
+                *seen = GyroSeen { reading, rate, bias, drift, temperature_deg_c, flags: *flags };
             }
-            increments.push(increment);
-            self.seen.gyro_biases.push(bias);
-            self.seen.gyro_drifts.push(drift);
-            self.seen.gyro_temperatures_deg_c.push(self.thermal.temperature(calibration, model.channel));
-            out.gyro_flags.push(flags);
         }
 
-        // Before the substitution: the angle that it restores is a lump, not a rate.
-        let rates: Sensors<f64> = increments.iter().map(|increment| increment / duration_s).collect();
-        self.note_rates(&rates, &out.gyro_flags);
-        out.flags |= self.substitute(calibration, input, &mut increments);
+        out.flags |= self.substitute(calibration, input, increments);
         count_switch_flags(out.flags, counters);
         let interpolated = out.flags.contains(TickFlags::INTERPOLATED);
         let unsettled = TickFlags::INTERPOLATED
@@ -121,55 +137,25 @@ impl Corrector {
         let orientation = &calibration.gyro_orientation;
         let axes = &mut self.thermal.gyro_axes;
         if orientation.sensors() > MIN_SENSORS && !interpolated {
-            let verdict = axes.watch(orientation, mask, &rates);
+            let verdict = axes.watch(orientation, mask, rates);
             out.gyro_parity = verdict.residuals;
             out.flags.set(TickFlags::PARITY_EXCEEDED, verdict.exceeded);
             counters.sensors_excluded += u64::from(verdict.exclude.is_some());
         }
-        let (angle, trusted) = resolve(axes, orientation, mask, &increments, tick.end_time);
+        let (angle, trusted) = resolve(axes, orientation, mask, increments, tick.end_time);
         let slewed_from = self.slew.as_ref().and_then(|slew| slew.gyro_axes.as_ref());
-        out.delta_angle = crate::unit::slew::axes(angle, slewed_from, mask, &increments, self.slew_share);
+        out.delta_angle = crate::unit::slew::axes(angle, slewed_from, mask, increments, self.slew_share);
         out.flags.set(TickFlags::ANGLE_INVALID, !trusted);
     }
 }
 
 impl Corrector {
-    /// What the temperatures and the parity check say of a gyro.
-    fn temperature_flags(
-        &self,
-        calibration: &Calibration,
-        index: usize,
-        model: &GyroModel,
-        time: Timestamp,
-    ) -> SensorFlags {
-        let axes = &self.thermal.gyro_axes;
-        let clamped = self.thermal.gyros.get(index).is_some_and(GyroThermal::clamped);
-        let mut flags = SensorFlags::VALID;
-        flags.set(SensorFlags::CLAMPED_TEMPERATURE, clamped || axes.clamped());
-        let stale = self.thermal.stale(calibration, model.channel, time);
-        flags.set(SensorFlags::STALE_TEMPERATURE, stale);
-        flags.set(SensorFlags::EXCLUDED, axes.is_excluded(index));
-        flags
-    }
-
-    /// Keeps the good rates, and every rate with what was subtracted put back.
-    fn note_rates(&mut self, rates: &Sensors<f64>, flags: &Sensors<SensorFlags>) {
-        for ((last, rate), flags) in self.last_rates.iter_mut().zip(rates).zip(flags) {
-            if flags.contains(SensorFlags::VALID) {
-                *last = *rate;
-            }
-        }
-        let seen = &mut self.seen;
-        let subtracted = seen.gyro_biases.iter().zip(&seen.gyro_drifts).map(|(bias, drift)| bias + drift);
-        seen.gyro_rates.extend(rates.iter().zip(subtracted).map(|(rate, subtracted)| rate + subtracted));
-    }
-
     /// Bridges a mode switch (models §5).
     fn substitute(
         &mut self,
         calibration: &Calibration,
         input: TickInput,
-        increments: &mut Sensors<f64>,
+        increments: &mut [f64],
     ) -> TickFlags {
         match &calibration.reversal {
             Some(reversal) => self.substitution.tick(reversal, input, increments),
