@@ -290,8 +290,8 @@ impl Inverse {
             self.columns.iter().zip(&other.columns).zip(readings).enumerate()
         {
             if self.mask.contains(index) {
-                let between = column.iter().zip(target).map(|(c, target)| c + (target - c) * u);
-                sum.iter_mut().zip(between).for_each(|(sum, c)| *sum += c * s);
+                let [x, y, z] = [0, 1, 2].map(|axis| column[axis] + (target[axis] - column[axis]) * u);
+                sum = [sum[0] + x * s, sum[1] + y * s, sum[2] + z * s];
             }
         }
         sum

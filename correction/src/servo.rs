@@ -221,15 +221,27 @@ impl ServoMemory {
         // A tick before the end of the transition cannot be: its clock is broken.
         let settles = 0.0..=servo.settle_time_s();
         let running = self.settles_from.is_some_and(|start| settles.contains(&middle.seconds_from(start)));
-        let unbalance =
-            if running { libm::tanh(tick.duration.as_s() / (2.0 * servo.time_constant_s)) } else { 0.0 };
-        let excess_hz =
-            if running { self.frequency_excess_hz(sensor, servo, tick, middle, unbalance) } else { None };
+        if !running {
+            if let Some(last) = self.last.get_mut(sensor) {
+                *last = mean_hz.map(|mean| (middle, mean));
+            }
+            return Transient::Settled;
+        }
+        self.running_rate(sensor, servo, tick, (middle, mean_hz))
+    }
+
+    /// The apparent rate while the transient runs; remembers the mean rate without it.
+    fn running_rate(
+        &mut self,
+        sensor: usize,
+        servo: &Servo,
+        tick: &ServoTick,
+        (middle, mean_hz): (Timestamp, Option<f64>),
+    ) -> Transient {
+        let unbalance = libm::tanh(tick.duration.as_s() / (2.0 * servo.time_constant_s));
+        let excess_hz = self.frequency_excess_hz(sensor, servo, tick, middle, unbalance);
         if let Some(last) = self.last.get_mut(sensor) {
             *last = mean_hz.map(|mean| (middle, mean - unbalance * excess_hz.unwrap_or(0.0)));
-        }
-        if !running {
-            return Transient::Settled;
         }
         let rate = excess_hz.map(|excess_hz| tick.scale_rad_per_count * unbalance * excess_hz);
         match rate.filter(|rate| rate.is_finite()) {

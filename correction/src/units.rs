@@ -160,8 +160,19 @@ impl Timestamp {
         reason = "differences handled as seconds are far below 2⁵³ ns (104 days)"
     )]
     pub const fn seconds_from(self, other: Self) -> f64 {
-        self.0.saturating_sub(other.0) as f64 * 1e-9
+        // What `saturating_sub` gives, with a branch that is never taken in place of what it always computes.
+        let ns = match self.0.checked_sub(other.0) {
+            Some(ns) => ns,
+            None => ends_apart(self.0),
+        };
+        ns as f64 * 1e-9
     }
+}
+
+/// The saturated difference of two times that are too far apart, the first of which is `from`.
+#[cold]
+const fn ends_apart(from: i64) -> i64 {
+    if from < 0 { i64::MIN } else { i64::MAX }
 }
 
 impl Add<Span> for Timestamp {

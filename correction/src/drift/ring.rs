@@ -53,12 +53,16 @@ pub(super) struct Covered {
     end: Timestamp,
     first: i64,
     last: i64,
+    /// Place of the last cell, and how much of it the tick covers (s).
+    slot: usize,
+    in_last_s: f64,
 }
 
 impl Covered {
     /// Of a tick from `start` to `end`.
     pub(super) fn new(start: Timestamp, end: Timestamp) -> Self {
-        Self { start, end, first: first_number(start), last: last_number(end) }
+        let (first, last) = (first_number(start), last_number(end));
+        Self { start, end, first, last, slot: slot(last), in_last_s: overlap(last, start, end).as_s() }
     }
 }
 
@@ -108,12 +112,18 @@ impl Ring {
     /// Shares the mean rate (rad/s) of a tick out to the cells that it covers. Call [`reach`](Self::reach) first.
     pub(super) fn add(&mut self, tick: &Covered, rate: f64) {
         let oldest = self.oldest();
-        for number in tick.first.max(oldest)..=tick.last {
-            let covered_s = overlap(number, tick.start, tick.end).as_s();
-            if let Some(cell) = self.cells.get_mut(slot(number)) {
-                cell.angle_rad += rate * covered_s;
-                cell.observed_s += covered_s;
-            }
+        for number in tick.first.max(oldest)..tick.last {
+            self.gain(slot(number), overlap(number, tick.start, tick.end).as_s(), rate);
+        }
+        if oldest <= tick.last {
+            self.gain(tick.slot, tick.in_last_s, rate);
+        }
+    }
+
+    fn gain(&mut self, slot: usize, covered_s: f64, rate: f64) {
+        if let Some(cell) = self.cells.get_mut(slot) {
+            cell.angle_rad += rate * covered_s;
+            cell.observed_s += covered_s;
         }
     }
 

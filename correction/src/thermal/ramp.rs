@@ -59,6 +59,9 @@ impl<const N: usize> Ramp<N> {
     /// How far along the line `time` is, 0…1; 0 for values that stand still.
     #[must_use]
     pub fn share(&self, time: Timestamp) -> f64 {
+        if self.per_second == 0.0 {
+            return 0.0;
+        }
         (time.seconds_from(self.start) * self.per_second).clamp(0.0, 1.0)
     }
 }

@@ -15,17 +15,18 @@ const MAX_PENDING: usize = 8192;
 /// What the accelerometer stream has for a gyro tick.
 #[derive(Debug)]
 pub(super) enum Match {
-    /// The tick that ends with it, and what its readings stand for.
-    Found(AccelTick, OutputKind),
+    /// The tick that ends with it.
+    Found(Pending),
     /// None yet: it may still come.
     NotYet,
 }
 
-/// A tick that waits for its gyro tick.
+/// A tick that waits for its gyro tick, or has met it.
 #[derive(Debug, Serialize, Deserialize)]
-struct Pending {
-    tick: AccelTick,
-    output: OutputKind,
+pub(super) struct Pending {
+    pub(super) tick: AccelTick,
+    /// What its readings stand for.
+    pub(super) output: OutputKind,
     /// Messages of gyro ticks that had come before it.
     after: u64,
 }
@@ -64,6 +65,11 @@ impl AccelIntake {
     /// Puts a tick in its place in time.
     fn insert(&mut self, pending: Pending, counters: &mut Counters) {
         let time = pending.tick.end_time;
+        if self.pending.len() < MAX_PENDING && self.pending.back().is_none_or(|last| last.tick.end_time < time)
+        {
+            self.pending.push_back(pending);
+            return;
+        }
         let place = self.pending.iter().rposition(|p| p.tick.end_time < time).map_or(0, |i| i + 1);
         if self.pending.get(place).is_some_and(|p| p.tick.end_time == time) {
             counters.accel_duplicates += 1;
@@ -86,7 +92,7 @@ impl AccelIntake {
                 counters.accel_unpaired += 1;
             } else if front.end_time < gyro.end_time + half {
                 let found = self.pending.pop_front();
-                return found.map_or(Match::NotYet, |found| Match::Found(found.tick, found.output));
+                return found.map_or(Match::NotYet, Match::Found);
             } else {
                 break;
             }

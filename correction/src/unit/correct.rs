@@ -190,7 +190,7 @@ impl Corrector {
         self.drift.observe(&self.seen);
     }
 
-    /// Completes the observation of the tick and the sensors' health.
+    /// Completes the observation of the tick.
     fn note(&mut self, released: &Released<'_>, out: &CorrectedTick) {
         let tick = released.tick;
         let per_second = 1.0 / tick.duration.as_s();
@@ -203,11 +203,6 @@ impl Corrector {
         seen.angular_rate = out.delta_angle.map(|angle| angle * per_second);
         seen.flags = out.flags;
         seen.flags.set(TickFlags::RESTART, released.restart);
-        let gyros = self.gyro_health.iter_mut().zip(&out.gyro_flags);
-        let accels = self.accel_health.iter_mut().zip(&out.accel_flags);
-        // A tick without its accelerometers says nothing of them.
-        let accels = accels.filter(|_| !out.flags.contains(TickFlags::ACCELEROMETER_MISSING));
-        gyros.chain(accels).for_each(|(health, flags)| health.note(*flags));
     }
 
     /// What is presently subtracted, in case axes.

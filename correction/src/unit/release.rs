@@ -1,10 +1,10 @@
 //! Ticks leave the unit: what fits the calibration, which tick need not wait any longer, and what is said with it.
 
-use super::accel_intake::Match;
+use super::accel_intake::{Match, Pending};
 use super::gyro_intake::Left;
 use super::{Uncalibrated, Unit, correct};
 use crate::calibration::Calibration;
-use crate::sample::{AccelTick, CorrectedTick, GyroTick, OutputKind, TickFlags};
+use crate::sample::{CorrectedTick, GyroTick, OutputKind, TickFlags};
 
 /// A tick on its way into the correction.
 #[derive(Debug, Clone, Copy)]
@@ -71,7 +71,7 @@ impl Unit {
                 break;
             }
             let accel = match self.accels.take(tick, &mut self.counters) {
-                Match::Found(accel, output) => Some((accel, output)),
+                Match::Found(accel) => Some(accel),
                 Match::NotYet if expects_accel => break,
                 Match::NotYet => None,
             };
@@ -95,7 +95,7 @@ impl Unit {
             let expects_accel =
                 self.active.as_ref().is_none_or(|active| active.calibration.accel_count() > 0);
             let accel = match self.accels.take(front.tick, &mut self.counters) {
-                Match::Found(accel, output) => Some((accel, output)),
+                Match::Found(accel) => Some(accel),
                 Match::NotYet if expects_accel && !front.expired => return,
                 Match::NotYet => None,
             };
@@ -114,14 +114,14 @@ impl Unit {
     fn correct_and_give_out(
         &mut self,
         mut released: Released<'_>,
-        accel: Option<&(AccelTick, OutputKind)>,
+        accel: Option<&Pending>,
         emit: &mut dyn FnMut(&CorrectedTick),
     ) {
         // A swap since it came may have changed what fits.
-        let accel = accel.filter(|(accel, output)| {
-            self.fits(false, *output, accel.readings.len(), |c| (c.accel_output(), c.accel_count()))
+        let accel = accel.filter(|Pending { tick, output, .. }| {
+            self.fits(false, *output, tick.readings.len(), |c| (c.accel_output(), c.accel_count()))
         });
-        let accel = accel.map(|(accel, _)| accel);
+        let accel = accel.map(|accel| &accel.tick);
         self.last_end = released.tick.end_time;
         if released.restart {
             self.waiting.restart(self.last_end);

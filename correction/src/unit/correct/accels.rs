@@ -1,5 +1,6 @@
 //! The accelerometers' part of a tick: bias, scale factor, board ratio, case axes.
 
+use super::gyros::UNSOUND;
 use super::{Corrector, of_length, resolve};
 use crate::calibration::Calibration;
 use crate::observation::AccelSeen;
@@ -47,48 +48,66 @@ impl Corrector {
         let mut mask = included;
         let mut forces = [0.0; MAX_SENSORS];
         let count = calibration.accels.len();
-        let forces = forces.get_mut(..count).unwrap_or_default();
         of_length(&mut self.seen.accels, count);
         of_length(&mut out.accel_flags, count);
-        let of_sensors = forces.iter_mut().zip(&mut out.accel_flags);
-        for (i, (model, (force, flags))) in calibration.accels.iter().zip(of_sensors).enumerate() {
-            let (Some(terms), Some(footing), Some(last_force)) = (
-                self.accel_terms(i, time),
-                self.thermal.footings.accels.get(i),
-                self.last_forces.get_mut(i),
-            ) else {
-                continue;
-            };
-            *flags = footing.flags(time);
-            flags.set(SensorFlags::EXCLUDED, !included.contains(i));
-            let reading = tick.readings.get(i).copied().unwrap_or(f64::NAN);
-            *force = if reading.is_finite() {
-                if reading.abs() >= model.input_limit {
-                    *flags |= SensorFlags::OVERRANGE;
+        let slew = self.slew.as_ref().filter(|_| self.slew_share > 0.0);
+        let (
+            Some(thermals),
+            Some(footings),
+            Some(last_forces),
+            Some(healths),
+            Some(seen),
+            Some(all_flags),
+            Some(readings),
+            Some(forces),
+        ) = (
+            self.thermal.accels.get(..count),
+            self.thermal.footings.accels.get(..count),
+            self.last_forces.get_mut(..count),
+            self.accel_health.get_mut(..count),
+            self.seen.accels.get_mut(..count),
+            out.accel_flags.get_mut(..count),
+            tick.readings.get(..count),
+            forces.get_mut(..count),
+        )
+        else {
+            return;
+        };
+        for (i, model) in calibration.accels.iter().enumerate() {
+            let terms = thermals[i].at(time);
+            let terms = slew.map_or(terms, |slew| slew.accel(i, terms, self.slew_share));
+            let mut flags = footings[i].flags(time);
+            if !included.contains(i) {
+                flags |= SensorFlags::EXCLUDED;
+            }
+            let (reading, limit) = (readings[i], model.input_limit);
+            let force = if reading.is_finite() {
+                if reading.abs() >= limit {
+                    flags |= SensorFlags::OVERRANGE;
                     counters.overrange_readings += 1;
                 }
-                let reading = reading.clamp(-model.input_limit, model.input_limit);
+                let reading = reading.clamp(-limit, limit);
                 terms.specific_force(match calibration.accel_output {
                     OutputKind::Counts => reading / duration_s,
                     OutputKind::Mean => reading,
                 })
             } else {
-                *flags |= SensorFlags::NOT_FINITE;
+                flags |= SensorFlags::NOT_FINITE;
                 counters.not_finite_readings += 1;
-                *last_force
+                last_forces[i]
             };
             if flags.intersects(SensorFlags::OVERRANGE | SensorFlags::NOT_FINITE) {
                 mask = mask.without(i);
-                *flags -= SensorFlags::VALID;
             } else {
-                *last_force = *force;
+                last_forces[i] = force;
             }
-            if flags.contains(SensorFlags::EXCLUDED) {
-                *flags -= SensorFlags::VALID;
+            if flags.intersects(UNSOUND) {
+                flags -= SensorFlags::VALID;
             }
-            if let Some(seen) = self.seen.accels.get_mut(i) {
-                *seen = AccelSeen { reading, flags: *flags };
-            }
+            forces[i] = force;
+            all_flags[i] = flags;
+            healths[i].note(flags);
+            seen[i] = AccelSeen { reading, flags };
         }
         let Some(axes) = &mut self.thermal.accel_axes else { return };
         if orientation.sensors() > MIN_SENSORS {

@@ -10,8 +10,13 @@ use crate::sample::{
 use crate::servo::{ServoTick, Transient};
 use crate::thermal::{GyroModel, GyroTerms};
 use crate::unit::counters::Counters;
+use crate::unit::footing::Footing;
 use crate::unit::release::Released;
 use crate::units::Timestamp;
+
+/// A reading that does not count as it stands.
+pub(super) const UNSOUND: SensorFlags =
+    SensorFlags::OVERRANGE.union(SensorFlags::NOT_FINITE).union(SensorFlags::EXCLUDED);
 
 impl Corrector {
     /// The terms of a gyro in use, its trend in the bias.
@@ -22,8 +27,7 @@ impl Corrector {
         time: Timestamp,
         since_turn_on_s: f64,
     ) -> Option<GyroTerms> {
-        let mut terms = self.thermal.gyros.get(index)?.at(time);
-        terms.bias += model.trend.as_ref().map_or(0.0, |trend| trend.at(since_turn_on_s));
+        let terms = terms(self.thermal.gyros.get(index)?.at(time), model, since_turn_on_s);
         let slew = self.slew.as_ref().filter(|_| self.slew_share > 0.0);
         Some(slew.map_or(terms, |slew| slew.gyro(index, terms, self.slew_share)))
     }
@@ -54,25 +58,45 @@ impl Corrector {
         let mut mask = included;
         let (mut increments, mut rates) = ([0.0; MAX_SENSORS], [0.0; MAX_SENSORS]);
         let count = calibration.gyros.len();
-        let increments = increments.get_mut(..count).unwrap_or_default();
-        let rates = rates.get_mut(..count).unwrap_or_default();
         of_length(&mut self.seen.gyros, count);
         of_length(&mut out.gyro_flags, count);
-        let of_sensors = increments.iter_mut().zip(&mut *rates).zip(&mut out.gyro_flags);
-        for (i, (model, ((increment, rate), flags))) in calibration.gyros.iter().zip(of_sensors).enumerate() {
-            let (Some(terms), Some(footing), Some(last_rate)) = (
-                self.gyro_terms(i, model, tick.end_time, since_turn_on_s),
-                self.thermal.footings.gyros.get(i).copied(),
-                self.last_rates.get_mut(i),
-            ) else {
-                continue;
-            };
-            let mut bias = bias(&terms, tick);
+        let slew = self.slew.as_ref().filter(|_| self.slew_share > 0.0);
+        let signs = Signs::of(tick);
+        // Lists of one length, so that it is checked here and not at every access.
+        let (
+            Some(thermals),
+            Some(footings),
+            Some(last_rates),
+            Some(healths),
+            Some(seen),
+            Some(all_flags),
+            Some(readings),
+            Some(increments),
+            Some(rates),
+        ) = (
+            self.thermal.gyros.get(..count),
+            self.thermal.footings.gyros.get(..count),
+            self.last_rates.get_mut(..count),
+            self.gyro_health.get_mut(..count),
+            self.seen.gyros.get_mut(..count),
+            out.gyro_flags.get_mut(..count),
+            tick.readings.get(..count),
+            increments.get_mut(..count),
+            rates.get_mut(..count),
+        )
+        else {
+            return;
+        };
+        for (i, model) in calibration.gyros.iter().enumerate() {
+            let terms = terms(thermals[i].at(tick.end_time), model, since_turn_on_s);
+            let terms = slew.map_or(terms, |slew| slew.gyro(i, terms, self.slew_share));
+            let Footing { temperature_deg_c, .. } = footings[i];
+            let mut bias = signs.bias(&terms);
             if let (Some(servo), false) = (&model.servo, lost) {
                 let servo_tick = ServoTick {
                     end_time: tick.end_time,
                     duration: tick.duration,
-                    temperature_deg_c: footing.temperature_deg_c,
+                    temperature_deg_c,
                     scale_rad_per_count: terms.increment_weight,
                     half_periods: tick.half_periods.get(i).copied(),
                 };
@@ -86,43 +110,41 @@ impl Corrector {
                 }
             }
             let drift = self.drift.subtrahend(i, tick.end_time);
-            *flags = footing.flags(tick.end_time);
-            flags.set(SensorFlags::EXCLUDED, !included.contains(i));
+            let mut flags = footings[i].flags(tick.end_time);
+            if !included.contains(i) {
+                flags |= SensorFlags::EXCLUDED;
+            }
 
-            let reading = tick.readings.get(i).copied().unwrap_or(f64::NAN);
-            *increment = if lost {
+            let (reading, limit) = (readings[i], model.input_limit);
+            increments[i] = if lost {
                 0.0
             } else if reading.is_finite() {
-                if reading.abs() >= model.input_limit {
-                    *flags |= SensorFlags::OVERRANGE;
+                if reading.abs() >= limit {
+                    flags |= SensorFlags::OVERRANGE;
                     counters.overrange_readings += 1;
+                    mask = mask.without(i);
                 }
                 // Beyond its limit a reading says no more than the limit, and stays finite whatever it is.
-                let reading = reading.clamp(-model.input_limit, model.input_limit);
+                let reading = reading.clamp(-limit, limit);
                 scaled(calibration.gyro_output, reading, terms.increment_weight, duration_s)
                     - (bias + drift) * duration_s
             } else {
-                *flags |= SensorFlags::NOT_FINITE;
+                flags |= SensorFlags::NOT_FINITE;
                 counters.not_finite_readings += 1;
-                *last_rate * duration_s
+                mask = mask.without(i);
+                last_rates[i] * duration_s
             };
             // Before the substitution: the angle that it restores is a lump, not a rate.
-            *rate = *increment / duration_s;
-            if lost
-                || flags.intersects(SensorFlags::OVERRANGE | SensorFlags::NOT_FINITE | SensorFlags::EXCLUDED)
-            {
-                *flags -= SensorFlags::VALID;
-                if flags.intersects(SensorFlags::OVERRANGE | SensorFlags::NOT_FINITE) {
-                    mask = mask.without(i);
-                }
+            rates[i] = increments[i] / duration_s;
+            if lost || flags.intersects(UNSOUND) {
+                flags -= SensorFlags::VALID;
             } else {
-                *last_rate = *rate;
+                last_rates[i] = rates[i];
             }
-            if let Some(seen) = self.seen.gyros.get_mut(i) {
-                let temperature_deg_c = footing.temperature_deg_c;
-                let rate = *rate + (bias + drift);
-                *seen = GyroSeen { reading, rate, bias, drift, temperature_deg_c, flags: *flags };
-            }
+            all_flags[i] = flags;
+            healths[i].note(flags);
+            let rate = rates[i] + (bias + drift);
+            seen[i] = GyroSeen { reading, rate, bias, drift, temperature_deg_c, flags };
         }
 
         out.flags |= self.substitute(calibration, input, increments);
@@ -169,11 +191,29 @@ impl Corrector {
     }
 }
 
-/// The terms of Ω that follow temperature, with the signs of the tick's mode and meander (rad/s).
-fn bias(terms: &GyroTerms, tick: &GyroTick) -> f64 {
-    let sign = tick.mode.map_or(1.0, LasingMode::sign);
-    let phase = tick.meander.map_or(1.0, LasingMode::sign);
-    terms.bias + sign * terms.magnetic + phase * terms.meander
+/// The terms with the trend in the bias.
+fn terms(mut thermal: GyroTerms, model: &GyroModel, since_turn_on_s: f64) -> GyroTerms {
+    thermal.bias += model.trend.as_ref().map_or(0.0, |trend| trend.at(since_turn_on_s));
+    thermal
+}
+
+/// Signs of a tick's mode and meander; +1 where the instrument has none.
+#[derive(Debug, Clone, Copy)]
+struct Signs {
+    mode: f64,
+    meander: f64,
+}
+
+impl Signs {
+    fn of(tick: &GyroTick) -> Self {
+        let sign = |phase: Option<LasingMode>| phase.map_or(1.0, LasingMode::sign);
+        Self { mode: sign(tick.mode), meander: sign(tick.meander) }
+    }
+
+    /// The terms of Ω that follow temperature (rad/s).
+    fn bias(&self, terms: &GyroTerms) -> f64 {
+        terms.bias + self.mode * terms.magnetic + self.meander * terms.meander
+    }
 }
 
 /// K(T)·P (rad).
