@@ -86,14 +86,17 @@ fn run(command: Command) -> Result<String, Error> {
                 return Ok(printed);
             }
             let committed = Figures::read(&path)?;
-            if committed.architecture == counted.architecture {
+            if counted.is_comparable(&committed) {
                 counted.compare(&committed, &path)?;
             } else {
                 let _ = writeln!(
                     io::stderr(),
-                    "isotherm-bench: {} is of {}, this is {}: nothing was compared",
+                    "isotherm-bench: {} holds for {} on {}, this is {} on {}: nothing was compared; write the figures anew with \
+                     --bless where that is what the project is built with now",
                     path.display(),
+                    committed.compiler,
                     committed.architecture,
+                    counted.compiler,
                     counted.architecture
                 );
             }

@@ -1,7 +1,8 @@
 //! Instructions per tick, counted by callgrind: the same on a busy machine as on a quiet one.
 //!
 //! This program runs itself under `valgrind --tool=callgrind`, once for each kernel; only what happens inside the kernel's pass
-//! is counted. The committed figures hold for one compiler and one architecture, and say for which.
+//! is counted. The committed figures hold for one compiler and one architecture, and say for which: with another they are
+//! shown, not judged.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -20,6 +21,8 @@ const LARGEST_RISE: f64 = 0.05;
 pub(crate) struct Figures {
     /// Architecture that they hold for.
     pub(crate) architecture: String,
+    /// Compiler that they hold for: what `rustc --version` says.
+    pub(crate) compiler: String,
     /// Instructions per tick, by kernel.
     pub(crate) per_tick: BTreeMap<String, f64>,
 }
@@ -34,7 +37,14 @@ pub(crate) fn count() -> Result<Figures, Error> {
         let figure = instructions as f64 / kernel.ticks() as f64;
         per_tick.insert(kernel.name().to_owned(), (figure * 10.0).round() / 10.0);
     }
-    Ok(Figures { architecture: std::env::consts::ARCH.to_owned(), per_tick })
+    Ok(Figures { architecture: std::env::consts::ARCH.to_owned(), compiler: compiler()?, per_tick })
+}
+
+/// The compiler at hand: what has just built this program, where nobody has changed it since.
+fn compiler() -> Result<String, Error> {
+    let output = Command::new("rustc").arg("--version").output();
+    let output = output.map_err(|error| Error::Count(format!("rustc --version: {error}")))?;
+    Ok(String::from_utf8_lossy(&output.stdout).trim().to_owned())
 }
 
 /// Counts one kernel in a process of its own.
@@ -78,6 +88,11 @@ impl Figures {
         let text = serde_json::to_string_pretty(self)
             .map_err(|error| Error::Invalid { path: path.to_owned(), what: error.to_string() })?;
         std::fs::write(path, text + "\n").map_err(|source| Error::file(path, source))
+    }
+
+    /// Whether figures of the other kind can be compared with these: one compiler, one architecture.
+    pub(crate) fn is_comparable(&self, other: &Self) -> bool {
+        (&self.architecture, &self.compiler) == (&other.architecture, &other.compiler)
     }
 
     /// Compares with committed figures.

@@ -159,12 +159,17 @@ pub enum CodecError {
 /// What [`Message::check`] finds; [`CodecError::Length`] beyond [`MAX_FRAME`].
 pub fn encode_into<M: Message>(message: &M, frame: &mut Vec<u8>) -> Result<(), CodecError> {
     message.check()?;
+    encode_as::<M>(message, frame)
+}
+
+/// Encodes something that has the body of a message `M`, without its checks.
+pub(crate) fn encode_as<M: Message>(body: &impl Serialize, frame: &mut Vec<u8>) -> Result<(), CodecError> {
     frame.clear();
     frame.extend([M::KIND as u8, M::VERSIONS.current]);
-    let mut body = postcard::to_extend(message, std::mem::take(frame)).map_err(|_| CodecError::Malformed)?;
-    let checksum = crc32fast::hash(&body);
-    body.extend(checksum.to_le_bytes());
-    *frame = body;
+    let mut bytes = postcard::to_extend(body, std::mem::take(frame)).map_err(|_| CodecError::Malformed)?;
+    let checksum = crc32fast::hash(&bytes);
+    bytes.extend(checksum.to_le_bytes());
+    *frame = bytes;
     if frame.len() > MAX_FRAME {
         return Err(CodecError::Length { length: frame.len() });
     }
@@ -186,6 +191,17 @@ pub fn encode<M: Message>(message: &M) -> Result<Vec<u8>, CodecError> {
 /// # Errors
 /// [`CodecError`], whatever the bytes are.
 pub fn decode<M: Message>(frame: &[u8]) -> Result<M, CodecError> {
+    let (version, body) = open::<M>(frame)?;
+    let (message, rest) = M::read_body(version, body).map_err(|_| CodecError::Malformed)?;
+    if !rest.is_empty() {
+        return Err(CodecError::Trailing { count: rest.len() });
+    }
+    message.check()?;
+    Ok(message)
+}
+
+/// Version and body of a sound frame.
+fn open<M: Message>(frame: &[u8]) -> Result<(u8, &[u8]), CodecError> {
     let length = frame.len();
     if !(HEADER + CHECKSUM..=MAX_FRAME).contains(&length) {
         return Err(CodecError::Length { length });
@@ -206,16 +222,18 @@ pub fn decode<M: Message>(frame: &[u8]) -> Result<M, CodecError> {
     if got != need {
         return Err(CodecError::Checksum { got, need });
     }
-    let body = covered.get(HEADER..).unwrap_or_default();
-    let (message, rest) = M::read_body(version, body).map_err(|_| CodecError::Malformed)?;
-    if !rest.is_empty() {
-        return Err(CodecError::Trailing { count: rest.len() });
-    }
-    message.check()?;
-    Ok(message)
+    Ok((version, covered.get(HEADER..).unwrap_or_default()))
 }
 
-/// Deserialises a sequence of at most `MAX` elements, allocating as they come and never ahead.
+/// Body of a sound frame, for a reader of the current version that needs no message in between.
+pub(crate) fn body<M: Message>(frame: &[u8]) -> Result<&[u8], CodecError> {
+    open::<M>(frame).map(|(_, body)| body)
+}
+
+/// Most elements for which room is made before they come: a frame may promise more than it holds.
+const ROOM_AHEAD: usize = 32;
+
+/// Deserialises a sequence of at most `MAX` elements, allocating as they come and little ahead.
 pub(crate) fn bounded<'de, D, T, const MAX: usize>(deserializer: D) -> Result<Vec<T>, D::Error>
 where
     D: Deserializer<'de>,
@@ -231,7 +249,7 @@ where
         }
 
         fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Vec<T>, A::Error> {
-            let mut elements = Vec::new();
+            let mut elements = Vec::with_capacity(seq.size_hint().unwrap_or(0).min(ROOM_AHEAD));
             while let Some(element) = seq.next_element()? {
                 if elements.len() == MAX {
                     return Err(A::Error::invalid_length(MAX + 1, &self));

@@ -1,11 +1,13 @@
 //! Corrected batches: what a navigation computer subscribes to.
 
+use std::collections::VecDeque;
+
 use arrayvec::ArrayVec;
 use isotherm_correction::sample::{
     self as core, ChannelName, MAX_PARITY, MAX_SENSORS, SensorFlags, TickFlags,
 };
 use isotherm_correction::units::{Span, Timestamp};
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, Serializer};
 
 use crate::codec::{CodecError, Kind, MAX_TICKS, Message, bounded};
 use crate::raw::{MAX_CHANNELS, Mode};
@@ -84,6 +86,28 @@ impl Message for CorrectedBatch {
     fn check(&self) -> Result<(), CodecError> {
         let count = self.ticks.len();
         if (1..=MAX_TICKS).contains(&count) { Ok(()) } else { Err(CodecError::Ticks { count }) }
+    }
+}
+
+/// The body of a [`CorrectedBatch`] whose ticks stay where they are: the same bytes, nothing copied.
+#[derive(Debug, Serialize)]
+pub(crate) struct CorrectedBody<'a> {
+    pub(crate) unit: &'a str,
+    pub(crate) revision: Revision,
+    pub(crate) temperatures: ArrayVec<AppliedTemperature, MAX_CHANNELS>,
+    pub(crate) ticks: Ticks<'a>,
+}
+
+/// The first `count` ticks that are ready.
+#[derive(Debug)]
+pub(crate) struct Ticks<'a> {
+    pub(crate) ready: &'a VecDeque<core::CorrectedTick>,
+    pub(crate) count: usize,
+}
+
+impl Serialize for Ticks<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_seq(self.ready.iter().take(self.count).map(CorrectedTick::from))
     }
 }
 

@@ -1,6 +1,7 @@
 //! Raw batches: what a producer publishes for one unit.
 
 mod batcher;
+mod direct;
 mod health;
 
 use arrayvec::ArrayVec;
@@ -10,6 +11,7 @@ use isotherm_correction::units::{Span, Timestamp};
 use serde::{Deserialize, Serialize};
 
 pub use batcher::{BatchError, Batcher, RawFrame};
+pub(crate) use direct::{read_accel, read_gyro};
 pub use health::{HealthBatch, HealthReading, HealthTick, MAX_HEALTH};
 
 use crate::codec::{CodecError, Kind, MAX_TICKS, Message, bounded};

@@ -32,9 +32,9 @@ pub use revisions::InForce;
 use revisions::Revisions;
 
 use crate::codec::{self, CodecError, MAX_TICKS};
-use crate::corrected::{AppliedTemperature, CorrectedBatch, Revision};
+use crate::corrected::{AppliedTemperature, CorrectedBatch, CorrectedBody, Revision, Ticks};
 use crate::key::{Input, RawStream, UnitId};
-use crate::raw::{AccelBatch, GyroBatch, HealthBatch, TemperatureBatch};
+use crate::raw::{self, HealthBatch, TemperatureBatch};
 use crate::reference::Reference;
 use crate::status::{Counter, LastTick};
 
@@ -178,20 +178,22 @@ impl UnitStream {
     fn receive_frame(&mut self, stream: RawStream, frame: &[u8]) -> Result<(), CodecError> {
         match stream {
             RawStream::Gyro => {
-                let batch: GyroBatch = codec::decode(frame)?;
                 let mut ticks = std::mem::take(&mut self.gyro_ticks);
-                ticks.clear();
-                ticks.extend(batch.to_core());
-                self.handle(Event::Gyro { output: batch.output(), ticks: &ticks });
+                let read = raw::read_gyro(frame, &mut ticks);
+                if let Ok(output) = read {
+                    self.handle(Event::Gyro { output, ticks: &ticks });
+                }
                 self.gyro_ticks = ticks;
+                read?;
             }
             RawStream::Accel => {
-                let batch: AccelBatch = codec::decode(frame)?;
                 let mut ticks = std::mem::take(&mut self.accel_ticks);
-                ticks.clear();
-                ticks.extend(batch.to_core());
-                self.handle(Event::Accel { output: batch.output(), ticks: &ticks });
+                let read = raw::read_accel(frame, &mut ticks);
+                if let Ok(output) = read {
+                    self.handle(Event::Accel { output, ticks: &ticks });
+                }
                 self.accel_ticks = ticks;
+                read?;
             }
             RawStream::Temperature => {
                 let batch: TemperatureBatch = codec::decode(frame)?;
@@ -282,8 +284,8 @@ impl UnitStream {
 
     /// Takes the corrected ticks as they are.
     pub fn take_ready(&mut self) -> Vec<CorrectedTick> {
-        let ticks: Vec<_> = self.ready.drain(..).collect();
-        self.note_taken(ticks.last());
+        let ticks: Vec<_> = self.ready.iter().cloned().collect();
+        self.drop_ready(ticks.len());
         ticks
     }
 
@@ -291,16 +293,26 @@ impl UnitStream {
     pub fn next_frame(&mut self, frame: &mut Vec<u8>) -> bool {
         let Some(first) = self.ready.front() else { return false };
         let counter = first.revision;
-        let count = self.ready.iter().take(MAX_TICKS).take_while(|tick| tick.revision == counter).count();
-        let taken: Vec<_> = self.ready.drain(..count).collect();
-        self.note_taken(taken.last());
-        let batch = CorrectedBatch {
-            unit: self.id.to_string(),
+        let ticks = self.ready.iter().take(MAX_TICKS).take_while(|tick| tick.revision == counter);
+        let count = ticks.count();
+        let batch = CorrectedBody {
+            unit: self.id.as_str(),
             revision: self.revisions.revision(counter),
             temperatures: self.temperatures().collect(),
-            ticks: taken.iter().map(Into::into).collect(),
+            ticks: Ticks { ready: &self.ready, count },
         };
-        codec::encode_into(&batch, frame).is_ok()
+        let encoded = codec::encode_as::<CorrectedBatch>(&batch, frame).is_ok();
+        self.drop_ready(count);
+        encoded
+    }
+
+    /// Drops the first ready ticks: they were taken.
+    pub fn drop_ready(&mut self, count: usize) {
+        let count = count.min(self.ready.len());
+        let last = count.checked_sub(1).and_then(|last| self.ready.get(last));
+        let last = last.map(|tick| (tick.end_time.as_ns(), tick.sequence, tick.revision));
+        self.note_taken(last);
+        self.ready.drain(..count);
     }
 
     /// The first output of each revision, in order and once each; ask after every frame.
@@ -309,15 +321,15 @@ impl UnitStream {
     }
 
     /// Remembers the last tick taken, and drops revisions of which nothing can be waiting any more.
-    fn note_taken(&mut self, last: Option<&CorrectedTick>) {
-        let Some(last) = last else { return };
+    fn note_taken(&mut self, last: Option<(i64, u64, u64)>) {
+        let Some((end_time_ns, sequence, revision)) = last else { return };
         let series = self.series.unwrap_or_default();
-        self.last = Some(LastTick { end_time_ns: last.end_time.as_ns(), sequence: last.sequence, series });
-        self.revisions.taken(last.revision);
+        self.last = Some(LastTick { end_time_ns, sequence, series });
+        self.revisions.taken(revision);
     }
 
     fn temperatures(&self) -> impl Iterator<Item = AppliedTemperature> + '_ {
-        let channels = self.unit.channels().take(crate::raw::MAX_CHANNELS);
+        let channels = self.unit.channels().take(raw::MAX_CHANNELS);
         channels.filter_map(|channel| {
             let state = channel.state?;
             Some(AppliedTemperature {

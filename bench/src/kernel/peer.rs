@@ -20,7 +20,9 @@ struct Triad {
 }
 
 impl Triad {
-    /// One sample, as autopilots have it: temperature clamped to the range of the fit, bias, scale, rotation.
+    /// One sample, as autopilots have it: temperature clamped to the range of the fit, bias, scale, rotation. A call per
+    /// sample, as they come: what follows is not known yet.
+    #[inline(never)]
     fn correct(&self, sample: [f32; 3], temperature: f32) -> [f32; 3] {
         let delta = temperature.clamp(self.range[0], self.range[1]) - self.reference;
         let mut scaled = [0.0; 3];

@@ -52,6 +52,16 @@ pub struct Summary {
     pub sensor_flags: BTreeMap<&'static str, u64>,
 }
 
+/// Counts each bit that is set; most ticks have none.
+fn count_bits(counts: &mut [u64], bits: u16) {
+    if bits == 0 {
+        return;
+    }
+    for (bit, count) in counts.iter_mut().enumerate() {
+        *count += u64::from(bits >> bit & 1);
+    }
+}
+
 impl Sums {
     /// Adds one output.
     pub fn add(&mut self, tick: &CorrectedTick) {
@@ -66,15 +76,10 @@ impl Sums {
         for (sum, delta) in self.velocity_m_per_s.iter_mut().zip(tick.delta_velocity) {
             *sum += delta;
         }
-        let bits = tick.flags.bits();
-        for (bit, count) in self.flags.iter_mut().enumerate() {
-            *count += u64::from(bits >> bit & 1);
-        }
+        count_bits(&mut self.flags, tick.flags.bits());
         let sensors = tick.gyro_flags.iter().chain(&tick.accel_flags);
         let bits = sensors.fold(0, |bits, flags| bits | (*flags - SensorFlags::VALID).bits());
-        for (bit, count) in self.sensor_flags.iter_mut().enumerate() {
-            *count += u64::from(bits >> bit & 1);
-        }
+        count_bits(&mut self.sensor_flags, bits.into());
     }
 
     /// Raw ticks so far.

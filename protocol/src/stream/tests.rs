@@ -6,6 +6,7 @@ use isotherm_correction::units::Timestamp;
 
 use super::status::reason;
 use super::*;
+use crate::raw::{AccelBatch, GyroBatch};
 use crate::codec::encode;
 use crate::control::Schedule;
 use crate::digest::Digest;

@@ -1,0 +1,155 @@
+//! Gyro and accelerometer frames straight into the core's ticks, into room that is used again.
+//!
+//! This is what becomes of every message in the service: nothing is allocated, and no tick is written twice. The bytes are
+//! those of [`GyroBatch`] and [`AccelBatch`], which say what they mean; a test holds both readings of them together.
+
+use isotherm_correction::sample::{AccelTick, GyroTick, HalfPeriodCounts, MAX_SENSORS, OutputKind, Sensors};
+use isotherm_correction::units::Timestamp;
+use postcard::Deserializer;
+use postcard::de_flavors::Slice;
+use serde::Deserialize;
+
+use super::{AccelBatch, GyroBatch, Mode, span};
+use crate::codec::{self, CodecError, MAX_TICKS};
+
+/// What is left of a body.
+type Body<'a> = Deserializer<'a, Slice<'a>>;
+
+/// Fewest bytes of a tick: its times, kind and number of readings.
+const FEWEST_BYTES: usize = 4;
+
+/// Reads a gyro frame; what its readings stand for.
+///
+/// `ticks` holds the ticks afterwards, and anything after an error.
+///
+/// # Errors
+/// As [`codec::decode`] of a [`GyroBatch`].
+pub(crate) fn read_gyro(frame: &[u8], ticks: &mut Vec<GyroTick>) -> Result<OutputKind, CodecError> {
+    let bytes = codec::body::<GyroBatch>(frame)?;
+    let mut alike = Alike::default();
+    let mut half_periods = None;
+    let rest = read_body(bytes, |body| {
+        let first_sequence = u64::deserialize(&mut *body)?;
+        let series = u64::deserialize(&mut *body)?;
+        make_room(body, bytes.len(), ticks)?;
+        for (index, tick) in ticks.iter_mut().enumerate() {
+            tick.sequence = first_sequence.saturating_add(index as u64);
+            tick.series = series;
+            tick.end_time = Timestamp::from_ns(i64::deserialize(&mut *body)?);
+            tick.duration = span(u64::deserialize(&mut *body)?);
+            alike.note(index, readings(body, &mut tick.readings)?, tick.readings.len());
+            tick.mode = Option::<Mode>::deserialize(&mut *body)?.map(Into::into);
+            tick.switch_command = bool::deserialize(&mut *body)?;
+            tick.meander = Option::<Mode>::deserialize(&mut *body)?.map(Into::into);
+            let got = length(body, MAX_SENSORS)?;
+            tick.half_periods.clear();
+            for _ in 0..got {
+                let positive = i32::deserialize(&mut *body)?;
+                let negative = i32::deserialize(&mut *body)?;
+                tick.half_periods.push(HalfPeriodCounts { positive, negative });
+            }
+            let need = tick.readings.len();
+            if got != 0 && got != need {
+                half_periods.get_or_insert(CodecError::HalfPeriods { index, got, need });
+            }
+        }
+        Ok(())
+    })?;
+    let output = alike.judge(ticks.len(), rest)?;
+    half_periods.map_or(Ok(output), Err)
+}
+
+/// Reads an accelerometer frame; what its readings stand for.
+///
+/// `ticks` holds the ticks afterwards, and anything after an error.
+///
+/// # Errors
+/// As [`codec::decode`] of an [`AccelBatch`].
+pub(crate) fn read_accel(frame: &[u8], ticks: &mut Vec<AccelTick>) -> Result<OutputKind, CodecError> {
+    let bytes = codec::body::<AccelBatch>(frame)?;
+    let mut alike = Alike::default();
+    let rest = read_body(bytes, |body| {
+        let first_sequence = u64::deserialize(&mut *body)?;
+        make_room(body, bytes.len(), ticks)?;
+        for (index, tick) in ticks.iter_mut().enumerate() {
+            tick.sequence = first_sequence.saturating_add(index as u64);
+            tick.end_time = Timestamp::from_ns(i64::deserialize(&mut *body)?);
+            tick.duration = span(u64::deserialize(&mut *body)?);
+            alike.note(index, readings(body, &mut tick.readings)?, tick.readings.len());
+        }
+        Ok(())
+    })?;
+    alike.judge(ticks.len(), rest)
+}
+
+/// Reads a body with `read`; how many bytes are left over behind it.
+fn read_body<'a>(
+    bytes: &'a [u8],
+    read: impl FnOnce(&mut Body<'a>) -> postcard::Result<()>,
+) -> Result<usize, CodecError> {
+    let mut body = Deserializer::from_bytes(bytes);
+    read(&mut body).map_err(|_| CodecError::Malformed)?;
+    body.finalize().map(<[u8]>::len).map_err(|_| CodecError::Malformed)
+}
+
+/// A stated number of elements, at most `most`.
+fn length(body: &mut Body<'_>, most: usize) -> postcard::Result<usize> {
+    let length = usize::deserialize(body)?;
+    if length > most { Err(postcard::Error::SerdeDeCustom) } else { Ok(length) }
+}
+
+/// Makes `ticks` as many as a body of so many bytes states; never more than it can hold.
+fn make_room<T: Clone + Default>(body: &mut Body<'_>, bytes: usize, ticks: &mut Vec<T>) -> postcard::Result<()> {
+    let count = length(body, MAX_TICKS.min(bytes / FEWEST_BYTES))?;
+    ticks.resize(count, T::default());
+    Ok(())
+}
+
+/// Reads the readings of a tick; what they stand for.
+fn readings(body: &mut Body<'_>, values: &mut Sensors<f64>) -> postcard::Result<OutputKind> {
+    let kind = match u32::deserialize(&mut *body)? {
+        0 => OutputKind::Counts,
+        1 => OutputKind::Mean,
+        _ => return Err(postcard::Error::SerdeDeCustom),
+    };
+    let count = length(body, MAX_SENSORS)?;
+    values.clear();
+    for _ in 0..count {
+        values.push(match kind {
+            OutputKind::Counts => f64::from(i32::deserialize(&mut *body)?),
+            OutputKind::Mean => f64::deserialize(&mut *body)?,
+        });
+    }
+    Ok(kind)
+}
+
+/// Whether all ticks of a batch have readings of one kind and number.
+#[derive(Debug, Default)]
+struct Alike {
+    first: Option<(OutputKind, usize)>,
+    /// The first tick that differs.
+    mixed: Option<usize>,
+}
+
+impl Alike {
+    fn note(&mut self, index: usize, kind: OutputKind, sensors: usize) {
+        if *self.first.get_or_insert((kind, sensors)) != (kind, sensors) {
+            self.mixed.get_or_insert(index);
+        }
+    }
+
+    /// What is wrong with a batch of `count` ticks with so many bytes left over, in the order of [`codec::decode`].
+    fn judge(&self, count: usize, left_over: usize) -> Result<OutputKind, CodecError> {
+        if left_over > 0 {
+            return Err(CodecError::Trailing { count: left_over });
+        }
+        let Some((kind, _)) = self.first else { return Err(CodecError::Ticks { count }) };
+        match self.mixed {
+            Some(index) => Err(CodecError::MixedReadings { index }),
+            None => Ok(kind),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;
