@@ -9,10 +9,12 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub(crate) enum Error {
     /// A case gives a wrong result: its speed would say nothing.
-    #[error("{case}: {what} is {value:e}, must be at most {limit:e}: what it gives is wrong, so its speed is not measured")]
+    #[error(
+        "{case}: {what} is {value:e}, must be at most {limit:e}: what it gives is wrong, so its speed is not measured"
+    )]
     Wrong {
         /// The case.
-        case: &'static str,
+        case: String,
         /// What is wrong.
         what: &'static str,
         /// What it is.

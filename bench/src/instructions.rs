@@ -11,7 +11,7 @@ use std::process::Command;
 use serde::{Deserialize, Serialize};
 
 use crate::error::Error;
-use crate::kernel::all;
+use crate::kernel::KERNELS;
 
 /// More than so much above the committed figure is a fault.
 const LARGEST_RISE: f64 = 0.05;
@@ -31,7 +31,8 @@ pub(crate) struct Figures {
 #[expect(clippy::cast_precision_loss, reason = "below 2⁵³ instructions")]
 pub(crate) fn count() -> Result<Figures, Error> {
     let mut per_tick = BTreeMap::new();
-    for (index, kernel) in all()?.iter_mut().enumerate() {
+    for (index, make) in KERNELS.iter().enumerate() {
+        let mut kernel = make()?;
         kernel.check()?;
         let instructions = count_one(index)?;
         let figure = instructions as f64 / kernel.ticks() as f64;
@@ -56,7 +57,9 @@ fn count_one(index: usize) -> Result<u64, Error> {
         .arg(program)
         .args(["pass", &index.to_string()])
         .output()
-        .map_err(|error| Error::Count(format!("valgrind: {error}; install Debian's package valgrind or the like")))?;
+        .map_err(|error| {
+            Error::Count(format!("valgrind: {error}; install Debian's package valgrind or the like"))
+        })?;
     let words = String::from_utf8_lossy(&output.stderr);
     if !output.status.success() {
         return Err(Error::Count(format!("valgrind ended with {}:\n{words}", output.status)));
@@ -69,9 +72,8 @@ fn count_one(index: usize) -> Result<u64, Error> {
 
 /// Runs one kernel once: what the counted process does.
 pub(crate) fn pass(index: usize) -> Result<(), Error> {
-    let mut kernels = all()?;
-    if let Some(kernel) = kernels.get_mut(index) {
-        std::hint::black_box(kernel.pass());
+    if let Some(make) = KERNELS.get(index) {
+        std::hint::black_box(make()?.pass());
     }
     Ok(())
 }
@@ -80,7 +82,8 @@ impl Figures {
     /// Reads committed figures.
     pub(crate) fn read(path: &Path) -> Result<Self, Error> {
         let text = std::fs::read_to_string(path).map_err(|source| Error::file(path, source))?;
-        serde_json::from_str(&text).map_err(|error| Error::Invalid { path: path.to_owned(), what: error.to_string() })
+        serde_json::from_str(&text)
+            .map_err(|error| Error::Invalid { path: path.to_owned(), what: error.to_string() })
     }
 
     /// Writes figures to be committed.

@@ -2,13 +2,10 @@
 
 mod codec;
 mod peer;
+mod stream;
 mod unit;
 
 use serde::Serialize;
-
-pub(crate) use codec::codec_cases;
-pub(crate) use peer::Peer;
-pub(crate) use unit::unit_cases;
 
 use crate::error::Error;
 use crate::rounds::interleaved;
@@ -16,7 +13,7 @@ use crate::rounds::interleaved;
 /// Something that works through a number of ticks, again and again.
 pub(crate) trait Kernel {
     /// What it is called.
-    fn name(&self) -> &'static str;
+    fn name(&self) -> &str;
     /// Ticks in one pass.
     fn ticks(&self) -> usize;
     /// Works through them once; what comes back depends on all results, so that none is left out.
@@ -29,7 +26,7 @@ pub(crate) trait Kernel {
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct Row {
     /// What was measured.
-    pub(crate) name: &'static str,
+    pub(crate) name: String,
     /// Nanoseconds per tick, median over the rounds.
     pub(crate) ns_per_tick: f64,
     /// Quartiles.
@@ -38,12 +35,32 @@ pub(crate) struct Row {
     pub(crate) ratio_to_peer: f64,
 }
 
+/// Makes a kernel, with all that it works on.
+pub(crate) type Make = fn() -> Result<Box<dyn Kernel>, Error>;
+
 /// Every kernel; the first is the reference.
+pub(crate) const KERNELS: [Make; 16] = [
+    || Ok(Box::new(peer::Peer::new())),
+    || Ok(Box::new(unit::identity()?)),
+    || Ok(Box::new(unit::steady()?)),
+    || Ok(Box::new(unit::zeeman()?)),
+    || Ok(Box::new(unit::fibre_optic()?)),
+    || Ok(Box::new(unit::skewed_six()?)),
+    || Ok(Box::new(unit::coning_sculling()?)),
+    || Ok(Box::new(codec::Decode::of(1)?)),
+    || Ok(Box::new(codec::Decode::of(10)?)),
+    || Ok(Box::new(codec::Decode::of(100)?)),
+    || Ok(Box::new(codec::Encode::of(1)?)),
+    || Ok(Box::new(codec::Encode::of(10)?)),
+    || Ok(Box::new(codec::Encode::of(100)?)),
+    || Ok(Box::new(stream::Stream::of(1)?)),
+    || Ok(Box::new(stream::Stream::of(10)?)),
+    || Ok(Box::new(stream::Stream::of(100)?)),
+];
+
+/// Makes every kernel.
 pub(crate) fn all() -> Result<Vec<Box<dyn Kernel>>, Error> {
-    let mut kernels: Vec<Box<dyn Kernel>> = vec![Box::new(Peer::new())];
-    kernels.extend(unit_cases()?.into_iter().map(|case| Box::new(case) as Box<dyn Kernel>));
-    kernels.extend(codec_cases());
-    Ok(kernels)
+    KERNELS.iter().map(|make| make()).collect()
 }
 
 /// Checks every kernel, then times them in so many interleaved rounds.
@@ -63,7 +80,7 @@ pub(crate) fn measure(rounds: usize) -> Result<Vec<Row>, Error> {
             peer = ns_per_tick;
         }
         rows.push(Row {
-            name: kernel.name(),
+            name: kernel.name().to_owned(),
             ns_per_tick,
             quartiles_ns: [0.25, 0.75].map(|share| per_tick(kernel.as_ref(), times.quantile_s(share))),
             ratio_to_peer: ns_per_tick / peer,

@@ -195,7 +195,8 @@ impl PreLaunch {
             if observation.missed > 0 {
                 run.cut();
             }
-            let Some(&GyroSeen { rate, bias, temperature_deg_c, flags, .. }) = observation.gyros.get(index) else {
+            let Some(&GyroSeen { rate, bias, temperature_deg_c, flags, .. }) = observation.gyros.get(index)
+            else {
                 run.bad();
                 continue;
             };

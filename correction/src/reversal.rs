@@ -116,12 +116,7 @@ impl Substitution {
     /// A mode that differs from the last one without a command begins a transition at this tick; where ticks
     /// are missing before it the switch may have come later than the gap's start, so all n are counted
     /// from here. Ticks missing inside a transition count as ticks of it.
-    pub fn tick(
-        &mut self,
-        reversal: &Reversal,
-        input: TickInput,
-        increments: &mut [f64],
-    ) -> TickFlags {
+    pub fn tick(&mut self, reversal: &Reversal, input: TickInput, increments: &mut [f64]) -> TickFlags {
         let mut flags = TickFlags::empty();
         if input.restart {
             if !(self.lost.is_empty() && self.pending.is_none()) {

@@ -9,7 +9,7 @@ use isotherm_correction::sample::{
 use isotherm_correction::units::{Span, Timestamp};
 use serde::{Deserialize, Serialize, Serializer};
 
-use crate::codec::{CodecError, Kind, MAX_TICKS, Message, bounded};
+use crate::codec::{CodecError, Kind, MAX_TICKS, Message, bounded, encode_as};
 use crate::raw::{MAX_CHANNELS, Mode};
 use crate::version::{self, Versions};
 
@@ -84,25 +84,46 @@ impl Message for CorrectedBatch {
     const VERSIONS: Versions = version::CORRECTED;
 
     fn check(&self) -> Result<(), CodecError> {
-        let count = self.ticks.len();
-        if (1..=MAX_TICKS).contains(&count) { Ok(()) } else { Err(CodecError::Ticks { count }) }
+        check_count(self.ticks.len())
     }
 }
 
-/// The body of a [`CorrectedBatch`] whose ticks stay where they are: the same bytes, nothing copied.
+/// A [`CorrectedBatch`] whose ticks stay where they are: the same bytes, nothing copied.
 #[derive(Debug, Serialize)]
-pub(crate) struct CorrectedBody<'a> {
-    pub(crate) unit: &'a str,
-    pub(crate) revision: Revision,
-    pub(crate) temperatures: ArrayVec<AppliedTemperature, MAX_CHANNELS>,
-    pub(crate) ticks: Ticks<'a>,
+pub struct CorrectedBody<'a> {
+    /// Serial of the unit.
+    pub unit: &'a str,
+    /// The calibration that made the ticks.
+    pub revision: Revision,
+    /// Temperatures in use at the last tick of the batch.
+    pub temperatures: ArrayVec<AppliedTemperature, MAX_CHANNELS>,
+    /// The ticks.
+    pub ticks: Ticks<'a>,
 }
 
-/// The first `count` ticks that are ready.
+/// The first ticks of those that are ready.
 #[derive(Debug)]
-pub(crate) struct Ticks<'a> {
-    pub(crate) ready: &'a VecDeque<core::CorrectedTick>,
-    pub(crate) count: usize,
+pub struct Ticks<'a> {
+    /// All that are ready.
+    pub ready: &'a VecDeque<core::CorrectedTick>,
+    /// How many of them.
+    pub count: usize,
+}
+
+impl CorrectedBody<'_> {
+    /// Encodes it into `frame`, as [`codec::encode_into`](crate::codec::encode_into) does the batch.
+    ///
+    /// # Errors
+    /// [`CodecError::Ticks`] outside 1…4096 ticks; [`CodecError::Length`] beyond the longest frame.
+    pub fn encode_into(&self, frame: &mut Vec<u8>) -> Result<(), CodecError> {
+        check_count(self.ticks.count.min(self.ticks.ready.len()))?;
+        encode_as::<CorrectedBatch>(self, frame)
+    }
+}
+
+/// Checks the number of ticks of a batch.
+fn check_count(count: usize) -> Result<(), CodecError> {
+    if (1..=MAX_TICKS).contains(&count) { Ok(()) } else { Err(CodecError::Ticks { count }) }
 }
 
 impl Serialize for Ticks<'_> {

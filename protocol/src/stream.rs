@@ -32,7 +32,7 @@ pub use revisions::InForce;
 use revisions::Revisions;
 
 use crate::codec::{self, CodecError, MAX_TICKS};
-use crate::corrected::{AppliedTemperature, CorrectedBatch, CorrectedBody, Revision, Ticks};
+use crate::corrected::{AppliedTemperature, CorrectedBody, Revision, Ticks};
 use crate::key::{Input, RawStream, UnitId};
 use crate::raw::{self, HealthBatch, TemperatureBatch};
 use crate::reference::Reference;
@@ -301,7 +301,7 @@ impl UnitStream {
             temperatures: self.temperatures().collect(),
             ticks: Ticks { ready: &self.ready, count },
         };
-        let encoded = codec::encode_as::<CorrectedBatch>(&batch, frame).is_ok();
+        let encoded = batch.encode_into(frame).is_ok();
         self.drop_ready(count);
         encoded
     }

@@ -1,74 +1,69 @@
-//! Decoding and encoding apart, per batch size.
+//! Decoding and encoding apart, per batch size, as the service does them.
 
+use std::collections::VecDeque;
+
+use isotherm_correction::sample::{CorrectedTick, GyroTick};
 use isotherm_protocol::codec;
-use isotherm_protocol::corrected::{CorrectedBatch, Revision};
-use isotherm_protocol::raw::GyroBatch;
-use isotherm_correction::sample::{CorrectedTick, GyroTick, OutputKind};
+use isotherm_protocol::corrected::{CorrectedBatch, CorrectedBody, Revision, Ticks};
+use isotherm_protocol::raw::{GyroBatch, read_gyro};
 
-use super::Kernel;
-use super::unit::{UnitCase, unit_cases};
+use super::{Kernel, unit};
 use crate::error::Error;
 
-/// Batch sizes, with what their rows are called.
-const SIZES: [(usize, &str, &str); 3] = [
-    (1, "decode raw gyros, batches of 1", "encode corrected, batches of 1"),
-    (10, "decode raw gyros, batches of 10", "encode corrected, batches of 10"),
-    (100, "decode raw gyros, batches of 100", "encode corrected, batches of 100"),
-];
 /// Ticks of a pass.
-const TICKS: usize = 20_000;
+pub(super) const TICKS: usize = 20_000;
 
-/// Decoding of frames of raw gyro ticks, to what the core takes.
-struct Decode {
-    name: &'static str,
+/// Decoding of frames of raw gyro ticks of the Zeeman unit, which have the most in them, to what the core takes.
+pub(super) struct Decode {
+    name: String,
     frames: Vec<Vec<u8>>,
     ticks: Vec<GyroTick>,
     room: Vec<GyroTick>,
 }
 
-/// Encoding of corrected ticks.
-struct Encode {
-    name: &'static str,
-    batches: Vec<Vec<CorrectedTick>>,
+/// Encoding of corrected ticks of the Zeeman unit.
+pub(super) struct Encode {
+    name: String,
+    batches: Vec<VecDeque<CorrectedTick>>,
     room: Vec<u8>,
 }
 
-/// All batch sizes, on ticks of the Zeeman unit, which have the most in them.
-pub(crate) fn codec_cases() -> Vec<Box<dyn Kernel>> {
-    let mut cases: Vec<Box<dyn Kernel>> = Vec::new();
-    let Ok(units) = unit_cases() else { return cases };
-    let Some(unit) = units.iter().find(|unit| unit.output() == OutputKind::Counts) else { return cases };
-    let (raw, corrected) = ticks(unit);
-    for (size, decode, encode) in SIZES {
-        let frames = raw.chunks(size).filter_map(|ticks| {
-            codec::encode(&GyroBatch::from_core(unit.output(), ticks)?).ok()
-        });
-        cases.push(Box::new(Decode { name: decode, frames: frames.collect(), ticks: raw.clone(), room: Vec::new() }));
-        let batches = corrected.chunks(size).map(<[_]>::to_vec).collect();
-        cases.push(Box::new(Encode { name: encode, batches, room: Vec::new() }));
-    }
-    cases
-}
-
-fn ticks(unit: &UnitCase) -> (Vec<GyroTick>, Vec<CorrectedTick>) {
-    let corrected = unit.corrected().into_iter().take(TICKS).collect();
-    (unit.gyro_ticks().take(TICKS).cloned().collect(), corrected)
-}
-
 impl Decode {
+    /// Batches of `size`.
+    pub(super) fn of(size: usize) -> Result<Self, Error> {
+        let unit = unit::zeeman()?;
+        let [output, _] = unit.outputs();
+        let ticks: Vec<_> = unit.gyro_ticks().take(TICKS).cloned().collect();
+        let frames =
+            ticks.chunks(size).filter_map(|ticks| codec::encode(&GyroBatch::from_core(output, ticks)?).ok());
+        let name = format!("decode raw gyros, batches of {size}");
+        Ok(Self { name, frames: frames.collect(), ticks, room: Vec::new() })
+    }
+
     fn decode(&mut self, each: &mut dyn FnMut(&GyroTick)) {
         for frame in &self.frames {
-            let Ok(batch) = codec::decode::<GyroBatch>(frame) else { continue };
-            self.room.clear();
-            self.room.extend(batch.to_core());
-            self.room.iter().for_each(&mut *each);
+            if read_gyro(frame, &mut self.room).is_ok() {
+                self.room.iter().for_each(&mut *each);
+            }
         }
     }
 }
 
+/// Whether so many of so many ticks came back as they were.
+#[expect(clippy::cast_precision_loss, reason = "some ten thousand ticks")]
+pub(super) fn compare<T: PartialEq>(case: &str, back: &[T], ticks: &[T]) -> Result<(), Error> {
+    let differ = back.iter().zip(ticks).filter(|(back, tick)| back != tick).count();
+    let value = (differ + back.len().abs_diff(ticks.len())) as f64;
+    if value > 0.0 {
+        let (case, what) = (case.to_owned(), "number of ticks that differ");
+        return Err(Error::Wrong { case, what, value, limit: 0.0 });
+    }
+    Ok(())
+}
+
 impl Kernel for Decode {
-    fn name(&self) -> &'static str {
-        self.name
+    fn name(&self) -> &str {
+        &self.name
     }
 
     fn ticks(&self) -> usize {
@@ -82,29 +77,31 @@ impl Kernel for Decode {
         sum
     }
 
-    #[expect(clippy::cast_precision_loss, reason = "some ten thousand ticks")]
     fn check(&mut self) -> Result<(), Error> {
         let mut back = Vec::new();
         self.decode(&mut |tick| back.push(tick.clone()));
-        let differ = back.iter().zip(&self.ticks).filter(|(back, tick)| back != tick).count();
-        let value = (differ + back.len().abs_diff(self.ticks.len())) as f64;
-        if value > 0.0 {
-            return Err(Error::Wrong { case: self.name, what: "number of ticks that differ", value, limit: 0.0 });
-        }
-        Ok(())
+        compare(&self.name, &back, &self.ticks)
     }
 }
 
 impl Encode {
+    /// Batches of `size`.
+    pub(super) fn of(size: usize) -> Result<Self, Error> {
+        let corrected: Vec<_> = unit::zeeman()?.corrected().into_iter().take(TICKS).collect();
+        let batches = corrected.chunks(size).map(|ticks| ticks.iter().cloned().collect());
+        let name = format!("encode corrected, batches of {size}");
+        Ok(Self { name, batches: batches.collect(), room: Vec::new() })
+    }
+
     fn encode(&mut self, each: &mut dyn FnMut(&[u8])) {
         for ticks in &self.batches {
-            let batch = CorrectedBatch {
-                unit: "ZLG-0001".to_owned(),
+            let batch = CorrectedBody {
+                unit: "ZLG-0001",
                 revision: Revision { counter: 1, digest: [7; 8] },
                 temperatures: Default::default(),
-                ticks: ticks.iter().map(Into::into).collect(),
+                ticks: Ticks { ready: ticks, count: ticks.len() },
             };
-            if codec::encode_into(&batch, &mut self.room).is_ok() {
+            if batch.encode_into(&mut self.room).is_ok() {
                 each(&self.room);
             }
         }
@@ -112,12 +109,12 @@ impl Encode {
 }
 
 impl Kernel for Encode {
-    fn name(&self) -> &'static str {
-        self.name
+    fn name(&self) -> &str {
+        &self.name
     }
 
     fn ticks(&self) -> usize {
-        self.batches.iter().map(Vec::len).sum()
+        self.batches.iter().map(VecDeque::len).sum()
     }
 
     #[inline(never)]
@@ -128,21 +125,14 @@ impl Kernel for Encode {
         sum
     }
 
-    #[expect(clippy::cast_precision_loss, reason = "some ten thousand ticks")]
     fn check(&mut self) -> Result<(), Error> {
-        let expected: Vec<CorrectedTick> = self.batches.concat();
         let mut back = Vec::new();
         self.encode(&mut |frame| {
             if let Ok(batch) = codec::decode::<CorrectedBatch>(frame) {
                 back.extend(batch.ticks);
             }
         });
-        let wire: Vec<isotherm_protocol::corrected::CorrectedTick> = expected.iter().map(Into::into).collect();
-        let differ = back.iter().zip(&wire).filter(|(back, tick)| back != tick).count();
-        let value = (differ + back.len().abs_diff(wire.len())) as f64;
-        if value > 0.0 {
-            return Err(Error::Wrong { case: self.name, what: "number of ticks that differ", value, limit: 0.0 });
-        }
-        Ok(())
+        let wire: Vec<_> = self.batches.iter().flatten().map(Into::into).collect();
+        compare(&self.name, &back, &wire)
     }
 }

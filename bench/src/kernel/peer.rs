@@ -44,7 +44,8 @@ pub(crate) struct Peer {
 
 impl Peer {
     pub(crate) fn new() -> Self {
-        let rotation = [[0.999_99, 2.0e-3, -1.0e-3], [-2.0e-3, 0.999_99, 3.0e-3], [1.0e-3, -3.0e-3, 0.999_99]];
+        let rotation =
+            [[0.999_99, 2.0e-3, -1.0e-3], [-2.0e-3, 0.999_99, 3.0e-3], [1.0e-3, -3.0e-3, 0.999_99]];
         let triad = |size: f32| Triad {
             reference: 25.0,
             range: [-40.0, 85.0],
@@ -62,7 +63,7 @@ impl Peer {
 }
 
 impl Kernel for Peer {
-    fn name(&self) -> &'static str {
+    fn name(&self) -> &str {
         "autopilot: cubic bias, scale, rotation"
     }
 
@@ -87,13 +88,19 @@ impl Kernel for Peer {
         let expected = [0.5 - 1e-3, 1e-3, -0.5e-3];
         let worst = (0..3).map(|axis| {
             let scaled = expected.iter().zip(self.gyro.scale).map(|(x, s)| f64::from(*x) * f64::from(s));
-            let rotated: f64 = self.gyro.rotation[axis].iter().zip(scaled).map(|(r, s)| f64::from(*r) * s).sum();
+            let rotated: f64 =
+                self.gyro.rotation[axis].iter().zip(scaled).map(|(r, s)| f64::from(*r) * s).sum();
             (rotated - f64::from(found[axis])).abs()
         });
         let value = worst.fold(0.0, f64::max);
         let limit = ROUNDING.max(f64::from(f32::EPSILON));
         if value > limit {
-            return Err(Error::Wrong { case: self.name(), what: "error of the corrected rate (rad/s)", value, limit });
+            return Err(Error::Wrong {
+                case: self.name().to_owned(),
+                what: "error of the corrected rate (rad/s)",
+                value,
+                limit,
+            });
         }
         Ok(())
     }

@@ -5,7 +5,9 @@ use std::sync::Arc;
 
 use isotherm_correction::calibration::Calibration;
 use isotherm_correction::navigation::NavigationStep;
-use isotherm_correction::sample::{AccelTick, CorrectedTick, GyroTick, OutputKind, SensorFlags, TemperatureReading, TickFlags};
+use isotherm_correction::sample::{
+    AccelTick, CorrectedTick, GyroTick, OutputKind, SensorFlags, TemperatureReading, TickFlags,
+};
 use isotherm_correction::unit::{Event, Unit, UnitSettings};
 use isotherm_protocol::document::Document;
 use isotherm_simulator::{Scenario, Simulation, presets};
@@ -42,26 +44,41 @@ pub(crate) struct UnitCase {
     fits: bool,
 }
 
-/// All kinds of units.
-pub(crate) fn unit_cases() -> Result<Vec<UnitCase>, Error> {
-    let mems = || presets::mems_chamber(1);
+/// Unit scale along the case axes, and nothing else.
+pub(crate) fn identity() -> Result<UnitCase, Error> {
+    UnitCase::new("identity", "MEMS-0001.toml", strip_all, &presets::mems_chamber(1), false)
+}
+
+/// What an autopilot has, from the document of a MEMS unit.
+pub(crate) fn steady() -> Result<UnitCase, Error> {
+    let name = "static bias, scale, orientation";
+    UnitCase::new(name, "MEMS-0001.toml", |_| {}, &presets::mems_chamber(1), true)
+}
+
+/// Every term of a Zeeman unit.
+pub(crate) fn zeeman() -> Result<UnitCase, Error> {
+    let name = "Zeeman: every term, a switch each 24 000 ticks";
+    UnitCase::new(name, "ZLG-0001.toml", |_| {}, &presets::zeeman_rest(1), true)
+}
+
+/// Thermal lags.
+pub(crate) fn fibre_optic() -> Result<UnitCase, Error> {
+    let scenario = presets::fibre_optic_chamber(1, presets::judging_profile());
+    UnitCase::new("fibre-optic: six lags per gyro", "FOG-0001.toml", |_| {}, &scenario, true)
+}
+
+/// Twice as many sensors as axes.
+pub(crate) fn skewed_six() -> Result<UnitCase, Error> {
+    let scenario = presets::skewed_six(1, None);
+    UnitCase::new("six skewed sensors, parity", "MEMS-0001.toml", skew, &scenario, false)
+}
+
+/// Ticks summed to navigation steps.
+pub(crate) fn coning_sculling() -> Result<UnitCase, Error> {
     // Four ticks are a step that there is.
     let step = NavigationStep::new(4, true).unwrap_or_default();
-    let navigation = UnitSettings { navigation: step, ..UnitSettings::default() };
-    Ok(vec![
-        UnitCase::new("identity", "MEMS-0001.toml", strip_all, &mems(), false)?,
-        UnitCase::new("static bias, scale, orientation", "MEMS-0001.toml", |_| {}, &mems(), true)?,
-        UnitCase::new("Zeeman: every term, a switch each 24 000 ticks", "ZLG-0001.toml", |_| {}, &presets::zeeman_rest(1), true)?,
-        UnitCase::new(
-            "fibre-optic: six lags per gyro",
-            "FOG-0001.toml",
-            |_| {},
-            &presets::fibre_optic_chamber(1, presets::judging_profile()),
-            true,
-        )?,
-        UnitCase::new("six skewed sensors, parity", "MEMS-0001.toml", skew, &presets::skewed_six(1, None), false)?,
-        UnitCase { settings: navigation, ..UnitCase::new("coning and sculling, 4 ticks", "MEMS-0001.toml", |_| {}, &mems(), true)? },
-    ])
+    let settings = UnitSettings { navigation: step, ..UnitSettings::default() };
+    Ok(UnitCase { name: "coning and sculling, 4 ticks", settings, ..steady()? })
 }
 
 /// Nothing but unit scale along the case axes.
@@ -84,7 +101,8 @@ fn strip_all(document: &mut Document) {
 fn skew(document: &mut Document) {
     let rows = isotherm_simulator::orientation::Orientation::dodecahedron().rows;
     let gyros = document.gyro.sensor.clone();
-    document.gyro.sensor = gyros.iter().chain(&gyros).cloned().zip(0..).map(|(sensor, index)| renamed(sensor, index)).collect();
+    document.gyro.sensor =
+        gyros.iter().chain(&gyros).cloned().zip(0..).map(|(sensor, index)| renamed(sensor, index)).collect();
     document.gyro.orientation.rows.clone_from(&rows);
     document.gyro.orientation.thermal = None;
     for accel in document.accel.iter_mut() {
@@ -98,7 +116,10 @@ fn skew(document: &mut Document) {
     }
 }
 
-fn renamed(mut sensor: isotherm_protocol::document::GyroSensor, index: usize) -> isotherm_protocol::document::GyroSensor {
+fn renamed(
+    mut sensor: isotherm_protocol::document::GyroSensor,
+    index: usize,
+) -> isotherm_protocol::document::GyroSensor {
     sensor.name = format!("g{index}");
     sensor
 }
@@ -119,9 +140,11 @@ impl UnitCase {
         let path = path(document);
         let text = std::fs::read_to_string(&path).map_err(|source| Error::file(&path, source))?;
         let invalid = |what: String| Error::Invalid { path: path.clone(), what };
-        let mut document = Document::parse(&text, None).map_err(|found| invalid(format!("{found:?}")))?.document;
+        let mut document =
+            Document::parse(&text, None).map_err(|found| invalid(format!("{found:?}")))?.document;
         change(&mut document);
-        let calibration = Calibration::new(&document.to_parts()).map_err(|defects| invalid(format!("{defects:?}")))?;
+        let calibration =
+            Calibration::new(&document.to_parts()).map_err(|defects| invalid(format!("{defects:?}")))?;
         let mut bundles: Vec<Bundle> = Vec::new();
         let mut truth = [0.0; 3];
         let steps = Simulation::new(scenario).map_err(|error| invalid(error.to_string()))?;
@@ -166,7 +189,7 @@ impl UnitCase {
 }
 
 impl Kernel for UnitCase {
-    fn name(&self) -> &'static str {
+    fn name(&self) -> &str {
         self.name
     }
 
@@ -192,19 +215,29 @@ impl Kernel for UnitCase {
         let (mut angle, mut seconds) = ([0.0; 3], 0.0);
         self.drive(&mut |tick| {
             count += u64::from(tick.ticks);
-            disorder += u64::from(last.is_some_and(|last| tick.sequence != last + u64::from(tick.ticks)) || tick.missed > 0);
+            disorder += u64::from(
+                last.is_some_and(|last| tick.sequence != last + u64::from(tick.ticks)) || tick.missed > 0,
+            );
             last = Some(tick.sequence);
             let flagged = tick.flags.intersects(TickFlags::INTERPOLATED | TickFlags::WARM_UP);
-            let sound = tick.gyro_flags.iter().chain(&tick.accel_flags).all(|flags| flags.contains(SensorFlags::VALID));
+            let sound = tick
+                .gyro_flags
+                .iter()
+                .chain(&tick.accel_flags)
+                .all(|flags| flags.contains(SensorFlags::VALID));
             unsound += u64::from(!sound && !flagged);
             angle.iter_mut().zip(tick.delta_angle).for_each(|(sum, delta)| *sum += delta);
             seconds += tick.duration.as_s();
         });
-        let case = self.name;
         let wrong = |what, value: f64, limit: f64| {
+            let case = self.name.to_owned();
             if value > limit { Err(Error::Wrong { case, what, value, limit }) } else { Ok(()) }
         };
-        wrong("number of ticks that are missing or too many", (count as f64 - self.ticks() as f64).abs(), 0.0)?;
+        wrong(
+            "number of ticks that are missing or too many",
+            (count as f64 - self.ticks() as f64).abs(),
+            0.0,
+        )?;
         wrong("number of ticks out of order", disorder as f64, 0.0)?;
         if self.fits {
             wrong("number of unsound ticks", unsound as f64, 0.0)?;
@@ -216,14 +249,24 @@ impl Kernel for UnitCase {
 }
 
 impl UnitCase {
-    /// The first ticks of the unit in order, for cases that only encode and decode them.
+    /// Its gyro ticks in order.
     pub(crate) fn gyro_ticks(&self) -> impl Iterator<Item = &GyroTick> {
         self.bundles.iter().flat_map(|bundle| &bundle.gyros)
     }
 
-    /// What the readings of its gyros stand for.
-    pub(crate) fn output(&self) -> OutputKind {
-        self.output
+    /// Its accelerometer ticks in order.
+    pub(crate) fn accel_ticks(&self) -> impl Iterator<Item = &AccelTick> {
+        self.bundles.iter().flat_map(|bundle| &bundle.accels)
+    }
+
+    /// What the readings of its gyros and of its accelerometers stand for.
+    pub(crate) fn outputs(&self) -> [OutputKind; 2] {
+        [self.output, self.accel_output]
+    }
+
+    /// The calibration.
+    pub(crate) fn calibration(&self) -> &Arc<Calibration> {
+        &self.calibration
     }
 
     /// Every corrected tick.

@@ -65,7 +65,8 @@ impl AccelIntake {
     /// Puts a tick in its place in time.
     fn insert(&mut self, pending: Pending, counters: &mut Counters) {
         let time = pending.tick.end_time;
-        if self.pending.len() < MAX_PENDING && self.pending.back().is_none_or(|last| last.tick.end_time < time)
+        if self.pending.len() < MAX_PENDING
+            && self.pending.back().is_none_or(|last| last.tick.end_time < time)
         {
             self.pending.push_back(pending);
             return;

@@ -12,8 +12,8 @@ use serde::{Deserialize, Serialize};
 
 use super::axes::Axes;
 use super::counters::Counters;
-use super::release::Released;
 use super::health::SensorHealth;
+use super::release::Released;
 use super::slew::Slew;
 use super::thermal_memory::{ThermalMemory, Waiting};
 use crate::calibration::Calibration;
@@ -165,9 +165,8 @@ impl Corrector {
         }
         self.thermal.advance(calibration, waiting, delay, tick.end_time, counters);
         let axes = &self.thermal.gyro_axes;
-        let project = |rate| {
-            calibration.gyro_orientation.forward(axes.temperature_deg_c(tick.end_time), rate)
-        };
+        let project =
+            |rate| calibration.gyro_orientation.forward(axes.temperature_deg_c(tick.end_time), rate);
         self.drift.advance(tick.end_time, released.restart, &project);
         self.slew_share = self.slew.as_ref().map_or(0.0, |slew| slew.share(tick.end_time));
         if self.slew_share <= 0.0 {

@@ -61,7 +61,9 @@ impl Unit {
             let calibration = &active.calibration;
             (calibration.gyro_output(), calibration.gyro_count(), calibration.accel_count() > 0)
         };
-        let Some((need_output, need_sensors, expects_accel)) = self.active.as_ref().map(takes) else { return 0 };
+        let Some((need_output, need_sensors, expects_accel)) = self.active.as_ref().map(takes) else {
+            return 0;
+        };
         if output != need_output || self.pending.is_some() {
             return 0;
         }

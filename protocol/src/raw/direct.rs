@@ -24,7 +24,7 @@ const FEWEST_BYTES: usize = 4;
 ///
 /// # Errors
 /// As [`codec::decode`] of a [`GyroBatch`].
-pub(crate) fn read_gyro(frame: &[u8], ticks: &mut Vec<GyroTick>) -> Result<OutputKind, CodecError> {
+pub fn read_gyro(frame: &[u8], ticks: &mut Vec<GyroTick>) -> Result<OutputKind, CodecError> {
     let bytes = codec::body::<GyroBatch>(frame)?;
     let mut alike = Alike::default();
     let mut half_periods = None;
@@ -65,7 +65,7 @@ pub(crate) fn read_gyro(frame: &[u8], ticks: &mut Vec<GyroTick>) -> Result<Outpu
 ///
 /// # Errors
 /// As [`codec::decode`] of an [`AccelBatch`].
-pub(crate) fn read_accel(frame: &[u8], ticks: &mut Vec<AccelTick>) -> Result<OutputKind, CodecError> {
+pub fn read_accel(frame: &[u8], ticks: &mut Vec<AccelTick>) -> Result<OutputKind, CodecError> {
     let bytes = codec::body::<AccelBatch>(frame)?;
     let mut alike = Alike::default();
     let rest = read_body(bytes, |body| {
@@ -99,7 +99,11 @@ fn length(body: &mut Body<'_>, most: usize) -> postcard::Result<usize> {
 }
 
 /// Makes `ticks` as many as a body of so many bytes states; never more than it can hold.
-fn make_room<T: Clone + Default>(body: &mut Body<'_>, bytes: usize, ticks: &mut Vec<T>) -> postcard::Result<()> {
+fn make_room<T: Clone + Default>(
+    body: &mut Body<'_>,
+    bytes: usize,
+    ticks: &mut Vec<T>,
+) -> postcard::Result<()> {
     let count = length(body, MAX_TICKS.min(bytes / FEWEST_BYTES))?;
     ticks.resize(count, T::default());
     Ok(())

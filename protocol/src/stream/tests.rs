@@ -6,11 +6,11 @@ use isotherm_correction::units::Timestamp;
 
 use super::status::reason;
 use super::*;
-use crate::raw::{AccelBatch, GyroBatch};
 use crate::codec::encode;
 use crate::control::Schedule;
 use crate::digest::Digest;
 use crate::document::Document;
+use crate::raw::{AccelBatch, GyroBatch};
 use crate::raw::{HealthReading as WireReading, HealthTick, TemperatureTick};
 use crate::status::{Output, Place, PreLaunchVerdict, SensorKind, State as WireState, Status};
 

@@ -4,9 +4,7 @@ use super::gyros::UNSOUND;
 use super::{Corrector, of_length, resolve};
 use crate::calibration::Calibration;
 use crate::observation::AccelSeen;
-use crate::sample::{
-    AccelTick, CorrectedTick, MAX_SENSORS, MIN_SENSORS, OutputKind, SensorFlags, TickFlags,
-};
+use crate::sample::{AccelTick, CorrectedTick, MAX_SENSORS, MIN_SENSORS, OutputKind, SensorFlags, TickFlags};
 use crate::thermal::AccelTerms;
 use crate::unit::counters::Counters;
 use crate::units::Timestamp;

@@ -37,8 +37,11 @@ prop_compose! {
 
 fn gyro_batch() -> impl Strategy<Value = GyroBatch> {
     let ticks = some_readings().prop_flat_map(|readings| prop::collection::vec(gyro_tick(readings), 0..6));
-    (any::<u64>(), any::<u64>(), ticks)
-        .prop_map(|(first_sequence, series, ticks)| GyroBatch { first_sequence, series, ticks })
+    (any::<u64>(), any::<u64>(), ticks).prop_map(|(first_sequence, series, ticks)| GyroBatch {
+        first_sequence,
+        series,
+        ticks,
+    })
 }
 
 /// The frame of a batch that may be wrong, with one byte of its body changed, taken out or put in.
