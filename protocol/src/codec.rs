@@ -12,6 +12,7 @@
 use std::fmt;
 use std::marker::PhantomData;
 
+use postcard::ser_flavors::Flavor;
 use serde::de::{DeserializeOwned, Error as _, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 use thiserror::Error;
@@ -166,14 +167,34 @@ pub fn encode_into<M: Message>(message: &M, frame: &mut Vec<u8>) -> Result<(), C
 pub(crate) fn encode_as<M: Message>(body: &impl Serialize, frame: &mut Vec<u8>) -> Result<(), CodecError> {
     frame.clear();
     frame.extend([M::KIND as u8, M::VERSIONS.current]);
-    let mut bytes = postcard::to_extend(body, std::mem::take(frame)).map_err(|_| CodecError::Malformed)?;
-    let checksum = crc32fast::hash(&bytes);
-    bytes.extend(checksum.to_le_bytes());
-    *frame = bytes;
+    postcard::serialize_with_flavor(body, Room(frame)).map_err(|_| CodecError::Malformed)?;
+    let checksum = crc32fast::hash(frame);
+    frame.extend(checksum.to_le_bytes());
     if frame.len() > MAX_FRAME {
         return Err(CodecError::Length { length: frame.len() });
     }
     Ok(())
+}
+
+/// A frame that is being written: whole slices at once, where postcard's own flavour takes byte after byte.
+struct Room<'a>(&'a mut Vec<u8>);
+
+impl Flavor for Room<'_> {
+    type Output = ();
+
+    fn try_push(&mut self, byte: u8) -> postcard::Result<()> {
+        self.0.push(byte);
+        Ok(())
+    }
+
+    fn try_extend(&mut self, bytes: &[u8]) -> postcard::Result<()> {
+        self.0.extend_from_slice(bytes);
+        Ok(())
+    }
+
+    fn finalize(self) -> postcard::Result<()> {
+        Ok(())
+    }
 }
 
 /// Encodes a message.
