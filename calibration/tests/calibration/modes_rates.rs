@@ -1,8 +1,6 @@
 //! `modes` and `rates` as their users run them: recordings in, documents and reports out, exit codes.
-#![expect(clippy::unwrap_used, reason = "helpers of tests end the test where something is not as it must be")]
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
 
 use isotherm_log::message::{Message, Topic};
 use isotherm_log::offline::unit_id;
@@ -16,23 +14,7 @@ use isotherm_simulator::presets::{mems_chamber, zeeman_rest};
 use isotherm_simulator::{Scenario, Simulation};
 use serde_json::Value;
 
-fn calibrate(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_isotherm-calibrate")).args(arguments).output().unwrap()
-}
-
-#[track_caller]
-fn succeeds(arguments: &[&str]) -> String {
-    let output = calibrate(arguments);
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout).unwrap()
-}
-
-#[track_caller]
-fn fails(arguments: &[&str], code: i32) -> String {
-    let output = calibrate(arguments);
-    assert_eq!(output.status.code(), Some(code), "{}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stderr).unwrap()
-}
+use crate::command::{fails, shipped, succeeds};
 
 /// Scenarios one after the other, as one recording; each starts where the last one ended.
 fn record(path: &Path, scenarios: &[Scenario]) {
@@ -86,7 +68,7 @@ fn zeeman(seed: u64, chamber: Profile) -> Scenario {
 
 /// The unit's document without what `modes` is to find.
 fn base(folder: &Path) -> PathBuf {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/calibration/ZLG-0001.toml");
+    let path = shipped("ZLG-0001.toml");
     let mut document = Document::parse(&std::fs::read_to_string(path).unwrap(), None).unwrap().document;
     for sensor in &mut document.gyro.sensor {
         sensor.static_bias = None;

@@ -1,17 +1,13 @@
 //! `positions` as its user calls it.
-#![expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, reason = "counts of tests")]
-#![expect(clippy::unwrap_used, reason = "helpers of tests end the test where something is not as it must be")]
-
-#[path = "positions_stand/mod.rs"]
-#[expect(dead_code, reason = "other tests use the rest")]
-mod stand;
 
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
 
 use isotherm_calibration::positions::plan::Plan;
 use isotherm_calibration::written::Written;
-use stand::{ARCSEC, Dice, Stand};
+
+use crate::command::program;
+use crate::stand::{self, ARCSEC, Dice, Stand};
 
 /// A stand that turns the unit, ten ticks a second.
 fn driven(seed: u64) -> Stand {
@@ -26,9 +22,9 @@ fn driven(seed: u64) -> Stand {
     }
 }
 
-/// Runs the command in a folder.
-fn calibrate(folder: &Path, args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_isotherm-calibrate")).current_dir(folder).args(args).output().unwrap()
+/// Runs the program in a folder.
+fn within(folder: &Path, arguments: &[&str]) -> Output {
+    program(arguments).current_dir(folder).output().unwrap()
 }
 
 fn text(bytes: &[u8]) -> String {
@@ -54,7 +50,7 @@ fn the_command_writes_the_document_and_says_what_it_did() {
         let mut args = vec!["positions", "cold.csv", "hot.csv"];
         args.extend(common);
         args.extend(more);
-        calibrate(folder.path(), &args)
+        within(folder.path(), &args)
     };
     let done = call(&["--out", "new.toml", "--html", "new.html", "--judge", "room.csv"]);
     assert!(done.status.success(), "{}", text(&done.stderr));
@@ -86,7 +82,7 @@ fn the_command_writes_the_document_and_says_what_it_did() {
     let second = std::fs::read_to_string(at("new.toml")).unwrap();
     assert_eq!(text(&first), second.replace(" --overwrite", ""));
     // JSON instead of tables; a warning where nobody says what gravity is.
-    let json = calibrate(
+    let json = within(
         folder.path(),
         &["positions", "room.csv", "--mapping", "mapping.toml", "--document", "base.toml", "--json"],
     );
@@ -101,11 +97,11 @@ fn the_command_writes_the_document_and_says_what_it_did() {
 #[test]
 fn the_budget_prints_the_examples_of_the_paper() {
     let folder = tempfile::tempdir().unwrap();
-    let said = text(&calibrate(folder.path(), &["positions", "--budget"]).stdout);
+    let said = text(&within(folder.path(), &["positions", "--budget"]).stdout);
     for words in ["11.5", "10.6", "0.3″ for quartz", "1.2″ for silicon", "15.7″"] {
         assert!(said.contains(words), "{words} is not in\n{said}");
     }
-    let json = calibrate(
+    let json = within(
         folder.path(),
         &["positions", "--budget", "--json", "--axis-rate", "6", "--positioning", "1", "--run-out", "0"],
     );

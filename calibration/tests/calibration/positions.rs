@@ -1,10 +1,4 @@
 //! `positions`: a simulated stand with its errors, from the log to the document.
-#![expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, reason = "counts of tests")]
-#![expect(clippy::unwrap_used, reason = "helpers of tests end the test where something is not as it must be")]
-
-#[path = "positions_stand/mod.rs"]
-#[expect(dead_code, reason = "other tests use the rest")]
-mod stand;
 
 use isotherm_calibration::positions::analysis::{Analysis, Settings, analyse};
 use isotherm_calibration::positions::document::complete;
@@ -17,8 +11,11 @@ use isotherm_calibration::written::Written;
 use isotherm_correction::unit::UnitSettings;
 use isotherm_log::offline::Offline;
 use nalgebra::DVector;
-use stand::judging::{HOUSING_ABOVE_DEG_C, away, chi_square, plausible, quick, settings, times, tracks};
-use stand::{ARCSEC, GRAVITY, HZ_PER_V, Stand};
+
+use crate::stand::judging::{
+    HOUSING_ABOVE_DEG_C, away, chi_square, plausible, quick, settings, times, tracks,
+};
+use crate::stand::{self, ARCSEC, GRAVITY, HZ_PER_V, Stand};
 
 #[test]
 fn twelve_positions_with_random_stand_errors_find_the_axes_within_their_covariance() {

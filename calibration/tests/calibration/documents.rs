@@ -1,29 +1,15 @@
 //! `show`, `diff` and `merge`, as their user calls them.
-#![expect(clippy::unwrap_used, reason = "helpers of tests end the test where something is not as it must be")]
 
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::path::Path;
 
 use isotherm_calibration::written::Written;
 use isotherm_protocol::document::{Curve, Document, Shape};
 use serde_json::Value;
 
-fn calibrate(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_isotherm-calibrate")).args(arguments).output().unwrap()
-}
-
-fn json(arguments: &[&str]) -> Value {
-    let output = calibrate(arguments);
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    serde_json::from_slice(&output.stdout).unwrap()
-}
-
-fn folder() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/calibration")
-}
+use crate::command::{calibrate, json, shipped};
 
 fn save(path: &str, change: impl FnOnce(&mut Document)) {
-    let mut document = Written::read(&folder().join("MEMS-0001.toml")).unwrap().document;
+    let mut document = Written::read(&shipped("MEMS-0001.toml")).unwrap().document;
     change(&mut document);
     Written::of(&document).unwrap().save(Path::new(path), true).unwrap();
 }
@@ -33,7 +19,7 @@ fn every_document_that_is_shipped_can_be_shown() {
     let pages = tempfile::tempdir().unwrap();
     let html = pages.path().join("page.html").display().to_string();
     let mut count = 0;
-    for entry in std::fs::read_dir(folder()).unwrap() {
+    for entry in std::fs::read_dir(shipped("")).unwrap() {
         let path = entry.unwrap().path();
         if path.extension().is_none_or(|extension| extension != "toml") {
             continue;
@@ -53,7 +39,7 @@ fn every_document_that_is_shipped_can_be_shown() {
 
 #[test]
 fn shown_values_are_those_of_the_document() {
-    let path = folder().join("example-full.toml").display().to_string();
+    let path = shipped("example-full.toml").display().to_string();
     let shown = json(&["show", &path, "--json"]);
     assert_eq!(shown["document"]["unit"], "EXAMPLE-0001");
     let terms = shown["terms"].as_array().unwrap();
