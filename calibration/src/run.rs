@@ -3,6 +3,7 @@
 mod together;
 
 use std::collections::BTreeSet;
+use std::path::PathBuf;
 
 use isotherm_correction::sample::CorrectedTick;
 use isotherm_correction::unit::{Unit, UnitSettings};
@@ -50,6 +51,15 @@ impl Run {
     #[must_use]
     pub fn of_events(name: String, unit: UnitId, events: Vec<LogEvent>) -> Self {
         Self { name, unit, source: Source::Events(events) }
+    }
+
+    /// The files that it is read from; none where it is in memory.
+    #[must_use]
+    pub fn files(&self) -> &[PathBuf] {
+        match &self.source {
+            Source::Files { files: LogFiles::Recordings(paths) | LogFiles::Text { paths, .. }, .. } => paths,
+            Source::Events(_) => &[],
+        }
     }
 
     /// Its readings as columns.
@@ -189,4 +199,19 @@ impl Watch for () {
     fn begin(&mut self, _: Progress) {}
     fn step(&mut self) {}
     fn end(&mut self) {}
+}
+
+/// One that is lent, for several readings one after the other.
+impl<W: Watch> Watch for &mut W {
+    fn begin(&mut self, progress: Progress) {
+        (**self).begin(progress);
+    }
+
+    fn step(&mut self) {
+        (**self).step();
+    }
+
+    fn end(&mut self) {
+        (**self).end();
+    }
 }

@@ -185,10 +185,14 @@ impl ImpactArgs {
         let parts = parsed.document.to_parts();
         let stated: Vec<DriftParts> = parts.gyros.iter().filter_map(|gyro| gyro.drift).collect();
         <[DriftParts; 3]>::try_from(stated).map_err(|stated| {
+            let advice = if stated.len() < 3 {
+                "isotherm-calibrate drift --document puts them in"
+            } else {
+                "leave the document out, or give one that states it for the gyros along x, y and z only"
+            };
+            let (path, count) = (path.display(), stated.len());
             Error::Refused(vec![format!(
-                "{} states a drift for {} gyros, the platform has three: isotherm-calibrate drift --document puts them in",
-                path.display(),
-                stated.len()
+                "{path} states a drift for {count} gyros, the platform has three: {advice}"
             )])
         })
     }

@@ -3,7 +3,7 @@
 use isotherm_correction::units::Angle;
 use isotherm_log::plot::page::{Axis, Chart, Content, Form, Ink, Panel, Samples, Series, Table};
 
-use super::make::Made;
+use super::make::{Made, Measured};
 use super::solve::GyroRates;
 use crate::drift::figures::short;
 use crate::report::{Coefficient, FitReport};
@@ -48,8 +48,38 @@ pub(super) fn report(made: &Made) -> FitReport {
             None => {}
         }
     }
+    if !made.judged.is_empty() {
+        report.notes.push(format!("Out of sample: {} steps of the judging logs.", made.judged.len()));
+        report.tables.push(("Errors of the judging steps".to_owned(), judged(made)));
+    }
     report.charts.push(("Linearity".to_owned(), chart(made)));
     report
+}
+
+/// Errors of the steps that the fit has not seen, by case axis.
+fn judged(made: &Made) -> Table {
+    let head = [
+        "log",
+        "window, s",
+        "table, °/s",
+        "before: x, °/h",
+        "y, °/h",
+        "z, °/h",
+        "after: x, °/h",
+        "y, °/h",
+        "z, °/h",
+    ];
+    let row = |step: &Measured| {
+        let [from, to] = step.matched.plateau.window_s;
+        let mut row = vec![
+            (step.matched.step.run + 1).to_string(),
+            format!("{from:.1}…{to:.1}"),
+            short(step.matched.step.rate_deg_per_s),
+        ];
+        row.extend(step.error.iter().flatten().map(|error| short(*error)));
+        row
+    };
+    Table { head: head.map(str::to_owned).to_vec(), rows: made.judged.iter().map(row).collect() }
 }
 
 fn coefficients(name: &str, found: &GyroRates, weight: Option<(f64, &str)>, report: &mut FitReport) {

@@ -1,11 +1,12 @@
 //! `drift`: known noise in, its coefficients out; real logs; refusals; what goes into a document.
 
+use std::path::Path;
+
 use isotherm_calibration::allan::deviation::lengths;
 use isotherm_calibration::allan::{Coefficient, Estimator, NoiseFit, Phase, Term};
 use isotherm_calibration::drift::markov::Fit;
 use isotherm_calibration::drift::slow::Slow;
 use isotherm_protocol::document::Document;
-use serde_json::Value;
 
 use crate::command::{calibrate, data, json, root};
 use crate::drift_generator::{Markov, Normal, recording};

@@ -8,6 +8,7 @@
 //! | `modes_rates` | `modes` and `rates` as their users run them |
 //! | `drift`, `impact`, `logged` | noise and drift, what they mean for navigation, and logs in every form |
 //! | `validate`, `documents` | documents judged, shown, compared and merged |
+//! | `skewed_six` | units of six sensors through all of them |
 //! | `command` | how the program is called |
 //! | `stand`, `drift_generator`, `simulated_logs` | what the logs are made with |
 
@@ -30,6 +31,7 @@ mod modes_rates;
 mod positions;
 mod positions_command;
 mod simulated_logs;
+mod skewed_six;
 mod stand;
 mod thermal;
 mod tumble;

@@ -164,7 +164,7 @@ fn the_document_gives_the_right_vectors_through_the_service_to_the_last_digit_th
     }
     let exact = Settings { positioning_rad: 0.05 * ARCSEC, ..settings(plan.clone(), None) };
     let found = analyse(&tracks(&runs, &base), &base.document, &exact).unwrap();
-    let (document, _) = complete(&base.document, &found, GRAVITY);
+    let document = complete(&base.document, &found, GRAVITY);
     let written = Written::of(&document).unwrap();
     let poses: Vec<_> = found.poses.iter().map(|(pose, position, _)| (pose.clone(), *position)).collect();
     let errors = found.fit.stand.map(|(error, _)| error);

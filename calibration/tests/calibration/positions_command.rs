@@ -4,9 +4,12 @@ use std::path::Path;
 use std::process::Output;
 
 use isotherm_calibration::positions::plan::Plan;
+use isotherm_calibration::report::Sigmas;
 use isotherm_calibration::written::Written;
+use isotherm_protocol::document::Document;
 
 use crate::command::program;
+use crate::simulated_logs::record_events;
 use crate::stand::{self, ARCSEC, Dice, Stand};
 
 /// A stand that turns the unit, ten ticks a second.
@@ -92,6 +95,44 @@ fn the_command_writes_the_document_and_says_what_it_did() {
     assert!(!wrong.status.success() && text(&wrong.stderr).contains("absent.toml"));
     let usage = call(&["--levelling", "0"]);
     assert_eq!(usage.status.code(), Some(2));
+}
+
+#[test]
+fn several_units_on_one_stand_end_with_one_table() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    std::fs::create_dir(at("documents")).unwrap();
+    let order: Vec<usize> = (0..12).collect();
+    for (seed, unit) in [(21, "MEMS-0001"), (22, "MEMS-0002")] {
+        let (events, _) = stand::log(&stand::instrument(), 20.0, &Plan::twelve(), &order, &driven(seed));
+        record_events(&at(&format!("{unit}.mcap")), unit, &events);
+        let document = Document { unit: unit.into(), ..stand::document() };
+        std::fs::write(at(&format!("documents/{unit}.toml")), Written::of(&document).unwrap().text).unwrap();
+    }
+    let logs = ["positions", "MEMS-0001.mcap", "MEMS-0002.mcap"];
+    let rest = ["--document", "documents", "--gravity", "9.8154", "--out", "new.toml", "--html", "new.html"];
+    let done = within(folder.path(), &[&logs[..], &rest].concat());
+    assert!(done.status.success(), "{}", text(&done.stderr));
+    let said = text(&done.stdout);
+    assert!(said.contains("\n2 units: 8 of 8 sensors accepted.\n"), "{said}");
+    for unit in ["MEMS-0001", "MEMS-0002"] {
+        let written = Written::read(&at(&format!("new-{unit}.toml"))).unwrap();
+        assert_eq!(written.document.unit, unit);
+        let sigma = Sigmas::of(&written.document);
+        let axis = sigma.get("accel", "x", "axis_arcsec").unwrap();
+        assert!(axis[0] < 0.1 && axis[1] > 1.0 && axis[1] < 30.0, "{axis:?}");
+        assert!(sigma.get("accel", "x", "scale_factor").is_some_and(|sigma| sigma[0] > 0.0));
+        assert!(at(&format!("new-{unit}.html")).exists());
+    }
+    // By itself a unit comes to the same.
+    let alone = ["positions", "MEMS-0002.mcap", "--document", "documents/MEMS-0002.toml"];
+    let done = within(folder.path(), &[&alone[..], &["--gravity", "9.8154", "--out", "alone.toml"]].concat());
+    assert!(done.status.success(), "{}", text(&done.stderr));
+    let accel = |name: &str| Written::read(&at(name)).unwrap().document.accel;
+    assert_eq!(accel("alone.toml"), accel("new-MEMS-0002.toml"));
+    // What diff makes of the two: each axis beside its standard error.
+    let changed = within(folder.path(), &["diff", "alone.toml", "new-MEMS-0002.toml"]);
+    assert!(text(&changed.stdout).contains(" ± "), "{}", text(&changed.stdout));
 }
 
 #[test]

@@ -120,7 +120,7 @@ fn track(instrument: &Instrument, attitudes: &[Matrix3<f64>], how: &Stand) -> (T
     // No channels: the log has one temperature.
     events.retain(|event| !matches!(event, isotherm_log::text::LogEvent::Temperature(_)));
     let run = stand::run("tumbled", events);
-    let document = bare(&run.series(()).unwrap(), AccelOutput::MetresPerSecondSquared, None).unwrap();
+    let document = bare(&run.series(()).unwrap(), AccelOutput::MetresPerSecondSquared).unwrap();
     (Track::of(&run, &Written::of(&document).unwrap().loaded, ()).unwrap(), held)
 }
 
