@@ -9,11 +9,13 @@
 //! | `drift`, `impact`, `logged` | noise and drift, what they mean for navigation, and logs in every form |
 //! | `validate`, `documents` | documents judged, shown, compared and merged |
 //! | `skewed_six` | units of six sensors through all of them |
+//! | `pages` | pages to be looked at |
 //! | `command` | how the program is called |
 //! | `stand`, `drift_generator`, `simulated_logs` | what the logs are made with |
 
 #![expect(
     clippy::unwrap_used,
+    clippy::panic,
     clippy::cast_precision_loss,
     clippy::cast_possible_truncation,
     clippy::cast_possible_wrap,
@@ -28,6 +30,7 @@ mod drift_generator;
 mod impact;
 mod logged;
 mod modes_rates;
+mod pages;
 mod positions;
 mod positions_command;
 mod simulated_logs;

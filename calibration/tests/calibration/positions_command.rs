@@ -13,7 +13,7 @@ use crate::simulated_logs::record_events;
 use crate::stand::{self, ARCSEC, Dice, Stand};
 
 /// A stand that turns the unit, ten ticks a second.
-fn driven(seed: u64) -> Stand {
+pub(crate) fn driven(seed: u64) -> Stand {
     Stand {
         errors: Dice::new(seed).vector(60.0 * ARCSEC),
         positioning: 5.385 * ARCSEC,

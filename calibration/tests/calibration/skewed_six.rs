@@ -9,7 +9,7 @@ use isotherm_calibration::written::Written;
 use isotherm_protocol::document::{AccelSensor, Curve, Document, GyroSensor, Shape, Unit};
 use isotherm_simulator::Scenario;
 use isotherm_simulator::chamber::Profile;
-use isotherm_simulator::instrument::Instrument;
+use isotherm_simulator::instrument::{Gyros, Instrument};
 use isotherm_simulator::motion::Motion;
 use isotherm_simulator::orientation::Orientation;
 use isotherm_simulator::presets::skewed_six;
@@ -167,7 +167,10 @@ fn drift_looks_at_six_gyros_or_at_the_three_axes_that_they_make() {
     );
     // What a log left, for navigation: along three axes too.
     let sailed = json(&["impact", &log, "--document", &base, "--calibration-hours", "0.5", "--json"]);
-    println!("{}", sailed["verdict"]);
+    assert!(
+        sailed["notes"].to_string().contains("no document states what the drift of these is"),
+        "{sailed}"
+    );
 }
 
 #[test]
@@ -183,4 +186,45 @@ fn six_sensors_are_judged_and_a_hand_tumbled_unit_of_six_is_refused() {
     let (code, _, errors) = words(&calibrate(&["tumble", &log, "--document", &base, "--gravity", "9.8154"]));
     assert!(code == Some(1) && errors.contains("6 accelerometers: |f| = g is for three"), "{errors}");
     assert!(errors.contains("positions"), "{errors}");
+}
+
+#[test]
+fn modes_find_a_fourth_gyro_that_stands_askew() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = |name: &str| folder.path().join(name).display().to_string();
+    let askew = [0.6, 0.64, 0.48];
+    let mut scenario = modes_rates::zeeman(6, Profile::constant(50.0).ramp(-30.0, 4.0).ramp(50.0, 4.0));
+    if let Gyros::Zeeman(unit) = &mut scenario.instrument.gyros {
+        unit.gyros.push(unit.gyros[1].clone());
+    }
+    let orientation = &mut scenario.instrument.gyro_orientation;
+    orientation.rows.push(askew);
+    orientation.rows_per_k.push([0.0; 3]);
+    let (log, base, out) = (place("run.mcap"), place("four.toml"), place("modes.toml"));
+    modes_rates::record(Path::new(&log), &[scenario]);
+    let mut document = Written::read(&modes_rates::base(folder.path())).unwrap().document;
+    let fourth = GyroSensor { name: "s".into(), ..document.gyro.sensor[1].clone() };
+    document.gyro.sensor.push(fourth);
+    document.gyro.orientation.rows.push(askew);
+    if let Some(thermal) = &mut document.gyro.orientation.thermal {
+        thermal.slopes_arcsec_per_deg_c.push([0.0; 3]);
+    }
+    save(&base, &document);
+    let place = "--latitude 55.75 --heading 30 --json --out";
+    let mut arguments = vec!["modes", &log, "--document", &base];
+    arguments.extend(place.split(' '));
+    let report = json(&[&arguments[..], &[&out]].concat());
+    assert_eq!(report["accepted"], true, "{}", report["verdict"]);
+    // The fourth is a copy of the second, and is found to be one, though the Earth turns it by another rate.
+    let made = Written::read(Path::new(&out)).unwrap().document;
+    let value = |gyro: usize, deg_c: f64| {
+        let sensor = &made.gyro.sensor[gyro];
+        [&sensor.static_bias, &sensor.magnetic_bias]
+            .map(|curve| curve.as_ref().unwrap().shape().at(deg_c).unwrap())
+    };
+    for deg_c in [-25.0, 10.0, 45.0] {
+        let (second, fourth) = (value(1, deg_c), value(3, deg_c));
+        println!("{deg_c} °C: {second:?} {fourth:?}");
+        second.iter().zip(fourth).for_each(|(a, b)| assert!((a - b).abs() < 0.02, "{deg_c} °C: {a} {b}"));
+    }
 }
