@@ -117,7 +117,7 @@ impl RatesArgs {
             key: "rates",
             details: details(&made),
             sigmas: sigmas(&made),
-            range_deg_c: made.temperature_deg_c.map(|deg_c| [deg_c, deg_c]),
+            range_deg_c: made.range_deg_c(),
             logs: work.logs(),
         };
         Ok(Fitted { report: made.report(), written: made.written, about })

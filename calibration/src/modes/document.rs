@@ -105,7 +105,8 @@ fn curve<Q: Quantity>(
     (!coefficients.is_empty()).then(|| Curve::new(Shape::Polynomial { reference, coefficients, range }))
 }
 
-fn widened([low, high]: [f64; 2]) -> [f64; 2] {
+/// A range in tenths of a degree, with some width.
+pub(crate) fn widened([low, high]: [f64; 2]) -> [f64; 2] {
     let [low, high] = [libm::floor(low * PER_DEG_C) / PER_DEG_C, libm::ceil(high * PER_DEG_C) / PER_DEG_C];
     // A range must have a width.
     if high > low { [low, high] } else { [low - 1.0 / PER_DEG_C, high + 1.0 / PER_DEG_C] }

