@@ -84,7 +84,7 @@ impl ValidateArgs {
         };
         if reports.len() > 1 {
             let names = work.iter().map(|work| work.unit.to_string());
-            return self.several(names.zip(reports).collect());
+            return self.several(&names.zip(reports).collect::<Vec<_>>());
         }
         self.one(&reports.into_iter().next().unwrap_or_else(|| Err(nothing()))?)
     }
@@ -176,14 +176,14 @@ impl ValidateArgs {
         end(report.refusals())
     }
 
-    fn several(&self, reports: Vec<Outcome>) -> Result<(), Error> {
+    fn several(&self, reports: &[Outcome]) -> Result<(), Error> {
         if let Some(html) = &self.html {
             for (unit, report) in reports.iter().filter_map(|(unit, came)| Some((unit, came.as_ref().ok()?)))
             {
                 write_file(&of_unit(html, unit), report.to_html().as_bytes(), true)?;
             }
         }
-        close_batch("Judgement of several units", &reports, (self.html.as_deref(), true), self.json)
+        close_batch("Judgement of several units", reports, (self.html.as_deref(), true), self.json)
     }
 }
 

@@ -155,7 +155,9 @@ fn read_all<W: Watch>(
              --latitude, --heading, --pitch and --roll of the beginning of each log"
                 .to_owned(),
         );
-        runs.iter_mut().for_each(|run| whole_turns(run, warnings));
+        for run in &mut runs {
+            whole_turns(run, warnings);
+        }
     }
     Ok(runs)
 }

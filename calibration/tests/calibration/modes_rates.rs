@@ -227,6 +227,10 @@ fn rates_are_fitted_written_and_reported() {
     assert!(fails(&[&["rates", logs[0]][..], &attitude].concat(), 2).contains("--axis and --rates"));
 }
 
+fn refs(arguments: &[String]) -> Vec<&str> {
+    arguments.iter().map(String::as_str).collect()
+}
+
 #[test]
 fn rates_are_judged_on_steps_that_the_fit_has_not_seen() {
     let folder = tempfile::tempdir().unwrap();
@@ -249,9 +253,6 @@ fn rates_are_judged_on_steps_that_the_fit_has_not_seen() {
         let start = ["rates", &seen, "--judge", judge, "--out", out, "--json"];
         start.into_iter().chain(rest.split(' ')).map(str::to_owned).collect()
     };
-    fn refs(arguments: &[String]) -> Vec<&str> {
-        arguments.iter().map(String::as_str).collect()
-    }
     let report: Value = serde_json::from_str(&succeeds(&refs(&fit(&judged, &out)))).unwrap();
     let z = &report["verdicts"][2];
     let size = |sample: &str, when: &str| z[sample][when]["rms"].as_f64().unwrap();
@@ -290,7 +291,9 @@ fn several_units_on_one_table_are_fitted_at_once() {
     let mut logs = Vec::new();
     for (seed, unit) in [(1, "MEMS-0001"), (2, "MEMS-0002")] {
         let mut scenarios = table(seed, [0.0, 0.0, 1.0], &[36.0, -36.0, 108.0, -108.0]);
-        scenarios.iter_mut().for_each(|scenario| scenario.unit = unit.into());
+        for scenario in &mut scenarios {
+            scenario.unit = unit.into();
+        }
         let log = place(&format!("{unit}.mcap"));
         record(Path::new(&log), &scenarios);
         logs.push(log);

@@ -107,7 +107,7 @@ fn shock(folder: &Path, page: &dyn Fn(&str, &[&str])) {
     let instrument = stand::instrument();
     let mut rows = stand::true_rows(&instrument, 22.0);
     let order: Vec<usize> = (0..12).collect();
-    for (name, turned, seed) in [("before", 0.0, 31), ("after", 50.0 * stand::ARCSEC, 32)] {
+    for (name, turned, seed) in [("before", 0.0, 41), ("after", 50.0 * stand::ARCSEC, 42)] {
         rows[2][0] += turned;
         let (events, _) = stand::log(&stand::with_axes(&rows), 20.0, &Plan::twelve(), &order, &driven(seed));
         record_events(Path::new(&at(&format!("{name}.mcap"))), "MEMS-0001", &events);

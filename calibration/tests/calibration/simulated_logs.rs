@@ -50,7 +50,7 @@ pub(crate) fn record_events<E: Borrow<LogEvent>>(
     };
     for event in events {
         match event.borrow() {
-            LogEvent::Temperature(reading) => batcher.temperature(reading.clone()).unwrap(),
+            LogEvent::Temperature(reading) => batcher.temperature(*reading).unwrap(),
             LogEvent::Accel { output, tick } => batcher.accel(*output, tick.clone()).unwrap(),
             LogEvent::Gyro { output, tick } => {
                 batcher.gyro(*output, tick.clone()).unwrap();

@@ -153,12 +153,16 @@ fn drift_looks_at_six_gyros_or_at_the_three_axes_that_they_make() {
         raw.iter().map(|sensor| sensor["name"].as_str().unwrap()).collect::<Vec<_>>(),
         ["1", "2", "3", "4", "5", "6"]
     );
-    raw.iter().for_each(|sensor| assert!((walk(sensor) / 0.15 - 1.0).abs() < 0.1, "{sensor}"));
+    for sensor in raw {
+        assert!((walk(sensor) / 0.15 - 1.0).abs() < 0.1, "{sensor}");
+    }
     // Six that are twice as many as needed: the axes have their noise over √2.
     let corrected = json(&["drift", &log, "--document", &base, "--json"]);
     let corrected = corrected["sensors"].as_array().unwrap();
     assert_eq!(corrected.len(), 3);
-    corrected.iter().for_each(|sensor| assert!((walk(sensor) / 0.106 - 1.0).abs() < 0.1, "{sensor}"));
+    for sensor in corrected {
+        assert!((walk(sensor) / 0.106 - 1.0).abs() < 0.1, "{sensor}");
+    }
     // Which of six gyros an axis' drift is of cannot be told.
     let refused = fails(&["drift", &log, "--document", &base, "--out", &out], 1);
     assert!(
@@ -195,7 +199,7 @@ fn modes_find_a_fourth_gyro_that_stands_askew() {
     let askew = [0.6, 0.64, 0.48];
     let mut scenario = modes_rates::zeeman(6, Profile::constant(50.0).ramp(-30.0, 4.0).ramp(50.0, 4.0));
     if let Gyros::Zeeman(unit) = &mut scenario.instrument.gyros {
-        unit.gyros.push(unit.gyros[1].clone());
+        unit.gyros.push(unit.gyros[1]);
     }
     let orientation = &mut scenario.instrument.gyro_orientation;
     orientation.rows.push(askew);
