@@ -104,20 +104,26 @@ pub fn analyse(grid: &Grid, wanted: Wanted) -> Vec<Analysis> {
             work.extend(ticks.into_iter().map(|m| (index, estimator, m)));
         }
     }
-    let variances = in_parallel(&work, |_| (), |(index, estimator, m)| {
-        prepared.get(*index).and_then(|of| of.phase.variance(*estimator, *m))
-    });
+    let variances = in_parallel(
+        &work,
+        |_| (),
+        |(index, estimator, m)| prepared.get(*index).and_then(|of| of.phase.variance(*estimator, *m)),
+    );
     let found: Vec<_> = work.into_iter().zip(variances).collect();
     let indices: Vec<usize> = (0..sensors.len()).collect();
-    let finished = in_parallel(&indices, |_| (), |index| {
-        let of_sensor: Vec<(Estimator, Variance)> = found
-            .iter()
-            .filter(|((sensor, ..), _)| sensor == index)
-            .filter_map(|((_, estimator, _), variance)| Some((*estimator, (*variance)?)))
-            .collect();
-        let (sensor, prepared) = (sensors.get(*index)?, prepared.get(*index)?);
-        Some(finish(grid, sensor, prepared, &of_sensor, wanted))
-    });
+    let finished = in_parallel(
+        &indices,
+        |_| (),
+        |index| {
+            let of_sensor: Vec<(Estimator, Variance)> = found
+                .iter()
+                .filter(|((sensor, ..), _)| sensor == index)
+                .filter_map(|((_, estimator, _), variance)| Some((*estimator, (*variance)?)))
+                .collect();
+            let (sensor, prepared) = (sensors.get(*index)?, prepared.get(*index)?);
+            Some(finish(grid, sensor, prepared, &of_sensor, wanted))
+        },
+    );
     finished.into_iter().flatten().collect()
 }
 

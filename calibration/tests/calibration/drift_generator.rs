@@ -101,5 +101,9 @@ pub(crate) fn recording(
         ..GyroTick::default()
     };
     let kept = (0..columns[0].len()).filter(|index| keep(*index));
-    record_events(path, serial, kept.map(|index| LogEvent::Gyro { output: OutputKind::Mean, tick: tick(index) }));
+    record_events(
+        path,
+        serial,
+        kept.map(|index| LogEvent::Gyro { output: OutputKind::Mean, tick: tick(index) }),
+    );
 }

@@ -55,7 +55,9 @@ function grouped(text) {
 /** A number beside a tick mark. */
 function tickLabel(value, decimals) {
   const size = Math.abs(value);
-  if (decimals === null || size >= 1e9 || (size > 0 && decimals > 6 && size < 1e-3)) return plain(value, 3);
+  if (decimals === null || size >= 1e9) return plain(value, 3);
+  // As many digits as tell it from its neighbours.
+  if (size > 0 && decimals > 6 && size < 1e-3) return plain(value, Math.max(3, Math.floor(Math.log10(size) + 1e-9) + 1 + decimals));
   return grouped(value.toFixed(decimals));
 }
 
