@@ -1,6 +1,7 @@
 //! The command line: arguments in, exit code out.
 
 mod bar;
+mod batch;
 mod diff;
 mod drift;
 mod impact;
@@ -14,7 +15,6 @@ mod runs;
 mod show;
 mod thermal;
 mod tumble;
-mod units;
 mod validate;
 
 use std::io::{self, Write};

@@ -32,7 +32,6 @@ pub mod impact;
 pub mod means;
 pub mod merge;
 pub mod modes;
-pub mod nominal;
 pub mod positions;
 pub mod provenance;
 pub mod rates;

@@ -150,11 +150,8 @@ impl Window {
 
 #[cfg(test)]
 mod tests {
-    use isotherm_protocol::document::Document;
-
     use super::*;
     use crate::fixture::simulated;
-    use crate::nominal::nominal;
     use crate::written::Written;
 
     #[test]
@@ -180,7 +177,7 @@ mod tests {
                 .values()
                 .all(|column| column.len() == 6 && column.iter().all(|t| t.is_finite()))
         );
-        let bare: Document = nominal(&written.document);
+        let bare = written.document.nominal();
         let before = Means::of(&run, &Written::of(&bare).unwrap().loaded, 10.0, ()).unwrap();
         assert_ne!(before.rate(0), means.rate(0), "the bias is in one of them");
         assert_eq!(run.series(()).unwrap().gyros.len(), 60 * 100);

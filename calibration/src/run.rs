@@ -2,9 +2,12 @@
 
 mod together;
 
+use std::borrow::Cow;
 use std::collections::BTreeSet;
+use std::path::PathBuf;
+use std::sync::Arc;
 
-use isotherm_correction::sample::CorrectedTick;
+use isotherm_correction::sample::{CorrectedTick, GyroTick};
 use isotherm_correction::unit::{Unit, UnitSettings};
 use isotherm_log::message::Topic;
 use isotherm_log::offline::{Loaded, Offline};
@@ -26,13 +29,15 @@ pub struct Run {
     pub name: String,
     /// The unit.
     pub unit: UnitId,
+    /// The gyros whose readings are taken, by number; all without them.
+    gyros: Option<[usize; 3]>,
     source: Source,
 }
 
 #[derive(Debug, Clone)]
 enum Source {
     Files { files: LogFiles, part: Part },
-    Events(Vec<LogEvent>),
+    Events(Arc<[LogEvent]>),
 }
 
 /// What a correction passed over, as `isotherm-replay correct` says it; empty where all is well.
@@ -43,13 +48,45 @@ impl Run {
     #[must_use]
     pub fn new(name: String, unit: UnitId, files: LogFiles, part: &Part) -> Self {
         let part = Part { units: [unit.clone()].into(), ..part.clone() };
-        Self { name, unit, source: Source::Files { files, part } }
+        Self { name, unit, gyros: None, source: Source::Files { files, part } }
     }
 
     /// A run that is already in memory.
     #[must_use]
     pub fn of_events(name: String, unit: UnitId, events: Vec<LogEvent>) -> Self {
-        Self { name, unit, source: Source::Events(events) }
+        Self { name, unit, gyros: None, source: Source::Events(events.into()) }
+    }
+
+    /// The same with three of its gyros only, for corrections with a document of these three.
+    #[must_use]
+    pub fn of_gyros(&self, gyros: [usize; 3]) -> Self {
+        Self { gyros: Some(gyros), ..self.clone() }
+    }
+
+    /// An event with the readings of the gyros that are taken. A tick that lacks one of them is left as it is: a correction refuses it.
+    fn taken<'a>(&self, event: &'a LogEvent) -> Cow<'a, LogEvent> {
+        let (Some(gyros), LogEvent::Gyro { output, tick }) = (self.gyros, event) else {
+            return Cow::Borrowed(event);
+        };
+        if gyros.iter().any(|gyro| *gyro >= tick.readings.len()) {
+            return Cow::Borrowed(event);
+        }
+        let half_periods = gyros.iter().filter_map(|gyro| tick.half_periods.get(*gyro).copied());
+        let tick = GyroTick {
+            readings: gyros.iter().filter_map(|gyro| tick.readings.get(*gyro).copied()).collect(),
+            half_periods: half_periods.collect(),
+            ..tick.clone()
+        };
+        Cow::Owned(LogEvent::Gyro { output: *output, tick })
+    }
+
+    /// The files that it is read from; none where it is in memory.
+    #[must_use]
+    pub fn files(&self) -> &[PathBuf] {
+        match &self.source {
+            Source::Files { files: LogFiles::Recordings(paths) | LogFiles::Text { paths, .. }, .. } => paths,
+            Source::Events(_) => &[],
+        }
     }
 
     /// Its readings as columns.
@@ -100,8 +137,8 @@ impl Run {
         };
         match &self.source {
             Source::Events(events) => {
-                for event in events {
-                    unit.handle(event);
+                for event in events.iter() {
+                    unit.handle(&self.taken(event));
                     give_out(&mut unit);
                 }
             }
@@ -113,7 +150,7 @@ impl Run {
                         // Tick by tick: behind a whole frame the unit, and its temperatures, stand at the frame's end.
                         match events(*input, &message.frame) {
                             Some(events) => events.iter().for_each(|event| {
-                                unit.handle(event);
+                                unit.handle(&self.taken(event));
                                 give_out(&mut unit);
                             }),
                             None => unit.receive(*input, &message.frame),
@@ -189,4 +226,19 @@ impl Watch for () {
     fn begin(&mut self, _: Progress) {}
     fn step(&mut self) {}
     fn end(&mut self) {}
+}
+
+/// One that is lent, for several readings one after the other.
+impl<W: Watch> Watch for &mut W {
+    fn begin(&mut self, progress: Progress) {
+        (**self).begin(progress);
+    }
+
+    fn step(&mut self) {
+        (**self).step();
+    }
+
+    fn end(&mut self) {
+        (**self).end();
+    }
 }

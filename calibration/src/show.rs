@@ -2,6 +2,7 @@
 
 mod about;
 pub(crate) mod charts;
+mod parts;
 pub mod terms;
 
 use isotherm_correction::calibration::Steady;

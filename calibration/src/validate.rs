@@ -10,15 +10,13 @@ mod runs;
 
 use isotherm_correction::earth::{LEVELLING_TOLERANCE, Place};
 use isotherm_correction::units::{AngularRate, STANDARD_GRAVITY_M_PER_S2};
-use isotherm_protocol::document::{Curve as DocumentCurve, Document, Problem, Quantity, Sample, Shape};
+use isotherm_protocol::document::{Document, Sample};
 
 use crate::drift::figures::short;
 use crate::error::Error;
 use crate::means::{Means, Size};
-use crate::nominal::nominal;
 use crate::report::{Curve, FitReport, Rest, Verdict};
 use crate::run::Watch;
-use crate::show::terms::tree;
 use crate::written::Written;
 use coverage::Coverage;
 pub use runs::{JudgedLog, digests};
@@ -43,40 +41,6 @@ const REST_RATE_DEG_PER_H: f64 = 18_000.0;
 /// Largest angle between mean specific forces of a unit that counts as being at rest (sine).
 const REST_TILT: f64 = 0.035;
 
-/// The document without what knows of temperature, bias or mode; accelerometers keep scale factor and bias as they are at
-/// the temperature that is assumed without a reading.
-///
-/// # Errors
-/// [`Error::Document`]: it does not hold without them, which would be a mistake here.
-pub fn before(document: &Document) -> Result<Written, Error> {
-    let mut bare = nominal(document);
-    let at = document.temperature.assumed_deg_c;
-    if let Some(accel) = &mut bare.accel {
-        accel.orientation.thermal = None;
-        for sensor in &mut accel.sensor {
-            sensor.board_ratio_error = None;
-            sensor.scale_factor = held(&sensor.scale_factor, at);
-            sensor.bias = sensor.bias.as_ref().map(|bias| held(bias, at));
-        }
-    }
-    // Terms of accelerometers that only some versions of the document have.
-    let mut tree = tree(&bare)?;
-    let sensors = tree.get_mut("accel").and_then(|accel| accel.get_mut("sensor")?.as_array_mut());
-    for sensor in sensors.into_iter().flatten().filter_map(toml::Value::as_table_mut) {
-        sensor.remove("lag");
-    }
-    let words = |problems: Vec<Problem>| Error::Document(problems.iter().map(ToString::to_string).collect());
-    Written::of(&Document::parse(&tree.to_string(), None).map_err(words)?.document)
-}
-
-/// A curve held at its value at one temperature.
-fn held<Q: Quantity>(curve: &DocumentCurve<Q>, at: f64) -> DocumentCurve<Q> {
-    match crate::show::terms::value(curve.shape(), at) {
-        Some(value) => DocumentCurve::new(Shape::Constant { value }).in_unit(curve.unit()),
-        None => curve.clone(),
-    }
-}
-
 /// Judges a document on the runs of one unit.
 ///
 /// # Errors
@@ -89,7 +53,7 @@ pub fn validate(
     mut watch: impl Watch,
 ) -> Result<FitReport, Error> {
     let document = &written.document;
-    let bare = before(document)?;
+    let bare = Written::of(&document.nominal())?;
     let mut report = FitReport::new(format!("Judgement of {name}"), document.unit.clone());
     let mut coverage = Coverage::of(written);
     for log in logs {
@@ -100,9 +64,9 @@ pub fn validate(
                 run.name, run.unit, document.unit
             )]));
         }
-        let after = Means::of(run, &written.loaded, wanted.window_s, runs::Lent(&mut watch))?;
-        let nominal = Means::of(run, &bare.loaded, wanted.window_s, runs::Lent(&mut watch))?;
-        coverage.count(run, written, runs::Lent(&mut watch))?;
+        let after = Means::of(run, &written.loaded, wanted.window_s, &mut watch)?;
+        let nominal = Means::of(run, &bare.loaded, wanted.window_s, &mut watch)?;
+        coverage.count(run, written, &mut watch)?;
         at_rest(&run.name, &after)?;
         let rest = rest(&run.name, &after, wanted.place.as_ref())?;
         let sample = if log.known { Sample::In } else { Sample::Out };

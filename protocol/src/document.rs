@@ -27,6 +27,7 @@ mod curve;
 mod defects;
 mod difference;
 mod measure;
+mod nominal;
 mod problem;
 mod read;
 pub(crate) mod reader;

@@ -8,7 +8,6 @@ use isotherm_correction::calibration::Calibration;
 use isotherm_correction::sample::CorrectedTick;
 use isotherm_correction::unit::Event;
 use isotherm_correction::units::AngularRate;
-use isotherm_protocol::document::Document;
 use isotherm_simulator::{Scenario, ScenarioErrors, Simulation, Step};
 
 use crate::drive;
@@ -48,26 +47,6 @@ pub fn run(
     unit.handle(Event::Flush, &mut |tick| out.push_back(tick.clone()));
     pair(&mut waiting, &mut out);
     Ok(())
-}
-
-/// The same document without anything that knows of temperature, bias or mode: nominal scale and axes.
-#[must_use]
-pub fn nominal(document: &Document) -> Document {
-    let mut document = document.clone();
-    document.mode_reversal = None;
-    document.gyro.orientation.thermal = None;
-    for sensor in &mut document.gyro.sensor {
-        sensor.increment_weight_error = None;
-        sensor.static_bias = None;
-        sensor.magnetic_bias = None;
-        sensor.slow_meander = None;
-        sensor.thermal_rate = None;
-        sensor.thermal_acceleration = None;
-        sensor.lag.clear();
-        sensor.trend = None;
-        sensor.servo = None;
-    }
-    document
 }
 
 /// Mean rates over windows of equal length.

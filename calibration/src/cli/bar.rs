@@ -39,6 +39,11 @@ impl Bar {
         bar
     }
 
+    /// That nobody sees, for what is done beside other things.
+    pub(crate) fn hidden() -> Self {
+        Self { drawn: ProgressBar::hidden(), progress: None, since: 0 }
+    }
+
     /// So many are done; from any thread.
     pub(crate) fn at(&self, done: usize) {
         self.drawn.set_position(done as u64);

@@ -175,7 +175,8 @@ impl ImpactArgs {
         })
     }
 
-    /// What the estimator is to expect: the document's, or gyros of the size of 002's.
+    /// What the estimator is to expect: the document's, or gyros of the size of 002's, where there is none or where it only corrects
+    /// the log.
     fn parts(&self) -> Result<[DriftParts; 3], Error> {
         let Some(path) = &self.document else { return Ok([sizes(); 3]) };
         let text = read_small_text(path, "read the calibration document")?;
@@ -184,11 +185,18 @@ impl ImpactArgs {
         })?;
         let parts = parsed.document.to_parts();
         let stated: Vec<DriftParts> = parts.gyros.iter().filter_map(|gyro| gyro.drift).collect();
+        if stated.is_empty() && !self.log.is_empty() {
+            return Ok([sizes(); 3]);
+        }
         <[DriftParts; 3]>::try_from(stated).map_err(|stated| {
+            let advice = if stated.len() < 3 {
+                "isotherm-calibrate drift --document puts them in"
+            } else {
+                "leave the document out, or give one that states it for the gyros along x, y and z only"
+            };
+            let (path, count) = (path.display(), stated.len());
             Error::Refused(vec![format!(
-                "{} states a drift for {} gyros, the platform has three: isotherm-calibrate drift --document puts them in",
-                path.display(),
-                stated.len()
+                "{path} states a drift for {count} gyros, the platform has three: {advice}"
             )])
         })
     }
@@ -271,6 +279,12 @@ impl ImpactArgs {
     fn sail_log(&self, voyage: &mut Voyage, parts: &[DriftParts; 3]) -> Result<Report, Error> {
         let columns = self.columns()?;
         let (drift, mut notes) = logged::drift(&columns, voyage)?;
+        if *parts == [sizes(); 3] {
+            notes.push(
+                "The estimators expect gyros of the size of tables 1 and 2 of 002: no document states what the drift of these is."
+                    .to_owned(),
+            );
+        }
         notes.push(
             "Taken as a platform's gyros x and y level, z up or down. The mean over the calibration, Earth's rate included, is taken \
              out; what is held is the mean of its last hour."

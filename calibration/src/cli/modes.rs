@@ -3,17 +3,17 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use isotherm_correction::earth::Place;
 
 use super::bar::Bar;
-use super::output::{About, OutputArgs};
+use super::batch::{Named, Work, carry_out};
+use super::output::{About, Fitted, OutputArgs};
 use super::place::PlaceArgs;
 use super::runs::LogArgs;
-use super::units::of_document;
 use crate::error::Error;
 use crate::modes::document::{details, sigmas};
 use crate::modes::fit::Asked;
 use crate::modes::make::{Wanted, make};
-use crate::written::Written;
 
 /// Magnetic and non-magnetic drift over temperature, slow meander and switch parameters of a mode-reversed laser gyro
 #[derive(Debug, Args)]
@@ -21,7 +21,7 @@ use crate::written::Written;
     isotherm-calibrate modes chamber.mcap --document unit.toml --latitude 55.75 --heading 30 --out unit-modes.toml\n  \
     isotherm-calibrate modes up.mcap down.mcap --judge other.mcap --document unit.toml --latitude 55.75 --heading 30 \
     --html modes.html\n\n\
-    The runs are of one unit at rest, with mode reversal on, over the temperatures it is to work at. The document gives scale, axes, \
+    The runs are of units at rest, with mode reversal on, over the temperatures it is to work at. The document gives scale, axes, \
     temperature channels and filter; its static, magnetic and slow-meander terms are replaced, with the transition ticks and the \
     servo where the runs show them.")]
 pub(super) struct ModesArgs {
@@ -30,7 +30,7 @@ pub(super) struct ModesArgs {
     /// Judge the constants on this log too, which they are not fitted to; may be repeated
     #[arg(long, value_name = "LOG")]
     judge: Vec<PathBuf>,
-    /// Calibration document (TOML) that the fit starts from
+    /// Calibration document (TOML) that the fit starts from; for several units the folder that has UNIT.toml of each
     #[arg(long, short, value_name = "DOC")]
     document: Option<PathBuf>,
     #[command(flatten)]
@@ -57,6 +57,9 @@ pub(super) struct ModesArgs {
     output: OutputArgs,
 }
 
+const NO_DOCUMENT: &str = "a mode-reversed gyro counts, and a log does not say what a count is worth: give --document with increment \
+    weights, input axes, temperature channels and filter";
+
 impl ModesArgs {
     /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
@@ -66,25 +69,27 @@ impl ModesArgs {
             return Err(Error::Usage(format!("--settle is {settle}, must be from 0 to 3600 s")));
         }
         let Some(document) = &self.document else {
-            return Err(Error::Usage(
-                "a mode-reversed gyro counts, and a log does not say what a count is worth: give --document with increment weights, \
-                 input axes, temperature channels and filter"
-                    .to_owned(),
-            ));
+            return Err(Error::Usage(NO_DOCUMENT.to_owned()));
         };
         let place = self.place.place()?;
-        let base = Written::read(document)?;
-        let runs = of_document(&self.log.reading, &self.log.log, &base.loaded.unit)?;
-        let judge = if self.judge.is_empty() {
-            Vec::new()
-        } else {
-            of_document(&self.log.reading, &self.judge, &base.loaded.unit)?
+        let named = Named {
+            reading: &self.log.reading,
+            logs: &self.log.log,
+            judge: &self.judge,
+            document: Some(document),
         };
+        carry_out(&self.output, "Mode-reversed gyros of several units", named.units()?, |work, bar| {
+            self.fit(work, place, bar)
+        })
+    }
+
+    fn fit(&self, work: &Work, place: Option<Place>, bar: fn() -> Bar) -> Result<Fitted, Error> {
+        let Some(base) = &work.base else { return Err(Error::Usage(NO_DOCUMENT.to_owned())) };
         let order = |order: Option<u8>| order.map(usize::from);
         let made = make(
             &Wanted {
-                runs: &runs,
-                judge: &judge,
+                runs: &work.runs,
+                judge: &work.judges,
                 base: &base.document,
                 place,
                 asked: Asked {
@@ -96,7 +101,7 @@ impl ModesArgs {
                 settle_s: self.settle,
                 reference_deg_c: self.reference,
             },
-            Bar::reading,
+            bar,
         )?;
         let ranges = made.gyros.iter().flatten().map(|fit| fit.range_deg_c);
         let about = About {
@@ -105,8 +110,8 @@ impl ModesArgs {
             details: details(&made),
             sigmas: sigmas(&made),
             range_deg_c: ranges.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]),
-            logs: &self.log.log,
+            logs: work.logs(),
         };
-        self.output.write(&made.written, about, &made.report())
+        Ok(Fitted { report: made.report(), written: made.written, about })
     }
 }

@@ -8,17 +8,17 @@ use isotherm_protocol::document::{Created, Document};
 use serde_json::json;
 use toml::Table;
 
+use super::batch::{Outcome, close_batch};
 use super::print;
 use crate::error::Error;
 use crate::provenance::{command_line, origin};
-use crate::report::Sigmas;
-use crate::report::{FitReport, residuals};
+use crate::report::{FitReport, Sigmas, of_unit, residuals};
 use crate::written::{Written, write_file};
 
 /// What a fit writes.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct OutputArgs {
-    /// Write the new document
+    /// Write the new document; of several units each to NEW-UNIT.toml
     #[arg(long, short, value_name = "NEW")]
     out: Option<PathBuf>,
     /// Replace documents and reports that are there already
@@ -27,16 +27,26 @@ pub(crate) struct OutputArgs {
     /// Date that the new document states (YYYY-MM-DD); that of the old one without it
     #[arg(long, value_name = "DATE", requires = "out")]
     created: Option<String>,
-    /// Write the report with its diagrams as one HTML file
+    /// Write the report with its diagrams as one HTML file; of several units each to FILE-UNIT.html, and the table to FILE
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
     /// Print everything as one JSON object
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
+}
+
+/// A fit on its way into files.
+pub(crate) struct Fitted {
+    /// The document without what is to be said of its origin.
+    pub(crate) written: Written,
+    /// What is said of the fit.
+    pub(crate) report: FitReport,
+    /// What the document says of it beside its coefficients.
+    pub(crate) about: About,
 }
 
 /// What the document says of a fit beside its coefficients.
-pub(crate) struct About<'a> {
+pub(crate) struct About {
     /// Method.
     pub(crate) method: &'static str,
     /// Name of its table in `origin.details`.
@@ -48,7 +58,7 @@ pub(crate) struct About<'a> {
     /// Range of temperature (°C).
     pub(crate) range_deg_c: Option<[f64; 2]>,
     /// Logs that it was fitted to.
-    pub(crate) logs: &'a [PathBuf],
+    pub(crate) logs: Vec<PathBuf>,
 }
 
 impl OutputArgs {
@@ -61,30 +71,40 @@ impl OutputArgs {
         self.date().map(|_| ())
     }
 
-    /// Writes document and page, prints the report, and ends with the reasons of what was refused.
-    pub(crate) fn write(&self, written: &Written, about: About<'_>, report: &FitReport) -> Result<(), Error> {
+    /// Checks the files of one unit of a batch, before any unit is fitted.
+    pub(super) fn check_unit(&self, unit: &str) -> Result<(), Error> {
+        let mut outputs = self.out.iter().chain(&self.html);
+        outputs.try_for_each(|out| keep(&of_unit(out, unit), self.overwrite))
+    }
+
+    /// Writes document and page of a fit, each under the name that `name` makes of what was given.
+    pub(super) fn save(&self, fitted: &Fitted, name: impl Fn(&Path) -> PathBuf) -> Result<(), Error> {
+        let Fitted { written, report, about } = fitted;
         if let Some(out) = &self.out {
-            self.document(written.document.clone(), about, report)?.save(out, self.overwrite)?;
+            self.document(written.document.clone(), about, report)?.save(&name(out), self.overwrite)?;
         }
         if let Some(html) = &self.html {
-            write_file(html, report.to_html().as_bytes(), self.overwrite)?;
+            write_file(&name(html), report.to_html().as_bytes(), self.overwrite)?;
         }
-        if self.json {
-            print(format!("{}\n", report.to_json()).as_bytes())?;
-        } else {
-            print(report.to_text().as_bytes())?;
-        }
+        Ok(())
+    }
+
+    /// Writes and prints the only fit of a command, and ends with the reasons of what was refused.
+    pub(super) fn finish(&self, fitted: &Fitted) -> Result<(), Error> {
+        self.save(fitted, Path::to_path_buf)?;
+        let report = &fitted.report;
+        print(if self.json { format!("{}\n", report.to_json()) } else { report.to_text() }.as_bytes())?;
         let refusals = report.refusals();
         if refusals.is_empty() { Ok(()) } else { Err(Error::Refused(refusals)) }
     }
 
-    fn document(
-        &self,
-        mut document: Document,
-        about: About<'_>,
-        report: &FitReport,
-    ) -> Result<Written, Error> {
-        let mut origin = origin(about.logs, &command_line())?;
+    /// Prints the fits of several units, the table that closes them last, and ends with the reasons of what was refused.
+    pub(super) fn finish_batch(&self, title: &str, units: &[Outcome]) -> Result<(), Error> {
+        close_batch(title, units, (self.html.as_deref(), self.overwrite), self.json)
+    }
+
+    fn document(&self, mut document: Document, about: &About, report: &FitReport) -> Result<Written, Error> {
+        let mut origin = origin(&about.logs, &command_line())?;
         origin.method = Some(about.method.to_owned());
         origin.range_deg_c = about.range_deg_c;
         origin.residual = residuals(&report.verdicts);
@@ -99,7 +119,7 @@ impl OutputArgs {
                 toml::Value::try_from(earlier).map_err(|error| Error::Document(vec![error.to_string()]))?;
             details.insert("before".to_owned(), earlier);
         }
-        details.insert(about.key.to_owned(), toml::Value::Table(about.details));
+        details.insert(about.key.to_owned(), toml::Value::Table(about.details.clone()));
         about.sigmas.write(&mut details);
         origin.details = Some(details);
         document.origin = Some(origin);
@@ -109,7 +129,8 @@ impl OutputArgs {
         Written::of(&document)
     }
 
-    fn date(&self) -> Result<Option<Created>, Error> {
+    /// The date that the new document is to state.
+    pub(super) fn date(&self) -> Result<Option<Created>, Error> {
         self.created.as_deref().map(date).transpose()
     }
 }

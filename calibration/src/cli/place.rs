@@ -1,9 +1,10 @@
-//! The arguments that say where a unit at rest is and how it stands.
+//! The arguments that say where a unit is, how it stands at rest, and how strong gravity is there.
 
 use clap::Args;
 use isotherm_correction::earth::Place;
 
 use crate::error::Error;
+use crate::positions::gravity;
 
 /// Place and attitude, for the Earth rate.
 #[derive(Debug, Clone, Args)]
@@ -25,10 +26,31 @@ pub(crate) struct PlaceArgs {
     remove_mean: bool,
 }
 
+/// Gravity at the place of a calibration.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct GravityArgs {
+    /// Gravity at the place (m/s²)
+    #[arg(long, value_name = "M_PER_S2")]
+    gravity: Option<f64>,
+    /// Latitude of the place (°), for normal gravity
+    #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
+    latitude: Option<f64>,
+    /// Height of the place above the sea (m), for normal gravity
+    #[arg(long, value_name = "M", default_value_t = 0.0, allow_hyphen_values = true)]
+    height: f64,
+}
+
+impl GravityArgs {
+    /// Gravity (m/s²), and a warning where nothing is said of it.
+    pub(crate) fn stated(&self) -> Result<(f64, Option<String>), Error> {
+        gravity::stated(self.gravity, self.latitude, self.height)
+    }
+}
+
 impl PlaceArgs {
-    /// The place; `None` where it is said not to be known.
+    /// The place, where it must be known; `None` where it is said not to be.
     pub(crate) fn place(&self) -> Result<Option<Place>, Error> {
-        let (Some(latitude), Some(heading)) = (self.latitude, self.heading) else {
+        if self.latitude.is_none() || self.heading.is_none() {
             if self.remove_mean {
                 return Ok(None);
             }
@@ -37,6 +59,19 @@ impl PlaceArgs {
                 "the Earth rate is to be removed: give {missing} (and --pitch and --roll where there are no accelerometers to level \
                  with), or --remove-mean where the attitude is not known"
             )));
+        }
+        self.known()
+    }
+
+    /// The place, where it is said; half a place is none.
+    pub(crate) fn known(&self) -> Result<Option<Place>, Error> {
+        let (Some(latitude), Some(heading)) = (self.latitude, self.heading) else {
+            return match self.latitude {
+                Some(_) => {
+                    Err(Error::Usage("--latitude goes with --heading: give both, or neither".to_owned()))
+                }
+                None => Ok(None),
+            };
         };
         let tilt = self.pitch.zip(self.roll).map(|(pitch, roll)| [pitch, roll]);
         let place = Place::new(latitude, heading, tilt).map_err(|errors| {

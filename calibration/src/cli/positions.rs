@@ -8,24 +8,25 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use isotherm_protocol::document::AccelOutput;
 
-use super::output::{check_outputs, date};
+use super::bar::Bar;
+use super::batch::{Named, Work, carry_out};
+use super::output::{About, Fitted, OutputArgs};
+use super::place::GravityArgs;
 use super::print;
 use super::runs::Reading;
 use crate::error::Error;
 use crate::positions::analysis::{Analysis, Settings, analyse, positions};
 use crate::positions::budget::ARCSEC_PER_RAD;
 use crate::positions::document::{complete, range};
-use crate::positions::gravity;
 use crate::positions::judged::Judgement;
 use crate::positions::plan::Plan;
 use crate::positions::pose::Pose;
-use crate::positions::provenance::{before, with_origin};
+use crate::positions::provenance::{before, details, sigmas};
 use crate::positions::report::{Set, report};
 use crate::positions::still::StillLimits;
 use crate::positions::times::Times;
-use crate::report::FitReport;
 use crate::run::Run;
-use crate::written::{Written, write_file};
+use crate::written::Written;
 use planned::PlannedArgs;
 use steps::{first_document, judged, tracks};
 
@@ -52,30 +53,15 @@ pub(super) struct PositionsArgs {
     /// Table of times (CSV: `start_s,end_s,position[,log]`): no poses are searched for
     #[arg(long, value_name = "FILE")]
     times: Option<PathBuf>,
-    /// Calibration document (TOML) that is completed; without it the accelerometers must stand along the case axes
+    /// Calibration document (TOML) that is completed, without it the accelerometers must stand along the case axes; for several
+    /// units the folder that has UNIT.toml of each
     #[arg(long, short, value_name = "DOC")]
     document: Option<PathBuf>,
     /// Log that the fit must not see, to judge it by; may be repeated
     #[arg(long, value_name = "LOG")]
     judge: Vec<PathBuf>,
-    /// Write the document with what was found
-    #[arg(long, short, value_name = "NEW")]
-    out: Option<PathBuf>,
-    /// Write over a file that is there
-    #[arg(long)]
-    overwrite: bool,
-    /// Date that the new document states (YYYY-MM-DD); that of the old one without it
-    #[arg(long, value_name = "DATE", requires = "out")]
-    created: Option<String>,
-    /// Gravity at the stand (m/s²)
-    #[arg(long, value_name = "M_PER_S2")]
-    gravity: Option<f64>,
-    /// Latitude of the stand (°), for normal gravity
-    #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
-    latitude: Option<f64>,
-    /// Height of the stand above the sea (m), for normal gravity
-    #[arg(long, value_name = "M", default_value_t = 0.0, allow_hyphen_values = true)]
-    height: f64,
+    #[command(flatten)]
+    gravity: GravityArgs,
     /// σ1: standard deviation of the stand's positioning (″)
     #[arg(long, value_name = "ARCSEC", default_value_t = 5.0)]
     positioning: f64,
@@ -111,21 +97,8 @@ pub(super) struct PositionsArgs {
     accelerometer_unit: String,
     #[command(flatten)]
     planned: PlannedArgs,
-    /// Write the report with its diagrams as one HTML file
-    #[arg(long, value_name = "FILE")]
-    html: Option<PathBuf>,
-    /// Print everything as one JSON object
-    #[arg(long)]
-    json: bool,
-}
-
-/// Positions that the fit has not seen, judged, with the names of their runs.
-type Unseen = (Vec<Judgement>, Vec<String>);
-
-/// A fit with its report.
-struct Made {
-    written: Written,
-    report: FitReport,
+    #[command(flatten)]
+    output: OutputArgs,
 }
 
 impl PositionsArgs {
@@ -136,19 +109,16 @@ impl PositionsArgs {
         if self.budget {
             return self.print_budget(&plan);
         }
-        let made = self.make(plan)?;
-        if let Some(out) = &self.out {
-            made.written.save(out, self.overwrite)?;
-        }
-        if let Some(html) = &self.html {
-            write_file(html, made.report.to_html().as_bytes(), true)?;
-        }
-        if self.json {
-            print(format!("{}\n", made.report.to_json()).as_bytes())?;
-        } else {
-            print(made.report.to_text().as_bytes())?;
-        }
-        if made.report.accepted() { Ok(()) } else { Err(Error::Refused(made.report.refusals())) }
+        let (settings, about_gravity) = self.settings(plan)?;
+        let named = Named {
+            reading: &self.reading,
+            logs: &self.log,
+            judge: &self.judge,
+            document: self.document.as_deref(),
+        };
+        carry_out(&self.output, "Accelerometers of several units", named.units()?, |work, bar| {
+            self.fit(work, &settings, about_gravity.as_ref(), bar)
+        })
     }
 
     /// What the arguments must hold before anything is read.
@@ -178,20 +148,20 @@ impl PositionsArgs {
             (self.log.iter().chain(&self.judge).chain(&self.document).chain(&self.times))
                 .map(PathBuf::as_path)
                 .collect();
-        check_outputs(self.out.as_deref(), self.html.as_deref(), &inputs, self.overwrite)
+        self.output.check(&inputs)
     }
 
     fn print_budget(&self, plan: &Plan) -> Result<(), Error> {
         let budget = self.planned.budget(self.positioning, self.run_out);
         let levelling_rad = self.levelling / ARCSEC_PER_RAD;
-        if self.json {
+        if self.output.json {
             return print(format!("{}\n", budget.to_json(plan, levelling_rad)).as_bytes());
         }
         print(budget.to_text(plan, levelling_rad).as_bytes())
     }
 
     fn settings(&self, plan: Plan) -> Result<(Settings, Option<String>), Error> {
-        let (gravity, warning) = gravity::stated(self.gravity, self.latitude, self.height)?;
+        let (gravity, warning) = self.gravity.stated()?;
         let settings = Settings {
             plan,
             gravity,
@@ -211,81 +181,78 @@ impl PositionsArgs {
         Ok((settings, warning))
     }
 
-    /// Runs of the one unit in logs.
-    fn runs(&self, logs: &[PathBuf], base: Option<&Written>) -> Result<Vec<Run>, Error> {
-        let mut units = self.reading.runs(logs, base.map(|base| &base.loaded.unit))?;
-        let of_document = base.and_then(|base| units.remove(&base.loaded.unit));
-        if let Some(runs) = of_document {
-            return Ok(runs);
-        }
-        match (units.pop_first(), units.keys().next()) {
-            (Some((unit, _)), _) if base.is_some() => Err(Error::Refused(vec![format!(
-                "the logs are of unit {unit}, the document is not: give the document of that unit"
-            )])),
-            (Some((_, runs)), None) => Ok(runs),
-            (Some((first, _)), Some(second)) => Err(Error::Refused(vec![format!(
-                "the logs are of several units ({first}, {second}): choose one with --unit, each has its own axes"
-            )])),
-            (None, _) => Err(Error::Refused(vec!["the logs have no raw readings".to_owned()])),
-        }
-    }
-
-    fn make(&self, plan: Plan) -> Result<Made, Error> {
-        let (settings, about_gravity) = self.settings(plan)?;
-        let base = self.document.as_deref().map(Written::read).transpose()?;
-        let runs = self.runs(&self.log, base.as_ref())?;
+    fn fit(
+        &self,
+        work: &Work,
+        settings: &Settings,
+        about_gravity: Option<&String>,
+        bar: fn() -> Bar,
+    ) -> Result<Fitted, Error> {
+        let runs = &work.runs;
         let output = if self.accelerometer_unit == "V" {
             AccelOutput::Volts
         } else {
             AccelOutput::MetresPerSecondSquared
         };
-        let base = match base {
+        let first;
+        let base = match &work.base {
             Some(base) if base.document.accel.is_some() => base,
             Some(_) => {
                 return Err(Error::Refused(vec![
                     "the document has no accelerometers: add [accel] with their channels, nominal scale factors and axes".to_owned(),
                 ]));
             }
-            None => Written::of(&first_document(&runs, output, self.created.as_deref())?)?,
+            None => {
+                first = Written::of(&first_document(runs, output, bar())?)?;
+                &first
+            }
         };
-        let tracks = tracks(&runs, &base)?;
-        let mut analysis = analyse(&tracks, &base.document, &settings).map_err(Error::Refused)?;
-        analysis.warnings.extend(about_gravity);
-        let (mut document, warnings) = complete(&base.document, &analysis, settings.gravity);
-        analysis.warnings.extend(warnings);
-        if let Some(created) = &self.created {
-            document.created = Some(date(created)?);
-        }
-        let before =
-            Written::of(&before(&base.document, &analysis, settings.gravity, self.document.is_some()))?;
+        let tracks = tracks(runs, base, bar)?;
+        let mut analysis = analyse(&tracks, &base.document, settings).map_err(Error::Refused)?;
+        analysis.warnings.extend(about_gravity.cloned());
+        let document = complete(&base.document, &analysis, settings.gravity);
+        let before = Written::of(&before(&base.document, &analysis, settings.gravity, work.base.is_some()))?;
         let after = Written::of(&document)?;
         let inside: Vec<(Pose, usize)> =
             analysis.poses.iter().map(|(pose, position, _)| (pose.clone(), *position)).collect();
-        let judged = judged(&settings, &analysis, &inside, &runs, [&before, &after])?;
-        let outside = self.outside(&settings, &analysis, [&before, &after, &base])?;
-        let name = |runs: &[Run]| -> Vec<String> { runs.iter().map(|run| run.name.clone()).collect() };
-        let names = name(&runs);
-        let outside_set =
-            outside.as_ref().map(|(judged, runs)| Set { judged: judged.as_slice(), runs: runs.as_slice() });
-        let report =
-            report(&document, &analysis, &settings, Set { judged: &judged, runs: &names }, outside_set);
-        with_origin(&mut document, &analysis, &settings, &report, &self.log, range(&analysis))?;
-        Ok(Made { written: Written::of(&document)?, report })
+        let inside = judged(settings, &analysis, &inside, runs, [&before, &after], bar)?;
+        let outside = outside(settings, &analysis, &work.judges, [&before, &after, base], bar)?;
+        let [names, outside_names] = [runs, &work.judges]
+            .map(|runs| -> Vec<String> { runs.iter().map(|run| run.name.clone()).collect() });
+        let report = report(
+            &document,
+            &analysis,
+            settings,
+            Set { judged: &inside, runs: &names },
+            outside.as_ref().map(|judged| Set { judged, runs: &outside_names }),
+        );
+        let about = About {
+            method: "positions of a stand, weighted least squares with the stand's errors",
+            key: "positions",
+            details: details(&analysis, settings, &report)?,
+            sigmas: sigmas(&document, &analysis, settings),
+            range_deg_c: Some(if analysis.levels_deg_c.len() > 1 {
+                analysis.range_deg_c
+            } else {
+                range(&analysis)
+            }),
+            logs: work.logs(),
+        };
+        Ok(Fitted { written: after, report, about })
     }
+}
 
-    /// Positions that the fit has not seen.
-    fn outside(
-        &self,
-        settings: &Settings,
-        analysis: &Analysis,
-        [before, after, base]: [&Written; 3],
-    ) -> Result<Option<Unseen>, Error> {
-        if self.judge.is_empty() {
-            return Ok(None);
-        }
-        let runs = self.runs(&self.judge, Some(base))?;
-        let (poses, _) = positions(&tracks(&runs, base)?, settings).map_err(Error::Refused)?;
-        let judged = judged(settings, analysis, &poses, &runs, [before, after])?;
-        Ok(Some((judged, runs.into_iter().map(|run| run.name).collect())))
+/// Positions that the fit has not seen.
+fn outside(
+    settings: &Settings,
+    analysis: &Analysis,
+    runs: &[Run],
+    [before, after, base]: [&Written; 3],
+    bar: fn() -> Bar,
+) -> Result<Option<Vec<Judgement>>, Error> {
+    if runs.is_empty() {
+        return Ok(None);
     }
+    let (poses, _) = positions(&tracks(runs, base, bar)?, settings).map_err(Error::Refused)?;
+    Ok(Some(judged(settings, analysis, &poses, runs, [before, after], bar)?))
 }

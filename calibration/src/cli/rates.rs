@@ -3,20 +3,20 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use isotherm_correction::earth::Place;
 use isotherm_correction::sample::OutputKind;
 use isotherm_protocol::document::{Document, GyroOutput};
 
 use super::bar::Bar;
-use super::output::{About, OutputArgs};
+use super::batch::{Named, Work, carry_out};
+use super::output::{About, Fitted, OutputArgs};
 use super::place::PlaceArgs;
 use super::runs::LogArgs;
-use super::units::{of_document, of_only};
 use crate::error::Error;
 use crate::rates::document::{details, nominal, sigmas};
 use crate::rates::make::{Wanted, make};
 use crate::rates::steps::{Step, listed, read};
 use crate::run::Run;
-use crate::written::Written;
 
 /// Scale factor, asymmetry, linearity, input axes and bias of gyros from runs on a rate table
 #[derive(Debug, Args)]
@@ -26,20 +26,34 @@ use crate::written::Written;
     isotherm-calibrate rates table.mcap --steps table.csv --document unit.toml --remove-mean\n\n\
     Plateaus of steady rate are found in the log, in the order of --rates; rests between them are found too. --steps names a CSV \
     with the columns log, axis, rate_deg_per_s, begin_s, end_s (the first and the last two may be left out), or TOML with a \
-    [[step]] of the same keys for each. Latitude and attitude are those of the beginning of each log.")]
+    [[step]] of the same keys for each; judging logs are numbered on behind the others, and of several units each counts its own \
+    logs. Latitude and attitude are those of the beginning of each log.")]
 pub(super) struct RatesArgs {
     #[command(flatten)]
     log: LogArgs,
-    /// Axis of the table in case axes (x, -y, … or 0,0.6,0.8); once for each log
+    /// Judge what was found on this log too, which the fit does not see; may be repeated
+    #[arg(long, value_name = "LOG")]
+    judge: Vec<PathBuf>,
+    /// Axis of the table in case axes (x, -y, … or 0,0.6,0.8); once for each log, then for each judging log
     #[arg(long, value_name = "AXIS", allow_hyphen_values = true, requires = "rates")]
     axis: Vec<String>,
     /// Rates of the table in their order (°/s), with commas
     #[arg(long, value_name = "RATES", value_delimiter = ',', allow_hyphen_values = true, requires = "axis")]
     rates: Vec<f64>,
+    /// Rates of the table in the judging logs (°/s), with commas; those of --rates without it
+    #[arg(
+        long,
+        value_name = "RATES",
+        value_delimiter = ',',
+        allow_hyphen_values = true,
+        requires_all = ["rates", "judge"]
+    )]
+    judge_rates: Vec<f64>,
     /// Table of the steps (CSV or TOML)
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["axis", "rates"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["axis", "rates", "judge_rates"])]
     steps: Option<PathBuf>,
-    /// Calibration document (TOML) that the fit starts from; nominal scale and axes without it
+    /// Calibration document (TOML) that the fit starts from, nominal scale and axes without it; for several units the folder that
+    /// has UNIT.toml of each
     #[arg(long, short, value_name = "DOC")]
     document: Option<PathBuf>,
     #[command(flatten)]
@@ -57,7 +71,7 @@ pub(super) struct RatesArgs {
 impl RatesArgs {
     /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
-        let inputs = self.log.log.iter().chain(&self.document).chain(&self.steps);
+        let inputs = self.log.log.iter().chain(&self.judge).chain(&self.document).chain(&self.steps);
         self.output.check(&inputs.map(PathBuf::as_path).collect::<Vec<&Path>>())?;
         if !(0.0..=1e6).contains(&self.table_ppm) {
             return Err(Error::Usage(format!(
@@ -66,54 +80,69 @@ impl RatesArgs {
             )));
         }
         let place = self.place.place()?;
-        let base = self.document.as_deref().map(Written::read).transpose()?;
-        let runs = match &base {
-            Some(base) => of_document(&self.log.reading, &self.log.log, &base.loaded.unit)?,
-            None => of_only(&self.log.reading, &self.log.log)?,
+        let named = Named {
+            reading: &self.log.reading,
+            logs: &self.log.log,
+            judge: &self.judge,
+            document: self.document.as_deref(),
         };
-        let base = match (base, runs.first()) {
-            (Some(base), _) => base.document,
-            (None, Some(first)) => without_document(first)?,
+        carry_out(&self.output, "Rate table, several units", named.units()?, |work, bar| {
+            self.fit(work, place.as_slice(), bar)
+        })
+    }
+
+    fn fit(&self, work: &Work, place: &[Place], bar: fn() -> Bar) -> Result<Fitted, Error> {
+        let nominal;
+        let base = match (&work.base, work.runs.first()) {
+            (Some(base), _) => &base.document,
+            (None, Some(first)) => {
+                nominal = without_document(first, bar())?;
+                &nominal
+            }
             (None, None) => return Err(Error::Usage("no log is given".to_owned())),
         };
-        let steps = self.stated(runs.len())?;
-        let place: Vec<_> = place.into_iter().collect();
+        let steps = self.stated(work.runs.len(), work.judges.len())?;
         let wanted = Wanted {
-            runs: &runs,
+            runs: &work.runs,
+            judge: &work.judges,
             steps: &steps,
-            base: &base,
-            place: &place,
+            base,
+            place,
             table_ppm: self.table_ppm,
             with_bias: self.with_bias,
         };
-        let made = make(&wanted, Bar::reading)?;
+        let made = make(&wanted, bar)?;
         let about = About {
             method: "rate table, weighted least squares",
             key: "rates",
             details: details(&made),
             sigmas: sigmas(&made),
-            range_deg_c: made.temperature_deg_c.map(|deg_c| [deg_c, deg_c]),
-            logs: &self.log.log,
+            range_deg_c: made.range_deg_c(),
+            logs: work.logs(),
         };
-        self.output.write(&made.written, about, &made.report())
+        Ok(Fitted { report: made.report(), written: made.written, about })
     }
 
-    fn stated(&self, runs: usize) -> Result<Vec<Step>, Error> {
+    /// The steps of the logs and, behind them, of the judging logs.
+    fn stated(&self, runs: usize, judges: usize) -> Result<Vec<Step>, Error> {
         match &self.steps {
-            Some(path) => read(path, runs),
+            Some(path) => read(path, runs + judges),
             None if self.rates.is_empty() => Err(Error::Usage(
                 "what did the table do? Give --axis and --rates, or --steps FILE".to_owned(),
             )),
-            None => listed(&self.axis, &self.rates, runs),
+            None => {
+                let judging = if self.judge_rates.is_empty() { &self.rates } else { &self.judge_rates };
+                listed(&self.axis, [&self.rates, judging], [runs, judges])
+            }
         }
     }
 }
 
 /// A nominal document for a log of three gyros.
-fn without_document(run: &Run) -> Result<Document, Error> {
+fn without_document(run: &Run, bar: Bar) -> Result<Document, Error> {
     let mut output = None;
     let mut gyros = 0;
-    run.gyro_ticks(Bar::reading(), |kind, tick| {
+    run.gyro_ticks(bar, |kind, tick| {
         output = Some(kind);
         gyros = tick.readings.len();
     })?;

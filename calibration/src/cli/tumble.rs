@@ -7,19 +7,18 @@ use isotherm_correction::sample::OutputKind;
 use isotherm_protocol::document::AccelOutput;
 
 use super::bar::Bar;
-use super::output::{check_outputs, date};
-use super::print;
+use super::output::{About, Fitted, OutputArgs};
+use super::place::GravityArgs;
 use super::runs::LogArgs;
 use crate::error::Error;
 use crate::positions::bare::bare;
-use crate::positions::gravity;
 use crate::positions::still::StillLimits;
 use crate::positions::track::Track;
 use crate::run::Run;
 use crate::tumble::analysis::{Settings, analyse};
 use crate::tumble::document::{before, complete};
-use crate::tumble::report::{Left, report, with_origin};
-use crate::written::{Written, write_file};
+use crate::tumble::report::{Left, details, report, sigmas};
+use crate::written::Written;
 
 /// Axes, scale factors and biases of a unit that was put down in many ways by hand: accelerometers from |f| = g, gyros against them
 #[derive(Debug, Args)]
@@ -34,24 +33,8 @@ pub(super) struct TumbleArgs {
     /// Calibration document (TOML) that is completed; without it everything else stands as the log has it
     #[arg(long, short, value_name = "DOC")]
     document: Option<PathBuf>,
-    /// Write the document with what was found
-    #[arg(long, short, value_name = "NEW")]
-    out: Option<PathBuf>,
-    /// Write over a file that is there
-    #[arg(long)]
-    overwrite: bool,
-    /// Date that the new document states (YYYY-MM-DD); that of the old one without it
-    #[arg(long, value_name = "DATE", requires = "out")]
-    created: Option<String>,
-    /// Gravity at the place (m/s²)
-    #[arg(long, value_name = "M_PER_S2")]
-    gravity: Option<f64>,
-    /// Latitude of the place (°), for normal gravity
-    #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
-    latitude: Option<f64>,
-    /// Height of the place above the sea (m), for normal gravity
-    #[arg(long, value_name = "M", default_value_t = 0.0, allow_hyphen_values = true)]
-    height: f64,
+    #[command(flatten)]
+    gravity: GravityArgs,
     /// Time at the beginning that the unit was left alone (s)
     #[arg(long, value_name = "SECONDS", default_value_t = 30.0)]
     still_start: f64,
@@ -70,19 +53,15 @@ pub(super) struct TumbleArgs {
     /// What a mean of an accelerometer is measured in, where there is no document: "V" (converter readings too), or "m/s2"
     #[arg(long, value_name = "UNIT", default_value = "V", value_parser = ["V", "m/s2"])]
     accelerometer_unit: String,
-    /// Write the report with its diagrams as one HTML file
-    #[arg(long, value_name = "FILE")]
-    html: Option<PathBuf>,
-    /// Print everything as one JSON object
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    output: OutputArgs,
 }
 
 impl TumbleArgs {
     /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
         self.check()?;
-        let (gravity, about_gravity) = gravity::stated(self.gravity, self.latitude, self.height)?;
+        let (gravity, about_gravity) = self.gravity.stated()?;
         let base = self.document.as_deref().map(Written::read).transpose()?;
         let run = self.log.run(base.as_ref().map(|base| &base.loaded.unit))?;
         let base = match base {
@@ -112,32 +91,25 @@ impl TumbleArgs {
         bar.finish();
         let mut tumble = found.map_err(Error::Refused)?;
         tumble.warnings.extend(about_gravity);
-        let (mut document, warnings) = complete(&base.document, &tumble);
+        let (document, warnings) = complete(&base.document, &tumble);
         tumble.warnings.extend(warnings);
-        if let Some(created) = &self.created {
-            document.created = Some(date(created)?);
-        }
         let left = |written: &Written| -> Result<Left, Error> {
             let track = Track::of(&run, &written.loaded, Bar::reading())?;
             Ok(Left::of(&track, &tumble.poses, gravity))
         };
         let before = left(&Written::of(&before(&base.document, &tumble, self.document.is_some()))?)?;
-        let after = left(&Written::of(&document)?)?;
-        let report = report(&document, &tumble, &settings, &run.name, [&before, &after]);
-        with_origin(&mut document, &tumble, &settings, &report, &self.log.log)?;
         let written = Written::of(&document)?;
-        if let Some(out) = &self.out {
-            written.save(out, self.overwrite)?;
-        }
-        if let Some(html) = &self.html {
-            write_file(html, report.to_html().as_bytes(), true)?;
-        }
-        if self.json {
-            print(format!("{}\n", report.to_json()).as_bytes())?;
-        } else {
-            print(report.to_text().as_bytes())?;
-        }
-        if report.accepted() { Ok(()) } else { Err(Error::Refused(report.refusals())) }
+        let after = left(&written)?;
+        let report = report(&document, &tumble, &settings, &run.name, [&before, &after]);
+        let about = About {
+            method: "tumble: |f| = g over still poses; gyros against the accelerometers",
+            key: "tumble",
+            details: details(&tumble, &settings, &report)?,
+            sigmas: sigmas(&document, &tumble),
+            range_deg_c: None,
+            logs: self.log.log.clone(),
+        };
+        self.output.finish(&Fitted { written, report, about })
     }
 
     /// What the arguments must hold before anything is read.
@@ -155,7 +127,7 @@ impl TumbleArgs {
             }
         }
         let inputs: Vec<&Path> = self.log.log.iter().chain(&self.document).map(PathBuf::as_path).collect();
-        check_outputs(self.out.as_deref(), self.html.as_deref(), &inputs, self.overwrite)
+        self.output.check(&inputs)
     }
 
     /// A document where there is none.
@@ -166,7 +138,7 @@ impl TumbleArgs {
             (_, "V") => AccelOutput::Volts,
             _ => AccelOutput::MetresPerSecondSquared,
         };
-        let mut document = bare(&series, output, self.created.as_deref().map(date).transpose()?)?;
+        let mut document = bare(&series, output)?;
         if output == AccelOutput::Volts {
             document.note = Some(
                 "What this document calls V is the accelerometers' reading as the log has it: volts, or counts of a converter with \

@@ -4,18 +4,18 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use isotherm_correction::earth::Place;
 use isotherm_log::file::refuse_overwriting;
 use isotherm_protocol::key::UnitId;
-use serde_json::json;
 
 use super::bar::Bar;
+use super::batch::{Outcome, close_batch};
+use super::place::PlaceArgs;
 use super::print;
 use super::runs::Reading;
 use crate::error::Error;
 use crate::provenance::origin;
-use crate::report::{BatchTable, FitReport, in_parallel, of_unit};
-use crate::run::{Run, Watch};
+use crate::report::{FitReport, in_parallel, of_unit};
+use crate::run::Watch;
 use crate::validate::{JudgedLog, Wanted, digests, validate};
 use crate::written::{Written, write_file};
 
@@ -40,24 +40,8 @@ pub(super) struct ValidateArgs {
     /// Length of the windows that are averaged over
     #[arg(long, value_name = "SECONDS", default_value_t = 10.0)]
     window: f64,
-    /// Latitude of the unit at rest (°): with it and --heading Earth rate is taken off instead of the mean
-    #[arg(long, value_name = "DEG", requires = "heading", allow_negative_numbers = true)]
-    latitude: Option<f64>,
-    /// Heading of the case's x axis from north towards east (°)
-    #[arg(long, value_name = "DEG", requires = "latitude", allow_negative_numbers = true)]
-    heading: Option<f64>,
-    /// Roll about the case's x axis (°); without it the unit is levelled by its accelerometers
-    #[arg(
-        long,
-        value_name = "DEG",
-        requires = "pitch",
-        requires = "latitude",
-        allow_negative_numbers = true
-    )]
-    roll: Option<f64>,
-    /// Pitch of the case's x axis above the horizon (°)
-    #[arg(long, value_name = "DEG", requires = "roll", allow_negative_numbers = true)]
-    pitch: Option<f64>,
+    #[command(flatten)]
+    place: PlaceArgs,
     /// Write the report with its diagrams as one HTML file
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
@@ -99,7 +83,8 @@ impl ValidateArgs {
             reports
         };
         if reports.len() > 1 {
-            return self.several(&work, &reports);
+            let names = work.iter().map(|work| work.unit.to_string());
+            return self.several(&names.zip(reports).collect::<Vec<_>>());
         }
         self.one(&reports.into_iter().next().unwrap_or_else(|| Err(nothing()))?)
     }
@@ -111,17 +96,7 @@ impl ValidateArgs {
                 self.window
             )));
         }
-        let place = match (self.latitude, self.heading) {
-            (Some(latitude), Some(heading)) => {
-                let place = Place::new(latitude, heading, self.pitch.zip(self.roll).map(|(p, r)| [p, r]));
-                let words = |errors: Vec<isotherm_correction::earth::PlaceError>| {
-                    errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
-                };
-                Some(place.map_err(|errors| Error::Usage(words(errors)))?)
-            }
-            _ => None,
-        };
-        Ok(Wanted { window_s: self.window, place })
+        Ok(Wanted { window_s: self.window, place: self.place.known()? })
     }
 
     /// Documents by serial, and whether they are of a folder.
@@ -183,22 +158,13 @@ impl ValidateArgs {
             let known = written.as_ref().map(|written| digests(&written.document)).unwrap_or_default();
             let mut logs = Vec::new();
             for run in runs {
-                let files = self.files_of(&run);
                 let known = !known.is_empty()
-                    && origin(&files, "")?.log.iter().any(|log| known.contains(&log.sha256));
+                    && origin(run.files(), "")?.log.iter().any(|log| known.contains(&log.sha256));
                 logs.push(JudgedLog { run, known });
             }
             work.push(Work { name, unit, written, logs });
         }
         Ok(work)
-    }
-
-    /// The files of a run, by its name.
-    fn files_of(&self, run: &Run) -> Vec<PathBuf> {
-        let parts: Vec<&str> = run.name.split(" + ").collect();
-        let name = |path: &Path| path.file_name().map(|name| name.to_string_lossy().into_owned());
-        let of_run = |path: &&PathBuf| name(path).is_some_and(|name| parts.contains(&name.as_str()));
-        self.log.iter().filter(of_run).filter(|path| path.is_file()).cloned().collect()
     }
 
     fn one(&self, report: &FitReport) -> Result<(), Error> {
@@ -210,38 +176,14 @@ impl ValidateArgs {
         end(report.refusals())
     }
 
-    fn several(&self, work: &[Work], reports: &[Result<FitReport, Error>]) -> Result<(), Error> {
-        let mut batch = BatchTable::default();
-        let (mut refusals, mut all) = (Vec::new(), Vec::new());
-        for (work, report) in work.iter().zip(reports) {
-            match report {
-                Ok(report) => {
-                    if let Some(html) = &self.html {
-                        let path = of_unit(html, work.unit.as_str());
-                        write_file(&path, report.to_html().as_bytes(), true)?;
-                    }
-                    if !self.json {
-                        print(format!("{}\n", report.to_text()).as_bytes())?;
-                    }
-                    batch.add(work.unit.to_string(), Ok(report.verdicts.clone()));
-                    refusals.extend(report.refusals());
-                    all.push(report.to_json());
-                }
-                Err(error) => {
-                    batch.add(work.unit.to_string(), Err(error.to_string()));
-                    refusals.push(format!("{}: {error}", work.unit));
-                }
+    fn several(&self, reports: &[Outcome]) -> Result<(), Error> {
+        if let Some(html) = &self.html {
+            for (unit, report) in reports.iter().filter_map(|(unit, came)| Some((unit, came.as_ref().ok()?)))
+            {
+                write_file(&of_unit(html, unit), report.to_html().as_bytes(), true)?;
             }
         }
-        if let Some(html) = &self.html {
-            write_file(html, batch.to_html("Judgement of several units").as_bytes(), true)?;
-        }
-        if self.json {
-            print(format!("{}\n", json!({ "batch": batch.to_json(), "reports": all })).as_bytes())?;
-        } else {
-            print(batch.to_text().as_bytes())?;
-        }
-        end(refusals)
+        close_batch("Judgement of several units", reports, (self.html.as_deref(), true), self.json)
     }
 }
 

@@ -1,10 +1,5 @@
 //! Everything that is said of one sensor, made for all of them on every processor core.
 
-use std::num::NonZero;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::thread;
-
 use super::markov::{Beside, DailyLine, Fit};
 use super::pieces::{Grid, Sensor};
 use super::slow::{Autocorrelation, Slow};
@@ -13,6 +8,7 @@ use crate::allan::confidence::degrees_of_freedom;
 use crate::allan::deviation::lengths;
 use crate::allan::fit::interval;
 use crate::allan::{Estimator, NoiseFit, Phase, PowerLaw, Variance};
+use crate::report::in_parallel;
 use crate::spectrum::{Line, Spectrum};
 
 /// What is asked for.
@@ -89,34 +85,11 @@ struct Prepared {
     spectrum: Option<Spectrum>,
 }
 
-/// Does some work for each of some things on every processor core; results in the order of the things.
-pub(crate) fn in_parallel<T: Sync, R: Send>(things: &[T], work: impl Fn(&T) -> R + Sync) -> Vec<R> {
-    let cores = thread::available_parallelism().map_or(1, NonZero::get).min(things.len());
-    let next = AtomicUsize::new(0);
-    let results: Vec<Mutex<Option<R>>> = things.iter().map(|_| Mutex::new(None)).collect();
-    thread::scope(|scope| {
-        for _ in 0..cores {
-            scope.spawn(|| {
-                while let Some((thing, result)) = {
-                    let index = next.fetch_add(1, Ordering::Relaxed);
-                    things.get(index).zip(results.get(index))
-                } {
-                    let done = work(thing);
-                    if let Ok(mut result) = result.lock() {
-                        *result = Some(done);
-                    }
-                }
-            });
-        }
-    });
-    results.into_iter().filter_map(|result| result.into_inner().ok().flatten()).collect()
-}
-
 /// Analyses every sensor of a log.
 #[must_use]
 pub fn analyse(grid: &Grid, wanted: Wanted) -> Vec<Analysis> {
     let sensors = &grid.sensors;
-    let prepared = in_parallel(sensors, |sensor| prepare(grid, sensor));
+    let prepared = in_parallel(sensors, |_| (), |sensor| prepare(grid, sensor));
     // One thing of work per sensor and averaging time, the slow ones first.
     let mut work = Vec::new();
     for (index, of) in prepared.iter().enumerate() {
@@ -131,20 +104,26 @@ pub fn analyse(grid: &Grid, wanted: Wanted) -> Vec<Analysis> {
             work.extend(ticks.into_iter().map(|m| (index, estimator, m)));
         }
     }
-    let variances = in_parallel(&work, |(index, estimator, m)| {
-        prepared.get(*index).and_then(|of| of.phase.variance(*estimator, *m))
-    });
+    let variances = in_parallel(
+        &work,
+        |_| (),
+        |(index, estimator, m)| prepared.get(*index).and_then(|of| of.phase.variance(*estimator, *m)),
+    );
     let found: Vec<_> = work.into_iter().zip(variances).collect();
     let indices: Vec<usize> = (0..sensors.len()).collect();
-    let finished = in_parallel(&indices, |index| {
-        let of_sensor: Vec<(Estimator, Variance)> = found
-            .iter()
-            .filter(|((sensor, ..), _)| sensor == index)
-            .filter_map(|((_, estimator, _), variance)| Some((*estimator, (*variance)?)))
-            .collect();
-        let (sensor, prepared) = (sensors.get(*index)?, prepared.get(*index)?);
-        Some(finish(grid, sensor, prepared, &of_sensor, wanted))
-    });
+    let finished = in_parallel(
+        &indices,
+        |_| (),
+        |index| {
+            let of_sensor: Vec<(Estimator, Variance)> = found
+                .iter()
+                .filter(|((sensor, ..), _)| sensor == index)
+                .filter_map(|((_, estimator, _), variance)| Some((*estimator, (*variance)?)))
+                .collect();
+            let (sensor, prepared) = (sensors.get(*index)?, prepared.get(*index)?);
+            Some(finish(grid, sensor, prepared, &of_sensor, wanted))
+        },
+    );
     finished.into_iter().flatten().collect()
 }
 

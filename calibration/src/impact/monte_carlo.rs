@@ -6,8 +6,8 @@ use rand_pcg::rand_core::{Rng, SeedableRng};
 
 use super::estimate::{REFERENCE_TICKS, TICK_S};
 use super::scenario::{CARES, Course, Drift, Figures, Voyage};
-use crate::drift::analysis::in_parallel;
 use crate::error::Error;
+use crate::report::in_parallel;
 
 /// Normal deviates from a seed, the same on every machine.
 struct Deviates {
@@ -104,10 +104,14 @@ pub fn sail_all(
     trend: [f64; 3],
     seeds: &[u64],
 ) -> Result<Voyages, Error> {
-    let all = in_parallel(seeds, |seed| {
-        let drift = drift(voyage, parts, trend, *seed);
-        CARES.into_iter().map(|care| voyage.sail(care, &drift, parts)).collect::<Result<Vec<_>, _>>()
-    });
+    let all = in_parallel(
+        seeds,
+        |_| (),
+        |seed| {
+            let drift = drift(voyage, parts, trend, *seed);
+            CARES.into_iter().map(|care| voyage.sail(care, &drift, parts)).collect::<Result<Vec<_>, _>>()
+        },
+    );
     let mut first = Vec::new();
     let mut figures = vec![Vec::new(); CARES.len()];
     for courses in all {

@@ -8,7 +8,7 @@ mod knife;
 use isotherm_correction::sample::TickFlags;
 use isotherm_correction::unit::Unit;
 use isotherm_log::offline::Loaded;
-use isotherm_protocol::document::{Curve, Document, OrientationThermal, Shape};
+use isotherm_protocol::document::{Curve, Document, Orientation, OrientationThermal, Shape};
 
 use knife::Knife;
 
@@ -93,18 +93,13 @@ pub struct Cut {
     pub reference_deg_c: f64,
 }
 
-/// The document as it is for three gyros along their own input axes, the others as good as absent.
+/// The document of three gyros along their own input axes, for a run that has no others ([`Run::of_gyros`]).
 pub(crate) fn along_input_axes(document: &Document, group: [usize; 3]) -> Document {
     let mut own = document.clone();
-    let orientation = &mut own.gyro.orientation;
-    let axis = |sensor: usize| group.iter().position(|member| *member == sensor);
-    let unit = |axis: usize| [0, 1, 2].map(|column| if column == axis { 1.0 } else { 0.0 });
-    let count = own.gyro.sensor.len();
-    orientation.rows = (0..count).map(|sensor| unit(axis(sensor).unwrap_or(0))).collect();
-    orientation.weights = (count > 3)
-        .then(|| (0..count).map(|sensor| if axis(sensor).is_some() { 1.0 } else { 1e-24 }).collect());
-    orientation.thermal = None;
-    orientation.parity = None;
+    own.gyro.sensor = group.iter().filter_map(|sensor| document.gyro.sensor.get(*sensor).cloned()).collect();
+    own.gyro.orientation = Orientation::along_case_axes();
+    // It tells the gyros of all of them.
+    own.self_test = None;
     own
 }
 
@@ -142,8 +137,9 @@ pub fn gather<W: Watch>(
     for (number, run) in runs.iter().enumerate() {
         #[expect(clippy::cast_precision_loss, reason = "few runs")]
         let begin_s = number as f64 * BETWEEN_RUNS_S;
+        let run = run.of_gyros(group);
         let mut knife =
-            Knife::new(cut, group, bare, begin_s, gathered.cells.last().map_or(0, |cell| cell.stretch + 1));
+            Knife::new(cut, bare, begin_s, gathered.cells.last().map_or(0, |cell| cell.stretch + 1));
         let troubles = run.correct_together(&loaded, watch(), |raw, ticks, unit| {
             let Some(bare) = ticks.first() else { return };
             gathered.ticks[0] += 1;

@@ -105,7 +105,8 @@ fn curve<Q: Quantity>(
     (!coefficients.is_empty()).then(|| Curve::new(Shape::Polynomial { reference, coefficients, range }))
 }
 
-fn widened([low, high]: [f64; 2]) -> [f64; 2] {
+/// A range in tenths of a degree, with some width.
+pub(crate) fn widened([low, high]: [f64; 2]) -> [f64; 2] {
     let [low, high] = [libm::floor(low * PER_DEG_C) / PER_DEG_C, libm::ceil(high * PER_DEG_C) / PER_DEG_C];
     // A range must have a width.
     if high > low { [low, high] } else { [low - 1.0 / PER_DEG_C, high + 1.0 / PER_DEG_C] }
@@ -128,19 +129,7 @@ pub fn reference_of(base: &Document) -> f64 {
 #[must_use]
 pub fn base_constant(base: &Document, sensor: usize, reference_deg_c: f64) -> f64 {
     let curve = base.gyro.sensor.get(sensor).and_then(|sensor| sensor.static_bias.as_ref());
-    match curve.map(Curve::shape) {
-        Some(Shape::Constant { value }) => *value,
-        Some(Shape::Polynomial { reference, coefficients, range }) => {
-            let away = reference_deg_c.clamp(range[0], range[1]) - reference;
-            coefficients.iter().rev().fold(0.0, |sum, c| sum * away + c)
-        }
-        Some(Shape::PiecewiseLinear { knots } | Shape::Spline { knots }) => {
-            let distance = |knot: &[f64; 2]| (knot[0] - reference_deg_c).abs();
-            let nearest = knots.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)));
-            nearest.map_or(0.0, |knot| knot[1])
-        }
-        None => 0.0,
-    }
+    curve.and_then(|curve| curve.shape().at(reference_deg_c)).unwrap_or(0.0)
 }
 
 /// What one count of a gyro stands for (″); zero where the output is no count.

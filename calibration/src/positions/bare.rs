@@ -1,8 +1,8 @@
 //! A document of a unit that has none yet: everything as the log has it, for a fit to complete.
 
 use isotherm_protocol::document::{
-    Accel, AccelOutput, AccelSensor, CURRENT_SCHEMA, Channel, Created, Curve, Document, Filter, Gyro,
-    GyroOutput, GyroSensor, Orientation, Shape, Temperature, Unit,
+    Accel, AccelOutput, AccelSensor, CURRENT_SCHEMA, Channel, Curve, Document, Filter, Gyro, GyroOutput,
+    GyroSensor, Orientation, Shape, Temperature, Unit,
 };
 
 use isotherm_correction::sample::{MAX_SENSORS, MIN_SENSORS, OutputKind};
@@ -18,7 +18,7 @@ const RANGE_DEG_C: [f64; 2] = [-70.0, 130.0];
 ///
 /// # Errors
 /// [`Error::Refused`] where the log needs a document: counts of gyros, skewed sensors, channels that do not read °C.
-pub fn bare(series: &Series, accel_output: AccelOutput, created: Option<Created>) -> Result<Document, Error> {
+pub fn bare(series: &Series, accel_output: AccelOutput) -> Result<Document, Error> {
     let mut reasons = Vec::new();
     if series.gyros.output != Some(OutputKind::Mean) {
         reasons.push(
@@ -78,7 +78,7 @@ pub fn bare(series: &Series, accel_output: AccelOutput, created: Option<Created>
     Ok(Document {
         schema: CURRENT_SCHEMA,
         unit: series.unit.to_string(),
-        created,
+        created: None,
         note: None,
         origin: None,
         temperature: Temperature {

@@ -7,7 +7,6 @@ use isotherm_protocol::document::{
 
 use super::analysis::Analysis;
 use super::model::Sensor;
-use super::temperature::value_at;
 use crate::written::tidy;
 
 /// Room around the temperatures that were taken (°C), for the stand's chamber does not meet them to the degree.
@@ -22,12 +21,11 @@ pub(crate) const fn units(output: AccelOutput) -> (Unit, Unit) {
     }
 }
 
-/// Puts what was found into a document; gives what is to be said of it.
+/// Puts what was found into a document.
 #[must_use]
-pub fn complete(document: &Document, analysis: &Analysis, gravity: f64) -> (Document, Vec<String>) {
+pub fn complete(document: &Document, analysis: &Analysis, gravity: f64) -> Document {
     let mut document = document.clone();
-    let mut warnings = Vec::new();
-    let Some(accel) = &mut document.accel else { return (document, warnings) };
+    let Some(accel) = &mut document.accel else { return document };
     let (scale_unit, bias_unit) = units(accel.output);
     let range = range(analysis);
     for (sensor, found) in accel.sensor.iter_mut().zip(&analysis.fit.sensors) {
@@ -35,16 +33,12 @@ pub fn complete(document: &Document, analysis: &Analysis, gravity: f64) -> (Docu
         if analysis.levels_deg_c.len() > 1 {
             sensor.scale_factor = curve(analysis, &scale, range).in_unit(scale_unit);
             sensor.bias = Some(curve(analysis, &found.bias, range).in_unit(bias_unit));
-        } else if !level(sensor, scale[0], found.bias[0], analysis.levels_deg_c[0], (scale_unit, bias_unit)) {
-            warnings.push(format!(
-                "accelerometer {}: the old document's spline over temperature cannot be moved by one temperature's positions and is \
-                 gone: calibrate at several temperatures, or run `thermal` again",
-                sensor.name
-            ));
+        } else {
+            level(sensor, scale[0], found.bias[0], analysis.levels_deg_c[0], (scale_unit, bias_unit));
         }
     }
     orient(accel, analysis, range);
-    (document, warnings)
+    document
 }
 
 /// Range of the curves (°C), in whole degrees.
@@ -69,36 +63,24 @@ fn curve<Q: Quantity>(analysis: &Analysis, scaled: &[f64], range: [f64; 2]) -> C
     })
 }
 
-/// Moves an accelerometer's curves to what one temperature says, keeping their shape; false where a shape could not be kept.
+/// Moves an accelerometer's curves to what one temperature says, keeping their shape.
 pub(crate) fn level(
     sensor: &mut AccelSensor,
     scale: f64,
     bias: f64,
     deg_c: f64,
     (scale_unit, bias_unit): (Unit, Unit),
-) -> bool {
-    let mut kept = true;
+) {
     let constant = |value: f64| Shape::Constant { value: tidy(value) };
-    let shape = match (sensor.scale_factor.shape(), value_at(sensor.scale_factor.shape(), deg_c)) {
-        (shape, Some(old)) if old != 0.0 => times(shape, scale / old),
-        (_, _) => {
-            kept = false;
-            constant(scale)
-        }
+    let shape = sensor.scale_factor.shape();
+    let shape = match shape.at(deg_c) {
+        Some(old) if old != 0.0 => times(shape, scale / old),
+        _ => constant(scale),
     };
     sensor.scale_factor = Curve::new(shape).in_unit(scale_unit);
-    let old = sensor.bias.as_ref().map(|curve| value_at(curve.shape(), deg_c));
-    sensor.bias = Some(match (&sensor.bias, old) {
-        (Some(curve), Some(Some(old))) => {
-            let moved = curve.plus(bias - old);
-            Curve::new(times(moved.shape(), 1.0)).in_unit(bias_unit)
-        }
-        (there, _) => {
-            kept &= there.is_none();
-            Curve::new(constant(bias)).in_unit(bias_unit)
-        }
-    });
-    kept
+    let moved = sensor.bias.as_ref().and_then(|curve| Some(curve.plus(bias - curve.shape().at(deg_c)?)));
+    let shape = moved.map_or_else(|| constant(bias), |curve| times(curve.shape(), 1.0));
+    sensor.bias = Some(Curve::new(shape).in_unit(bias_unit));
 }
 
 /// A shape with all values multiplied.

@@ -51,7 +51,7 @@ pub fn judge(
         Some(Judgement {
             run: pose.run,
             position: *position,
-            time_s: 0.5 * (pose.span_s[0] + pose.span_s[1]),
+            time_s: pose.middle_s(),
             deg_c: pose.mean_temperature(channels).unwrap_or(f64::NAN),
             error,
             length,

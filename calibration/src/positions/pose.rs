@@ -65,6 +65,12 @@ impl Pose {
         }
     }
 
+    /// Its middle since the run's beginning (s).
+    #[must_use]
+    pub fn middle_s(&self) -> f64 {
+        0.5 * (self.span_s[0] + self.span_s[1])
+    }
+
     /// Mean temperature of some channels (°C); `None` where there is none of them.
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "at most 32 channels")]

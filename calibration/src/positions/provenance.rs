@@ -1,16 +1,14 @@
 //! Where the numbers of the document come from, and what "before" means.
 
-use std::path::PathBuf;
-
 use isotherm_protocol::document::{Document, Shape};
 use serde_json::json;
+use toml::Table;
 
 use super::analysis::{Analysis, Settings};
 use super::budget::ARCSEC_PER_RAD;
 use super::model::SMALL;
 use crate::error::Error;
-use crate::provenance::{command_line, origin};
-use crate::report::{FitReport, residuals};
+use crate::report::{FitReport, Sigmas};
 use crate::written::tidy;
 
 /// The document that "before" stands for: the one that was given, or else one scale factor for all accelerometers, no bias, axes
@@ -40,23 +38,12 @@ pub fn before(base: &Document, analysis: &Analysis, gravity: f64, given: bool) -
     document
 }
 
-/// States in the document where its numbers come from.
+/// What the document says of the fit beside its coefficients.
 ///
 /// # Errors
-/// [`Error::Log`] where a log cannot be read for its digest.
-pub fn with_origin(
-    document: &mut Document,
-    analysis: &Analysis,
-    settings: &Settings,
-    report: &FitReport,
-    logs: &[PathBuf],
-    range: [f64; 2],
-) -> Result<(), Error> {
-    let mut origin = origin(logs, &command_line())?;
+/// [`Error::Document`] where it cannot be written, which would be a mistake here.
+pub fn details(analysis: &Analysis, settings: &Settings, report: &FitReport) -> Result<Table, Error> {
     let bent = analysis.quadratic.as_ref().is_some_and(|found| found.3 < 1e-3);
-    origin.method = Some("positions of a stand, weighted least squares with the stand's errors".to_owned());
-    origin.range_deg_c = Some(if analysis.levels_deg_c.len() > 1 { analysis.range_deg_c } else { range });
-    origin.residual = residuals(&report.verdicts);
     let coefficients: serde_json::Map<String, serde_json::Value> = report
         .coefficients
         .iter()
@@ -74,8 +61,6 @@ pub fn with_origin(
         .row_iter()
         .map(|row| row.iter().map(|c| tidy(c * analysis.widened * analysis.widened)).collect())
         .collect();
-    let old = document.origin.take().and_then(|old| old.details);
-    let mut details = old.unwrap_or_default();
     let about = json!({
         "gravity_m_per_s2": settings.gravity,
         "positions": analysis.poses.len(),
@@ -94,11 +79,34 @@ pub fn with_origin(
         "axes_covariance_arcsec2": covariance,
         "relative_scale_sigma": scale_sigmas(analysis),
     });
-    let about = toml::Value::try_from(about).map_err(|error| Error::Document(vec![error.to_string()]))?;
-    details.insert("positions".to_owned(), about);
-    origin.details = Some(details);
-    document.origin = Some(origin);
-    Ok(())
+    Table::try_from(about).map_err(|error| Error::Document(vec![error.to_string()]))
+}
+
+/// Standard errors of scale factors, biases and axes, for what compares documents.
+#[must_use]
+pub fn sigmas(document: &Document, analysis: &Analysis, settings: &Settings) -> Sigmas {
+    let mut sigmas = Sigmas::default();
+    let Some(accel) = &document.accel else { return sigmas };
+    let fit = &analysis.fit;
+    let of_sensor = fit.solution.parameters.len().saturating_sub(3) / fit.guess.len().max(1);
+    let own = fit.degrees.sensor + 1;
+    for (index, (sensor, guess)) in accel.sensor.iter().zip(&fit.guess).enumerate() {
+        let of = |from: usize, scale: f64| -> Vec<f64> {
+            let mut factor = SMALL * guess.scale * scale * analysis.widened;
+            let sigma = |place| {
+                let sigma = tidy(fit.solution.sigma(index * of_sensor + place) * factor);
+                factor /= analysis.half_deg_c;
+                sigma
+            };
+            (from..from + own).map(sigma).collect()
+        };
+        sigmas.put("accel", &sensor.name, "scale_factor", of(0, 1.0 / settings.gravity));
+        sigmas.put("accel", &sensor.name, "bias", of(own, 1.0));
+        let axis = fit.axis_sigma(&settings.plan, index, 0);
+        let arcsec = axis.map(|sigma| tidy(sigma * ARCSEC_PER_RAD * analysis.widened));
+        sigmas.put("accel", &sensor.name, "axis_arcsec", arcsec.to_vec());
+    }
+    sigmas
 }
 
 /// Standard errors of the scale factors (relative).

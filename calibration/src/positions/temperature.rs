@@ -1,6 +1,6 @@
 //! Temperatures of positions: which channels they come from, which of them are one level, what the board does at them.
 
-use isotherm_protocol::document::{Document, Shape};
+use isotherm_protocol::document::Document;
 
 use super::analysis::Settings;
 use super::pose::Pose;
@@ -37,29 +37,9 @@ pub(super) fn board_ratio(document: &Document, sensor: usize, pose: &Pose) -> f6
     let stated = || {
         let sensor = document.accel.as_ref()?.sensor.get(sensor)?;
         let t = pose.temperature_deg_c.get(sensor.board_channel.as_ref()?)?;
-        value_at(sensor.board_ratio_error.as_ref()?.shape(), *t)
+        sensor.board_ratio_error.as_ref()?.shape().at(*t)
     };
     1.0 + stated().unwrap_or(0.0) * 1e-6
-}
-
-/// Value of a document's curve; `None` for a spline.
-#[must_use]
-pub fn value_at(shape: &Shape, x: f64) -> Option<f64> {
-    match shape {
-        Shape::Constant { value } => Some(*value),
-        Shape::Polynomial { reference, coefficients, range } => {
-            let away = x.max(range[0]).min(range[1]) - reference;
-            Some(coefficients.iter().rev().fold(0.0, |sum, c| sum * away + c))
-        }
-        Shape::PiecewiseLinear { knots } => {
-            let (first, last) = (knots.first()?, knots.last()?);
-            let x = x.max(first[0]).min(last[0]);
-            let pair = knots.windows(2).find(|pair| x <= pair[1][0])?;
-            let part = (x - pair[0][0]) / (pair[1][0] - pair[0][0]);
-            Some(pair[0][1] + part * (pair[1][1] - pair[0][1]))
-        }
-        Shape::Spline { .. } => None,
-    }
 }
 
 /// Temperatures that are far enough apart to be several: the number of each one's level, and the levels' means.

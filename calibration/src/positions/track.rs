@@ -40,7 +40,7 @@ impl Track {
     /// # Errors
     /// As [`Run::series`] and [`Run::correct`]; [`Error::Refused`] without accelerometers.
     pub fn of(run: &Run, loaded: &Loaded, mut watch: impl Watch) -> Result<Self, Error> {
-        let series = run.series(Lent(&mut watch))?;
+        let series = run.series(&mut watch)?;
         let accels = &series.accels;
         if accels.is_empty() {
             return Err(Error::Refused(vec![format!(
@@ -129,23 +129,6 @@ impl Track {
         let (Some(first), Some(end)) = (self.end_ns.first(), self.end_ns.get(tick)) else { return f64::NAN };
         let duration = |index: usize| self.duration_s.get(index).copied().unwrap_or(0.0);
         (end - first) as f64 * 1e-9 + duration(0) - duration(tick)
-    }
-}
-
-/// A watch that is lent.
-struct Lent<'a, W: Watch>(&'a mut W);
-
-impl<W: Watch> Watch for Lent<'_, W> {
-    fn begin(&mut self, progress: isotherm_log::progress::Progress) {
-        self.0.begin(progress);
-    }
-
-    fn step(&mut self) {
-        self.0.step();
-    }
-
-    fn end(&mut self) {
-        self.0.end();
     }
 }
 

@@ -100,7 +100,7 @@ fn of_group(run: &Run, document: &Document, group: [usize; 3], watch: impl Watch
     let mut first = None;
     let (mut velocity, mut force_s) = ([0.0; 3], 0.0);
     let (mut of_axes, mut of_all) = (Mean::default(), Mean::default());
-    let troubles = run.correct(&loaded, watch, |tick, unit| {
+    let troubles = run.of_gyros(group).correct(&loaded, watch, |tick, unit| {
         let begin = tick.end_time.as_ns().saturating_sub(tick.duration.as_ns());
         #[expect(clippy::cast_precision_loss, reason = "a run is far below 2⁵³ ns")]
         let since_s = (begin - *first.get_or_insert(begin)) as f64 * 1e-9;

@@ -105,7 +105,7 @@ pub fn sigmas(made: &Made) -> Sigmas {
 #[must_use]
 pub fn details(made: &Made) -> Table {
     let mut table = Table::new();
-    if let Some(deg_c) = made.temperature_deg_c {
+    if let Some(deg_c) = made.temperature_deg_c() {
         table.insert("temperature_deg_c".into(), tidy(deg_c).into());
     }
     let rates = made.steps.iter().map(|step| step.matched.step.rate_deg_per_s.into());

@@ -1,7 +1,5 @@
 //! What the document makes of the steps, by the service's own code.
 
-use isotherm_protocol::document::Document;
-
 use super::bins::means_within;
 use super::make::Measured;
 use crate::error::Error;
@@ -10,33 +8,31 @@ use crate::report::Verdict;
 use crate::run::{Run, Watch};
 use crate::written::Written;
 
-/// Errors of the corrected rate in the windows of the steps, by the service's own code with a document.
+/// Errors of the corrected rate in the windows of a run's steps, by the service's own code with a document.
 pub(super) fn errors<W: Watch>(
-    runs: &[Run],
-    document: &Document,
+    (number, run): (usize, &Run),
+    written: &Written,
     steps: &mut [Measured],
     sample: usize,
     watch: &mut impl FnMut() -> W,
 ) -> Result<(), Error> {
-    let loaded = Written::of(document)?.loaded;
-    for (number, run) in runs.iter().enumerate() {
-        let windows: Vec<[f64; 2]> = steps
-            .iter()
-            .filter(|step| step.matched.step.run == number)
-            .map(|step| step.matched.plateau.window_s)
-            .collect();
-        let means = means_within(run, &loaded, &windows, watch())?;
-        let own = steps.iter_mut().filter(|step| step.matched.step.run == number);
-        for (step, mean) in own.zip(means) {
-            step.error[sample] = [0, 1, 2].map(|axis| mean[axis] - step.rate[axis]);
-        }
+    let windows: Vec<[f64; 2]> = steps
+        .iter()
+        .filter(|step| step.matched.step.run == number)
+        .map(|step| step.matched.plateau.window_s)
+        .collect();
+    let means = means_within(run, &written.loaded, &windows, watch())?;
+    let own = steps.iter_mut().filter(|step| step.matched.step.run == number);
+    for (step, mean) in own.zip(means) {
+        step.error[sample] = [0, 1, 2].map(|axis| mean[axis] - step.rate[axis]);
     }
     Ok(())
 }
 
-/// Before and after by case axis; the bias is not what rates are about, so means are taken off.
-pub(super) fn verdicts(steps: &[Measured]) -> Vec<Verdict> {
-    let of = |axis: usize, sample: usize| {
+/// Before and after by case axis, of the steps that were fitted and of those that were not, which decide where there are any; the
+/// bias is not what rates are about, so means are taken off.
+pub(super) fn verdicts(steps: &[Measured], judged: &[Measured]) -> Vec<Verdict> {
+    let of = |steps: &[Measured], axis: usize, sample: usize| {
         let errors: Vec<f64> = steps.iter().map(|step| step.error[sample][axis]).collect();
         let mean = Size::of(&errors).mean;
         Size::of(&errors.iter().map(|error| error - mean).collect::<Vec<_>>())
@@ -45,9 +41,11 @@ pub(super) fn verdicts(steps: &[Measured]) -> Vec<Verdict> {
         .iter()
         .enumerate()
         .map(|(axis, name)| {
-            let sizes = [of(axis, 0), of(axis, 1)];
-            let verdict = Verdict::new(format!("gyro {name}"), "°/h", sizes);
-            if sizes[1].rms <= sizes[0].rms {
+            let sizes = |steps: &[Measured]| [of(steps, axis, 0), of(steps, axis, 1)];
+            let outside = (!judged.is_empty()).then(|| sizes(judged));
+            let verdict = Verdict::new(format!("gyro {name}"), "°/h", sizes(steps)).out_of_sample(outside);
+            let [before, after] = verdict.deciding();
+            if after.rms <= before.rms {
                 verdict
             } else {
                 verdict.refused("the errors of its steps grow: are the table's axis and rates right?")

@@ -7,11 +7,11 @@ use super::document;
 use super::judge::{errors, verdicts};
 use super::matching::Matched;
 use super::measure::{earth_in_bins, first_gains, points, true_rates, white};
-use super::read::{read, whole_turns};
+use super::read::{Turned, read, whole_turns};
 use super::solve::{GyroRates, solve};
 use super::steps::Step;
 use crate::error::Error;
-use crate::modes::document::row;
+use crate::modes::document::{row, widened};
 use crate::modes::robust::median;
 use crate::report::{FitReport, Verdict};
 use crate::run::{Run, Watch};
@@ -25,7 +25,9 @@ const ROUNDS: usize = 3;
 pub struct Wanted<'a> {
     /// Runs.
     pub runs: &'a [Run],
-    /// What the table did in them.
+    /// Runs that the fit does not see and is judged on.
+    pub judge: &'a [Run],
+    /// What the table did in all of them; the numbers of the judging runs follow on those of the others.
     pub steps: &'a [Step],
     /// Document that gives channels, filter, biases, and the scale and axes that are to be replaced.
     pub base: &'a Document,
@@ -57,12 +59,14 @@ pub struct Made {
     pub gyros: Vec<Result<GyroRates, String>>,
     /// The steps.
     pub steps: Vec<Measured>,
+    /// The steps of the judging runs.
+    pub judged: Vec<Measured>,
     /// White noise of each gyro (°/√h).
     pub walk: Vec<f64>,
     /// Verdicts, by case axis.
     pub verdicts: Vec<Verdict>,
-    /// Mean temperature of the runs (°C).
-    pub temperature_deg_c: Option<f64>,
+    /// Mean temperature of each run (°C).
+    pub temperatures_deg_c: Vec<f64>,
     /// What is to be said.
     pub warnings: Vec<String>,
 }
@@ -73,27 +77,8 @@ pub struct Made {
 /// [`Error::Refused`] with every reason; [`Error::Log`], [`Error::Document`].
 pub fn make<W: Watch>(wanted: &Wanted<'_>, mut watch: impl FnMut() -> W) -> Result<Made, Error> {
     let mut warnings = Vec::new();
-    let mut runs = Vec::new();
-    let mut reasons = Vec::new();
-    for (number, run) in wanted.runs.iter().enumerate() {
-        match read(wanted, number, run, &mut watch, &mut warnings)? {
-            Ok(read) => runs.push(read),
-            Err(reason) => reasons.push(reason),
-        }
-    }
-    if !reasons.is_empty() {
-        return Err(Error::Refused(reasons));
-    }
-    if wanted.place.is_empty() {
-        warnings.push(
-            "the Earth rate is not known: steps are cut to whole turns, and its share along the table's axis is in the bias. Give \
-             --latitude, --heading, --pitch and --roll of the beginning of each log"
-                .to_owned(),
-        );
-        for run in &mut runs {
-            whole_turns(run, &mut warnings);
-        }
-    }
+    let mut runs = read_all(wanted, &mut watch, &mut warnings)?;
+    let judging = runs.split_off(wanted.runs.len());
     let sensors = wanted.base.gyro.sensor.len();
     let mut walk = vec![0.0; sensors];
     let mut axes: Vec<[f64; 3]> = (0..sensors).map(|sensor| row(wanted.base, sensor, f64::NAN)).collect();
@@ -132,29 +117,132 @@ pub fn make<W: Watch>(wanted: &Wanted<'_>, mut watch: impl FnMut() -> W) -> Resu
     }
     let temperatures: Vec<f64> = runs.iter().filter_map(|run| run.binned.temperature_deg_c).collect();
     let axes_deg_c = runs.iter().find_map(|run| run.binned.axes_deg_c);
-    let written = Written::of(&document::fitted(wanted.base, &gyros, axes_deg_c, wanted.with_bias))?;
-    let mut steps: Vec<Measured> = runs
-        .iter()
-        .zip(&rates)
+    let earth = earth_in_bins(&judging, &axes, &gains, &biases);
+    let judging_rates = true_rates(&judging, &earth);
+    let mut made = Made {
+        written: Written::of(wanted.base)?,
+        gyros,
+        steps: measured(&runs, &rates),
+        judged: measured(&judging, &judging_rates),
+        walk,
+        verdicts: Vec::new(),
+        temperatures_deg_c: temperatures,
+        warnings,
+    };
+    made.settle(wanted, axes_deg_c, &mut watch)?;
+    Ok(made)
+}
+
+/// Reads the runs and, behind them, the judging ones.
+fn read_all<W: Watch>(
+    wanted: &Wanted<'_>,
+    watch: &mut impl FnMut() -> W,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<Turned>, Error> {
+    let (mut runs, mut reasons) = (Vec::new(), Vec::new());
+    for (number, run) in wanted.runs.iter().chain(wanted.judge).enumerate() {
+        match read(wanted, number, run, &mut *watch, warnings)? {
+            Ok(read) => runs.push(read),
+            Err(reason) => reasons.push(reason),
+        }
+    }
+    if !reasons.is_empty() {
+        return Err(Error::Refused(reasons));
+    }
+    if wanted.place.is_empty() {
+        warnings.push(
+            "the Earth rate is not known: steps are cut to whole turns, and its share along the table's axis is in the bias. Give \
+             --latitude, --heading, --pitch and --roll of the beginning of each log"
+                .to_owned(),
+        );
+        for run in &mut runs {
+            whole_turns(run, warnings);
+        }
+    }
+    Ok(runs)
+}
+
+/// The steps of runs with their true rates, not judged yet.
+fn measured(runs: &[Turned], rates: &[Vec<[f64; 3]>]) -> Vec<Measured> {
+    runs.iter()
+        .zip(rates)
         .flat_map(|(run, rates)| run.matched.iter().cloned().zip(rates.iter().copied()))
         .map(|(matched, rate)| Measured { matched, rate, error: [[0.0; 3]; 2] })
-        .collect();
-    for (sample, document) in [wanted.base, &written.document].into_iter().enumerate() {
-        errors(wanted.runs, document, &mut steps, sample, &mut watch)?;
-    }
-    let verdicts = verdicts(&steps);
-    Ok(Made {
-        written,
-        gyros,
-        steps,
-        walk,
-        verdicts,
-        temperature_deg_c: (!temperatures.is_empty()).then(|| median(&temperatures)),
-        warnings,
-    })
+        .collect()
 }
 
 impl Made {
+    /// Writes and judges; gyros that make an axis worse keep weight and axis, and all is judged once more.
+    fn settle<W: Watch>(
+        &mut self,
+        wanted: &Wanted<'_>,
+        axes_deg_c: Option<f64>,
+        watch: &mut impl FnMut() -> W,
+    ) -> Result<(), Error> {
+        self.judge(wanted, 0, watch)?;
+        self.write(wanted, axes_deg_c, watch)?;
+        let first = verdicts(&self.steps, &self.judged);
+        let worse: Vec<usize> = (0..first.len()).filter(|axis| !first[*axis].accepted).collect();
+        self.verdicts = first;
+        if worse.is_empty() {
+            return Ok(());
+        }
+        for (sensor, row) in wanted.base.gyro.orientation.rows.iter().enumerate() {
+            let main =
+                (0..3).fold(0, |best, axis| if row[axis].abs() > row[best].abs() { axis } else { best });
+            if let (true, Some(gyro)) = (worse.contains(&main), self.gyros.get_mut(sensor)) {
+                let axis = ["x", "y", "z"][main];
+                *gyro = Err(format!("its weight and axis make the rate about {axis} worse than it was"));
+            }
+        }
+        self.write(wanted, axes_deg_c, watch)?;
+        for (axis, verdict) in verdicts(&self.steps, &self.judged).into_iter().enumerate() {
+            if !worse.contains(&axis) {
+                self.verdicts[axis] = verdict;
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes what is left of the fits, and judges it.
+    fn write<W: Watch>(
+        &mut self,
+        wanted: &Wanted<'_>,
+        axes_deg_c: Option<f64>,
+        watch: &mut impl FnMut() -> W,
+    ) -> Result<(), Error> {
+        let document = document::fitted(wanted.base, &self.gyros, axes_deg_c, wanted.with_bias);
+        self.written = Written::of(&document)?;
+        self.judge(wanted, 1, watch)
+    }
+
+    /// Errors of all steps with the document as it stands: before (0), after (1).
+    fn judge<W: Watch>(
+        &mut self,
+        wanted: &Wanted<'_>,
+        sample: usize,
+        watch: &mut impl FnMut() -> W,
+    ) -> Result<(), Error> {
+        for (number, run) in wanted.runs.iter().chain(wanted.judge).enumerate() {
+            let steps = if number < wanted.runs.len() { &mut self.steps } else { &mut self.judged };
+            errors((number, run), &self.written, steps, sample, &mut *watch)?;
+        }
+        Ok(())
+    }
+
+    /// Median of the runs' mean temperatures (°C).
+    #[must_use]
+    pub fn temperature_deg_c(&self) -> Option<f64> {
+        (!self.temperatures_deg_c.is_empty()).then(|| median(&self.temperatures_deg_c))
+    }
+
+    /// Lowest and highest mean temperature of a run (°C), in tenths of a degree.
+    #[must_use]
+    pub fn range_deg_c(&self) -> Option<[f64; 2]> {
+        let ends = self.temperatures_deg_c.iter().map(|deg_c| [*deg_c, *deg_c]);
+        ends.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]).map(widened)
+    }
+
     /// The report.
     #[must_use]
     pub fn report(&self) -> FitReport {

@@ -3,7 +3,7 @@
 use isotherm_correction::units::Angle;
 use isotherm_log::plot::page::{Axis, Chart, Content, Form, Ink, Panel, Samples, Series, Table};
 
-use super::make::Made;
+use super::make::{Made, Measured};
 use super::solve::GyroRates;
 use crate::drift::figures::short;
 use crate::report::{Coefficient, FitReport};
@@ -21,8 +21,9 @@ pub(super) fn report(made: &Made) -> FitReport {
     report.verdicts.clone_from(&made.verdicts);
     report.warnings.clone_from(&made.warnings);
     let turning = made.steps.iter().filter(|step| step.matched.step.rate_deg_per_s != 0.0).count();
-    let temperature =
-        made.temperature_deg_c.map_or_else(String::new, |deg_c| format!(", mean temperature {deg_c:.1} °C"));
+    let temperature = made
+        .temperature_deg_c()
+        .map_or_else(String::new, |deg_c| format!(", mean temperature {deg_c:.1} °C"));
     report
         .notes
         .push(format!("{turning} steps of the table and {} rests{temperature}.", made.steps.len() - turning));
@@ -48,8 +49,38 @@ pub(super) fn report(made: &Made) -> FitReport {
             None => {}
         }
     }
+    if !made.judged.is_empty() {
+        report.notes.push(format!("Out of sample: {} steps of the judging logs.", made.judged.len()));
+        report.tables.push(("Errors of the judging steps".to_owned(), judged(made)));
+    }
     report.charts.push(("Linearity".to_owned(), chart(made)));
     report
+}
+
+/// Errors of the steps that the fit has not seen, by case axis.
+fn judged(made: &Made) -> Table {
+    let head = [
+        "log",
+        "window, s",
+        "table, °/s",
+        "before: x, °/h",
+        "y, °/h",
+        "z, °/h",
+        "after: x, °/h",
+        "y, °/h",
+        "z, °/h",
+    ];
+    let row = |step: &Measured| {
+        let [from, to] = step.matched.plateau.window_s;
+        let mut row = vec![
+            (step.matched.step.run + 1).to_string(),
+            format!("{from:.1}…{to:.1}"),
+            short(step.matched.step.rate_deg_per_s),
+        ];
+        row.extend(step.error.iter().flatten().map(|error| short(*error)));
+        row
+    };
+    Table { head: head.map(str::to_owned).to_vec(), rows: made.judged.iter().map(row).collect() }
 }
 
 fn coefficients(name: &str, found: &GyroRates, weight: Option<(f64, &str)>, report: &mut FitReport) {

@@ -80,25 +80,28 @@ fn unit(axis: [f64; 3]) -> Option<[f64; 3]> {
     (norm.is_finite() && norm > 0.0).then(|| axis.map(|x| x / norm))
 }
 
-/// Steps by a list of rates: run k turns about axis k, the last axis holding for all further runs.
+/// Steps by lists of rates: run k turns about axis k. Both rates and runs are those of the fit, then those that it is judged on.
 ///
 /// # Errors
 /// [`Error::Usage`].
-pub fn listed(names: &[String], rates: &[f64], runs: usize) -> Result<Vec<Step>, Error> {
-    if names.len() != runs {
+pub fn listed(
+    names: &[String],
+    [rates, judging]: [&[f64]; 2],
+    [runs, judges]: [usize; 2],
+) -> Result<Vec<Step>, Error> {
+    if names.len() != runs + judges {
+        let and = if judges > 0 { format!(", {judges} to judge on") } else { String::new() };
         return Err(Error::Usage(format!(
-            "{runs} logs and {} times --axis: state the table's axis of each log, in their order",
+            "{runs} logs{and} and {} times --axis: state the table's axis of each log, in their order",
             names.len()
         )));
     }
     let mut steps = Vec::new();
     for (run, name) in names.iter().enumerate() {
         let axis = axis(name).map_err(Error::Usage)?;
-        for rate in rates {
-            steps.push(
-                checked(Step { run, axis, rate_deg_per_s: *rate, window_s: None }, runs)
-                    .map_err(Error::Usage)?,
-            );
+        for rate in if run < runs { rates } else { judging } {
+            let step = Step { run, axis, rate_deg_per_s: *rate, window_s: None };
+            steps.push(checked(step, runs + judges).map_err(Error::Usage)?);
         }
     }
     Ok(steps)

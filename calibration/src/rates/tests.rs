@@ -70,11 +70,11 @@ fn place() -> Vec<Place> {
 }
 
 fn steps(runs: usize) -> Vec<Step> {
-    listed(&["x", "y", "z"].map(str::to_owned)[..runs], &RATES, runs).unwrap()
+    listed(&["x", "y", "z"].map(str::to_owned)[..runs], [&RATES, &[]], [runs, 0]).unwrap()
 }
 
 fn made(runs: &[Run], steps: &[Step], place: &[Place]) -> Result<Made, Error> {
-    make(&Wanted { runs, steps, base: &base(), place, table_ppm: 0.0, with_bias: false }, || ())
+    make(&Wanted { runs, judge: &[], steps, base: &base(), place, table_ppm: 0.0, with_bias: false }, || ())
 }
 
 /// Three runs, one about each axis.
@@ -152,7 +152,7 @@ fn a_bent_gyro_is_told_from_noise() {
 #[test]
 fn one_axis_gives_its_own_gyro_s_weight_and_no_other() {
     let runs = [run(900, AXES[2], |reading| reading)];
-    let steps = listed(&["z".to_owned()], &RATES, 1).unwrap();
+    let steps = listed(&["z".to_owned()], [&RATES, &[]], [1, 0]).unwrap();
     let made = made(&runs, &steps, &place()).unwrap();
     assert!(made.gyros[0].is_err() && made.gyros[1].is_err());
     let found = made.gyros[2].as_ref().unwrap();
@@ -189,7 +189,7 @@ fn without_a_place_whole_turns_hold_the_earth_off() {
 fn steps_that_are_not_those_of_the_log_are_refused() {
     let runs = [run(1, AXES[0], |reading| reading)];
     let words = |rates: &[f64]| {
-        let steps = listed(&["x".to_owned()], rates, 1).unwrap();
+        let steps = listed(&["x".to_owned()], [rates, &[]], [1, 0]).unwrap();
         made(&runs, &steps, &place()).map(|made| made.report().to_text()).unwrap_err().to_string()
     };
     let few = words(&[36.0, -36.0]);
@@ -199,7 +199,7 @@ fn steps_that_are_not_those_of_the_log_are_refused() {
     );
     let swapped = words(&[36.0, -36.0, 144.0, -72.0, 72.0, -144.0]);
     assert!(swapped.contains("its step is stated as") && swapped.contains("order of the rates"), "{swapped}");
-    assert!(matches!(listed(&["x".to_owned()], &[1.0], 2), Err(Error::Usage(_))));
+    assert!(matches!(listed(&["x".to_owned()], [&[1.0], &[]], [2, 0]), Err(Error::Usage(_))));
 }
 
 #[test]

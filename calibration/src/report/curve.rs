@@ -67,29 +67,12 @@ pub fn judge(
     window_s: f64,
     mut watch: impl Watch,
 ) -> Result<Judged, Error> {
-    let before = Means::of(run, before, window_s, Again(&mut watch))?;
-    let after = Means::of(run, after, window_s, Again(&mut watch))?;
+    let before = Means::of(run, before, window_s, &mut watch)?;
+    let after = Means::of(run, after, window_s, &mut watch)?;
     let mut troubles = after.troubles.clone();
     troubles.extend(before.troubles.iter().filter(|words| !after.troubles.contains(words)).cloned());
     let curves = Curve::of_means(&run.name, sample, [&before, &after], document, rest);
     Ok(Judged { curves, troubles })
-}
-
-/// A watch that is lent.
-struct Again<'a, W: Watch>(&'a mut W);
-
-impl<W: Watch> Watch for Again<'_, W> {
-    fn begin(&mut self, progress: isotherm_log::progress::Progress) {
-        self.0.begin(progress);
-    }
-
-    fn step(&mut self) {
-        self.0.step();
-    }
-
-    fn end(&mut self) {
-        self.0.end();
-    }
 }
 
 impl Curve {

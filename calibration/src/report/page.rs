@@ -12,6 +12,8 @@ use crate::spectrum::Spectrum;
 const POINTS: usize = 4096;
 /// Height of a panel of curves (CSS pixels).
 const HEIGHT: u32 = 170;
+/// Least range of temperature that is worth a diagram over it (°C).
+const LEAST_DEG_C: f64 = 1.0;
 /// Height of a panel of coefficients.
 const LOW: u32 = 110;
 /// Standard errors that an error bar reaches to either side: 95 %.
@@ -82,11 +84,18 @@ impl FitReport {
     }
 
     fn over_temperature(&self, page: &mut Page) {
-        let known = |curve: &&Curve| curve.temperature_deg_c.iter().any(|t| t.is_finite());
-        if self.residuals.iter().any(|curve| known(&curve)) {
+        let spread = |outside: bool| {
+            let own = self.residuals.iter().filter(|curve| (curve.sample == Sample::Out) == outside);
+            let all = own.flat_map(|curve| &curve.temperature_deg_c).filter(|t| t.is_finite());
+            let [low, high] =
+                all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], t| [low.min(*t), high.max(*t)]);
+            high - low
+        };
+        if [false, true].into_iter().any(|outside| spread(outside) >= LEAST_DEG_C) {
             page.heading("Over temperature");
         }
-        for outside in [false, true] {
+        let known = |curve: &&Curve| curve.temperature_deg_c.iter().any(|t| t.is_finite());
+        for outside in [false, true].into_iter().filter(|outside| spread(*outside) >= LEAST_DEG_C) {
             let curves: Vec<&Curve> = self
                 .residuals
                 .iter()

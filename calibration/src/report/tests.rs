@@ -5,7 +5,6 @@ use isotherm_protocol::document::{Document, Sample};
 use super::*;
 use crate::fixture::simulated;
 use crate::means::Size;
-use crate::nominal::nominal;
 use crate::written::Written;
 
 fn size(peak_to_peak: f64) -> Size {
@@ -91,7 +90,7 @@ fn judging_a_run_shows_what_the_terms_do() {
     let run = simulated(&scenario, |_| ());
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/calibration/MEMS-0001.toml");
     let after = Written::read(Path::new(path)).unwrap();
-    let before = Written::of(&nominal(&after.document)).unwrap();
+    let before = Written::of(&after.document.nominal()).unwrap();
     let judged = |rest: Rest| {
         let pair = (&before.loaded, &after.loaded);
         judge(&run, Sample::Out, pair, (&after.document, &rest), 5.0, ()).unwrap()

@@ -15,7 +15,7 @@ use super::{Run, Source, Troubles, Watch};
 use crate::error::Error;
 
 impl Run {
-    /// Its raw gyro ticks, in the order of the log.
+    /// Its raw ticks of all gyros, in the order of the log.
     ///
     /// # Errors
     /// [`Error::Log`] where the log cannot be read.
@@ -26,7 +26,7 @@ impl Run {
     ) -> Result<(), Error> {
         match &self.source {
             Source::Events(events) => {
-                for event in events {
+                for event in events.iter() {
                     if let LogEvent::Gyro { output, tick } = event {
                         each(*output, tick);
                     }
@@ -63,8 +63,8 @@ impl Run {
         let mut units = Together::new(loaded, each);
         match &self.source {
             Source::Events(events) => {
-                for event in events {
-                    units.take(event);
+                for event in events.iter() {
+                    units.take(&self.taken(event));
                 }
             }
             Source::Files { files, part } => {
@@ -73,7 +73,7 @@ impl Run {
                 while let Some(message) = messages.next_message()? {
                     if let Topic::Raw(_, input) = &message.topic {
                         match super::events(*input, &message.frame) {
-                            Some(events) => events.iter().for_each(|event| units.take(event)),
+                            Some(events) => events.iter().for_each(|event| units.take(&self.taken(event))),
                             None => {
                                 units.units.iter_mut().for_each(|unit| unit.receive(*input, &message.frame));
                             }

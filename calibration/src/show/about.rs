@@ -1,7 +1,8 @@
 //! What a document says of itself and of what is no curve.
 
-use isotherm_protocol::document::{Document, Orientation, Sample};
+use isotherm_protocol::document::{Document, Orientation};
 
+use super::parts;
 use super::terms::Term;
 use crate::drift::figures::short;
 use crate::report::Sheet;
@@ -100,20 +101,9 @@ pub(super) fn tables(sheet: &mut Sheet, document: &Document) {
     }
     let head = ["input axis", "x", "y", "z", "off its case axis, ″", "turns, ″/°C"];
     sheet.table("Input axes in case axes", &head, rows);
-    let residuals = document.origin.iter().flat_map(|origin| &origin.residual).map(|residual| {
-        let sample = if residual.sample == Sample::In { "in sample" } else { "out of sample" };
-        let measure = match residual.measure {
-            isotherm_protocol::document::Measure::DegPerH => "°/h",
-            isotherm_protocol::document::Measure::MetresPerSecondSquared => "m/s²",
-        };
-        let peaks = residual.peak_to_peak_before.zip(residual.peak_to_peak_after);
-        vec![
-            format!("{}, {measure}, {sample}", residual.of),
-            format!("{} → {}", short(residual.rms_before), short(residual.rms_after)),
-            or_dash(peaks.map(|(before, after)| format!("{} → {}", short(before), short(after)))),
-        ]
-    });
-    sheet.table("Residuals by its own account", &["", "rms", "peak to peak"], residuals.collect());
+    let residuals = document.origin.iter().flat_map(|origin| &origin.residual);
+    sheet.table("Residuals by its own account", &parts::HEAD, residuals.map(parts::of_residual).collect());
+    parts::tables(sheet, document);
 }
 
 fn axes<P>(names: Vec<String>, orientation: &Orientation<P>) -> Vec<Vec<String>> {

@@ -5,7 +5,7 @@
 use std::fmt::Write;
 
 use isotherm_correction::curve::{Curve, CurveParts};
-use isotherm_protocol::document::{Argument, Document, Shape, Unit};
+use isotherm_protocol::document::{Argument, Document, Unit};
 use toml::{Table, Value};
 
 use crate::error::Error;
@@ -62,21 +62,6 @@ pub fn tree(document: &Document) -> Result<Table, Error> {
     let words = |error: &dyn std::fmt::Display| Error::Document(vec![error.to_string()]);
     let text = document.to_toml().map_err(|error| words(&error))?;
     text.parse::<Table>().map_err(|error| words(&error))
-}
-
-/// The value of a curve at one argument, in the document's units.
-#[must_use]
-pub fn value(shape: &Shape, at: f64) -> Option<f64> {
-    let parts = match shape {
-        Shape::Constant { value } => return Some(*value),
-        Shape::Polynomial { reference, coefficients, range } => {
-            let (reference, range) = (*reference, *range);
-            CurveParts::Polynomial { reference, coefficients: coefficients.clone(), range }
-        }
-        Shape::PiecewiseLinear { knots } => CurveParts::PiecewiseLinear { knots: knots.clone() },
-        Shape::Spline { knots } => CurveParts::Spline { knots: knots.clone() },
-    };
-    Curve::new(&parts).ok().map(|curve| curve.at(at).value)
 }
 
 /// All curves of the sensors, in the order of the document.

@@ -7,7 +7,6 @@ use super::accel::AccelFit;
 use super::analysis::Tumble;
 use super::gyro::GyroFit;
 use crate::positions::document::{level, units};
-use crate::positions::temperature::value_at;
 use crate::written::tidy;
 
 /// Puts what was found into a document; gives what is to be said of it.
@@ -26,12 +25,7 @@ pub fn complete(document: &Document, tumble: &Tumble) -> (Document, Vec<String>)
         for (index, sensor) in accel.sensor.iter_mut().enumerate() {
             let deg_c = temperature(sensor.channel.as_ref());
             let AccelFit { scale, bias, .. } = &tumble.accel;
-            if !level(sensor, scale[index], bias[index], deg_c, units) {
-                warnings.push(format!(
-                    "accelerometer {}: the old document's spline over temperature cannot be moved and is gone",
-                    sensor.name
-                ));
-            }
+            level(sensor, scale[index], bias[index], deg_c, units);
         }
         accel.orientation.rows = tumble.accel.rows.iter().map(|row| row.map(tidy)).collect();
         if accel.orientation.thermal.take().is_some() {
@@ -51,12 +45,12 @@ pub fn complete(document: &Document, tumble: &Tumble) -> (Document, Vec<String>)
 fn gyros(document: &mut Document, found: &GyroFit, temperature: &dyn Fn(Option<&String>) -> f64) {
     for (index, sensor) in document.gyro.sensor.iter_mut().enumerate() {
         let deg_c = temperature(sensor.channel.as_ref());
-        let error = sensor.increment_weight_error.as_ref().and_then(|curve| value_at(curve.shape(), deg_c));
+        let error = sensor.increment_weight_error.as_ref().and_then(|curve| curve.shape().at(deg_c));
         let weight = found.weight[index];
         sensor.increment_weight_rad_per_rad = Some(tidy(weight / (1.0 + error.unwrap_or(0.0) * 1e-6)));
         let rest = AngularRate::from_rad_per_s(weight * found.rest[index]).as_deg_per_h();
         let there = sensor.static_bias.take();
-        let old = there.as_ref().and_then(|curve| value_at(curve.shape(), deg_c));
+        let old = there.as_ref().and_then(|curve| curve.shape().at(deg_c));
         sensor.static_bias = Some(match (there, old) {
             (Some(curve), Some(old)) => curve.plus(tidy(rest - old)),
             _ => Curve::new(Shape::Constant { value: tidy(rest) }),

@@ -3,7 +3,6 @@
 use isotherm_log::plot::page::{Axis, Chart, Content, Form, Ink, Panel, Samples, Series, Table};
 use isotherm_protocol::document::{Document, Sample};
 use serde_json::json;
-use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::accel::norm;
@@ -14,8 +13,8 @@ use crate::means::Size;
 use crate::positions::budget::ARCSEC_PER_RAD;
 use crate::positions::pose::Pose;
 use crate::positions::track::Track;
-use crate::provenance::{command_line, origin};
-use crate::report::{Coefficient, Curve, Figure, FitReport, Verdict, residuals};
+use crate::report::{Coefficient, Curve, Figure, FitReport, Sigmas, Verdict};
+use crate::written::tidy;
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
@@ -79,8 +78,7 @@ pub fn report(
         settings.gravity
     ));
     report.coefficients = coefficients(document, tumble);
-    let time_s: Arc<[f64]> =
-        tumble.poses.iter().map(|pose| 0.5 * (pose.span_s[0] + pose.span_s[1])).collect();
+    let time_s: Arc<[f64]> = tumble.poses.iter().map(Pose::middle_s).collect();
     report.residuals.push(Curve {
         of: "|f|−g".to_owned(),
         measure: "m/s²".to_owned(),
@@ -99,8 +97,7 @@ pub fn report(
 
 /// What is left by itself: beside what was there before, it is a line at zero.
 fn left_chart(tumble: &Tumble, after: &Left) -> Chart {
-    let middle = |pose: &Pose| 0.5 * (pose.span_s[0] + pose.span_s[1]);
-    let times = tumble.poses.iter().map(middle);
+    let times = tumble.poses.iter().map(Pose::middle_s);
     let own: Vec<(f64, f64)> = times.zip(after.length.iter().map(|length| length * 1e3)).collect();
     let turns: Vec<(f64, f64)> = after.turn_s.iter().copied().zip(after.angle_deg.iter().copied()).collect();
     let panel = |title: &str, unit: &str, points: Vec<(f64, f64)>| Panel {
@@ -187,20 +184,11 @@ fn coefficients(document: &Document, tumble: &Tumble) -> Vec<Coefficient> {
     all
 }
 
-/// States in the document where its numbers come from.
+/// What the document says of the fit beside its coefficients.
 ///
 /// # Errors
-/// [`Error::Log`] where a log cannot be read for its digest.
-pub fn with_origin(
-    document: &mut Document,
-    tumble: &Tumble,
-    settings: &Settings,
-    report: &FitReport,
-    logs: &[PathBuf],
-) -> Result<(), Error> {
-    let mut origin = origin(logs, &command_line())?;
-    origin.method = Some("tumble: |f| = g over still poses; gyros against the accelerometers".to_owned());
-    origin.residual = residuals(&report.verdicts);
+/// [`Error::Document`] where it cannot be written, which would be a mistake here.
+pub fn details(tumble: &Tumble, settings: &Settings, report: &FitReport) -> Result<toml::Table, Error> {
     let coefficients: serde_json::Map<String, serde_json::Value> = report
         .coefficients
         .iter()
@@ -210,8 +198,6 @@ pub fn with_origin(
         .collect();
     let covariance: Vec<Vec<f64>> =
         tumble.accel.covariance.row_iter().map(|row| row.iter().copied().collect()).collect();
-    let old = document.origin.take().and_then(|old| old.details);
-    let mut details = old.unwrap_or_default();
     let about = json!({
         "gravity_m_per_s2": settings.gravity,
         "poses": tumble.poses.len(),
@@ -224,9 +210,39 @@ pub fn with_origin(
         // Scale factors (relative), biases over K·g, angles xy, xz, yz (rad).
         "accelerometer_covariance": covariance,
     });
-    let about = toml::Value::try_from(about).map_err(|error| Error::Document(vec![error.to_string()]))?;
-    details.insert("tumble".to_owned(), about);
-    origin.details = Some(details);
-    document.origin = Some(origin);
-    Ok(())
+    toml::Table::try_from(about).map_err(|error| Error::Document(vec![error.to_string()]))
+}
+
+/// Standard errors of scale factors, biases and axes, for what compares documents.
+#[must_use]
+pub fn sigmas(document: &Document, tumble: &Tumble) -> Sigmas {
+    let mut sigmas = Sigmas::default();
+    let accel = &tumble.accel;
+    // Row and column of each angle; the others are zero by definition.
+    let angle = |row: usize, column: usize| match (row, column) {
+        (0, 1) => accel.sigma[6],
+        (0, 2) => accel.sigma[7],
+        (1, 2) => accel.sigma[8],
+        _ => 0.0,
+    };
+    let arcsec = |rad: f64| tidy(rad * ARCSEC_PER_RAD);
+    let sensors = document.accel.iter().flat_map(|accel| &accel.sensor);
+    for (axis, sensor) in sensors.enumerate().take(AXES.len()) {
+        let scale = tidy(accel.scale[axis].abs() * accel.sigma[axis]);
+        sigmas.put("accel", &sensor.name, "scale_factor", vec![scale]);
+        sigmas.put("accel", &sensor.name, "bias", vec![tidy(accel.sigma[3 + axis])]);
+        let row = [0, 1, 2].map(|column| arcsec(angle(axis, column)));
+        sigmas.put("accel", &sensor.name, "axis_arcsec", row.to_vec());
+    }
+    let Ok(gyro) = &tumble.gyro else { return sigmas };
+    for (axis, sensor) in document.gyro.sensor.iter().enumerate().take(AXES.len()) {
+        let ppm = tidy(1e6 * gyro.sigma[axis] / gyro.weight[axis].abs());
+        sigmas.put("gyro", &sensor.name, "increment_weight_ppm", vec![ppm]);
+        let mut row = [0.0; 3];
+        for (which, column) in (0..3).filter(|column| *column != axis).enumerate() {
+            row[column] = arcsec(gyro.sigma[3 + 2 * axis + which]);
+        }
+        sigmas.put("gyro", &sensor.name, "axis_arcsec", row.to_vec());
+    }
+    sigmas
 }

@@ -2,11 +2,10 @@
 
 use std::collections::BTreeSet;
 
-use isotherm_log::progress::Progress;
 use isotherm_protocol::document::Document;
 use toml::Value;
 
-use crate::run::{Run, Watch};
+use crate::run::Run;
 
 /// A run, and whether the document was made from it.
 #[derive(Debug, Clone)]
@@ -40,22 +39,5 @@ fn gather(value: &Value, found: &mut BTreeSet<String>) {
             table.values().for_each(|value| gather(value, found));
         }
         _ => {}
-    }
-}
-
-/// A watch that is lent for one reading.
-pub(super) struct Lent<'a, W: Watch>(pub(super) &'a mut W);
-
-impl<W: Watch> Watch for Lent<'_, W> {
-    fn begin(&mut self, progress: Progress) {
-        self.0.begin(progress);
-    }
-
-    fn step(&mut self) {
-        self.0.step();
-    }
-
-    fn end(&mut self) {
-        self.0.end();
     }
 }

@@ -101,14 +101,15 @@ impl Page {
 
     /// A table.
     pub fn table(&mut self, table: &Table) {
+        let kinds: Vec<&str> = (0..table.head.len()).map(|column| kind(table, column)).collect();
         self.body.push_str("<div class=\"table\"><table>\n<thead><tr>");
-        self.cells("th", &table.head);
+        self.cells("th", &table.head, &kinds);
         self.body.push_str("</tr></thead>\n<tbody>\n");
         for row in &table.rows {
             let (name, values) = row.split_at(row.len().min(1));
             self.body.push_str("<tr>");
-            self.cells("th", name);
-            self.cells("td", values);
+            self.cells("th", name, &kinds);
+            self.cells("td", values, kinds.get(1..).unwrap_or_default());
             self.body.push_str("</tr>\n");
         }
         self.body.push_str("</tbody></table></div>\n");
@@ -147,9 +148,10 @@ impl Page {
         )
     }
 
-    fn cells(&mut self, tag: &str, cells: &[String]) {
-        for cell in cells {
-            self.write(format_args!("<{tag}>{}</{tag}>", escape(cell)));
+    fn cells(&mut self, tag: &str, cells: &[String], kinds: &[&str]) {
+        for (index, cell) in cells.iter().enumerate() {
+            let kind = kinds.get(index).copied().unwrap_or_default();
+            self.write(format_args!("<{tag}{kind}>{}</{tag}>", escape(cell)));
         }
     }
 
@@ -160,6 +162,25 @@ impl Page {
     fn write(&mut self, text: std::fmt::Arguments<'_>) {
         // Writing to a string cannot fail.
         let _ = self.body.write_fmt(text);
+    }
+}
+
+/// Longest word or figure that a column is as wide as (letters); longer ones are set in several lines.
+const WIDEST: usize = 40;
+
+/// The attribute of a column's cells: words stand to the left, figures to the right, and the first column as the style sheet has it.
+fn kind(table: &Table, column: usize) -> &'static str {
+    let cells = || table.rows.iter().filter_map(|row| row.get(column));
+    let figure = |cell: &String| {
+        let bare = cell.trim_start_matches(['→', ' ', '(', '<', '±']);
+        bare.is_empty() || bare == "–" || bare.starts_with(|c: char| c.is_ascii_digit() || "-−+".contains(c))
+    };
+    if column == 0 || cells().all(figure) {
+        ""
+    } else if cells().any(|cell| cell.chars().count() > WIDEST) {
+        " class=\"words long\""
+    } else {
+        " class=\"words\""
     }
 }
 

@@ -4,7 +4,7 @@ mod schema;
 
 use std::marker::PhantomData;
 
-use isotherm_correction::curve::{CurveParts, MAX_COEFFICIENTS, MAX_KNOTS, MIN_KNOTS};
+use isotherm_correction::curve::{Curve as CoreCurve, CurveParts, MAX_COEFFICIENTS, MAX_KNOTS, MIN_KNOTS};
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
 use super::measure::{Argument, Unit};
@@ -104,6 +104,38 @@ impl Shape {
             Self::Spline { .. } => "spline",
         }
     }
+
+    /// The value at an argument, as the core evaluates it: outside its range the curve is held. `None` where the numbers make no
+    /// curve.
+    #[must_use]
+    pub fn at(&self, argument: f64) -> Option<f64> {
+        match self {
+            Self::Constant { value } => Some(*value),
+            _ => CoreCurve::new(&self.to_parts(1.0, 0.0)).ok().map(|curve| curve.at(argument).value),
+        }
+    }
+
+    /// The core's parts, values times `factor`, `plus` a constant.
+    fn to_parts(&self, factor: f64, plus: f64) -> CurveParts {
+        let convert =
+            |knots: &[[f64; 2]]| knots.iter().map(|[x, value]| [*x, value * factor + plus]).collect();
+        match self {
+            Self::Constant { value } => CurveParts::Polynomial {
+                reference: 0.0,
+                coefficients: vec![value * factor + plus],
+                range: EVERYWHERE,
+            },
+            Self::Polynomial { reference, coefficients, range } => {
+                let mut coefficients: Vec<f64> = coefficients.iter().map(|c| c * factor).collect();
+                if let Some(first) = coefficients.first_mut() {
+                    *first += plus;
+                }
+                CurveParts::Polynomial { reference: *reference, coefficients, range: *range }
+            }
+            Self::PiecewiseLinear { knots } => CurveParts::PiecewiseLinear { knots: convert(knots) },
+            Self::Spline { knots } => CurveParts::Spline { knots: convert(knots) },
+        }
+    }
 }
 
 /// Argument range of a constant in the core, which has no form for it: wider than any temperature or rate.
@@ -183,27 +215,18 @@ impl<Q: Quantity> Curve<Q> {
         curve
     }
 
+    /// The same curve held at its value at one argument; one that does not hold stays as it is.
+    #[must_use]
+    pub fn held_at(&self, argument: f64) -> Self {
+        match self.shape.at(argument) {
+            Some(value) => Self::new(Shape::Constant { value }).in_unit(self.unit),
+            None => self.clone(),
+        }
+    }
+
     /// The core's parts, `plus` a constant in its units.
     pub(super) fn to_parts(&self, plus: f64) -> CurveParts {
-        let factor = self.unit.in_core_units();
-        let convert =
-            |knots: &[[f64; 2]]| knots.iter().map(|[x, value]| [*x, value * factor + plus]).collect();
-        match &self.shape {
-            Shape::Constant { value } => CurveParts::Polynomial {
-                reference: 0.0,
-                coefficients: vec![value * factor + plus],
-                range: EVERYWHERE,
-            },
-            Shape::Polynomial { reference, coefficients, range } => {
-                let mut coefficients: Vec<f64> = coefficients.iter().map(|c| c * factor).collect();
-                if let Some(first) = coefficients.first_mut() {
-                    *first += plus;
-                }
-                CurveParts::Polynomial { reference: *reference, coefficients, range: *range }
-            }
-            Shape::PiecewiseLinear { knots } => CurveParts::PiecewiseLinear { knots: convert(knots) },
-            Shape::Spline { knots } => CurveParts::Spline { knots: convert(knots) },
-        }
+        self.shape.to_parts(self.unit.in_core_units(), plus)
     }
 
     /// Keys of the numbers of this curve.

@@ -1,7 +1,9 @@
-//! The replay tool as a whole: its command line, its ready mappings, its simulated logs.
+//! The replay tool as a whole: its command line, its ready mappings, its simulated logs, recording from a bus. One test program, because
+//! every one that opens sessions takes half a minute to build.
 
 #![expect(
     clippy::unwrap_used,
+    clippy::expect_used,
     clippy::panic,
     reason = "helpers of tests end the test where something is not as it must be"
 )]
@@ -15,5 +17,6 @@ mod examples;
 mod info_plot;
 mod python_recordings;
 mod real_logs;
+mod record;
 mod simulated_logs;
 mod text_logs;

@@ -9,7 +9,7 @@ use isotherm_protocol::document::{
 use isotherm_simulator::Scenario;
 use isotherm_simulator::instrument::Gyros;
 use isotherm_simulator::presets::{fibre_optic_chamber, judging_profile, training_profile};
-use isotherm_tests::simulated::{Size, Windows, nominal, rate_errors};
+use isotherm_tests::simulated::{Size, Windows, rate_errors};
 
 use crate::instrument::{
     AXES, accelerometers, bare_gyro, orientation, scale_error, stated, temperature, tidy,
@@ -139,7 +139,7 @@ fn residuals(document: &Document, scenario: &Scenario, sample: Sample) -> Result
             .map_err(|defects| Failure::Compile(format!("{defects:?}")))?;
         Ok(rate_errors(&Arc::new(calibration), scenario, JUDGE_WINDOW_S)?)
     };
-    let (before, after) = (errors(&nominal(document))?, errors(document)?);
+    let (before, after) = (errors(&document.nominal())?, errors(document)?);
     let residual = |(axis, name): (usize, &str)| {
         let (before, after) = (Size::of(before.axis(axis)), Size::of(after.axis(axis)));
         println!(

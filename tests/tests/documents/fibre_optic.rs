@@ -3,7 +3,7 @@
 use isotherm_protocol::document::{Measure, Sample};
 use isotherm_simulator::Scenario;
 use isotherm_simulator::presets::{fibre_optic_chamber, judging_profile, training_profile};
-use isotherm_tests::simulated::{Size, nominal, rate_errors};
+use isotherm_tests::simulated::{Size, rate_errors};
 
 use crate::{compile, parsed};
 
@@ -15,7 +15,7 @@ const TICK_NS: i64 = 50_000_000;
 /// Rate errors per gyro before and after on a scenario.
 fn sizes(scenario: &Scenario) -> Vec<[Size; 2]> {
     let document = parsed("FOG-0001.toml").document;
-    let [before, after] = [nominal(&document), document]
+    let [before, after] = [document.nominal(), document]
         .map(|document| rate_errors(&compile(&document), scenario, WINDOW_S).unwrap());
     (0..3).map(|axis| [Size::of(before.axis(axis)), Size::of(after.axis(axis))]).collect()
 }

@@ -2,7 +2,7 @@
 
 use isotherm_simulator::Scenario;
 use isotherm_simulator::presets::mems_chamber;
-use isotherm_tests::simulated::{Size, nominal, rate_errors};
+use isotherm_tests::simulated::{Size, rate_errors};
 
 use crate::{compile, parsed};
 
@@ -15,7 +15,7 @@ const NOISE_DEG_PER_H: f64 = 0.15 * 6.0;
 fn bias_and_scale_over_temperature_are_removed_to_the_noise_floor() {
     let scenario = Scenario { tick_ns: 50_000_000, ..mems_chamber(31) };
     let document = parsed("MEMS-0001.toml").document;
-    let before = rate_errors(&compile(&nominal(&document)), &scenario, WINDOW_S).unwrap();
+    let before = rate_errors(&compile(&document.nominal()), &scenario, WINDOW_S).unwrap();
     let after = rate_errors(&compile(&document), &scenario, WINDOW_S).unwrap();
     for axis in 0..3 {
         let (before, after) = (Size::of(before.axis(axis)), Size::of(after.axis(axis)));

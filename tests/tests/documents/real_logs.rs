@@ -7,7 +7,7 @@ use isotherm_correction::sample::CorrectedTick;
 use isotherm_correction::units::AngularRate;
 use isotherm_tests::data;
 use isotherm_tests::logs::{RealLog, correct, events};
-use isotherm_tests::simulated::{Size, nominal};
+use isotherm_tests::simulated::Size;
 
 use crate::{compile, parsed};
 
@@ -57,7 +57,7 @@ fn needs_data_the_cubic_of_the_chamber_log_reaches_the_known_residuals() {
         let forces = ticks.iter().map(|t| t.delta_velocity[2] / t.duration.as_s());
         [Size::of(rates).deviation, Size::of(forces).deviation]
     };
-    let mut bare = nominal(&document);
+    let mut bare = document.nominal();
     for sensor in &mut bare.accel.as_mut().unwrap().sensor {
         sensor.bias = None;
     }

@@ -8,7 +8,7 @@ use isotherm_simulator::instrument::Gyros;
 use isotherm_simulator::noise::GyroNoise;
 use isotherm_simulator::presets::{zeeman_rest, zeeman_sine};
 use isotherm_simulator::zeeman::Zeeman;
-use isotherm_tests::simulated::{Size, nominal, run};
+use isotherm_tests::simulated::{Size, run};
 
 use crate::{compile, parsed};
 
@@ -54,7 +54,7 @@ fn mean(stretches: &[(LasingMode, [f64; 3])], mode: LasingMode, axis: usize) -> 
 fn at_rest_the_mode_dependent_drift_is_removed_to_the_noise_floor() {
     let scenario = zeeman_rest(11);
     let document = parsed(FILE).document;
-    let (raw, corrected) = (stretches(&nominal(&document), &scenario), stretches(&document, &scenario));
+    let (raw, corrected) = (stretches(&document.nominal(), &scenario), stretches(&document, &scenario));
     for axis in 0..3 {
         let drift = [LasingMode::Plus, LasingMode::Minus].map(|mode| mean(&raw, mode, axis).0);
         println!("gyro {axis}: nominal {:.3} and {:.3} °/h", drift[0], drift[1]);

@@ -51,7 +51,6 @@ impl Sums {
 /// Cuts one run.
 pub(super) struct Knife {
     cut: Cut,
-    group: [usize; 3],
     axes: Option<OrientationThermal>,
     begin_s: f64,
     first_ns: Option<i64>,
@@ -65,10 +64,9 @@ pub(super) struct Knife {
 }
 
 impl Knife {
-    pub(super) fn new(cut: Cut, group: [usize; 3], bare: &Document, begin_s: f64, stretch: usize) -> Self {
+    pub(super) fn new(cut: Cut, bare: &Document, begin_s: f64, stretch: usize) -> Self {
         Self {
             cut,
-            group,
             axes: bare.gyro.orientation.thermal.clone(),
             begin_s,
             first_ns: None,
@@ -128,7 +126,7 @@ impl Knife {
         if let Some(thermal) = &self.axes {
             self.axes_deg_c = temperature(thermal, unit);
         }
-        let dither = self.group.map(|sensor| dither_hz(raw, sensor).unwrap_or(f64::NAN));
+        let dither = [0, 1, 2].map(|sensor| dither_hz(raw, sensor).unwrap_or(f64::NAN));
         self.second.add(since_s, ticks, dither);
         self.cell.add(since_s, ticks, dither);
         if self.second.good_s > 1.0 - 0.5 * bare.duration.as_s() {

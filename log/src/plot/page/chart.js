@@ -42,7 +42,10 @@ class Chart {
       [low, high] = [Math.min(low, l), Math.max(high, h)];
     }
     if (!(low <= high)) return [0, 1];
-    return high > low ? [low, high] : [low - 0.5, high + 0.5];
+    if (!(high > low)) return [low - 0.5, high + 0.5];
+    // Dots at either end are not to be cut in two by the frame.
+    const dots = this.shape.panels.some(panel => (panel.series ?? []).some(one => one.form === "dots"));
+    return dots ? widened([low, high], 0.02, this.shape.x.logarithmic) : [low, high];
   }
 
   toolbar() {

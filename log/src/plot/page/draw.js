@@ -53,7 +53,7 @@ function drawSeries(g, view, y, s, form, colour, density) {
   g.strokeStyle = g.fillStyle = colour;
   const [from, end] = visible(s, view.range);
   if (form === "dots") {
-    const size = end - from > 2000 ? 1.5 : 3;
+    const size = end - from > 2000 ? 1.5 : end - from > 200 ? 3 : 5;
     for (let i = from; i < end; i++) {
       const value = s.mean.list[i];
       if (value !== value) continue;

@@ -87,7 +87,9 @@ class Panel {
       low = Math.max(low, high * 1e-12);
       [low, high] = high > 0 ? [low / 1.15, high * 1.15] : [0.1, 1];
     } else {
-      const room = high > low ? 0.06 * (high - low) : Math.max(Math.abs(low) * 1e-6, 1e-9);
+      // What varies by less than a ten-millionth of itself is level, and its rounding no curve.
+      const size = Math.max(Math.abs(low), Math.abs(high));
+      const room = high - low > 1e-7 * size ? 0.06 * (high - low) : Math.max(0.05 * size, 1e-9);
       [low, high] = [low - room, high + room];
     }
     const most = Math.max(2, Math.round(this.height / 27));

@@ -55,7 +55,9 @@ function grouped(text) {
 /** A number beside a tick mark. */
 function tickLabel(value, decimals) {
   const size = Math.abs(value);
-  if (decimals === null || size >= 1e9 || (size > 0 && decimals > 6 && size < 1e-3)) return plain(value, 3);
+  if (decimals === null || size >= 1e9) return plain(value, 3);
+  // As many digits as tell it from its neighbours.
+  if (size > 0 && decimals > 6 && size < 1e-3) return plain(value, Math.max(3, Math.floor(Math.log10(size) + 1e-9) + 1 + decimals));
   return grouped(value.toFixed(decimals));
 }
 
@@ -89,6 +91,13 @@ function zoomed([low, high], at, factor, whole, least) {
   const span = Math.min(Math.max((high - low) * factor, least), whole[1] - whole[0]);
   const share = (at - low) / (high - low);
   return held([at - share * span, at + (1 - share) * span], whole);
+}
+
+/** A range with a share of itself more at either end. */
+function widened([low, high], share, logarithmic) {
+  if (logarithmic) return widened([Math.log(low), Math.log(high)], share, false).map(Math.exp);
+  const by = share * (high - low);
+  return [low - by, high + by];
 }
 
 /** A part of the axis moved so far that it lies inside `whole`. */

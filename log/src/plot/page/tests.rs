@@ -148,3 +148,19 @@ fn the_whole_script_can_be_parsed_where_node_is_there() {
         Ok(output) => assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr)),
     }
 }
+
+#[test]
+fn words_stand_to_the_left_and_figures_to_the_right() {
+    let mut page = Page::new("x");
+    let row = |cells: [&str; 4]| cells.map(str::to_owned).to_vec();
+    let long = "failed: a reason that is longer than a phone is wide, by far";
+    page.table(&Table {
+        head: row(["unit", "of", "rms", "state"]),
+        rows: vec![row(["A", "gyro x", "→ 1.5", "accepted"]), row(["B", "gyro y", "–", long])],
+    });
+    let html = page.to_html();
+    let line =
+        "<th>A</th><td class=\"words\">gyro x</td><td>→ 1.5</td><td class=\"words long\">accepted</td>";
+    assert!(html.contains(line), "{html}");
+    assert!(html.contains("<th>unit</th><th class=\"words\">of</th><th>rms</th>"), "{html}");
+}

@@ -8,7 +8,7 @@ use tokio::sync::mpsc::unbounded_channel;
 use tokio::time::timeout;
 use zenoh::Wait;
 
-use crate::bus::{Bench, LIMIT, read};
+use super::bus::{Bench, LIMIT, read};
 
 /// A memory that is told from others by its number.
 fn memory(unit: &UnitId, number: u64) -> JournalEntry {

@@ -8,11 +8,8 @@
     reason = "a test stops where something is missing, and its numbers are small"
 )]
 
-#[path = "thermal/bad_input.rs"]
 mod bad_input;
-#[path = "thermal/chamber.rs"]
 mod chamber;
-#[path = "thermal/service.rs"]
 mod service;
 
 use isotherm_calibration::report::FitReport;

@@ -16,7 +16,8 @@ use zenoh::Session;
 use zenoh::pubsub::Publisher;
 use zenoh::qos::{CongestionControl, Priority};
 
-use crate::common::{replay, shell_example, temperature};
+use super::{shell_example, temperature};
+use crate::common::replay;
 
 pub(crate) const LIMIT: Duration = Duration::from_secs(30);
 

@@ -1,13 +1,6 @@
 //! `tumble`: the real log of a unit tumbled by hand, and a simulated one whose constants are known.
-#![expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, reason = "counts of tests")]
-#![expect(clippy::unwrap_used, reason = "helpers of tests end the test where something is not as it must be")]
-
-#[path = "positions_stand/mod.rs"]
-#[expect(dead_code, reason = "other tests use the rest")]
-mod stand;
 
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
 use isotherm_calibration::means::Size;
 use isotherm_calibration::positions::bare::bare;
@@ -25,22 +18,9 @@ use isotherm_simulator::instrument::{Gyros, Instrument};
 use isotherm_simulator::presets::mems_chamber;
 use nalgebra::Matrix3;
 use serde_json::Value;
-use stand::{Dice, GRAVITY, Stand};
 
-fn root() -> PathBuf {
-    PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
-}
-
-/// The real log's two files, where they are.
-fn real() -> Option<[PathBuf; 2]> {
-    let data = std::env::var_os("ISOTHERM_DATA").map_or_else(|| root().join("../shared/data"), PathBuf::from);
-    let files = ["gyro.txt.gz", "acc.txt.gz"].map(|name| data.join("tumble-mems").join(name));
-    let there = files.iter().all(|file| file.exists());
-    if !there {
-        println!("skipped: no data at {}", data.display());
-    }
-    there.then_some(files)
-}
+use crate::command::{data, program, root};
+use crate::stand::{self, Dice, GRAVITY, Stand};
 
 fn constant(shape: &Shape) -> f64 {
     let Shape::Constant { value } = shape else { unreachable!() };
@@ -49,12 +29,12 @@ fn constant(shape: &Shape) -> f64 {
 
 #[test]
 fn the_real_tumble_log_gives_the_known_answers() {
-    let Some(files) = real() else { return };
+    let Some(data) = data("tumble-mems") else { return };
+    let files = ["gyro.txt.gz", "acc.txt.gz"].map(|name| data.join(name));
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("tumble.toml");
     let mapping = root().join("config/mappings/tumble-mems.toml");
-    let done = Command::new(env!("CARGO_BIN_EXE_isotherm-calibrate"))
-        .arg("tumble")
+    let done = program(&["tumble"])
         .args(&files)
         .args(["--unit", "TUMBLE-0001", "--gravity", "9.81744", "--json", "--mapping"])
         .arg(&mapping)
@@ -140,7 +120,7 @@ fn track(instrument: &Instrument, attitudes: &[Matrix3<f64>], how: &Stand) -> (T
     // No channels: the log has one temperature.
     events.retain(|event| !matches!(event, isotherm_log::text::LogEvent::Temperature(_)));
     let run = stand::run("tumbled", events);
-    let document = bare(&run.series(()).unwrap(), AccelOutput::MetresPerSecondSquared, None).unwrap();
+    let document = bare(&run.series(()).unwrap(), AccelOutput::MetresPerSecondSquared).unwrap();
     (Track::of(&run, &Written::of(&document).unwrap().loaded, ()).unwrap(), held)
 }
 

@@ -4,11 +4,11 @@ use std::path::Path;
 
 use isotherm_correction::sample::{GyroTick, OutputKind};
 use isotherm_correction::units::{Span, Timestamp};
-use isotherm_log::message::{Message, Topic};
-use isotherm_log::recording::{RecordingOptions, RecordingWriter};
-use isotherm_protocol::raw::Batcher;
+use isotherm_log::text::LogEvent;
 use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::{Rng, SeedableRng};
+
+use crate::simulated_logs::record_events;
 
 /// Normal deviates.
 pub(crate) struct Normal {
@@ -90,31 +90,20 @@ pub(crate) fn recording(
     tick_ns: i64,
     keep: impl Fn(usize) -> bool,
 ) {
-    let unit = isotherm_log::offline::unit_id(serial).unwrap();
-    let mut writer = RecordingWriter::create(path, RecordingOptions::default()).unwrap();
-    let mut batcher = Batcher::new(256);
-    let mut write = |batcher: &mut Batcher| {
-        while let Some(frame) = batcher.next_frame() {
-            let topic = Topic::Raw(unit.clone(), frame.stream);
-            let received_ns = u64::try_from(frame.time.as_ns()).unwrap();
-            writer.write(&Message { topic, received_ns, frame: frame.frame }).unwrap();
-        }
+    let tick = |index: usize| GyroTick {
+        sequence: index as u64,
+        end_time: Timestamp::from_ns((index as i64 + 1) * tick_ns),
+        duration: Span::from_ns(tick_ns),
+        readings: columns
+            .iter()
+            .map(|column| column[index] * (std::f64::consts::PI / 180.0 / 3600.0))
+            .collect(),
+        ..GyroTick::default()
     };
-    for index in (0..columns[0].len()).filter(|index| keep(*index)) {
-        let tick = GyroTick {
-            sequence: index as u64,
-            end_time: Timestamp::from_ns((index as i64 + 1) * tick_ns),
-            duration: Span::from_ns(tick_ns),
-            readings: columns
-                .iter()
-                .map(|column| column[index] * (std::f64::consts::PI / 180.0 / 3600.0))
-                .collect(),
-            ..GyroTick::default()
-        };
-        batcher.gyro(OutputKind::Mean, tick).unwrap();
-        write(&mut batcher);
-    }
-    batcher.flush().unwrap();
-    write(&mut batcher);
-    writer.finish().unwrap();
+    let kept = (0..columns[0].len()).filter(|index| keep(*index));
+    record_events(
+        path,
+        serial,
+        kept.map(|index| LogEvent::Gyro { output: OutputKind::Mean, tick: tick(index) }),
+    );
 }

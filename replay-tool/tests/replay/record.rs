@@ -1,7 +1,11 @@
-//! What the tests of recordings share.
+//! Recording from the bus, and recovering what a recorder has left behind.
 
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+mod bus;
+mod memory;
+mod recover;
+
+use std::path::PathBuf;
+use std::process::Command;
 
 use isotherm_correction::sample::ChannelName;
 use isotherm_log::message::{Message, Topic};
@@ -9,13 +13,10 @@ use isotherm_protocol::codec;
 use isotherm_protocol::key::{RawStream, UnitId};
 use isotherm_protocol::raw::{TemperatureBatch, TemperatureTick};
 
-/// Runs the program in a folder.
-pub(crate) fn replay(folder: &Path, args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_isotherm-replay")).current_dir(folder).args(args).output().unwrap()
-}
+use crate::common::replay;
 
 /// A message that is told from others by its number.
-pub(crate) fn temperature(serial: &str, number: u32) -> Message {
+fn temperature(serial: &str, number: u32) -> Message {
     let channels = [ChannelName::from("board").unwrap()].into_iter().collect();
     let raw = [f64::from(number) * 1.1].into_iter().collect();
     let ticks = vec![TemperatureTick { time_ns: i64::from(number) * 5_000_000, raw }];
@@ -25,7 +26,7 @@ pub(crate) fn temperature(serial: &str, number: u32) -> Message {
 }
 
 /// Runs the lines of a command's example in an empty folder; each must succeed, and these commands must be among them.
-pub(crate) fn shell_example(command: &str, expected: &[&str]) {
+fn shell_example(command: &str, expected: &[&str]) {
     let folder = tempfile::tempdir().unwrap();
     let help = String::from_utf8(replay(folder.path(), &[command, "--help"]).stdout).unwrap();
     let example = help.split("Example").nth(1).unwrap().split("\n\n").next().unwrap();

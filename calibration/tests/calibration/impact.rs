@@ -1,15 +1,11 @@
 //! `impact`: the figures of 002, and the command as its user calls it.
-#![expect(clippy::cast_precision_loss, reason = "ticks of three days")]
-#![expect(clippy::unwrap_used, reason = "helpers of tests end the test where something is not as it must be")]
-
-use std::path::Path;
-use std::process::{Command, Output};
 
 use isotherm_calibration::impact::monte_carlo::{drift, sail_all};
 use isotherm_calibration::impact::scenario::{CARES, Care, Drift, Figures, Voyage};
 use isotherm_correction::drift::DriftParts;
 use isotherm_correction::units::AngularRate;
-use serde_json::Value;
+
+use crate::command::{calibrate, json, shipped};
 
 const VOYAGE: Voyage = Voyage {
     latitude_deg: 60.0,
@@ -113,16 +109,6 @@ fn the_trend_state_costs_nothing_where_there_is_none() {
     assert!(with < 1.1 * without, "{with} {without}");
 }
 
-fn calibrate(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_isotherm-calibrate")).args(arguments).output().unwrap()
-}
-
-fn json(arguments: &[&str]) -> Value {
-    let output = calibrate(arguments);
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    serde_json::from_slice(&output.stdout).unwrap()
-}
-
 #[test]
 fn the_command_sails_stated_drifts_and_documents() {
     let folder = tempfile::tempdir().unwrap();
@@ -137,10 +123,7 @@ fn the_command_sails_stated_drifts_and_documents() {
     let page = std::fs::read_to_string(&html).unwrap();
     assert!(page.contains(report["verdict"].as_str().unwrap()));
 
-    let document = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../config/calibration/ZLG-0001.toml")
-        .display()
-        .to_string();
+    let document = shipped("ZLG-0001.toml").display().to_string();
     let arguments = ["impact", "--document", &document, "--seeds", "4", "--hours", "12", "--json"];
     let many = json(&arguments);
     assert_eq!(many["rows"].as_array().unwrap().len(), 3);

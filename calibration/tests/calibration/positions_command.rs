@@ -1,20 +1,19 @@
 //! `positions` as its user calls it.
-#![expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, reason = "counts of tests")]
-#![expect(clippy::unwrap_used, reason = "helpers of tests end the test where something is not as it must be")]
-
-#[path = "positions_stand/mod.rs"]
-#[expect(dead_code, reason = "other tests use the rest")]
-mod stand;
 
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
 
 use isotherm_calibration::positions::plan::Plan;
+use isotherm_calibration::report::Sigmas;
 use isotherm_calibration::written::Written;
-use stand::{ARCSEC, Dice, Stand};
+use isotherm_protocol::document::Document;
+
+use crate::command::program;
+use crate::simulated_logs::record_events;
+use crate::stand::{self, ARCSEC, Dice, Stand};
 
 /// A stand that turns the unit, ten ticks a second.
-fn driven(seed: u64) -> Stand {
+pub(crate) fn driven(seed: u64) -> Stand {
     Stand {
         errors: Dice::new(seed).vector(60.0 * ARCSEC),
         positioning: 5.385 * ARCSEC,
@@ -26,9 +25,9 @@ fn driven(seed: u64) -> Stand {
     }
 }
 
-/// Runs the command in a folder.
-fn calibrate(folder: &Path, args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_isotherm-calibrate")).current_dir(folder).args(args).output().unwrap()
+/// Runs the program in a folder.
+fn within(folder: &Path, arguments: &[&str]) -> Output {
+    program(arguments).current_dir(folder).output().unwrap()
 }
 
 fn text(bytes: &[u8]) -> String {
@@ -54,7 +53,7 @@ fn the_command_writes_the_document_and_says_what_it_did() {
         let mut args = vec!["positions", "cold.csv", "hot.csv"];
         args.extend(common);
         args.extend(more);
-        calibrate(folder.path(), &args)
+        within(folder.path(), &args)
     };
     let done = call(&["--out", "new.toml", "--html", "new.html", "--judge", "room.csv"]);
     assert!(done.status.success(), "{}", text(&done.stderr));
@@ -86,7 +85,7 @@ fn the_command_writes_the_document_and_says_what_it_did() {
     let second = std::fs::read_to_string(at("new.toml")).unwrap();
     assert_eq!(text(&first), second.replace(" --overwrite", ""));
     // JSON instead of tables; a warning where nobody says what gravity is.
-    let json = calibrate(
+    let json = within(
         folder.path(),
         &["positions", "room.csv", "--mapping", "mapping.toml", "--document", "base.toml", "--json"],
     );
@@ -99,13 +98,51 @@ fn the_command_writes_the_document_and_says_what_it_did() {
 }
 
 #[test]
+fn several_units_on_one_stand_end_with_one_table() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    std::fs::create_dir(at("documents")).unwrap();
+    let order: Vec<usize> = (0..12).collect();
+    for (seed, unit) in [(21, "MEMS-0001"), (22, "MEMS-0002")] {
+        let (events, _) = stand::log(&stand::instrument(), 20.0, &Plan::twelve(), &order, &driven(seed));
+        record_events(&at(&format!("{unit}.mcap")), unit, &events);
+        let document = Document { unit: unit.into(), ..stand::document() };
+        std::fs::write(at(&format!("documents/{unit}.toml")), Written::of(&document).unwrap().text).unwrap();
+    }
+    let logs = ["positions", "MEMS-0001.mcap", "MEMS-0002.mcap"];
+    let rest = ["--document", "documents", "--gravity", "9.8154", "--out", "new.toml", "--html", "new.html"];
+    let done = within(folder.path(), &[&logs[..], &rest].concat());
+    assert!(done.status.success(), "{}", text(&done.stderr));
+    let said = text(&done.stdout);
+    assert!(said.contains("\n2 units: 8 of 8 sensors accepted.\n"), "{said}");
+    for unit in ["MEMS-0001", "MEMS-0002"] {
+        let written = Written::read(&at(&format!("new-{unit}.toml"))).unwrap();
+        assert_eq!(written.document.unit, unit);
+        let sigma = Sigmas::of(&written.document);
+        let axis = sigma.get("accel", "x", "axis_arcsec").unwrap();
+        assert!(axis[0] < 0.1 && axis[1] > 1.0 && axis[1] < 30.0, "{axis:?}");
+        assert!(sigma.get("accel", "x", "scale_factor").is_some_and(|sigma| sigma[0] > 0.0));
+        assert!(at(&format!("new-{unit}.html")).exists());
+    }
+    // By itself a unit comes to the same.
+    let alone = ["positions", "MEMS-0002.mcap", "--document", "documents/MEMS-0002.toml"];
+    let done = within(folder.path(), &[&alone[..], &["--gravity", "9.8154", "--out", "alone.toml"]].concat());
+    assert!(done.status.success(), "{}", text(&done.stderr));
+    let accel = |name: &str| Written::read(&at(name)).unwrap().document.accel;
+    assert_eq!(accel("alone.toml"), accel("new-MEMS-0002.toml"));
+    // What diff makes of the two: each axis beside its standard error.
+    let changed = within(folder.path(), &["diff", "alone.toml", "new-MEMS-0002.toml"]);
+    assert!(text(&changed.stdout).contains(" ± "), "{}", text(&changed.stdout));
+}
+
+#[test]
 fn the_budget_prints_the_examples_of_the_paper() {
     let folder = tempfile::tempdir().unwrap();
-    let said = text(&calibrate(folder.path(), &["positions", "--budget"]).stdout);
+    let said = text(&within(folder.path(), &["positions", "--budget"]).stdout);
     for words in ["11.5", "10.6", "0.3″ for quartz", "1.2″ for silicon", "15.7″"] {
         assert!(said.contains(words), "{words} is not in\n{said}");
     }
-    let json = calibrate(
+    let json = within(
         folder.path(),
         &["positions", "--budget", "--json", "--axis-rate", "6", "--positioning", "1", "--run-out", "0"],
     );

@@ -1,39 +1,15 @@
 //! `drift`: known noise in, its coefficients out; real logs; refusals; what goes into a document.
-#![expect(
-    clippy::cast_precision_loss,
-    clippy::cast_possible_truncation,
-    clippy::cast_possible_wrap,
-    reason = "numbers of ticks and seeds of tests"
-)]
-#![expect(clippy::unwrap_used, reason = "helpers of tests end the test where something is not as it must be")]
-#![expect(clippy::float_cmp, reason = "a document states what was printed")]
 
-mod drift_generator;
+use std::path::Path;
 
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
-
-use drift_generator::{Markov, Normal, recording};
 use isotherm_calibration::allan::deviation::lengths;
 use isotherm_calibration::allan::{Coefficient, Estimator, NoiseFit, Phase, Term};
 use isotherm_calibration::drift::markov::Fit;
 use isotherm_calibration::drift::slow::Slow;
 use isotherm_protocol::document::Document;
-use serde_json::Value;
 
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
-}
-
-fn calibrate(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_isotherm-calibrate")).args(arguments).output().unwrap()
-}
-
-fn json(arguments: &[&str]) -> Value {
-    let output = calibrate(arguments);
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    serde_json::from_slice(&output.stdout).unwrap()
-}
+use crate::command::{calibrate, data, json, root};
+use crate::drift_generator::{Markov, Normal, recording};
 
 fn fit(readings: &[f64], tick_s: f64) -> NoiseFit {
     let phase = Phase::new([readings], 0.0);
@@ -274,13 +250,8 @@ fn what_a_log_does_not_allow_is_refused_in_words() {
 
 #[test]
 fn with_data_the_laser_gyro_log_has_its_mean_rates_and_noise() {
-    let folder =
-        std::env::var_os("ISOTHERM_DATA").map_or_else(|| root().join("../shared/data"), PathBuf::from);
-    let log = folder.join("rlg-static/rlg-static.imu.gz").display().to_string();
-    if !Path::new(&log).exists() {
-        println!("skipped: no data at {log}");
-        return;
-    }
+    let Some(folder) = data("rlg-static") else { return };
+    let log = folder.join("rlg-static.imu.gz").display().to_string();
     let mapping = root().join("config/mappings/rlg-static.toml").display().to_string();
     let counts = calibrate(&["drift", &log, "--mapping", &mapping]);
     assert_eq!(counts.status.code(), Some(1));

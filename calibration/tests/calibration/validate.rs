@@ -1,10 +1,6 @@
 //! `validate`: a document judged on logs, as its user calls it.
-#![expect(clippy::unwrap_used, reason = "helpers of tests end the test where something is not as it must be")]
 
-mod simulated_logs;
-
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::path::Path;
 
 use isotherm_calibration::means::Means;
 use isotherm_calibration::provenance::origin;
@@ -18,32 +14,15 @@ use isotherm_protocol::document::{Document, Shape};
 use isotherm_simulator::Simulation;
 use isotherm_simulator::failure::{FailingSensor, Failure, Fault};
 use serde_json::Value;
-use simulated_logs::{fibre_optic, record, write_text};
+
+use crate::command::{calibrate, json, shipped, words};
+use crate::simulated_logs::{fibre_optic, record, write_text};
 
 /// Length of the runs: a hold, and most of a ramp.
 const SECONDS: f64 = 3600.0;
 
-fn calibrate(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_isotherm-calibrate")).args(arguments).output().unwrap()
-}
-
-fn json(arguments: &[&str]) -> Value {
-    let output = calibrate(arguments);
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    serde_json::from_slice(&output.stdout).unwrap()
-}
-
-fn words(output: &Output) -> (Option<i32>, String, String) {
-    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
-    (output.status.code(), text(&output.stdout), text(&output.stderr))
-}
-
-fn document() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/calibration/FOG-0001.toml")
-}
-
 fn save(path: &Path, change: impl FnOnce(&mut Document)) {
-    let mut changed = Written::read(&document()).unwrap().document;
+    let mut changed = Written::read(&shipped("FOG-0001.toml")).unwrap().document;
     change(&mut changed);
     Written::of(&changed).unwrap().save(path, true).unwrap();
 }
@@ -53,7 +32,7 @@ fn a_good_document_is_accepted_and_a_bad_one_is_not() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).display().to_string();
     record(Path::new(&path("judge.mcap")), &fibre_optic(5, "FOG-0001", SECONDS));
-    let good = document().display().to_string();
+    let good = shipped("FOG-0001.toml").display().to_string();
     // White noise is the most of what is left in shorter windows.
     let arguments =
         ["validate", &good, &path("judge.mcap"), "--window", "50", "--json", "--html", &path("judge.html")];
@@ -98,7 +77,7 @@ fn a_log_that_the_document_was_made_from_is_in_sample() {
     let path = |name: &str| folder.path().join(name).display().to_string();
     record(Path::new(&path("known.mcap")), &fibre_optic(5, "FOG-0001", SECONDS));
     save(Path::new(&path("unit.toml")), |document| {
-        let of_log = origin(&[PathBuf::from(path("known.mcap"))], "test").unwrap();
+        let of_log = origin(&[path("known.mcap").into()], "test").unwrap();
         document.origin.get_or_insert_default().log = of_log.log;
     });
     let report = json(&["validate", &path("unit.toml"), &path("known.mcap"), "--json"]);
@@ -149,7 +128,7 @@ fn a_text_log_says_the_same_as_a_recording() {
     scenario.start_ns = 0;
     record(Path::new(&path("judge.mcap")), &scenario);
     write_text(Path::new(&path("judge.csv")), Path::new(&path("mapping.toml")), &scenario);
-    let document = document().with_file_name("MEMS-0001.toml").display().to_string();
+    let document = shipped("MEMS-0001.toml").display().to_string();
     let recorded = json(&["validate", &document, &path("judge.mcap"), "--json"]);
     let written =
         json(&["validate", &document, &path("judge.csv"), "--mapping", &path("mapping.toml"), "--json"]);
@@ -181,7 +160,7 @@ fn temperatures_of_a_recording_are_those_of_their_time() {
         events.push(LogEvent::Gyro { output: OutputKind::Mean, tick: step.gyro });
     }
     let in_memory = Run::of_events("recorded".into(), unit, events);
-    let loaded = Written::read(&document()).unwrap().loaded;
+    let loaded = Written::read(&shipped("FOG-0001.toml")).unwrap().loaded;
     let [a, b] = [&recorded, &in_memory].map(|run| Means::of(run, &loaded, 10.0, ()).unwrap());
     assert_eq!(a, b);
 }
@@ -190,7 +169,7 @@ fn temperatures_of_a_recording_are_those_of_their_time() {
 fn what_cannot_be_judged_is_refused_in_words() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).display().to_string();
-    let good = document().display().to_string();
+    let good = shipped("FOG-0001.toml").display().to_string();
     let refused = |arguments: &[&str], code: i32, word: &str| {
         let (got, _, stderr) = words(&calibrate(arguments));
         assert!(got == Some(code) && stderr.contains(word), "{arguments:?} {got:?}: {stderr}");

@@ -81,12 +81,16 @@ pub(crate) fn with_axes(rows: &[[f64; 3]; 3]) -> Instrument {
     instrument
 }
 
-/// True axes at a housing temperature.
+/// True axes of three accelerometers at a housing temperature.
 pub(crate) fn true_rows(instrument: &Instrument, housing_deg_c: f64) -> [[f64; 3]; 3] {
-    let orientation = &instrument.accelerometers.as_ref().unwrap().orientation;
+    all_rows(&instrument.accelerometers.as_ref().unwrap().orientation, housing_deg_c).try_into().unwrap()
+}
+
+/// True axes at a housing temperature.
+pub(crate) fn all_rows(orientation: &Orientation, housing_deg_c: f64) -> Vec<[f64; 3]> {
     let columns = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
         .map(|unit| orientation.project(unit, housing_deg_c));
-    [0, 1, 2].map(|sensor| [0, 1, 2].map(|axis| columns[axis][sensor]))
+    (0..columns[0].len()).map(|sensor| [0, 1, 2].map(|axis| columns[axis][sensor])).collect()
 }
 
 /// The unit's document before anything was calibrated: one nominal scale factor, no bias, axes along the case.

@@ -1,11 +1,13 @@
 //! Small simulated logs as files.
 
+use std::borrow::Borrow;
 use std::fmt::Write as _;
 use std::path::Path;
 
 use isotherm_log::message::{Message, Topic};
 use isotherm_log::offline::unit_id;
 use isotherm_log::recording::{RecordingOptions, RecordingWriter};
+use isotherm_log::text::LogEvent;
 use isotherm_protocol::raw::Batcher;
 use isotherm_simulator::{Scenario, Simulation};
 
@@ -18,11 +20,27 @@ pub(crate) fn fibre_optic(seed: u64, unit: &str, seconds: f64) -> Scenario {
 
 /// Writes a scenario as a recording, 256 ticks a message.
 pub(crate) fn record(path: &Path, scenario: &Scenario) {
-    let unit = unit_id(&scenario.unit).unwrap();
-    let mut writer = RecordingWriter::create(path, RecordingOptions::default()).unwrap();
-    let mut batcher = Batcher::new(256);
     let output = scenario.instrument.gyros.output_kind();
     let accel_output = scenario.instrument.accel_output_kind();
+    let events = Simulation::new(scenario).unwrap().flat_map(|step| {
+        let accel = accel_output.zip(step.accel).map(|(output, tick)| LogEvent::Accel { output, tick });
+        let temperatures = step.temperatures.into_iter().map(LogEvent::Temperature);
+        let events: Vec<_> =
+            temperatures.chain(accel).chain([LogEvent::Gyro { output, tick: step.gyro }]).collect();
+        events
+    });
+    record_events(path, &scenario.unit, events);
+}
+
+/// Writes what a unit read as a recording, 256 ticks a message.
+pub(crate) fn record_events<E: Borrow<LogEvent>>(
+    path: &Path,
+    unit: &str,
+    events: impl IntoIterator<Item = E>,
+) {
+    let unit = unit_id(unit).unwrap();
+    let mut writer = RecordingWriter::create(path, RecordingOptions::default()).unwrap();
+    let mut batcher = Batcher::new(256);
     let mut write = |batcher: &mut Batcher| {
         while let Some(frame) = batcher.next_frame() {
             let topic = Topic::Raw(unit.clone(), frame.stream);
@@ -30,15 +48,15 @@ pub(crate) fn record(path: &Path, scenario: &Scenario) {
             writer.write(&Message { topic, received_ns, frame: frame.frame }).unwrap();
         }
     };
-    for step in Simulation::new(scenario).unwrap() {
-        for reading in step.temperatures {
-            batcher.temperature(reading).unwrap();
+    for event in events {
+        match event.borrow() {
+            LogEvent::Temperature(reading) => batcher.temperature(*reading).unwrap(),
+            LogEvent::Accel { output, tick } => batcher.accel(*output, tick.clone()).unwrap(),
+            LogEvent::Gyro { output, tick } => {
+                batcher.gyro(*output, tick.clone()).unwrap();
+                write(&mut batcher);
+            }
         }
-        if let (Some(output), Some(tick)) = (accel_output, step.accel) {
-            batcher.accel(output, tick).unwrap();
-        }
-        batcher.gyro(output, step.gyro).unwrap();
-        write(&mut batcher);
     }
     batcher.flush().unwrap();
     write(&mut batcher);

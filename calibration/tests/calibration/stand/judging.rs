@@ -55,13 +55,13 @@ pub(crate) fn tracks(runs: &[Run], written: &Written) -> Vec<Track> {
 }
 
 /// Difference from the true axes at one power, as two angles per accelerometer.
-pub(crate) fn away(analysis: &Analysis, rows: &[[f64; 3]; 3], power: usize, quadratic: bool) -> DVector<f64> {
+pub(crate) fn away(analysis: &Analysis, rows: &[[f64; 3]], power: usize, quadratic: bool) -> DVector<f64> {
     let fit = if quadratic { &analysis.quadratic.as_ref().unwrap().0 } else { &analysis.fit };
     let angles = fit.sensors.iter().zip(&fit.guess).zip(rows).flat_map(|((sensor, guess), truth)| {
         let error = [0, 1, 2].map(|i| sensor.axis[power][i] - truth[i]);
         guess.across.map(|across| (0..3).map(|i| error[i] * across[i]).sum::<f64>())
     });
-    DVector::from_iterator(6, angles)
+    DVector::from_vec(angles.collect())
 }
 
 pub(crate) fn chi_square(away: &DVector<f64>, covariance: DMatrix<f64>) -> f64 {

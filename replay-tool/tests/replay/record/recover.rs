@@ -4,7 +4,8 @@ use std::fs;
 
 use isotherm_log::recording::{RecordingOptions, RecordingWriter};
 
-use crate::common::{replay, shell_example, temperature};
+use super::{shell_example, temperature};
+use crate::common::replay;
 
 /// A recording of a hundred messages in ten chunks.
 fn write(path: &std::path::Path) {

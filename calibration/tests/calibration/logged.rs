@@ -1,10 +1,6 @@
 //! `drift` and `impact` on logs of corrected and raw ticks, as their user calls them.
-#![expect(clippy::unwrap_used, reason = "helpers of tests end the test where something is not as it must be")]
 
-mod simulated_logs;
-
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::path::Path;
 
 use isotherm_calibration::run::Run;
 use isotherm_calibration::written::Written;
@@ -14,21 +10,9 @@ use isotherm_log::offline::{Offline, unit_id};
 use isotherm_log::part::{LogFiles, Part};
 use isotherm_log::recording::{RecordingOptions, RecordingReader, RecordingWriter};
 use serde_json::Value;
-use simulated_logs::{fibre_optic, record, write_text};
 
-fn calibrate(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_isotherm-calibrate")).args(arguments).output().unwrap()
-}
-
-fn json(arguments: &[&str]) -> Value {
-    let output = calibrate(arguments);
-    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
-    serde_json::from_slice(&output.stdout).unwrap()
-}
-
-fn document() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/calibration/FOG-0001.toml")
-}
+use crate::command::{calibrate, json, shipped};
+use crate::simulated_logs::{fibre_optic, record, write_text};
 
 /// A recording of the simulated unit, and its ticks corrected as CSV and as a recording.
 fn logs(folder: &Path) -> [String; 3] {
@@ -36,7 +20,7 @@ fn logs(folder: &Path) -> [String; 3] {
     let raw = path("raw.mcap");
     record(&raw, &fibre_optic(7, "FOG-0001", 9000.0));
     let unit = unit_id("FOG-0001").unwrap();
-    let loaded = Written::read(&document()).unwrap().loaded;
+    let loaded = Written::read(&shipped("FOG-0001.toml")).unwrap().loaded;
     let run = Run::new("raw".into(), unit.clone(), LogFiles::Recordings(vec![raw.clone()]), &Part::default());
     let mut csv = Vec::new();
     write_header(&mut csv).unwrap();
@@ -79,7 +63,7 @@ fn figures(report: &Value) -> Vec<[f64; 2]> {
 fn drift_says_the_same_of_a_log_in_every_form() {
     let folder = tempfile::tempdir().unwrap();
     let [raw, csv, mcap] = logs(folder.path());
-    let document = document().display().to_string();
+    let document = shipped("FOG-0001.toml").display().to_string();
     let mut means = Vec::new();
     for accelerometers in [&[][..], &["--accelerometers"]] {
         let of = |arguments: &[&str]| json(&[&["drift"], arguments, accelerometers, &["--json"]].concat());
@@ -125,8 +109,8 @@ fn impact_sails_the_drift_of_a_log() {
     let folder = tempfile::tempdir().unwrap();
     let [raw, csv, mcap] = logs(folder.path());
     // The document of the unit, with what the estimator is to expect of another.
-    let expected = Written::read(&document().with_file_name("ZLG-0001.toml")).unwrap().document;
-    let mut unit = Written::read(&document()).unwrap().document;
+    let expected = Written::read(&shipped("ZLG-0001.toml")).unwrap().document;
+    let mut unit = Written::read(&shipped("FOG-0001.toml")).unwrap().document;
     for (gyro, other) in unit.gyro.sensor.iter_mut().zip(expected.gyro.sensor) {
         gyro.drift = other.drift;
     }

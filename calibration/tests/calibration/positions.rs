@@ -1,10 +1,4 @@
 //! `positions`: a simulated stand with its errors, from the log to the document.
-#![expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, reason = "counts of tests")]
-#![expect(clippy::unwrap_used, reason = "helpers of tests end the test where something is not as it must be")]
-
-#[path = "positions_stand/mod.rs"]
-#[expect(dead_code, reason = "other tests use the rest")]
-mod stand;
 
 use isotherm_calibration::positions::analysis::{Analysis, Settings, analyse};
 use isotherm_calibration::positions::document::complete;
@@ -17,8 +11,11 @@ use isotherm_calibration::written::Written;
 use isotherm_correction::unit::UnitSettings;
 use isotherm_log::offline::Offline;
 use nalgebra::DVector;
-use stand::judging::{HOUSING_ABOVE_DEG_C, away, chi_square, plausible, quick, settings, times, tracks};
-use stand::{ARCSEC, GRAVITY, HZ_PER_V, Stand};
+
+use crate::stand::judging::{
+    HOUSING_ABOVE_DEG_C, away, chi_square, plausible, quick, settings, times, tracks,
+};
+use crate::stand::{self, ARCSEC, GRAVITY, HZ_PER_V, Stand};
 
 #[test]
 fn twelve_positions_with_random_stand_errors_find_the_axes_within_their_covariance() {
@@ -167,7 +164,7 @@ fn the_document_gives_the_right_vectors_through_the_service_to_the_last_digit_th
     }
     let exact = Settings { positioning_rad: 0.05 * ARCSEC, ..settings(plan.clone(), None) };
     let found = analyse(&tracks(&runs, &base), &base.document, &exact).unwrap();
-    let (document, _) = complete(&base.document, &found, GRAVITY);
+    let document = complete(&base.document, &found, GRAVITY);
     let written = Written::of(&document).unwrap();
     let poses: Vec<_> = found.poses.iter().map(|(pose, position, _)| (pose.clone(), *position)).collect();
     let errors = found.fit.stand.map(|(error, _)| error);

@@ -1,29 +1,15 @@
 //! `show`, `diff` and `merge`, as their user calls them.
-#![expect(clippy::unwrap_used, reason = "helpers of tests end the test where something is not as it must be")]
 
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::path::Path;
 
 use isotherm_calibration::written::Written;
-use isotherm_protocol::document::{Curve, Document, Shape};
+use isotherm_protocol::document::{Curve, Document, Measure, Origin, Residual, Sample, Shape};
 use serde_json::Value;
 
-fn calibrate(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_isotherm-calibrate")).args(arguments).output().unwrap()
-}
-
-fn json(arguments: &[&str]) -> Value {
-    let output = calibrate(arguments);
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    serde_json::from_slice(&output.stdout).unwrap()
-}
-
-fn folder() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/calibration")
-}
+use crate::command::{calibrate, json, shipped};
 
 fn save(path: &str, change: impl FnOnce(&mut Document)) {
-    let mut document = Written::read(&folder().join("MEMS-0001.toml")).unwrap().document;
+    let mut document = Written::read(&shipped("MEMS-0001.toml")).unwrap().document;
     change(&mut document);
     Written::of(&document).unwrap().save(Path::new(path), true).unwrap();
 }
@@ -33,7 +19,7 @@ fn every_document_that_is_shipped_can_be_shown() {
     let pages = tempfile::tempdir().unwrap();
     let html = pages.path().join("page.html").display().to_string();
     let mut count = 0;
-    for entry in std::fs::read_dir(folder()).unwrap() {
+    for entry in std::fs::read_dir(shipped("")).unwrap() {
         let path = entry.unwrap().path();
         if path.extension().is_none_or(|extension| extension != "toml") {
             continue;
@@ -53,7 +39,7 @@ fn every_document_that_is_shipped_can_be_shown() {
 
 #[test]
 fn shown_values_are_those_of_the_document() {
-    let path = folder().join("example-full.toml").display().to_string();
+    let path = shipped("example-full.toml").display().to_string();
     let shown = json(&["show", &path, "--json"]);
     assert_eq!(shown["document"]["unit"], "EXAMPLE-0001");
     let terms = shown["terms"].as_array().unwrap();
@@ -110,8 +96,22 @@ fn merge_puts_parts_together_or_says_what_is_in_the_way() {
     };
     let axes =
         |document: &mut Document| document.accel.as_mut().unwrap().orientation.rows[0] = [1.0, 2e-5, 0.0];
+    let residual = Residual {
+        of: "gyro.x".into(),
+        sample: Sample::Out,
+        measure: Measure::DegPerH,
+        rms_before: 90.0,
+        rms_after: 1.25,
+        peak_to_peak_before: Some(300.0),
+        peak_to_peak_after: Some(5.5),
+    };
+    let fitted = |document: &mut Document| {
+        bias(4.0)(document);
+        document.origin =
+            Some(Origin { method: Some("joint".into()), residual: vec![residual], ..Origin::default() });
+    };
     save(&path("base.toml"), |_| ());
-    save(&path("thermal.toml"), bias(4.0));
+    save(&path("thermal.toml"), fitted);
     save(&path("other.toml"), bias(5.0));
     save(&path("positions.toml"), axes);
     let (base, thermal, other, positions, new) = (
@@ -129,11 +129,22 @@ fn merge_puts_parts_together_or_says_what_is_in_the_way() {
     axes(&mut expected);
     let document = Written::read(Path::new(&new)).unwrap().document;
     assert_eq!((&document.gyro, &document.accel), (&expected.gyro, &expected.accel));
+    // What each part says of itself is shown, and it is that part's.
+    let shown = String::from_utf8(calibrate(&["show", &new]).stdout).unwrap();
+    let line =
+        |words: &str| shown.lines().find(|line| line.contains(words)).unwrap_or_else(|| panic!("{shown}"));
+    assert!(
+        line("joint").contains("thermal.toml") && line("joint").contains("gyro.sensor.x.static_bias"),
+        "{shown}"
+    );
+    let residual = line("thermal.toml: gyro.x, °/h, out of sample");
+    assert!(residual.contains("90.0 → 1.25") && residual.contains("300 → 5.50"), "{residual}");
     // A merged document goes into the next merge, with all that it says of itself.
     let again = path("again.toml");
     let twice = calibrate(&["merge", &new, &base, "--out", &again]);
     assert!(twice.status.success(), "{}", String::from_utf8_lossy(&twice.stderr));
-    assert!(std::fs::read_to_string(&again).unwrap().contains("positions.toml"));
+    let shown = String::from_utf8(calibrate(&["show", &again]).stdout).unwrap();
+    assert!(shown.contains("new.toml / positions.toml"), "{shown}");
     // Never over a file that is there, nor with a conflict.
     let arguments = ["merge", &base, &thermal, &other, "--out", &path("conflict.toml")];
     let conflict = calibrate(&arguments);

@@ -1,0 +1,40 @@
+//! The calibration tool as a whole: one test program, because linking one takes as long as running most of what is in it.
+//!
+//! | file | holds |
+//! |---|---|
+//! | `thermal` | what the methods reach on simulated coils and the real chamber log, bad input, the fit against the service |
+//! | `positions`, `positions_command` | a simulated stand, from the log to the document |
+//! | `tumble` | a unit put down by hand, real and simulated |
+//! | `modes_rates` | `modes` and `rates` as their users run them |
+//! | `drift`, `impact`, `logged` | noise and drift, what they mean for navigation, and logs in every form |
+//! | `validate`, `documents` | documents judged, shown, compared and merged |
+//! | `skewed_six` | units of six sensors through all of them |
+//! | `pages` | pages to be looked at |
+//! | `command` | how the program is called |
+//! | `stand`, `drift_generator`, `simulated_logs` | what the logs are made with |
+
+#![expect(
+    clippy::unwrap_used,
+    clippy::cast_precision_loss,
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    reason = "a test ends where something is not as it must be, and its counts are small"
+)]
+#![expect(clippy::float_cmp, reason = "a document states what was printed")]
+
+mod command;
+mod documents;
+mod drift;
+mod drift_generator;
+mod impact;
+mod logged;
+mod modes_rates;
+mod pages;
+mod positions;
+mod positions_command;
+mod simulated_logs;
+mod skewed_six;
+mod stand;
+mod thermal;
+mod tumble;
+mod validate;
