@@ -102,6 +102,7 @@ impl Case {
             folder: folder.to_owned(),
             keep: CHECKED,
             format,
+            declare_keys: false,
         }
     }
 }

@@ -43,7 +43,7 @@ pub(crate) fn check(plan: &Plan, subject: Subject, received: &Received) -> Resul
         let sent = (0..messages).map(|index| instrument.message(plan, unit, index));
         let sent: Vec<Message> = sent.collect::<Result<_, _>>()?;
         match subject {
-            Subject::Relay => relayed(&sent, &kept),
+            Subject::Relay | Subject::Keyed => relayed(&sent, &kept),
             Subject::Service => corrected(unit, &sent, &kept)?,
             Subject::Python => plain(&sent, &kept),
         }
@@ -139,6 +139,7 @@ mod tests {
             folder: std::path::PathBuf::new(),
             keep: 10,
             format: Format::Raw,
+            declare_keys: false,
         };
         let instrument = Instrument::simulate(1000).unwrap();
         let sent = (0..100).map(|index| instrument.message(&plan, 0, index).unwrap()).collect();

@@ -66,6 +66,7 @@ pub(crate) fn run(
     let folder = tempfile::tempdir().map_err(|source| Error::file(&std::env::temp_dir(), source))?;
     let mut plan = case.plan(folder.path(), subject.format());
     plan.zenoh_config = profile.write(folder.path())?;
+    plan.declare_keys = subject == Subject::Keyed;
     let plan_file = folder.path().join("plan.json");
     let write = |plan: &Plan| {
         let text = serde_json::to_string(plan).unwrap_or_default();

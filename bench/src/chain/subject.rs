@@ -19,6 +19,8 @@ use crate::process::{Process, beside, this};
 pub(crate) enum Subject {
     /// The reference: puts what comes in on the output key.
     Relay,
+    /// The same, with the keys declared that it receives.
+    Keyed,
     /// `isotherm serve`.
     Service,
     /// What a user would write: a Python subscriber with numpy.
@@ -33,6 +35,7 @@ impl Subject {
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Relay => "relay",
+            Self::Keyed => "relay, keys declared",
             Self::Service => "isotherm",
             Self::Python => "python",
         }
@@ -41,7 +44,7 @@ impl Subject {
     /// What it puts out.
     pub(crate) fn format(self) -> Format {
         match self {
-            Self::Relay => Format::Raw,
+            Self::Relay | Self::Keyed => Format::Raw,
             Self::Service => Format::Corrected,
             Self::Python => Format::Plain,
         }
@@ -55,7 +58,7 @@ impl Subject {
         profile: &Profile,
     ) -> Result<(Process, String), Error> {
         let mut command = match self {
-            Self::Relay => {
+            Self::Relay | Self::Keyed => {
                 let mut command = Command::new(this()?);
                 command.args(["part", "relay"]).arg(plan_file);
                 command
