@@ -6,8 +6,8 @@
 mod case;
 mod check;
 mod profile;
-mod python;
-mod round;
+pub(crate) mod python;
+pub(crate) mod round;
 mod row;
 mod subject;
 mod swap;
@@ -21,7 +21,7 @@ pub(crate) use case::Case;
 pub(crate) use profile::Profile;
 pub(crate) use row::Row;
 pub(crate) use subject::Subject;
-pub(crate) use table::table;
+pub(crate) use table::{middle, table};
 
 use crate::error::Error;
 use crate::machine::Machine;

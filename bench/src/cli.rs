@@ -12,6 +12,7 @@ use crate::chain::{self, ChainArgs};
 use crate::error::Error;
 use crate::instructions::{self, Figures};
 use crate::kernel;
+use crate::scale::{self, ScaleArgs};
 use crate::part::{self, Role};
 
 /// How fast Isotherm is, as ratios to named references
@@ -47,6 +48,8 @@ enum Command {
     },
     /// Latency, throughput and loss through the service, beside a bare relay and a Python script
     Chain(ChainArgs),
+    /// How cost, memory, start-up and swaps grow with the number of units; offline correction beside numpy
+    Scale(ScaleArgs),
     /// Play one part of a chain
     #[command(hide = true)]
     Part {
@@ -114,6 +117,10 @@ fn run(command: Command) -> Result<String, Error> {
         Command::Chain(args) => {
             let report = chain::measure(&args)?;
             Ok(if args.json { as_json(&report) } else { chain::table(&report) })
+        }
+        Command::Scale(args) => {
+            let report = scale::measure(&args)?;
+            Ok(if args.json { as_json(&report) } else { scale::table(&report) })
         }
         Command::Part { role, plan } => part::run(role, &plan).map(|()| String::new()),
         Command::Pass { index } => instructions::pass(index).map(|()| String::new()),

@@ -5,6 +5,7 @@
 //! | [`kernel`] | the state machine per tick, beside what an autopilot does per sample |
 //! | [`instructions`] | the same counted in instructions, for a machine that is never quiet |
 //! | [`chain`] | source, service or relay, and sink over TCP loopback: latency, throughput, loss |
+//! | [`scale`] | growth with the number of units; offline correction beside numpy |
 //! | [`part`] | the processes of a chain |
 //! | [`rounds`] | interleaved rounds and their medians |
 //! | [`clock`], [`machine`], [`process`], [`progress`] | what the benches stand on |
@@ -22,6 +23,7 @@ mod part;
 mod process;
 mod progress;
 mod rounds;
+mod scale;
 
 fn main() -> std::process::ExitCode {
     cli::main()

@@ -26,17 +26,20 @@ pub(crate) struct Case {
     pub(crate) swaps: bool,
     /// Sessions of the source.
     pub(crate) sessions: usize,
+    /// Units that are given another calibration afterwards, one after the other, to see how long that takes.
+    pub(crate) timed_swaps: usize,
 }
 
 /// What is not measured at the start: the first tick waits for an earlier one, and connections are cold (s).
 const WARM_UP_S: f64 = 0.5;
-/// Ticks of each unit that are checked.
+/// Ticks of each unit that are checked, and of all units that are kept for it.
 const CHECKED: usize = 100;
+const KEPT: usize = 200_000;
 
 impl Case {
     /// Units at a rate, for so many seconds.
     pub(crate) fn paced(units: usize, rate_hz: u32, batch: usize, seconds: f64) -> Self {
-        Self { units, rate_hz, batch, pace: Pace::Burst, seconds, ticks: 0, swaps: false, sessions: 1 }
+        Self { units, rate_hz, batch, pace: Pace::Burst, seconds, ticks: 0, swaps: false, sessions: 1, timed_swaps: 0 }
     }
 
     /// As much as will go through, at most so many ticks of all units in so many seconds.
@@ -100,7 +103,7 @@ impl Case {
             connect: None,
             zenoh_config: None,
             folder: folder.to_owned(),
-            keep: CHECKED,
+            keep: CHECKED.min(KEPT.div_ceil(self.units)),
             format,
             declare_keys: false,
         }

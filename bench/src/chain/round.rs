@@ -10,7 +10,7 @@ use super::case::Case;
 use super::check;
 use super::profile::Profile;
 use super::subject::Subject;
-use super::swap::Swapper;
+use super::swap::{self, Swapper};
 use crate::error::Error;
 use crate::machine::Usage;
 use crate::part::{Plan, Ready, Received, Sent, read_numbers};
@@ -54,6 +54,8 @@ pub(crate) struct Outcome {
     pub(crate) swaps_per_unit: u64,
     /// From the start of the middle until it was ready (s).
     pub(crate) start_s: f64,
+    /// From the question until the answer of a swap, in the median (ms); 0 where none was timed.
+    pub(crate) swap_ms: f64,
 }
 
 /// Runs one round.
@@ -102,9 +104,10 @@ pub(crate) fn run(
     let received: Received = sink.hear(READY_LIMIT)?;
     swapper.map(Swapper::stop).transpose()?;
     let after = middle.usage()?;
+    let swap_ms = if subject == Subject::Service { swap::timed(&plan, case.timed_swaps)? } else { 0.0 };
     check::check(&plan, subject, &received)?;
     let used = Usage { cpu_s: after.cpu_s - before.cpu_s, ..after };
-    outcome(&plan, case, (&sent, &received), used, start_s)
+    Ok(Outcome { start_s, swap_ms, ..outcome(&plan, case, (&sent, &received), used)? })
 }
 
 /// Puts together what the parts have written down.
@@ -114,7 +117,6 @@ fn outcome(
     case: &Case,
     (sent, received): (&Sent, &Received),
     used: Usage,
-    start_s: f64,
 ) -> Result<Outcome, Error> {
     let [sent_ns, came_ns] =
         [read_numbers(&plan.folder.join("sent.bin"))?, read_numbers(&plan.folder.join("came.bin"))?];
@@ -147,6 +149,6 @@ fn outcome(
         resident_kib: used.resident_kib,
         source_late_us: sent.late_us,
         swaps_per_unit: received.fewest_changes,
-        start_s,
+        ..Outcome::default()
     })
 }

@@ -68,6 +68,7 @@ impl Row {
                 source_late_us: std::array::from_fn(|index| over(&|outcome| outcome.source_late_us[index])),
                 swaps_per_unit: rounds.iter().map(|outcome| outcome.swaps_per_unit).min().unwrap_or(0),
                 start_s: over(&|outcome| outcome.start_s),
+                swap_ms: over(&|outcome| outcome.swap_ms),
             },
             rounds,
         }
