@@ -102,7 +102,7 @@ const SATURATED_S: f64 = 5.0;
 
 impl ChainArgs {
     /// All cases, each as a list of variants that are to be compared.
-    fn cases(&self) -> Vec<Vec<Case>> {
+    fn cases(&self) -> Vec<(Measure, Vec<Case>)> {
         let seconds = if self.quick { 1.0 } else { self.seconds };
         let mut cases = Vec::new();
         let usize_of = |numbers: &[u32], or: usize| match numbers {
@@ -126,7 +126,7 @@ impl ChainArgs {
             };
             cases.extend(loads.into_iter().map(|(units, rate, batch)| {
                 let pace = if self.spread { Pace::Spread } else { Pace::Burst };
-                vec![Case { pace, ..Case::paced(units, rate, batch, seconds) }]
+                (Measure::Latency, vec![Case { pace, ..Case::paced(units, rate, batch, seconds) }])
             }));
         }
         if self.measure.contains(&Measure::Saturation) {
@@ -134,7 +134,7 @@ impl ChainArgs {
             cases.extend(units.iter().flat_map(|units| {
                 SATURATED_TICKS.map(|(batch, ticks)| {
                     let ticks = if self.quick { ticks / 10 } else { ticks };
-                    vec![Case::saturated(*units, batch, ticks, SATURATED_S)]
+                    (Measure::Saturation, vec![Case::saturated(*units, batch, ticks, SATURATED_S)])
                 })
             }));
         }
@@ -143,7 +143,7 @@ impl ChainArgs {
             let rate = self.rate.first().copied().unwrap_or(200);
             cases.extend(units.into_iter().map(|units| {
                 let without = Case::paced(units, rate, 1, if self.quick { 2.0 } else { seconds.max(4.0) });
-                vec![without.clone(), Case { swaps: true, ..without }]
+                (Measure::Swap, vec![without.clone(), Case { swaps: true, ..without }])
             }));
         }
         cases
@@ -178,9 +178,9 @@ pub(crate) fn measure(args: &ChainArgs) -> Result<Report, Error> {
     }
     let (cases, profiles) = (args.cases(), args.profiles());
     let rounds = if args.quick { 1 } else { args.rounds.max(1) };
-    let runs: Vec<_> = cases.iter().map(|variants| runs(variants, &profiles, &subjects)).collect();
+    let runs: Vec<_> = cases.iter().map(|(_, variants)| runs(variants, &profiles, &subjects)).collect();
     let bar = Bar::over(runs.iter().map(|runs| runs.len() * rounds).sum());
-    for runs in runs {
+    for ((measure, _), runs) in cases.iter().zip(runs) {
         let mut outcomes = vec![Vec::with_capacity(rounds); runs.len()];
         for _ in 0..rounds {
             for ((case, profile, subject), outcomes) in runs.iter().zip(&mut outcomes) {
@@ -198,7 +198,7 @@ pub(crate) fn measure(args: &ChainArgs) -> Result<Report, Error> {
             let without =
                 runs.iter().position(|(other, _, same)| case.swaps && !other.swaps && same == subject);
             let of = without.and_then(|index| before.get(index)).unwrap_or(&reference);
-            Row::new(case, *subject, &profile.name, outcomes, of)
+            Row::new(*measure, case, (*subject, &profile.name), outcomes, of)
         }));
     }
     bar.finish();

@@ -12,6 +12,7 @@ use crate::chain::{self, ChainArgs};
 use crate::error::Error;
 use crate::instructions::{self, Figures};
 use crate::kernel;
+use crate::report::{self, ReportArgs};
 use crate::scale::{self, ScaleArgs};
 use crate::part::{self, Role};
 
@@ -50,6 +51,8 @@ enum Command {
     Chain(ChainArgs),
     /// How cost, memory, start-up and swaps grow with the number of units; offline correction beside numpy
     Scale(ScaleArgs),
+    /// Write figures, printed as JSON before, into `docs/performance.md`
+    Report(ReportArgs),
     /// Play one part of a chain
     #[command(hide = true)]
     Part {
@@ -122,6 +125,7 @@ fn run(command: Command) -> Result<String, Error> {
             let report = scale::measure(&args)?;
             Ok(if args.json { as_json(&report) } else { scale::table(&report) })
         }
+        Command::Report(args) => report::write(&args),
         Command::Part { role, plan } => part::run(role, &plan).map(|()| String::new()),
         Command::Pass { index } => instructions::pass(index).map(|()| String::new()),
     }

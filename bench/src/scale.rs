@@ -7,9 +7,9 @@ mod table;
 use serde::{Deserialize, Serialize};
 
 pub(crate) use offline::Offline;
-pub(crate) use table::table;
+pub(crate) use table::{kib_per_unit, table};
 
-use crate::chain::{Case, Profile, Row, Subject, round};
+use crate::chain::{Case, Measure, Profile, Row, Subject, round};
 use crate::error::Error;
 use crate::machine::Machine;
 use crate::part::Pace;
@@ -107,7 +107,12 @@ fn live(args: &ScaleArgs, rounds: usize, report: &mut Report) -> Result<(), Erro
     let ticks = if args.quick { TICKS / 10 } else { TICKS };
     let cases: Vec<Case> = units
         .iter()
-        .map(|units| Case { timed_swaps: SWAPS, ..Case::saturated(*units, BATCH, ticks, LIMIT_S) })
+        .map(|units| Case {
+            rate_hz: RATE_HZ,
+            state: false,
+            timed_swaps: SWAPS,
+            ..Case::saturated(*units, BATCH, ticks, LIMIT_S)
+        })
         .collect();
     let own = Profile::own();
     let bar = Bar::over((cases.len() + 2) * rounds);
@@ -119,12 +124,14 @@ fn live(args: &ScaleArgs, rounds: usize, report: &mut Report) -> Result<(), Erro
             bar.step();
         }
     }
-    let row = |(case, outcomes): (&Case, Vec<_>)| Row::new(case, Subject::Service, &own.name, outcomes.clone(), &outcomes);
+    let row = |(case, outcomes): (&Case, Vec<_>)| {
+        Row::new(Measure::Saturation, case, (Subject::Service, &own.name), outcomes.clone(), &outcomes)
+    };
     report.units = cases.iter().zip(outcomes).map(row).collect();
     report.growth = growth(&report.units);
 
     let most = units.iter().copied().max().unwrap_or(1);
-    let rated = Case { pace: Pace::Spread, ..Case::paced(most, RATE_HZ, BATCH, if args.quick { 1.0 } else { RATED_S }) };
+    let rated = Case { pace: Pace::Spread, state: false, ..Case::paced(most, RATE_HZ, BATCH, if args.quick { 1.0 } else { RATED_S }) };
     let subjects = [Subject::Relay, Subject::Service];
     let mut outcomes = [Vec::new(), Vec::new()];
     for _ in 0..rounds {
@@ -137,7 +144,7 @@ fn live(args: &ScaleArgs, rounds: usize, report: &mut Report) -> Result<(), Erro
     bar.finish();
     let [reference, _] = outcomes.clone();
     let rows = subjects.into_iter().zip(outcomes);
-    report.rated = rows.map(|(subject, rounds)| Row::new(&rated, subject, &own.name, rounds, &reference)).collect();
+    report.rated = rows.map(|(subject, rounds)| Row::new(Measure::Latency, &rated, (subject, &own.name), rounds, &reference)).collect();
     Ok(())
 }
 
@@ -152,12 +159,14 @@ fn growth(rows: &[Row]) -> Vec<Growth> {
             .collect();
         Growth { what: what.to_owned(), exponent: fit::exponent(&points) }
     };
-    vec![
+    let growth = [
         over("processor time of all units, each at one rate", true, &|row| {
             row.median.cpu_us_per_tick * row.case.units as f64
         }),
         over("resident memory beyond that of one unit", false, &|row| row.median.resident_kib as f64),
         over("start-up beyond that of one unit", false, &|row| row.median.start_s),
         over("time of one swap", true, &|row| row.median.swap_ms),
-    ]
+    ];
+    // Of a single point there is none.
+    growth.into_iter().filter(|growth| growth.exponent.is_finite()).collect()
 }

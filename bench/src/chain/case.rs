@@ -24,6 +24,8 @@ pub(crate) struct Case {
     pub(crate) ticks: usize,
     /// Whether every unit is given another calibration each second.
     pub(crate) swaps: bool,
+    /// Whether the service has a state folder, in which it writes down every calibration.
+    pub(crate) state: bool,
     /// Sessions of the source.
     pub(crate) sessions: usize,
     /// Units that are given another calibration afterwards, one after the other, to see how long that takes.
@@ -39,7 +41,7 @@ const KEPT: usize = 200_000;
 impl Case {
     /// Units at a rate, for so many seconds.
     pub(crate) fn paced(units: usize, rate_hz: u32, batch: usize, seconds: f64) -> Self {
-        Self { units, rate_hz, batch, pace: Pace::Burst, seconds, ticks: 0, swaps: false, sessions: 1, timed_swaps: 0 }
+        Self { units, rate_hz, batch, pace: Pace::Burst, seconds, ticks: 0, swaps: false, state: true, sessions: 1, timed_swaps: 0 }
     }
 
     /// As much as will go through, at most so many ticks of all units in so many seconds.
@@ -106,6 +108,7 @@ impl Case {
             keep: CHECKED.min(KEPT.div_ceil(self.units)),
             format,
             declare_keys: false,
+            state: self.state,
         }
     }
 }

@@ -139,6 +139,7 @@ mod tests {
             folder: std::path::PathBuf::new(),
             keep: 10,
             format: Format::Raw,
+            state: false,
             declare_keys: false,
         };
         let instrument = Instrument::simulate(1000).unwrap();

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::Measure;
 use super::case::Case;
 use super::round::Outcome;
 use super::subject::Subject;
@@ -12,6 +13,8 @@ use crate::rounds::median;
 pub(crate) struct Row {
     /// The load, in words.
     pub(crate) name: String,
+    /// What of it was measured.
+    pub(crate) measure: Measure,
     /// The load.
     pub(crate) case: Case,
     /// What stood in the middle.
@@ -33,9 +36,9 @@ pub(crate) struct Row {
 impl Row {
     /// A row of so many rounds; `reference` has as many.
     pub(crate) fn new(
+        measure: Measure,
         case: &Case,
-        subject: Subject,
-        profile: &str,
+        (subject, profile): (Subject, &str),
         rounds: Vec<Outcome>,
         reference: &[Outcome],
     ) -> Self {
@@ -46,6 +49,7 @@ impl Row {
         let sum = |of: fn(&Outcome) -> u64| rounds.iter().map(of).sum();
         Self {
             name: case.words(),
+            measure,
             case: case.clone(),
             subject,
             profile: profile.to_owned(),

@@ -88,10 +88,9 @@ impl Subject {
         }
         let settings = plan.folder.join("service.toml");
         let congestion = if plan.block { "block" } else { "drop" };
-        let text = format!(
-            "calibrations = \"units\"\nstate = \"state\"\nmax_units = {}\ncongestion = \"{congestion}\"\n",
-            plan.units.max(1)
-        );
+        let state = if plan.state { "state = \"state\"\n" } else { "" };
+        let units = plan.units.max(1);
+        let text = format!("calibrations = \"units\"\n{state}max_units = {units}\ncongestion = \"{congestion}\"\n");
         fs::write(&settings, text).map_err(|source| Error::file(&settings, source))?;
         let mut command = Command::new(program);
         command

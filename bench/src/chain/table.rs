@@ -2,13 +2,12 @@
 
 use comfy_table::Table;
 
-use super::{Report, Row};
+use super::{Measure, Report, Row};
 use crate::cli::plain;
-use crate::part::Pace;
 
 /// Latency first, then throughput.
 pub(crate) fn table(report: &Report) -> String {
-    let saturated = |row: &&Row| matches!(row.case.pace, Pace::Saturated { .. });
+    let saturated = |row: &&Row| row.measure == Measure::Saturation;
     let mut text = format!("{}\n", report.machine.words());
     let paced: Vec<&Row> = report.rows.iter().filter(|row| !saturated(row)).collect();
     if !paced.is_empty() {

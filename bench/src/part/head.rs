@@ -89,6 +89,7 @@ mod tests {
             folder: std::path::PathBuf::new(),
             keep: 3,
             format: Format::Raw,
+            state: false,
             declare_keys: false,
         }
     }

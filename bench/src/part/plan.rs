@@ -59,6 +59,8 @@ pub(crate) struct Plan {
     pub(crate) keep: usize,
     /// What the sink gets.
     pub(crate) format: Format,
+    /// Whether the service has a state folder.
+    pub(crate) state: bool,
     /// Whether the relay declares the keys that it receives, so that Zenoh looks for their subscribers once only.
     pub(crate) declare_keys: bool,
 }
