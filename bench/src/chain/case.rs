@@ -32,8 +32,10 @@ pub(crate) struct Case {
     pub(crate) timed_swaps: usize,
 }
 
-/// What is not measured at the start: the first tick waits for an earlier one, and connections are cold (s).
+/// What is not measured at the start, where caches are cold (s).
 const WARM_UP_S: f64 = 0.5;
+/// What goes out before, longer than the window in which a first tick waits for an earlier one (s).
+const PRELUDE_S: f64 = 0.06;
 /// Ticks of each unit that are checked, and of all units that are kept for it.
 const CHECKED: usize = 100;
 const KEPT: usize = 200_000;
@@ -94,11 +96,13 @@ impl Case {
         let saturated = matches!(self.pace, Pace::Saturated { .. });
         let messages =
             if saturated { self.ticks / self.batch } else { self.messages_in(WARM_UP_S + self.seconds) };
+        let prelude = self.messages_in(PRELUDE_S) + 1;
         Plan {
             units: self.units,
             rate_hz: self.rate_hz,
             batch: self.batch,
-            messages: messages.max(1),
+            messages: prelude + messages.max(1),
+            prelude,
             pace: self.pace,
             block: saturated,
             sessions: self.sessions,

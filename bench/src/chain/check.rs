@@ -131,6 +131,7 @@ mod tests {
             rate_hz: 1000,
             batch: 2,
             messages: 100,
+            prelude: 0,
             pace: Pace::Burst,
             block: false,
             sessions: 1,

@@ -95,6 +95,12 @@ pub(crate) fn run(
     let _: Ready = sink.hear(READY_LIMIT)?;
     let mut source = part("source")?;
     let _: Ready = source.hear(READY_LIMIT)?;
+    for part in [&mut source, &mut sink] {
+        part.tell("prelude")?;
+    }
+    for part in [&source, &sink] {
+        let _: Ready = part.hear(READY_LIMIT)?;
+    }
 
     let before = middle.usage()?;
     let swapper = if case.swaps { Some(Swapper::start(&plan)?) } else { None };
@@ -124,7 +130,7 @@ fn outcome(
         .map_err(|error| Error::Part { part: "latencies", what: error.to_string() })?;
     for (unit, came) in came_ns.chunks(plan.ticks().max(1)).enumerate() {
         for (message, came) in
-            came.chunks(plan.batch).enumerate().take(sent.messages).skip(case.warm_up_messages())
+            came.chunks(plan.batch).enumerate().take(plan.prelude + sent.messages).skip(plan.prelude + case.warm_up_messages())
         {
             let Some(went) = sent_ns.get(message * plan.units + unit) else { continue };
             for came in came.iter().filter(|came| **came > 0) {

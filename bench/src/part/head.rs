@@ -81,6 +81,7 @@ mod tests {
             rate_hz: 1000,
             batch: 3,
             messages: 10,
+            prelude: 0,
             pace: Pace::Burst,
             block: false,
             sessions: 1,

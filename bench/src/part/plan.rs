@@ -43,7 +43,9 @@ pub(crate) struct Plan {
     pub(crate) batch: usize,
     /// Messages of each unit, of its gyros and of its accelerometers.
     pub(crate) messages: usize,
-    /// When they go out.
+    /// The first of these, which go out before the clock runs: units appear with them, and a first tick waits for an earlier one.
+    pub(crate) prelude: usize,
+    /// When the others go out.
     pub(crate) pace: Pace,
     /// Whether the middle waits for the sink where that is slow.
     pub(crate) block: bool,

@@ -17,9 +17,9 @@ use crate::error::Error;
 /// What the sink reports.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Received {
-    /// Messages.
+    /// Messages behind the prelude.
     pub(crate) messages: u64,
-    /// Ticks, each counted once.
+    /// Ticks behind the prelude, each counted once.
     pub(crate) ticks: u64,
     /// Ticks that had been there before.
     pub(crate) duplicates: u64,
@@ -74,10 +74,17 @@ pub(crate) fn run(plan: &Plan) -> Result<(), Error> {
     let _subscriber = subscriber.map_err(|error| Error::zenoh("sink", &error))?;
     wait_for_middle(&session)?;
     say(&Ready { ready: true, locators: Vec::new() })?;
-    // How many messages of each unit the source has sent.
+    let of_each = |messages: u64| messages * plan.units as u64 * plan.batch as u64;
+    if hear().is_none() {
+        return Ok(());
+    }
+    wait_for(&book, of_each(plan.prelude as u64), PRELUDE_PATIENCE);
+    lock(&book).begin();
+    say(&Ready { ready: true, locators: Vec::new() })?;
+    // How many messages of each unit the source has sent behind the prelude.
     let Some(line) = hear() else { return Ok(()) };
     let sent: u64 = line.parse().unwrap_or(0);
-    wait_for(&book, sent * plan.units as u64 * plan.batch as u64);
+    wait_for(&book, of_each(sent), PATIENCE);
 
     let mut book = lock(&book);
     let changes = book.units.iter().map(|unit| unit.changes).min();
@@ -87,13 +94,17 @@ pub(crate) fn run(plan: &Plan) -> Result<(), Error> {
     say(&book.account)
 }
 
+/// How long nothing may come behind the last tick.
+const PATIENCE: Duration = Duration::from_secs(3);
+/// How long nothing may come while thousands of units appear.
+const PRELUDE_PATIENCE: Duration = Duration::from_secs(30);
+
 /// Waits for so many ticks, at most as long as some come.
-fn wait_for(book: &Mutex<Book>, ticks: u64) {
-    const PATIENCE: Duration = Duration::from_millis(1500);
+fn wait_for(book: &Mutex<Book>, ticks: u64, patience: Duration) {
     let mut seen = (0, Instant::now());
     loop {
         let now = lock(book).account.ticks;
-        if now >= ticks || (now == seen.0 && seen.1.elapsed() > PATIENCE) {
+        if now >= ticks || (now == seen.0 && seen.1.elapsed() > patience) {
             return;
         }
         if now != seen.0 {
@@ -104,6 +115,12 @@ fn wait_for(book: &Mutex<Book>, ticks: u64) {
 }
 
 impl Book {
+    /// Begins the account anew; which ticks have come is kept.
+    fn begin(&mut self) {
+        let Received { duplicates, disordered, strange, .. } = self.account;
+        self.account = Received { duplicates, disordered, strange, ..Received::default() };
+    }
+
     /// Enters a message that came at a time.
     fn enter(&mut self, sample: &Sample, now: u64) {
         let frame = sample.payload().to_bytes();

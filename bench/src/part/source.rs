@@ -18,7 +18,7 @@ use crate::error::Error;
 /// What the source reports.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Sent {
-    /// Messages of gyro ticks of each unit that went out.
+    /// Messages of gyro ticks of each unit that went out behind the prelude.
     pub(crate) messages: usize,
     /// How long that took (s).
     pub(crate) seconds: f64,
@@ -56,7 +56,16 @@ pub(crate) fn run(plan: &Plan) -> Result<(), Error> {
     if hear().is_none() {
         return Ok(());
     }
-    let report = publish(plan, &units, bursts, &mut sent)?;
+    let rest = bursts.split_off(plan.prelude.min(bursts.len()));
+    for burst in bursts {
+        units.iter().zip(burst).try_for_each(|(outlets, message)| outlets.put(message))?;
+    }
+    say(&Ready { ready: true, locators: Vec::new() })?;
+    if hear().is_none() {
+        return Ok(());
+    }
+    let behind = sent.get_mut(plan.prelude * plan.units..).unwrap_or_default();
+    let report = publish(plan, &units, rest, behind)?;
     write_numbers(&path(plan, "sent.bin"), &sent)?;
     say(&report)?;
     // The sessions stay open until everything has come through.
