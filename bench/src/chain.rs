@@ -41,6 +41,7 @@ pub(crate) enum Measure {
 
 /// Arguments of `chain`.
 #[derive(Debug, Clone, clap::Args)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a switch of the command line")]
 pub(crate) struct ChainArgs {
     /// What is measured
     #[arg(long, value_delimiter = ',', default_values = ["latency", "saturation", "swap"])]

@@ -12,9 +12,9 @@ use crate::chain::{self, ChainArgs};
 use crate::error::Error;
 use crate::instructions::{self, Figures};
 use crate::kernel;
+use crate::part::{self, Role};
 use crate::report::{self, ReportArgs};
 use crate::scale::{self, ScaleArgs};
-use crate::part::{self, Role};
 
 /// How fast Isotherm is, as ratios to named references
 #[derive(Debug, Parser)]

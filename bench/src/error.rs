@@ -74,6 +74,6 @@ impl Error {
     }
 
     pub(crate) fn zenoh(part: &'static str, error: &zenoh::Error) -> Self {
-        Self::Part { part, what: isotherm_bus::words(error).to_string() }
+        Self::Part { part, what: isotherm_bus::words(error) }
     }
 }

@@ -4,6 +4,7 @@ mod page;
 mod plot;
 mod tables;
 
+use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -62,8 +63,8 @@ pub(crate) fn write(args: &ReportArgs) -> Result<String, Error> {
         sections.extend(scale.offline.as_ref().map(|offline| ("offline", tables::offline(offline))));
     }
     let page = fs::read_to_string(&args.page).map_err(|source| Error::file(&args.page, source))?;
-    let written = page::fill(&page, &sections)
-        .map_err(|what| Error::Invalid { path: args.page.clone(), what })?;
+    let written =
+        page::fill(&page, &sections).map_err(|what| Error::Invalid { path: args.page.clone(), what })?;
     fs::write(&args.page, written).map_err(|source| Error::file(&args.page, source))?;
 
     fs::create_dir_all(&args.plots).map_err(|source| Error::file(&args.plots, source))?;
@@ -79,7 +80,7 @@ pub(crate) fn write(args: &ReportArgs) -> Result<String, Error> {
         let path = args.plots.join(name);
         let svg = svg.map_err(|what| Error::Invalid { path: path.clone(), what })?;
         fs::write(&path, svg).map_err(|source| Error::file(&path, source))?;
-        words += &format!("{}\n", path.display());
+        let _ = writeln!(words, "{}", path.display());
     }
     Ok(words)
 }
@@ -90,5 +91,7 @@ fn read<T: DeserializeOwned>(path: &Path) -> Result<Option<T>, Error> {
         return Ok(None);
     }
     let text = fs::read_to_string(path).map_err(|source| Error::file(path, source))?;
-    serde_json::from_str(&text).map(Some).map_err(|error| Error::Invalid { path: path.to_owned(), what: error.to_string() })
+    serde_json::from_str(&text)
+        .map(Some)
+        .map_err(|error| Error::Invalid { path: path.to_owned(), what: error.to_string() })
 }

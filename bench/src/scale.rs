@@ -17,6 +17,7 @@ use crate::progress::Bar;
 
 /// Arguments of `scale`.
 #[derive(Debug, Clone, clap::Args)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a switch of the command line")]
 pub(crate) struct ScaleArgs {
     /// Numbers of units
     #[arg(long, value_delimiter = ',', default_values = ["1", "10", "100", "1000", "5000"], value_parser = clap::value_parser!(u32).range(1..=10_000))]
@@ -131,7 +132,11 @@ fn live(args: &ScaleArgs, rounds: usize, report: &mut Report) -> Result<(), Erro
     report.growth = growth(&report.units);
 
     let most = units.iter().copied().max().unwrap_or(1);
-    let rated = Case { pace: Pace::Spread, state: false, ..Case::paced(most, RATE_HZ, BATCH, if args.quick { 1.0 } else { RATED_S }) };
+    let rated = Case {
+        pace: Pace::Spread,
+        state: false,
+        ..Case::paced(most, RATE_HZ, BATCH, if args.quick { 1.0 } else { RATED_S })
+    };
     let subjects = [Subject::Relay, Subject::Service];
     let mut outcomes = [Vec::new(), Vec::new()];
     for _ in 0..rounds {
@@ -144,7 +149,9 @@ fn live(args: &ScaleArgs, rounds: usize, report: &mut Report) -> Result<(), Erro
     bar.finish();
     let [reference, _] = outcomes.clone();
     let rows = subjects.into_iter().zip(outcomes);
-    report.rated = rows.map(|(subject, rounds)| Row::new(Measure::Latency, &rated, (subject, &own.name), rounds, &reference)).collect();
+    report.rated = rows
+        .map(|(subject, rounds)| Row::new(Measure::Latency, &rated, (subject, &own.name), rounds, &reference))
+        .collect();
     Ok(())
 }
 
@@ -154,9 +161,8 @@ fn growth(rows: &[Row]) -> Vec<Growth> {
     let over = |what: &str, alone: bool, of: &dyn Fn(&Row) -> f64| {
         let first = rows.first().map_or(0.0, of);
         let rows = rows.iter().skip(usize::from(!alone));
-        let points: Vec<[f64; 2]> = rows
-            .map(|row| [row.case.units as f64, if alone { of(row) } else { of(row) - first }])
-            .collect();
+        let points: Vec<[f64; 2]> =
+            rows.map(|row| [row.case.units as f64, if alone { of(row) } else { of(row) - first }]).collect();
         Growth { what: what.to_owned(), exponent: fit::exponent(&points) }
     };
     let growth = [

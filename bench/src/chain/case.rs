@@ -43,7 +43,18 @@ const KEPT: usize = 200_000;
 impl Case {
     /// Units at a rate, for so many seconds.
     pub(crate) fn paced(units: usize, rate_hz: u32, batch: usize, seconds: f64) -> Self {
-        Self { units, rate_hz, batch, pace: Pace::Burst, seconds, ticks: 0, swaps: false, state: true, sessions: 1, timed_swaps: 0 }
+        Self {
+            units,
+            rate_hz,
+            batch,
+            pace: Pace::Burst,
+            seconds,
+            ticks: 0,
+            swaps: false,
+            state: true,
+            sessions: 1,
+            timed_swaps: 0,
+        }
     }
 
     /// As much as will go through, at most so many ticks of all units in so many seconds.

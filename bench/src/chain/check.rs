@@ -108,8 +108,8 @@ fn plain(sent: &[Message], kept: &[Kept]) -> Result<(), String> {
                 return Err(format!("tick {sequence} was never sent"));
             };
             for (number, expected) in numbers.iter().map(|bytes| f64::from_le_bytes(*bytes)).zip(expected) {
-                // Negated, so that what is no number does not pass.
-                if !((number - expected).abs() <= LARGEST_DIFFERENCE) {
+                let difference = (number - expected).abs();
+                if difference.is_nan() || difference > LARGEST_DIFFERENCE {
                     return Err(format!(
                         "an increment of tick {sequence} is {number:e}, must be {expected:e}"
                     ));

@@ -66,9 +66,8 @@ impl Constants {
             let velocity: [f64; 3] = std::array::from_fn(|axis| {
                 (force[axis] - self.accel_bias[axis]) / self.accel_scale[axis] * duration
             });
-            let [x, y, z] = turn(&self.gyro_axes, angle);
-            let [u, v, w] = turn(&self.accel_axes, velocity);
-            [x, y, z, u, v, w]
+            let (angle, velocity) = (turn(&self.gyro_axes, angle), turn(&self.accel_axes, velocity));
+            std::array::from_fn(|place| *angle.iter().chain(&velocity).nth(place).unwrap_or(&f64::NAN))
         });
         (first..).zip(ticks).collect()
     }

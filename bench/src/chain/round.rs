@@ -129,8 +129,11 @@ fn outcome(
     let mut latencies = Histogram::<u64>::new_with_bounds(1, LONGEST_NS, 3)
         .map_err(|error| Error::Part { part: "latencies", what: error.to_string() })?;
     for (unit, came) in came_ns.chunks(plan.ticks().max(1)).enumerate() {
-        for (message, came) in
-            came.chunks(plan.batch).enumerate().take(plan.prelude + sent.messages).skip(plan.prelude + case.warm_up_messages())
+        for (message, came) in came
+            .chunks(plan.batch)
+            .enumerate()
+            .take(plan.prelude + sent.messages)
+            .skip(plan.prelude + case.warm_up_messages())
         {
             let Some(went) = sent_ns.get(message * plan.units + unit) else { continue };
             for came in came.iter().filter(|came| **came > 0) {

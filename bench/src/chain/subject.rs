@@ -63,7 +63,7 @@ impl Subject {
                 command.args(["part", "relay"]).arg(plan_file);
                 command
             }
-            Self::Service => self.serve(plan)?,
+            Self::Service => Self::serve(plan)?,
             Self::Python => python::relay(plan)?,
         };
         if let Some(runtime) = &profile.runtime {
@@ -78,7 +78,7 @@ impl Subject {
     }
 
     /// The service, with a document for each unit.
-    fn serve(self, plan: &Plan) -> Result<Command, Error> {
+    fn serve(plan: &Plan) -> Result<Command, Error> {
         let program = beside("isotherm")?;
         let documents = plan.folder.join("units");
         fs::create_dir_all(&documents).map_err(|source| Error::file(&documents, source))?;
@@ -90,7 +90,8 @@ impl Subject {
         let congestion = if plan.block { "block" } else { "drop" };
         let state = if plan.state { "state = \"state\"\n" } else { "" };
         let units = plan.units.max(1);
-        let text = format!("calibrations = \"units\"\n{state}max_units = {units}\ncongestion = \"{congestion}\"\n");
+        let text =
+            format!("calibrations = \"units\"\n{state}max_units = {units}\ncongestion = \"{congestion}\"\n");
         fs::write(&settings, text).map_err(|source| Error::file(&settings, source))?;
         let mut command = Command::new(program);
         command

@@ -1,5 +1,7 @@
 //! The chain's figures as tables.
 
+use std::fmt::Write as _;
+
 use comfy_table::Table;
 
 use super::{Measure, Report, Row};
@@ -11,14 +13,14 @@ pub(crate) fn table(report: &Report) -> String {
     let mut text = format!("{}\n", report.machine.words());
     let paced: Vec<&Row> = report.rows.iter().filter(|row| !saturated(row)).collect();
     if !paced.is_empty() {
-        text += &format!("\n{}\n", latency(&paced));
+        let _ = writeln!(text, "\n{}", latency(&paced));
     }
     let saturated: Vec<&Row> = report.rows.iter().filter(saturated).collect();
     if !saturated.is_empty() {
-        text += &format!("\n{}\n", throughput(&saturated));
+        let _ = writeln!(text, "\n{}", throughput(&saturated));
     }
     for words in &report.skipped {
-        text += &format!("\nskipped: {words}\n");
+        let _ = writeln!(text, "\nskipped: {words}");
     }
     text
 }

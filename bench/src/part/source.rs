@@ -87,9 +87,8 @@ fn publish(
         let due = begin + index * plan.period_ns();
         match plan.pace {
             Pace::Burst => late.push(sleep_until(due)),
-            Pace::Spread => {}
             Pace::Saturated { limit_ms } if now_ns() > begin + limit_ms * 1_000_000 => break,
-            Pace::Saturated { .. } => {}
+            Pace::Spread | Pace::Saturated { .. } => {}
         }
         for (unit, ((outlets, message), sent)) in (0_u64..).zip(units.iter().zip(burst).zip(sent)) {
             if plan.pace == Pace::Spread {

@@ -6,8 +6,11 @@ pub(super) fn fill(page: &str, sections: &[(&str, String)]) -> Result<String, St
     let mut page = page.to_owned();
     for (name, table) in sections {
         let begin = format!("<!-- figures: {name} -->\n");
-        let (before, rest) = page.split_once(&begin).ok_or_else(|| format!("has no line {}", begin.trim_end()))?;
-        let (_, after) = rest.split_once("<!-- end -->\n").ok_or_else(|| format!("figures {name} have no <!-- end -->"))?;
+        let (before, rest) =
+            page.split_once(&begin).ok_or_else(|| format!("has no line {}", begin.trim_end()))?;
+        let (_, after) = rest
+            .split_once("<!-- end -->\n")
+            .ok_or_else(|| format!("figures {name} have no <!-- end -->"))?;
         page = format!("{before}{begin}\n{}\n\n<!-- end -->\n{after}", table.trim());
     }
     Ok(page)

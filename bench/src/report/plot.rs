@@ -8,7 +8,8 @@ use crate::chain::{Measure, Row, middle};
 
 const SIZE: (u32, u32) = (960, 460);
 /// Of the relay, of the service, of the rest.
-const COLOURS: [RGBColor; 4] = [RGBColor(120, 120, 120), RGBColor(196, 78, 32), RGBColor(38, 98, 168), RGBColor(80, 140, 70)];
+const COLOURS: [RGBColor; 4] =
+    [RGBColor(120, 120, 120), RGBColor(196, 78, 32), RGBColor(38, 98, 168), RGBColor(80, 140, 70)];
 
 fn colour(index: usize) -> RGBColor {
     COLOURS.get(index % COLOURS.len()).copied().unwrap_or(BLACK)
@@ -17,8 +18,7 @@ fn colour(index: usize) -> RGBColor {
 /// Latency from the median to 99 of 100 ticks, by load; one mark for each subject.
 #[expect(clippy::cast_precision_loss, reason = "a handful of rows")]
 pub(super) fn latency(rows: &[Row]) -> Result<String, String> {
-    let rows: Vec<&Row> =
-        rows.iter().filter(|row| row.measure == Measure::Latency).collect();
+    let rows: Vec<&Row> = rows.iter().filter(|row| row.measure == Measure::Latency).collect();
     let (mut loads, mut subjects): (Vec<String>, Vec<String>) = (Vec::new(), Vec::new());
     for row in &rows {
         if !loads.contains(&row.name) {
@@ -61,8 +61,12 @@ pub(super) fn latency(rows: &[Row]) -> Result<String, String> {
                 PathElement::new(vec![(place(row), p50), (place(row), p99)], style)
             });
             let drawn = chart.draw_series(bars).map_err(words)?;
-            drawn.label(subject.clone()).legend(move |(x, y)| PathElement::new(vec![(x, y), (x + 18, y)], style));
-            let dots = of.iter().map(|row| Circle::new((place(row), row.median.latency_us[0]), 5, colour(index).filled()));
+            drawn
+                .label(subject.clone())
+                .legend(move |(x, y)| PathElement::new(vec![(x, y), (x + 18, y)], style));
+            let dots = of
+                .iter()
+                .map(|row| Circle::new((place(row), row.median.latency_us[0]), 5, colour(index).filled()));
             chart.draw_series(dots).map_err(words)?;
         }
         legend(&mut chart)?;
@@ -113,15 +117,16 @@ pub(super) fn units(rows: &[Row]) -> Result<String, String> {
     Ok(svg)
 }
 
-fn legend<'a, X, Y>(
-    chart: &mut ChartContext<'a, SVGBackend<'a>, Cartesian2d<X, Y>>,
-) -> Result<(), String>
+fn legend<'a, X, Y>(chart: &mut ChartContext<'a, SVGBackend<'a>, Cartesian2d<X, Y>>) -> Result<(), String>
 where
     X: Ranged<ValueType = f64> + 'a,
     Y: Ranged<ValueType = f64> + 'a,
 {
     let mut labels = chart.configure_series_labels();
-    labels.position(SeriesLabelPosition::UpperLeft).background_style(WHITE.mix(0.8)).border_style(BLACK.mix(0.3));
+    labels
+        .position(SeriesLabelPosition::UpperLeft)
+        .background_style(WHITE.mix(0.8))
+        .border_style(BLACK.mix(0.3));
     labels.label_font(("sans-serif", 13)).draw().map_err(words)
 }
 

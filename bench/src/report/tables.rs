@@ -1,5 +1,7 @@
 //! Tables in Markdown.
 
+use std::fmt::Write as _;
+
 use super::Kernel;
 use crate::chain::{Measure, Row, middle};
 use crate::machine::Machine;
@@ -9,7 +11,7 @@ use crate::scale::{Growth, Offline, kib_per_unit};
 fn markdown(head: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
     let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
     let mut text = line(&head.iter().map(ToString::to_string).collect::<Vec<_>>());
-    text += &format!("|---{}|\n", "|---:".repeat(head.len().saturating_sub(1)));
+    let _ = writeln!(text, "|---{}|", "|---:".repeat(head.len().saturating_sub(1)));
     text.extend(rows.into_iter().map(|cells| line(&cells)));
     text
 }
@@ -31,7 +33,7 @@ fn thousands(number: f64) -> String {
 pub(super) fn machine(machine: &Machine, skipped: &[String]) -> String {
     let mut text = format!("Measured on: {}.\n", machine.words());
     for words in skipped {
-        text += &format!("\nSkipped: {words}\n");
+        let _ = writeln!(text, "\nSkipped: {words}");
     }
     text
 }
@@ -50,7 +52,18 @@ fn ratio(ratio: f64, is_reference: bool) -> String {
 
 fn latency_rows<'a>(rows: impl Iterator<Item = &'a Row>) -> String {
     let mut last = "";
-    let head = ["load", "in the middle", "p50 µs", "p90", "p99", "p99.9", "p50 ratio", "p99 ratio", "lost", "CPU µs/tick"];
+    let head = [
+        "load",
+        "in the middle",
+        "p50 µs",
+        "p90",
+        "p99",
+        "p99.9",
+        "p50 ratio",
+        "p99 ratio",
+        "lost",
+        "CPU µs/tick",
+    ];
     markdown(
         &head,
         rows.enumerate().map(|(index, row)| {
@@ -116,7 +129,8 @@ pub(super) fn kernel(rows: &[Kernel]) -> String {
 /// By number of units, and how that grows.
 #[expect(clippy::cast_precision_loss, reason = "far below 2⁵³")]
 pub(super) fn units(rows: &[Row], growth: &[Growth]) -> String {
-    let head = ["units", "ticks/s", "CPU µs/tick", "lost", "resident MiB", "KiB per unit", "start s", "swap ms"];
+    let head =
+        ["units", "ticks/s", "CPU µs/tick", "lost", "resident MiB", "KiB per unit", "start s", "swap ms"];
     let table = markdown(
         &head,
         rows.iter().map(|row| {
@@ -133,8 +147,10 @@ pub(super) fn units(rows: &[Row], growth: &[Growth]) -> String {
             ]
         }),
     );
-    let exponents =
-        markdown(&["grows with the number of units", "exponent"], growth.iter().map(|growth| vec![growth.what.clone(), format!("{:.2}", growth.exponent)]));
+    let exponents = markdown(
+        &["grows with the number of units", "exponent"],
+        growth.iter().map(|growth| vec![growth.what.clone(), format!("{:.2}", growth.exponent)]),
+    );
     format!("{table}\n{exponents}")
 }
 
@@ -142,7 +158,17 @@ pub(super) fn units(rows: &[Row], growth: &[Growth]) -> String {
 #[expect(clippy::cast_precision_loss, reason = "far below 2⁵³")]
 pub(super) fn rated(rows: &[Row]) -> String {
     let mut last = "";
-    let head = ["load", "in the middle", "p50 µs", "p99", "p99 ratio", "lost", "CPU µs/tick", "cores", "resident KiB per unit"];
+    let head = [
+        "load",
+        "in the middle",
+        "p50 µs",
+        "p99",
+        "p99 ratio",
+        "lost",
+        "CPU µs/tick",
+        "cores",
+        "resident KiB per unit",
+    ];
     markdown(
         &head,
         rows.iter().map(|row| {
@@ -166,7 +192,11 @@ pub(super) fn rated(rows: &[Row]) -> String {
 
 /// Offline correction.
 pub(super) fn offline(offline: &Offline) -> String {
-    let own = vec!["`isotherm-replay correct`, from MCAP".to_owned(), thousands(offline.correct_per_s), String::new()];
+    let own = vec![
+        "`isotherm-replay correct`, from MCAP".to_owned(),
+        thousands(offline.correct_per_s),
+        String::new(),
+    ];
     let mut rows = vec![own];
     if let Some(numpy) = &offline.numpy {
         let ways = [
@@ -175,9 +205,11 @@ pub(super) fn offline(offline: &Offline) -> String {
             ("numpy, tick by tick, from MCAP", numpy.tick_by_tick_per_s),
             ("numpy, tick by tick, from arrays in memory", numpy.tick_by_tick_in_memory_per_s),
         ];
-        rows.extend(ways.into_iter().zip(numpy.ratios).map(|((name, per_s), ratio)| {
-            vec![name.to_owned(), thousands(per_s), format!("{ratio:.1}×")]
-        }));
+        rows.extend(
+            ways.into_iter().zip(numpy.ratios).map(|((name, per_s), ratio)| {
+                vec![name.to_owned(), thousands(per_s), format!("{ratio:.1}×")]
+            }),
+        );
     }
     markdown(&["one core", "ticks/s", "`correct` is faster by"], rows)
 }

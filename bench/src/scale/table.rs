@@ -1,5 +1,7 @@
 //! The scale's figures as tables.
 
+use std::fmt::Write as _;
+
 use super::Report;
 use crate::chain::{Row, middle};
 use crate::cli::plain;
@@ -8,19 +10,19 @@ use crate::cli::plain;
 pub(crate) fn table(report: &Report) -> String {
     let mut text = format!("{}\n", report.machine.words());
     if !report.units.is_empty() {
-        text += &format!("\n{}\n", units(&report.units));
+        let _ = writeln!(text, "\n{}", units(&report.units));
         for growth in &report.growth {
-            text += &format!(" exponent {:6.3}  {}\n", growth.exponent, growth.what);
+            let _ = writeln!(text, " exponent {:6.3}  {}", growth.exponent, growth.what);
         }
     }
     if !report.rated.is_empty() {
-        text += &format!("\n{}\n", rated(&report.rated));
+        let _ = writeln!(text, "\n{}", rated(&report.rated));
     }
     if let Some(offline) = &report.offline {
-        text += &format!("\n{}\n", offline_table(offline));
+        let _ = writeln!(text, "\n{}", offline_table(offline));
     }
     for words in &report.skipped {
-        text += &format!("\nskipped: {words}\n");
+        let _ = writeln!(text, "\nskipped: {words}");
     }
     text
 }
@@ -32,9 +34,18 @@ pub(crate) fn kib_per_unit(row: &Row, first: &Row) -> f64 {
         / (row.case.units as f64 - first.case.units as f64)
 }
 
+#[expect(clippy::cast_precision_loss, reason = "far below 2⁵³")]
 fn units(rows: &[Row]) -> comfy_table::Table {
-    let mut table =
-        plain(&["units", "ticks/s", "CPU µs/tick", "lost", "resident MiB", "KiB per unit", "start s", "swap ms"]);
+    let mut table = plain(&[
+        "units",
+        "ticks/s",
+        "CPU µs/tick",
+        "lost",
+        "resident MiB",
+        "KiB per unit",
+        "start s",
+        "swap ms",
+    ]);
     for row in rows {
         let outcome = &row.median;
         table.add_row([
@@ -43,9 +54,9 @@ fn units(rows: &[Row]) -> comfy_table::Table {
             format!("{:.3}", outcome.cpu_us_per_tick),
             outcome.lost.to_string(),
             format!("{:.1}", outcome.resident_kib as f64 / 1024.0),
-            rows.first().filter(|first| first.case.units < row.case.units).map_or_else(String::new, |first| {
-                format!("{:.1}", kib_per_unit(row, first))
-            }),
+            rows.first()
+                .filter(|first| first.case.units < row.case.units)
+                .map_or_else(String::new, |first| format!("{:.1}", kib_per_unit(row, first))),
             format!("{:.2}", outcome.start_s),
             format!("{:.1}", outcome.swap_ms),
         ]);
@@ -54,7 +65,8 @@ fn units(rows: &[Row]) -> comfy_table::Table {
 }
 
 fn rated(rows: &[Row]) -> comfy_table::Table {
-    let mut table = plain(&["load", "in the middle", "p50 µs", "p99", "p99 ratio", "lost", "CPU µs/tick", "cores"]);
+    let mut table =
+        plain(&["load", "in the middle", "p50 µs", "p99", "p99 ratio", "lost", "CPU µs/tick", "cores"]);
     for row in rows {
         let [p50, _, p99, _] = row.median.latency_us;
         table.add_row([
@@ -73,7 +85,11 @@ fn rated(rows: &[Row]) -> comfy_table::Table {
 
 fn offline_table(offline: &super::Offline) -> comfy_table::Table {
     let mut table = plain(&["offline, one core", "ticks/s", "`correct` is faster by"]);
-    table.add_row(["isotherm-replay correct, from MCAP".to_owned(), format!("{:.0}", offline.correct_per_s), String::new()]);
+    table.add_row([
+        "isotherm-replay correct, from MCAP".to_owned(),
+        format!("{:.0}", offline.correct_per_s),
+        String::new(),
+    ]);
     if let Some(numpy) = &offline.numpy {
         let rows = [
             ("numpy, vectorised, from MCAP", numpy.vectorised_per_s),
