@@ -110,9 +110,8 @@ mod tests {
     #[test]
     fn a_child_that_has_ended_counts() {
         let before = children_s().expect("the account is there");
-        let spun =
-            std::process::Command::new("bash").args(["-c", "for ((i = 0; i < 100000; i++)); do :; done"]);
-        let status = { spun }.status().expect("bash runs");
+        let mut spun = std::process::Command::new("bash");
+        let status = spun.args(["-c", "for ((i = 0; i < 100000; i++)); do :; done"]).status().expect("bash runs");
         assert!(status.success() && children_s().expect("the account is there") > before);
     }
 }
