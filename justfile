@@ -38,3 +38,7 @@ python:
 # Run the demo briefly and print its figures
 demo:
     .ci/run demo
+
+# Measure everything and write docs/performance.md anew (about an hour; QUICK=1: whether all works)
+performance:
+    bash bench/performance.sh

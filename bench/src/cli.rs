@@ -8,9 +8,13 @@ use clap::{Parser, Subcommand};
 use comfy_table::presets::NOTHING;
 use comfy_table::{CellAlignment, Table};
 
+use crate::chain::{self, ChainArgs};
 use crate::error::Error;
 use crate::instructions::{self, Figures};
 use crate::kernel;
+use crate::part::{self, Role};
+use crate::report::{self, ReportArgs};
+use crate::scale::{self, ScaleArgs};
 
 /// How fast Isotherm is, as ratios to named references
 #[derive(Debug, Parser)]
@@ -42,6 +46,20 @@ enum Command {
         /// Print JSON
         #[arg(long)]
         json: bool,
+    },
+    /// Latency, throughput and loss through the service, beside a bare relay and a Python script
+    Chain(ChainArgs),
+    /// How cost, memory, start-up and swaps grow with the number of units; offline correction beside numpy
+    Scale(ScaleArgs),
+    /// Write figures, printed as JSON before, into `docs/performance.md`
+    Report(ReportArgs),
+    /// Play one part of a chain
+    #[command(hide = true)]
+    Part {
+        /// Which
+        role: Role,
+        /// What is to be done
+        plan: PathBuf,
     },
     /// Run one kernel once: what `instructions` counts
     #[command(hide = true)]
@@ -102,6 +120,16 @@ fn run(command: Command) -> Result<String, Error> {
             }
             Ok(printed)
         }
+        Command::Chain(args) => {
+            let report = chain::measure(&args)?;
+            Ok(if args.json { as_json(&report) } else { chain::table(&report) })
+        }
+        Command::Scale(args) => {
+            let report = scale::measure(&args)?;
+            Ok(if args.json { as_json(&report) } else { scale::table(&report) })
+        }
+        Command::Report(args) => report::write(&args),
+        Command::Part { role, plan } => part::run(role, &plan).map(|()| String::new()),
         Command::Pass { index } => instructions::pass(index).map(|()| String::new()),
     }
 }
@@ -110,7 +138,7 @@ fn as_json(value: &impl serde::Serialize) -> String {
     serde_json::to_string_pretty(value).map_or_else(|error| error.to_string(), |text| text + "\n")
 }
 
-fn plain(head: &[&str]) -> Table {
+pub(crate) fn plain(head: &[&str]) -> Table {
     let mut table = Table::new();
     table.load_preset(NOTHING).set_header(head);
     table.column_iter_mut().skip(1).for_each(|column| column.set_cell_alignment(CellAlignment::Right));

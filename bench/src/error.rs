@@ -41,6 +41,28 @@ pub(crate) enum Error {
     /// Instructions cannot be counted.
     #[error("cannot count instructions: {0}")]
     Count(String),
+    /// A process of a chain has failed.
+    #[error("{part}: {what}")]
+    Part {
+        /// Which.
+        part: &'static str,
+        /// What became of it.
+        what: String,
+    },
+    /// A program that is to be measured is not there.
+    #[error("{} is not there: build it with `cargo build --release --locked --workspace --bins`", .0.display())]
+    Missing(PathBuf),
+    /// What came out is not what should have.
+    #[error("{subject}: {what}: what it gives is wrong, so its speed is not told")]
+    Output {
+        /// What was measured.
+        subject: String,
+        /// What is wrong with it.
+        what: String,
+    },
+    /// A session.
+    #[error(transparent)]
+    Bus(#[from] isotherm_bus::BusError),
     /// Something takes more than it took.
     #[error("{}", .0.join("\n"))]
     Slower(Vec<String>),
@@ -49,5 +71,9 @@ pub(crate) enum Error {
 impl Error {
     pub(crate) fn file(path: &Path, source: io::Error) -> Self {
         Self::File { path: path.to_owned(), source }
+    }
+
+    pub(crate) fn zenoh(part: &'static str, error: &zenoh::Error) -> Self {
+        Self::Part { part, what: isotherm_bus::words(error) }
     }
 }

@@ -46,3 +46,28 @@ pub(crate) fn interleaved<T>(cases: &mut [T], rounds: usize, mut run: impl FnMut
     };
     times.into_iter().map(sorted).collect()
 }
+
+/// Median of some figures; what is no number is left out, and no figures have none.
+pub(crate) fn median(figures: impl Iterator<Item = f64>) -> f64 {
+    let mut sorted: Vec<f64> = figures.filter(|figure| !figure.is_nan()).collect();
+    sorted.sort_by(f64::total_cmp);
+    let upper = sorted.get(sorted.len() / 2).copied().unwrap_or(f64::NAN);
+    match sorted.len().checked_sub(1) {
+        Some(last) if last % 2 == 1 => {
+            sorted.get(last / 2).map_or(upper, |lower| f64::midpoint(*lower, upper))
+        }
+        _ => upper,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_median_is_in_the_middle() {
+        assert_eq!(median([3.0, 1.0, 2.0].into_iter()).to_bits(), 2.0_f64.to_bits());
+        assert_eq!(median([4.0, 1.0, f64::NAN, 2.0, 3.0].into_iter()).to_bits(), 2.5_f64.to_bits());
+        assert!(median(std::iter::empty()).is_nan());
+    }
+}

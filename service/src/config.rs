@@ -40,7 +40,7 @@ pub struct Settings {
     pub state: Option<PathBuf>,
     /// What speaks against a swap.
     pub swap: SwapSettings,
-    /// Most units at a time (1…4096); further ones are refused.
+    /// Most units at a time (1…16384); further ones are refused.
     pub max_units: usize,
     /// Settings of every unit's state machine.
     pub unit: UnitSettings,
@@ -120,7 +120,7 @@ impl Settings {
             state: root.new_path(walk, "state", folder),
             swap: SwapSettings::read(walk, &mut root, folder),
             max_units: root
-                .integer(walk, "max_units", 1, 4096)
+                .integer(walk, "max_units", 1, 16_384)
                 .map_or(default.max_units, |units| units as usize),
             unit: UnitSettings {
                 pairing_window: root

@@ -121,10 +121,10 @@ fn every_key_arrives_where_it_belongs() {
 #[test]
 fn each_problem_names_its_place_its_value_and_its_limit() {
     let cases = [
-        ("max_units = 0", "1:13: max_units: is 0, must be a whole number from 1 to 4096"),
-        ("\n max_units = 4097", "2:14: max_units: is 4097, must be a whole number from 1 to 4096"),
-        ("max_units = 1.5", "1:13: max_units: is 1.5, must be a whole number from 1 to 4096"),
-        ("max_units = -1", "1:13: max_units: is -1, must be a whole number from 1 to 4096"),
+        ("max_units = 0", "1:13: max_units: is 0, must be a whole number from 1 to 16384"),
+        ("\n max_units = 16385", "2:14: max_units: is 16385, must be a whole number from 1 to 16384"),
+        ("max_units = 1.5", "1:13: max_units: is 1.5, must be a whole number from 1 to 16384"),
+        ("max_units = -1", "1:13: max_units: is -1, must be a whole number from 1 to 16384"),
         ("pairing_window_ms = 0", "1:21: pairing_window_ms: is 0, must be a whole number from 1 to 10000"),
         (
             "temperature_delay_ms = \"5\"",

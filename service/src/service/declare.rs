@@ -3,7 +3,8 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use isotherm_protocol::key::{self, UnitId};
+use isotherm_protocol::key::{self, RawStream, UnitId};
+use zenoh::key_expr::KeyExpr;
 use zenoh::liveliness::LivelinessToken;
 use zenoh::pubsub::Subscriber;
 use zenoh::qos::{CongestionControl, Priority};
@@ -72,15 +73,24 @@ impl Declared {
 }
 
 /// One declared publisher per unit, at one priority, so that its batches stay in order.
+///
+/// With it the unit's raw keys are declared, for as long as the unit is there: Zenoh remembers the route to a declared key. To
+/// one that it only receives as text it looks for the subscribers anew with every message, among all keys of all units.
 pub(super) fn outlets(session: Session, congestion: CongestionControl) -> OutletMaker {
     Box::new(move |unit| {
+        let declare = |stream| session.declare_keyexpr(key::raw(unit, stream)).wait();
+        let received: Vec<KeyExpr<'static>> = RawStream::ALL.into_iter().map(declare).collect::<Result<_, _>>()?;
         let publisher = session
             .declare_publisher(key::corrected(unit))
             .congestion_control(congestion)
             .priority(Priority::RealTime)
             .express(false)
             .wait()?;
-        let outlet: Outlet = Box::new(move |frame| publisher.put(frame).wait());
+        let outlet: Outlet = Box::new(move |frame| {
+            // Undeclared where they are dropped.
+            let _ = &received;
+            publisher.put(frame).wait()
+        });
         Ok(outlet)
     })
 }

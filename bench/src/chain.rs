@@ -1,0 +1,241 @@
+//! The chain: source, middle and sink in three processes over TCP loopback; the service beside a bare relay.
+//!
+//! The relay is the reference: the same Zenoh configuration, and a callback that only puts what came in on the output key.
+//! Subjects take turns in every round, and a ratio is one of two rounds that follow one another.
+
+mod case;
+mod check;
+mod profile;
+pub(crate) mod python;
+pub(crate) mod round;
+mod row;
+mod subject;
+mod swap;
+mod table;
+
+use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
+
+pub(crate) use case::Case;
+pub(crate) use profile::Profile;
+pub(crate) use row::Row;
+pub(crate) use subject::Subject;
+pub(crate) use table::{middle, table};
+
+use crate::error::Error;
+use crate::machine::Machine;
+use crate::part::Pace;
+use crate::progress::Bar;
+
+/// What of a chain is measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+pub(crate) enum Measure {
+    /// Latency at given rates.
+    Latency,
+    /// Throughput where nothing waits.
+    Saturation,
+    /// Latency while every unit is given another calibration each second, beside latency without.
+    Swap,
+}
+
+/// Arguments of `chain`.
+#[derive(Debug, Clone, clap::Args)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a switch of the command line")]
+pub(crate) struct ChainArgs {
+    /// What is measured
+    #[arg(long, value_delimiter = ',', default_values = ["latency", "saturation", "swap"])]
+    measure: Vec<Measure>,
+    /// What stands in the middle; the relay is always among them
+    #[arg(long, value_delimiter = ',', default_values = ["relay", "service", "python"])]
+    subject: Vec<Subject>,
+    /// Numbers of units; with `--rate` and `--batch` instead of the usual cases
+    #[arg(long, value_delimiter = ',', value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    units: Vec<u32>,
+    /// Ticks per second of each unit
+    #[arg(long, value_delimiter = ',', value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    rate: Vec<u32>,
+    /// Ticks in a message
+    #[arg(long, value_delimiter = ',', value_parser = clap::value_parser!(u32).range(1..=4096))]
+    batch: Vec<u32>,
+    /// Rounds; every subject runs once in each
+    #[arg(long, default_value_t = 5)]
+    rounds: usize,
+    /// How long a round of latency is measured (s)
+    #[arg(long, default_value_t = 3.0)]
+    seconds: f64,
+    /// One round of a second for each case: whether all works, not how fast
+    #[arg(long)]
+    quick: bool,
+    /// Units one after the other over their period instead of all at once
+    #[arg(long)]
+    spread: bool,
+    /// Settings of Zenoh, a name or NAME;runtime=RON;key/of/zenoh=JSON; several are compared with one another, the first is
+    /// the reference
+    #[arg(long, value_name = "PROFILE")]
+    profile: Vec<Profile>,
+    /// Threads of Zenoh's runtimes in the middle (RON), as the environment variable `ZENOH_RUNTIME` has them
+    #[arg(long, value_name = "RON")]
+    zenoh_runtime: Option<String>,
+    /// Source and sink have the settings too
+    #[arg(long)]
+    ends_too: bool,
+    /// Print JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// All that was measured.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Report {
+    /// On what.
+    pub(crate) machine: Machine,
+    /// Rows, by case and then by subject.
+    pub(crate) rows: Vec<Row>,
+    /// What was left out, and why.
+    pub(crate) skipped: Vec<String>,
+}
+
+/// Ticks of all units that are sent at most where nothing waits.
+const SATURATED_TICKS: [(usize, usize); 2] = [(1, 1_500_000), (32, 6_400_000)];
+/// How long the source goes on there at most (s).
+const SATURATED_S: f64 = 5.0;
+
+impl ChainArgs {
+    /// All cases, each as a list of variants that are to be compared.
+    fn cases(&self) -> Vec<(Measure, Vec<Case>)> {
+        let seconds = if self.quick { 1.0 } else { self.seconds };
+        let mut cases = Vec::new();
+        let usize_of = |numbers: &[u32], or: usize| match numbers {
+            [] => vec![or],
+            numbers => numbers.iter().map(|number| *number as usize).collect(),
+        };
+        if self.measure.contains(&Measure::Latency) {
+            let chosen = !(self.units.is_empty() && self.rate.is_empty() && self.batch.is_empty());
+            let loads: Vec<(usize, u32, usize)> = if chosen {
+                let rates = if self.rate.is_empty() { vec![1000] } else { self.rate.clone() };
+                let mut loads = Vec::new();
+                for units in usize_of(&self.units, 20) {
+                    for rate in &rates {
+                        loads.extend(usize_of(&self.batch, 1).into_iter().map(|batch| (units, *rate, batch)));
+                    }
+                }
+                loads
+            } else {
+                let at = |rate| [1, 20, 100].map(|units| (units, rate, 1));
+                at(200).into_iter().chain(at(1000)).chain([(100, 1000, 10)]).collect()
+            };
+            cases.extend(loads.into_iter().map(|(units, rate, batch)| {
+                let pace = if self.spread { Pace::Spread } else { Pace::Burst };
+                (Measure::Latency, vec![Case { pace, ..Case::paced(units, rate, batch, seconds) }])
+            }));
+        }
+        if self.measure.contains(&Measure::Saturation) {
+            let units = usize_of(&self.units, 20);
+            cases.extend(units.iter().flat_map(|units| {
+                SATURATED_TICKS.map(|(batch, ticks)| {
+                    let ticks = if self.quick { ticks / 10 } else { ticks };
+                    (Measure::Saturation, vec![Case::saturated(*units, batch, ticks, SATURATED_S)])
+                })
+            }));
+        }
+        if self.measure.contains(&Measure::Swap) {
+            let units = usize_of(&self.units, 100);
+            let rate = self.rate.first().copied().unwrap_or(200);
+            cases.extend(units.into_iter().map(|units| {
+                let without = Case::paced(units, rate, 1, if self.quick { 2.0 } else { seconds.max(4.0) });
+                (Measure::Swap, vec![without.clone(), Case { swaps: true, ..without }])
+            }));
+        }
+        cases
+    }
+
+    /// Settings that are compared.
+    fn profiles(&self) -> Vec<Profile> {
+        let mut profiles = self.profile.clone();
+        if let Some(runtime) = &self.zenoh_runtime {
+            profiles.push(Profile::of_runtime(runtime));
+        }
+        if profiles.is_empty() {
+            profiles.push(Profile::own());
+        }
+        profiles
+    }
+}
+
+/// Runs the chain.
+pub(crate) fn measure(args: &ChainArgs) -> Result<Report, Error> {
+    let machine = Machine::look();
+    let (mut rows, mut skipped) = (Vec::new(), Vec::new());
+    let mut subjects = args.subject.clone();
+    subjects.push(Subject::Relay);
+    subjects.sort_unstable();
+    subjects.dedup();
+    if subjects.contains(&Subject::Python)
+        && let Err(error) = python::interpreter()
+    {
+        skipped.push(format!("{error}"));
+        subjects.retain(|subject| *subject != Subject::Python);
+    }
+    let (cases, profiles) = (args.cases(), args.profiles());
+    let rounds = if args.quick { 1 } else { args.rounds.max(1) };
+    let runs: Vec<_> = cases.iter().map(|(_, variants)| runs(variants, &profiles, &subjects)).collect();
+    let bar = Bar::over(runs.iter().map(|runs| runs.len() * rounds).sum());
+    for ((measure, _), runs) in cases.iter().zip(runs) {
+        let mut outcomes = vec![Vec::with_capacity(rounds); runs.len()];
+        for _ in 0..rounds {
+            for ((case, profile, subject), outcomes) in runs.iter().zip(&mut outcomes) {
+                bar.show(&format!("{}: {}", case.words(), subject.name()));
+                let outcome = round::run(case, *subject, profile, args.ends_too.then_some(profile))?;
+                check_swaps(case, *subject, &outcome)?;
+                outcomes.push(outcome);
+                bar.step();
+            }
+        }
+        let reference = outcomes.first().cloned().unwrap_or_default();
+        let before = outcomes.clone();
+        rows.extend(runs.iter().zip(outcomes).map(|((case, profile, subject), outcomes)| {
+            // Swaps are compared with the same subject without them, all else with the relay.
+            let without =
+                runs.iter().position(|(other, _, same)| case.swaps && !other.swaps && same == subject);
+            let of = without.and_then(|index| before.get(index)).unwrap_or(&reference);
+            Row::new(*measure, case, (*subject, &profile.name), outcomes, of)
+        }));
+    }
+    bar.finish();
+    Ok(Report { machine: machine.measured(), rows, skipped })
+}
+
+/// What takes turns in a round.
+fn runs(variants: &[Case], profiles: &[Profile], subjects: &[Subject]) -> Vec<(Case, Profile, Subject)> {
+    let mut runs = Vec::new();
+    for profile in profiles {
+        for case in variants {
+            let able =
+                |subject: &&Subject| !variants.iter().any(|case| case.swaps) || **subject == Subject::Service;
+            let first = runs.is_empty();
+            // The relay is the reference of swaps too, without any.
+            let relay = variants.len() > 1 && first;
+            runs.extend(relay.then(|| (case.clone(), profile.clone(), Subject::Relay)));
+            runs.extend(
+                subjects.iter().filter(able).map(|subject| (case.clone(), profile.clone(), *subject)),
+            );
+        }
+    }
+    runs
+}
+
+/// Whether every unit was given the calibrations that it was to be given.
+fn check_swaps(case: &Case, subject: Subject, outcome: &round::Outcome) -> Result<(), Error> {
+    let need = if case.swaps { swap::expected(Duration::from_secs_f64(case.seconds)) } else { 0 };
+    if outcome.swaps_per_unit < need {
+        return Err(Error::Output {
+            subject: subject.name().to_owned(),
+            what: format!(
+                "a unit was given {} calibrations, must be {need} at least",
+                outcome.swaps_per_unit
+            ),
+        });
+    }
+    Ok(())
+}

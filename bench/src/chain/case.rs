@@ -1,0 +1,129 @@
+//! What a chain is put under.
+
+use std::path::Path;
+use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
+
+use crate::part::{Format, Pace, Plan};
+
+/// A load.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Case {
+    /// Units.
+    pub(crate) units: usize,
+    /// Ticks per second of each.
+    pub(crate) rate_hz: u32,
+    /// Ticks in a message.
+    pub(crate) batch: usize,
+    /// When messages go out.
+    pub(crate) pace: Pace,
+    /// How long is measured (s).
+    pub(crate) seconds: f64,
+    /// Ticks of each unit where there is no pace.
+    pub(crate) ticks: usize,
+    /// Whether every unit is given another calibration each second.
+    pub(crate) swaps: bool,
+    /// Whether the service has a state folder, in which it writes down every calibration.
+    pub(crate) state: bool,
+    /// Sessions of the source.
+    pub(crate) sessions: usize,
+    /// Units that are given another calibration afterwards, one after the other, to see how long that takes.
+    pub(crate) timed_swaps: usize,
+}
+
+/// What is not measured at the start, where caches are cold (s).
+const WARM_UP_S: f64 = 0.5;
+/// What goes out before, longer than the window in which a first tick waits for an earlier one (s).
+const PRELUDE_S: f64 = 0.06;
+/// Ticks of each unit that are checked, and of all units that are kept for it.
+const CHECKED: usize = 100;
+const KEPT: usize = 200_000;
+
+impl Case {
+    /// Units at a rate, for so many seconds.
+    pub(crate) fn paced(units: usize, rate_hz: u32, batch: usize, seconds: f64) -> Self {
+        Self {
+            units,
+            rate_hz,
+            batch,
+            pace: Pace::Burst,
+            seconds,
+            ticks: 0,
+            swaps: false,
+            state: true,
+            sessions: 1,
+            timed_swaps: 0,
+        }
+    }
+
+    /// As much as will go through, at most so many ticks of all units in so many seconds.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "some seconds")]
+    pub(crate) fn saturated(units: usize, batch: usize, ticks: usize, seconds: f64) -> Self {
+        let pace = Pace::Saturated { limit_ms: (seconds * 1000.0) as u64 };
+        Self { pace, ticks: ticks / units, ..Self::paced(units, 1000, batch, seconds) }
+    }
+
+    /// In words.
+    pub(crate) fn words(&self) -> String {
+        let units = if self.units == 1 { "unit" } else { "units" };
+        let batch = match self.batch {
+            1 => String::new(),
+            batch => format!(", batches of {batch}"),
+        };
+        let swaps = if self.swaps { ", a swap each second" } else { "" };
+        match self.pace {
+            Pace::Saturated { .. } => format!("{} {units}, saturated, batches of {}", self.units, self.batch),
+            Pace::Spread => format!("{} {units} × {} Hz, spread{batch}{swaps}", self.units, self.rate_hz),
+            Pace::Burst => format!("{} {units} × {} Hz{batch}{swaps}", self.units, self.rate_hz),
+        }
+    }
+
+    /// How long it takes at most, once all is ready.
+    pub(crate) fn limit(&self) -> Duration {
+        Duration::from_secs_f64(4.0 * (self.seconds + WARM_UP_S) + 10.0)
+    }
+
+    /// Messages of each unit that are sent before latency counts.
+    pub(crate) fn warm_up_messages(&self) -> usize {
+        match self.pace {
+            Pace::Saturated { .. } => 0,
+            Pace::Burst | Pace::Spread => self.messages_in(WARM_UP_S),
+        }
+    }
+
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        clippy::cast_precision_loss,
+        reason = "some seconds"
+    )]
+    fn messages_in(&self, seconds: f64) -> usize {
+        (seconds * f64::from(self.rate_hz) / self.batch as f64).ceil() as usize
+    }
+
+    /// What the parts are to do.
+    pub(crate) fn plan(&self, folder: &Path, format: Format) -> Plan {
+        let saturated = matches!(self.pace, Pace::Saturated { .. });
+        let messages =
+            if saturated { self.ticks / self.batch } else { self.messages_in(WARM_UP_S + self.seconds) };
+        let prelude = self.messages_in(PRELUDE_S) + 1;
+        Plan {
+            units: self.units,
+            rate_hz: self.rate_hz,
+            batch: self.batch,
+            messages: prelude + messages.max(1),
+            prelude,
+            pace: self.pace,
+            block: saturated,
+            sessions: self.sessions,
+            connect: None,
+            zenoh_config: None,
+            folder: folder.to_owned(),
+            keep: CHECKED.min(KEPT.div_ceil(self.units)),
+            format,
+            declare_keys: false,
+            state: self.state,
+        }
+    }
+}

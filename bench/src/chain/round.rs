@@ -1,0 +1,163 @@
+//! One round of one subject: three processes from their start to their end.
+
+use std::fs;
+use std::time::{Duration, Instant};
+
+use hdrhistogram::Histogram;
+use serde::{Deserialize, Serialize};
+
+use super::case::Case;
+use super::check;
+use super::profile::Profile;
+use super::subject::Subject;
+use super::swap::{self, Swapper};
+use crate::error::Error;
+use crate::machine::Usage;
+use crate::part::{Plan, Ready, Received, Sent, read_numbers};
+use crate::process::{Process, this};
+
+/// How long a part may take to be ready.
+const READY_LIMIT: Duration = Duration::from_secs(120);
+/// Quantiles that are told.
+pub(crate) const QUANTILES: [f64; 4] = [0.5, 0.9, 0.99, 0.999];
+/// Longest latency that is told apart (ns).
+const LONGEST_NS: u64 = 60_000_000_000;
+
+/// What came of a round.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub(crate) struct Outcome {
+    /// End-to-end latency at the quantiles (µs): from before the tick is handed to Zenoh until the sink's callback is called.
+    pub(crate) latency_us: [f64; 4],
+    /// Greatest latency (µs).
+    pub(crate) latency_max_us: f64,
+    /// Ticks that the source sent.
+    pub(crate) sent: u64,
+    /// Ticks that did not come to the sink.
+    pub(crate) lost: u64,
+    /// Ticks that came more than once.
+    pub(crate) duplicates: u64,
+    /// Ticks out of order.
+    pub(crate) disordered: u64,
+    /// Messages per second at the sink.
+    pub(crate) messages_per_s: f64,
+    /// Ticks per second at the sink.
+    pub(crate) ticks_per_s: f64,
+    /// Processor time of the middle per tick (µs).
+    pub(crate) cpu_us_per_tick: f64,
+    /// Share of one core that it took.
+    pub(crate) cpu_share: f64,
+    /// Its resident memory at the end (KiB).
+    pub(crate) resident_kib: u64,
+    /// How far the source was behind its times, in the median, 99 of 100 times, and at most (µs).
+    pub(crate) source_late_us: [f64; 3],
+    /// Calibrations that each unit was given while it ran, at least.
+    pub(crate) swaps_per_unit: u64,
+    /// From the start of the middle until it was ready (s).
+    pub(crate) start_s: f64,
+    /// From the question until the answer of a swap, in the median (ms); 0 where none was timed.
+    pub(crate) swap_ms: f64,
+}
+
+/// Runs one round.
+pub(crate) fn run(
+    case: &Case,
+    subject: Subject,
+    profile: &Profile,
+    ends: Option<&Profile>,
+) -> Result<Outcome, Error> {
+    let folder = tempfile::tempdir().map_err(|source| Error::file(&std::env::temp_dir(), source))?;
+    let mut plan = case.plan(folder.path(), subject.format());
+    plan.zenoh_config = profile.write(folder.path())?;
+    plan.declare_keys = subject == Subject::Keyed;
+    let plan_file = folder.path().join("plan.json");
+    let write = |plan: &Plan| {
+        let text = serde_json::to_string(plan).unwrap_or_default();
+        fs::write(&plan_file, text).map_err(|source| Error::file(&plan_file, source))
+    };
+    write(&plan)?;
+    let starting = Instant::now();
+    let (middle, locator) = subject.start(&plan, &plan_file, profile)?;
+    let start_s = starting.elapsed().as_secs_f64();
+    plan.connect = Some(locator);
+    if ends.is_none() {
+        plan.zenoh_config = None;
+    }
+    write(&plan)?;
+    let part = |name: &'static str| {
+        let mut command = std::process::Command::new(this()?);
+        command.args(["part", name]).arg(&plan_file);
+        if let Some(runtime) = ends.and_then(|profile| profile.runtime.as_ref()) {
+            command.env("ZENOH_RUNTIME", runtime);
+        }
+        Process::start(name, &mut command, &plan.folder)
+    };
+    let mut sink = part("sink")?;
+    let _: Ready = sink.hear(READY_LIMIT)?;
+    let mut source = part("source")?;
+    let _: Ready = source.hear(READY_LIMIT)?;
+    for part in [&mut source, &mut sink] {
+        part.tell("prelude")?;
+    }
+    for part in [&source, &sink] {
+        let _: Ready = part.hear(READY_LIMIT)?;
+    }
+
+    let before = middle.usage()?;
+    let swapper = if case.swaps { Some(Swapper::start(&plan)?) } else { None };
+    source.tell("go")?;
+    let sent: Sent = source.hear(case.limit() + READY_LIMIT)?;
+    sink.tell(&sent.messages.to_string())?;
+    let received: Received = sink.hear(READY_LIMIT)?;
+    swapper.map(Swapper::stop).transpose()?;
+    let after = middle.usage()?;
+    let swap_ms = if subject == Subject::Service { swap::timed(&plan, case.timed_swaps)? } else { 0.0 };
+    check::check(&plan, subject, &received)?;
+    let used = Usage { cpu_s: after.cpu_s - before.cpu_s, ..after };
+    Ok(Outcome { start_s, swap_ms, ..outcome(&plan, case, (&sent, &received), used)? })
+}
+
+/// Puts together what the parts have written down.
+#[expect(clippy::cast_precision_loss, reason = "far below 2⁵³")]
+fn outcome(
+    plan: &Plan,
+    case: &Case,
+    (sent, received): (&Sent, &Received),
+    used: Usage,
+) -> Result<Outcome, Error> {
+    let [sent_ns, came_ns] =
+        [read_numbers(&plan.folder.join("sent.bin"))?, read_numbers(&plan.folder.join("came.bin"))?];
+    let mut latencies = Histogram::<u64>::new_with_bounds(1, LONGEST_NS, 3)
+        .map_err(|error| Error::Part { part: "latencies", what: error.to_string() })?;
+    for (unit, came) in came_ns.chunks(plan.ticks().max(1)).enumerate() {
+        for (message, came) in came
+            .chunks(plan.batch)
+            .enumerate()
+            .take(plan.prelude + sent.messages)
+            .skip(plan.prelude + case.warm_up_messages())
+        {
+            let Some(went) = sent_ns.get(message * plan.units + unit) else { continue };
+            for came in came.iter().filter(|came| **came > 0) {
+                latencies.saturating_record(came.saturating_sub(*went).max(1));
+            }
+        }
+    }
+    let us = |ns: u64| ns as f64 * 1e-3;
+    let total = (sent.messages * plan.units * plan.batch) as u64;
+    let seconds = (received.between_ns[1] - received.between_ns[0]) as f64 * 1e-9;
+    Ok(Outcome {
+        latency_us: QUANTILES.map(|share| us(latencies.value_at_quantile(share))),
+        latency_max_us: us(latencies.max()),
+        sent: total,
+        lost: total - received.ticks.min(total),
+        duplicates: received.duplicates,
+        disordered: received.disordered,
+        messages_per_s: received.messages as f64 / seconds,
+        ticks_per_s: received.ticks as f64 / seconds,
+        cpu_us_per_tick: used.cpu_s * 1e6 / total as f64,
+        cpu_share: used.cpu_s / sent.seconds,
+        resident_kib: used.resident_kib,
+        source_late_us: sent.late_us,
+        swaps_per_unit: received.fewest_changes,
+        ..Outcome::default()
+    })
+}

@@ -1,0 +1,103 @@
+//! Gives every unit another calibration each second, beside a chain at work.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use isotherm_bus::SessionOptions;
+use isotherm_protocol::key;
+use zenoh::{Session, Wait};
+
+use super::subject::document;
+use crate::clock::{now_ns, sleep_until};
+use crate::error::Error;
+use crate::part::{Plan, unit_name};
+use crate::rounds::median;
+
+/// Time between two swaps of a unit (ns).
+const PERIOD_NS: u64 = 1_000_000_000;
+/// What is left alone first, for the check to have ticks of the first calibration (ns).
+const FIRST_NS: u64 = 800_000_000;
+
+/// How long an answer may take.
+const LIMIT: Duration = Duration::from_secs(10);
+
+/// A thread that puts calibration documents.
+#[derive(Debug)]
+pub(super) struct Swapper {
+    ended: Arc<AtomicBool>,
+    thread: JoinHandle<Result<(), Error>>,
+}
+
+impl Swapper {
+    /// Begins: units one after the other, evenly over the second.
+    pub(super) fn start(plan: &Plan) -> Result<Self, Error> {
+        let session = open(plan)?;
+        let ended = Arc::new(AtomicBool::new(false));
+        let (asked, units) = (Arc::clone(&ended), plan.units);
+        let thread = std::thread::spawn(move || {
+            let begin = now_ns() + FIRST_NS;
+            for (swap, at) in (0..).zip(0_u64..) {
+                sleep_until(begin + at * PERIOD_NS / units as u64);
+                if asked.load(Ordering::Relaxed) {
+                    break;
+                }
+                let (unit, edition) = (swap % units, swap / units + 1);
+                let put = session.put(key::calibration(&unit_name(unit)?), document(unit, edition)?);
+                put.wait().map_err(|error| Error::zenoh("swaps", &error))?;
+            }
+            // What was put has been written out when the session is closed.
+            session.close().wait().map_err(|error| Error::zenoh("swaps", &error))
+        });
+        Ok(Self { ended, thread })
+    }
+
+    /// Ends it; an error where swaps could not be sent.
+    pub(super) fn stop(self) -> Result<(), Error> {
+        self.ended.store(true, Ordering::Relaxed);
+        let gone = |_| Error::Part { part: "swaps", what: "the thread has ended with a panic".to_owned() };
+        self.thread.join().map_err(gone)?
+    }
+}
+
+/// A session of the operator's.
+fn open(plan: &Plan) -> Result<Session, Error> {
+    let connect = plan.connect.iter().cloned().collect();
+    let options = SessionOptions { config: plan.zenoh_config.clone(), connect, ..SessionOptions::default() };
+    let session = zenoh::open(options.to_config()?).wait();
+    session.map_err(|source| Error::Bus(isotherm_bus::BusError::Open(source)))
+}
+
+/// Gives some units another calibration, one after the other, each when the one before has been answered; the median of the times (ms),
+/// 0 for none.
+pub(super) fn timed(plan: &Plan, units: usize) -> Result<f64, Error> {
+    if units == 0 {
+        return Ok(0.0);
+    }
+    let session = open(plan)?;
+    let wrong = |what: String| Error::Part { part: "swaps", what };
+    let mut times = Vec::with_capacity(units);
+    for unit in (0..plan.units).cycle().take(units) {
+        // Other than what the unit has, and than what it had.
+        let text = document(unit, 1 + times.len())?;
+        let begin = now_ns();
+        let replies = session.get(key::calibration(&unit_name(unit)?)).payload(text).timeout(LIMIT).wait();
+        let reply = replies.map_err(|error| Error::zenoh("swaps", &error))?.recv();
+        let reply = reply.map_err(|_| wrong("no service answers".to_owned()))?.into_result();
+        let sample = reply.map_err(|error| wrong(format!("{error:?}")))?;
+        #[expect(clippy::cast_precision_loss, reason = "far below 2⁵³ ns")]
+        times.push((now_ns() - begin) as f64 * 1e-6);
+        let bytes = sample.payload().to_bytes();
+        if !String::from_utf8_lossy(&bytes).contains("\"accepted\"") {
+            return Err(wrong(format!("a swap was answered with {}", String::from_utf8_lossy(&bytes))));
+        }
+    }
+    Ok(median(times.into_iter()))
+}
+
+/// Least number of swaps of each unit in so many seconds of ticks.
+pub(super) fn expected(seconds: Duration) -> u64 {
+    // The first comes half a second late, the last may be on its way.
+    seconds.as_secs().saturating_sub(1)
+}

@@ -1,0 +1,113 @@
+//! The processes of a chain: each is this program, started with a hidden command and a plan.
+//!
+//! A part says `{"ready":…}` on stdout when it is ready, does its work when it reads a line, and reports in one line of JSON. It
+//! ends where its stdin does, so that nothing is left over when the one who started it has gone.
+
+pub(crate) mod frames;
+pub(crate) mod head;
+mod plan;
+mod relay;
+mod sink;
+mod source;
+
+use std::fs;
+use std::io::{self, BufRead, Write};
+use std::path::{Path, PathBuf};
+
+use isotherm_bus::SessionOptions;
+use serde::Serialize;
+use zenoh::{Session, Wait};
+
+pub(crate) use plan::{Format, Pace, Plan, unit_name};
+pub(crate) use sink::{Kept, Received, read_kept};
+pub(crate) use source::Sent;
+
+use crate::error::Error;
+
+/// Which part a process plays.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum Role {
+    /// Publishes raw ticks at their times.
+    Source,
+    /// Puts what comes in on the output key, as it is.
+    Relay,
+    /// Writes down what came when.
+    Sink,
+}
+
+/// What a part says when it is ready.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, serde::Deserialize)]
+pub(crate) struct Ready {
+    /// Always true.
+    pub(crate) ready: bool,
+    /// Where it listens.
+    pub(crate) locators: Vec<String>,
+}
+
+/// How long a part waits for the others (s).
+const LONGEST_WAIT_S: u64 = 60;
+
+/// Plays a part to its end.
+pub(crate) fn run(role: Role, plan: &Path) -> Result<(), Error> {
+    let text = fs::read_to_string(plan).map_err(|source| Error::file(plan, source))?;
+    let plan: Plan = serde_json::from_str(&text)
+        .map_err(|error| Error::Invalid { path: plan.to_owned(), what: error.to_string() })?;
+    match role {
+        Role::Source => source::run(&plan),
+        Role::Relay => relay::run(&plan),
+        Role::Sink => sink::run(&plan),
+    }
+}
+
+/// Opens a session as the project's programs do, and connects it where the plan says so.
+fn open(plan: &Plan, listen: bool) -> Result<Session, Error> {
+    let connect = plan.connect.iter().filter(|_| !listen).cloned().collect();
+    let options = SessionOptions { config: plan.zenoh_config.clone(), connect, ..SessionOptions::default() };
+    let session = zenoh::open(options.to_config()?).wait();
+    session.map_err(|source| Error::Bus(isotherm_bus::BusError::Open(source)))
+}
+
+/// Waits until the one in the middle answers: then it knows every subscription made before.
+fn wait_for_middle(session: &Session) -> Result<(), Error> {
+    let limit = std::time::Duration::from_secs(LONGEST_WAIT_S);
+    let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build();
+    let runtime = runtime.map_err(|source| Error::file(Path::new("runtime"), source))?;
+    runtime.block_on(isotherm_bus::presence::wait_for_service(session, limit))?;
+    Ok(())
+}
+
+/// Says something to the one who started this process.
+fn say(message: &impl Serialize) -> Result<(), Error> {
+    let line = serde_json::to_string(message)
+        .map_err(|error| Error::Part { part: "stdout", what: error.to_string() })?;
+    let mut out = io::stdout().lock();
+    let said = writeln!(out, "{line}").and_then(|()| out.flush());
+    said.map_err(|error| Error::Part { part: "stdout", what: error.to_string() })
+}
+
+/// Waits for a line; `None` where none will come.
+fn hear() -> Option<String> {
+    let mut line = String::new();
+    match io::stdin().lock().read_line(&mut line) {
+        Ok(0) | Err(_) => None,
+        Ok(_) => Some(line.trim().to_owned()),
+    }
+}
+
+/// Writes numbers as they lie in memory elsewhere: 8 bytes each, little-endian.
+fn write_numbers(path: &Path, numbers: &[u64]) -> Result<(), Error> {
+    let bytes: Vec<u8> = numbers.iter().flat_map(|number| number.to_le_bytes()).collect();
+    fs::write(path, bytes).map_err(|source| Error::file(path, source))
+}
+
+/// Reads numbers back.
+pub(crate) fn read_numbers(path: &Path) -> Result<Vec<u64>, Error> {
+    let bytes = fs::read(path).map_err(|source| Error::file(path, source))?;
+    let (numbers, _) = bytes.as_chunks::<8>();
+    Ok(numbers.iter().map(|bytes| u64::from_le_bytes(*bytes)).collect())
+}
+
+/// Where a part leaves its numbers.
+pub(crate) fn path(plan: &Plan, name: &str) -> PathBuf {
+    plan.folder.join(name)
+}

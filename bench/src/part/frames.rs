@@ -1,0 +1,115 @@
+//! Raw frames of simulated units, the same whoever makes them: the source publishes them, the check corrects them offline.
+
+use arrayvec::ArrayVec;
+use isotherm_correction::sample::{ChannelName, MAX_SENSORS};
+use isotherm_protocol::codec;
+use isotherm_protocol::raw::{
+    AccelBatch, AccelTick, GyroBatch, GyroTick, MAX_CHANNELS, Readings, TemperatureBatch, TemperatureTick,
+};
+use isotherm_simulator::{Scenario, Simulation, presets};
+
+use super::Plan;
+use crate::error::Error;
+
+/// Ticks of the simulation that are repeated again and again.
+const REPEATED: usize = 2_000;
+/// How far one unit is ahead of another in them.
+const AHEAD: usize = 7;
+/// Event time of the start (ns).
+const START_NS: u64 = 1_000_000_000_000;
+
+/// What a unit reads: three gyros, three accelerometers and eight temperature channels of the micromechanical preset.
+#[derive(Debug)]
+pub(crate) struct Instrument {
+    gyro: Vec<ArrayVec<f64, MAX_SENSORS>>,
+    accel: Vec<ArrayVec<f64, MAX_SENSORS>>,
+    channels: ArrayVec<ChannelName, MAX_CHANNELS>,
+    temperatures: Vec<ArrayVec<f64, MAX_CHANNELS>>,
+}
+
+/// What goes out at once.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Message {
+    /// Frame of temperatures, once in a second.
+    pub(crate) temperatures: Option<Vec<u8>>,
+    /// Frame of accelerometer ticks.
+    pub(crate) accel: Vec<u8>,
+    /// Frame of gyro ticks.
+    pub(crate) gyro: Vec<u8>,
+}
+
+impl Instrument {
+    /// Simulates it.
+    pub(crate) fn simulate(rate_hz: u32) -> Result<Self, Error> {
+        let scenario = Scenario { tick_ns: 1_000_000_000 / i64::from(rate_hz), ..presets::mems_chamber(1) };
+        let simulation = Simulation::new(&scenario)
+            .map_err(|error| Error::Part { part: "simulation", what: error.to_string() })?;
+        let mut instrument =
+            Self { gyro: Vec::new(), accel: Vec::new(), channels: ArrayVec::new(), temperatures: Vec::new() };
+        for step in simulation.take(REPEATED) {
+            instrument.gyro.push(step.gyro.readings.iter().copied().collect());
+            instrument.accel.push(step.accel.iter().flat_map(|tick| tick.readings.iter().copied()).collect());
+            if !step.temperatures.is_empty() {
+                instrument.channels = step.temperatures.iter().map(|reading| reading.channel).collect();
+                instrument.temperatures.push(step.temperatures.iter().map(|reading| reading.raw).collect());
+            }
+        }
+        Ok(instrument)
+    }
+
+    /// Message `index` of a unit.
+    pub(crate) fn message(&self, plan: &Plan, unit: usize, index: usize) -> Result<Message, Error> {
+        let first = index * plan.batch;
+        let (start_ns, tick_ns) = (START_NS.cast_signed(), plan.tick_ns().cast_signed());
+        let end_time_ns = |tick: usize| start_ns + (tick as u64 + 1).cast_signed() * tick_ns;
+        let means = |of: &[ArrayVec<f64, MAX_SENSORS>], tick: usize| {
+            let place = (tick + unit * AHEAD) % of.len().max(1);
+            Readings::Means(of.get(place).cloned().unwrap_or_default())
+        };
+        let ticks = first..first + plan.batch;
+        let second = ticks.clone().find(|tick| tick % plan.rate_hz as usize == 0);
+        let temperatures = second.map(|tick| TemperatureBatch {
+            channels: self.channels.clone(),
+            ticks: vec![TemperatureTick {
+                time_ns: end_time_ns(tick) - tick_ns,
+                raw: self
+                    .temperatures
+                    .get(tick / plan.rate_hz as usize % self.temperatures.len().max(1))
+                    .cloned()
+                    .unwrap_or_default(),
+            }],
+        });
+        let accel = AccelBatch {
+            first_sequence: first as u64,
+            ticks: ticks
+                .clone()
+                .map(|tick| AccelTick {
+                    end_time_ns: end_time_ns(tick),
+                    duration_ns: plan.tick_ns(),
+                    readings: means(&self.accel, tick),
+                })
+                .collect(),
+        };
+        let gyro = GyroBatch {
+            first_sequence: first as u64,
+            series: 0,
+            ticks: ticks
+                .map(|tick| GyroTick {
+                    end_time_ns: end_time_ns(tick),
+                    duration_ns: plan.tick_ns(),
+                    readings: means(&self.gyro, tick),
+                    mode: None,
+                    switch_command: false,
+                    meander: None,
+                    half_periods: ArrayVec::new(),
+                })
+                .collect(),
+        };
+        let encoding = |error: codec::CodecError| Error::Part { part: "source", what: error.to_string() };
+        Ok(Message {
+            temperatures: temperatures.map(|batch| codec::encode(&batch)).transpose().map_err(encoding)?,
+            accel: codec::encode(&accel).map_err(encoding)?,
+            gyro: codec::encode(&gyro).map_err(encoding)?,
+        })
+    }
+}

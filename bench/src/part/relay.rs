@@ -1,0 +1,66 @@
+//! The bare relay: the same Zenoh configuration as the service, and a callback that only puts what came in on the output key.
+
+use isotherm_protocol::key::{self, RawStream};
+use zenoh::key_expr::KeyExpr;
+use zenoh::qos::{CongestionControl, Priority};
+use zenoh::sample::Locality;
+use zenoh::{Session, Wait};
+
+use super::{Plan, Ready, head, hear, open, say, unit_name};
+use crate::error::Error;
+
+/// Relays until stdin ends.
+pub(crate) fn run(plan: &Plan) -> Result<(), Error> {
+    let session = open(plan, true)?;
+    let outputs = outputs(&session, plan)?;
+    let _declared = if plan.declare_keys { declare_keys(&session, plan)? } else { Vec::new() };
+    let subscriber = session
+        .declare_subscriber(key::ALL_RAW)
+        .allowed_origin(Locality::Remote)
+        .callback(move |sample| {
+            let key = sample.key_expr().as_str();
+            // The other topics come in and end here.
+            if key.ends_with("/gyro")
+                && let Some(output) = head::unit_of(key).and_then(|unit| outputs.get(unit))
+            {
+                // What cannot be put is missing at the sink.
+                let _ = output.put(sample.payload().clone()).wait();
+            }
+        })
+        .wait();
+    let _subscriber = subscriber.map_err(|error| Error::zenoh("relay", &error))?;
+    // Last of all: where it answers, the subscription is known. The query ends where it is dropped.
+    let answers = session.declare_queryable(key::ALL_STATUS).callback(drop).wait();
+    let _answers = answers.map_err(|error| Error::zenoh("relay", &error))?;
+    say(&Ready { ready: true, locators: isotherm_bus::locators(&session) })?;
+    while hear().is_some() {}
+    Ok(())
+}
+
+/// One declared publisher for each unit, with the service's quality of service.
+fn outputs(session: &Session, plan: &Plan) -> Result<Vec<zenoh::pubsub::Publisher<'static>>, Error> {
+    let congestion = if plan.block { CongestionControl::Block } else { CongestionControl::Drop };
+    let declare = |unit| {
+        session
+            .declare_publisher(key::corrected(&unit_name(unit)?))
+            .congestion_control(congestion)
+            .priority(Priority::RealTime)
+            .express(false)
+            .wait()
+            .map_err(|error| Error::zenoh("relay", &error))
+    };
+    (0..plan.units).map(declare).collect()
+}
+
+/// Declares what comes in, for as long as it is kept. A key that comes as text and is declared nowhere has its subscribers looked for with
+/// every message, among all keys that this session knows; the route to a declared one is remembered.
+fn declare_keys(session: &Session, plan: &Plan) -> Result<Vec<KeyExpr<'static>>, Error> {
+    let mut declared = Vec::new();
+    for unit in 0..plan.units {
+        for stream in RawStream::ALL {
+            let key = session.declare_keyexpr(key::raw(&unit_name(unit)?, stream)).wait();
+            declared.push(key.map_err(|error| Error::zenoh("relay", &error))?);
+        }
+    }
+    Ok(declared)
+}

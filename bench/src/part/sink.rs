@@ -1,0 +1,209 @@
+//! The sink: writes down what came when, and keeps the first ticks of every unit for the check.
+
+use std::fs;
+use std::path::Path;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use isotherm_protocol::key;
+use serde::{Deserialize, Serialize};
+use zenoh::Wait;
+use zenoh::sample::Sample;
+
+use super::{Plan, Ready, head, hear, open, path, say, wait_for_middle, write_numbers};
+use crate::clock::now_ns;
+use crate::error::Error;
+
+/// What the sink reports.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Received {
+    /// Messages behind the prelude.
+    pub(crate) messages: u64,
+    /// Ticks behind the prelude, each counted once.
+    pub(crate) ticks: u64,
+    /// Ticks that had been there before.
+    pub(crate) duplicates: u64,
+    /// Ticks that came behind a later one of their unit.
+    pub(crate) disordered: u64,
+    /// Messages that could not be read, or of units and ticks that there are not.
+    pub(crate) strange: u64,
+    /// When the first and the last message came (ns).
+    pub(crate) between_ns: [u64; 2],
+    /// Lowest number of different calibrations, less one, under which ticks of a unit came.
+    pub(crate) fewest_changes: u64,
+}
+
+/// What is written while ticks come in.
+struct Book {
+    plan: Plan,
+    account: Received,
+    /// When each tick came: by unit, then by tick; 0 is never.
+    came_ns: Vec<u64>,
+    units: Vec<Unit>,
+}
+
+/// What is known of one unit.
+#[derive(Debug, Clone, Default)]
+struct Unit {
+    next: u64,
+    revision: u64,
+    changes: u64,
+    kept: Vec<Vec<u8>>,
+    ticks_kept: u64,
+}
+
+/// Writes down until everything has come, or nothing comes any more.
+pub(crate) fn run(plan: &Plan) -> Result<(), Error> {
+    let book = Arc::new(Mutex::new(Book {
+        plan: plan.clone(),
+        account: Received::default(),
+        // Written to, so that the pages are there before the clock runs.
+        came_ns: vec![1; plan.units * plan.ticks()],
+        units: vec![Unit::default(); plan.units],
+    }));
+    lock(&book).came_ns.fill(0);
+    let session = open(plan, false)?;
+    let writing = Arc::clone(&book);
+    let subscriber = session
+        .declare_subscriber(key::ALL_CORRECTED)
+        .callback(move |sample| {
+            let now = now_ns();
+            lock(&writing).enter(&sample, now);
+        })
+        .wait();
+    let _subscriber = subscriber.map_err(|error| Error::zenoh("sink", &error))?;
+    wait_for_middle(&session)?;
+    say(&Ready { ready: true, locators: Vec::new() })?;
+    let of_each = |messages: u64| messages * plan.units as u64 * plan.batch as u64;
+    if hear().is_none() {
+        return Ok(());
+    }
+    wait_for(&book, of_each(plan.prelude as u64), PRELUDE_PATIENCE);
+    lock(&book).begin();
+    say(&Ready { ready: true, locators: Vec::new() })?;
+    // How many messages of each unit the source has sent behind the prelude.
+    let Some(line) = hear() else { return Ok(()) };
+    let sent: u64 = line.parse().unwrap_or(0);
+    wait_for(&book, of_each(sent), PATIENCE);
+
+    let mut book = lock(&book);
+    let changes = book.units.iter().map(|unit| unit.changes).min();
+    book.account.fewest_changes = changes.unwrap_or(0);
+    write_numbers(&path(plan, "came.bin"), &book.came_ns)?;
+    write_kept(&path(plan, "kept.bin"), &book.units)?;
+    say(&book.account)
+}
+
+/// How long nothing may come behind the last tick.
+const PATIENCE: Duration = Duration::from_secs(3);
+/// How long nothing may come while thousands of units appear.
+const PRELUDE_PATIENCE: Duration = Duration::from_secs(30);
+
+/// Waits for so many ticks, at most as long as some come.
+fn wait_for(book: &Mutex<Book>, ticks: u64, patience: Duration) {
+    let mut seen = (0, Instant::now());
+    loop {
+        let now = lock(book).account.ticks;
+        if now >= ticks || (now == seen.0 && seen.1.elapsed() > patience) {
+            return;
+        }
+        if now != seen.0 {
+            seen = (now, Instant::now());
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+impl Book {
+    /// Begins the account anew; which ticks have come is kept.
+    fn begin(&mut self) {
+        let Received { duplicates, disordered, strange, .. } = self.account;
+        self.account = Received { duplicates, disordered, strange, ..Received::default() };
+    }
+
+    /// Enters a message that came at a time.
+    fn enter(&mut self, sample: &Sample, now: u64) {
+        let frame = sample.payload().to_bytes();
+        let (all, keep) = (self.plan.ticks() as u64, self.plan.keep as u64);
+        let account = &mut self.account;
+        account.messages += 1;
+        if account.between_ns[0] == 0 {
+            account.between_ns[0] = now;
+        }
+        account.between_ns[1] = now;
+        let head = head::read(self.plan.format, &frame);
+        let number = head::unit_of(sample.key_expr().as_str());
+        let (Some(head), Some(number)) = (head, number) else {
+            account.strange += 1;
+            return;
+        };
+        let Some(unit) = self.units.get_mut(number).filter(|_| head.first + head.ticks <= all) else {
+            account.strange += 1;
+            return;
+        };
+        if unit.revision != head.revision {
+            unit.changes += u64::from(unit.next > 0);
+            unit.revision = head.revision;
+        }
+        if unit.next > head.first {
+            account.disordered += head.ticks;
+        }
+        unit.next = head.first + head.ticks;
+        if unit.ticks_kept < keep {
+            unit.ticks_kept += head.ticks;
+            unit.kept.push(frame.to_vec());
+        }
+        for tick in head.first..head.first + head.ticks {
+            let place = number as u64 * all + tick;
+            let came = usize::try_from(place).ok().and_then(|place| self.came_ns.get_mut(place));
+            match came {
+                Some(came) if *came == 0 => {
+                    *came = now;
+                    account.ticks += 1;
+                }
+                _ => account.duplicates += 1,
+            }
+        }
+    }
+}
+
+/// A frame that was kept.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Kept {
+    /// Number of its unit.
+    pub(crate) unit: usize,
+    /// The frame.
+    pub(crate) frame: Vec<u8>,
+}
+
+/// Writes frames: number of the unit and length, 4 bytes each, little-endian, then the frame.
+fn write_kept(path: &Path, units: &[Unit]) -> Result<(), Error> {
+    let mut bytes = Vec::new();
+    for (number, unit) in (0_u32..).zip(units) {
+        for frame in &unit.kept {
+            bytes.extend(number.to_le_bytes());
+            bytes.extend(u32::try_from(frame.len()).unwrap_or_default().to_le_bytes());
+            bytes.extend(frame);
+        }
+    }
+    fs::write(path, bytes).map_err(|source| Error::file(path, source))
+}
+
+/// Reads them back.
+pub(crate) fn read_kept(path: &Path) -> Result<Vec<Kept>, Error> {
+    let bytes = fs::read(path).map_err(|source| Error::file(path, source))?;
+    let (mut rest, mut kept) = (&bytes[..], Vec::new());
+    while let Some((unit, behind)) = rest.split_first_chunk::<4>() {
+        let cut = || Error::Invalid { path: path.to_owned(), what: "a frame is cut off".to_owned() };
+        let (length, behind) = behind.split_first_chunk::<4>().ok_or_else(cut)?;
+        let length = u32::from_le_bytes(*length) as usize;
+        let (frame, behind) = behind.split_at_checked(length).ok_or_else(cut)?;
+        kept.push(Kept { unit: u32::from_le_bytes(*unit) as usize, frame: frame.to_vec() });
+        rest = behind;
+    }
+    Ok(kept)
+}
+
+fn lock(book: &Mutex<Book>) -> MutexGuard<'_, Book> {
+    book.lock().unwrap_or_else(PoisonError::into_inner)
+}

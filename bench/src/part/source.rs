@@ -1,0 +1,162 @@
+//! The source: publishes raw ticks of simulated units at their times, and writes down when.
+
+use std::time::{Duration, Instant};
+
+use isotherm_protocol::key::{self, RawStream};
+use serde::{Deserialize, Serialize};
+use zenoh::pubsub::Publisher;
+use zenoh::qos::{CongestionControl, Priority};
+use zenoh::{Session, Wait};
+
+use super::frames::{Instrument, Message};
+use super::{
+    LONGEST_WAIT_S, Pace, Plan, Ready, hear, open, path, say, unit_name, wait_for_middle, write_numbers,
+};
+use crate::clock::{now_ns, sleep_until};
+use crate::error::Error;
+
+/// What the source reports.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Sent {
+    /// Messages of gyro ticks of each unit that went out behind the prelude.
+    pub(crate) messages: usize,
+    /// How long that took (s).
+    pub(crate) seconds: f64,
+    /// How far it was behind its times: in the median, 99 of 100 times, and at most (µs).
+    pub(crate) late_us: [f64; 3],
+}
+
+/// Publishers of one unit.
+struct Outlets {
+    temperatures: Publisher<'static>,
+    accel: Publisher<'static>,
+    gyro: Publisher<'static>,
+}
+
+/// Publishes when it is told to.
+pub(crate) fn run(plan: &Plan) -> Result<(), Error> {
+    let sessions: Vec<Session> =
+        (0..plan.sessions.max(1)).map(|_| open(plan, false)).collect::<Result<_, _>>()?;
+    let mut units = Vec::new();
+    for (unit, session) in (0..plan.units).zip(sessions.iter().cycle()) {
+        units.push(Outlets::declare(session, unit)?);
+    }
+    sessions.iter().try_for_each(wait_for_middle)?;
+    units.iter().try_for_each(|outlets| wait_for_subscriber(&outlets.gyro))?;
+
+    let instrument = Instrument::simulate(plan.rate_hz)?;
+    let mut bursts = Vec::with_capacity(plan.messages);
+    for index in 0..plan.messages {
+        let burst = (0..plan.units).map(|unit| instrument.message(plan, unit, index));
+        bursts.push(burst.collect::<Result<Vec<_>, _>>()?);
+    }
+    // The pages are there before the clock runs.
+    let mut sent = vec![u64::MAX; plan.units * plan.messages];
+    say(&Ready { ready: true, locators: Vec::new() })?;
+    if hear().is_none() {
+        return Ok(());
+    }
+    let rest = bursts.split_off(plan.prelude.min(bursts.len()));
+    for burst in bursts {
+        units.iter().zip(burst).try_for_each(|(outlets, message)| outlets.put(message))?;
+    }
+    say(&Ready { ready: true, locators: Vec::new() })?;
+    if hear().is_none() {
+        return Ok(());
+    }
+    let behind = sent.get_mut(plan.prelude * plan.units..).unwrap_or_default();
+    let report = publish(plan, &units, rest, behind)?;
+    write_numbers(&path(plan, "sent.bin"), &sent)?;
+    say(&report)?;
+    // The sessions stay open until everything has come through.
+    while hear().is_some() {}
+    Ok(())
+}
+
+/// Publishes everything; `sent` is by message, then by unit.
+fn publish(
+    plan: &Plan,
+    units: &[Outlets],
+    bursts: Vec<Vec<Message>>,
+    sent: &mut [u64],
+) -> Result<Sent, Error> {
+    let begin = now_ns() + 1_000_000;
+    let mut late = Vec::with_capacity(bursts.len());
+    let mut messages = 0;
+    for ((index, burst), sent) in (0_u64..).zip(bursts).zip(sent.chunks_mut(plan.units.max(1))) {
+        let due = begin + index * plan.period_ns();
+        match plan.pace {
+            Pace::Burst => late.push(sleep_until(due)),
+            Pace::Saturated { limit_ms } if now_ns() > begin + limit_ms * 1_000_000 => break,
+            Pace::Spread | Pace::Saturated { .. } => {}
+        }
+        for (unit, ((outlets, message), sent)) in (0_u64..).zip(units.iter().zip(burst).zip(sent)) {
+            if plan.pace == Pace::Spread {
+                late.push(sleep_until(due + unit * plan.period_ns() / plan.units as u64));
+            }
+            *sent = now_ns();
+            outlets.put(message)?;
+        }
+        messages += 1;
+    }
+    late.sort_unstable();
+    #[expect(clippy::cast_precision_loss, reason = "far below 2⁵³ ns")]
+    let (seconds, late_us) = {
+        let at = |share: usize| late.get((late.len() * share / 100).min(late.len().saturating_sub(1)));
+        (
+            (now_ns() - begin.min(now_ns())) as f64 * 1e-9,
+            [50, 99, 100].map(|share| at(share).map_or(0.0, |ns| *ns as f64 * 1e-3)),
+        )
+    };
+    Ok(Sent { messages, seconds, late_us })
+}
+
+impl Outlets {
+    fn declare(session: &Session, unit: usize) -> Result<Self, Error> {
+        let unit = unit_name(unit)?;
+        let declare = |stream| {
+            // As the project's own producers do.
+            session
+                .declare_publisher(key::raw(&unit, stream))
+                .congestion_control(CongestionControl::Block)
+                .priority(Priority::RealTime)
+                .wait()
+                .map_err(|error| Error::zenoh("source", &error))
+        };
+        Ok(Self {
+            temperatures: declare(RawStream::Temperature)?,
+            accel: declare(RawStream::Accel)?,
+            gyro: declare(RawStream::Gyro)?,
+        })
+    }
+
+    fn put(&self, message: Message) -> Result<(), Error> {
+        let put = |publisher: &Publisher<'static>, frame: Vec<u8>| {
+            publisher.put(frame).wait().map_err(|error| Error::zenoh("source", &error))
+        };
+        if let Some(frame) = message.temperatures {
+            put(&self.temperatures, frame)?;
+        }
+        put(&self.accel, message.accel)?;
+        put(&self.gyro, message.gyro)
+    }
+}
+
+/// Waits until somebody subscribes to what a publisher publishes.
+fn wait_for_subscriber(publisher: &Publisher<'static>) -> Result<(), Error> {
+    let deadline = Instant::now() + Duration::from_secs(LONGEST_WAIT_S);
+    let failed = |error: zenoh::Error| Error::zenoh("source", &error);
+    if publisher.matching_status().wait().map_err(failed)?.matching() {
+        return Ok(());
+    }
+    let listener = publisher.matching_listener().wait().map_err(failed)?;
+    if publisher.matching_status().wait().map_err(failed)?.matching() {
+        return Ok(());
+    }
+    while let Ok(Some(status)) = listener.recv_deadline(deadline) {
+        if status.matching() {
+            return Ok(());
+        }
+    }
+    Err(Error::Part { part: "source", what: format!("nobody subscribes to {}", publisher.key_expr()) })
+}
