@@ -35,6 +35,10 @@ purity:
 python:
     .ci/run python
 
+# Count instructions per tick and compare them with the committed figures (needs valgrind)
+instructions:
+    .ci/run instructions
+
 # Run the demo briefly and print its figures
 demo:
     .ci/run demo
