@@ -12,8 +12,12 @@
 mod bad_input;
 #[path = "thermal/chamber.rs"]
 mod chamber;
+#[path = "thermal/scale.rs"]
+mod scale;
 #[path = "thermal/service.rs"]
 mod service;
+#[path = "thermal/survey.rs"]
+mod survey;
 
 use isotherm_calibration::report::FitReport;
 use isotherm_calibration::run::Run;
@@ -54,7 +58,7 @@ fn settings(method: Method) -> Settings {
     let place = Place::new(55.75, 30.0, Some([0.0, 0.0])).unwrap();
     Settings {
         method,
-        site: Site::Known { place, force_m_per_s2: None },
+        stands: vec![Site::Known { place, force_m_per_s2: None }.into()],
         window_s: Some(100.0),
         ..Settings::default()
     }

@@ -64,6 +64,7 @@ pub(super) fn choose_filter(
                 columns.make(&spec.terms(true))?;
                 for (sensor, target) in sensors.iter().zip(targets) {
                     if sensor.channel == *name && sensor.dead.is_none() && (sensor.gyro || !sequential) {
+                        let spec = Spec { scale: target.widest_scale(), ..spec.clone() };
                         cost += target
                             .solve(&columns, &spec, false)
                             .map_or(0.0, |solution| libm::log(solution.rms));

@@ -9,8 +9,9 @@ use super::filter::choose_filter;
 use super::known::{Known, channel, histories};
 use super::outcome::{Found, Outcome};
 use super::samples::Samples;
-use super::select::{Target, WORTH_IT, terms_of};
+use super::select::{Target, Tried, WORTH_IT, terms_of};
 use super::settings::{Method, Settings, Terms};
+use super::stand::Stand;
 use super::target::{rest, target};
 use super::{search, sequential};
 use crate::error::Error;
@@ -54,9 +55,10 @@ pub fn fit(
     let mut warnings = Vec::new();
     let (mut refusals, mut dead) = (Vec::new(), Vec::new());
     let mut series = Vec::new();
-    for run in runs {
+    let stands: Vec<Stand> = (0..runs.len()).map(|run| settings.stand(run)).collect();
+    for (run, stand) in runs.iter().zip(&stands) {
         let of_run = run.series(Lent(&mut watch))?;
-        let found = checks::raw(&run.name, &of_run);
+        let found = checks::raw(&run.name, &of_run, stand);
         refusals.extend(found.refusals);
         warnings.extend(found.warnings);
         dead.extend(found.dead);
@@ -84,9 +86,16 @@ pub fn fit(
         .fold(0.0, f64::max);
     let filter = plain.temperature.filter.get_or_insert_with(|| filter(step_s)).clone();
     let mut samples = Vec::new();
-    for (run, series) in runs.iter().zip(&series) {
-        let of_run = Samples::of(run, series, &plain, settings.fit_window_s, Lent(&mut watch))?;
-        let found = checks::corrected(&of_run);
+    let mut rests = Vec::new();
+    for ((run, series), stand) in runs.iter().zip(&series).zip(&stands) {
+        let window_s = stand.window_s(settings.fit_window_s);
+        let of_run = Samples::of(run, series, &plain, window_s, Lent(&mut watch))?;
+        let mut found = checks::corrected(&of_run, stand);
+        if found.refusals.is_empty() {
+            let of_rest = rest(run, &plain, stand, Lent(&mut watch))?;
+            found.refusals.extend(checks::turning(&of_run, &plain, stand));
+            rests.push(of_rest);
+        }
         refusals.extend(found.refusals);
         warnings.extend(found.warnings);
         samples.push(of_run);
@@ -94,17 +103,16 @@ pub fn fit(
     if !refusals.is_empty() {
         return Err(Error::Refused(refusals));
     }
-    let rests = runs
-        .iter()
-        .map(|run| rest(run, &plain, &settings.site, Lent(&mut watch)))
-        .collect::<Result<Vec<_>, _>>()?;
     let sensors = sensors(&plain, &dead);
     let histories = histories(&plain, &filter, &sensors, &samples, &mut warnings)?;
-    let targets: Vec<Target> =
-        sensors.iter().map(|sensor| target(sensor, &plain, &samples, &rests, &histories)).collect();
+    let targets: Vec<Target> = sensors
+        .iter()
+        .map(|sensor| target(sensor, &plain, &samples, (&rests, &stands), &histories))
+        .collect();
     let chosen = choose_filter(&filter, &plain, (&sensors, &targets), &samples, &histories, settings)?;
     let mut outcome = Outcome::new(&base, plain, chosen.clone(), settings);
     outcome.warnings = warnings;
+    outcome.scales(&sensors, &targets);
     for (name, known) in &histories {
         let basis = known.basis(channel(&outcome.bare, name)?, &chosen);
         let mut columns = Columns::new(basis, &samples);
@@ -124,7 +132,7 @@ pub fn fit(
         }
         outcome.history(name, &known.history);
     }
-    outcome.finish((runs, judges), origin, |run| rest(run, &base, &settings.site, ()), watch)
+    outcome.finish((runs, judges), origin, |run, stand| rest(run, &base, stand, ()), watch)
 }
 
 /// A watch that is lent.
@@ -212,7 +220,8 @@ fn find(
     columns.make(&terms_of(degrees, &dynamics))?;
     let mut choice = target.choose(columns, (degrees, &dynamics), (history, &known.temperature));
     if settings.terms == Terms::All {
-        choice.chosen = choice.tried.iter().rposition(|tried| !tried.spec.trend);
+        let largest = |tried: &Tried| !tried.spec.trend && tried.spec.scale == target.widest_scale();
+        choice.chosen = choice.tried.iter().rposition(largest);
     }
     let Some(best) = choice.best().cloned() else {
         return Ok(Found::refused(

@@ -120,8 +120,9 @@ pub fn searched(
 
 /// Sum over the sensors of the logarithm of what is left.
 fn cost(columns: &Columns<'_>, targets: &[&Target], taus: &[f64]) -> f64 {
-    let spec = Spec { degree: DEGREE, dynamics: lags(taus, 0), trend: false };
+    let spec = Spec { degree: DEGREE, dynamics: lags(taus, 0), ..Spec::default() };
     let left = |target: &&Target| {
+        let spec = Spec { scale: target.widest_scale(), ..spec.clone() };
         target.solve(columns, &spec, false).map_or(0.0, |solution| libm::log(solution.rms))
     };
     targets.iter().map(left).sum()
