@@ -5,7 +5,7 @@ use isotherm_protocol::document::{Document, Origin};
 use super::bare::{bare, filter, nominal_of};
 use super::checks;
 use super::columns::Columns;
-use super::filter::choose_filter;
+use super::filter::{choose_filter, longest_run_s};
 use super::known::{Known, channel, histories};
 use super::outcome::{Found, Outcome};
 use super::samples::Samples;
@@ -116,9 +116,7 @@ pub fn fit(
     for (name, known) in &histories {
         let basis = known.basis(channel(&outcome.bare, name)?, &chosen);
         let mut columns = Columns::new(basis, &samples);
-        let longest = samples.iter().map(|run| run.time_s.len()).max().unwrap_or(0);
-        #[expect(clippy::cast_precision_loss, reason = "windows of a log")]
-        let longest_s = longest as f64 * settings.fit_window_s;
+        let longest_s = longest_run_s(&samples);
         let mine: Vec<usize> = (0..sensors.len()).filter(|&i| sensors[i].channel == *name).collect();
         let alive: Vec<&Target> =
             mine.iter().filter(|&&i| sensors[i].dead.is_none()).map(|&i| &targets[i]).collect();
@@ -127,7 +125,8 @@ pub fn fit(
             _ => Vec::new(),
         };
         for index in mine {
-            let found = find(&mut columns, (&sensors[index], &targets[index]), known, &searched, settings)?;
+            let one = (&sensors[index], &targets[index]);
+            let found = find(&mut columns, one, (known, longest_s), &searched, settings)?;
             outcome.add(&sensors[index], columns.basis(), found);
         }
         outcome.history(name, &known.history);
@@ -179,7 +178,7 @@ fn sensors(bare: &Document, dead: &[(bool, usize, String)]) -> Vec<Sensor> {
 fn find(
     columns: &mut Columns<'_>,
     (sensor, target): (&Sensor, &Target),
-    known: &Known,
+    (known, longest_s): (&Known, f64),
     searched: &[super::model::Dynamics],
     settings: &Settings,
 ) -> Result<Found, Error> {
@@ -214,7 +213,7 @@ fn find(
     }
     let dynamics = match settings.method {
         Method::Lag => searched.to_vec(),
-        _ => search::ladders(sensor.gyro, columns.basis().filter.grid_step_s, history),
+        _ => search::ladders(sensor.gyro, columns.basis().filter.grid_step_s, history, longest_s),
     };
     let degrees = if history.tells_dynamics() { &DEGREES[..] } else { &DEGREES[..3] };
     columns.make(&terms_of(degrees, &dynamics))?;
