@@ -67,7 +67,9 @@ pub(super) fn choose_filter(
                     spec.dynamics = if sequential {
                         Dynamics { name: String::new(), terms: vec![rate, acceleration] }
                     } else {
-                        search::ladders(false, grid, &known.history, longest_run_s(samples)).pop().unwrap_or_default()
+                        search::ladders(false, grid, &known.history, longest_run_s(samples))
+                            .pop()
+                            .unwrap_or_default()
                     };
                 }
                 columns.make(&spec.terms(true))?;

@@ -212,7 +212,16 @@ fn find(
         });
     }
     let dynamics = match settings.method {
-        Method::Lag => searched.to_vec(),
+        // What was searched beside what is fixed: a search follows the noise of its log, too.
+        Method::Lag => {
+            let grid_step_s = columns.basis().filter.grid_step_s;
+            let mut all = searched.to_vec();
+            if sensor.gyro && history.tells_dynamics() {
+                all.extend(searched.iter().filter(|searched| searched.terms.len() > 4).map(search::leading));
+            }
+            all.extend(search::ladders(sensor.gyro, grid_step_s, history, longest_s).into_iter().skip(1));
+            all
+        }
         _ => search::ladders(sensor.gyro, columns.basis().filter.grid_step_s, history, longest_s),
     };
     let degrees = if history.tells_dynamics() { &DEGREES[..] } else { &DEGREES[..3] };

@@ -44,6 +44,14 @@ pub fn lags(taus_s: &[f64], gain_degree: usize) -> Dynamics {
     Dynamics { name: format!("{plural} of {} s{gain}", list.join(", ")), terms: terms.collect() }
 }
 
+/// Lags beside the thermal acceleration, for a thermometer that is behind a part of what it stands for. An accelerometer has none.
+#[must_use]
+pub fn leading(lags: &Dynamics) -> Dynamics {
+    let mut dynamics = Dynamics { name: format!("{}, T̈", lags.name), terms: lags.terms.clone() };
+    dynamics.terms.push(Term::Acceleration(Branch::Both, 0));
+    dynamics
+}
+
 /// The dynamics that the joint method offers: 000's terms where the sensor can have them, and lags on a fixed ladder.
 #[must_use]
 pub fn ladders(gyro: bool, grid_step_s: f64, history: &History, longest_run_s: f64) -> Vec<Dynamics> {
@@ -70,9 +78,11 @@ pub fn ladders(gyro: bool, grid_step_s: f64, history: &History, longest_run_s: f
     all.extend(SINGLE.map(|tau| lags(&fit(&[tau]), 0)));
     if history.tells_dynamics() {
         let longest = longest(longest_run_s, grid_step_s);
-        let ladders = LADDERS.map(|ladder| -> Vec<f64> {
-            fit(ladder).into_iter().filter(|tau| *tau <= longest).collect()
-        });
+        let ladders = LADDERS
+            .map(|ladder| -> Vec<f64> { fit(ladder).into_iter().filter(|tau| *tau <= longest).collect() });
+        if gyro {
+            all.extend(ladders.iter().skip(1).map(|ladder| leading(&lags(ladder, 1))));
+        }
         all.extend([1, 0].into_iter().flat_map(|gain| ladders.iter().map(move |ladder| lags(ladder, gain))));
     }
     all

@@ -20,7 +20,10 @@ pub type Found = Result<Vec<(Term, f64, f64)>, String>;
 #[must_use]
 pub fn gyro_terms() -> [Vec<Term>; 2] {
     [
-        [Branch::RunUp, Branch::Braking].map(|branch| Term::Rate(branch, 0)).to_vec(),
+        [0, 1]
+            .into_iter()
+            .flat_map(|power| [Branch::RunUp, Branch::Braking].map(|branch| Term::Rate(branch, power)))
+            .collect(),
         [Branch::RunUp, Branch::Braking].map(|branch| Term::Acceleration(branch, 0)).to_vec(),
     ]
 }

@@ -13,9 +13,13 @@ use isotherm_correction::units::{Span, Timestamp};
 use isotherm_log::offline::unit_id;
 use isotherm_log::text::LogEvent;
 use isotherm_protocol::document::Origin;
+use isotherm_simulator::Scenario;
 use isotherm_simulator::chamber::{Chamber, Profile};
+use isotherm_simulator::instrument::Gyros;
+use isotherm_simulator::noise::GyroNoise;
+use isotherm_simulator::presets::{fibre_optic_chamber, judging_profile, training_profile};
 
-use super::{factors, together};
+use super::{TICK_NS, factors, fitted, together};
 
 const LAYERS: usize = 24;
 /// rad/s in one °/h.
@@ -237,5 +241,25 @@ fn survey_of_coils() {
         }
         let white = coil.walk * (3600.0 / WINDOW_S).sqrt();
         println!("| {name} | {raw:.3} | {:.0} |{row}", raw / white.max(1e-9));
+    }
+}
+
+#[test]
+#[ignore = "by hand: what the models themselves leave of the simulator's unit"]
+fn survey_of_the_simulated_unit_without_noise() {
+    let runs = [training_profile(), judging_profile()].map(|profile| {
+        let mut scenario = Scenario { tick_ns: TICK_NS, ..fibre_optic_chamber(1, profile) };
+        if let Gyros::FibreOptic(gyros) = &mut scenario.instrument.gyros {
+            gyros.iter_mut().for_each(|gyro| gyro.noise = GyroNoise::default());
+        }
+        super::run(&scenario)
+    });
+    for method in [Method::Sequential, Method::Joint, Method::Lag] {
+        let made = fitted(method, &runs);
+        println!(
+            "{method:?}: {:.1?}\n{}",
+            factors(&made.report),
+            made.report.headline().replace(". ", ".\n")
+        );
     }
 }
