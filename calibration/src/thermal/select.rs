@@ -284,21 +284,25 @@ fn smallest(tried: &[Tried]) -> Option<usize> {
 }
 
 /// Weights that keep slow parts from dominating: no temperature counts for more than `CROWDED` times what is usual, so that a hold of
-/// hours weighs no more than some passes. Limited to a tenth, because what a plateau knows well is not to be thrown away.
+/// hours weighs no more than some passes. Limited to a tenth, because what a plateau knows well is not to be thrown away. What is on
+/// a plateau and at rest is counted for itself: the ends of the ramps, which alone tell of the fast lags, have the same temperatures.
 #[must_use]
-pub fn equal_temperature(temperature: &[f64], [low, high]: [f64; 2]) -> Vec<f64> {
+pub fn equal_temperature(temperature: &[f64], at_rest: &[bool], [low, high]: [f64; 2]) -> Vec<f64> {
     const BINS: f64 = 25.0;
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 25")]
     let bin = |t: f64| ((t - low) / (high - low).max(1e-9) * BINS).clamp(0.0, BINS - 1.0) as usize;
-    let mut counts = [0.0_f64; 25];
-    for t in temperature.iter().filter(|t| t.is_finite()) {
-        counts[bin(*t)] += 1.0;
+    let mut counts = [[0.0_f64; 25]; 2];
+    let windows = || temperature.iter().zip(at_rest);
+    for (t, at_rest) in windows().filter(|(t, _)| t.is_finite()) {
+        counts[usize::from(*at_rest)][bin(*t)] += 1.0;
     }
-    let mut filled: Vec<f64> = counts.iter().copied().filter(|count| *count > 0.0).collect();
+    let mut filled: Vec<f64> = counts[0].iter().copied().filter(|count| *count > 0.0).collect();
     let usual = CROWDED * super::solve::median(&mut filled).unwrap_or(1.0);
-    let weight =
-        |t: &f64| if t.is_finite() { (usual / counts[bin(*t)].max(1.0)).clamp(0.1, 1.0) } else { 0.0 };
-    temperature.iter().map(weight).collect()
+    let weight = |(t, at_rest): (&f64, &bool)| {
+        let among = if t.is_finite() { counts[usize::from(*at_rest)][bin(*t)] } else { return 0.0 };
+        (usual / among.max(1.0)).clamp(0.1, 1.0)
+    };
+    windows().map(weight).collect()
 }
 
 /// All terms that some models have.

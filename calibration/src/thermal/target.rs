@@ -121,7 +121,7 @@ pub(super) fn target(
         }
     }
     let Some(known) = histories.get(&sensor.channel) else { return target };
-    target.weights = equal_temperature(&known.temperature, known.history.range_deg_c);
+    target.weights = equal_temperature(&known.temperature, &known.history.at_rest, known.history.range_deg_c);
     let usual_s = samples.iter().map(|run| run.window_s).fold(f64::INFINITY, f64::min);
     for (weight, run) in target.weights.iter_mut().zip(&target.run) {
         // A longer window has less noise.
