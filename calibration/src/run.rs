@@ -10,7 +10,7 @@ use isotherm_log::message::Topic;
 use isotherm_log::offline::{Loaded, Offline};
 use isotherm_log::part::{LogFiles, Part};
 use isotherm_log::progress::Progress;
-use isotherm_log::source::Log;
+use isotherm_log::source::{Log, LogReport};
 use isotherm_log::text::LogEvent;
 use isotherm_protocol::codec;
 use isotherm_protocol::key::{RawStream, UnitId};
@@ -68,6 +68,9 @@ impl Run {
                     watch.step();
                 }
                 watch.end();
+                if let LogReport::Recording(report) = messages.report() {
+                    series.cut_short = report.cut_short;
+                }
             }
         }
         if series.gyros.is_empty() && series.accels.is_empty() {

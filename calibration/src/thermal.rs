@@ -15,6 +15,7 @@
 //! | [`solve`] | weighted, regularised, robust linear least squares |
 //! | [`model`] | which terms a sensor has, and their place in the document |
 //! | [`scale`] | what gravity or a rate table tells of the scale factors |
+//! | [`passes`] | whether passes through the same temperatures show the same |
 //! | [`sequential`], [`search`], [`select`] | 000's procedure; time constants; cross-validation |
 //! | [`mod@fit`] | from runs to a document and its report |
 
@@ -27,6 +28,7 @@ pub mod fit;
 mod known;
 pub mod model;
 mod outcome;
+pub mod passes;
 pub mod samples;
 pub mod scale;
 pub mod search;

@@ -12,6 +12,8 @@
 mod bad_input;
 #[path = "thermal/chamber.rs"]
 mod chamber;
+#[path = "thermal/command.rs"]
+mod command;
 #[path = "thermal/scale.rs"]
 mod scale;
 #[path = "thermal/service.rs"]

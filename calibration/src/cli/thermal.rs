@@ -7,6 +7,7 @@ mod work;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
+use isotherm_correction::units::Span;
 
 use super::bar::Bar;
 use super::output::{check_outputs, date};
@@ -141,7 +142,39 @@ impl ThermalArgs {
     fn check(&self) -> Result<(), Error> {
         let inputs: Vec<&Path> =
             self.log.log.iter().chain(&self.judge).chain(&self.document).map(PathBuf::as_path).collect();
-        check_outputs(self.out.as_deref(), self.html.as_deref(), &inputs, self.overwrite)
+        check_outputs(self.out.as_deref(), self.html.as_deref(), &inputs, self.overwrite)?;
+        self.each_once()
+    }
+
+    /// A log counts once, and judges nothing that was fitted to it.
+    fn each_once(&self) -> Result<(), Error> {
+        let same = |a: &Path, b: &Path| match (a.canonicalize(), b.canonicalize()) {
+            (Ok(a), Ok(b)) => a == b,
+            _ => a == b,
+        };
+        let logs = &self.log.log;
+        let again =
+            logs.iter().enumerate().find(|(at, log)| logs.iter().take(*at).any(|other| same(log, other)));
+        if let Some((_, log)) = again {
+            return Err(Error::Usage(format!(
+                "{} is given twice: a log counts once, and cross-validation would find it again",
+                log.display()
+            )));
+        }
+        let part = |start: f64, length: Option<f64>| [start, length.map_or(f64::INFINITY, |l| start + l)];
+        let fitted = part(self.log.reading.start.as_s(), self.log.reading.duration.map(Span::as_s));
+        let judged = part(self.judge_start.unwrap_or(0.0), self.judge_duration);
+        if fitted[0] >= judged[1] || judged[0] >= fitted[1] {
+            return Ok(());
+        }
+        match self.judge.iter().find(|judge| logs.iter().any(|log| same(log, judge))) {
+            None => Ok(()),
+            Some(judge) => Err(Error::Usage(format!(
+                "--judge {}: the document is fitted to the same part of it, which cannot judge it: give another log, or other parts of this \
+                 one (--duration here, --judge-start there)",
+                judge.display()
+            ))),
+        }
     }
 
     fn settings(&self) -> Result<Settings, Error> {

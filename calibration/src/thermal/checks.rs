@@ -66,6 +66,11 @@ pub fn raw(name: &str, series: &Series, stand: &Stand) -> Findings {
     if series.gyros.output == Some(OutputKind::Mean) && stand.turning.is_none() {
         rates(&mut found, name, &series.gyros);
     }
+    if let Some(words) = &series.cut_short {
+        found.warnings.push(format!(
+            "the recording is cut short, and is taken to where it is whole: {words}; isotherm-replay recover may save more"
+        ));
+    }
     if series.bad_frames > 0 {
         found.warnings.push(format!(
             "{name}: {} frames could not be read and are left out; isotherm-replay recover may save them",
@@ -215,14 +220,16 @@ pub fn turning(samples: &Samples, document: &Document, stand: &Stand) -> Option<
 
 /// Looks at a run that went through the corrector: the accelerometers must feel about one g.
 #[must_use]
-pub fn corrected(samples: &Samples, stand: &Stand) -> Findings {
+pub fn corrected(samples: &Samples, stand: &Stand, dead: &[(bool, usize, String)]) -> Findings {
     let warnings = samples.troubles.iter().map(|words| format!("{}: {words}", samples.name)).collect();
     let mut found = Findings { warnings, ..Findings::default() };
     let mean = |values: &Vec<f64>| {
         let mut good: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
         median(&mut good)
     };
-    if samples.forces.len() == 3 && stand.turning.is_none() {
+    // A dead accelerometer is refused for itself.
+    let alive = dead.iter().all(|(gyro, ..)| *gyro);
+    if samples.forces.len() == 3 && alive && stand.turning.is_none() {
         let forces: Option<Vec<f64>> = samples.forces.iter().map(mean).collect();
         if let Some(forces) = forces {
             let size = forces.iter().map(|f| f * f).sum::<f64>().sqrt();

@@ -13,7 +13,7 @@ use super::select::{Target, Tried, WORTH_IT, terms_of};
 use super::settings::{Method, Settings, Terms};
 use super::stand::Stand;
 use super::target::{rest, target};
-use super::{search, sequential};
+use super::{passes, search, sequential};
 use crate::error::Error;
 use crate::report::FitReport;
 use crate::run::{Run, Watch};
@@ -90,7 +90,7 @@ pub fn fit(
     for ((run, series), stand) in runs.iter().zip(&series).zip(&stands) {
         let window_s = stand.window_s(settings.fit_window_s);
         let of_run = Samples::of(run, series, &plain, window_s, Lent(&mut watch))?;
-        let mut found = checks::corrected(&of_run, stand);
+        let mut found = checks::corrected(&of_run, stand, &dead);
         if found.refusals.is_empty() {
             let of_rest = rest(run, &plain, stand, Lent(&mut watch))?;
             found.refusals.extend(checks::turning(&of_run, &plain, stand));
@@ -110,6 +110,7 @@ pub fn fit(
         .map(|sensor| target(sensor, &plain, &samples, (&rests, &stands), &histories))
         .collect();
     let chosen = choose_filter(&filter, &plain, (&sensors, &targets), &samples, &histories, settings)?;
+    let settings = &Settings { window_s: Some(window_s(settings, &samples)), ..settings.clone() };
     let mut outcome = Outcome::new(&base, plain, chosen.clone(), settings);
     outcome.warnings = warnings;
     outcome.scales(&sensors, &targets);
@@ -149,6 +150,15 @@ impl<W: Watch> Watch for Lent<'_, W> {
     fn end(&mut self) {
         self.0.end();
     }
+}
+
+/// Length of the windows that residuals are stated over (s): in long runs several of the fit's, so that white noise does not hide
+/// what they are about.
+fn window_s(settings: &Settings, samples: &[Samples]) -> f64 {
+    const WINDOWS_OF_A_RUN: f64 = 200.0;
+    const MOST: f64 = 10.0;
+    let several = libm::floor(longest_run_s(samples) / (WINDOWS_OF_A_RUN * settings.fit_window_s));
+    settings.window_s.unwrap_or(settings.fit_window_s * several.clamp(1.0, MOST))
 }
 
 /// Every sensor that follows a channel.
@@ -246,9 +256,15 @@ fn find(
         );
         return Ok(Found { choice: Some(choice), ..Found::refused(&why) });
     }
+    let share = passes::share(target, columns, (history, &known.temperature));
+    let doubt = passes::doubt(share).filter(|_| !best.spec.dynamics.terms.is_empty());
     let solution = target.solve(columns, &best.spec, true);
     Ok(match solution {
         None => Found { choice: Some(choice), ..Found::refused("the model has no solution on this log") },
-        Some(solution) => Found::chosen(choice, &best.spec, &solution, target.level),
+        Some(solution) => {
+            let mut found = Found::chosen(choice, &best.spec, &solution, target.level);
+            found.remarks.extend(doubt);
+            found
+        }
     })
 }

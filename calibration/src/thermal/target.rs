@@ -35,9 +35,13 @@ pub(super) fn rest(run: &Run, document: &Document, stand: &Stand, watch: impl Wa
     };
     let rate = place.earth_rate_in_case(mean_force).ok_or_else(|| {
         Error::Refused(vec![format!(
-            "{}: the unit cannot be levelled from its accelerometers: state --roll and --pitch, or leave the mean out with \
-             --remove-mean",
-            run.name
+            "{}: the unit cannot be levelled from its accelerometers, which feel {} in the mean: that takes one g within 2 % and an x axis \
+             off the vertical. State --roll and --pitch, or have the mean taken off with --remove-mean",
+            run.name,
+            mean_force.map_or_else(
+                || "nothing".to_owned(),
+                |[x, y, z]| format!("({x:.3}, {y:.3}, {z:.3}) m/s²")
+            )
         )])
     })?;
     let deg_per_h = rate.map(|rate| AngularRate::from_rad_per_s(rate).as_deg_per_h());
@@ -99,6 +103,8 @@ pub(super) fn target(
         let empty = Vec::new();
         let outputs = if sensor.gyro { &run.gyros } else { &run.forces }.get(sensor.index).unwrap_or(&empty);
         let responses = run.responses.get(sensor.index);
+        // Whatever it feels goes through a scale factor that may follow temperature: what it felt on the whole is no part of its bias.
+        let usual = Size::of(outputs).mean;
         #[expect(clippy::cast_precision_loss, reason = "windows of a log")]
         let count = run.time_s.len() as f64;
         for (row, output) in outputs.iter().enumerate() {
@@ -107,7 +113,7 @@ pub(super) fn target(
             let axis = axes.get(row).copied().unwrap_or_default();
             let along = |vector: [f64; 3]| vector.iter().zip(axis).map(|(v, a)| v * a).sum::<f64>();
             let (input, expected) = match input {
-                Input::Unknown => (f64::NAN, 0.0),
+                Input::Unknown => (f64::NAN, usual),
                 Input::NoPart => (f64::NAN, f64::NAN),
                 Input::BesideLevel(vector) | Input::Known(vector) => (along(vector), along(vector)),
             };

@@ -35,8 +35,8 @@ impl Outcome {
         .collect();
         if !kinds.is_empty() {
             self.notes.push(format!(
-                "Scale factors stay where the runs have one input only; runs for them: {}, each log with its own.",
-                kinds.join(", ")
+                "Scale factors stay as they are: to fit them, give runs of {}, each log with its own.",
+                kinds.join(" and of ")
             ));
         }
     }
@@ -96,6 +96,11 @@ impl Outcome {
         report.verdicts = verdicts;
         report.warnings = self.warnings;
         report.notes = self.notes;
+        let window_s = self.settings.window_s.unwrap_or(self.settings.fit_window_s);
+        report.notes.push(format!(
+            "The fit is to means over {} s; before and after are means over {window_s} s.",
+            self.settings.fit_window_s
+        ));
         report.notes.push(format!(
             "Temperature is smoothed over {} s and differentiated over {} s on a grid of {} s: this filter belongs to the coefficients.",
             self.filter.smoothing_s, self.filter.derivative_step_s, self.filter.grid_step_s
@@ -125,7 +130,10 @@ fn output(sensor: &Sensor) -> &'static str {
     if sensor.gyro { "°/h" } else { "output" }
 }
 
-/// The best model of each kind of dynamics, by sensor.
+/// Models that the table of a sensor shows, beside the one without dynamics and the chosen one.
+const SHOWN: usize = 8;
+
+/// The best model of each kind of dynamics, by sensor: of many kinds the best ones.
 fn validation(found: &[(Sensor, Basis, Found)]) -> Option<Table> {
     let head = ["sensor", "model", "coefficients", "left where it was not fitted", "of the mean's", ""];
     let mut rows = Vec::new();
@@ -133,24 +141,34 @@ fn validation(found: &[(Sensor, Basis, Found)]) -> Option<Table> {
         let Some(choice) = &found.choice else { continue };
         let kind_of =
             |tried: &'_ Tried| (tried.spec.dynamics.name.clone(), tried.spec.trend, tried.spec.scale);
-        let mut seen = Vec::new();
+        let mut kinds: Vec<&Tried> = Vec::new();
         for tried in &choice.tried {
-            let kind = kind_of(tried);
-            if seen.contains(&kind) {
+            match kinds.iter_mut().find(|kind| kind_of(kind) == kind_of(tried)) {
+                Some(kind) if tried.score < kind.score => *kind = tried,
+                Some(_) => {}
+                None => kinds.push(tried),
+            }
+        }
+        if let Some(best) = choice.best()
+            && let Some(kind) = kinds.iter_mut().find(|kind| kind_of(kind) == kind_of(best))
+        {
+            *kind = best;
+        }
+        let mut scores: Vec<f64> = kinds.iter().map(|kind| kind.score).collect();
+        scores.sort_unstable_by(f64::total_cmp);
+        let last = scores.get(SHOWN - 1).copied().unwrap_or(f64::INFINITY);
+        for kind in kinds {
+            let chosen = choice.best() == Some(kind);
+            if kind.score > last && !chosen && !kind.spec.dynamics.terms.is_empty() {
                 continue;
             }
-            let same = choice.tried.iter().filter(|other| kind_of(other) == kind);
-            let chosen = choice.best().filter(|best| kind_of(best) == kind);
-            let best = chosen.or_else(|| same.min_by(|a, b| a.score.total_cmp(&b.score)));
-            seen.push(kind);
-            let Some(best) = best else { continue };
             rows.push(vec![
                 sensor.name.clone(),
-                best.spec.words(),
-                best.count.to_string(),
-                short(best.score),
-                format!("{:.0} %", 100.0 * best.score / choice.mean),
-                if chosen.is_some() && found.refused.is_none() { "chosen".to_owned() } else { String::new() },
+                kind.spec.words(),
+                kind.count.to_string(),
+                short(kind.score),
+                format!("{:.1} %", 100.0 * kind.score / choice.mean),
+                if chosen && found.refused.is_none() { "chosen".to_owned() } else { String::new() },
             ]);
         }
     }

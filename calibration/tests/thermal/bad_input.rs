@@ -142,6 +142,46 @@ fn a_dead_sensor_is_refused_and_the_others_are_fitted() {
 }
 
 #[test]
+fn a_dead_accelerometer_is_refused_and_the_others_are_fitted() {
+    // Gravity is what it would have felt.
+    let zero = run(0..5400, |s| {
+        let mut second = usual(s);
+        second.forces[2] = 0.0;
+        second
+    });
+    let made = tried(zero, Method::Joint).unwrap();
+    let refused: Vec<_> = made.report.verdicts.iter().filter(|verdict| !verdict.accepted).collect();
+    assert_eq!(refused.len(), 1, "{}", made.report.to_text());
+    assert!(refused[0].of == "accelerometer z" && refused[0].reason.contains("reads zero throughout"));
+}
+
+#[test]
+fn degrees_fahrenheit_are_pointed_out() {
+    let hot = run(0..5400, |s| Second { deg_c: 1.8 * (usual(s).deg_c + 30.0) + 32.0, ..usual(s) });
+    let made = tried(hot, Method::Joint).unwrap();
+    let told = |words: &&String| words.contains("158.0 °C") && words.contains("°F");
+    assert!(made.report.warnings.iter().any(|words| told(&words)), "{:?}", made.report.warnings);
+}
+
+#[test]
+fn passes_that_disagree_are_told() {
+    // The second half of the log has another bias at every temperature, and no plateau nor third pass shows it.
+    let moving = |s: u32| {
+        let t = f64::from(s);
+        let deg_c = if s < 1500 { 40.0 - t / 30.0 } else { -10.0 + (t - 1500.0) / 30.0 };
+        let mut second = usual(s);
+        let hysteresis = if s < 1500 { 3e-4 * (t / 1500.0) } else { 3e-4 * (3000.0 - t) / 1500.0 };
+        second.deg_c = deg_c + 2e-3 * (f64::from((s * 7919) % 1000) / 1000.0 - 0.5);
+        second.rates[0] = 2e-6 * deg_c + if s < 1500 { 1.0 } else { -1.0 } * hysteresis;
+        second.rates[1] = 1e-5 * deg_c;
+        second
+    };
+    let made = tried(run(0..3000, moving), Method::Joint).unwrap();
+    let told = |of: &str| made.report.warnings.iter().any(|w| w.starts_with(of) && w.contains("disagree"));
+    assert!(told("gyro x") && !told("gyro y"), "{}", made.report.to_text());
+}
+
+#[test]
 fn readings_that_are_no_numbers_are_told_or_refused() {
     let some = run(0..5400, |s| {
         let mut second = usual(s);

@@ -74,7 +74,7 @@ fn base() -> Document {
 }
 
 fn fitted(runs: &[Run], stands: Vec<Stand>, method: Method) -> Fitted {
-    let settings = Settings { method, stands, ..Settings::default() };
+    let settings = Settings { method, stands, window_s: Some(10.0), ..Settings::default() };
     fit(Some(&base()), (runs, &[]), &settings, Origin::default(), ()).unwrap()
 }
 
@@ -280,6 +280,23 @@ fn the_residual_of_runs_in_two_attitudes_is_that_of_the_service() {
             assert!((stated / rms - 1.0).abs() < 1e-9, "{method:?} {axis}: {stated} {rms}");
         }
     }
+}
+
+#[test]
+fn a_known_scale_factor_does_not_get_into_the_bias_where_the_attitude_is_not_known() {
+    // z feels one g, through a scale factor that the document knows.
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/calibration/MEMS-0001.toml");
+    let known = Document::parse(&std::fs::read_to_string(path).unwrap(), None).unwrap().document;
+    let runs = [run("level", &scenario(4, [0.0, 0.0], 0.0))];
+    let made = fit(Some(&known), (&runs, &[]), &Settings::default(), Origin::default(), ()).unwrap();
+    assert!(made.report.accepted(), "{}", made.report.to_text());
+    let slope = |document: &Document| {
+        let bias = document.accel.as_ref().unwrap().sensor[2].bias.clone().unwrap();
+        let Shape::Polynomial { coefficients, .. } = bias.shape().clone() else { panic!() };
+        coefficients[1]
+    };
+    let (found, wanted) = (slope(&made.written.document), slope(&known));
+    assert!((found / wanted - 1.0).abs() < 0.15, "{found} {wanted}");
 }
 
 /// What report and document both state of an accelerometer axis in sample (m/s²).

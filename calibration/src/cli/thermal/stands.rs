@@ -52,8 +52,9 @@ impl StandArgs {
         ];
         if let Some((name, count)) = counts.into_iter().find(|(_, count)| *count > 1 && *count != all) {
             let judging = if judges > 0 { format!(" and {judges} of --judge") } else { String::new() };
+            let logs = if runs == 1 { "log" } else { "logs" };
             return Err(Error::Usage(format!(
-                "{count} times {name} for {runs} logs{judging}: state it once for all, or once for each, in the order of the logs, those of \
+                "{count} times {name} for {runs} {logs}{judging}: state it once for all, or once for each, in the order of the logs, those of \
                  --judge behind"
             )));
         }
