@@ -92,7 +92,7 @@ pub fn fit(
         let of_run = Samples::of(run, series, &plain, window_s, Lent(&mut watch))?;
         let mut found = checks::corrected(&of_run, stand, &dead);
         if found.refusals.is_empty() {
-            let of_rest = rest(run, &plain, stand, Lent(&mut watch))?;
+            let of_rest = rest(run, &base, stand, Lent(&mut watch))?;
             found.refusals.extend(checks::turning(&of_run, &plain, stand));
             rests.push(of_rest);
         }

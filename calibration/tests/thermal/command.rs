@@ -81,7 +81,7 @@ fn folders_recordings_and_several_units() {
         (&["whole.mcap", "other.mcap", "--unit", "B"], "whole.mcap has no raw ticks of unit B"),
         (&["whole.mcap", "./whole.mcap"], "is given twice"),
         (&["whole.mcap", "--judge", "whole.mcap"], "cannot judge it"),
-        (&["whole.mcap", "--latitude", "55", "--heading", "30"], "state --roll and --pitch"),
+        (&["whole.mcap", "--latitude", "55", "--heading", "30"], "State --roll and --pitch"),
         (&["whole.mcap", "--axis", "z", "--rate", "0", "--rate", "20"], "2 times --rate for 1 log"),
         (&["whole.mcap", "--axis", "z", "--rate", "20"], "20.000 °/s are stated"),
         (&["whole.mcap", "--axis", "z", "--rate", "0.1"], "slower turns tell nothing"),
