@@ -109,7 +109,7 @@ impl Reading {
             };
             let mapping = Box::new(self.text_mapping(log)?);
             let files =
-                LogFiles::Text { paths: log.to_vec(), mapping, unit: unit.clone(), batch_ticks: BATCH_TICKS };
+                LogFiles::Text { paths: log.clone(), mapping, unit: unit.clone(), batch_ticks: BATCH_TICKS };
             return Ok([run(unit, files)].into());
         }
         if let Some(mapping) = &self.mapping {
@@ -123,7 +123,7 @@ impl Reading {
             Some(unit) => vec![unit],
             None => units_of(&mut Log::recordings(log)?, Bar::reading())?,
         };
-        Ok(units.into_iter().map(|unit| run(unit, LogFiles::Recordings(log.to_vec()))).collect())
+        Ok(units.into_iter().map(|unit| run(unit, LogFiles::Recordings(log.clone()))).collect())
     }
 
     fn text_mapping(&self, logs: &[PathBuf]) -> Result<Mapping, Error> {

@@ -31,7 +31,6 @@ use stands::StandArgs;
     isotherm-calibrate thermal still.mcap turned.mcap --document unit.toml --latitude 55.75 --heading 30 --pitch 0 --roll 0 \\\n      \
     --axis z --rate 0 --rate 20 --out unit-new.toml\n\n\
     A refused sensor keeps the terms that it had; the others are written, and the command ends with 1 unless --accept-partial.")]
-#[expect(clippy::struct_excessive_bools, reason = "switches of a command line")]
 pub(super) struct ThermalArgs {
     #[command(flatten)]
     log: LogArgs,

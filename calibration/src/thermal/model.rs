@@ -144,7 +144,9 @@ fn scale_error(found: &[(Term, f64)]) -> Option<Vec<f64>> {
     });
     let highest = powers.iter().map(|(power, _)| *power).max()?;
     let mut coefficients = vec![0.0; highest + 1];
-    powers.iter().for_each(|(power, value)| coefficients[*power] = *value);
+    for (power, value) in powers {
+        coefficients[power] = value;
+    }
     Some(coefficients)
 }
 

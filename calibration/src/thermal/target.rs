@@ -95,7 +95,7 @@ pub(super) fn target(
     for (index, ((run, rest), stand)) in samples.iter().zip(rests).zip(stands).enumerate() {
         let input = Input::of(sensor.gyro, rest, stand);
         target.level &= matches!(input, Input::Known(_) | Input::NoPart);
-        let axes = match (sensor.gyro, &bare.accel) {
+        let rows = match (sensor.gyro, &bare.accel) {
             (true, _) => axes(&bare.gyro.orientation, sensor.index, run),
             (false, Some(accel)) => axes(&accel.orientation, sensor.index, run),
             (false, None) => Vec::new(),
@@ -110,7 +110,7 @@ pub(super) fn target(
         for (row, output) in outputs.iter().enumerate() {
             let response =
                 if sensor.gyro { 1.0 } else { responses.and_then(|r| r.get(row)).copied().unwrap_or(1.0) };
-            let axis = axes.get(row).copied().unwrap_or_default();
+            let axis = rows.get(row).copied().unwrap_or_default();
             let along = |vector: [f64; 3]| vector.iter().zip(axis).map(|(v, a)| v * a).sum::<f64>();
             let (input, expected) = match input {
                 Input::Unknown => (f64::NAN, usual),

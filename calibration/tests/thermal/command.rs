@@ -27,7 +27,9 @@ fn record(log: &Path, mapping: &isotherm_log::mapping::Mapping, unit: &str, part
     let files = LogFiles::Text { paths: vec![log.to_path_buf()], mapping, unit, batch_ticks: 64 };
     let [start, end] = part.map(Span::from_s);
     let mut messages = files.open(&Part { start, end: Some(end), ..Part::default() }).unwrap();
-    let mut writer = RecordingWriter::create(out, RecordingOptions::default()).unwrap();
+    let mut writer =
+        RecordingWriter::create(out, RecordingOptions { chunk_bytes: 20_000, ..RecordingOptions::default() })
+            .unwrap();
     while let Some(message) = messages.next_message().unwrap() {
         writer.write(&message).unwrap();
     }

@@ -264,7 +264,9 @@ fn the_residual_of_runs_in_two_attitudes_is_that_of_the_service() {
         for (scenario, stand) in scenarios.iter().zip(&stands) {
             let Site::Known { force_m_per_s2: Some(force), .. } = stand.site else { panic!() };
             let mut unit = Offline::new(&loaded, UnitSettings::default());
-            events(scenario).iter().for_each(|event| unit.handle(event));
+            for event in &events(scenario) {
+                unit.handle(event);
+            }
             unit.finish();
             for window in unit.take().chunks(10).filter(|window| window.len() == 10) {
                 for axis in 0..3 {

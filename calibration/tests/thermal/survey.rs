@@ -6,6 +6,8 @@
 //! growing with depth, or changing sign from layer to layer), times a thermo-optic coefficient that grows with temperature, beside a
 //! static bias that is no polynomial, and white noise.
 
+use std::fmt::Write as _;
+
 use isotherm_calibration::run::Run;
 use isotherm_calibration::thermal::{Method, Settings, fit};
 use isotherm_correction::sample::{ChannelName, GyroTick, OutputKind, TemperatureReading};
@@ -102,7 +104,7 @@ fn simulated(coil: &Coil, profile: &Profile, seed: u64) -> Run {
             let around = chamber.deg_c(begin_s + part as f64 * step);
             housing += (around - housing) * (1.0 - (-step / coil.housing_s).exp());
             let mut rates = [0.0; LAYERS];
-            for layer in 0..LAYERS {
+            for (layer, rate) in rates.iter_mut().enumerate() {
                 let here = layers[layer];
                 let out =
                     if layer == 0 { outer * (housing - here) } else { between * (layers[layer - 1] - here) };
@@ -111,7 +113,7 @@ fn simulated(coil: &Coil, profile: &Profile, seed: u64) -> Run {
                 } else {
                     between * (layers[layer + 1] - here)
                 };
-                rates[layer] = out + within;
+                *rate = out + within;
             }
             let mean = rates.iter().sum::<f64>() / LAYERS as f64;
             let depth = |layer: usize| (layer as f64 + 0.5) * width - 0.5;
@@ -224,13 +226,13 @@ fn survey_of_coils() {
             let report = match fit(None, both, &settings, Origin::default(), ()) {
                 Ok(made) => made.report,
                 Err(error) => {
-                    row += &format!(" {error} |");
+                    let _ = write!(row, " {error} |");
                     continue;
                 }
             };
             let each: Vec<String> = factors(&report).iter().map(|[rms, _]| format!("{rms:.0}")).collect();
             let refused = if report.accepted() { "" } else { " refused" };
-            row += &format!(" {:.1} ({}){refused} |", together(&report)[0], each.join(", "));
+            let _ = write!(row, " {:.1} ({}){refused} |", together(&report)[0], each.join(", "));
             let of = |which: usize| -> f64 {
                 report.verdicts.iter().map(|v| v.out_of_sample.unwrap()[which].rms.powi(2)).sum::<f64>()
             };
@@ -250,7 +252,9 @@ fn survey_of_the_simulated_unit_without_noise() {
     let runs = [training_profile(), judging_profile()].map(|profile| {
         let mut scenario = Scenario { tick_ns: TICK_NS, ..fibre_optic_chamber(1, profile) };
         if let Gyros::FibreOptic(gyros) = &mut scenario.instrument.gyros {
-            gyros.iter_mut().for_each(|gyro| gyro.noise = GyroNoise::default());
+            for gyro in gyros {
+                gyro.noise = GyroNoise::default();
+            }
         }
         super::run(&scenario)
     });
