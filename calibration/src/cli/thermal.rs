@@ -75,7 +75,7 @@ pub(super) struct ThermalArgs {
     /// Windows of the fit (s)
     #[arg(long, value_name = "SECONDS", default_value_t = 10.0)]
     fit_window: f64,
-    /// Windows over which residuals are stated (s); those of the fit without it
+    /// Windows over which residuals are stated (s); without it those of the fit, in runs of hours up to ten of them together
     #[arg(long, value_name = "SECONDS")]
     window: Option<f64>,
     /// Smoothing of the temperature (s); searched without it

@@ -47,7 +47,7 @@ pub struct Settings {
     pub stands: Vec<Stand>,
     /// Length of the windows of the fit (s).
     pub fit_window_s: f64,
-    /// Length of the windows over which residuals are stated (s); `None` to follow the length of the runs.
+    /// Length of the windows over which residuals are stated (s); `None` for those of the fit, in runs of hours up to ten of them together.
     pub window_s: Option<f64>,
     /// Smoothing of the temperature (s); `None` to search it.
     pub smoothing_s: Option<f64>,
