@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
+use isotherm_log::source::is_recording;
 use isotherm_protocol::digest::Digest;
 use isotherm_protocol::document::{Log, Origin};
 use sha2::{Digest as _, Sha256};
@@ -22,8 +23,15 @@ pub fn origin(logs: &[PathBuf], command: &str) -> Result<Origin, Error> {
     Ok(Origin { tool: Some(TOOL.to_owned()), command: Some(command.to_owned()), log, ..Origin::default() })
 }
 
-/// Name and SHA-256 of a log.
+/// Name and SHA-256 of a log; of a folder that of its files.
 fn log_of(path: &Path) -> Result<Log, Error> {
+    let digest = if path.is_dir() { of_folder(path)? } else { of_file(path)? };
+    let name = path.file_name().map(|name| name.to_string_lossy().into_owned());
+    let name = name.unwrap_or_else(|| path.display().to_string());
+    Ok(Log { name, sha256: digest.to_string() })
+}
+
+fn of_file(path: &Path) -> Result<Digest, Error> {
     let failed = |source: io::Error| Error::file(path, "read the log", source);
     let mut file = File::open(path).map_err(failed)?;
     let mut hash = Sha256::new();
@@ -34,9 +42,74 @@ fn log_of(path: &Path) -> Result<Log, Error> {
             count => hash.update(&block[..count]),
         }
     }
-    let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    let sha256 = Digest::from(<[u8; 32]>::from(hash.finalize())).to_string();
-    Ok(Log { name, sha256 })
+    Ok(Digest::from(<[u8; 32]>::from(hash.finalize())))
+}
+
+/// The digest of what `sha256sum` prints of a folder's files, in the order of their names: of its recordings where it has some, else of
+/// all but documents and pages, which a fit may have written beside its log.
+fn of_folder(folder: &Path) -> Result<Digest, Error> {
+    let mut files = recordings_in(folder)?;
+    if files.is_empty() {
+        let beside = |path: &PathBuf| {
+            let hidden = path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'));
+            hidden || path.extension().is_some_and(|end| end == "toml" || end == "html")
+        };
+        files = files_of(folder)?;
+        files.retain(|path| !beside(path));
+    }
+    files.sort();
+    let mut hash = Sha256::new();
+    for file in &files {
+        let name = file.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+        hash.update(format!("{}  {name}\n", of_file(file)?));
+    }
+    Ok(Digest::from(<[u8; 32]>::from(hash.finalize())))
+}
+
+/// The regular files of a folder, not those of folders in it.
+fn files_of(folder: &Path) -> Result<Vec<PathBuf>, Error> {
+    let failed = |source: io::Error| Error::file(folder, "read the folder", source);
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(failed)? {
+        let path = entry.map_err(failed)?.path();
+        if path.is_file() {
+            files.push(path);
+        }
+    }
+    Ok(files)
+}
+
+/// The recordings in a folder, in the order in which they were written: by name, numbers in it by their size.
+///
+/// # Errors
+/// [`Error::Log`] where the folder cannot be read.
+pub fn recordings_in(folder: &Path) -> Result<Vec<PathBuf>, Error> {
+    let mut files = files_of(folder)?;
+    files.retain(|path| is_recording(path));
+    files.sort_by_cached_key(|path| {
+        pieces(&path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default())
+    });
+    Ok(files)
+}
+
+/// A name as text and numbers in turn, so that 10 comes behind 9.
+fn pieces(name: &str) -> Vec<(String, u128)> {
+    let mut pieces = vec![(String::new(), 0_u128)];
+    let mut in_number = false;
+    for letter in name.chars() {
+        match (letter.to_digit(10), pieces.last_mut()) {
+            (Some(digit), Some((_, number))) => {
+                *number = number.saturating_mul(10).saturating_add(digit.into());
+                in_number = true;
+            }
+            (None, Some((text, _))) if !in_number => text.push(letter),
+            _ => {
+                pieces.push((letter.to_string(), 0));
+                in_number = false;
+            }
+        }
+    }
+    pieces
 }
 
 /// The command line as it was given, for the document.
@@ -51,4 +124,37 @@ pub fn command_line() -> String {
             format!("{line} {word}")
         }
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_has_the_digest_of_its_files_by_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        std::fs::write(path("b.csv"), "two").unwrap();
+        std::fs::write(path("a.csv"), "one").unwrap();
+        std::fs::write(path("new.toml"), "what a fit wrote").unwrap();
+        let digest = |path: &Path| origin(&[path.to_path_buf()], "").unwrap().log.remove(0).sha256;
+        let listed = format!("{}  a.csv\n{}  b.csv\n", digest(&path("a.csv")), digest(&path("b.csv")));
+        std::fs::write(path("listed.html"), listed).unwrap();
+        assert_eq!(digest(folder.path()), digest(&path("listed.html")));
+        std::fs::write(path("b.csv"), "three").unwrap();
+        assert_ne!(digest(folder.path()), digest(&path("listed.html")));
+        assert!(origin(&[path("none")], "").unwrap_err().to_string().contains("none"));
+    }
+
+    #[test]
+    fn recordings_come_in_the_order_of_their_numbers() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["run_10.mcap", "run_9.mcap", "run_1.mcap", "notes.mcap.txt"] {
+            let magic = if name.ends_with("mcap") { isotherm_log::recording::MAGIC } else { b"no" };
+            std::fs::write(folder.path().join(name), magic).unwrap();
+        }
+        let found = recordings_in(folder.path()).unwrap();
+        let names: Vec<_> = found.iter().map(|path| path.file_name().unwrap().to_str().unwrap()).collect();
+        assert_eq!(names, ["run_1.mcap", "run_9.mcap", "run_10.mcap"]);
+    }
 }

@@ -13,7 +13,7 @@ use isotherm_log::message::Topic;
 use isotherm_log::offline::{Loaded, Offline};
 use isotherm_log::part::{LogFiles, Part};
 use isotherm_log::progress::Progress;
-use isotherm_log::source::Log;
+use isotherm_log::source::{Log, LogReport};
 use isotherm_log::text::LogEvent;
 use isotherm_protocol::codec;
 use isotherm_protocol::key::{RawStream, UnitId};
@@ -105,6 +105,9 @@ impl Run {
                     watch.step();
                 }
                 watch.end();
+                if let LogReport::Recording(report) = messages.report() {
+                    series.cut_short = report.cut_short;
+                }
             }
         }
         if series.gyros.is_empty() && series.accels.is_empty() {

@@ -1,4 +1,4 @@
-//! Bias over temperature from runs at rest (models §8).
+//! Bias and scale factor over temperature from runs at rest, in several attitudes, or on a rate table (models §8).
 //!
 //! One linear model serves all methods; they differ in which terms they offer and in how they find the numbers. The
 //! columns of the model are what the service itself subtracts for a coefficient of one, and what is reported is what
@@ -7,12 +7,15 @@
 //! | module | holds |
 //! |---|---|
 //! | [`settings`] | what may be asked for |
+//! | [`stand`] | how the unit stands or turns in a run, and what it would read without error |
 //! | [`bare`] | the unit without the terms that are fitted; a nominal document for a log without one |
 //! | [`samples`], [`checks`] | a run as windows, and what must hold of it |
 //! | [`columns`] | what one unit of each term subtracts, from the corrector |
 //! | [`branches`] | plateaus, ramps, and the pieces that cross-validation leaves out |
 //! | [`solve`] | weighted, regularised, robust linear least squares |
 //! | [`model`] | which terms a sensor has, and their place in the document |
+//! | [`scale`] | what gravity or a rate table tells of the scale factors |
+//! | [`passes`] | whether passes through the same temperatures show the same |
 //! | [`sequential`], [`search`], [`select`] | 000's procedure; time constants; cross-validation |
 //! | [`mod@fit`] | from runs to a document and its report |
 
@@ -25,14 +28,18 @@ pub mod fit;
 mod known;
 pub mod model;
 mod outcome;
+pub mod passes;
 pub mod samples;
+pub mod scale;
 pub mod search;
 pub mod select;
 pub mod sequential;
 pub mod settings;
 pub mod solve;
+pub mod stand;
 mod target;
 mod told;
 
 pub use fit::{Fitted, fit};
-pub use settings::{Method, Settings, Site, Terms};
+pub use settings::{Method, Settings, Terms};
+pub use stand::{Site, Stand, Turning};

@@ -13,6 +13,7 @@ use isotherm_protocol::key::UnitId;
 
 use super::bar::Bar;
 use crate::error::Error;
+use crate::provenance::recordings_in;
 use crate::run::{Run, units_of};
 use crate::series::Series;
 
@@ -22,7 +23,7 @@ const BATCH_TICKS: usize = 512;
 /// Logs, of one unit or of several.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct LogArgs {
-    /// Recordings (.mcap), or the files of a text log in the order of its mapping
+    /// Recordings (.mcap), the files of a text log in the order of its mapping, or a folder that has them
     #[arg(required = true, value_name = "LOG")]
     pub(crate) log: Vec<PathBuf>,
     #[command(flatten)]
@@ -80,7 +81,8 @@ impl Reading {
         logs: &[PathBuf],
         fallback: Option<&UnitId>,
     ) -> Result<BTreeMap<UnitId, Vec<Run>>, Error> {
-        let together = if are_recordings(logs)? { 1 } else { self.text_mapping(logs)?.files.len().max(1) };
+        let together =
+            if are_recordings(&unfolded(logs)?)? { 1 } else { self.text_mapping(logs)?.files.len().max(1) };
         let folders = logs.iter().all(|path| path.is_dir());
         let mut of_unit: BTreeMap<UnitId, Vec<Run>> = BTreeMap::new();
         for log in logs.chunks(if folders { 1 } else { together }) {
@@ -98,6 +100,7 @@ impl Reading {
         let part = Part { start: self.start, end, ..Part::default() };
         let given = self.serial()?;
         let name = names(log);
+        let log = &unfolded(log)?;
         let run = |unit: UnitId, files| (unit.clone(), Run::new(name.clone(), unit, files, &part));
         if !are_recordings(log)? {
             let unit = match given.as_ref().or(fallback) {
@@ -106,7 +109,7 @@ impl Reading {
             };
             let mapping = Box::new(self.text_mapping(log)?);
             let files =
-                LogFiles::Text { paths: log.to_vec(), mapping, unit: unit.clone(), batch_ticks: BATCH_TICKS };
+                LogFiles::Text { paths: log.clone(), mapping, unit: unit.clone(), batch_ticks: BATCH_TICKS };
             return Ok([run(unit, files)].into());
         }
         if let Some(mapping) = &self.mapping {
@@ -120,7 +123,7 @@ impl Reading {
             Some(unit) => vec![unit],
             None => units_of(&mut Log::recordings(log)?, Bar::reading())?,
         };
-        Ok(units.into_iter().map(|unit| run(unit, LogFiles::Recordings(log.to_vec()))).collect())
+        Ok(units.into_iter().map(|unit| run(unit, LogFiles::Recordings(log.clone()))).collect())
     }
 
     fn text_mapping(&self, logs: &[PathBuf]) -> Result<Mapping, Error> {
@@ -130,11 +133,32 @@ impl Reading {
         for path in logs {
             std::fs::metadata(path).map_err(|source| Error::file(path, "open the log", source))?;
         }
-        Err(Error::Usage(format!(
-            "{} is no recording, and a text log needs --mapping FILE: ready ones are in config/mappings",
-            names(logs)
-        )))
+        let folder = logs.iter().find(|path| path.is_dir());
+        Err(Error::Usage(match folder {
+            Some(folder) => format!(
+                "the folder {} has no recording (.mcap) in it; a folder with the files of a text log needs --mapping FILE that names \
+                 them: ready ones are in config/mappings",
+                folder.display()
+            ),
+            None => format!(
+                "{} is no recording, and a text log needs --mapping FILE: ready ones are in config/mappings",
+                names(logs)
+            ),
+        }))
     }
+}
+
+/// The logs with the recordings of each folder in its place; a folder without any stays.
+fn unfolded(logs: &[PathBuf]) -> Result<Vec<PathBuf>, Error> {
+    let mut all = Vec::new();
+    for log in logs {
+        let inside = if log.is_dir() { recordings_in(log)? } else { Vec::new() };
+        if inside.is_empty() {
+            all.push(log.clone());
+        }
+        all.extend(inside);
+    }
+    Ok(all)
 }
 
 /// Reads seconds.

@@ -2,14 +2,19 @@
 
 use isotherm_correction::sample::OutputKind;
 use isotherm_correction::units::STANDARD_GRAVITY_M_PER_S2;
+use isotherm_protocol::document::Document;
 
 use super::samples::Samples;
 use super::solve::median;
+use super::stand::Stand;
 use crate::series::{Series, Ticks};
 
 /// Mean rate of a gyro at rest beyond which it does not rest, or its unit is wrong (°/s): Earth's rate and the bias of a poor
 /// micromechanical gyro stay below.
 const FASTEST_DEG_PER_S: f64 = 20.0;
+/// How far a gyro on a rate table may be from what is stated: share of the rate, and beside it (°/s).
+const TABLE_SHARE: f64 = 0.05;
+const TABLE_DEG_PER_S: f64 = 0.5;
 /// How far the mean specific force may be from one g.
 const GRAVITY: [f64; 2] = [0.9, 1.1];
 /// Fewest readings of a tick series for which anything can be said.
@@ -41,7 +46,7 @@ pub fn median_step_s(times_ns: &[i64]) -> f64 {
 
 /// Looks at the raw readings of a run.
 #[must_use]
-pub fn raw(name: &str, series: &Series) -> Findings {
+pub fn raw(name: &str, series: &Series, stand: &Stand) -> Findings {
     let mut found = Findings::default();
     for (gyro, kind, ticks) in [(true, "gyro", &series.gyros), (false, "accelerometer", &series.accels)] {
         if ticks.is_empty() {
@@ -58,8 +63,13 @@ pub fn raw(name: &str, series: &Series) -> Findings {
             series.gyros.len()
         ));
     }
-    if series.gyros.output == Some(OutputKind::Mean) {
+    if series.gyros.output == Some(OutputKind::Mean) && stand.turning.is_none() {
         rates(&mut found, name, &series.gyros);
+    }
+    if let Some(words) = &series.cut_short {
+        found.warnings.push(format!(
+            "the recording is cut short, and is taken to where it is whole: {words}; isotherm-replay recover may save more"
+        ));
     }
     if series.bad_frames > 0 {
         found.warnings.push(format!(
@@ -174,16 +184,52 @@ fn thermometer(found: &mut Findings, name: &str, channel: &str, readings: &crate
     }
 }
 
+/// Whether a run on a rate table turns as it was stated, all the time; why not, and what to do.
+#[must_use]
+pub fn turning(samples: &Samples, document: &Document, stand: &Stand) -> Option<String> {
+    let turning = stand.turning.as_ref()?;
+    let stated = turning.rate_deg_per_h();
+    let allowed = (TABLE_SHARE * turning.rate_deg_per_s.abs() + TABLE_DEG_PER_S) * 3600.0;
+    let mut off: Vec<usize> = Vec::new();
+    for (index, (shown, row)) in samples.gyros.iter().zip(&document.gyro.orientation.rows).enumerate() {
+        let along: f64 = row.iter().zip(stated).map(|(r, s)| r * s).sum();
+        let away: Vec<usize> =
+            (0..shown.len()).filter(|&window| (shown[window] - along).abs() > allowed).collect();
+        if 2 * away.len() > shown.len() {
+            let mut good: Vec<f64> = shown.iter().copied().filter(|shown| shown.is_finite()).collect();
+            return Some(format!(
+                "{}: gyro {index} shows {:.3} °/s in the median, {:.3} °/s are stated along it: is --rate or --axis that of another log, \
+                 or its sign the other one?",
+                samples.name,
+                median(&mut good).unwrap_or(f64::NAN) / 3600.0,
+                along / 3600.0
+            ));
+        }
+        off.extend(away);
+    }
+    let (first, last) = (off.iter().min()?, off.iter().max()?);
+    let time = |window: &usize| samples.time_s.get(*window).copied().unwrap_or_default();
+    Some(format!(
+        "{}: the table is not at its stated {} °/s between {:.0} and {:.0} s: cut the log to where it is with --start and --duration",
+        samples.name,
+        turning.rate_deg_per_s,
+        time(first) - 0.5 * samples.window_s,
+        time(last) + 0.5 * samples.window_s
+    ))
+}
+
 /// Looks at a run that went through the corrector: the accelerometers must feel about one g.
 #[must_use]
-pub fn corrected(samples: &Samples) -> Findings {
+pub fn corrected(samples: &Samples, stand: &Stand, dead: &[(bool, usize, String)]) -> Findings {
     let warnings = samples.troubles.iter().map(|words| format!("{}: {words}", samples.name)).collect();
     let mut found = Findings { warnings, ..Findings::default() };
     let mean = |values: &Vec<f64>| {
         let mut good: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
         median(&mut good)
     };
-    if samples.forces.len() == 3 {
+    // A dead accelerometer is refused for itself.
+    let alive = dead.iter().all(|(gyro, ..)| *gyro);
+    if samples.forces.len() == 3 && alive && stand.turning.is_none() {
         let forces: Option<Vec<f64>> = samples.forces.iter().map(mean).collect();
         if let Some(forces) = forces {
             let size = forces.iter().map(|f| f * f).sum::<f64>().sqrt();

@@ -43,6 +43,8 @@ pub enum Term {
     Acceleration(Branch, usize),
     /// `(T − reference)ʲ·(T − L_τ)/τ`, τ in milliseconds.
     Lag(u64, usize),
+    /// (T − reference)ʲ times what the sensor feels, in ppm of its scale factor: a column of each sensor's own.
+    Scale(usize),
 }
 
 /// Time constant in the form that terms are told apart by.
@@ -102,7 +104,7 @@ impl Basis {
                 ..GyroSensor::bare(&index.to_string())
             };
             match *term {
-                None => {}
+                None | Some(Term::Scale(_)) => {}
                 Some(Term::Static(power)) => gyro.static_bias = Some(self.power(power, 1.0)),
                 Some(Term::Rate(branch, power)) => gyro.thermal_rate = Some(self.branches(branch, power)),
                 Some(Term::Acceleration(branch, power)) => {
@@ -245,8 +247,8 @@ impl<'a> Columns<'a> {
     /// # Errors
     /// [`Error::Document`].
     pub fn make(&mut self, terms: &[Term]) -> Result<(), Error> {
-        let mut wanted: Vec<Term> =
-            terms.iter().filter(|term| !self.known.contains_key(term)).copied().collect();
+        let of_all = |term: &&Term| !self.known.contains_key(*term) && !matches!(term, Term::Scale(_));
+        let mut wanted: Vec<Term> = terms.iter().filter(of_all).copied().collect();
         wanted.sort_unstable();
         wanted.dedup();
         for group in wanted.chunks(3) {

@@ -16,8 +16,12 @@ use crate::error::Error;
 
 /// Smoothings of the temperature that are tried (s).
 const SMOOTHINGS_S: [f64; 4] = [5.0, 10.0, 20.0, 40.0];
-/// For the sequential method, whose derivatives know nothing of lags: smoothing and derivative step (s).
-const SLOW_SMOOTHINGS_S: [f64; 5] = [15.0, 40.0, 90.0, 180.0, 250.0];
+/// For the sequential method, whose derivatives know nothing of lags: smoothing, its delay being all the lag that there is, and
+/// derivative step (s).
+const SLOW_SMOOTHINGS_S: [f64; 8] = [15.0, 40.0, 90.0, 180.0, 250.0, 400.0, 650.0, 1000.0];
+/// Longest smoothing as a share of the longest run, and in grid steps.
+const LONGEST_SMOOTHING_SHARE: f64 = 0.06;
+const LONGEST_SMOOTHING_GRID_STEPS: f64 = 2000.0;
 const DERIVATIVE_STEPS_S: [f64; 2] = [20.0, 40.0];
 
 /// The filter with which the sensors are explained best together.
@@ -33,7 +37,12 @@ pub(super) fn choose_filter(
     let sequential = settings.method == Method::Sequential;
     let (smoothings, steps): (Vec<f64>, Vec<f64>) = match settings.smoothing_s {
         Some(smoothing) => (vec![smoothing], vec![filter.derivative_step_s]),
-        None if sequential => (SLOW_SMOOTHINGS_S.to_vec(), DERIVATIVE_STEPS_S.to_vec()),
+        None if sequential => {
+            let longest_s =
+                (LONGEST_SMOOTHING_SHARE * longest_run_s(samples)).min(LONGEST_SMOOTHING_GRID_STEPS * grid);
+            let smoothings = SLOW_SMOOTHINGS_S.into_iter().filter(|s| *s <= longest_s.max(250.0));
+            (smoothings.collect(), DERIVATIVE_STEPS_S.to_vec())
+        }
         None => (SMOOTHINGS_S.to_vec(), vec![20.0]),
     };
     let whole = |length: f64| libm::round(length / grid).max(1.0) * grid;
@@ -58,12 +67,15 @@ pub(super) fn choose_filter(
                     spec.dynamics = if sequential {
                         Dynamics { name: String::new(), terms: vec![rate, acceleration] }
                     } else {
-                        search::ladders(false, grid, &known.history).pop().unwrap_or_default()
+                        search::ladders(false, grid, &known.history, longest_run_s(samples))
+                            .pop()
+                            .unwrap_or_default()
                     };
                 }
                 columns.make(&spec.terms(true))?;
                 for (sensor, target) in sensors.iter().zip(targets) {
                     if sensor.channel == *name && sensor.dead.is_none() && (sensor.gyro || !sequential) {
+                        let spec = Spec { scale: target.widest_scale(), ..spec.clone() };
                         cost += target
                             .solve(&columns, &spec, false)
                             .map_or(0.0, |solution| libm::log(solution.rms));
@@ -77,6 +89,13 @@ pub(super) fn choose_filter(
         }
     }
     Ok(best.map_or_else(|| filter.clone(), |(_, filter)| filter))
+}
+
+/// Length of the longest run (s).
+pub(super) fn longest_run_s(samples: &[Samples]) -> f64 {
+    #[expect(clippy::cast_precision_loss, reason = "windows of a log")]
+    let length_s = |run: &Samples| run.time_s.len() as f64 * run.window_s;
+    samples.iter().map(length_s).fold(0.0, f64::max)
 }
 
 /// A twentieth of what Ṫ·T̈ reaches: the blend between run-up and braking.

@@ -5,14 +5,15 @@ use isotherm_protocol::document::{Document, Origin};
 use super::bare::{bare, filter, nominal_of};
 use super::checks;
 use super::columns::Columns;
-use super::filter::choose_filter;
+use super::filter::{choose_filter, longest_run_s};
 use super::known::{Known, channel, histories};
 use super::outcome::{Found, Outcome};
 use super::samples::Samples;
-use super::select::{Target, WORTH_IT, terms_of};
+use super::select::{Target, Tried, WORTH_IT, terms_of};
 use super::settings::{Method, Settings, Terms};
+use super::stand::Stand;
 use super::target::{rest, target};
-use super::{search, sequential};
+use super::{passes, search, sequential};
 use crate::error::Error;
 use crate::report::FitReport;
 use crate::run::{Run, Watch};
@@ -54,9 +55,10 @@ pub fn fit(
     let mut warnings = Vec::new();
     let (mut refusals, mut dead) = (Vec::new(), Vec::new());
     let mut series = Vec::new();
-    for run in runs {
+    let stands: Vec<Stand> = (0..runs.len()).map(|run| settings.stand(run)).collect();
+    for (run, stand) in runs.iter().zip(&stands) {
         let of_run = run.series(Lent(&mut watch))?;
-        let found = checks::raw(&run.name, &of_run);
+        let found = checks::raw(&run.name, &of_run, stand);
         refusals.extend(found.refusals);
         warnings.extend(found.warnings);
         dead.extend(found.dead);
@@ -84,9 +86,16 @@ pub fn fit(
         .fold(0.0, f64::max);
     let filter = plain.temperature.filter.get_or_insert_with(|| filter(step_s)).clone();
     let mut samples = Vec::new();
-    for (run, series) in runs.iter().zip(&series) {
-        let of_run = Samples::of(run, series, &plain, settings.fit_window_s, Lent(&mut watch))?;
-        let found = checks::corrected(&of_run);
+    let mut rests = Vec::new();
+    for ((run, series), stand) in runs.iter().zip(&series).zip(&stands) {
+        let window_s = stand.window_s(settings.fit_window_s);
+        let of_run = Samples::of(run, series, &plain, window_s, Lent(&mut watch))?;
+        let mut found = checks::corrected(&of_run, stand, &dead);
+        if found.refusals.is_empty() {
+            let of_rest = rest(run, &base, stand, Lent(&mut watch))?;
+            found.refusals.extend(checks::turning(&of_run, &plain, stand));
+            rests.push(of_rest);
+        }
         refusals.extend(found.refusals);
         warnings.extend(found.warnings);
         samples.push(of_run);
@@ -94,23 +103,21 @@ pub fn fit(
     if !refusals.is_empty() {
         return Err(Error::Refused(refusals));
     }
-    let rests = runs
-        .iter()
-        .map(|run| rest(run, &plain, &settings.site, Lent(&mut watch)))
-        .collect::<Result<Vec<_>, _>>()?;
     let sensors = sensors(&plain, &dead);
     let histories = histories(&plain, &filter, &sensors, &samples, &mut warnings)?;
-    let targets: Vec<Target> =
-        sensors.iter().map(|sensor| target(sensor, &plain, &samples, &rests, &histories)).collect();
+    let targets: Vec<Target> = sensors
+        .iter()
+        .map(|sensor| target(sensor, &plain, &samples, (&rests, &stands), &histories))
+        .collect();
     let chosen = choose_filter(&filter, &plain, (&sensors, &targets), &samples, &histories, settings)?;
+    let settings = &Settings { window_s: Some(window_s(settings, &samples)), ..settings.clone() };
     let mut outcome = Outcome::new(&base, plain, chosen.clone(), settings);
     outcome.warnings = warnings;
+    outcome.scales(&sensors, &targets);
     for (name, known) in &histories {
         let basis = known.basis(channel(&outcome.bare, name)?, &chosen);
         let mut columns = Columns::new(basis, &samples);
-        let longest = samples.iter().map(|run| run.time_s.len()).max().unwrap_or(0);
-        #[expect(clippy::cast_precision_loss, reason = "windows of a log")]
-        let longest_s = longest as f64 * settings.fit_window_s;
+        let longest_s = longest_run_s(&samples);
         let mine: Vec<usize> = (0..sensors.len()).filter(|&i| sensors[i].channel == *name).collect();
         let alive: Vec<&Target> =
             mine.iter().filter(|&&i| sensors[i].dead.is_none()).map(|&i| &targets[i]).collect();
@@ -119,12 +126,13 @@ pub fn fit(
             _ => Vec::new(),
         };
         for index in mine {
-            let found = find(&mut columns, (&sensors[index], &targets[index]), known, &searched, settings)?;
+            let one = (&sensors[index], &targets[index]);
+            let found = find(&mut columns, one, (known, longest_s), &searched, settings)?;
             outcome.add(&sensors[index], columns.basis(), found);
         }
         outcome.history(name, &known.history);
     }
-    outcome.finish((runs, judges), origin, |run| rest(run, &base, &settings.site, ()), watch)
+    outcome.finish((runs, judges), origin, |run, stand| rest(run, &base, stand, ()), watch)
 }
 
 /// A watch that is lent.
@@ -142,6 +150,15 @@ impl<W: Watch> Watch for Lent<'_, W> {
     fn end(&mut self) {
         self.0.end();
     }
+}
+
+/// Length of the windows that residuals are stated over (s): in long runs several of the fit's, so that white noise does not hide
+/// what they are about.
+fn window_s(settings: &Settings, samples: &[Samples]) -> f64 {
+    const WINDOWS_OF_A_RUN: f64 = 200.0;
+    const MOST: f64 = 10.0;
+    let several = libm::floor(longest_run_s(samples) / (WINDOWS_OF_A_RUN * settings.fit_window_s));
+    settings.window_s.unwrap_or(settings.fit_window_s * several.clamp(1.0, MOST))
 }
 
 /// Every sensor that follows a channel.
@@ -171,7 +188,7 @@ fn sensors(bare: &Document, dead: &[(bool, usize, String)]) -> Vec<Sensor> {
 fn find(
     columns: &mut Columns<'_>,
     (sensor, target): (&Sensor, &Target),
-    known: &Known,
+    (known, longest_s): (&Known, f64),
     searched: &[super::model::Dynamics],
     settings: &Settings,
 ) -> Result<Found, Error> {
@@ -205,14 +222,24 @@ fn find(
         });
     }
     let dynamics = match settings.method {
-        Method::Lag => searched.to_vec(),
-        _ => search::ladders(sensor.gyro, columns.basis().filter.grid_step_s, history),
+        // What was searched beside what is fixed: a search follows the noise of its log, too.
+        Method::Lag => {
+            let grid_step_s = columns.basis().filter.grid_step_s;
+            let mut all = searched.to_vec();
+            if sensor.gyro && history.tells_dynamics() {
+                all.extend(searched.iter().filter(|searched| searched.terms.len() > 4).map(search::leading));
+            }
+            all.extend(search::ladders(sensor.gyro, grid_step_s, history, longest_s).into_iter().skip(1));
+            all
+        }
+        _ => search::ladders(sensor.gyro, columns.basis().filter.grid_step_s, history, longest_s),
     };
     let degrees = if history.tells_dynamics() { &DEGREES[..] } else { &DEGREES[..3] };
     columns.make(&terms_of(degrees, &dynamics))?;
     let mut choice = target.choose(columns, (degrees, &dynamics), (history, &known.temperature));
     if settings.terms == Terms::All {
-        choice.chosen = choice.tried.iter().rposition(|tried| !tried.spec.trend);
+        let largest = |tried: &Tried| !tried.spec.trend && tried.spec.scale == target.widest_scale();
+        choice.chosen = choice.tried.iter().rposition(largest);
     }
     let Some(best) = choice.best().cloned() else {
         return Ok(Found::refused(
@@ -229,9 +256,15 @@ fn find(
         );
         return Ok(Found { choice: Some(choice), ..Found::refused(&why) });
     }
+    let share = passes::share(target, columns, (history, &known.temperature));
+    let doubt = passes::doubt(share).filter(|_| !best.spec.dynamics.terms.is_empty());
     let solution = target.solve(columns, &best.spec, true);
     Ok(match solution {
         None => Found { choice: Some(choice), ..Found::refused("the model has no solution on this log") },
-        Some(solution) => Found::chosen(choice, &best.spec, &solution, target.level),
+        Some(solution) => {
+            let mut found = Found::chosen(choice, &best.spec, &solution, target.level);
+            found.remarks.extend(doubt);
+            found
+        }
     })
 }

@@ -11,6 +11,10 @@ use super::fit::Sensor;
 use super::samples::Samples;
 use crate::error::Error;
 
+/// What chambers for instruments hardly reach (°C).
+const HOTTEST_DEG_C: f64 = 130.0;
+const COLDEST_DEG_C: f64 = -80.0;
+
 /// What is known of a channel before the fit.
 #[derive(Debug)]
 pub(super) struct Known {
@@ -75,6 +79,12 @@ pub(super) fn histories(
             refusals.push(format!(
                 "temperature channel {name:?} stays between {low:.1} and {high:.1} °C: a fit over temperature needs at least \
                  {SMALLEST_RANGE_DEG_C} °C, better the whole range of use; run the chamber through it"
+            ));
+        }
+        if high > HOTTEST_DEG_C || low < COLDEST_DEG_C {
+            warnings.push(format!(
+                "channel {name:?} goes from {low:.1} to {high:.1} °C, which few units see: is it in °F, or its conversion in the document or \
+                 the mapping another one's?"
             ));
         }
         warnings.extend(doubts(name, &history));

@@ -5,6 +5,7 @@ use isotherm_protocol::document::{
 };
 
 use super::columns::{Basis, Branch, Term, seconds};
+use super::scale::{Holds, put};
 use crate::written::tidy;
 
 /// The dynamic part of a model.
@@ -25,6 +26,8 @@ pub struct Spec {
     pub dynamics: Dynamics,
     /// Whether a drift with time is estimated beside it. It is never written: it keeps the curves clean of it.
     pub trend: bool,
+    /// Highest power of temperature in the scale factor error; `None` where the scale factor stays.
+    pub scale: Option<usize>,
 }
 
 impl Spec {
@@ -32,22 +35,27 @@ impl Spec {
     #[must_use]
     pub fn terms(&self, level: bool) -> Vec<Term> {
         let first = usize::from(!level);
-        (first..=self.degree).map(Term::Static).chain(self.dynamics.terms.iter().copied()).collect()
+        let scale = self.scale.into_iter().flat_map(|highest| (first..=highest).map(Term::Scale));
+        let statics = (first..=self.degree).map(Term::Static);
+        statics.chain(self.dynamics.terms.iter().copied()).chain(scale).collect()
     }
 
     /// In words.
     #[must_use]
     pub fn words(&self) -> String {
-        let degree = match self.degree {
+        let of_degree = |degree: usize| match degree {
             0 => "constant".to_owned(),
             1 => "linear".to_owned(),
             2 => "quadratic".to_owned(),
             3 => "cubic".to_owned(),
             power => format!("degree {power}"),
         };
-        let mut words = degree;
+        let mut words = of_degree(self.degree);
         if !self.dynamics.terms.is_empty() {
             words = format!("{words} + {}", self.dynamics.name);
+        }
+        if let Some(degree) = self.scale {
+            words = format!("{words}, scale factor error {}", of_degree(degree));
         }
         if self.trend {
             words = format!("{words}, beside a drift with time");
@@ -78,6 +86,7 @@ pub fn described(term: Term, output: &str) -> (String, String) {
             format!("thermal acceleration{}, power {j}", branch(on)),
             format!("({output})/(°C/s²){}", power(j)),
         ),
+        Term::Scale(j) => (format!("scale factor error, power {j}"), format!("ppm{}", power(j))),
         Term::Lag(tau, j) => {
             (format!("lag of {} s, power {j}", seconds(tau)), format!("({output})/(°C/s){}", power(j)))
         }
@@ -127,7 +136,22 @@ fn of_lag(found: &[(Term, f64)], tau: u64) -> Vec<(usize, f64)> {
     })
 }
 
-/// Puts found coefficients (°/h and so on) into a gyro that has none of these terms.
+/// Coefficients of the scale factor error (ppm), by power from 0; `None` where the scale factor stays.
+fn scale_error(found: &[(Term, f64)]) -> Option<Vec<f64>> {
+    let powers = powers(found, |term| match term {
+        Term::Scale(power) => Some(power),
+        _ => None,
+    });
+    let highest = powers.iter().map(|(power, _)| *power).max()?;
+    let mut coefficients = vec![0.0; highest + 1];
+    for (power, value) in powers {
+        coefficients[power] = value;
+    }
+    Some(coefficients)
+}
+
+/// Puts found coefficients (°/h and so on) into a gyro that has none of these terms; its scale factor keeps what it has, times the
+/// error that was found.
 pub fn put_gyro(sensor: &mut GyroSensor, basis: &Basis, found: &[(Term, f64)]) {
     sensor.static_bias = curve(
         basis,
@@ -147,6 +171,11 @@ pub fn put_gyro(sensor: &mut GyroSensor, basis: &Basis, found: &[(Term, f64)]) {
     let lag =
         |tau: u64| Some(Lag { time_constant_s: seconds(tau), gain: curve(basis, &of_lag(found, tau))? });
     sensor.lag = taus(found).into_iter().filter_map(lag).collect();
+    if let Some(error) = scale_error(found) {
+        let old = sensor.increment_weight_error.take();
+        let old = old.unwrap_or_else(|| Curve::new(Shape::Constant { value: 0.0 }));
+        sensor.increment_weight_error = Some(put(&old, basis, &error, Holds::Error));
+    }
 }
 
 fn branches<Q: Quantity>(
@@ -168,7 +197,8 @@ fn branches<Q: Quantity>(
     }
 }
 
-/// Puts found coefficients (output units and so on) into an accelerometer. It has a static bias and lags only.
+/// Puts found coefficients (output units and so on) into an accelerometer, which has a static bias and lags only; its scale factor
+/// keeps what it has, times the error that was found.
 pub fn put_accel(sensor: &mut AccelSensor, basis: &Basis, found: &[(Term, f64)]) {
     let unit = output_unit(sensor.scale_factor.unit());
     let of_static = powers(found, |term| match term {
@@ -181,6 +211,9 @@ pub fn put_accel(sensor: &mut AccelSensor, basis: &Basis, found: &[(Term, f64)])
         Some(AccelLag { time_constant_s: seconds(tau), gain })
     };
     sensor.lag = taus(found).into_iter().filter_map(lag).collect();
+    if let Some(error) = scale_error(found) {
+        sensor.scale_factor = put(&sensor.scale_factor, basis, &error, Holds::Factor);
+    }
 }
 
 /// The output that a scale factor leads to.

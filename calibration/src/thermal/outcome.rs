@@ -7,8 +7,9 @@ use super::columns::{Basis, Term};
 use super::fit::{Fitted, Lent, Sensor};
 use super::model::{Spec, put_accel, put_gyro};
 use super::select::{Choice, WORTH_IT};
-use super::settings::{Settings, Site};
+use super::settings::Settings;
 use super::solve::Solution;
+use super::stand::Stand;
 use crate::error::Error;
 use crate::report::{Curve, Figure, Rest, Verdict, judge};
 use crate::run::{Run, Watch};
@@ -92,7 +93,7 @@ impl Outcome {
             warnings: Vec::new(),
             base: base.clone(),
             filter,
-            settings: *settings,
+            settings: settings.clone(),
             found: Vec::new(),
             notes: Vec::new(),
             range_deg_c: [f64::INFINITY, f64::NEG_INFINITY],
@@ -135,7 +136,7 @@ impl Outcome {
         mut self,
         (runs, judges): (&[Run], &[Run]),
         origin: Origin,
-        rest: impl Fn(&Run) -> Result<Rest, Error>,
+        rest: impl Fn(&Run, &Stand) -> Result<Rest, Error>,
         mut watch: impl Watch,
     ) -> Result<Fitted, Error> {
         self.found.sort_by_key(|(sensor, ..)| (!sensor.gyro, sensor.index));
@@ -148,17 +149,22 @@ impl Outcome {
             let (mut curves, mut troubles) = (Vec::new(), Vec::new());
             let both =
                 runs.iter().map(|run| (run, Sample::In)).chain(judges.iter().map(|run| (run, Sample::Out)));
-            for (run, sample) in both {
+            for (index, (run, sample)) in both.enumerate() {
+                let stand = self.settings.stand(index);
                 let both_ways = judge(
                     run,
                     sample,
                     (&before.loaded, &written.loaded),
-                    (&written.document, &rest(run)?),
-                    window_s,
+                    (&written.document, &rest(run, &stand)?),
+                    stand.window_s(window_s),
                     Lent(&mut watch),
                 )?;
                 troubles.extend(both_ways.troubles.iter().map(|words| format!("{}: {words}", run.name)));
-                curves.extend(both_ways.curves);
+                // On a table the accelerometers feel its turning, too.
+                let at_rest = stand.turning.is_none();
+                curves.extend(
+                    both_ways.curves.into_iter().filter(|curve| at_rest || curve.of.starts_with("gyro")),
+                );
             }
             let verdicts = Curve::verdicts(&curves);
             let worse = self.take_out(&verdicts);
@@ -213,7 +219,7 @@ impl Outcome {
             }
         }
         document.created = self.settings.created.or(self.base.created);
-        if self.settings.site == Site::Unknown {
+        if self.settings.removes_mean() {
             let level = "The attitude of the unit was not stated: every fitted bias is zero in the middle of its range, and the level of \
                          each output stays what it was.";
             document.note = Some(match &self.base.note {

@@ -32,6 +32,8 @@ pub struct Samples {
     pub responses: Vec<Vec<f64>>,
     /// Temperature readings by channel.
     pub temperatures: BTreeMap<String, Vec<TemperatureReading>>,
+    /// Smoothed temperatures by channel at the end of each window (°C).
+    pub deg_c: BTreeMap<String, Vec<f64>>,
     /// What the correction passed over.
     pub troubles: Troubles,
 }
@@ -76,19 +78,17 @@ impl Samples {
             };
             responses = of_forces.iter().zip(&biased).map(difference).collect();
         }
-        let (first, troubles) = match plain.first() {
-            Some(first) => (first.time_s.clone(), first.troubles.clone()),
-            None => (Vec::new(), Vec::new()),
-        };
+        let Means { time_s, troubles, temperature_deg_c, .. } = plain.first().cloned().unwrap_or_default();
         Ok(Self {
             name: run.name.clone(),
             start_ns: start_ns(series),
             window_s,
-            time_s: first,
+            time_s,
             gyros: by_sensor(&rates, gyro_count),
             forces: of_forces,
             responses,
             temperatures: readings(series),
+            deg_c: temperature_deg_c,
             troubles,
         })
     }

@@ -24,10 +24,9 @@ const POINTS: usize = 16;
 const COUNTS: [usize; 5] = [1, 2, 3, 5, 7];
 /// Power of the static bias in the search.
 const DEGREE: usize = 3;
-/// Time constants of the fixed ladder (s), short and long.
-const SHORT_LADDER: [f64; 3] = [20.0, 100.0, 500.0];
-
-const LONG_LADDER: [f64; 5] = [12.0, 30.0, 75.0, 190.0, 480.0];
+/// Time constants of the fixed ladders (s).
+const LADDERS: [&[f64]; 3] =
+    [&[20.0, 100.0, 500.0], &[12.0, 30.0, 75.0, 190.0, 480.0], &[30.0, 100.0, 320.0, 1000.0, 2000.0]];
 /// Time constants that the joint method offers alone (s).
 const SINGLE: [f64; 3] = [30.0, 100.0, 300.0];
 
@@ -45,9 +44,17 @@ pub fn lags(taus_s: &[f64], gain_degree: usize) -> Dynamics {
     Dynamics { name: format!("{plural} of {} s{gain}", list.join(", ")), terms: terms.collect() }
 }
 
+/// Lags beside the thermal acceleration, for a thermometer that is behind a part of what it stands for. An accelerometer has none.
+#[must_use]
+pub fn leading(lags: &Dynamics) -> Dynamics {
+    let mut dynamics = Dynamics { name: format!("{}, T̈", lags.name), terms: lags.terms.clone() };
+    dynamics.terms.push(Term::Acceleration(Branch::Both, 0));
+    dynamics
+}
+
 /// The dynamics that the joint method offers: 000's terms where the sensor can have them, and lags on a fixed ladder.
 #[must_use]
-pub fn ladders(gyro: bool, grid_step_s: f64, history: &History) -> Vec<Dynamics> {
+pub fn ladders(gyro: bool, grid_step_s: f64, history: &History, longest_run_s: f64) -> Vec<Dynamics> {
     let named = |name: &str, terms: &[Term]| Dynamics { name: name.to_owned(), terms: terms.to_vec() };
     let mut all = vec![Dynamics::default()];
     if !history.both_directions() {
@@ -70,7 +77,13 @@ pub fn ladders(gyro: bool, grid_step_s: f64, history: &History) -> Vec<Dynamics>
     };
     all.extend(SINGLE.map(|tau| lags(&fit(&[tau]), 0)));
     if history.tells_dynamics() {
-        all.extend([&SHORT_LADDER[..], &LONG_LADDER[..]].map(|ladder| lags(&fit(ladder), 0)));
+        let longest = longest(longest_run_s, grid_step_s);
+        let ladders = LADDERS
+            .map(|ladder| -> Vec<f64> { fit(ladder).into_iter().filter(|tau| *tau <= longest).collect() });
+        if gyro {
+            all.extend(ladders.iter().skip(1).map(|ladder| leading(&lags(ladder, 1))));
+        }
+        all.extend([1, 0].into_iter().flat_map(|gain| ladders.iter().map(move |ladder| lags(ladder, gain))));
     }
     all
 }
@@ -92,7 +105,7 @@ pub fn searched(
     }
     let grid_step = columns.basis().filter.grid_step_s;
     let shortest = (SHORTEST_GRID_STEPS * grid_step).max(2.0);
-    let longest = (LONGEST_SHARE * longest_run_s).clamp(4.0 * shortest, LONGEST_S);
+    let longest = longest(longest_run_s, grid_step);
     let grid = ladder([shortest, longest], POINTS);
     columns.make(&(0..=DEGREE).map(Term::Static).collect::<Vec<_>>())?;
     columns.make(&grid.iter().map(|tau| Term::Lag(millis(*tau), 0)).collect::<Vec<_>>())?;
@@ -118,10 +131,17 @@ pub fn searched(
     Ok(all)
 }
 
+/// The longest time constant that a log can tell (s).
+fn longest(longest_run_s: f64, grid_step_s: f64) -> f64 {
+    let shortest = (SHORTEST_GRID_STEPS * grid_step_s).max(2.0);
+    (LONGEST_SHARE * longest_run_s).clamp(4.0 * shortest, LONGEST_S)
+}
+
 /// Sum over the sensors of the logarithm of what is left.
 fn cost(columns: &Columns<'_>, targets: &[&Target], taus: &[f64]) -> f64 {
-    let spec = Spec { degree: DEGREE, dynamics: lags(taus, 0), trend: false };
+    let spec = Spec { degree: DEGREE, dynamics: lags(taus, 0), ..Spec::default() };
     let left = |target: &&Target| {
+        let spec = Spec { scale: target.widest_scale(), ..spec.clone() };
         target.solve(columns, &spec, false).map_or(0.0, |solution| libm::log(solution.rms))
     };
     targets.iter().map(left).sum()

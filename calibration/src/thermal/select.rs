@@ -1,8 +1,11 @@
 //! Cross-validation: which terms survive on stretches that they were not fitted to.
 
+use std::borrow::Cow;
+
 use super::branches::History;
 use super::columns::{Columns, Term};
 use super::model::{Dynamics, Spec};
+use super::scale::{self, Kept};
 use super::solve::{Solution, once, solve};
 
 /// Score of a larger model, as a share of that of a smaller one, above which the smaller one is kept.
@@ -19,7 +22,7 @@ const WINDOWS_PER_BLOCK: usize = 200;
 const LONGEST_BLOCK: usize = 10;
 
 /// One sensor's windows over all runs.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Target {
     /// What is to be explained, in the units of the coefficients.
     pub values: Vec<f64>,
@@ -31,6 +34,10 @@ pub struct Target {
     pub share: Vec<f64>,
     /// Whether the level is known; otherwise each run has one of its own.
     pub level: bool,
+    /// What a scale factor error of 1 ppm adds in each window; `None` where the scale factor stays.
+    pub scale: Option<Vec<f64>>,
+    /// Why it stays.
+    pub kept: Option<Kept>,
 }
 
 /// One tried model.
@@ -75,13 +82,35 @@ impl Target {
         levels.chain(drifts).collect()
     }
 
+    /// The largest scale factor error that the runs can tell.
+    #[must_use]
+    pub fn widest_scale(&self) -> Option<usize> {
+        self.scale.as_ref().map(|_| scale::HIGHEST)
+    }
+
+    /// The columns of a model, in the order of its terms, those that stay out of the document behind.
+    fn design<'a>(&self, columns: &'a Columns<'_>, spec: &Spec) -> Vec<Cow<'a, [f64]>> {
+        let nuisance = self.nuisance(spec.trend).into_iter().map(Cow::Owned);
+        spec.terms(self.level).into_iter().map(|term| self.column(columns, term)).chain(nuisance).collect()
+    }
+
+    /// The column of a term that was made; those of the scale factor are the sensor's own.
+    #[must_use]
+    pub fn column<'a>(&self, columns: &'a Columns<'_>, term: Term) -> Cow<'a, [f64]> {
+        match (term, &self.scale) {
+            (Term::Scale(power), Some(scale)) => {
+                let powers = columns.get(Term::Static(power));
+                Cow::Owned(powers.iter().zip(scale).map(|(power, scale)| power * scale).collect())
+            }
+            _ => Cow::Borrowed(columns.get(term)),
+        }
+    }
+
     /// Solves for a model; the coefficients come in the order of its terms, those that stay out of the document behind.
     #[must_use]
     pub fn solve(&self, columns: &Columns<'_>, spec: &Spec, robust: bool) -> Option<Solution> {
-        let nuisance = self.nuisance(spec.trend);
-        let terms = spec.terms(self.level);
-        let all: Vec<&[f64]> =
-            terms.iter().map(|term| columns.get(*term)).chain(nuisance.iter().map(Vec::as_slice)).collect();
+        let design = self.design(columns, spec);
+        let all: Vec<&[f64]> = design.iter().map(AsRef::as_ref).collect();
         if robust {
             solve(&all, &self.values, &self.weights)
         } else {
@@ -99,10 +128,8 @@ impl Target {
         history: &History,
         temperature: &[f64],
     ) -> Option<f64> {
-        let nuisance = self.nuisance(spec.trend);
-        let terms = spec.terms(self.level);
-        let all: Vec<&[f64]> =
-            terms.iter().map(|term| columns.get(*term)).chain(nuisance.iter().map(Vec::as_slice)).collect();
+        let design = self.design(columns, spec);
+        let all: Vec<&[f64]> = design.iter().map(AsRef::as_ref).collect();
         let pieces = history.piece.iter().max().map_or(0, |last| last + 1);
         // White noise is in every model alike: averaged over some windows it no longer hides which of them is better.
         let block = (self.values.len() / WINDOWS_PER_BLOCK).clamp(1, LONGEST_BLOCK);
@@ -168,7 +195,12 @@ impl Target {
         };
         for dynamics in dynamics {
             for &degree in degrees {
-                try_one(Spec { degree, dynamics: dynamics.clone(), trend: false });
+                try_one(Spec {
+                    degree,
+                    dynamics: dynamics.clone(),
+                    trend: false,
+                    scale: self.widest_scale(),
+                });
             }
         }
         let mut chosen = smallest(&tried);
@@ -183,11 +215,37 @@ impl Target {
                 tried.iter().enumerate().skip(first).filter_map(plain).min_by(|a, b| a.1.total_cmp(&b.1));
             chosen = best.map_or(chosen, |(index, _)| Some(index));
         }
+        let chosen =
+            chosen.and_then(|index| self.least_scale(columns, &mut tried, index, (history, temperature)));
         Choice { mean, tried, chosen }
     }
 }
 
 impl Target {
+    /// Tries the chosen model with smaller scale factor errors, and without: the smallest that is as good.
+    fn least_scale(
+        &self,
+        columns: &Columns<'_>,
+        tried: &mut Vec<Tried>,
+        chosen: usize,
+        (history, temperature): (&History, &[f64]),
+    ) -> Option<usize> {
+        let first = tried.len();
+        let (widest, own) = (self.widest_scale(), tried.get(chosen)?.clone());
+        let smaller =
+            widest.into_iter().flat_map(|widest| (usize::from(!self.level)..widest).map(Some).chain([None]));
+        for scale in smaller {
+            let spec = Spec { scale, ..own.spec.clone() };
+            if let Some(score) = self.score(columns, &spec, history, temperature) {
+                tried.push(Tried { count: spec.terms(self.level).len(), spec, score });
+            }
+        }
+        let mut among: Vec<usize> = (first..tried.len()).collect();
+        among.push(chosen);
+        let models: Vec<Tried> = among.iter().filter_map(|&index| tried.get(index).cloned()).collect();
+        smallest(&models).and_then(|best| among.get(best).copied())
+    }
+
     /// The best model of each kind of dynamics once more, beside a drift with time.
     fn with_drift(
         &self,
@@ -226,21 +284,25 @@ fn smallest(tried: &[Tried]) -> Option<usize> {
 }
 
 /// Weights that keep slow parts from dominating: no temperature counts for more than `CROWDED` times what is usual, so that a hold of
-/// hours weighs no more than some passes. Limited to a tenth, because what a plateau knows well is not to be thrown away.
+/// hours weighs no more than some passes. Limited to a tenth, because what a plateau knows well is not to be thrown away. What is on
+/// a plateau and at rest is counted for itself: the ends of the ramps, which alone tell of the fast lags, have the same temperatures.
 #[must_use]
-pub fn equal_temperature(temperature: &[f64], [low, high]: [f64; 2]) -> Vec<f64> {
+pub fn equal_temperature(temperature: &[f64], at_rest: &[bool], [low, high]: [f64; 2]) -> Vec<f64> {
     const BINS: f64 = 25.0;
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 25")]
     let bin = |t: f64| ((t - low) / (high - low).max(1e-9) * BINS).clamp(0.0, BINS - 1.0) as usize;
-    let mut counts = [0.0_f64; 25];
-    for t in temperature.iter().filter(|t| t.is_finite()) {
-        counts[bin(*t)] += 1.0;
+    let mut counts = [[0.0_f64; 25]; 2];
+    let windows = || temperature.iter().zip(at_rest);
+    for (t, at_rest) in windows().filter(|(t, _)| t.is_finite()) {
+        counts[usize::from(*at_rest)][bin(*t)] += 1.0;
     }
-    let mut filled: Vec<f64> = counts.iter().copied().filter(|count| *count > 0.0).collect();
+    let mut filled: Vec<f64> = counts[0].iter().copied().filter(|count| *count > 0.0).collect();
     let usual = CROWDED * super::solve::median(&mut filled).unwrap_or(1.0);
-    let weight =
-        |t: &f64| if t.is_finite() { (usual / counts[bin(*t)].max(1.0)).clamp(0.1, 1.0) } else { 0.0 };
-    temperature.iter().map(weight).collect()
+    let weight = |(t, at_rest): (&f64, &bool)| {
+        let among = if t.is_finite() { counts[usize::from(*at_rest)][bin(*t)] } else { return 0.0 };
+        (usual / among.max(1.0)).clamp(0.1, 1.0)
+    };
+    windows().map(weight).collect()
 }
 
 /// All terms that some models have.

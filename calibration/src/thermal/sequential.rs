@@ -20,7 +20,10 @@ pub type Found = Result<Vec<(Term, f64, f64)>, String>;
 #[must_use]
 pub fn gyro_terms() -> [Vec<Term>; 2] {
     [
-        [Branch::RunUp, Branch::Braking].map(|branch| Term::Rate(branch, 0)).to_vec(),
+        [0, 1]
+            .into_iter()
+            .flat_map(|power| [Branch::RunUp, Branch::Braking].map(|branch| Term::Rate(branch, power)))
+            .collect(),
         [Branch::RunUp, Branch::Braking].map(|branch| Term::Acceleration(branch, 0)).to_vec(),
     ]
 }
@@ -30,6 +33,9 @@ pub fn gyro_terms() -> [Vec<Term>; 2] {
 pub fn degree(history: &History) -> usize {
     history.levels().saturating_sub(1).min(2)
 }
+
+/// Standard errors by which a power of the scale factor error must stand out.
+const STANDS_OUT: f64 = 3.0;
 
 /// Finds the coefficients of one sensor: `steps` are the terms of each step after the plateaus.
 ///
@@ -54,15 +60,27 @@ pub fn find(columns: &Columns<'_>, target: &Target, history: &History, steps: &[
         target.weights.iter().zip(&history.at_rest).map(|(w, rest)| if *rest { *w } else { 0.0 }).collect();
     let moving: Vec<f64> =
         target.weights.iter().zip(&history.at_rest).map(|(w, rest)| if *rest { 0.0 } else { *w }).collect();
-    let all: Vec<&[f64]> =
-        statics.iter().map(|term| columns.get(*term)).chain(levels.iter().map(Vec::as_slice)).collect();
-    let solution = solve(&all, &target.values, &resting).ok_or("too few windows on plateaus")?;
-    let mut found: Vec<(Term, f64, f64)> = statics
-        .iter()
-        .enumerate()
-        .map(|(i, term)| (*term, solution.coefficients[i], solution.sigmas[i]))
-        .collect();
-    let rest = solution.residual;
+    // The scale factor goes beside the bias, as far as it stands out.
+    let mut scale = target.widest_scale().map(|widest| widest.min(degree(history)));
+    let (mut found, rest) = loop {
+        let powers = scale.into_iter().flat_map(|highest| (first..=highest).map(Term::Scale));
+        let terms: Vec<Term> = statics.iter().copied().chain(powers).collect();
+        let own: Vec<_> = terms.iter().map(|term| target.column(columns, *term)).collect();
+        let all: Vec<&[f64]> =
+            own.iter().map(AsRef::as_ref).chain(levels.iter().map(Vec::as_slice)).collect();
+        let solution = solve(&all, &target.values, &resting).ok_or("too few windows on plateaus")?;
+        let found: Vec<(Term, f64, f64)> = terms
+            .iter()
+            .zip(solution.coefficients.iter().zip(&solution.sigmas))
+            .map(|(term, (value, sigma))| (*term, *value, *sigma))
+            .collect();
+        match (scale, found.last()) {
+            (Some(highest), Some((_, value, sigma))) if value.abs() < STANDS_OUT * sigma => {
+                scale = highest.checked_sub(1).filter(|lower| *lower >= first);
+            }
+            _ => break (found, solution.residual),
+        }
+    };
     let mut parts: Vec<Vec<(Term, f64, f64)>> =
         steps.iter().map(|terms| terms.iter().map(|term| (*term, 0.0, 0.0)).collect()).collect();
     for _ in 0..ROUNDS {
@@ -95,7 +113,8 @@ pub fn find(columns: &Columns<'_>, target: &Target, history: &History, steps: &[
 pub fn left(columns: &Columns<'_>, target: &Target, found: &[(Term, f64, f64)]) -> f64 {
     let mut residual = target.values.clone();
     for (term, value, _) in found {
-        residual.iter_mut().zip(columns.get(*term)).for_each(|(left, column)| *left -= value * column);
+        let column = target.column(columns, *term);
+        residual.iter_mut().zip(column.iter()).for_each(|(left, column)| *left -= value * column);
     }
     let runs = target.run.last().map_or(0, |last| last + 1);
     let (mut square, mut weight) = (0.0, 0.0);

@@ -4,6 +4,8 @@ use nalgebra::{DMatrix, DVector};
 
 /// Share of a column's own weight that the ridge adds: it only holds what the data leave open.
 const RIDGE: f64 = 1e-9;
+/// Root mean square of a column that is nothing but rounding: T̈ of a perfect ramp.
+const NOTHING: f64 = 1e-11;
 /// Passes of the reweighting.
 const PASSES: usize = 4;
 /// Distance from the residual's neighbours at which a window counts for nothing (robust standard deviations).
@@ -67,7 +69,9 @@ pub fn once(columns: &[&[f64]], target: &[f64], weights: &[f64]) -> Option<Solut
         square.sqrt()
     };
     let norms: Vec<f64> = columns.iter().map(norm).collect();
-    let scale = |norm: f64| if norm > 1e-300 { 1.0 / norm } else { 0.0 };
+    let all_weight: f64 = good.iter().map(|&row| weights[row]).sum();
+    let nothing = NOTHING * all_weight.sqrt();
+    let scale = |norm: f64| if norm > nothing { 1.0 / norm } else { 0.0 };
     let ridge = RIDGE.sqrt();
     let matrix = DMatrix::from_fn(rows + count, count, |i, j| match good.get(i) {
         Some(&row) => weights[row].sqrt() * columns[j][row] * scale(norms[j]),

@@ -7,11 +7,40 @@ use super::columns::Basis;
 use super::fit::Sensor;
 use super::model::described;
 use super::outcome::{Found, Outcome};
-use super::settings::Site;
+use super::scale::Kept;
+use super::select::{Target, Tried};
 use crate::drift::figures::short;
 use crate::report::{Coefficient, Curve, FitReport, Verdict, residuals};
 
 impl Outcome {
+    /// Says which sensors keep their scale factors, and why.
+    pub(super) fn scales(&mut self, sensors: &[Sensor], targets: &[Target]) {
+        let mut without = Vec::new();
+        for (sensor, target) in sensors.iter().zip(targets).filter(|(sensor, _)| sensor.dead.is_none()) {
+            match &target.kept {
+                Some(Kept::Short(why)) => {
+                    self.warnings.push(format!("{}: it keeps its scale factor: {why}", sensor.name));
+                }
+                Some(Kept::NotMeant) => without.push(sensor.gyro),
+                None => {}
+            }
+        }
+        let kinds: Vec<&str> = [
+            (true, "gyros on a rate table (--axis, --rate)"),
+            (false, "accelerometers in several attitudes (--roll, --pitch)"),
+        ]
+        .into_iter()
+        .filter(|(gyro, _)| without.contains(gyro))
+        .map(|(_, words)| words)
+        .collect();
+        if !kinds.is_empty() {
+            self.notes.push(format!(
+                "Scale factors stay as they are: to fit them, give runs of {}, each log with its own.",
+                kinds.join(" and of ")
+            ));
+        }
+    }
+
     pub(super) fn origin(&self, origin: Origin, verdicts: &[Verdict]) -> Origin {
         let mut details = toml::Table::new();
         let mut figures = toml::Table::new();
@@ -50,7 +79,7 @@ impl Outcome {
         details.insert("fit_window_s".into(), self.settings.fit_window_s.into());
         details.insert("smoothing_s".into(), self.filter.smoothing_s.into());
         details.insert("derivative_step_s".into(), self.filter.derivative_step_s.into());
-        details.insert("mean_removed".into(), (self.settings.site == Site::Unknown).into());
+        details.insert("mean_removed".into(), self.settings.removes_mean().into());
         Origin {
             method: Some(self.settings.method.name().to_owned()),
             range_deg_c: Some(self.range_deg_c.map(|t| libm::round(10.0 * t) / 10.0)),
@@ -67,11 +96,16 @@ impl Outcome {
         report.verdicts = verdicts;
         report.warnings = self.warnings;
         report.notes = self.notes;
+        let window_s = self.settings.window_s.unwrap_or(self.settings.fit_window_s);
+        report.notes.push(format!(
+            "The fit is to means over {} s; before and after are means over {window_s} s.",
+            self.settings.fit_window_s
+        ));
         report.notes.push(format!(
             "Temperature is smoothed over {} s and differentiated over {} s on a grid of {} s: this filter belongs to the coefficients.",
             self.filter.smoothing_s, self.filter.derivative_step_s, self.filter.grid_step_s
         ));
-        if self.settings.site == Site::Unknown {
+        if self.settings.removes_mean() {
             report.notes.push("The mean of each run is taken off: nothing is known of Earth rate and gravity along the axes.".into());
         }
         for (sensor, _, found) in &self.found {
@@ -96,34 +130,45 @@ fn output(sensor: &Sensor) -> &'static str {
     if sensor.gyro { "°/h" } else { "output" }
 }
 
-/// The best model of each kind of dynamics, by sensor.
+/// Models that the table of a sensor shows, beside the one without dynamics and the chosen one.
+const SHOWN: usize = 8;
+
+/// The best model of each kind of dynamics, by sensor: of many kinds the best ones.
 fn validation(found: &[(Sensor, Basis, Found)]) -> Option<Table> {
     let head = ["sensor", "model", "coefficients", "left where it was not fitted", "of the mean's", ""];
     let mut rows = Vec::new();
     for (sensor, _, found) in found {
         let Some(choice) = &found.choice else { continue };
-        let mut seen: Vec<(&str, bool)> = Vec::new();
+        let kind_of =
+            |tried: &'_ Tried| (tried.spec.dynamics.name.clone(), tried.spec.trend, tried.spec.scale);
+        let mut kinds: Vec<&Tried> = Vec::new();
         for tried in &choice.tried {
-            let kind = (tried.spec.dynamics.name.as_str(), tried.spec.trend);
-            if seen.contains(&kind) {
+            match kinds.iter_mut().find(|kind| kind_of(kind) == kind_of(tried)) {
+                Some(kind) if tried.score < kind.score => *kind = tried,
+                Some(_) => {}
+                None => kinds.push(tried),
+            }
+        }
+        if let Some(best) = choice.best()
+            && let Some(kind) = kinds.iter_mut().find(|kind| kind_of(kind) == kind_of(best))
+        {
+            *kind = best;
+        }
+        let mut scores: Vec<f64> = kinds.iter().map(|kind| kind.score).collect();
+        scores.sort_unstable_by(f64::total_cmp);
+        let last = scores.get(SHOWN - 1).copied().unwrap_or(f64::INFINITY);
+        for kind in kinds {
+            let chosen = choice.best() == Some(kind);
+            if kind.score > last && !chosen && !kind.spec.dynamics.terms.is_empty() {
                 continue;
             }
-            seen.push(kind);
-            let same = choice
-                .tried
-                .iter()
-                .filter(|other| (other.spec.dynamics.name.as_str(), other.spec.trend) == kind);
-            let chosen =
-                choice.best().filter(|best| (best.spec.dynamics.name.as_str(), best.spec.trend) == kind);
-            let best = chosen.or_else(|| same.min_by(|a, b| a.score.total_cmp(&b.score)));
-            let Some(best) = best else { continue };
             rows.push(vec![
                 sensor.name.clone(),
-                best.spec.words(),
-                best.count.to_string(),
-                short(best.score),
-                format!("{:.0} %", 100.0 * best.score / choice.mean),
-                if chosen.is_some() && found.refused.is_none() { "chosen".to_owned() } else { String::new() },
+                kind.spec.words(),
+                kind.count.to_string(),
+                short(kind.score),
+                format!("{:.1} %", 100.0 * kind.score / choice.mean),
+                if chosen && found.refused.is_none() { "chosen".to_owned() } else { String::new() },
             ]);
         }
     }

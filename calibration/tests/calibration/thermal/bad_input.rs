@@ -142,6 +142,44 @@ fn a_dead_sensor_is_refused_and_the_others_are_fitted() {
 }
 
 #[test]
+fn a_dead_accelerometer_is_refused_and_the_others_are_fitted() {
+    // Gravity is what it would have felt.
+    let zero = run(0..5400, |s| {
+        let mut second = usual(s);
+        second.forces[2] = 0.0;
+        second
+    });
+    let made = tried(zero, Method::Joint).unwrap();
+    let refused: Vec<_> = made.report.verdicts.iter().filter(|verdict| !verdict.accepted).collect();
+    assert_eq!(refused.len(), 1, "{}", made.report.to_text());
+    assert!(refused[0].of == "accelerometer z" && refused[0].reason.contains("reads zero throughout"));
+}
+
+#[test]
+fn degrees_fahrenheit_are_pointed_out() {
+    let hot = run(0..5400, |s| Second { deg_c: 1.8 * (usual(s).deg_c + 30.0) + 32.0, ..usual(s) });
+    let made = tried(hot, Method::Joint).unwrap();
+    let told = |words: &&String| words.contains("158.0 °C") && words.contains("°F");
+    assert!(made.report.warnings.iter().any(|words| told(&words)), "{:?}", made.report.warnings);
+}
+
+#[test]
+fn passes_that_disagree_are_told() {
+    // Down and up again, and gyro z follows something else than the thermometer.
+    let made_up = |s: u32| {
+        let t = f64::from(s);
+        let deg_c = if s < 1500 { 40.0 - t / 30.0 } else { -10.0 + (t - 1500.0) / 30.0 };
+        let mut second = usual(s);
+        second.deg_c = deg_c + 2e-3 * (f64::from((s * 7919) % 1000) / 1000.0 - 0.5);
+        second.rates[1] = 1e-5 * deg_c;
+        second
+    };
+    let made = tried(run(0..3000, made_up), Method::Joint).unwrap();
+    let told = |of: &str| made.report.warnings.iter().any(|w| w.starts_with(of) && w.contains("disagree"));
+    assert!(told("gyro z") && !told("gyro y"), "{}", made.report.to_text());
+}
+
+#[test]
 fn readings_that_are_no_numbers_are_told_or_refused() {
     let some = run(0..5400, |s| {
         let mut second = usual(s);

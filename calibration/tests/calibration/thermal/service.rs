@@ -63,7 +63,7 @@ fn the_residual_of_the_report_is_that_of_the_service() {
     let (log, mapping) = text_log(folder.path());
     for method in [Method::Sequential, Method::Joint, Method::Lag] {
         let run = run_of(&log, &mapping);
-        let settings = Settings { method, ..Settings::default() };
+        let settings = Settings { method, window_s: Some(10.0), ..Settings::default() };
         let made = fit(None, (&[run], &[]), &settings, Origin::default(), ()).unwrap();
         let out = folder.path().join(format!("{}.toml", method.name()));
         made.written.save(&out, false).unwrap();

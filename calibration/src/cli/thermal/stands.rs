@@ -1,0 +1,103 @@
+//! The arguments that say how the unit stands or turns in each log.
+
+use clap::Args;
+
+use crate::error::Error;
+use crate::positions::gravity;
+use crate::rates::steps::axis;
+use crate::thermal::{Site, Stand, Turning};
+
+/// Rates of a table that can be used (°/s).
+const RATES_DEG_PER_S: [f64; 2] = [1.0, 10_000.0];
+
+/// Place, attitude and turning: each option once for all logs, or once for each.
+#[derive(Debug, Clone, Args)]
+pub(super) struct StandArgs {
+    /// Geodetic latitude (°, north positive): the Earth's rate is removed from the gyros
+    #[arg(long, value_name = "DEG", requires = "heading", allow_negative_numbers = true)]
+    latitude: Option<f64>,
+    /// Heading of the case's x axis from north towards east (°); once for all logs, or once for each, those of --judge behind
+    #[arg(long, value_name = "DEG", requires = "latitude", allow_negative_numbers = true)]
+    heading: Vec<f64>,
+    /// Roll about the case's x axis (°), likewise; without it and --pitch the unit is levelled from its accelerometers
+    #[arg(long, value_name = "DEG", requires_all = ["pitch", "latitude"], allow_negative_numbers = true)]
+    roll: Vec<f64>,
+    /// Pitch of the case's x axis above the horizon (°), likewise
+    #[arg(long, value_name = "DEG", requires_all = ["roll", "latitude"], allow_negative_numbers = true)]
+    pitch: Vec<f64>,
+    /// Gravity at the place (m/s²); normal gravity of the latitude without it
+    #[arg(long, value_name = "M_PER_S2", requires = "roll")]
+    gravity: Option<f64>,
+    /// Axis of the rate table in case axes (x, -y, … or 0,0.6,0.8); once for all logs, or once for each
+    #[arg(long, value_name = "AXIS", allow_hyphen_values = true, requires = "rate")]
+    axis: Vec<String>,
+    /// Rate of the table all through a log (°/s), 0 at rest; likewise
+    #[arg(long, value_name = "DEG_PER_S", allow_negative_numbers = true, requires = "axis")]
+    rate: Vec<f64>,
+    /// Take the mean of each run off, as it is done without --latitude
+    #[arg(long, conflicts_with = "latitude")]
+    remove_mean: bool,
+}
+
+impl StandArgs {
+    /// One for each of so many runs, and then for each of so many that judge; none where nothing is stated.
+    pub(super) fn stands(&self, runs: usize, judges: usize) -> Result<Vec<Stand>, Error> {
+        let all = runs + judges;
+        let counts = [
+            ("--heading", self.heading.len()),
+            ("--roll", self.roll.len()),
+            ("--pitch", self.pitch.len()),
+            ("--axis", self.axis.len()),
+            ("--rate", self.rate.len()),
+        ];
+        if let Some((name, count)) = counts.into_iter().find(|(_, count)| *count > 1 && *count != all) {
+            let judging = if judges > 0 { format!(" and {judges} of --judge") } else { String::new() };
+            let logs = if runs == 1 { "log" } else { "logs" };
+            return Err(Error::Usage(format!(
+                "{count} times {name} for {runs} {logs}{judging}: state it once for all, or once for each, in the order of the logs, those of \
+                 --judge behind"
+            )));
+        }
+        if self.latitude.is_none() && self.rate.is_empty() {
+            return Ok(Vec::new());
+        }
+        (0..all).map(|run| Ok(Stand { site: self.site(run)?, turning: self.turning(run)? })).collect()
+    }
+
+    fn site(&self, run: usize) -> Result<Site, Error> {
+        let (Some(latitude), Some(heading)) = (self.latitude, of_run(&self.heading, run)) else {
+            return Ok(Site::Unknown);
+        };
+        let tilt = of_run(&self.pitch, run).zip(of_run(&self.roll, run)).map(|(pitch, roll)| [pitch, roll]);
+        let gravity = match self.gravity {
+            Some(_) => Some(gravity::stated(self.gravity, None, 0.0)?.0),
+            None => None,
+        };
+        Site::at(latitude, heading, tilt, gravity).map_err(|errors| {
+            Error::Usage(errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
+        })
+    }
+
+    fn turning(&self, run: usize) -> Result<Option<Turning>, Error> {
+        let Some((name, rate_deg_per_s)) = of_run(&self.axis, run).zip(of_run(&self.rate, run)) else {
+            return Ok(None);
+        };
+        let axis = axis(&name).map_err(Error::Usage)?;
+        let [low, high] = RATES_DEG_PER_S;
+        if rate_deg_per_s == 0.0 {
+            return Ok(None);
+        }
+        if !(low..=high).contains(&rate_deg_per_s.abs()) {
+            return Err(Error::Usage(format!(
+                "--rate is {rate_deg_per_s} °/s, must be 0 for a log at rest, or from {low} to {high} °/s in size: slower turns tell nothing \
+                 of a scale factor"
+            )));
+        }
+        Ok(Some(Turning { axis, rate_deg_per_s }))
+    }
+}
+
+/// The value of a run where each has its own, or all have one.
+fn of_run<T: Clone>(values: &[T], run: usize) -> Option<T> {
+    if values.len() == 1 { values.first() } else { values.get(run) }.cloned()
+}

@@ -1,0 +1,104 @@
+//! `thermal` as its user calls it: logs in files, folders and recordings.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use isotherm_correction::units::Span;
+use isotherm_log::part::{LogFiles, Part};
+use isotherm_log::recording::{RecordingOptions, RecordingWriter};
+
+use super::service::text_log;
+
+fn calibrate(folder: &Path, args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_isotherm-calibrate")).current_dir(folder).args(args).output().unwrap()
+}
+
+/// What the command says, and its exit code.
+fn said(folder: &Path, args: &[&str]) -> (String, Option<i32>) {
+    let done = calibrate(folder, &[&["thermal"], args].concat());
+    let both = [done.stdout, done.stderr].concat();
+    (String::from_utf8(both).unwrap(), done.status.code())
+}
+
+/// A part of the text log as a recording.
+fn record(log: &Path, mapping: &isotherm_log::mapping::Mapping, unit: &str, part: [f64; 2], out: &Path) {
+    let unit = isotherm_log::offline::unit_id(unit).unwrap();
+    let mapping = Box::new(mapping.clone());
+    let files = LogFiles::Text { paths: vec![log.to_path_buf()], mapping, unit, batch_ticks: 64 };
+    let [start, end] = part.map(Span::from_s);
+    let mut messages = files.open(&Part { start, end: Some(end), ..Part::default() }).unwrap();
+    let mut writer =
+        RecordingWriter::create(out, RecordingOptions { chunk_bytes: 20_000, ..RecordingOptions::default() })
+            .unwrap();
+    while let Some(message) = messages.next_message().unwrap() {
+        writer.write(&message).unwrap();
+    }
+    writer.finish().unwrap();
+}
+
+#[test]
+fn folders_recordings_and_several_units() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let (log, mapping) = text_log(at);
+    let text = ["--mapping", "mapping.toml", "--unit", "UNIT"];
+    let with = |more: &[&'static str]| [more, &text].concat();
+
+    // A folder of a text log is the log, and its digest that of its files.
+    std::fs::create_dir(at.join("chamber")).unwrap();
+    std::fs::copy(&log, at.join("chamber/log.csv")).unwrap();
+    let (words, code) = said(at, &with(&["chamber", "--out", "of-folder.toml"]));
+    assert_eq!(code, Some(0), "{words}");
+    let (words, code) = said(at, &with(&["log.csv", "--out", "of-file.toml"]));
+    assert_eq!(code, Some(0), "{words}");
+    let read = |name: &str| std::fs::read_to_string(at.join(name)).unwrap();
+    let curve = |text: &str| text[text.find("[[gyro.sensor]]").unwrap()..].to_owned();
+    assert_eq!(curve(&read("of-folder.toml")), curve(&read("of-file.toml")));
+    assert!(read("of-folder.toml").contains("name = \"chamber\""));
+
+    // So is a folder with a recording in pieces.
+    std::fs::create_dir(at.join("pieces")).unwrap();
+    record(&log, &mapping, "A", [0.0, 2000.0], &at.join("pieces/run-9.mcap"));
+    record(&log, &mapping, "A", [2000.0, 1e6], &at.join("pieces/run-10.mcap"));
+    record(&log, &mapping, "A", [0.0, 1e6], &at.join("whole.mcap"));
+    record(&log, &mapping, "B", [0.0, 1e6], &at.join("other.mcap"));
+    let json = |args: &[&str]| -> serde_json::Value {
+        let done = calibrate(at, &[&["thermal", "--json"], args].concat());
+        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+        serde_json::from_slice(&done.stdout).unwrap()
+    };
+    assert_eq!(json(&["pieces"])["coefficients"], json(&["whole.mcap"])["coefficients"]);
+
+    // Units: all of them, or the one that is wanted.
+    assert_eq!(json(&["whole.mcap", "other.mcap"])["units"].as_array().unwrap().len(), 2);
+    assert_eq!(json(&["other.mcap", "--unit", "B"])["unit"], "B");
+    std::fs::write(at.join("a.toml"), read("of-file.toml").replace("\"UNIT\"", "\"A\"")).unwrap();
+    let (words, code) = said(at, &["whole.mcap", "other.mcap", "--document", "a.toml"]);
+    assert!(code == Some(1) && words.contains("several units") && words.contains("--unit"), "{words}");
+
+    // What cannot be is said.
+    std::fs::create_dir(at.join("empty")).unwrap();
+    let refusals: [(&[&str], &str); 8] = [
+        (&["empty"], "has no recording (.mcap) in it"),
+        (&["whole.mcap", "other.mcap", "--unit", "B"], "whole.mcap has no raw ticks of unit B"),
+        (&["whole.mcap", "./whole.mcap"], "is given twice"),
+        (&["whole.mcap", "--judge", "whole.mcap"], "cannot judge it"),
+        (&["whole.mcap", "--latitude", "55", "--heading", "30"], "State --roll and --pitch"),
+        (&["whole.mcap", "--axis", "z", "--rate", "0", "--rate", "20"], "2 times --rate for 1 log"),
+        (&["whole.mcap", "--axis", "z", "--rate", "20"], "20.000 °/s are stated"),
+        (&["whole.mcap", "--axis", "z", "--rate", "0.1"], "slower turns tell nothing"),
+    ];
+    for (args, wanted) in refusals {
+        let (words, code) = said(at, args);
+        assert!(matches!(code, Some(1 | 2)) && words.contains(wanted), "{args:?}: {words}");
+    }
+    let (words, code) =
+        said(at, &["whole.mcap", "--duration", "1500", "--judge", "whole.mcap", "--judge-start", "1500"]);
+    assert!(!words.contains("cannot judge it") && code.is_some(), "{words}");
+
+    // A recording that a kill cut short is taken to where it is whole.
+    let bytes = std::fs::read(at.join("whole.mcap")).unwrap();
+    std::fs::write(at.join("cut.mcap"), &bytes[..bytes.len() * 9 / 10]).unwrap();
+    let (words, _) = said(at, &["cut.mcap"]);
+    assert!(words.contains("cut short") && words.contains("isotherm-replay recover"), "{words}");
+}
