@@ -35,7 +35,7 @@ impl Outcome {
         .collect();
         if !kinds.is_empty() {
             self.notes.push(format!(
-                "Scale factors stay as they are: to fit them, give runs of {}, each log with its own.",
+                "The scale factors stay for which there are no runs: of {}, each log with its own.",
                 kinds.join(" and of ")
             ));
         }
