@@ -15,7 +15,6 @@ use isotherm_protocol::document::{Argument, Curve, Quantity, Shape};
 use super::columns::Basis;
 use super::solve::once;
 use crate::drift::figures::short;
-use crate::positions::temperature::value_at;
 use crate::written::tidy;
 
 /// Highest power of temperature in a scale factor error.
@@ -184,7 +183,7 @@ pub fn put<Q: Quantity>(old: &Curve<Q>, basis: &Basis, s: &[f64], how: Holds) ->
         other => {
             let knot = |index: u16| {
                 let t = range[0] + (range[1] - range[0]) * f64::from(index) / f64::from(KNOTS - 1);
-                [tidy(t), tidy(how.value(value_at(other, t).unwrap_or(0.0), at(t)))]
+                [tidy(t), tidy(how.value(other.at(t).unwrap_or(0.0), at(t)))]
             };
             Shape::PiecewiseLinear { knots: (0..KNOTS).map(knot).collect() }
         }
@@ -246,14 +245,14 @@ mod tests {
             for t in [-40.0, -31.0, -7.3, 0.0, 10.0, 44.4, 60.0] {
                 let away = t - 10.0;
                 let factor = 1.0 + 1e-6 * (s[0] + s[1] * away + s[2] * away * away);
-                let wanted = value_at(old.shape(), t).unwrap() * factor;
-                let got = value_at(new.shape(), t).unwrap();
+                let wanted = old.shape().at(t).unwrap() * factor;
+                let got = new.shape().at(t).unwrap();
                 assert!((got / wanted - 1.0).abs() < limit, "{t}: {got} {wanted}");
             }
         }
         let old: Curve<Relative> = Curve::new(Shape::Constant { value: 500.0 });
         let new = put(&old, &basis(), &s, Holds::Error);
-        let got = 1.0 + 1e-6 * value_at(new.shape(), 30.0).unwrap();
+        let got = 1.0 + 1e-6 * new.shape().at(30.0).unwrap();
         let wanted = (1.0 + 500e-6) * (1.0 + 1e-6 * (300.0 + 400.0 - 40.0));
         assert!((got - wanted).abs() < 1e-12);
     }

@@ -10,6 +10,7 @@ use crate::codec::encode;
 use crate::control::Schedule;
 use crate::digest::Digest;
 use crate::document::Document;
+use crate::corrected::CorrectedBatch;
 use crate::raw::{AccelBatch, GyroBatch};
 use crate::raw::{HealthReading as WireReading, HealthTick, TemperatureTick};
 use crate::status::{Output, Place, PreLaunchVerdict, SensorKind, State as WireState, Status};
