@@ -46,7 +46,8 @@ fn latency(rows: &[&Row]) -> Table {
         "lost",
         "CPU µs/tick",
         "ratio",
-        "source late µs", "swaps",
+        "source late µs",
+        "swaps",
     ]);
     let mut last = "";
     for row in rows {
