@@ -121,8 +121,13 @@ fn run(command: Command) -> Result<String, Error> {
             Ok(printed)
         }
         Command::Chain(args) => {
-            let report = chain::measure(&args)?;
-            Ok(if args.json { as_json(&report) } else { chain::table(&report) })
+            let report = chain::measure(&args);
+            let text = if args.json { as_json(&report) } else { chain::table(&report) };
+            if report.failed.is_empty() {
+                return Ok(text);
+            }
+            let _ = io::stdout().write_all(text.as_bytes());
+            Err(Error::Failed(report.failed))
         }
         Command::Scale(args) => {
             let report = scale::measure(&args)?;

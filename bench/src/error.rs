@@ -60,6 +60,9 @@ pub(crate) enum Error {
         /// What is wrong with it.
         what: String,
     },
+    /// Cases of which no figure was told.
+    #[error("{}", .0.join("\n"))]
+    Failed(Vec<String>),
     /// A session.
     #[error(transparent)]
     Bus(#[from] isotherm_bus::BusError),

@@ -111,7 +111,8 @@ mod tests {
     fn a_child_that_has_ended_counts() {
         let before = children_s().expect("the account is there");
         let mut spun = std::process::Command::new("bash");
-        let status = spun.args(["-c", "for ((i = 0; i < 100000; i++)); do :; done"]).status().expect("bash runs");
+        let status =
+            spun.args(["-c", "for ((i = 0; i < 100000; i++)); do :; done"]).status().expect("bash runs");
         assert!(status.success() && children_s().expect("the account is there") > before);
     }
 }

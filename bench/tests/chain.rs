@@ -8,6 +8,7 @@ use serde_json::Value;
 /// The program under test.
 const BENCH: &str = env!("CARGO_BIN_EXE_isotherm-bench");
 
+#[expect(clippy::expect_used, reason = "cargo has built it")]
 fn chain(arguments: &[&str]) -> (bool, Value, String) {
     let output =
         Command::new(BENCH).args(["chain", "--json"]).args(arguments).output().expect("the bench starts");

@@ -95,9 +95,3 @@ pub(super) fn timed(plan: &Plan, units: usize) -> Result<f64, Error> {
     }
     Ok(median(times.into_iter()))
 }
-
-/// Least number of swaps of each unit in so many seconds of ticks.
-pub(super) fn expected(seconds: Duration) -> u64 {
-    // The first comes half a second late, the last may be on its way.
-    seconds.as_secs().saturating_sub(1)
-}

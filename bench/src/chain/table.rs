@@ -47,6 +47,7 @@ fn latency(rows: &[&Row]) -> Table {
         "CPU µs/tick",
         "ratio",
         "source late µs",
+        "swaps",
     ]);
     let mut last = "";
     for row in rows {
@@ -65,6 +66,7 @@ fn latency(rows: &[&Row]) -> Table {
             format!("{:.2}", row.median.cpu_us_per_tick),
             format!("{:.2}×", row.cpu_ratio),
             format!("{:.0}", row.median.source_late_us[1]),
+            if row.case.swaps { row.median.swaps_per_unit.to_string() } else { String::new() },
         ]);
         last = &row.name;
     }

@@ -57,9 +57,7 @@ pub(crate) fn run(plan: &Plan) -> Result<(), Error> {
         return Ok(());
     }
     let rest = bursts.split_off(plan.prelude.min(bursts.len()));
-    for burst in bursts {
-        units.iter().zip(burst).try_for_each(|(outlets, message)| outlets.put(message))?;
-    }
+    prelude(&units, bursts)?;
     say(&Ready { ready: true, locators: Vec::new() })?;
     if hear().is_none() {
         return Ok(());
@@ -70,6 +68,22 @@ pub(crate) fn run(plan: &Plan) -> Result<(), Error> {
     say(&report)?;
     // The sessions stay open until everything has come through.
     while hear().is_some() {}
+    Ok(())
+}
+
+/// Publishes what units appear with, one after the other: to the one in the middle a unit that appears is work, the more the more units there
+/// are, and a session that is not read from for 5 s is closed.
+fn prelude(units: &[Outlets], bursts: Vec<Vec<Message>>) -> Result<(), Error> {
+    /// Time for a unit to appear, for each unit that there is.
+    const APPEARANCE: Duration = Duration::from_micros(2);
+    for (index, burst) in bursts.into_iter().enumerate() {
+        for (outlets, message) in units.iter().zip(burst) {
+            outlets.put(message)?;
+            if index == 0 {
+                std::thread::sleep(APPEARANCE.saturating_mul(u32::try_from(units.len()).unwrap_or(u32::MAX)));
+            }
+        }
+    }
     Ok(())
 }
 

@@ -37,6 +37,7 @@ pub(super) fn latency(rows: &[Row]) -> Result<String, String> {
         let mut chart = ChartBuilder::on(&root)
             .caption("End-to-end latency: p50 (dot) to p99 (bar)", ("sans-serif", 18))
             .margin(12)
+            .margin_right(40)
             .x_label_area_size(36)
             .y_label_area_size(70)
             .build_cartesian_2d(-0.5..loads.len() as f64 - 0.5, within.log_scale())
@@ -44,10 +45,16 @@ pub(super) fn latency(rows: &[Row]) -> Result<String, String> {
         let name = |x: &f64| {
             let whole = (x.round() - x).abs() < 1e-6;
             let index = (0..loads.len()).find(|index| whole && (*index as f64 - x).abs() < 0.5);
-            index.and_then(|index| loads.get(index)).cloned().unwrap_or_default()
+            index
+                .and_then(|index| loads.get(index))
+                .map_or_else(String::new, |load| load.replace(", batches of ", " / "))
         };
         let mut mesh = chart.configure_mesh();
-        mesh.disable_x_mesh().x_labels(loads.len() + 2).x_label_formatter(&name).y_desc("µs");
+        mesh.disable_x_mesh()
+            .x_labels(loads.len() + 2)
+            .x_label_formatter(&name)
+            .y_desc("µs")
+            .y_label_formatter(&whole);
         mesh.label_style(("sans-serif", 12)).draw().map_err(words)?;
         for (index, subject) in subjects.iter().enumerate() {
             let style = colour(index).stroke_width(5);
@@ -98,12 +105,18 @@ pub(super) fn units(rows: &[Row]) -> Result<String, String> {
         let mut chart = ChartBuilder::on(&root)
             .caption("The service over the number of units", ("sans-serif", 18))
             .margin(12)
+            .margin_right(40)
             .x_label_area_size(44)
             .y_label_area_size(70)
             .build_cartesian_2d(across.log_scale(), within.log_scale())
             .map_err(words)?;
         let mut mesh = chart.configure_mesh();
-        mesh.x_desc("units").label_style(("sans-serif", 12)).draw().map_err(words)?;
+        mesh.x_desc("units")
+            .x_label_formatter(&whole)
+            .y_label_formatter(&whole)
+            .label_style(("sans-serif", 12))
+            .draw()
+            .map_err(words)?;
         for (index, (name, points)) in series.into_iter().enumerate() {
             let style = colour(index).stroke_width(3);
             let drawn = chart.draw_series(LineSeries::new(points.clone(), style)).map_err(words)?;
@@ -128,6 +141,12 @@ where
         .background_style(WHITE.mix(0.8))
         .border_style(BLACK.mix(0.3));
     labels.label_font(("sans-serif", 13)).draw().map_err(words)
+}
+
+/// A number on an axis.
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "the axis hands it over so")]
+fn whole(number: &f64) -> String {
+    format!("{number:.0}")
 }
 
 /// Whole powers of ten around some figures; what has no logarithm is left out.

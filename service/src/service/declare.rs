@@ -79,7 +79,8 @@ impl Declared {
 pub(super) fn outlets(session: Session, congestion: CongestionControl) -> OutletMaker {
     Box::new(move |unit| {
         let declare = |stream| session.declare_keyexpr(key::raw(unit, stream)).wait();
-        let received: Vec<KeyExpr<'static>> = RawStream::ALL.into_iter().map(declare).collect::<Result<_, _>>()?;
+        let received: Vec<KeyExpr<'static>> =
+            RawStream::ALL.into_iter().map(declare).collect::<Result<_, _>>()?;
         let publisher = session
             .declare_publisher(key::corrected(unit))
             .congestion_control(congestion)
