@@ -64,8 +64,7 @@ pub fn residual(
         for (axis, estimator) in estimators.iter_mut().enumerate() {
             let known = index < aiding.calibration_ticks || (axis < 2 && aiding.level_afterwards);
             estimator.advance(end, false, &project);
-            let gyro =
-                GyroSeen { rate: measured[axis], flags: SensorFlags::VALID, ..GyroSeen::default() };
+            let gyro = GyroSeen { rate: measured[axis], flags: SensorFlags::VALID, ..GyroSeen::default() };
             let observation = Observation {
                 end_time: end,
                 duration: tick,
