@@ -80,7 +80,7 @@ fn run(command: Command) -> Result<String, Error> {
             for row in rows {
                 let [low, high] = row.quartiles_ns;
                 table.add_row([
-                    row.name.to_owned(),
+                    row.name,
                     format!("{:.1}", row.ns_per_tick),
                     format!("{low:.1}…{high:.1}"),
                     format!("{:.2}×", row.ratio_to_peer),

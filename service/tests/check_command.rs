@@ -65,7 +65,7 @@ fn every_problem_of_every_bad_file_goes_to_stderr_with_its_place() {
     assert_eq!(output.status.code(), Some(78));
     let problems = lines(&output.stderr);
     for start in [
-        format!("{service}:1:13: max_units: is 0, must be a whole number from 1 to 4096"),
+        format!("{service}:1:13: max_units: is 0, must be a whole number from 1 to 16384"),
         format!("{service}:2:1: pairing_window: is not a known key"),
         format!("{calibration}:2:8: unit: is \"a b\""),
         format!("{zenoh}:4:1: "),

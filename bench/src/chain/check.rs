@@ -129,6 +129,9 @@ fn plain(sent: &[Message], kept: &[Kept]) -> Result<(), String> {
 
 #[cfg(test)]
 mod tests {
+    use arrayvec::ArrayVec;
+    use isotherm_protocol::corrected::Revision;
+
     use super::*;
     use crate::part::{Format, Pace};
 
@@ -199,8 +202,8 @@ mod tests {
         let ticks: Vec<CorrectedTick> = offline(0, &sent).unwrap().into_values().take(2).collect();
         let batch = |ticks| CorrectedBatch {
             unit: "BENCH-00000".to_owned(),
-            revision: Default::default(),
-            temperatures: Default::default(),
+            revision: Revision::default(),
+            temperatures: ArrayVec::default(),
             ticks,
         };
         let right = codec::encode(&batch(ticks.clone())).unwrap();

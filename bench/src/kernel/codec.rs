@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 
+use arrayvec::ArrayVec;
 use isotherm_correction::sample::{CorrectedTick, GyroTick};
 use isotherm_protocol::codec;
 use isotherm_protocol::corrected::{CorrectedBatch, CorrectedBody, Revision, Ticks};
@@ -98,7 +99,7 @@ impl Encode {
             let batch = CorrectedBody {
                 unit: "ZLG-0001",
                 revision: Revision { counter: 1, digest: [7; 8] },
-                temperatures: Default::default(),
+                temperatures: ArrayVec::new(),
                 ticks: Ticks { ready: ticks, count: ticks.len() },
             };
             if batch.encode_into(&mut self.room).is_ok() {

@@ -63,7 +63,7 @@ impl Peer {
 }
 
 impl Kernel for Peer {
-    fn name(&self) -> &str {
+    fn name(&self) -> &'static str {
         "autopilot: cubic bias, scale, rotation"
     }
 
@@ -87,7 +87,7 @@ impl Kernel for Peer {
         let found = self.gyro.correct([0.5, 0.0, 0.0], 25.0);
         let expected = [0.5 - 1e-3, 1e-3, -0.5e-3];
         let worst = (0..3).map(|axis| {
-            let scaled = expected.iter().zip(self.gyro.scale).map(|(x, s)| f64::from(*x) * f64::from(s));
+            let scaled = expected.iter().zip(self.gyro.scale).map(|(x, s)| *x * f64::from(s));
             let rotated: f64 =
                 self.gyro.rotation[axis].iter().zip(scaled).map(|(r, s)| f64::from(*r) * s).sum();
             (rotated - f64::from(found[axis])).abs()

@@ -88,7 +88,7 @@ fn strip_all(document: &mut Document) {
         sensor.static_bias = None;
     }
     document.gyro.orientation.thermal = None;
-    for accel in document.accel.iter_mut() {
+    if let Some(accel) = &mut document.accel {
         accel.orientation.thermal = None;
         for sensor in &mut accel.sensor {
             sensor.bias = None;
@@ -105,7 +105,7 @@ fn skew(document: &mut Document) {
         gyros.iter().chain(&gyros).cloned().zip(0..).map(|(sensor, index)| renamed(sensor, index)).collect();
     document.gyro.orientation.rows.clone_from(&rows);
     document.gyro.orientation.thermal = None;
-    for accel in document.accel.iter_mut() {
+    if let Some(accel) = &mut document.accel {
         let sensors = accel.sensor.clone();
         accel.sensor = sensors.iter().chain(&sensors).cloned().collect();
         for (index, sensor) in accel.sensor.iter_mut().enumerate() {
@@ -201,9 +201,7 @@ impl Kernel for UnitCase {
     fn pass(&mut self) -> f64 {
         let mut sum = 0.0;
         self.drive(&mut |tick| {
-            let [x, y, z] = tick.delta_angle;
-            let [u, v, w] = tick.delta_velocity;
-            sum += x + y + z + u + v + w;
+            sum += tick.delta_angle.iter().chain(&tick.delta_velocity).sum::<f64>();
         });
         sum
     }

@@ -146,13 +146,12 @@ impl Corrector {
         &self.thermal
     }
 
-    /// Corrects one tick of a unit that was turned on at `turn_on`.
+    /// Corrects one tick, with its accelerometers', of a unit that was turned on at `turn_on`.
     pub(super) fn correct(
         &mut self,
         calibration: &Calibration,
-        released: &Released<'_>,
+        (released, accel): (&Released<'_>, Option<&AccelTick>),
         turn_on: Timestamp,
-        accel: Option<&AccelTick>,
         (waiting, delay): (&mut Waiting, Span),
         counters: &mut Counters,
         out: &mut CorrectedTick,

@@ -147,9 +147,8 @@ impl Unit {
             Some(active) if fits => {
                 active.corrector.correct(
                     &active.calibration,
-                    &released,
+                    (&released, accel),
                     turn_on,
-                    accel,
                     (&mut self.waiting, settings.temperature_delay),
                     &mut self.counters,
                     corrected,

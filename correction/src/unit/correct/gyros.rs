@@ -3,6 +3,7 @@
 use super::{Corrector, of_length, resolve};
 use crate::calibration::Calibration;
 use crate::observation::GyroSeen;
+use crate::orientation::SensorMask;
 use crate::reversal::{Substitution, TickInput};
 use crate::sample::{
     CorrectedTick, GyroTick, LasingMode, MAX_SENSORS, MIN_SENSORS, OutputKind, SensorFlags, TickFlags,
@@ -17,6 +18,12 @@ use crate::units::Timestamp;
 /// A reading that does not count as it stands.
 pub(super) const UNSOUND: SensorFlags =
     SensorFlags::OVERRANGE.union(SensorFlags::NOT_FINITE).union(SensorFlags::EXCLUDED);
+
+/// The increments of a tick that are not those of a settled instrument.
+const UNSETTLED: TickFlags = TickFlags::INTERPOLATED
+    .union(TickFlags::ANGLE_RESTORED)
+    .union(TickFlags::SERVO_TRANSIENT)
+    .union(TickFlags::SERVO_UNMEASURED);
 
 impl Corrector {
     /// The terms of a gyro in use, its trend in the bias.
@@ -43,14 +50,7 @@ impl Corrector {
     ) {
         let tick = released.tick;
         let duration_s = tick.duration.as_s();
-        let input = TickInput {
-            end_time: tick.end_time,
-            duration: tick.duration,
-            mode: tick.mode,
-            switch_command: tick.switch_command,
-            missed: released.missed,
-            restart: released.restart,
-        };
+        let input = input(released);
         let lost = calibration.reversal.as_ref().is_some_and(|r| self.substitution.is_lost(r, &input));
         self.servo.advance(lost, tick.end_time, tick.duration);
 
@@ -100,14 +100,9 @@ impl Corrector {
                     scale_rad_per_count: terms.increment_weight,
                     half_periods: tick.half_periods.get(i).copied(),
                 };
-                match self.servo.apparent_rate(i, servo, &servo_tick) {
-                    Transient::Settled => {}
-                    Transient::Apparent { rate_rad_per_s } => {
-                        bias += rate_rad_per_s;
-                        out.flags |= TickFlags::SERVO_TRANSIENT;
-                    }
-                    Transient::Unmeasured => out.flags |= TickFlags::SERVO_UNMEASURED,
-                }
+                let transient = self.servo.apparent_rate(i, servo, &servo_tick);
+                bias += transient.rate_rad_per_s();
+                out.flags |= flags_of(transient);
             }
             let drift = self.drift.subtrahend(i, tick.end_time);
             let mut flags = footings[i].flags(tick.end_time);
@@ -149,22 +144,28 @@ impl Corrector {
 
         out.flags |= self.substitute(calibration, input, increments);
         count_switch_flags(out.flags, counters);
-        let interpolated = out.flags.contains(TickFlags::INTERPOLATED);
-        let unsettled = TickFlags::INTERPOLATED
-            | TickFlags::ANGLE_RESTORED
-            | TickFlags::SERVO_TRANSIENT
-            | TickFlags::SERVO_UNMEASURED;
-        self.seen.settled = !lost && self.slew.is_none() && !out.flags.intersects(unsettled);
+        self.seen.settled = !lost && self.slew.is_none() && !out.flags.intersects(UNSETTLED);
+        self.resolve_angle(calibration, mask, (increments, rates), out, counters);
+    }
 
+    /// Resolves the increments (rad) in case axes, and watches the parity of the rates before the substitution (rad/s).
+    fn resolve_angle(
+        &mut self,
+        calibration: &Calibration,
+        mask: SensorMask,
+        (increments, rates): (&[f64], &[f64]),
+        out: &mut CorrectedTick,
+        counters: &mut Counters,
+    ) {
         let orientation = &calibration.gyro_orientation;
         let axes = &mut self.thermal.gyro_axes;
-        if orientation.sensors() > MIN_SENSORS && !interpolated {
+        if orientation.sensors() > MIN_SENSORS && !out.flags.contains(TickFlags::INTERPOLATED) {
             let verdict = axes.watch(orientation, mask, rates);
             out.gyro_parity = verdict.residuals;
             out.flags.set(TickFlags::PARITY_EXCEEDED, verdict.exceeded);
             counters.sensors_excluded += u64::from(verdict.exclude.is_some());
         }
-        let (angle, trusted) = resolve(axes, orientation, mask, increments, tick.end_time);
+        let (angle, trusted) = resolve(axes, orientation, mask, increments, out.end_time);
         let slewed_from = self.slew.as_ref().and_then(|slew| slew.gyro_axes.as_ref());
         out.delta_angle = crate::unit::slew::axes(angle, slewed_from, mask, increments, self.slew_share);
         out.flags.set(TickFlags::ANGLE_INVALID, !trusted);
@@ -188,6 +189,28 @@ impl Corrector {
             }
             None => TickFlags::empty(),
         }
+    }
+}
+
+/// What the substitution must know of a tick.
+fn input(released: &Released<'_>) -> TickInput {
+    let tick = released.tick;
+    TickInput {
+        end_time: tick.end_time,
+        duration: tick.duration,
+        mode: tick.mode,
+        switch_command: tick.switch_command,
+        missed: released.missed,
+        restart: released.restart,
+    }
+}
+
+/// What is told of a tick with this transient of the servo.
+const fn flags_of(transient: Transient) -> TickFlags {
+    match transient {
+        Transient::Settled => TickFlags::empty(),
+        Transient::Apparent { .. } => TickFlags::SERVO_TRANSIENT,
+        Transient::Unmeasured => TickFlags::SERVO_UNMEASURED,
     }
 }
 

@@ -67,7 +67,7 @@ fn damage() -> impl Strategy<Value = Option<(prop::sample::Index, u8, u8)>> {
 }
 
 /// Compared as text, where numbers that are none are equal too.
-fn words<T: core::fmt::Debug>(read: Result<(OutputKind, Vec<T>), CodecError>) -> String {
+fn words<T: core::fmt::Debug>(read: &Result<(OutputKind, Vec<T>), CodecError>) -> String {
     format!("{read:?}")
 }
 
@@ -78,7 +78,7 @@ proptest! {
         let mut ticks = vec![GyroTick::default(); 3];
         let direct = read_gyro(&frame, &mut ticks).map(|output| (output, ticks));
         let decoded = codec::decode::<GyroBatch>(&frame);
-        prop_assert_eq!(words(direct), words(decoded.map(|batch| (batch.output(), batch.to_core().collect()))));
+        prop_assert_eq!(words(&direct), words(&decoded.map(|batch| (batch.output(), batch.to_core().collect()))));
     }
 
     #[test]
@@ -93,6 +93,6 @@ proptest! {
         let mut ticks = Vec::new();
         let direct = read_accel(&frame, &mut ticks).map(|output| (output, ticks));
         let decoded = codec::decode::<AccelBatch>(&frame);
-        prop_assert_eq!(words(direct), words(decoded.map(|batch| (batch.output(), batch.to_core().collect()))));
+        prop_assert_eq!(words(&direct), words(&decoded.map(|batch| (batch.output(), batch.to_core().collect()))));
     }
 }
