@@ -169,14 +169,16 @@ impl Operator {
     }
 }
 
-/// Every entry of an audit file that was begun with the state folder.
+/// Every entry of an audit file that was begun with the state folder. A line that the service is writing in this moment
+/// does not count: a file system may show half of a write where it goes over a page. Were such a half left by a crash, then
+/// the next line would go on in it and not be readable.
 ///
 /// # Panics
 /// Where a line cannot be read, or the numbers are not consecutive from 1.
 #[must_use]
 pub fn audit(state: &Path) -> Vec<AuditEntry> {
     let bytes = std::fs::read(state.join("audit.jsonl")).expect("the audit file is there");
-    let lines = bytes.split(|byte| *byte == b'\n').filter(|line| !line.is_empty());
+    let lines = bytes.split_inclusive(|byte| *byte == b'\n').filter_map(|line| line.strip_suffix(b"\n"));
     let read = |line: &[u8]| {
         AuditEntry::from_line(line).unwrap_or_else(|e| panic!("{e}: {}", String::from_utf8_lossy(line)))
     };
