@@ -2,6 +2,7 @@
 //!
 //! A site's namespace, where there is one, is set in the Zenoh configuration and never appears here.
 
+use std::borrow::Borrow;
 use std::fmt;
 use std::sync::Arc;
 
@@ -82,6 +83,13 @@ impl UnitId {
     /// The serial.
     #[must_use]
     pub fn as_str(&self) -> &str {
+        &self.0
+    }
+}
+
+/// So that a map by serial is asked with the text of a key.
+impl Borrow<str> for UnitId {
+    fn borrow(&self) -> &str {
         &self.0
     }
 }

@@ -1,7 +1,8 @@
 //! What the receive threads do with a raw message: find its unit, have it corrected, survive whatever it is.
 
+mod units;
+
 use std::any::Any;
-use std::collections::HashMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 use std::time::{Duration, Instant};
@@ -18,29 +19,21 @@ use crate::fault::{FaultKind, FaultLog};
 use crate::registrar::Desk;
 use crate::totals::Totals;
 use crate::unit::{Journal, Outlet, Present, QuietSettings, SwapAccount, UnitActor};
-
-/// Makes the outlet of a unit that appears.
-pub type OutletMaker = Box<dyn Fn(&UnitId) -> Result<Outlet, zenoh::Error> + Send + Sync>;
+pub use units::OutletMaker;
+use units::{Outlets, Unit, Units};
 
 /// All units, and what belongs to none.
 pub struct Intake {
     settings: Settings,
     /// Locked after the units, where both are.
     calibrations: RwLock<Calibrations>,
-    outlets: OutletMaker,
+    outlets: Outlets,
     /// To whom units tell what only the registrar can write down.
     desk: Option<Desk>,
     /// Where the journals of units go.
     journal: Option<Journal>,
     units: RwLock<Units>,
     faults: Mutex<FaultLog>,
-}
-
-/// The units that have appeared.
-#[derive(Debug, Default)]
-struct Units {
-    // By the serial's text, so that the key of a message finds its unit without an allocation.
-    by_serial: HashMap<String, Arc<Mutex<UnitActor>>>,
 }
 
 impl std::fmt::Debug for Intake {
@@ -60,7 +53,7 @@ impl Intake {
         Self {
             settings,
             calibrations,
-            outlets,
+            outlets: Outlets::new(outlets),
             desk: None,
             journal: None,
             units: RwLock::default(),
@@ -77,6 +70,19 @@ impl Intake {
     #[must_use]
     pub fn journaling_to(self, journal: Journal) -> Self {
         Self { journal: Some(journal), ..self }
+    }
+
+    /// Makes the outlet of every unit that has a calibration, as far as there is a place for it; gives how many.
+    pub(crate) fn prepare(&self) -> usize {
+        let units: Vec<_> = read(&self.calibrations).units().take(self.settings.max_units).cloned().collect();
+        let made = units.iter().filter(|unit| match self.outlets.prepare(unit) {
+            Ok(()) => true,
+            Err(error) => {
+                tracing::warn!(%unit, "no publisher yet, tried again when it appears: {error}");
+                false
+            }
+        });
+        made.count()
     }
 
     /// Takes one message; whether subscribers of the status should hear of it at once.
@@ -117,7 +123,7 @@ impl Intake {
     }
 
     /// Makes the unit of a message that is its first, unless the message is bad or there are too many.
-    fn appear(&self, serial: &str, stream: RawStream, frame: &[u8]) -> Option<Arc<Mutex<UnitActor>>> {
+    fn appear(&self, serial: &str, stream: RawStream, frame: &[u8]) -> Option<Unit> {
         let id = UnitId::new(serial)
             .map_err(|error| self.fault(FaultKind::BadSerial, || format!("serial {serial:?} {error}")))
             .ok()?;
@@ -134,13 +140,13 @@ impl Intake {
             return self.refuse(&id);
         }
         let mut units = self.units.write().unwrap_or_else(PoisonError::into_inner);
-        if let Some(unit) = units.by_serial.get(serial) {
+        if let Some(unit) = units.get(serial) {
             return Some(Arc::clone(unit));
         }
         if !self.has_place(&units, calibrated) {
             return self.refuse(&id);
         }
-        let outlet = match (self.outlets)(&id) {
+        let outlet = match self.outlets.take(&id) {
             Ok(outlet) => outlet,
             Err(error) => {
                 self.fault(FaultKind::TooManyUnits, || {
@@ -161,7 +167,7 @@ impl Intake {
             tracing::warn!(unit = %id, uncalibrated = ?self.settings.unit.uncalibrated, "appeared, no calibration");
         }
         let unit = Arc::new(Mutex::new(actor));
-        units.by_serial.insert(serial.to_owned(), Arc::clone(&unit));
+        units.insert(id, &unit);
         Some(unit)
     }
 
@@ -183,12 +189,11 @@ impl Intake {
     /// Whether one more unit may appear; places for units that have a calibration are kept free for them.
     fn has_place(&self, units: &Units, calibrated: bool) -> bool {
         let waiting = |calibrations: &Calibrations| {
-            calibrations.units().filter(|unit| !units.by_serial.contains_key(unit.as_str())).count()
+            calibrations.units().filter(|unit| units.get(unit.as_str()).is_none()).count()
         };
         let limit = self.settings.max_units;
         // Most of the time there is room for all of them, whoever has appeared.
-        units.by_serial.len() < limit
-            && (calibrated || units.by_serial.len() + waiting(&read(&self.calibrations)) < limit)
+        units.len() < limit && (calibrated || units.len() + waiting(&read(&self.calibrations)) < limit)
     }
 
     fn refuse<T>(&self, id: &UnitId) -> Option<T> {
@@ -200,8 +205,8 @@ impl Intake {
     }
 
     /// The unit of a serial, if it has appeared.
-    fn unit(&self, serial: &str) -> Option<Arc<Mutex<UnitActor>>> {
-        read(&self.units).by_serial.get(serial).map(Arc::clone)
+    fn unit(&self, serial: &str) -> Option<Unit> {
+        read(&self.units).get(serial).map(Arc::clone)
     }
 
     /// Counts a fault that belongs to no unit, and logs the first of its kind.
@@ -265,11 +270,9 @@ impl Intake {
 
     /// Does something with every unit, in the order of their serials; a panic costs that unit its memory and no more.
     pub fn each_unit<T>(&self, mut work: impl FnMut(&mut UnitActor) -> T) -> Vec<T> {
-        let units = read(&self.units);
-        let mut units: Vec<_> =
-            units.by_serial.iter().map(|(serial, unit)| (serial.clone(), Arc::clone(unit))).collect();
-        units.sort_by(|(a, _), (b, _)| a.cmp(b));
-        units.iter().filter_map(|(_, unit)| guarded(&mut lock(unit), &mut work)).collect()
+        // Not locked meanwhile: a unit that appears must not wait for a look at all others.
+        let units = read(&self.units).in_order();
+        units.iter().filter_map(|unit| guarded(&mut lock(unit), &mut work)).collect()
     }
 
     /// Status of one unit; `instance` is the service's name for itself.

@@ -7,6 +7,7 @@ mod instance;
 mod outlets;
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -17,6 +18,7 @@ use zenoh::query::Query;
 use crate::config::Settings;
 use crate::intake::Intake;
 use crate::registrar::Board;
+use crate::unit::UnitActor;
 use instance::Instance;
 use outlets::Outlets;
 
@@ -49,18 +51,24 @@ enum Request {
 
 /// Asks the keeper; never waits.
 #[derive(Debug, Clone)]
-pub(crate) struct Bell(SyncSender<Request>);
+pub(crate) struct Bell {
+    requests: SyncSender<Request>,
+    /// Rung for a status, and the keeper has not looked since.
+    rung: Arc<AtomicBool>,
+}
 
 impl Bell {
     /// Some unit's status is due.
     pub(crate) fn status_due(&self) {
-        // With so many requests waiting the keeper is going to look at all units anyhow.
-        let _ = self.0.try_send(Request::Status);
+        if !self.rung.swap(true, Ordering::AcqRel) {
+            // With so many requests waiting the keeper is going to look at all units anyhow.
+            let _ = self.requests.try_send(Request::Status);
+        }
     }
 
     /// Somebody asks.
     pub(crate) fn ask(&self, asked: Asked, query: Query) {
-        if let Err(TrySendError::Full(_)) = self.0.try_send(Request::Query(asked, query)) {
+        if let Err(TrySendError::Full(_)) = self.requests.try_send(Request::Query(asked, query)) {
             tracing::warn!(?asked, "a query is refused: {WAITING_REQUESTS} are waiting");
         }
     }
@@ -69,7 +77,7 @@ impl Bell {
 /// The running keeper.
 #[derive(Debug)]
 pub(crate) struct Keeper {
-    requests: SyncSender<Request>,
+    bell: Bell,
     thread: JoinHandle<()>,
 }
 
@@ -85,12 +93,15 @@ impl Keeper {
         settings: &Settings,
     ) -> std::io::Result<Self> {
         let (requests, receiver) = sync_channel(WAITING_REQUESTS);
+        let rung = Arc::new(AtomicBool::new(false));
         let instance = Instance::new(session, settings.digest, board);
         let mut work = Work {
             outlets: Outlets::new(session.clone()),
             instance,
             configuration: settings.to_toml(),
             intake,
+            rung: Arc::clone(&rung),
+            units_changed: true,
             status_interval: settings.status_interval,
             look_interval: (settings.tail_flush / 4)
                 .clamp(Duration::from_millis(5), Duration::from_millis(100)),
@@ -98,29 +109,18 @@ impl Keeper {
         let thread = std::thread::Builder::new()
             .name("isotherm-keeper".to_owned())
             .spawn(move || work.run(&receiver))?;
-        Ok(Self { requests, thread })
+        Ok(Self { bell: Bell { requests, rung }, thread })
     }
 
     /// Where to ask it.
     pub(crate) fn bell(&self) -> Bell {
-        Bell(self.requests.clone())
+        self.bell.clone()
     }
 
     /// Has everything flushed and waits until it is; whether it ended in order.
     pub(crate) fn stop(self) -> bool {
-        self.requests.send(Request::Stop).is_ok() & self.thread.join().is_ok()
+        self.bell.requests.send(Request::Stop).is_ok() & self.thread.join().is_ok()
     }
-}
-
-/// Which units' status is published.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Which {
-    /// Where something has changed.
-    Due,
-    /// And where something is in progress.
-    InProgress,
-    /// Every one.
-    All,
 }
 
 /// What the keeper works with.
@@ -130,6 +130,9 @@ struct Work {
     /// Effective configuration of the service.
     configuration: String,
     intake: Arc<Intake>,
+    rung: Arc<AtomicBool>,
+    /// Some unit's status was due since the service's own was looked at.
+    units_changed: bool,
     status_interval: Duration,
     look_interval: Duration,
 }
@@ -139,49 +142,67 @@ impl Work {
         let start = Instant::now();
         let (mut next_status, mut next_progress) = (start + self.status_interval, start + PROGRESS_INTERVAL);
         let mut next_look = start + self.look_interval;
-        self.publish(Which::All);
+        self.publish_all();
         loop {
             let wait = next_status.min(next_look).saturating_duration_since(Instant::now());
             match requests.recv_timeout(wait) {
-                Ok(Request::Status) => self.publish(Which::Due),
+                Ok(Request::Status) => self.publish(|actor| actor.take_status_due()),
                 Ok(Request::Query(asked, query)) => self.answer(asked, &query),
                 Ok(Request::Stop) | Err(RecvTimeoutError::Disconnected) => break,
                 Err(RecvTimeoutError::Timeout) => {}
             }
             let now = Instant::now();
             if now >= next_look {
-                self.intake.each_unit(|actor| actor.tend(now));
-                self.publish(Which::Due);
+                self.publish(|actor| {
+                    actor.tend(now);
+                    actor.take_status_due()
+                });
+                self.publish_own(false);
                 next_look = now + self.look_interval;
             }
             if now >= next_status {
                 self.intake.each_unit(|actor| actor.measure_rates(now));
-                self.publish(Which::All);
+                self.publish_all();
                 next_status = now + self.status_interval;
                 next_progress = now + PROGRESS_INTERVAL;
             } else if now >= next_progress {
-                self.publish(Which::InProgress);
+                self.publish(|actor| actor.take_status_due() || actor.is_in_progress());
                 next_progress = now + PROGRESS_INTERVAL;
             }
         }
-        self.intake.each_unit(crate::unit::UnitActor::flush);
-        self.publish(Which::All);
+        self.intake.each_unit(UnitActor::flush);
+        self.publish_all();
     }
 
-    /// Publishes the status of units, and the service's own where it has changed or all are asked for.
-    fn publish(&mut self, which: Which) {
-        let instance = self.instance.name();
-        let due = self.intake.each_unit(|actor| {
-            let progress = which == Which::InProgress && actor.is_in_progress();
-            let publish = actor.take_status_due() || which == Which::All || progress;
-            publish.then(|| (actor.id().clone(), actor.status(instance)))
+    /// Publishes every status there is.
+    fn publish_all(&mut self) {
+        self.publish(|actor| {
+            actor.take_status_due();
+            true
         });
+        self.publish_own(true);
+    }
+
+    /// Publishes the status of the units for which `is_due` says so.
+    fn publish(&mut self, mut is_due: impl FnMut(&mut UnitActor) -> bool) {
+        // Before the look: who rings from here on is heard again.
+        self.rung.store(false, Ordering::Release);
+        let instance = self.instance.name();
+        let due = self
+            .intake
+            .each_unit(|actor| is_due(actor).then(|| (actor.id().clone(), actor.status(instance))));
         for (unit, status) in due.into_iter().flatten() {
+            self.units_changed = true;
             if let Err(error) = self.outlets.unit(&unit, &status) {
                 tracing::warn!(%unit, "cannot publish the status: {}", isotherm_bus::words(&error));
             }
         }
-        if let Some(status) = self.instance.status(&self.intake, which == Which::All)
+    }
+
+    /// Publishes the service's own status where it has changed, or `always`.
+    fn publish_own(&mut self, always: bool) {
+        let changed = std::mem::take(&mut self.units_changed);
+        if let Some(status) = self.instance.status(&self.intake, changed, always)
             && let Err(error) = self.outlets.service(&status)
         {
             tracing::warn!("cannot publish the service's status: {}", isotherm_bus::words(&error));

@@ -83,6 +83,8 @@ pub(crate) async fn start_on(
     work.take_over(&calibrations);
     work.restore();
     let found = read_folder(&mut work, &settings)?;
+    let prepared = intake.prepare();
+    tracing::debug!(units = prepared, "publishers and keys of units with a calibration are declared");
     let board = work.board();
     let source = Source::new(&settings, Arc::clone(&intake), Arc::clone(&board), session.zid().to_string());
     let registrar = Registrar::start(opening, work).map_err(ServiceError::Thread)?;

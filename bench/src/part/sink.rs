@@ -49,7 +49,6 @@ struct Unit {
     revision: u64,
     changes: u64,
     kept: Vec<Vec<u8>>,
-    ticks_kept: u64,
 }
 
 /// Writes down until everything has come, or nothing comes any more.
@@ -78,7 +77,13 @@ pub(crate) fn run(plan: &Plan) -> Result<(), Error> {
     if hear().is_none() {
         return Ok(());
     }
-    wait_for(&book, of_each(plan.prelude as u64), PRELUDE_PATIENCE);
+    let prelude = of_each(plan.prelude as u64);
+    wait_for(&book, prelude, PRELUDE_PATIENCE);
+    let came = lock(&book).account.ticks;
+    if came < prelude {
+        let what = format!("{came} of the {prelude} ticks with which units appear came through");
+        return Err(Error::Part { part: "sink", what });
+    }
     lock(&book).begin();
     say(&Ready { ready: true, locators: Vec::new() })?;
     // How many messages of each unit the source has sent behind the prelude.
@@ -149,8 +154,7 @@ impl Book {
             account.disordered += head.ticks;
         }
         unit.next = head.first + head.ticks;
-        if unit.ticks_kept < keep {
-            unit.ticks_kept += head.ticks;
+        if head.first < keep {
             unit.kept.push(frame.to_vec());
         }
         for tick in head.first..head.first + head.ticks {

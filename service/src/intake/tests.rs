@@ -17,14 +17,17 @@ fn gyro_frame(sequence: u64) -> Vec<u8> {
 }
 
 fn intake(max_units: usize, calibrated: &[&str]) -> Intake {
+    with_outlets(max_units, calibrated, Box::new(|_| Ok(Box::new(|_| Ok(())))))
+}
+
+fn with_outlets(max_units: usize, calibrated: &[&str], outlets: OutletMaker) -> Intake {
     let text = include_str!("../../../config/calibration/example-full.toml");
     let calibration = Arc::new(Document::parse(text, None).unwrap().calibration);
     let mut calibrations = Calibrations::default();
     for serial in calibrated {
         calibrations.insert(UnitId::new(serial).unwrap(), Arc::clone(&calibration), [7; 8]);
     }
-    let settings = Settings { max_units, ..Settings::default() };
-    Intake::new(settings, calibrations, Box::new(|_| Ok(Box::new(|_| Ok(())))))
+    Intake::new(Settings { max_units, ..Settings::default() }, calibrations, outlets)
 }
 
 fn units(intake: &Intake) -> Vec<String> {
@@ -70,6 +73,29 @@ fn strange_units_do_not_take_the_places_of_calibrated_ones() {
     }
     assert_eq!(units(&intake), ["A", "CAL-1", "CAL-2"]);
     assert_eq!(intake.totals().refused.get("units_refused"), Some(&3));
+}
+
+#[test]
+fn what_zenoh_needs_of_a_calibrated_unit_is_there_before_it_appears() {
+    let made = Arc::new(Mutex::new(Vec::new()));
+    let noting = Arc::clone(&made);
+    let outlets: OutletMaker = Box::new(move |unit| {
+        noting.lock().unwrap().push(unit.to_string());
+        let outlet: Outlet = Box::new(|_| Ok(()));
+        if unit.as_str() == "CAL-2" { Err("the session is closed".into()) } else { Ok(outlet) }
+    });
+    let intake = with_outlets(3, &["CAL-1", "CAL-2", "CAL-3"], outlets);
+    assert_eq!(intake.prepare(), 2);
+    assert_eq!(*made.lock().unwrap(), ["CAL-1", "CAL-2", "CAL-3"]);
+    for serial in ["CAL-1", "CAL-2"] {
+        intake.receive(&format!("imu/{serial}/raw/gyro"), Some(&gyro_frame(0)), Instant::now());
+    }
+    assert_eq!(
+        made.lock().unwrap()[3..],
+        ["CAL-2"],
+        "what could not be made is tried again, what was made is used"
+    );
+    assert_eq!(units(&intake), ["CAL-1"]);
 }
 
 #[test]

@@ -34,7 +34,7 @@ impl Work {
         let mut replies: Vec<_> = statuses.into_iter().flatten().collect();
         let key = key::service_status(instance);
         if takes_in(query, &key)
-            && let Some(status) = self.instance.status(&self.intake, true)
+            && let Some(status) = self.instance.status(&self.intake, true, true)
         {
             replies.push((key, codec::encode(&status)));
         }

@@ -93,7 +93,7 @@ fn plans(
     mut calibrations: BTreeMap<UnitId, Loaded>,
 ) -> Result<Vec<UnitPlan>, Error> {
     let wanted = args.log.units()?;
-    if let Some(unit) = wanted.iter().find(|unit| !outlines.units.contains_key(unit)) {
+    if let Some(unit) = wanted.iter().find(|unit: &&UnitId| !outlines.units.contains_key(*unit)) {
         return Err(Error::Usage(format!("--unit {unit}: there is nothing of this unit in the log")));
     }
     let (mut plans, mut without) = (Vec::new(), Vec::new());
