@@ -151,7 +151,7 @@ pub(crate) fn plain(head: &[&str]) -> Table {
 }
 
 /// Runs the program.
-pub(crate) fn main() -> ExitCode {
+pub fn main() -> ExitCode {
     match run(Cli::parse().command) {
         Ok(text) => {
             // A reader that has gone away is no error.

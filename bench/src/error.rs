@@ -7,7 +7,8 @@ use thiserror::Error;
 
 /// Why a bench ended early.
 #[derive(Debug, Error)]
-pub(crate) enum Error {
+#[non_exhaustive]
+pub enum Error {
     /// A case gives a wrong result: its speed would say nothing.
     #[error(
         "{case}: {what} is {value:e}, must be at most {limit:e}: what it gives is wrong, so its speed is not measured"

@@ -11,7 +11,7 @@ use crate::error::Error;
 use crate::rounds::interleaved;
 
 /// Something that works through a number of ticks, again and again.
-pub(crate) trait Kernel {
+pub trait Kernel {
     /// What it is called.
     fn name(&self) -> &str;
     /// Ticks in one pass.
@@ -19,6 +19,9 @@ pub(crate) trait Kernel {
     /// Works through them once; what comes back depends on all results, so that none is left out.
     fn pass(&mut self) -> f64;
     /// Whether what it gives is right.
+    ///
+    /// # Errors
+    /// [`Error::Wrong`], with what is wrong.
     fn check(&mut self) -> Result<(), Error>;
 }
 
@@ -58,14 +61,17 @@ pub(crate) const KERNELS: [Make; 16] = [
     || Ok(Box::new(stream::Stream::of(100)?)),
 ];
 
-/// Makes every kernel.
-pub(crate) fn all() -> Result<Vec<Box<dyn Kernel>>, Error> {
+/// Makes every kernel; the first is the reference.
+///
+/// # Errors
+/// A shipped document that does not hold.
+pub fn kernels() -> Result<Vec<Box<dyn Kernel>>, Error> {
     KERNELS.iter().map(|make| make()).collect()
 }
 
 /// Checks every kernel, then times them in so many interleaved rounds.
 pub(crate) fn measure(rounds: usize) -> Result<Vec<Row>, Error> {
-    let mut kernels = all()?;
+    let mut kernels = kernels()?;
     kernels.iter_mut().try_for_each(|kernel| kernel.check())?;
     let times = interleaved(&mut kernels, rounds, |kernel| {
         std::hint::black_box(kernel.pass());
