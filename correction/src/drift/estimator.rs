@@ -261,6 +261,12 @@ impl DriftEstimator {
         self.observed_until = Some(end);
     }
 
+    /// Whether [`subtrahend`](Self::subtrahend) may be anything but zero.
+    #[must_use]
+    pub fn subtracts(&self) -> bool {
+        self.settings.subtract && !self.is_idle()
+    }
+
     /// What to subtract from gyro `gyro` at the end of the present tick, `time` (rad/s): the prediction, without a step at
     /// updates. Zero for a gyro without a stated drift, and where the settings do not ask for it.
     #[must_use]
