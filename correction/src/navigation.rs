@@ -107,6 +107,7 @@ impl StepSum {
     /// A step ends early, shorter than stated, before a tick that announces missing ticks or a restart, and
     /// where the calibration revision changes or the unit becomes calibrated or ceases to be. Raw readings of
     /// an uncalibrated unit are summed plainly: cross products of counts mean nothing.
+    #[inline]
     pub fn push(
         &mut self,
         step: &NavigationStep,

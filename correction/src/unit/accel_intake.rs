@@ -54,14 +54,21 @@ impl AccelIntake {
     }
 
     /// Puts a tick in its place in time.
+    #[inline]
     fn insert(&mut self, pending: Pending, counters: &mut Counters) {
         let time = pending.tick.end_time;
         if self.pending.len() < MAX_PENDING
             && self.pending.back().is_none_or(|last| last.tick.end_time < time)
         {
             self.pending.push_back(pending);
-            return;
+        } else {
+            self.insert_between(pending, counters);
         }
+    }
+
+    /// Likewise a tick that is not the newest, or one too many.
+    fn insert_between(&mut self, pending: Pending, counters: &mut Counters) {
+        let time = pending.tick.end_time;
         let place = self.pending.iter().rposition(|p| p.tick.end_time < time).map_or(0, |i| i + 1);
         if self.pending.get(place).is_some_and(|p| p.tick.end_time == time) {
             counters.accel_duplicates += 1;

@@ -151,12 +151,17 @@ impl Corrector {
 
         let count = calibration.gyros.len();
         of_length(&mut self.seen.gyros, count);
+        of_length(&mut out.gyro_flags, count);
         for i in 0..N {
-            let (Some(seen), Some(health), Some(last)) =
-                (self.seen.gyros.get_mut(i), self.gyro_health.get_mut(i), self.last_rates.get_mut(i))
-            else {
+            let (Some(seen), Some(health), Some(last), Some(flags)) = (
+                self.seen.gyros.get_mut(i),
+                self.gyro_health.get_mut(i),
+                self.last_rates.get_mut(i),
+                out.gyro_flags.get_mut(i),
+            ) else {
                 break;
             };
+            *flags = SensorFlags::VALID;
             *seen = GyroSeen {
                 reading: readings[i],
                 rate: measured[i],
@@ -168,8 +173,6 @@ impl Corrector {
             health.note_valid();
             *last = rates[i];
         }
-        of_length(&mut out.gyro_flags, count);
-        out.gyro_flags.fill(SensorFlags::VALID);
         if calibration.reversal.is_some() {
             let of_sensor = |i| if i < count { rates.get(i).copied().unwrap_or(f64::NAN) } else { f64::NAN };
             self.substitution.note_good(input, array::from_fn(of_sensor));
@@ -223,18 +226,21 @@ impl Corrector {
 
         let count = calibration.accels.len();
         of_length(&mut self.seen.accels, count);
+        of_length(&mut out.accel_flags, count);
         for i in 0..N {
-            let (Some(seen), Some(health), Some(last)) =
-                (self.seen.accels.get_mut(i), self.accel_health.get_mut(i), self.last_forces.get_mut(i))
-            else {
+            let (Some(seen), Some(health), Some(last), Some(flags)) = (
+                self.seen.accels.get_mut(i),
+                self.accel_health.get_mut(i),
+                self.last_forces.get_mut(i),
+                out.accel_flags.get_mut(i),
+            ) else {
                 break;
             };
+            *flags = SensorFlags::VALID;
             *seen = AccelSeen { reading: readings[i], flags: SensorFlags::VALID };
             health.note_valid();
             *last = forces[i];
         }
-        of_length(&mut out.accel_flags, count);
-        out.accel_flags.fill(SensorFlags::VALID);
         let force = axes.resolve(time, &forces);
         out.delta_velocity = force.map(|force| force * duration_s);
         self.seen.specific_force = Some(force);
