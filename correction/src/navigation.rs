@@ -122,12 +122,7 @@ impl StepSum {
     }
 
     /// Takes one tick of a step.
-    fn sum(
-        &mut self,
-        step: &NavigationStep,
-        tick: &CorrectedTick,
-        emit: &mut dyn FnMut(&CorrectedTick),
-    ) {
+    fn sum(&mut self, step: &NavigationStep, tick: &CorrectedTick, emit: &mut dyn FnMut(&CorrectedTick)) {
         let breaks = tick.missed > 0 || tick.flags.intersects(TickFlags::GAP | TickFlags::RESTART);
         let differs = self.open.as_ref().is_some_and(|open| {
             let changed = open.flags.symmetric_difference(tick.flags);

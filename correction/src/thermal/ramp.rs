@@ -59,7 +59,7 @@ impl<const N: usize> Ramp<N> {
     /// How far along the line `time` is, 0…1; 0 for values that stand still.
     #[must_use]
     pub fn share(&self, time: Timestamp) -> f64 {
-        share(time, self.start, self.per_second)
+        share(time.seconds_from(self.start), self.per_second)
     }
 
     /// Where the values begin, and how far they go, each.
@@ -73,9 +73,9 @@ impl<const N: usize> Ramp<N> {
     }
 }
 
-/// How far along a line that begins at `start` `time` is, 0…1.
-pub(crate) fn share(time: Timestamp, start: Timestamp, per_second: f64) -> f64 {
-    let way = time.seconds_from(start) * per_second;
+/// How far along a line one is so long after its beginning (s), 0…1.
+pub(crate) fn share(since_start_s: f64, per_second: f64) -> f64 {
+    let way = since_start_s * per_second;
     // Not `clamp`: for values that stand still −0 is to become 0, and these are two instructions without a branch.
     let way = if way > 0.0 { way } else { 0.0 };
     if way < 1.0 { way } else { 1.0 }

@@ -91,22 +91,20 @@ fn read_body<'a>(
 }
 
 /// A stated number of elements, at most `most`.
+#[inline]
 fn length(body: &mut Body<'_>, most: usize) -> Option<usize> {
     usize::try_from(body.u64()?).ok().filter(|length| *length <= most)
 }
 
 /// Makes `ticks` as many as a body of so many bytes states; never more than it can hold.
-fn make_room<T: Clone + Default>(
-    body: &mut Body<'_>,
-    bytes: usize,
-    ticks: &mut Vec<T>,
-) -> Option<()> {
+fn make_room<T: Clone + Default>(body: &mut Body<'_>, bytes: usize, ticks: &mut Vec<T>) -> Option<()> {
     let count = length(body, MAX_TICKS.min(bytes / FEWEST_BYTES))?;
     ticks.resize(count, T::default());
     Some(())
 }
 
 /// Reads the readings of a tick; what they stand for.
+#[inline]
 fn readings(body: &mut Body<'_>, values: &mut Sensors<f64>) -> Option<OutputKind> {
     let kind = match body.u32()? {
         0 => OutputKind::Counts,

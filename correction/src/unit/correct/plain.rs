@@ -100,7 +100,11 @@ impl Corrector {
         };
         let settles_s = lines.gyros.servos.as_ref().map(|servos| servos.settles_s);
         let servos = self.servo.is_settled(settles_s, time, duration);
-        (settled && servos && time <= lines.fresh_until).then_some(Readings { gyros, accels, input })
+        (settled && servos && time.is_near() && time <= lines.fresh_until).then_some(Readings {
+            gyros,
+            accels,
+            input,
+        })
     }
 
     /// As [`gyros`](Self::gyros); whether a sensor was excluded.
@@ -221,8 +225,7 @@ impl Corrector {
             OutputKind::Counts => readings.map(|reading| reading / duration_s),
             OutputKind::Mean => *readings,
         };
-        let forces: [f64; N] =
-            array::from_fn(|i| (outputs[i] - bias[i]) * ratio[i] * per_scale_factor[i]);
+        let forces: [f64; N] = array::from_fn(|i| (outputs[i] - bias[i]) * ratio[i] * per_scale_factor[i]);
 
         let count = calibration.accels.len();
         of_length(&mut self.seen.accels, count);
@@ -267,6 +270,7 @@ struct Excluded(bool);
 /// A place for each reading, where every one is a number below its sensor's limit.
 fn within<const N: usize>(readings: &[f64], limits: &[f64; N]) -> Option<[f64; N]> {
     let readings: [f64; N] = array::from_fn(|i| readings.get(i).copied().unwrap_or(0.0));
-    let sound = readings.iter().zip(limits).fold(true, |sound, (reading, limit)| sound & (reading.abs() < *limit));
+    let sound =
+        readings.iter().zip(limits).fold(true, |sound, (reading, limit)| sound & (reading.abs() < *limit));
     sound.then_some(readings)
 }

@@ -14,6 +14,7 @@ use crate::sample::SensorFlags;
 use crate::thermal::{AccelModel, AccelThermal, GyroModel, GyroThermal, Ramp, TrendModel, share};
 use crate::unit::axes::Axes;
 use crate::unit::footing::Footing;
+use crate::unit::thermal_memory::ThermalMemory;
 use crate::units::Timestamp;
 
 /// The plan of a unit, as wide as its sensors need; the rooms are kept.
@@ -130,39 +131,51 @@ impl Plan {
 
     /// Holds from the next tick on, where the corrector stands so that it can.
     pub(super) fn gather(&mut self, calibration: &Calibration, corrector: &Corrector) {
+        let Some(fresh_until) = fresh_until(corrector) else {
+            self.holds = false;
+            return;
+        };
         let sensors = calibration.gyros.len().max(calibration.accels.len());
         self.holds = match &mut self.lines {
-            Width::Four(lines) => fill(lines, calibration, corrector),
-            Width::Eight(lines) => fill(lines, calibration, corrector),
-            room if sensors <= 4 => make(calibration, corrector, |lines| *room = Width::Four(lines)),
-            room => make(calibration, corrector, |lines| *room = Width::Eight(lines)),
+            Width::Four(room) => {
+                Lines::of(calibration, &corrector.thermal, fresh_until).map(|lines| **room = lines).is_some()
+            }
+            Width::Eight(room) => {
+                Lines::of(calibration, &corrector.thermal, fresh_until).map(|lines| **room = lines).is_some()
+            }
+            none => {
+                let made = if sensors <= 4 {
+                    Lines::of(calibration, &corrector.thermal, fresh_until).map(Box::new).map(Width::Four)
+                } else {
+                    Lines::of(calibration, &corrector.thermal, fresh_until).map(Box::new).map(Width::Eight)
+                };
+                made.map(|made| *none = made).is_some()
+            }
         };
     }
 }
 
-fn fill<const N: usize>(lines: &mut Lines<N>, calibration: &Calibration, corrector: &Corrector) -> bool {
-    Lines::of(calibration, corrector).map(|gathered| *lines = gathered).is_some()
-}
-
-fn make<const N: usize>(
-    calibration: &Calibration,
-    corrector: &Corrector,
-    keep: impl FnOnce(Box<Lines<N>>),
-) -> bool {
-    Lines::of(calibration, corrector).map(|gathered| keep(Box::new(gathered))).is_some()
+/// Up to which end ticks rest on fresh temperatures; `None` where a tick must look closer: in a slew, or where a temperature
+/// is missing, too old already, or outside its range.
+fn fresh_until(corrector: &Corrector) -> Option<Timestamp> {
+    let footings = &corrector.thermal.footings;
+    let mut fresh_until = Timestamp::from_ns(i64::MAX);
+    for footing in footings.gyros.iter().chain(&footings.accels) {
+        let (flags, until) = footing.until();
+        if flags != SensorFlags::VALID {
+            return None;
+        }
+        fresh_until = fresh_until.min(until);
+    }
+    (corrector.slew.is_none() && corrector.seen.end_time < fresh_until).then_some(fresh_until)
 }
 
 impl<const N: usize> Lines<N> {
-    /// As the corrector stands; `None` where a tick must look closer: in a slew, with a sensor left out, or with a temperature
-    /// outside its range.
-    fn of(calibration: &Calibration, corrector: &Corrector) -> Option<Self> {
-        let thermal = &corrector.thermal;
-        let footings = &thermal.footings;
-        if corrector.slew.is_some() {
-            return None;
-        }
+    /// As the terms stand; `None` with a sensor left out, and where a line begins so far away that differences of time
+    /// saturate.
+    fn of(calibration: &Calibration, thermal: &ThermalMemory, fresh_until: Timestamp) -> Option<Self> {
         let gyro_axes = AxesLines::of(&thermal.gyro_axes, &calibration.gyro_orientation)?;
-        let gyros = GyroLines::of(&calibration.gyros, &thermal.gyros, &footings.gyros);
+        let gyros = GyroLines::of(&calibration.gyros, &thermal.gyros, &thermal.footings.gyros);
         let accels = match (&calibration.accel_orientation, &thermal.accel_axes) {
             (Some(orientation), Some(axes)) => Some((
                 AccelLines::of(&calibration.accels, &thermal.accels),
@@ -171,15 +184,12 @@ impl<const N: usize> Lines<N> {
             (None, _) => None,
             (Some(_), None) => return None,
         };
-        let mut fresh_until = Timestamp::from_ns(i64::MAX);
-        for footing in footings.gyros.iter().chain(&footings.accels) {
-            let (flags, until) = footing.until();
-            if flags != SensorFlags::VALID {
-                return None;
-            }
-            fresh_until = fresh_until.min(until);
-        }
-        Some(Self { gyros, gyro_axes, accels, fresh_until })
+        let near = |axes: &AxesLines<N>| axes.start.is_near();
+        let accels_near = accels
+            .as_ref()
+            .is_none_or(|(accels, axes)| accels.pace.is_near() && accels.board_pace.is_near() && near(axes));
+        let all_near = gyros.pace.is_near() && near(&gyro_axes) && accels_near;
+        all_near.then_some(Self { gyros, gyro_axes, accels, fresh_until })
     }
 }
 
@@ -202,9 +212,14 @@ impl<const N: usize> Pace<N> {
         Self { start: ramps.map(|ramp| ramp.pace().0), per_second: ramps.map(|ramp| ramp.pace().1) }
     }
 
-    /// How far along their lines the terms are at `time`, 0…1 each.
+    /// Whether no difference to a near time saturates.
+    fn is_near(&self) -> bool {
+        self.start.iter().all(|start| start.is_near())
+    }
+
+    /// How far along their lines the terms are at `time`, which is near, 0…1 each.
     pub(super) fn share(&self, time: Timestamp) -> [f64; N] {
-        array::from_fn(|i| share(time, self.start[i], self.per_second[i]))
+        array::from_fn(|i| share(time.seconds_from_near(self.start[i]), self.per_second[i]))
     }
 }
 
@@ -212,10 +227,7 @@ impl<const N: usize> Line<N> {
     /// The term of this number on each ramp.
     fn of<const T: usize>(ramps: &[&Ramp<T>; N], term: usize) -> Self {
         let number = |values: &[f64; T]| values.get(term).copied().unwrap_or_default();
-        Self {
-            from: ramps.map(|ramp| number(ramp.line().0)),
-            step: ramps.map(|ramp| number(ramp.line().1)),
-        }
+        Self { from: ramps.map(|ramp| number(ramp.line().0)), step: ramps.map(|ramp| number(ramp.line().1)) }
     }
 
     /// The term so far along its line.
@@ -312,9 +324,9 @@ impl<const N: usize> AxesLines<N> {
         })
     }
 
-    /// As [`Inverse::lerp_apply`]: case axes from the readings at `time`.
+    /// As [`Inverse::lerp_apply`]: case axes from the readings at `time`, which is near.
     pub(super) fn resolve(&self, time: Timestamp, readings: &[f64; N]) -> [f64; 3] {
-        let share = share(time, self.start, self.per_second);
+        let share = share(time.seconds_from_near(self.start), self.per_second);
         let mut sum = [0.0; 4];
         for (i, reading) in readings.iter().enumerate() {
             // At its end the line is the end itself.
