@@ -117,19 +117,19 @@ impl StepSum {
         if step.ticks <= 1 && !step.coning_sculling && self.open.is_none() {
             emit(tick);
         } else {
-            self.sum(step, tick, emit);
+            self.sum(*step, tick, emit);
         }
     }
 
     /// Takes one tick of a step.
-    fn sum(&mut self, step: &NavigationStep, tick: &CorrectedTick, emit: &mut dyn FnMut(&CorrectedTick)) {
+    fn sum(&mut self, step: NavigationStep, tick: &CorrectedTick, emit: &mut dyn FnMut(&CorrectedTick)) {
         let breaks = tick.missed > 0 || tick.flags.intersects(TickFlags::GAP | TickFlags::RESTART);
         let differs = self.open.as_ref().is_some_and(|open| {
             let changed = open.flags.symmetric_difference(tick.flags);
             open.revision != tick.revision || changed.contains(TickFlags::UNCALIBRATED)
         });
         if breaks || differs {
-            self.flush(step, emit);
+            self.flush(&step, emit);
         }
         if breaks {
             self.last = Default::default();
@@ -153,7 +153,7 @@ impl StepSum {
             tick.ticks.max(1) >= step.ticks
         };
         if full {
-            self.flush(step, emit);
+            self.flush(&step, emit);
         }
     }
 

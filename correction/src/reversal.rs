@@ -109,8 +109,8 @@ impl Substitution {
 
     /// Whether the coming tick is a good one that nothing is to be done with but to remember it:
     /// [`note_good`](Self::note_good) then does what [`tick`](Self::tick) would.
-    pub(crate) fn is_plain(&self, reversal: &Reversal, input: &TickInput) -> bool {
-        self.is_settled() && !input.restart && !self.is_lost(reversal, input)
+    pub(crate) fn is_plain(&self, reversal: Reversal, input: &TickInput) -> bool {
+        self.is_settled() && !input.restart && self.left_from(reversal, input) == 0
     }
 
     /// Remembers a good tick by its mean rates per sensor (rad/s), NaN where there is no sensor. Its duration is above zero.

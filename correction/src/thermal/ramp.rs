@@ -59,7 +59,8 @@ impl<const N: usize> Ramp<N> {
     /// How far along the line `time` is, 0…1; 0 for values that stand still.
     #[must_use]
     pub fn share(&self, time: Timestamp) -> f64 {
-        share(time.seconds_from(self.start), self.per_second)
+        // Nothing to work out, as for every term of a unit without temperatures.
+        if self.per_second == 0.0 { 0.0 } else { share(time.seconds_from(self.start), self.per_second) }
     }
 
     /// Where the values begin, and how far they go, each.

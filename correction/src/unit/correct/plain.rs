@@ -33,6 +33,11 @@ struct Readings<const N: usize> {
 }
 
 impl Corrector {
+    /// Whether there is a plan that holds.
+    pub(in crate::unit) fn has_plan(&self) -> bool {
+        self.plan.four().is_some() || self.plan.eight().is_some()
+    }
+
     /// Corrects a tick by the plan, where there is one and the tick is plain; otherwise nothing has changed.
     ///
     /// Temperature readings that are due must have been looked for.
@@ -95,7 +100,7 @@ impl Corrector {
         };
         let input = input(released);
         let settled = match &calibration.reversal {
-            Some(reversal) => self.substitution.is_plain(reversal, &input),
+            Some(reversal) => self.substitution.is_plain(*reversal, &input),
             None => self.substitution.is_settled(),
         };
         let settles_s = lines.gyros.servos.as_ref().map(|servos| servos.settles_s);

@@ -143,7 +143,7 @@ impl Plan {
             Width::Eight(room) => {
                 Lines::of(calibration, &corrector.thermal, fresh_until).map(|lines| **room = lines).is_some()
             }
-            none => {
+            none @ Width::None => {
                 let made = if sensors <= 4 {
                     Lines::of(calibration, &corrector.thermal, fresh_until).map(Box::new).map(Width::Four)
                 } else {
