@@ -36,9 +36,9 @@ pub fn read_gyro(frame: &[u8], ticks: &mut Vec<GyroTick>) -> Result<OutputKind, 
             tick.end_time = Timestamp::from_ns(body.i64()?);
             tick.duration = span(body.u64()?);
             alike.note(index, readings(body, &mut tick.readings)?, tick.readings.len());
-            tick.mode = body.mode()?;
+            body.mode(&mut tick.mode)?;
             tick.switch_command = body.bool()?;
-            tick.meander = body.mode()?;
+            body.mode(&mut tick.meander)?;
             let got = length(body, MAX_SENSORS)?;
             tick.half_periods.clear();
             for _ in 0..got {

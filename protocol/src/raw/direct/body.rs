@@ -90,17 +90,19 @@ impl<'a> Body<'a> {
         }
     }
 
-    /// A lasing mode, or none.
+    /// A lasing mode, or none, into `mode`.
     #[inline]
-    pub(super) fn mode(&mut self) -> Option<Option<LasingMode>> {
-        if !self.bool()? {
-            return Some(None);
-        }
-        match self.u32()? {
-            0 => Some(Some(LasingMode::Plus)),
-            1 => Some(Some(LasingMode::Minus)),
-            _ => None,
-        }
+    pub(super) fn mode(&mut self, mode: &mut Option<LasingMode>) -> Option<()> {
+        *mode = if self.bool()? {
+            match self.u32()? {
+                0 => Some(LasingMode::Plus),
+                1 => Some(LasingMode::Minus),
+                _ => return None,
+            }
+        } else {
+            None
+        };
+        Some(())
     }
 }
 
