@@ -107,6 +107,7 @@ impl StepSum {
     /// A step ends early, shorter than stated, before a tick that announces missing ticks or a restart, and
     /// where the calibration revision changes or the unit becomes calibrated or ceases to be. Raw readings of
     /// an uncalibrated unit are summed plainly: cross products of counts mean nothing.
+    #[inline]
     pub fn push(
         &mut self,
         step: &NavigationStep,
@@ -115,15 +116,20 @@ impl StepSum {
     ) {
         if step.ticks <= 1 && !step.coning_sculling && self.open.is_none() {
             emit(tick);
-            return;
+        } else {
+            self.sum(*step, tick, emit);
         }
+    }
+
+    /// Takes one tick of a step.
+    fn sum(&mut self, step: NavigationStep, tick: &CorrectedTick, emit: &mut dyn FnMut(&CorrectedTick)) {
         let breaks = tick.missed > 0 || tick.flags.intersects(TickFlags::GAP | TickFlags::RESTART);
         let differs = self.open.as_ref().is_some_and(|open| {
             let changed = open.flags.symmetric_difference(tick.flags);
             open.revision != tick.revision || changed.contains(TickFlags::UNCALIBRATED)
         });
         if breaks || differs {
-            self.flush(step, emit);
+            self.flush(&step, emit);
         }
         if breaks {
             self.last = Default::default();
@@ -147,7 +153,7 @@ impl StepSum {
             tick.ticks.max(1) >= step.ticks
         };
         if full {
-            self.flush(step, emit);
+            self.flush(&step, emit);
         }
     }
 

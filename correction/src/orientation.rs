@@ -263,6 +263,11 @@ impl Inverse {
         self.mask
     }
 
+    /// What one unit of each sensor's reading gives along the case axes.
+    pub(crate) const fn columns(&self) -> &[[f64; 3]; MAX_SENSORS] {
+        &self.columns
+    }
+
     /// v = C⁺·s (unit of `readings`).
     ///
     /// A sensor outside the mask is not looked at, so its reading may be anything, NaN too. Readings that are

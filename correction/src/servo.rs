@@ -26,6 +26,7 @@ use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 
 use crate::curve::{Curve, CurveError, CurveParts};
+use crate::orientation::SensorMask;
 use crate::sample::{HalfPeriodCounts, MAX_SENSORS};
 use crate::units::{Span, Timestamp};
 
@@ -216,7 +217,7 @@ impl ServoMemory {
     /// form: `f_1` is taken the same way from the first tick that has half-period counts, and decays from that
     /// tick's middle.
     pub fn apparent_rate(&mut self, sensor: usize, servo: &Servo, tick: &ServoTick) -> Transient {
-        let middle = tick.end_time - Span::from_ns(tick.duration.as_ns() / 2);
+        let middle = middle(tick.end_time, tick.duration);
         let mean_hz = tick.half_periods.and_then(|counts| mean_hz(counts, tick.duration));
         // A tick before the end of the transition cannot be: its clock is broken.
         let settles = 0.0..=servo.settle_time_s();
@@ -228,6 +229,32 @@ impl ServoMemory {
             return Transient::Settled;
         }
         self.running_rate(sensor, servo, tick, (middle, mean_hz))
+    }
+
+    /// Whether no transition is running, and no servo that settles within `settles_s` (s) after one has a transient in this
+    /// tick: [`apparent_rate`](Self::apparent_rate) would give [`Transient::Settled`] for each. `None`: there is no servo.
+    pub(crate) fn is_settled(&self, settles_s: Option<f64>, end_time: Timestamp, duration: Span) -> bool {
+        let runs = |(start, settles_s): (Timestamp, f64)| {
+            (0.0..=settles_s).contains(&middle(end_time, duration).seconds_from(start))
+        };
+        !self.switching && !self.settles_from.zip(settles_s).is_some_and(runs)
+    }
+
+    /// What [`apparent_rate`](Self::apparent_rate) remembers of these gyros in a tick without a transient.
+    pub(crate) fn note_settled(
+        &mut self,
+        sensors: SensorMask,
+        (end_time, duration): (Timestamp, Span),
+        half_periods: &[HalfPeriodCounts],
+    ) {
+        let middle = middle(end_time, duration);
+        for (sensor, last) in self.last.iter_mut().enumerate() {
+            if !sensors.contains(sensor) {
+                continue;
+            }
+            let counts = half_periods.get(sensor);
+            *last = counts.and_then(|counts| mean_hz(*counts, duration)).map(|mean| (middle, mean));
+        }
     }
 
     /// The apparent rate while the transient runs; remembers the mean rate without it.
@@ -290,6 +317,11 @@ impl ServoMemory {
         let near = between_s > 0.0 && between_s <= REACH_TICKS * duration_s;
         if near { (0.25 * duration_s / between_s, now - before) } else { (0.0, 0.0) }
     }
+}
+
+/// Middle of a tick.
+fn middle(end_time: Timestamp, duration: Span) -> Timestamp {
+    end_time - Span::from_ns(duration.as_ns() / 2)
 }
 
 /// `(c⁺ + c⁻)/Δt` (counts/s); `None` for a tick without duration.

@@ -11,4 +11,5 @@ mod ramp;
 pub use accel::{AccelModel, AccelTerms, AccelThermal};
 pub(crate) use gyro::TermError;
 pub use gyro::{GyroModel, GyroTerms, GyroThermal, MAX_LAGS, TrendModel};
+pub(crate) use ramp::share;
 pub use ramp::{Follower, Ramp};

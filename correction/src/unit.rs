@@ -112,6 +112,9 @@ pub struct Unit {
     /// Where a tick is corrected: no memory, only a place.
     #[serde(skip)]
     corrected: CorrectedTick,
+    /// No tick takes the shorter way of plain ones.
+    #[serde(skip)]
+    general_path_only: bool,
 }
 
 impl Unit {
@@ -134,7 +137,15 @@ impl Unit {
             turn_on: None,
             last_end: Timestamp::default(),
             corrected: CorrectedTick::default(),
+            general_path_only: false,
         }
+    }
+
+    /// The same unit, which corrects every tick by the general path: for comparing the two. Not part of its memory.
+    #[must_use]
+    pub fn by_general_path(mut self) -> Self {
+        self.general_path_only = true;
+        self
     }
 
     /// Puts a calibration in force from the next tick on, at once. Running state that still means the same is kept.

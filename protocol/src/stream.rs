@@ -90,6 +90,13 @@ impl UnitStream {
         }
     }
 
+    /// The same stream, whose unit corrects every tick by the general path: see [`Unit::by_general_path`].
+    #[must_use]
+    pub fn by_general_path(mut self) -> Self {
+        self.unit = self.unit.by_general_path();
+        self
+    }
+
     /// Lets the revision counter go on behind `highest`, the highest that the unit was ever given; at the start only.
     #[must_use]
     pub fn with_revision(mut self, highest: u64) -> Self {

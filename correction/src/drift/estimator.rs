@@ -145,15 +145,20 @@ impl DriftEstimator {
     /// `project` gives the rates along the input axes for a rate in case axes, as
     /// [`Orientation::forward`](crate::orientation::Orientation::forward) does at the present temperature; it is called
     /// once per reference.
+    #[inline]
     pub fn advance(
         &mut self,
         end_time: Timestamp,
         restart: bool,
         project: &dyn Fn([f64; 3]) -> Sensors<f64>,
     ) {
-        if self.is_idle() {
-            return;
+        if !self.is_idle() {
+            self.go_on(end_time, restart, project);
         }
+    }
+
+    /// Goes on where there are gyros to follow.
+    fn go_on(&mut self, end_time: Timestamp, restart: bool, project: &dyn Fn([f64; 3]) -> Sensors<f64>) {
         let grid = grid_cell(end_time);
         if restart {
             self.restart(end_time, grid);
@@ -242,10 +247,15 @@ impl DriftEstimator {
     }
 
     /// Takes a tick after its correction.
+    #[inline]
     pub fn observe(&mut self, observation: &Observation) {
-        if self.is_idle() {
-            return;
+        if !self.is_idle() {
+            self.add(observation);
         }
+    }
+
+    /// Adds the tick's residual rates to what is kept of each gyro.
+    fn add(&mut self, observation: &Observation) {
         let end = observation.end_time;
         let start = end - observation.duration;
         let covered = Covered::new(start, end);
@@ -259,6 +269,12 @@ impl DriftEstimator {
             }
         }
         self.observed_until = Some(end);
+    }
+
+    /// Whether [`subtrahend`](Self::subtrahend) may be anything but zero.
+    #[must_use]
+    pub fn subtracts(&self) -> bool {
+        self.settings.subtract && !self.is_idle()
     }
 
     /// What to subtract from gyro `gyro` at the end of the present tick, `time` (rad/s): the prediction, without a step at

@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 
 use super::lag::{Lag, MAX_LAGS, advance, settled};
-use super::ramp::Follower;
+use super::ramp::{Follower, Ramp};
 use crate::calibration::AccelParts;
 use crate::channel::{ThermalFilter, ThermalState};
 use crate::curve::{Curve, CurveError, CurveParts};
@@ -157,6 +157,11 @@ impl AccelThermal {
         let [bias, per_scale_factor] = self.sensor.at(time);
         let [ratio] = self.board.at(time);
         AccelTerms { bias, per_scale_factor, ratio }
+    }
+
+    /// The ways that bias and 1/K are on, and the board ratio.
+    pub(crate) const fn ramps(&self) -> (&Ramp<2>, &Ramp<1>) {
+        (self.sensor.ramp(), self.board.ramp())
     }
 
     /// Whether an argument was outside its fitted range at the last evaluation.

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use alloc::vec::Vec;
 
 use super::lag::{Lag, advance, settled};
-use super::ramp::Follower;
+use super::ramp::{Follower, Ramp};
 use crate::calibration::{BranchArgument, GyroParts};
 use crate::channel::{ThermalFilter, ThermalState};
 use crate::curve::{Curve, CurveError};
@@ -176,6 +176,11 @@ impl TrendModel {
         self.coefficients.iter().rev().fold(0.0, |sum, c| sum * t + c)
     }
 
+    /// Coefficients by power, the highest last, and the interval (s).
+    pub(crate) fn parts(&self) -> (&[f64], [f64; 2]) {
+        (&self.coefficients, self.interval_s)
+    }
+
     /// Rate (rad/s) from the end of the interval on.
     #[must_use]
     pub fn last(&self) -> f64 {
@@ -257,6 +262,11 @@ impl GyroThermal {
     pub fn at(&self, time: Timestamp) -> GyroTerms {
         let [increment_weight, bias, magnetic, meander] = self.terms.at(time);
         GyroTerms { increment_weight, bias, magnetic, meander }
+    }
+
+    /// The way that the terms are on, in the order of [`GyroTerms`].
+    pub(crate) const fn ramp(&self) -> &Ramp<4> {
+        self.terms.ramp()
     }
 
     /// Whether an argument was outside its fitted range at the last evaluation.

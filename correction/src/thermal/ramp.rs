@@ -59,11 +59,27 @@ impl<const N: usize> Ramp<N> {
     /// How far along the line `time` is, 0…1; 0 for values that stand still.
     #[must_use]
     pub fn share(&self, time: Timestamp) -> f64 {
-        if self.per_second == 0.0 {
-            return 0.0;
-        }
-        (time.seconds_from(self.start) * self.per_second).clamp(0.0, 1.0)
+        // Nothing to work out, as for every term of a unit without temperatures.
+        if self.per_second == 0.0 { 0.0 } else { share(time.seconds_from(self.start), self.per_second) }
     }
+
+    /// Where the values begin, and how far they go, each.
+    pub(crate) const fn line(&self) -> (&[f64; N], &[f64; N]) {
+        (&self.from, &self.step)
+    }
+
+    /// When they begin, and what part of their way they make in a second.
+    pub(crate) const fn pace(&self) -> (Timestamp, f64) {
+        (self.start, self.per_second)
+    }
+}
+
+/// How far along a line one is so long after its beginning (s), 0…1.
+pub(crate) fn share(since_start_s: f64, per_second: f64) -> f64 {
+    let way = since_start_s * per_second;
+    // Not `clamp`: for values that stand still −0 is to become 0, and these are two instructions without a branch.
+    let way = if way > 0.0 { way } else { 0.0 };
+    if way < 1.0 { way } else { 1.0 }
 }
 
 /// A ramp that is turned after each evaluation of the terms it carries.
@@ -104,6 +120,11 @@ impl<const N: usize> Follower<N> {
     #[must_use]
     pub const fn clamped(&self) -> bool {
         self.clamped
+    }
+
+    /// The way that the values are on.
+    pub(crate) const fn ramp(&self) -> &Ramp<N> {
+        &self.ramp
     }
 }
 

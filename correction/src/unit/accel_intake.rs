@@ -12,15 +12,6 @@ use crate::units::{Span, Timestamp};
 /// Most accelerometer ticks that wait.
 const MAX_PENDING: usize = 8192;
 
-/// What the accelerometer stream has for a gyro tick.
-#[derive(Debug)]
-pub(super) enum Match {
-    /// The tick that ends with it.
-    Found(Pending),
-    /// None yet: it may still come.
-    NotYet,
-}
-
 /// A tick that waits for its gyro tick, or has met it.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Pending {
@@ -63,14 +54,21 @@ impl AccelIntake {
     }
 
     /// Puts a tick in its place in time.
+    #[inline]
     fn insert(&mut self, pending: Pending, counters: &mut Counters) {
         let time = pending.tick.end_time;
         if self.pending.len() < MAX_PENDING
             && self.pending.back().is_none_or(|last| last.tick.end_time < time)
         {
             self.pending.push_back(pending);
-            return;
+        } else {
+            self.insert_between(pending, counters);
         }
+    }
+
+    /// Likewise a tick that is not the newest, or one too many.
+    fn insert_between(&mut self, pending: Pending, counters: &mut Counters) {
+        let time = pending.tick.end_time;
         let place = self.pending.iter().rposition(|p| p.tick.end_time < time).map_or(0, |i| i + 1);
         if self.pending.get(place).is_some_and(|p| p.tick.end_time == time) {
             counters.accel_duplicates += 1;
@@ -84,26 +82,30 @@ impl AccelIntake {
         }
     }
 
-    /// Looks for the tick that ends with `gyro`, nearer than half the gyro tick's duration.
-    pub(super) fn take(&mut self, gyro: &GyroTick, counters: &mut Counters) -> Match {
+    /// Looks for the tick that ends with `gyro`, nearer than half the gyro tick's duration; one that is not there may still
+    /// come.
+    pub(super) fn meets(&mut self, gyro: &GyroTick, counters: &mut Counters) -> Option<&Pending> {
         let half = Span::from_ns(gyro.duration.as_ns() / 2);
-        while let Some(Pending { tick: front, .. }) = self.pending.front() {
-            if front.end_time + half <= gyro.end_time {
-                self.pending.pop_front();
-                counters.accel_unpaired += 1;
-            } else if front.end_time < gyro.end_time + half {
-                let found = self.pending.pop_front();
-                return found.map_or(Match::NotYet, Match::Found);
-            } else {
-                break;
-            }
+        while self.pending.front().is_some_and(|front| front.tick.end_time + half <= gyro.end_time) {
+            self.pending.pop_front();
+            counters.accel_unpaired += 1;
         }
-        Match::NotYet
+        self.pending.front().filter(|front| front.tick.end_time < gyro.end_time + half)
     }
 
-    /// Remembers that the gyro tick which ends at `end_time` has gone.
-    pub(super) fn gyro_released(&mut self, end_time: Timestamp) {
+    /// Takes the tick that [meets](Self::meets) `gyro`.
+    pub(super) fn take(&mut self, gyro: &GyroTick, counters: &mut Counters) -> Option<Pending> {
+        self.meets(gyro, counters)?;
+        self.pending.pop_front()
+    }
+
+    /// Remembers that the gyro tick which ends at `end_time` has gone, and drops the tick that it has `met`, where that still
+    /// stands here.
+    pub(super) fn gyro_released(&mut self, end_time: Timestamp, met: bool) {
         self.released = Some(end_time);
+        if met {
+            self.pending.pop_front();
+        }
     }
 
     /// Notes that gyro ticks came which start no new series.

@@ -97,6 +97,14 @@ impl Axes {
         Some(from.lerp_apply(to, self.temperature.share(time), readings))
     }
 
+    /// The way that the inverse is on, and its ends; `None` while not every sensor takes part.
+    pub(super) fn of_all(&self, orientation: &Orientation) -> Option<(&Ramp<1>, &Inverse, &Inverse)> {
+        let (all, [from, to]) = (SensorMask::all(orientation.sensors()), [&self.from, &self.to]);
+        let (from, to) = (from.as_ref()?, to.as_ref()?);
+        let masks = [self.included, self.mask, from.mask(), to.mask()];
+        masks.iter().all(|mask| *mask == all).then_some((&self.temperature, from, to))
+    }
+
     /// Temperature that the orientation follows (°C).
     pub(super) fn temperature_deg_c(&self, time: Timestamp) -> f64 {
         let [now] = self.temperature.at(time);

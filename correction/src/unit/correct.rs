@@ -5,10 +5,15 @@
 
 mod accels;
 mod gyros;
+mod plain;
+mod plan;
 
 use alloc::sync::Arc;
 
 use serde::{Deserialize, Serialize};
+
+use plain::Tick;
+use plan::Plan;
 
 use super::axes::Axes;
 use super::counters::Counters;
@@ -51,6 +56,9 @@ pub(super) struct Corrector {
     /// The swap that is being made over a time, and the share of what was before it at the present tick.
     slew: Option<Slew>,
     slew_share: f64,
+    /// What plain ticks are corrected with: copied from the above.
+    #[serde(skip)]
+    plan: Plan,
 }
 
 /// When a corrector begins, as seen from the one before it.
@@ -94,6 +102,7 @@ impl Corrector {
             last_forces: core::iter::repeat_n(0.0, calibration.accel_count()).collect(),
             slew: None,
             slew_share: 0.0,
+            plan: Plan::default(),
         };
         if let Some((old_calibration, old)) = kept {
             let same_output = old_calibration.gyro_output == calibration.gyro_output
@@ -157,21 +166,45 @@ impl Corrector {
         out: &mut CorrectedTick,
     ) {
         let tick = released.tick;
+        let since_turn_on_s = tick.end_time.seconds_from(turn_on);
+        if released.plainly && !released.restart && !waiting.is_due(tick.end_time, delay) {
+            let tick = Tick { released, accel, since_turn_on_s };
+            if self.correct_plainly(calibration, &tick, out, counters) {
+                return;
+            }
+        }
         if released.restart {
             self.thermal.restart(calibration);
             self.servo.reset();
             self.slew = None;
         }
         self.thermal.advance(calibration, waiting, delay, tick.end_time, counters);
-        let axes = &self.thermal.gyro_axes;
-        let project =
-            |rate| calibration.gyro_orientation.forward(axes.temperature_deg_c(tick.end_time), rate);
-        self.drift.advance(tick.end_time, released.restart, &project);
+        self.advance_drift(calibration, released);
         self.slew_share = self.slew.as_ref().map_or(0.0, |slew| slew.share(tick.end_time));
         if self.slew_share <= 0.0 {
             self.slew = None;
         }
 
+        self.begin(released, out);
+        self.gyros(calibration, released, since_turn_on_s, out, counters);
+        self.accels(calibration, tick.end_time, accel, out, counters);
+        self.note(released, out);
+        self.drift.observe(&self.seen);
+        let mut plan = core::mem::take(&mut self.plan);
+        plan.gather(calibration, self);
+        self.plan = plan;
+    }
+
+    /// Goes on with the drift estimate to the end of a tick.
+    fn advance_drift(&mut self, calibration: &Calibration, released: &Released<'_>) {
+        let (time, axes) = (released.tick.end_time, &self.thermal.gyro_axes);
+        let project = |rate| calibration.gyro_orientation.forward(axes.temperature_deg_c(time), rate);
+        self.drift.advance(time, released.restart, &project);
+    }
+
+    /// Begins the corrected tick with what is known of it before its readings.
+    fn begin(&self, released: &Released<'_>, out: &mut CorrectedTick) {
+        let tick = released.tick;
         out.sequence = tick.sequence;
         out.end_time = tick.end_time;
         out.duration = tick.duration;
@@ -182,10 +215,6 @@ impl Corrector {
         out.accel_parity.clear();
         out.flags = TickFlags::empty();
         out.flags.set(TickFlags::WARM_UP, self.thermal.footings.warming_up);
-        self.gyros(calibration, released, tick.end_time.seconds_from(turn_on), out, counters);
-        self.accels(calibration, tick.end_time, accel, out, counters);
-        self.note(released, out);
-        self.drift.observe(&self.seen);
     }
 
     /// Completes the observation of the tick.

@@ -21,6 +21,11 @@ pub(super) struct Footing {
 }
 
 impl Footing {
+    /// What the temperatures say of the sensor, and in ticks up to which end.
+    pub(super) const fn until(&self) -> (SensorFlags, Timestamp) {
+        (self.flags, self.fresh_until)
+    }
+
     /// What the temperatures say of the sensor in a tick that ends at `time`.
     pub(super) fn flags(&self, time: Timestamp) -> SensorFlags {
         if time > self.fresh_until { self.flags | SensorFlags::STALE_TEMPERATURE } else { self.flags }

@@ -26,6 +26,12 @@ pub struct SensorHealth {
 }
 
 impl SensorHealth {
+    /// Enters a tick in which nothing but `VALID` was flagged.
+    pub(super) fn note_valid(&mut self) {
+        self.flags = SensorFlags::VALID;
+        self.ticks += 1;
+    }
+
     /// Enters the flags of one tick.
     pub(super) fn note(&mut self, flags: SensorFlags) {
         self.flags = flags;

@@ -151,6 +151,11 @@ impl Operating {
         }
     }
 
+    /// Whether anybody is to be shown corrected ticks: [`observe`](Self::observe) does nothing otherwise.
+    pub(super) fn watches(&self) -> bool {
+        self.self_test.is_some() || self.rest.is_some() || self.state == State::PreLaunchCalibration
+    }
+
     /// Takes one corrected tick; a reference where the unit has been at rest for long enough.
     pub(super) fn observe(
         &mut self,

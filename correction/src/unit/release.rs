@@ -1,10 +1,12 @@
 //! Ticks leave the unit: what fits the calibration, which tick need not wait any longer, and what is said with it.
 
-use super::accel_intake::{Match, Pending};
+use super::accel_intake::Pending;
 use super::gyro_intake::Left;
-use super::{Uncalibrated, Unit, correct};
+use super::operating::Operating;
+use super::{Active, Uncalibrated, Unit, correct};
 use crate::calibration::Calibration;
 use crate::sample::{CorrectedTick, GyroTick, OutputKind, TickFlags};
+use crate::units::Timestamp;
 
 /// A tick on its way into the correction.
 #[derive(Debug, Clone, Copy)]
@@ -13,6 +15,8 @@ pub(super) struct Released<'a> {
     pub(super) output: OutputKind,
     pub(super) missed: u64,
     pub(super) restart: bool,
+    /// It may be corrected by the plan of plain ticks.
+    pub(super) plainly: bool,
 }
 
 impl Unit {
@@ -57,7 +61,7 @@ impl Unit {
         ticks: &[GyroTick],
         emit: &mut dyn FnMut(&CorrectedTick),
     ) -> usize {
-        let takes = |active: &super::Active| {
+        let takes = |active: &Active| {
             let calibration = &active.calibration;
             (calibration.gyro_output(), calibration.gyro_count(), calibration.accel_count() > 0)
         };
@@ -67,23 +71,27 @@ impl Unit {
         if output != need_output || self.pending.is_some() {
             return 0;
         }
+        // Out of the unit meanwhile, so that accelerometer ticks are corrected where they stand.
+        let mut accels = core::mem::take(&mut self.accels);
         let mut passed = 0;
         for tick in ticks {
             if tick.readings.len() != need_sensors || !self.gyros.goes_straight(tick) {
                 break;
             }
-            let accel = match self.accels.take(tick, &mut self.counters) {
-                Match::Found(accel) => Some(accel),
-                Match::NotYet if expects_accel => break,
-                Match::NotYet => None,
-            };
+            let accel = accels.meets(tick, &mut self.counters);
+            if expects_accel && accel.is_none() {
+                break;
+            }
+            let met = accel.is_some();
             self.counters.gyro_ticks_in += 1;
             self.gyros.went_straight(tick);
-            self.accels.gyro_released(tick.end_time);
-            let released = Released { tick, output, missed: 0, restart: false };
-            self.correct_and_give_out(released, accel.as_ref(), emit);
+            let plainly = !self.general_path_only;
+            let released = Released { tick, output, missed: 0, restart: false, plainly };
+            self.correct_and_give_out(released, accel, emit);
+            accels.gyro_released(tick.end_time, met);
             passed += 1;
         }
+        self.accels = accels;
         passed
     }
 
@@ -96,18 +104,18 @@ impl Unit {
             // Whether a unit without calibration has accelerometers is not known: it waits as if it had.
             let expects_accel =
                 self.active.as_ref().is_none_or(|active| active.calibration.accel_count() > 0);
-            let accel = match self.accels.take(front.tick, &mut self.counters) {
-                Match::Found(accel) => Some(accel),
-                Match::NotYet if expects_accel && !front.expired => return,
-                Match::NotYet => None,
-            };
+            let accel = self.accels.take(front.tick, &mut self.counters);
+            if accel.is_none() && expects_accel && !front.expired {
+                return;
+            }
             let Some(Left { tick, output, missed, restart }) = self.gyros.release() else { return };
-            self.accels.gyro_released(tick.end_time);
+            self.accels.gyro_released(tick.end_time, false);
             // The run that a sequence number or a time was meant for is over with a restart.
             if let Some(change) = self.pending.take_if(|change| restart || change.at.is_due(&tick)) {
                 self.take_effect(change);
             }
-            let released = Released { tick: &tick, output, missed, restart };
+            let plainly = !self.general_path_only;
+            let released = Released { tick: &tick, output, missed, restart, plainly };
             self.correct_and_give_out(released, accel.as_ref(), emit);
         }
     }
@@ -154,13 +162,8 @@ impl Unit {
                     corrected,
                 );
                 corrected.revision = active.revision;
-                let temperature =
-                    |name: &_| active.corrector.thermal().alive(&active.calibration, name, tick.end_time);
-                let in_force = (&*active.calibration, active.revision);
-                let reference = self.operating.observe(&active.corrector.seen, in_force, &temperature);
-                if let Some(reference) = reference {
-                    // What is refused is counted.
-                    let _ = active.corrector.drift.submit_at_rest(&reference);
+                if self.operating.watches() {
+                    watch(&mut self.operating, active, tick.end_time);
                 }
             }
             Some(_) => {}
@@ -190,5 +193,16 @@ impl Unit {
         }
         self.counters.ticks_out += 1;
         self.steps.push(&settings.navigation, corrected, emit);
+    }
+}
+
+/// Shows a corrected tick to those who watch the unit.
+fn watch(operating: &mut Operating, active: &mut Active, time: Timestamp) {
+    let temperature = |name: &_| active.corrector.thermal().alive(&active.calibration, name, time);
+    let in_force = (&*active.calibration, active.revision);
+    let reference = operating.observe(&active.corrector.seen, in_force, &temperature);
+    if let Some(reference) = reference {
+        // What is refused is counted.
+        let _ = active.corrector.drift.submit_at_rest(&reference);
     }
 }

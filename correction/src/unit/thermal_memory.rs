@@ -49,10 +49,14 @@ impl Waiting {
         }
     }
 
+    /// Whether a reading takes effect before a tick which ends at `end_time`.
+    pub(super) fn is_due(&self, end_time: Timestamp, delay: Span) -> bool {
+        self.readings.front().is_some_and(|reading| reading.time + delay < end_time)
+    }
+
     /// The next reading that takes effect before a tick which ends at `end_time`.
     fn pop_before(&mut self, end_time: Timestamp, delay: Span) -> Option<TemperatureReading> {
-        let due = self.readings.front().is_some_and(|reading| reading.time + delay < end_time);
-        if due { self.readings.pop_front() } else { None }
+        if self.is_due(end_time, delay) { self.readings.pop_front() } else { None }
     }
 
     /// Drops readings from another time, after a step of the producer's clock.

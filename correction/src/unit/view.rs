@@ -35,6 +35,12 @@ impl Unit {
             .flat_map(|active| active.corrector.thermal().report(&active.calibration, self.last_end))
     }
 
+    /// Whether the next tick goes by the plan of plain ticks, if it is one: for who compares the two paths.
+    #[must_use]
+    pub fn has_plan(&self) -> bool {
+        self.active.as_ref().is_some_and(|active| active.corrector.has_plan())
+    }
+
     /// Whether ticks wait for their accelerometer tick, a missing neighbour, or the end of a navigation step.
     #[must_use]
     pub fn is_waiting(&self) -> bool {

@@ -3,17 +3,15 @@
 //! This is what becomes of every message in the service: nothing is allocated, and no tick is written twice. The bytes are
 //! those of [`GyroBatch`] and [`AccelBatch`], which say what they mean; a test holds both readings of them together.
 
+mod body;
+
 use isotherm_correction::sample::{AccelTick, GyroTick, HalfPeriodCounts, MAX_SENSORS, OutputKind, Sensors};
 use isotherm_correction::units::Timestamp;
-use postcard::Deserializer;
-use postcard::de_flavors::Slice;
-use serde::Deserialize;
 
-use super::{AccelBatch, GyroBatch, Mode, span};
+use super::{AccelBatch, GyroBatch, span};
 use crate::codec::{self, CodecError, MAX_TICKS};
 
-/// What is left of a body.
-type Body<'a> = Deserializer<'a, Slice<'a>>;
+use body::Body;
 
 /// Fewest bytes of a tick: its times, kind and number of readings.
 const FEWEST_BYTES: usize = 4;
@@ -29,23 +27,23 @@ pub fn read_gyro(frame: &[u8], ticks: &mut Vec<GyroTick>) -> Result<OutputKind, 
     let mut alike = Alike::default();
     let mut half_periods = None;
     let rest = read_body(bytes, |body| {
-        let first_sequence = u64::deserialize(&mut *body)?;
-        let series = u64::deserialize(&mut *body)?;
+        let first_sequence = body.u64()?;
+        let series = body.u64()?;
         make_room(body, bytes.len(), ticks)?;
         for (index, tick) in ticks.iter_mut().enumerate() {
             tick.sequence = first_sequence.saturating_add(index as u64);
             tick.series = series;
-            tick.end_time = Timestamp::from_ns(i64::deserialize(&mut *body)?);
-            tick.duration = span(u64::deserialize(&mut *body)?);
+            tick.end_time = Timestamp::from_ns(body.i64()?);
+            tick.duration = span(body.u64()?);
             alike.note(index, readings(body, &mut tick.readings)?, tick.readings.len());
-            tick.mode = Option::<Mode>::deserialize(&mut *body)?.map(Into::into);
-            tick.switch_command = bool::deserialize(&mut *body)?;
-            tick.meander = Option::<Mode>::deserialize(&mut *body)?.map(Into::into);
+            body.mode(&mut tick.mode)?;
+            tick.switch_command = body.bool()?;
+            body.mode(&mut tick.meander)?;
             let got = length(body, MAX_SENSORS)?;
             tick.half_periods.clear();
             for _ in 0..got {
-                let positive = i32::deserialize(&mut *body)?;
-                let negative = i32::deserialize(&mut *body)?;
+                let positive = body.i32()?;
+                let negative = body.i32()?;
                 tick.half_periods.push(HalfPeriodCounts { positive, negative });
             }
             let need = tick.readings.len();
@@ -53,7 +51,7 @@ pub fn read_gyro(frame: &[u8], ticks: &mut Vec<GyroTick>) -> Result<OutputKind, 
                 half_periods.get_or_insert(CodecError::HalfPeriods { index, got, need });
             }
         }
-        Ok(())
+        Some(())
     })?;
     let output = alike.judge(ticks.len(), rest)?;
     half_periods.map_or(Ok(output), Err)
@@ -69,15 +67,15 @@ pub fn read_accel(frame: &[u8], ticks: &mut Vec<AccelTick>) -> Result<OutputKind
     let bytes = codec::body::<AccelBatch>(frame)?;
     let mut alike = Alike::default();
     let rest = read_body(bytes, |body| {
-        let first_sequence = u64::deserialize(&mut *body)?;
+        let first_sequence = body.u64()?;
         make_room(body, bytes.len(), ticks)?;
         for (index, tick) in ticks.iter_mut().enumerate() {
             tick.sequence = first_sequence.saturating_add(index as u64);
-            tick.end_time = Timestamp::from_ns(i64::deserialize(&mut *body)?);
-            tick.duration = span(u64::deserialize(&mut *body)?);
+            tick.end_time = Timestamp::from_ns(body.i64()?);
+            tick.duration = span(body.u64()?);
             alike.note(index, readings(body, &mut tick.readings)?, tick.readings.len());
         }
-        Ok(())
+        Some(())
     })?;
     alike.judge(ticks.len(), rest)
 }
@@ -85,46 +83,43 @@ pub fn read_accel(frame: &[u8], ticks: &mut Vec<AccelTick>) -> Result<OutputKind
 /// Reads a body with `read`; how many bytes are left over behind it.
 fn read_body<'a>(
     bytes: &'a [u8],
-    read: impl FnOnce(&mut Body<'a>) -> postcard::Result<()>,
+    read: impl FnOnce(&mut Body<'a>) -> Option<()>,
 ) -> Result<usize, CodecError> {
-    let mut body = Deserializer::from_bytes(bytes);
-    read(&mut body).map_err(|_| CodecError::Malformed)?;
-    body.finalize().map(<[u8]>::len).map_err(|_| CodecError::Malformed)
+    let mut body = Body::new(bytes);
+    read(&mut body).ok_or(CodecError::Malformed)?;
+    Ok(body.left())
 }
 
 /// A stated number of elements, at most `most`.
-fn length(body: &mut Body<'_>, most: usize) -> postcard::Result<usize> {
-    let length = usize::deserialize(body)?;
-    if length > most { Err(postcard::Error::SerdeDeCustom) } else { Ok(length) }
+#[inline]
+fn length(body: &mut Body<'_>, most: usize) -> Option<usize> {
+    usize::try_from(body.u64()?).ok().filter(|length| *length <= most)
 }
 
 /// Makes `ticks` as many as a body of so many bytes states; never more than it can hold.
-fn make_room<T: Clone + Default>(
-    body: &mut Body<'_>,
-    bytes: usize,
-    ticks: &mut Vec<T>,
-) -> postcard::Result<()> {
+fn make_room<T: Clone + Default>(body: &mut Body<'_>, bytes: usize, ticks: &mut Vec<T>) -> Option<()> {
     let count = length(body, MAX_TICKS.min(bytes / FEWEST_BYTES))?;
     ticks.resize(count, T::default());
-    Ok(())
+    Some(())
 }
 
 /// Reads the readings of a tick; what they stand for.
-fn readings(body: &mut Body<'_>, values: &mut Sensors<f64>) -> postcard::Result<OutputKind> {
-    let kind = match u32::deserialize(&mut *body)? {
+#[inline]
+fn readings(body: &mut Body<'_>, values: &mut Sensors<f64>) -> Option<OutputKind> {
+    let kind = match body.u32()? {
         0 => OutputKind::Counts,
         1 => OutputKind::Mean,
-        _ => return Err(postcard::Error::SerdeDeCustom),
+        _ => return None,
     };
     let count = length(body, MAX_SENSORS)?;
     values.clear();
     for _ in 0..count {
         values.push(match kind {
-            OutputKind::Counts => f64::from(i32::deserialize(&mut *body)?),
-            OutputKind::Mean => f64::deserialize(&mut *body)?,
+            OutputKind::Counts => f64::from(body.i32()?),
+            OutputKind::Mean => body.f64()?,
         });
     }
-    Ok(kind)
+    Some(kind)
 }
 
 /// Whether all ticks of a batch have readings of one kind and number.

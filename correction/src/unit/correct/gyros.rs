@@ -193,7 +193,7 @@ impl Corrector {
 }
 
 /// What the substitution must know of a tick.
-fn input(released: &Released<'_>) -> TickInput {
+pub(super) fn input(released: &Released<'_>) -> TickInput {
     let tick = released.tick;
     TickInput {
         end_time: tick.end_time,
@@ -222,19 +222,19 @@ fn terms(mut thermal: GyroTerms, model: &GyroModel, since_turn_on_s: f64) -> Gyr
 
 /// Signs of a tick's mode and meander; +1 where the instrument has none.
 #[derive(Debug, Clone, Copy)]
-struct Signs {
+pub(super) struct Signs {
     mode: f64,
     meander: f64,
 }
 
 impl Signs {
-    fn of(tick: &GyroTick) -> Self {
+    pub(super) fn of(tick: &GyroTick) -> Self {
         let sign = |phase: Option<LasingMode>| phase.map_or(1.0, LasingMode::sign);
         Self { mode: sign(tick.mode), meander: sign(tick.meander) }
     }
 
     /// The terms of Ω that follow temperature (rad/s).
-    fn bias(&self, terms: &GyroTerms) -> f64 {
+    pub(super) fn bias(&self, terms: &GyroTerms) -> f64 {
         terms.bias + self.mode * terms.magnetic + self.meander * terms.meander
     }
 }

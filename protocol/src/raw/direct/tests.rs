@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::raw::{self, HalfPeriod, Readings};
+use crate::raw::{self, HalfPeriod, Mode, Readings};
 
 fn mode() -> impl Strategy<Value = Option<Mode>> {
     prop_oneof![Just(None), Just(Some(Mode::Plus)), Just(Some(Mode::Minus))]
