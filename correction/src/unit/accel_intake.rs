@@ -84,6 +84,11 @@ impl AccelIntake {
         }
     }
 
+    /// Where ticks wait, to be lent and given back.
+    pub(super) fn queue(&mut self) -> &mut VecDeque<Pending> {
+        &mut self.pending
+    }
+
     /// Looks for the tick that ends with `gyro`, nearer than half the gyro tick's duration.
     pub(super) fn take(&mut self, gyro: &GyroTick, counters: &mut Counters) -> Match {
         let half = Span::from_ns(gyro.duration.as_ns() / 2);
