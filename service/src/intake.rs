@@ -40,7 +40,22 @@ pub struct Intake {
 #[derive(Debug, Default)]
 struct Units {
     // By the serial's text, so that the key of a message finds its unit without an allocation.
-    by_serial: HashMap<String, Arc<Mutex<UnitActor>>>,
+    by_serial: HashMap<Arc<str>, Arc<Mutex<UnitActor>>>,
+    /// In the order of their serials, for those who look at all of them many times a second.
+    in_order: InOrder,
+}
+
+/// Units with their serials.
+type InOrder = Arc<Vec<(Arc<str>, Arc<Mutex<UnitActor>>)>>;
+
+impl Units {
+    fn insert(&mut self, serial: &str, unit: &Arc<Mutex<UnitActor>>) {
+        let serial: Arc<str> = serial.into();
+        let in_order = Arc::make_mut(&mut self.in_order);
+        let place = in_order.partition_point(|(before, _)| *before < serial);
+        in_order.insert(place, (Arc::clone(&serial), Arc::clone(unit)));
+        self.by_serial.insert(serial, Arc::clone(unit));
+    }
 }
 
 impl std::fmt::Debug for Intake {
@@ -161,7 +176,7 @@ impl Intake {
             tracing::warn!(unit = %id, uncalibrated = ?self.settings.unit.uncalibrated, "appeared, no calibration");
         }
         let unit = Arc::new(Mutex::new(actor));
-        units.by_serial.insert(serial.to_owned(), Arc::clone(&unit));
+        units.insert(serial, &unit);
         Some(unit)
     }
 
@@ -265,11 +280,24 @@ impl Intake {
 
     /// Does something with every unit, in the order of their serials; a panic costs that unit its memory and no more.
     pub fn each_unit<T>(&self, mut work: impl FnMut(&mut UnitActor) -> T) -> Vec<T> {
-        let units = read(&self.units);
-        let mut units: Vec<_> =
-            units.by_serial.iter().map(|(serial, unit)| (serial.clone(), Arc::clone(unit))).collect();
-        units.sort_by(|(a, _), (b, _)| a.cmp(b));
+        let units = Arc::clone(&read(&self.units).in_order);
         units.iter().filter_map(|(_, unit)| guarded(&mut lock(unit), &mut work)).collect()
+    }
+
+    /// Does something with every unit, as [`Self::each_unit`], and what is to follow with each before the next: the unit is
+    /// not locked any more then. How many had something to follow.
+    pub(crate) fn one_by_one<T>(
+        &self,
+        mut work: impl FnMut(&mut UnitActor) -> Option<T>,
+        mut then: impl FnMut(T),
+    ) -> usize {
+        let units = Arc::clone(&read(&self.units).in_order);
+        let found = units.iter().filter_map(|(_, unit)| {
+            // A statement of its own: the lock ends with it.
+            let found = guarded(&mut lock(unit), &mut work);
+            found.flatten()
+        });
+        found.map(&mut then).count()
     }
 
     /// Status of one unit; `instance` is the service's name for itself.

@@ -17,7 +17,7 @@ use zenoh::query::Query;
 use crate::config::Settings;
 use crate::intake::Intake;
 use crate::registrar::Board;
-use instance::Instance;
+use instance::{Instance, Look};
 use outlets::Outlets;
 
 /// Requests that may wait for the keeper; what comes beyond is refused, which a query notices by its missing reply.
@@ -170,18 +170,28 @@ impl Work {
 
     /// Publishes the status of units, and the service's own where it has changed or all are asked for.
     fn publish(&mut self, which: Which) {
-        let instance = self.instance.name();
-        let due = self.intake.each_unit(|actor| {
-            let progress = which == Which::InProgress && actor.is_in_progress();
-            let publish = actor.take_status_due() || which == Which::All || progress;
-            publish.then(|| (actor.id().clone(), actor.status(instance)))
-        });
-        for (unit, status) in due.into_iter().flatten() {
-            if let Err(error) = self.outlets.unit(&unit, &status) {
-                tracing::warn!(%unit, "cannot publish the status: {}", isotherm_bus::words(&error));
-            }
-        }
-        if let Some(status) = self.instance.status(&self.intake, which == Which::All)
+        let Self { instance, intake, outlets, .. } = self;
+        let name = instance.name();
+        // One after the other: the statuses of thousands of units are megabytes.
+        let told = intake.one_by_one(
+            |actor| {
+                let progress = which == Which::InProgress && actor.is_in_progress();
+                let publish = actor.take_status_due() || which == Which::All || progress;
+                publish.then(|| (actor.id().clone(), actor.status(name)))
+            },
+            |(unit, status)| {
+                if let Err(error) = outlets.unit(&unit, &status) {
+                    tracing::warn!(%unit, "cannot publish the status: {}", isotherm_bus::words(&error));
+                }
+            },
+        );
+        let look = match which {
+            Which::All => Look::Always,
+            // What the service says of its units changes with a status that is due.
+            Which::Due | Which::InProgress if told > 0 => Look::IfNews,
+            Which::Due | Which::InProgress => Look::IfPosted,
+        };
+        if let Some(status) = self.instance.status(&self.intake, look)
             && let Err(error) = self.outlets.service(&status)
         {
             tracing::warn!("cannot publish the service's status: {}", isotherm_bus::words(&error));

@@ -10,7 +10,18 @@ use zenoh::Session;
 
 use crate::fault::standing;
 use crate::intake::Intake;
-use crate::registrar::{Board, Standing};
+use crate::registrar::{Board, Posted};
+
+/// When the service's status is asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Look {
+    /// In any case.
+    Always,
+    /// Where something has changed since the last time.
+    IfNews,
+    /// Likewise, where units have not.
+    IfPosted,
+}
 
 /// This instance of the service.
 pub(super) struct Instance {
@@ -20,7 +31,8 @@ pub(super) struct Instance {
     board: Arc<Board>,
     /// What was said last, as far as a change of it is news.
     said: Option<ServiceStatus>,
-    problems: Vec<Standing>,
+    /// What the registrar had posted then.
+    posted: Option<Arc<Posted>>,
 }
 
 impl Instance {
@@ -33,7 +45,7 @@ impl Instance {
             settings_digest,
             board,
             said: None,
-            problems: Vec::new(),
+            posted: None,
         }
     }
 
@@ -42,9 +54,12 @@ impl Instance {
         &self.name
     }
 
-    /// Its status, where something has changed since the last time, or `always`.
-    pub(super) fn status(&mut self, intake: &Intake, always: bool) -> Option<ServiceStatus> {
+    /// Its status, where something has changed since the last time, or in any case.
+    pub(super) fn status(&mut self, intake: &Intake, look: Look) -> Option<ServiceStatus> {
         let posted = self.board.read();
+        if look == Look::IfPosted && self.posted.as_ref().is_some_and(|before| Arc::ptr_eq(before, &posted)) {
+            return None;
+        }
         let mut units = intake.each_unit(|actor| {
             let (state, output) = actor.doing();
             UnitSummary { unit: actor.id().to_string(), state, output }
@@ -57,15 +72,17 @@ impl Instance {
             started_unix_ms: self.started.1,
             uptime_s: 0.0,
             units,
-            calibrations: posted.folder,
-            bad_documents: posted.bad_documents,
-            store: posted.store,
+            calibrations: posted.folder.clone(),
+            bad_documents: posted.bad_documents.clone(),
+            store: posted.store.clone(),
             faults: Vec::new(),
             settings_digest: self.settings_digest,
             swaps_accepted: posted.accepted,
             swaps_refused: posted.refused,
         };
-        if !always && self.said.as_ref() == Some(&news) && self.problems == posted.problems {
+        let before = self.posted.replace(Arc::clone(&posted));
+        let same_problems = before.is_some_and(|before| before.problems == posted.problems);
+        if look != Look::Always && self.said.as_ref() == Some(&news) && same_problems {
             return None;
         }
         self.said = Some(news.clone());
@@ -73,7 +90,6 @@ impl Instance {
             posted.problems.iter().map(|it| standing(it.kind, it.count, it.words.clone())).collect();
         faults.extend(intake.faults());
         faults.truncate(MAX_FAULTS);
-        self.problems = posted.problems;
         // Time and faults go on all the time: no news by themselves.
         Some(ServiceStatus { uptime_s: self.started.0.elapsed().as_secs_f64(), faults, ..news })
     }
