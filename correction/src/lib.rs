@@ -40,6 +40,7 @@ pub mod channel;
 pub mod curve;
 pub mod drift;
 pub mod earth;
+mod later;
 pub mod navigation;
 pub mod observation;
 pub mod operation;

@@ -27,6 +27,7 @@ pub use parts::{
     ReversalParts,
 };
 
+use crate::later::Later;
 use crate::sample::{LasingMode, MAX_SENSORS, TickFlags};
 use crate::units::{Span, Timestamp};
 
@@ -72,7 +73,7 @@ pub struct Substitution {
     /// Good readings, uncorrected.
     history: History,
     /// Interpolated ticks without their fit; no good reading lies between two of them.
-    lost: ArrayVec<LostTick, MAX_LOST_TICKS>,
+    lost: Later<LostTick, MAX_LOST_TICKS>,
     /// Good readings since the last tick of `lost`.
     after: usize,
     /// Angle per sensor that the next good reading brings back (rad).
@@ -195,12 +196,13 @@ impl Substitution {
         for (increment, predicted) in increments.iter_mut().zip(&predicted) {
             *increment = *predicted;
         }
-        if self.lost.is_full() {
-            self.lost.remove(0);
+        let lost = self.lost.room();
+        if lost.is_full() {
+            lost.remove(0);
             resolved = false;
         }
         let (end_time, duration) = (input.end_time, input.duration);
-        self.lost.push(LostTick { end_time, duration, predicted, sensors: increments.len() });
+        lost.push(LostTick { end_time, duration, predicted, sensors: increments.len() });
         resolved
     }
 
@@ -273,7 +275,7 @@ impl Substitution {
     ///
     /// Returns false where the angle of a tick could not be restored.
     fn resolve(&mut self, reversal: Reversal) -> bool {
-        let waiting = core::mem::take(&mut self.lost);
+        let waiting = self.lost.take();
         let after = core::mem::take(&mut self.after);
         let (Some(first), Some(last), Some(newest)) =
             (waiting.first(), waiting.last(), self.history.newest())

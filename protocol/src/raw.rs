@@ -11,7 +11,7 @@ use isotherm_correction::units::{Span, Timestamp};
 use serde::{Deserialize, Serialize};
 
 pub use batcher::{BatchError, Batcher, RawFrame};
-pub use direct::{read_accel, read_gyro};
+pub use direct::{read_accel, read_gyro, read_temperatures};
 pub use health::{HealthBatch, HealthReading, HealthTick, MAX_HEALTH};
 
 use crate::codec::{CodecError, Kind, MAX_TICKS, Message, bounded};

@@ -9,6 +9,7 @@ mod heard;
 mod label;
 mod memory;
 mod revisions;
+mod room;
 mod status;
 #[cfg(test)]
 mod tests;
@@ -17,8 +18,8 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use isotherm_correction::calibration::Calibration;
-use isotherm_correction::operation::{Command, HealthReading, Refusal, State};
-use isotherm_correction::sample::{AccelTick, CorrectedTick, GyroTick, TemperatureReading, TickFlags};
+use isotherm_correction::operation::{Command, Refusal, State};
+use isotherm_correction::sample::{CorrectedTick, TickFlags};
 use isotherm_correction::unit::{At, Change, Event, Unit, UnitSettings};
 use isotherm_correction::units::Span;
 use serde::{Deserialize, Serialize};
@@ -30,11 +31,12 @@ pub use label::Label;
 pub use memory::{MEMORY_VERSION, MemoryError};
 pub use revisions::InForce;
 use revisions::Revisions;
+use room::{Queues, Room};
 
 use crate::codec::{self, CodecError, MAX_TICKS};
 use crate::corrected::{AppliedTemperature, CorrectedBody, Revision, Ticks};
 use crate::key::{Input, RawStream, UnitId};
-use crate::raw::{self, HealthBatch, TemperatureBatch};
+use crate::raw::{self, HealthBatch};
 use crate::reference::Reference;
 use crate::status::{Counter, LastTick};
 
@@ -57,15 +59,6 @@ pub struct UnitStream {
     series: Option<u64>,
     /// End of the last pre-launch calibration (ns on the producer's clock).
     pre_launch_ended_ns: Option<i64>,
-    // Room to work in, not memory.
-    #[serde(skip)]
-    gyro_ticks: Vec<GyroTick>,
-    #[serde(skip)]
-    accel_ticks: Vec<AccelTick>,
-    #[serde(skip)]
-    readings: Vec<TemperatureReading>,
-    #[serde(skip)]
-    health: Vec<HealthReading>,
 }
 
 impl UnitStream {
@@ -83,10 +76,6 @@ impl UnitStream {
             incoming_series: 0,
             series: None,
             pre_launch_ended_ns: None,
-            gyro_ticks: Vec::new(),
-            accel_ticks: Vec::new(),
-            readings: Vec::new(),
-            health: Vec::new(),
         }
     }
 
@@ -177,46 +166,31 @@ impl UnitStream {
     /// [`CodecError`] for a frame that cannot be read: it is counted, and nothing else changes.
     pub fn receive(&mut self, stream: RawStream, frame: &[u8]) -> Result<(), CodecError> {
         self.note_heard(Input::Raw(stream), frame);
-        let received = self.receive_frame(stream, frame);
+        let received = room::with(|room| self.receive_frame(stream, frame, room));
         self.bad_frames += u64::from(received.is_err());
         received
     }
 
-    fn receive_frame(&mut self, stream: RawStream, frame: &[u8]) -> Result<(), CodecError> {
+    fn receive_frame(&mut self, stream: RawStream, frame: &[u8], room: &mut Room) -> Result<(), CodecError> {
+        let Room { gyro_ticks, accel_ticks, readings, health, queues } = room;
         match stream {
             RawStream::Gyro => {
-                let mut ticks = std::mem::take(&mut self.gyro_ticks);
-                let read = raw::read_gyro(frame, &mut ticks);
-                if let Ok(output) = read {
-                    self.handle(Event::Gyro { output, ticks: &ticks });
-                }
-                self.gyro_ticks = ticks;
-                read?;
+                let output = raw::read_gyro(frame, gyro_ticks)?;
+                self.handle_in(queues, Event::Gyro { output, ticks: gyro_ticks });
             }
             RawStream::Accel => {
-                let mut ticks = std::mem::take(&mut self.accel_ticks);
-                let read = raw::read_accel(frame, &mut ticks);
-                if let Ok(output) = read {
-                    self.handle(Event::Accel { output, ticks: &ticks });
-                }
-                self.accel_ticks = ticks;
-                read?;
+                let output = raw::read_accel(frame, accel_ticks)?;
+                self.handle_in(queues, Event::Accel { output, ticks: accel_ticks });
             }
             RawStream::Temperature => {
-                let batch: TemperatureBatch = codec::decode(frame)?;
-                let mut readings = std::mem::take(&mut self.readings);
-                readings.clear();
-                readings.extend(batch.to_core());
-                self.handle(Event::Temperature(&readings));
-                self.readings = readings;
+                raw::read_temperatures(frame, readings)?;
+                self.handle_in(queues, Event::Temperature(readings));
             }
             RawStream::Health => {
                 let batch: HealthBatch = codec::decode(frame)?;
-                let mut readings = std::mem::take(&mut self.health);
-                readings.clear();
-                readings.extend(batch.to_core());
-                self.handle(Event::Health(&readings));
-                self.health = readings;
+                health.clear();
+                health.extend(batch.to_core());
+                self.handle_in(queues, Event::Health(health));
             }
         }
         Ok(())
@@ -236,6 +210,11 @@ impl UnitStream {
 
     /// Takes one event that is no frame, or no longer.
     pub fn handle(&mut self, event: Event<'_>) {
+        room::with(|room| self.handle_in(&mut room.queues, event));
+    }
+
+    fn handle_in(&mut self, queues: &mut Queues, event: Event<'_>) {
+        queues.lend(&mut self.unit, &mut self.ready);
         if let Event::Gyro { ticks, .. } = event {
             self.incoming_series = ticks.last().map_or(self.incoming_series, |tick| tick.series);
         }
@@ -261,6 +240,7 @@ impl UnitStream {
             before.0.into_iter().chain(after.0).for_each(|counter| self.revisions.made_ticks(counter));
         }
         self.note_pre_launch(state);
+        queues.take_back(&mut self.unit, &mut self.ready);
     }
 
     /// Does something with the unit that may end a pre-launch calibration.
@@ -320,6 +300,9 @@ impl UnitStream {
         let last = last.map(|tick| (tick.end_time.as_ns(), tick.sequence, tick.revision));
         self.note_taken(last);
         self.ready.drain(..count);
+        if self.ready.is_empty() {
+            room::with(|room| room.queues.take_ready(&mut self.ready));
+        }
     }
 
     /// The first output of each revision, in order and once each; ask after every frame.

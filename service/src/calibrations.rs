@@ -10,9 +10,11 @@ use isotherm_correction::units::Span;
 use isotherm_protocol::control::Schedule;
 use isotherm_protocol::corrected::Revision;
 use isotherm_protocol::digest::Digest;
-use isotherm_protocol::document::Document;
 use isotherm_protocol::history::Source;
 use isotherm_protocol::key::UnitId;
+use isotherm_protocol::stream::Label;
+
+use crate::kept_text::KeptText;
 
 /// A calibration as a unit is given it.
 #[derive(Debug, Clone)]
@@ -21,23 +23,31 @@ pub struct Installable {
     pub revision: Revision,
     /// The compiled calibration.
     pub calibration: Arc<Calibration>,
-    /// SHA-256 of the document's text; `None` for a calibration that never was one.
-    pub digest: Option<Digest>,
-    /// The document; `None` for a calibration that never was one.
-    pub document: Option<Arc<Document>>,
+    /// What the status says of it; without a digest for a calibration that never was a document.
+    pub label: Label,
     /// The text that it was compiled from, for the journal; `None` for a calibration that never was a document.
-    pub text: Option<Arc<str>>,
-    /// SHA-256 of the overlay that was laid over it.
-    pub overlay: Option<Digest>,
-    /// Where it came from; `None` for one that the program itself was started with.
-    pub source: Option<Source>,
+    pub text: Option<KeptText>,
 }
 
 impl Installable {
     /// A calibration that never was a document.
     #[must_use]
     pub fn plain(revision: Revision, calibration: Arc<Calibration>) -> Self {
-        Self { revision, calibration, digest: None, document: None, text: None, overlay: None, source: None }
+        Self { revision, calibration, label: Label::default(), text: None }
+    }
+
+    /// One that was compiled from a document; `overlay` was laid over it.
+    #[must_use]
+    pub fn of_document(
+        counter: u64,
+        calibration: Arc<Calibration>,
+        (label, overlay): (Label, Option<Digest>),
+        text: KeptText,
+        source: &Source,
+    ) -> Self {
+        let digest = label.digest.map(|digest| digest.head()).unwrap_or_default();
+        let label = Label { overlay, source: source.to_string(), ..label };
+        Self { revision: Revision { counter, digest }, calibration, label, text: Some(text) }
     }
 }
 
@@ -45,7 +55,7 @@ impl Installable {
 #[derive(Debug, Clone)]
 pub struct Change {
     /// What is to be in force.
-    pub next: Installable,
+    pub next: Arc<Installable>,
     /// From which tick on.
     pub at: Schedule,
     /// Time over which the change is made; zero is at once.
@@ -56,7 +66,7 @@ pub struct Change {
 #[derive(Debug, Clone, Default)]
 pub struct Plan {
     /// In force from the next tick on, or already.
-    pub current: Option<Installable>,
+    pub current: Option<Arc<Installable>>,
     /// To follow at its tick.
     pub pending: Option<Change>,
 }
@@ -104,7 +114,7 @@ impl Calibrations {
     /// Adds or replaces the calibration of one unit by one that is no document, as its first revision.
     pub fn insert(&mut self, unit: UnitId, calibration: Arc<Calibration>, digest: [u8; 8]) {
         let revision = Revision { counter: 1, digest };
-        let current = Installable::plain(revision, calibration);
+        let current = Arc::new(Installable::plain(revision, calibration));
         self.by_unit.insert(unit, Plan { current: Some(current), pending: None });
     }
 

@@ -116,7 +116,8 @@ struct Kind {
 /// Counts faults and remembers the first of each kind in words.
 #[derive(Debug, Clone, Default)]
 pub struct FaultLog {
-    kinds: [Kind; FaultKind::ALL.len()],
+    /// None before the first fault, for most units have none; then every kind.
+    kinds: Vec<Kind>,
     last: Option<FaultKind>,
 }
 
@@ -134,6 +135,9 @@ impl FaultLog {
         count: u64,
         words: impl FnOnce() -> String,
     ) -> Option<Telling> {
+        if self.kinds.is_empty() {
+            self.kinds = vec![Kind::default(); FaultKind::ALL.len()];
+        }
         let entry = self.kinds.get_mut(kind as usize)?;
         entry.count += count;
         entry.last = Some(SystemTime::now());

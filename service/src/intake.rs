@@ -272,7 +272,23 @@ impl Intake {
     pub fn each_unit<T>(&self, mut work: impl FnMut(&mut UnitActor) -> T) -> Vec<T> {
         // Not locked meanwhile: a unit that appears must not wait for a look at all others.
         let units = read(&self.units).in_order();
-        units.iter().filter_map(|unit| guarded(&mut lock(unit), &mut work)).collect()
+        units.iter().filter_map(|(_, unit)| guarded(&mut lock(unit), &mut work)).collect()
+    }
+
+    /// Does something with every unit, as [`Self::each_unit`], and what is to follow with each before the next: the unit is
+    /// not locked any more then. How many had something to follow.
+    pub(crate) fn one_by_one<T>(
+        &self,
+        mut work: impl FnMut(&mut UnitActor) -> Option<T>,
+        mut then: impl FnMut(T),
+    ) -> usize {
+        let units = read(&self.units).in_order();
+        let found = units.iter().filter_map(|(_, unit)| {
+            // A statement of its own: the lock ends with it.
+            let found = guarded(&mut lock(unit), &mut work);
+            found.flatten()
+        });
+        found.map(&mut then).count()
     }
 
     /// Status of one unit; `instance` is the service's name for itself.

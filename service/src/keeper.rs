@@ -19,7 +19,7 @@ use crate::config::Settings;
 use crate::intake::Intake;
 use crate::registrar::Board;
 use crate::unit::UnitActor;
-use instance::Instance;
+use instance::{Instance, Look};
 use outlets::Outlets;
 
 /// Requests that may wait for the keeper; what comes beyond is refused, which a query notices by its missing reply.
@@ -187,22 +187,29 @@ impl Work {
     fn publish(&mut self, mut is_due: impl FnMut(&mut UnitActor) -> bool) {
         // Before the look: who rings from here on is heard again.
         self.rung.store(false, Ordering::Release);
-        let instance = self.instance.name();
-        let due = self
-            .intake
-            .each_unit(|actor| is_due(actor).then(|| (actor.id().clone(), actor.status(instance))));
-        for (unit, status) in due.into_iter().flatten() {
-            self.units_changed = true;
-            if let Err(error) = self.outlets.unit(&unit, &status) {
-                tracing::warn!(%unit, "cannot publish the status: {}", isotherm_bus::words(&error));
-            }
-        }
+        let Self { instance, intake, outlets, .. } = self;
+        let name = instance.name();
+        // One after the other: the statuses of thousands of units are megabytes.
+        let told = intake.one_by_one(
+            |actor| is_due(actor).then(|| (actor.id().clone(), actor.status(name))),
+            |(unit, status)| {
+                if let Err(error) = outlets.unit(&unit, &status) {
+                    tracing::warn!(%unit, "cannot publish the status: {}", isotherm_bus::words(&error));
+                }
+            },
+        );
+        // What the service says of its units changes with a status that is due.
+        self.units_changed |= told > 0;
     }
 
     /// Publishes the service's own status where it has changed, or `always`.
     fn publish_own(&mut self, always: bool) {
-        let changed = std::mem::take(&mut self.units_changed);
-        if let Some(status) = self.instance.status(&self.intake, changed, always)
+        let look = match (always, std::mem::take(&mut self.units_changed)) {
+            (true, _) => Look::Always,
+            (false, true) => Look::IfNews,
+            (false, false) => Look::IfPosted,
+        };
+        if let Some(status) = self.instance.status(&self.intake, look)
             && let Err(error) = self.outlets.service(&status)
         {
             tracing::warn!("cannot publish the service's status: {}", isotherm_bus::words(&error));

@@ -9,30 +9,50 @@ const SUB_BITS: u32 = 4;
 /// One linear stretch below 16 ns, then sixteen buckets for each power of two up to 2⁶⁴ ns.
 const BUCKETS: usize = ((u64::BITS - SUB_BITS + 1) as usize) << SUB_BITS;
 
-/// Counts latencies in logarithmic buckets; recording never allocates.
-#[derive(Debug, Clone)]
+/// Counts latencies in logarithmic buckets. Buckets are made for those powers of two in which there is a latency, when its
+/// first one comes: a unit's latencies lie within some of the 61.
+#[derive(Debug, Clone, Default)]
 pub struct Histogram {
-    counts: Box<[u64]>,
+    /// In order.
+    octaves: Vec<Octave>,
     total: u64,
     sum: u64,
     largest: u64,
 }
 
-impl Default for Histogram {
-    fn default() -> Self {
-        Self { counts: vec![0; BUCKETS].into_boxed_slice(), total: 0, sum: 0, largest: 0 }
-    }
+/// The buckets of a power of two.
+#[derive(Debug, Clone)]
+struct Octave {
+    number: usize,
+    counts: [u64; 1 << SUB_BITS],
 }
 
 impl Histogram {
     /// Counts one latency (ns).
     pub fn record(&mut self, ns: u64) {
-        if let Some(count) = self.counts.get_mut(bucket(ns)) {
+        let bucket = bucket(ns);
+        let (number, sub) = (bucket >> SUB_BITS, bucket % (1 << SUB_BITS));
+        let place = self.octaves.binary_search_by_key(&number, |octave| octave.number);
+        let place = place.unwrap_or_else(|place| {
+            // There are few, and they stay.
+            self.octaves.reserve_exact(1);
+            self.octaves.insert(place, Octave { number, counts: [0; 1 << SUB_BITS] });
+            place
+        });
+        if let Some(count) = self.octaves.get_mut(place).and_then(|octave| octave.counts.get_mut(sub)) {
             *count += 1;
         }
         self.total += 1;
         self.sum = self.sum.saturating_add(ns);
         self.largest = self.largest.max(ns);
+    }
+
+    /// Every bucket there is, in order, with its number.
+    fn counts(&self) -> impl Iterator<Item = (u64, u64)> + '_ {
+        self.octaves.iter().flat_map(|octave| {
+            let counts = octave.counts.iter().enumerate();
+            counts.map(|(sub, count)| (((octave.number << SUB_BITS) + sub) as u64, *count))
+        })
     }
 
     /// How many were counted.
@@ -50,10 +70,8 @@ impl Histogram {
     /// The buckets in which something was counted, by their largest latency.
     #[must_use]
     pub fn buckets(&self) -> Vec<LatencyBucket> {
-        let counted = self.counts.iter().enumerate().filter(|(_, count)| **count > 0);
-        counted
-            .map(|(index, count)| LatencyBucket { up_to_ns: upper_bound(index as u64), count: *count })
-            .collect()
+        let counted = self.counts().filter(|(_, count)| *count > 0);
+        counted.map(|(index, count)| LatencyBucket { up_to_ns: upper_bound(index), count }).collect()
     }
 
     /// The latency (ns) that the share `share` (0…1) of all counted ones does not exceed; 0 where nothing was counted.
@@ -69,10 +87,10 @@ impl Histogram {
     pub fn quantile(&self, share: f64) -> u64 {
         let rank = ((self.total as f64 * share.clamp(0.0, 1.0)).ceil() as u64).max(1);
         let mut seen = 0;
-        for (index, count) in self.counts.iter().enumerate() {
+        for (index, count) in self.counts() {
             seen += count;
             if seen >= rank {
-                return upper_bound(index as u64).min(self.largest);
+                return upper_bound(index).min(self.largest);
             }
         }
         self.largest

@@ -9,6 +9,8 @@
 //! | `desk` | how to ask, without waiting |
 //! | `work` | the thread |
 //! | `order` | what a swap is asked for with |
+//! | `reading` | a document that was read and holds |
+//! | `file` | files of the folder, read |
 //! | `admit` | text in; verdict, problems and warnings out |
 //! | `policy` | age, temperature range, jump, schema version |
 //! | `compare` | what a swap changes |
@@ -30,11 +32,13 @@ mod board;
 mod command;
 mod compare;
 mod desk;
+mod file;
 mod folder;
 mod notice;
 mod order;
 mod policy;
 mod pre_launch;
+mod reading;
 mod record;
 mod refusals;
 mod rollback;

@@ -43,6 +43,8 @@ use log::{Found, Log};
 use mark::Mark;
 use shelf::Shelf;
 
+use crate::kept_text::KeptText;
+
 /// How long an audit file becomes before a new one is begun (bytes).
 const FULL_BYTES: u64 = 64 << 20;
 /// Most entries that are kept where there is no state folder.
@@ -160,6 +162,16 @@ impl Store {
         self.documents.put(bytes)
     }
 
+    /// Keeps calibration documents, each under its digest: all of them are on the disk when this returns. Much sooner than
+    /// one by one.
+    ///
+    /// # Errors
+    /// As [`Self::put_document`]; some may be kept then.
+    pub fn put_documents(&mut self, documents: &[(Digest, KeptText)]) -> Result<(), StoreError> {
+        self.check_held()?;
+        self.documents.put_all(documents)
+    }
+
     /// Keeps an overlay, as [`Self::put_document`] does a document.
     ///
     /// # Errors
@@ -198,27 +210,50 @@ impl Store {
         by: &str,
         event: AuditEvent,
     ) -> Result<u64, StoreError> {
+        self.append_all(time, [(unit, by, event)])
+    }
+
+    /// Writes entries down in their order, as [`Self::append`] does one, and gives the number of the last; all of them are on
+    /// the disk when this returns.
+    ///
+    /// # Errors
+    /// The same; of none of them anything is written then.
+    pub fn append_all<'e>(
+        &mut self,
+        time: SystemTime,
+        entries: impl IntoIterator<Item = (Option<&'e UnitId>, &'e str, AuditEvent)>,
+    ) -> Result<u64, StoreError> {
+        let entries: Vec<_> = entries.into_iter().collect();
         self.check_held()?;
-        self.check_stored(&event)?;
+        entries.iter().try_for_each(|(_, _, event)| self.check_stored(event))?;
         self.begin_anew_if_due(time)?;
-        if let (AuditEvent::Accepted(accepted), Journal::Folder { path, mark, .. }) =
-            (&event, &mut self.journal)
+        let revision = |event: &AuditEvent| match event {
+            AuditEvent::Accepted(accepted) => Some(accepted.revision),
+            _ => None,
+        };
+        if let (Some(highest), Journal::Folder { path, mark, .. }) =
+            (entries.iter().filter_map(|(_, _, event)| revision(event)).max(), &mut self.journal)
         {
-            mark.reserve(path, accepted.revision).map_err(StoreError::write(path))?;
+            mark.reserve(path, highest).map_err(StoreError::write(path))?;
         }
-        let entry = entry(self.next_number, time, unit, by, event);
+        let numbered = (self.next_number..).zip(entries);
+        let entries: Vec<_> =
+            numbered.map(|(number, (unit, by, event))| entry(number, time, unit, by, event)).collect();
         match &mut self.journal {
-            Journal::Folder { log, .. } => log.append(&entry.to_line()?)?,
+            Journal::Folder { log, .. } => {
+                let lines: Result<Vec<_>, _> = entries.iter().map(AuditEntry::to_line).collect();
+                log.append(&lines?.concat())?;
+            }
             Journal::Memory(recent) => {
-                recent.push_back(entry.clone());
-                if recent.len() > MAX_RECENT {
-                    recent.pop_front();
-                }
+                recent.extend(entries.iter().cloned());
+                recent.drain(..recent.len().saturating_sub(MAX_RECENT));
             }
         }
-        self.index.apply(&entry);
-        self.next_number = entry.number.saturating_add(1);
-        Ok(entry.number)
+        for entry in &entries {
+            self.index.apply(entry);
+        }
+        self.next_number = self.next_number.saturating_add(entries.len() as u64);
+        Ok(self.next_number.saturating_sub(1))
     }
 
     /// Refuses what would not survive a restart.

@@ -17,9 +17,9 @@ use isotherm_protocol::control::Schedule;
 use isotherm_protocol::journal::JournalEvent;
 use isotherm_protocol::key::{RawStream, UnitId};
 use isotherm_protocol::status::{self, Counter, Output};
-use isotherm_protocol::stream::{Label, UnitStream};
+use isotherm_protocol::stream::UnitStream;
 
-use crate::calibrations::{Change, Installable, Plan};
+use crate::calibrations::{Change, Plan};
 use crate::fault::{FaultKind, FaultLog};
 use crate::latency::Histogram;
 use crate::registrar::{Desk, Notice};
@@ -50,7 +50,8 @@ pub struct UnitActor {
     stream: UnitStream,
     plan: Plan,
     outlet: Outlet,
-    frame: Vec<u8>,
+    /// Length of the last frame that was published (bytes).
+    frame_length: usize,
     faults: FaultLog,
     latency: Histogram,
     quiet: Quiet,
@@ -82,7 +83,7 @@ impl UnitActor {
             stream: UnitStream::new(id, settings),
             plan: Plan::default(),
             outlet,
-            frame: Vec::new(),
+            frame_length: 0,
             faults: FaultLog::default(),
             latency: Histogram::default(),
             quiet: Quiet::new(quiet),
@@ -118,7 +119,7 @@ impl UnitActor {
     /// Hands a change to the stream.
     fn give(&mut self, change: &Change) -> Option<u64> {
         let Change { next, at, slew } = change;
-        let label = label(next);
+        let label = next.label.clone();
         let (calibration, revision) = (Arc::clone(&next.calibration), next.revision);
         let replaced = if label.digest.is_none() {
             self.stream.install_as(calibration, revision, label);
@@ -221,13 +222,12 @@ impl UnitActor {
     fn publish(&mut self) -> bool {
         let mut published = false;
         while let ready @ 1.. = self.stream.ready().len() {
-            let encoded = self.stream.next_frame(&mut self.frame);
+            // It goes away with the frame: room for one like the last, made at once.
+            let mut frame = Vec::with_capacity(self.frame_length + self.frame_length / 8);
+            let encoded = self.stream.next_frame(&mut frame);
+            self.frame_length = frame.len();
             let taken = (ready - self.stream.ready().len()) as u64;
-            let sent = if encoded {
-                (self.outlet)(std::mem::take(&mut self.frame))
-            } else {
-                Err("cannot be encoded".into())
-            };
+            let sent = if encoded { (self.outlet)(frame) } else { Err("cannot be encoded".into()) };
             match sent {
                 Ok(()) => published = true,
                 Err(error) => self.fault(FaultKind::Unpublished, taken, || {
@@ -339,17 +339,6 @@ impl UnitActor {
     #[must_use]
     pub fn id(&self) -> &UnitId {
         self.stream.id()
-    }
-}
-
-/// What the status says of a calibration.
-fn label(next: &Installable) -> Label {
-    let source = next.source.as_ref().map(ToString::to_string).unwrap_or_default();
-    match (&next.document, next.digest) {
-        (Some(document), Some(digest)) => {
-            Label { overlay: next.overlay, ..Label::of(document, digest, source) }
-        }
-        (_, digest) => Label { digest, source, overlay: next.overlay, ..Label::default() },
     }
 }
 

@@ -55,7 +55,7 @@ impl DriftEstimator {
         Self {
             gyros: gyros.iter().map(|model| model.map(GyroDrift::new)).collect(),
             settings,
-            waiting: Waiting::default(),
+            waiting: if gyros.is_empty() { Waiting::default() } else { Waiting::with_room() },
             counters: ReferenceCounters::default(),
             last_refusal: None,
             now: None,

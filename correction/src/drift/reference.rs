@@ -2,9 +2,9 @@
 
 use core::cmp::Ordering;
 
-use arrayvec::ArrayVec;
 use serde::{Deserialize, Serialize};
 
+use crate::later::Later;
 use crate::units::{Span, Timestamp};
 
 /// Shortest span of a reference.
@@ -180,30 +180,38 @@ impl Reference {
 /// References that wait for the first tick which is to feel them, the earliest first.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Waiting {
-    references: ArrayVec<Reference, MAX_WAITING_REFERENCES>,
+    references: Later<Reference, MAX_WAITING_REFERENCES>,
 }
 
 impl Waiting {
+    /// None, with room for all that may wait.
+    pub(super) fn with_room() -> Self {
+        let mut waiting = Self::default();
+        waiting.references.room();
+        waiting
+    }
+
     /// Puts a reference in its place; gives back the one furthest in the future where that is one too many.
     pub(super) fn push(&mut self, reference: &Reference) -> Option<Reference> {
         let mut over = None;
-        if self.references.is_full() {
-            let last = self.references.last().copied()?;
+        let references = self.references.room();
+        if references.is_full() {
+            let last = references.last().copied()?;
             if reference.order(&last).is_ge() {
                 return Some(*reference);
             }
-            over = self.references.pop();
+            over = references.pop();
         }
-        let place = self.references.iter().position(|r| reference.order(r).is_lt());
-        let place = place.unwrap_or(self.references.len());
+        let place = references.iter().position(|r| reference.order(r).is_lt());
+        let place = place.unwrap_or(references.len());
         // There is room: one was taken out above.
-        self.references.try_insert(place, *reference).ok();
+        references.try_insert(place, *reference).ok();
         over
     }
 
     /// The next reference that `due` holds for.
     pub(super) fn pop_if(&mut self, due: impl Fn(&Reference) -> bool) -> Option<Reference> {
-        if self.references.first().is_some_and(due) { self.references.pop_at(0) } else { None }
+        if self.references.first().is_some_and(due) { self.references.room().pop_at(0) } else { None }
     }
 
     pub(super) fn len(&self) -> usize {
@@ -214,8 +222,11 @@ impl Waiting {
     pub(super) fn restart(&mut self, now: Timestamp) -> usize {
         const NEAR: Span = Span::from_ns(3_600_000_000_000);
         let before = self.references.len();
+        if before == 0 {
+            return 0;
+        }
         // What ends before the first tick of the new time has no readings any more.
-        self.references.retain(|r| r.end > now && r.end.since(now) < NEAR);
+        self.references.room().retain(|r| r.end > now && r.end.since(now) < NEAR);
         before - self.references.len()
     }
 }

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::linear::{orthonormal_columns, parity_rows};
 use super::{Orientation, SensorMask, masked};
+use crate::later::Later;
 use crate::sample::{MAX_PARITY, MAX_SENSORS, MIN_SENSORS};
 
 /// The remaining parity vector without the suspect must be shorter than this fraction of the one without the
@@ -40,7 +41,7 @@ struct Compiled {
     mask: SensorMask,
     temperature_deg_c: f64,
     /// V·√W: N − 3 rows, V·√W·C = 0, V·Vᵀ = 1.
-    matrix: ArrayVec<[f64; MAX_SENSORS], MAX_PARITY>,
+    matrix: Later<[f64; MAX_SENSORS], MAX_PARITY>,
 }
 
 impl ParityCheck {
@@ -81,7 +82,7 @@ impl ParityCheck {
             return verdict;
         };
 
-        for row in &compiled.matrix {
+        for row in compiled.matrix.iter() {
             let products = row.iter().zip(readings).enumerate();
             let used = products.filter(|(index, _)| mask.contains(*index));
             verdict.residuals.push(used.fold(0.0, |sum, (_, (v, s))| sum + v * s));
@@ -122,13 +123,14 @@ impl ParityCheck {
                 self.suspect = None;
             }
         }
-        let mut matrix = ArrayVec::new();
+        let mut matrix = self.compiled.take().map(|before| before.matrix).unwrap_or_default();
+        matrix.take();
         if mask.count() > MIN_SENSORS {
             let rows = masked(orientation.rows_at(temperature_deg_c), mask);
             if let Some((q, _)) = orthonormal_columns(&orientation.weighted(rows)) {
-                matrix = parity_rows(&q, |index| mask.contains(index));
+                *matrix.room() = parity_rows(&q, |index| mask.contains(index));
             }
-            for row in &mut matrix {
+            for row in matrix.room() {
                 for (v, root_weight) in row.iter_mut().zip(&orientation.root_weights) {
                     *v *= root_weight;
                 }

@@ -1,5 +1,7 @@
 //! The last good readings, as rates against their mid-tick times.
 
+use alloc::vec::Vec;
+
 use serde::{Deserialize, Serialize};
 
 use crate::sample::MAX_SENSORS;
@@ -56,26 +58,24 @@ impl Reading {
     }
 }
 
-/// A ring of the newest readings.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+/// A ring of the newest readings; its room is made with the first of them, for most units never see a switch.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(super) struct History {
-    #[serde(with = "crate::written::array")]
-    ring: [Reading; KEPT],
+    /// Nothing, or [`KEPT`] readings.
+    #[serde(with = "written")]
+    ring: Vec<Reading>,
     /// Where the next reading goes, below [`KEPT`].
     next: usize,
     /// Readings held, at most [`KEPT`].
     held: usize,
 }
 
-impl Default for History {
-    fn default() -> Self {
-        Self { ring: [Reading::NONE; KEPT], next: 0, held: 0 }
-    }
-}
-
 impl History {
     /// Adds the newest reading; the oldest gives way.
     pub(super) fn push(&mut self, reading: Reading) {
+        if self.ring.is_empty() {
+            self.ring = alloc::vec![Reading::NONE; KEPT];
+        }
         if let Some(slot) = self.ring.get_mut(self.next) {
             *slot = reading;
         }
@@ -91,5 +91,25 @@ impl History {
     /// The newest reading.
     pub(super) fn newest(&self) -> Option<&Reading> {
         self.newest_first().next()
+    }
+}
+
+/// Written down with all its room, whether it is there or not.
+mod written {
+    use alloc::vec::Vec;
+
+    use serde::{Deserializer, Serializer};
+
+    use super::{KEPT, Reading};
+    use crate::written::array;
+
+    pub(super) fn serialize<S: Serializer>(ring: &[Reading], serializer: S) -> Result<S::Ok, S::Error> {
+        let mut all = [Reading::NONE; KEPT];
+        all.iter_mut().zip(ring).for_each(|(all, reading)| *all = *reading);
+        array::serialize(&all, serializer)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<Reading>, D::Error> {
+        array::deserialize::<D, Reading, KEPT>(deserializer).map(Vec::from)
     }
 }

@@ -3,6 +3,7 @@
 use arrayvec::ArrayVec;
 use serde::{Deserialize, Serialize};
 
+use alloc::boxed::Box;
 use alloc::vec::Vec;
 
 use super::lag::{Lag, advance, settled};
@@ -23,10 +24,11 @@ pub struct GyroModel {
     pub(crate) increment_weight_error: Curve,
     pub(crate) input_limit: f64,
     pub(crate) static_bias: Curve,
-    pub(crate) magnetic_bias: Option<Curve>,
-    pub(crate) slow_meander: Option<Curve>,
-    pub(crate) thermal_rate: Option<Branched>,
-    pub(crate) thermal_acceleration: Option<Branched>,
+    // What few gyros have, in room of its own.
+    pub(crate) magnetic_bias: Option<Box<Curve>>,
+    pub(crate) slow_meander: Option<Box<Curve>>,
+    pub(crate) thermal_rate: Option<Box<Branched>>,
+    pub(crate) thermal_acceleration: Option<Box<Branched>>,
     pub(crate) lags: Vec<Lag>,
     pub(crate) trend: Option<TrendModel>,
     pub(crate) servo: Option<Servo>,
@@ -63,7 +65,7 @@ impl GyroModel {
             let parts = parts?;
             let (run_up, braking) =
                 (curve(run_up, Some(&parts.run_up)), curve(braking, Some(&parts.braking)));
-            Some(Branched { argument: parts.argument, run_up: run_up?, braking: braking? })
+            Some(Box::new(Branched { argument: parts.argument, run_up: run_up?, braking: braking? }))
         };
         let thermal_rate =
             branched("thermal_rate.run_up", "thermal_rate.braking", parts.thermal_rate.as_ref());
@@ -95,8 +97,8 @@ impl GyroModel {
             increment_weight_error: increment_weight_error.unwrap_or_else(|| Curve::constant(0.0)),
             input_limit: parts.input_limit,
             static_bias: static_bias.unwrap_or_else(|| Curve::constant(0.0)),
-            magnetic_bias,
-            slow_meander,
+            magnetic_bias: magnetic_bias.map(Box::new),
+            slow_meander: slow_meander.map(Box::new),
             thermal_rate,
             thermal_acceleration,
             lags,
@@ -123,8 +125,8 @@ impl GyroModel {
         let branched = [&self.thermal_rate, &self.thermal_acceleration].into_iter().flatten();
         [&self.increment_weight_error, &self.static_bias]
             .into_iter()
-            .chain(&self.magnetic_bias)
-            .chain(&self.slow_meander)
+            .chain(self.magnetic_bias.as_deref())
+            .chain(self.slow_meander.as_deref())
             .chain(self.lags.iter().map(|lag| &lag.gain))
             .chain(
                 branched
@@ -291,8 +293,8 @@ fn evaluate(
     };
     let weight = model.increment_weight * (1.0 + eval(&model.increment_weight_error));
     let mut bias = eval(&model.static_bias);
-    let magnetic = model.magnetic_bias.as_ref().map_or(0.0, &mut eval);
-    let meander = model.slow_meander.as_ref().map_or(0.0, &mut eval);
+    let magnetic = model.magnetic_bias.as_deref().map_or(0.0, &mut eval);
+    let meander = model.slow_meander.as_deref().map_or(0.0, &mut eval);
     for (lag, lagged) in model.lags.iter().zip(lagged) {
         bias += eval(&lag.gain) * (thermal.temperature - lagged) * lag.per_second;
     }

@@ -82,6 +82,11 @@ impl AccelIntake {
         }
     }
 
+    /// Where ticks wait, to be lent and given back.
+    pub(super) fn queue(&mut self) -> &mut VecDeque<Pending> {
+        &mut self.pending
+    }
+
     /// Looks for the tick that ends with `gyro`, nearer than half the gyro tick's duration; one that is not there may still
     /// come.
     pub(super) fn meets(&mut self, gyro: &GyroTick, counters: &mut Counters) -> Option<&Pending> {

@@ -26,7 +26,7 @@ const OLD_BELIEVED_AFTER: u32 = 256;
 
 /// A tick that waits for its release.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-struct Pending {
+pub(super) struct Pending {
     tick: GyroTick,
     output: OutputKind,
     /// End of the last tick that was admitted with it from one batch, once that is known. The window counts from
@@ -318,6 +318,11 @@ impl GyroIntake {
         self.released = kept | 1;
         self.last = Some(tick.sequence);
         Some(Left { tick, output, missed, restart })
+    }
+
+    /// Where ticks wait, to be lent and given back.
+    pub(super) fn queue(&mut self) -> &mut VecDeque<Pending> {
+        &mut self.pending
     }
 
     /// How many ticks wait.

@@ -1,20 +1,25 @@
 //! Gyro and accelerometer frames straight into the core's ticks, into room that is used again.
 //!
 //! This is what becomes of every message in the service: nothing is allocated, and no tick is written twice. The bytes are
-//! those of [`GyroBatch`] and [`AccelBatch`], which say what they mean; a test holds both readings of them together.
+//! those of [`GyroBatch`], [`AccelBatch`] and [`TemperatureBatch`], which say what they mean; a test holds both readings of them together.
 
 mod body;
 
-use isotherm_correction::sample::{AccelTick, GyroTick, HalfPeriodCounts, MAX_SENSORS, OutputKind, Sensors};
+use arrayvec::ArrayVec;
+use isotherm_correction::sample::{
+    AccelTick, ChannelName, GyroTick, HalfPeriodCounts, MAX_SENSORS, OutputKind, Sensors, TemperatureReading,
+};
 use isotherm_correction::units::Timestamp;
 
-use super::{AccelBatch, GyroBatch, span};
+use super::{AccelBatch, GyroBatch, MAX_CHANNELS, TemperatureBatch, span};
 use crate::codec::{self, CodecError, MAX_TICKS};
 
 use body::Body;
 
 /// Fewest bytes of a tick: its times, kind and number of readings.
 const FEWEST_BYTES: usize = 4;
+/// Fewest bytes of a temperature tick: its time and number of readings.
+const FEWEST_BYTES_OF_TEMPERATURES: usize = 2;
 
 /// Reads a gyro frame; what its readings stand for.
 ///
@@ -78,6 +83,47 @@ pub fn read_accel(frame: &[u8], ticks: &mut Vec<AccelTick>) -> Result<OutputKind
         Some(())
     })?;
     alike.judge(ticks.len(), rest)
+}
+
+/// Reads a temperature frame.
+///
+/// `readings` holds the readings afterwards, tick by tick in the order of the channels, and anything after an error.
+///
+/// # Errors
+/// As [`codec::decode`] of a [`TemperatureBatch`].
+pub fn read_temperatures(frame: &[u8], readings: &mut Vec<TemperatureReading>) -> Result<(), CodecError> {
+    let bytes = codec::body::<TemperatureBatch>(frame)?;
+    let mut count = 0;
+    let mut mixed = None;
+    readings.clear();
+    let rest = read_body(bytes, |body| {
+        let mut channels = ArrayVec::<ChannelName, MAX_CHANNELS>::new();
+        for _ in 0..length(body, MAX_CHANNELS)? {
+            channels.push(ChannelName::from(body.str()?).ok()?);
+        }
+        count = length(body, MAX_TICKS.min(bytes.len() / FEWEST_BYTES_OF_TEMPERATURES))?;
+        for index in 0..count {
+            let time = Timestamp::from_ns(body.i64()?);
+            let got = length(body, MAX_CHANNELS)?;
+            if got != channels.len() {
+                mixed.get_or_insert(index);
+            }
+            for reading in 0..got {
+                let raw = body.f64()?;
+                let channel = channels.get(reading);
+                readings.extend(channel.map(|channel| TemperatureReading { channel: *channel, time, raw }));
+            }
+        }
+        Some(())
+    })?;
+    if rest > 0 {
+        return Err(CodecError::Trailing { count: rest });
+    }
+    match mixed {
+        _ if count == 0 => Err(CodecError::Ticks { count }),
+        Some(index) => Err(CodecError::MixedReadings { index }),
+        None => Ok(()),
+    }
 }
 
 /// Reads a body with `read`; how many bytes are left over behind it.

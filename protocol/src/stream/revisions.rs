@@ -61,6 +61,8 @@ impl Revisions {
     /// Enters one.
     pub(super) fn give(&mut self, revision: Revision, label: Label, slew: Span) {
         self.highest = self.highest.max(revision.counter);
+        // Mostly the only one.
+        self.given.reserve_exact(1);
         self.given.push_back(Given { revision, label, slew, made_ticks: false });
     }
 
@@ -90,6 +92,8 @@ impl Revisions {
         if self.in_force.len() == MAX_IN_FORCE {
             self.in_force.pop_front();
         }
+        // Taken after the same frame.
+        self.in_force.reserve_exact(1);
         self.in_force.push_back(first(self.revision(counter)));
     }
 

@@ -12,7 +12,7 @@ use crate::corrected::CorrectedBatch;
 use crate::digest::Digest;
 use crate::document::Document;
 use crate::raw::{AccelBatch, GyroBatch};
-use crate::raw::{HealthReading as WireReading, HealthTick, TemperatureTick};
+use crate::raw::{HealthReading as WireReading, HealthTick, TemperatureBatch, TemperatureTick};
 use crate::status::{Output, Place, PreLaunchVerdict, SensorKind, State as WireState, Status};
 
 const FULL: &str = include_str!("../../../config/calibration/example-full.toml");

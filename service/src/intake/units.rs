@@ -1,6 +1,6 @@
 //! The units that have appeared, and the outlets of those that may.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
 
 use isotherm_protocol::key::UnitId;
@@ -19,8 +19,8 @@ pub type OutletMaker = Box<dyn Fn(&UnitId) -> Result<Outlet, zenoh::Error> + Sen
 pub(super) struct Units {
     // For messages: the key finds its unit without an allocation.
     by_serial: HashMap<UnitId, Unit>,
-    // For everything that is told of all units.
-    in_order: BTreeMap<UnitId, Unit>,
+    /// In the order of their serials, for those who look at all of them many times a second.
+    in_order: Arc<Vec<(UnitId, Unit)>>,
 }
 
 impl Units {
@@ -36,13 +36,15 @@ impl Units {
 
     /// Takes one in.
     pub(super) fn insert(&mut self, id: UnitId, unit: &Unit) {
-        self.in_order.insert(id.clone(), Arc::clone(unit));
+        let in_order = Arc::make_mut(&mut self.in_order);
+        let place = in_order.partition_point(|(before, _)| *before < id);
+        in_order.insert(place, (id.clone(), Arc::clone(unit)));
         self.by_serial.insert(id, Arc::clone(unit));
     }
 
-    /// All of them, in the order of their serials.
-    pub(super) fn in_order(&self) -> Vec<Unit> {
-        self.in_order.values().map(Arc::clone).collect()
+    /// All of them as they are now, in the order of their serials.
+    pub(super) fn in_order(&self) -> Arc<Vec<(UnitId, Unit)>> {
+        Arc::clone(&self.in_order)
     }
 }
 

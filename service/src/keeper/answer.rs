@@ -7,7 +7,7 @@ use zenoh::bytes::ZBytes;
 use zenoh::key_expr::keyexpr;
 use zenoh::query::Query;
 
-use super::{Asked, Work};
+use super::{Asked, Look, Work};
 
 impl Work {
     /// Replies with everything that the query's key takes in, of what is asked for.
@@ -34,7 +34,7 @@ impl Work {
         let mut replies: Vec<_> = statuses.into_iter().flatten().collect();
         let key = key::service_status(instance);
         if takes_in(query, &key)
-            && let Some(status) = self.instance.status(&self.intake, true, true)
+            && let Some(status) = self.instance.status(&self.intake, Look::Always)
         {
             replies.push((key, codec::encode(&status)));
         }

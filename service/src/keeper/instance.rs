@@ -12,6 +12,17 @@ use crate::fault::standing;
 use crate::intake::Intake;
 use crate::registrar::{Board, Posted};
 
+/// When the service's status is asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Look {
+    /// In any case.
+    Always,
+    /// Where something has changed since the last time.
+    IfNews,
+    /// Likewise, where units have not.
+    IfPosted,
+}
+
 /// This instance of the service.
 pub(super) struct Instance {
     name: String,
@@ -21,7 +32,7 @@ pub(super) struct Instance {
     /// What was said last, as far as a change of it is news.
     said: Option<ServiceStatus>,
     /// What the registrar had posted then.
-    posted: Posted,
+    posted: Option<Arc<Posted>>,
 }
 
 impl Instance {
@@ -34,7 +45,7 @@ impl Instance {
             settings_digest,
             board,
             said: None,
-            posted: Posted::default(),
+            posted: None,
         }
     }
 
@@ -43,16 +54,10 @@ impl Instance {
         &self.name
     }
 
-    /// Its status, where something has changed since the last time, or `always`. Where no unit is said to have changed they are not
-    /// even looked at.
-    pub(super) fn status(
-        &mut self,
-        intake: &Intake,
-        units_changed: bool,
-        always: bool,
-    ) -> Option<ServiceStatus> {
+    /// Its status, where something has changed since the last time, or in any case.
+    pub(super) fn status(&mut self, intake: &Intake, look: Look) -> Option<ServiceStatus> {
         let posted = self.board.read();
-        if !always && !units_changed && self.posted == posted {
+        if look == Look::IfPosted && self.posted.as_ref().is_some_and(|before| Arc::ptr_eq(before, &posted)) {
             return None;
         }
         let mut units = intake.each_unit(|actor| {
@@ -75,7 +80,9 @@ impl Instance {
             swaps_accepted: posted.accepted,
             swaps_refused: posted.refused,
         };
-        if !always && self.said.as_ref() == Some(&news) && self.posted.problems == posted.problems {
+        let before = self.posted.replace(Arc::clone(&posted));
+        let same_problems = before.is_some_and(|before| before.problems == posted.problems);
+        if look != Look::Always && self.said.as_ref() == Some(&news) && same_problems {
             return None;
         }
         self.said = Some(news.clone());
@@ -83,7 +90,6 @@ impl Instance {
             posted.problems.iter().map(|it| standing(it.kind, it.count, it.words.clone())).collect();
         faults.extend(intake.faults());
         faults.truncate(MAX_FAULTS);
-        self.posted = posted;
         // Time and faults go on all the time: no news by themselves.
         Some(ServiceStatus { uptime_s: self.started.0.elapsed().as_secs_f64(), faults, ..news })
     }

@@ -37,7 +37,7 @@ pub(super) struct Look {
     /// Faults that belong to no unit.
     pub(super) faults: Vec<Fault>,
     /// What the registrar has posted.
-    pub(super) posted: Posted,
+    pub(super) posted: Arc<Posted>,
     /// Whether the state folder can be written; `None` where none is configured.
     pub(super) state_folder_writable: Option<bool>,
     /// The units, in the order of their serials.

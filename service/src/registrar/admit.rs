@@ -4,12 +4,13 @@ use isotherm_correction::operation::State;
 use isotherm_protocol::control::Difference;
 use isotherm_protocol::document::Problem;
 use isotherm_protocol::key::UnitId;
-use isotherm_protocol::overlay::{Candidate, Overlay};
+use isotherm_protocol::overlay::{Candidate, Overlay, is_overlay};
 use isotherm_protocol::signature::{self, TrustedKeys};
 
 use super::compare::compare;
 use super::order::Order;
 use super::policy;
+use super::reading::Reading;
 use super::record::Record;
 use super::work::Work;
 use crate::config::SwapSettings;
@@ -22,7 +23,7 @@ pub(super) struct Verdict {
     /// Whom it is for: as asked, else as the document says; `None` where it says nothing that can be used.
     pub(super) unit: Option<UnitId>,
     /// What would be put in force; `None` where the text is no valid document.
-    pub(super) candidate: Option<Candidate>,
+    pub(super) candidate: Option<Reading>,
     /// Everything that speaks against it.
     pub(super) problems: Vec<Problem>,
     /// What is doubtful.
@@ -44,16 +45,19 @@ impl Work {
         }
         let named = order.unit.clone().or_else(|| unit_of(text));
         let record = named.as_ref().and_then(|unit| self.records.get(unit));
-        let candidate = match Candidate::parse(text, Some(order.name), base_for(text, record)) {
+        let found = order.read.cloned().unwrap_or_else(|| {
+            Candidate::parse(text, Some(order.name), base_for(text, record).as_deref()).map(Reading::from)
+        });
+        let candidate = match found {
             Ok(candidate) => candidate,
             Err(found) => {
-                problems.extend(other_serial(order, text));
+                problems.extend(other_serial(order, unit_of(text), text));
                 problems.extend(found);
                 return Verdict { warnings, ..refused(named, problems) };
             }
         };
         warnings.extend(candidate.warnings.iter().cloned());
-        let unit = match (order.unit.clone(), UnitId::new(&candidate.document.unit)) {
+        let unit = match (order.unit.clone(), UnitId::new(&candidate.unit)) {
             (Some(unit), _) | (None, Ok(unit)) => unit,
             // Not to be reached: a document's unit has been checked.
             (None, Err(error)) => {
@@ -61,13 +65,16 @@ impl Work {
                 return Verdict { warnings, ..refused(None, problems) };
             }
         };
-        if candidate.document.unit != unit.as_str() && order.options.any_serial {
-            let other = &candidate.document.unit;
+        if candidate.unit != unit.as_str() && order.options.any_serial {
+            let other = &candidate.unit;
             let message =
                 format!("is \"{other}\": taken for unit {unit} all the same, as asked (any_serial)");
             warnings.push(policy::at_key(text, order.name, "unit", message));
         }
-        problems.extend(other_serial(order, text));
+        // That of an overlay's text may be another than that of the document below it.
+        let named =
+            if candidate.overlay.is_some() { unit_of(text) } else { UnitId::new(&candidate.unit).ok() };
+        problems.extend(other_serial(order, named, text));
         let present = self.intake.present(&unit);
         warnings.extend(present.as_ref().and_then(|present| interrupts(order, present.state)));
         let waiting = self.intake.waiting(&unit).map(|(revision, _)| revision);
@@ -85,8 +92,8 @@ impl Work {
 }
 
 /// That a document names another unit than it is meant for, whatever else is wrong with it.
-fn other_serial(order: &Order<'_>, text: &str) -> Option<Problem> {
-    let (unit, other) = (order.unit.as_ref()?, unit_of(text)?);
+fn other_serial(order: &Order<'_>, named: Option<UnitId>, text: &str) -> Option<Problem> {
+    let (unit, other) = (order.unit.as_ref()?, named?);
     let message = format!(
         "is \"{other}\", but the document was meant for unit {unit}: send it to {other}, correct the serial, or say so \
          explicitly (any_serial)"
@@ -106,7 +113,7 @@ fn interrupts(order: &Order<'_>, state: State) -> Option<Problem> {
 }
 
 /// A verdict on what could not be read.
-fn refused(unit: Option<UnitId>, problems: Vec<Problem>) -> Verdict {
+pub(super) fn refused(unit: Option<UnitId>, problems: Vec<Problem>) -> Verdict {
     Verdict { unit, candidate: None, problems, warnings: Vec::new(), difference: None }
 }
 
@@ -117,10 +124,13 @@ pub(super) fn unit_of(text: &str) -> Option<UnitId> {
 }
 
 /// The document that an overlay may lie on.
-fn base_for<'r>(text: &str, record: Option<&'r Record>) -> Option<&'r str> {
+fn base_for(text: &str, record: Option<&Record>) -> Option<String> {
+    if !is_overlay(text) {
+        return None;
+    }
     let written = record?.written()?;
     let named = Overlay::parse(text, None).map(|parsed| parsed.overlay.overlay_of).unwrap_or_default();
-    Some(written.base(&named))
+    Some(written.base(&named).read())
 }
 
 /// Verifies the signature as far as the configuration asks for one.

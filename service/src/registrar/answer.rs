@@ -64,6 +64,7 @@ impl Work {
             name: &name,
             source: Source::Bus,
             overlay: None,
+            read: None,
             options,
         })
     }
@@ -74,7 +75,7 @@ impl Work {
         for (unit, record) in &self.records {
             let key = key::calibration(unit);
             if let Some(written) = record.written().filter(|_| is_asked(query, &key)) {
-                answer(query, &key, written.text.as_bytes().to_vec(), Encoding::TEXT_PLAIN);
+                answer(query, &key, written.text.read().into_bytes(), Encoding::TEXT_PLAIN);
                 told = true;
             }
         }

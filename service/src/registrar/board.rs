@@ -1,6 +1,6 @@
 //! What the service's own status shows of the registrar.
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use isotherm_protocol::escape::shown;
 use isotherm_protocol::service_status::{
@@ -40,12 +40,12 @@ pub(crate) struct Standing {
 
 /// Where the registrar posts it, and anybody looks at it.
 #[derive(Debug, Default)]
-pub(crate) struct Board(Mutex<Posted>);
+pub(crate) struct Board(Mutex<Arc<Posted>>);
 
 impl Board {
-    /// What is posted.
-    pub(crate) fn read(&self) -> Posted {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    /// What is posted: the same for as long as nothing has changed.
+    pub(crate) fn read(&self) -> Arc<Posted> {
+        Arc::clone(&self.0.lock().unwrap_or_else(PoisonError::into_inner))
     }
 }
 
@@ -75,7 +75,10 @@ impl Work {
             accepted: self.records.values().map(|record| record.accepted).sum(),
             refused: self.refusals.count(),
         };
-        *self.board.0.lock().unwrap_or_else(PoisonError::into_inner) = posted;
+        let mut board = self.board.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if **board != posted {
+            *board = Arc::new(posted);
+        }
     }
 
     /// What is wrong until somebody does something about it.

@@ -2,23 +2,20 @@
 
 use isotherm_protocol::control::Difference;
 use isotherm_protocol::document::{self, Side};
-use isotherm_protocol::overlay::Candidate;
 
+use super::reading::{Reading, document_in};
 use super::record::Active;
 use crate::unit::Present;
 
 /// The difference between what was accepted last and a candidate; `None` where the former never was a document.
 ///
 /// Temperatures and mode are those of the unit; of one that has not appeared the correction is not compared.
-pub(super) fn compare(
-    active: &Active,
-    candidate: &Candidate,
-    present: Option<&Present>,
-) -> Option<Difference> {
+pub(super) fn compare(active: &Active, candidate: &Reading, present: Option<&Present>) -> Option<Difference> {
     let written = active.written.as_ref()?;
-    let document = document::difference(&written.document, &candidate.document);
-    let before = Side { document: &written.document, calibration: &active.calibration };
-    let after = Side { document: &candidate.document, calibration: &candidate.calibration };
+    let (old, new) = (document_in(&written.text)?, candidate.document()?);
+    let document = document::difference(&old, &new);
+    let before = Side { document: &old, calibration: &active.calibration };
+    let after = Side { document: &new, calibration: &candidate.calibration };
     let (correction, temperatures) = present.map_or_else(Default::default, |present| {
         let thermal = |name: &_| present.thermal(name);
         (document::correction_change(before, after, thermal, present.mode), present.words())

@@ -15,13 +15,13 @@ use std::path::{Path, PathBuf};
 
 use isotherm_protocol::control::{SwapOptions, SwapOutcome};
 use isotherm_protocol::digest::Digest;
-use isotherm_protocol::document::{Document, Problem};
+use isotherm_protocol::document::Problem;
 use isotherm_protocol::escape::shown;
 use isotherm_protocol::history::{AuditEvent, CarriedFile, Source};
 use isotherm_protocol::key::UnitId;
 use isotherm_protocol::overlay;
 
-use super::admit::unit_of;
+use super::file::Read;
 use super::order::Order;
 use super::work::Work;
 use crate::text;
@@ -32,6 +32,8 @@ use crate::watch::{FolderEvent, read_document};
 pub(super) struct Folder {
     path: Option<PathBuf>,
     files: BTreeMap<PathBuf, File>,
+    /// How many files name a unit.
+    naming: BTreeMap<UnitId, usize>,
     gone: Option<String>,
     deaf: Option<String>,
 }
@@ -99,14 +101,41 @@ impl Folder {
     }
 
     /// Enters a file's content; the unit that it named before.
-    pub(super) fn enter(&mut self, path: &Path, bytes: &[u8]) -> Option<UnitId> {
+    pub(super) fn enter(&mut self, path: &Path, read: &Read) -> Option<UnitId> {
         let file = self.files.entry(path.to_owned()).or_default();
-        file.digest = Some(Digest::of(bytes));
-        let text = std::str::from_utf8(bytes).ok();
-        let parsed = text.and_then(|text| Document::parse(text, None).ok());
-        let unit = parsed.and_then(|parsed| UnitId::new(&parsed.document.unit).ok());
-        file.hint = text.and_then(unit_of).or_else(|| file.hint.take());
-        std::mem::replace(&mut file.unit, unit)
+        file.digest = Some(read.digest);
+        file.hint = read.hint.clone().or_else(|| file.hint.take());
+        let before = std::mem::replace(&mut file.unit, read.unit());
+        let after = file.unit.clone();
+        for (unit, by) in [(&before, -1), (&after, 1)] {
+            self.count(unit.as_ref(), by);
+        }
+        before
+    }
+
+    /// Enters that a file is gone; the unit that it named.
+    fn remove(&mut self, path: &Path) -> Option<UnitId> {
+        let unit = self.files.remove(path).and_then(|file| file.unit);
+        self.count(unit.as_ref(), -1);
+        unit
+    }
+
+    /// One file more names a unit, or one less.
+    fn count(&mut self, unit: Option<&UnitId>, by: isize) {
+        let Some(unit) = unit else { return };
+        let files = self.naming.get(unit).copied().unwrap_or(0).saturating_add_signed(by);
+        if files == 0 {
+            self.naming.remove(unit);
+        } else {
+            self.naming.insert(unit.clone(), files);
+        }
+    }
+
+    /// Enters why the document of a file is not taken.
+    pub(super) fn refuse(&mut self, path: &Path, problem: Problem) {
+        if let Some(file) = self.files.get_mut(path) {
+            file.problems = vec![problem];
+        }
     }
 }
 
@@ -115,8 +144,9 @@ impl Work {
     pub(super) fn folder_event(&mut self, event: FolderEvent) {
         match event {
             FolderEvent::Changed { file, bytes, .. } => {
-                let before = self.folder.enter(&file, &bytes);
-                self.take_file(&file, &bytes, false);
+                let read = Read::of(&file, bytes);
+                let before = self.folder.enter(&file, &read);
+                self.take_file(&file, &read, false);
                 self.look_for_survivor(before.as_ref());
             }
             FolderEvent::Unreadable { file, reason } => {
@@ -125,7 +155,7 @@ impl Work {
                 self.folder.unreadable(&file, problem);
             }
             FolderEvent::Removed { file } => {
-                let before = self.folder.files.remove(&file).and_then(|file| file.unit);
+                let before = self.folder.remove(&file);
                 let unit = before.as_ref().map(ToString::to_string).unwrap_or_default();
                 tracing::warn!(unit, "{} is gone; what is in force stays in force", file.display());
                 self.look_for_survivor(before.as_ref());
@@ -146,14 +176,14 @@ impl Work {
     }
 
     /// Takes a file that was entered; `at_start` where the service has just started. Whether it is in order.
-    pub(super) fn take_file(&mut self, path: &Path, bytes: &[u8], at_start: bool) -> bool {
+    pub(super) fn take_file(&mut self, path: &Path, read: &Read, at_start: bool) -> bool {
         let unit = self.folder.files.get(path).and_then(|file| file.unit.clone());
-        let naming = unit.map(|unit| (self.folder.naming(&unit), unit));
-        if let Some((files, unit)) = naming.filter(|(files, _)| files.len() > 1) {
-            self.refuse_rivals(&unit, &files, at_start);
+        let rivals = unit.filter(|unit| self.folder.naming.get(unit).is_some_and(|files| *files > 1));
+        if let Some(unit) = rivals {
+            self.refuse_rivals(&unit, &self.folder.naming(&unit), at_start);
             return false;
         }
-        let problems = self.swap_file(path, bytes, at_start);
+        let problems = self.swap_file(path, read, at_start);
         let good = problems.is_empty();
         if let Some(file) = self.folder.files.get_mut(path) {
             file.problems = problems;
@@ -163,9 +193,11 @@ impl Work {
     }
 
     /// Takes the document of a file through the path of every swap; what was wrong with it.
-    fn swap_file(&mut self, path: &Path, bytes: &[u8], at_start: bool) -> Vec<Problem> {
+    fn swap_file(&mut self, path: &Path, read: &Read, at_start: bool) -> Vec<Problem> {
         let name = path.display().to_string();
-        if std::str::from_utf8(bytes).is_ok_and(overlay::is_overlay) {
+        let bytes = &*read.bytes();
+        let may_be_overlay = read.unit().is_none();
+        if may_be_overlay && std::str::from_utf8(bytes).is_ok_and(overlay::is_overlay) {
             let message =
                 "is an overlay: this folder is for whole documents; put it in force with `isotherm swap`";
             let problem = text::whole(&name, message.to_owned());
@@ -175,7 +207,7 @@ impl Work {
         let file = self.folder.files.get(path);
         let valid = file.and_then(|file| file.unit.clone());
         let known = valid.clone().or_else(|| file.and_then(|file| file.hint.clone()));
-        let digest = Digest::of(bytes);
+        let digest = read.digest;
         let active = |unit: &UnitId| self.records.get(unit).and_then(|record| record.active.as_ref());
         let said = valid.as_ref().filter(|unit| active(unit).is_some());
         if let Some(unit) = said.filter(|unit| self.store.said_by_folder(unit) == Some(digest)) {
@@ -191,7 +223,9 @@ impl Work {
             .and_then(active)
             .is_some_and(|active| active.written.as_ref().is_none_or(|written| written.digest != digest));
         let options = SwapOptions::default();
-        let order = Order { unit: known.clone(), bytes, name: &name, source, overlay: None, options };
+        let found = read.found.as_ref();
+        let order =
+            Order { unit: known.clone(), bytes, name: &name, source, overlay: None, read: found, options };
         if at_start && refused && other_in_force {
             return self.judge_again(&order);
         }
@@ -254,8 +288,9 @@ impl Work {
         }
         match read_document(path) {
             Ok(bytes) => {
-                self.folder.enter(path, &bytes);
-                self.take_file(path, &bytes, false);
+                let read = Read::of(path, bytes);
+                self.folder.enter(path, &read);
+                self.take_file(path, &read, false);
             }
             // Something is becoming of it, and the watcher is going to tell what.
             Err(error) => tracing::warn!("{} cannot be read: {error}", path.display()),

@@ -2,8 +2,11 @@
 
 use isotherm_protocol::control::SwapOptions;
 use isotherm_protocol::digest::Digest;
+use isotherm_protocol::document::Problem;
 use isotherm_protocol::history::Source;
 use isotherm_protocol::key::UnitId;
+
+use super::reading::Reading;
 
 /// A document that somebody wants in force.
 #[derive(Debug, Clone)]
@@ -18,6 +21,8 @@ pub(super) struct Order<'t> {
     pub(super) source: Source,
     /// Overlay that a document was once made with; for a rollback to it.
     pub(super) overlay: Option<Digest>,
+    /// What was found in it, where it was read before.
+    pub(super) read: Option<&'t Result<Reading, Vec<Problem>>>,
     /// What else was asked for.
     pub(super) options: SwapOptions,
 }

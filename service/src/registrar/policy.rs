@@ -3,11 +3,9 @@
 use std::time::SystemTime;
 
 use isotherm_correction::units::{AngularRate, SpecificForce};
-use isotherm_protocol::digest::Digest;
 use isotherm_protocol::document::{CURRENT_SCHEMA, Problem};
-use isotherm_protocol::overlay::Candidate;
-use isotherm_protocol::stream::Label;
 
+use super::reading::Reading;
 use super::record::Active;
 use crate::config::{Severity, SwapSettings};
 use crate::unit::Present;
@@ -56,17 +54,17 @@ impl Doubt {
 /// Everything that speaks against a valid document for a unit as it is now.
 pub(super) fn judge(
     settings: &SwapSettings,
-    candidate: &Candidate,
+    candidate: &Reading,
     active: Option<&Active>,
     present: Option<&Present>,
     now: SystemTime,
 ) -> Vec<Doubt> {
     let mut doubts = Vec::new();
     doubts.extend(age(settings, candidate, now));
-    if candidate.document.schema < CURRENT_SCHEMA {
+    if candidate.schema < CURRENT_SCHEMA {
         let words = format!(
             "is version {}, this release writes {CURRENT_SCHEMA}: have the document written anew",
-            candidate.document.schema
+            candidate.schema
         );
         doubts.push(Doubt::new("schema", settings.old_schema, "old_schema", words));
     }
@@ -79,7 +77,7 @@ pub(super) fn judge(
 }
 
 /// Ticks of another kind or number of sensors than the calibration has are refused, every one of them.
-fn stream(candidate: &Candidate, active: &Active) -> Option<Doubt> {
+fn stream(candidate: &Reading, active: &Active) -> Option<Doubt> {
     let (old, new) = (&active.calibration, &candidate.calibration);
     let same = (old.gyro_output(), old.gyro_count()) == (new.gyro_output(), new.gyro_count())
         && (old.accel_count() == 0 || new.accel_count() == 0 || {
@@ -90,12 +88,11 @@ fn stream(candidate: &Candidate, active: &Active) -> Option<Doubt> {
     (!same).then(|| Doubt::new("", Severity::Refuse, "", words.to_owned()))
 }
 
-fn age(settings: &SwapSettings, candidate: &Candidate, now: SystemTime) -> Option<Doubt> {
+fn age(settings: &SwapSettings, candidate: &Reading, now: SystemTime) -> Option<Doubt> {
     let limit_s = i64::try_from(settings.max_age?.as_secs()).unwrap_or(i64::MAX);
     let limit_days = limit_s / DAY_S;
     let doubt = |words| Some(Doubt::new("created", settings.age, "age", words));
-    let label = Label::of(&candidate.document, Digest(candidate.digest), "");
-    let (Some(created), Some(created_unix_s)) = (&candidate.document.created, label.created_unix_s) else {
+    let (Some(created), Some(created_unix_s)) = (&candidate.created, candidate.label.created_unix_s) else {
         return doubt(format!(
             "is missing: whether the document is older than {limit_days} days cannot be said"
         ));
@@ -111,7 +108,7 @@ fn age(settings: &SwapSettings, candidate: &Candidate, now: SystemTime) -> Optio
 
 fn range<'a>(
     settings: &'a SwapSettings,
-    candidate: &'a Candidate,
+    candidate: &'a Reading,
     present: &'a Present,
 ) -> impl Iterator<Item = Doubt> + 'a {
     let channels = candidate.calibration.channels().iter().enumerate();
@@ -129,7 +126,7 @@ fn range<'a>(
     })
 }
 
-fn jump(settings: &SwapSettings, candidate: &Candidate, active: &Active, present: &Present) -> Vec<Doubt> {
+fn jump(settings: &SwapSettings, candidate: &Reading, active: &Active, present: &Present) -> Vec<Doubt> {
     if settings.max_jump_rad_per_s.is_none() && settings.max_jump_m_per_s2.is_none() {
         return Vec::new();
     }

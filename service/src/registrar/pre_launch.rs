@@ -14,6 +14,7 @@ use isotherm_protocol::overlay::{GyroOverlay, OVERLAY_SCHEMA, Overlay, PreLaunch
 use super::command::PreLaunchRun;
 use super::desk::PreLaunchEnd;
 use super::order::Order;
+use super::reading::document_in;
 use super::record::Written;
 use super::start;
 use super::work::Work;
@@ -32,8 +33,8 @@ impl Work {
         let Some(run) = record.pre_launch.take() else { return };
         let came_to = match outcome {
             Outcome::Refused(reasons) => {
-                let gyros: Vec<_> =
-                    record.written().map(|written| names(&written.document).collect()).unwrap_or_default();
+                let document = record.written().and_then(|written| document_in(&written.text));
+                let gyros: Vec<_> = document.as_ref().map(|it| names(it).collect()).unwrap_or_default();
                 let reasons: Vec<_> =
                     reasons.iter().map(|reason| named(&reason.to_string(), &gyros)).collect();
                 Err(reasons.join("; "))
@@ -88,7 +89,7 @@ impl Work {
             active.written.clone()
         } else {
             let set = self.store.by_revision(unit, end.revision);
-            set.and_then(|set| start::written(&self.store, set).ok()).map(|(written, _)| written)
+            set.and_then(|set| start::written(&self.store, set).ok()).map(|(written, ..)| written)
         };
         let Some(written) = written else {
             return Err(format!(
@@ -96,7 +97,10 @@ impl Work {
                 end.revision
             ));
         };
-        let overlay = overlay(&written, end, constants, run);
+        let Some(document) = document_in(&written.text) else {
+            return Err(format!("the document of revision {} cannot be read any more", end.revision));
+        };
+        let overlay = overlay((&written, &document), end, constants, run);
         let text =
             overlay.to_toml().map_err(|error| format!("the overlay cannot be written out: {error}"))?;
         let digest = self.store.put_overlay(text.as_bytes()).map_err(|error| error.to_string())?;
@@ -121,6 +125,7 @@ impl Work {
             name: "pre-launch calibration",
             source: Source::PreLaunch,
             overlay: None,
+            read: None,
             options,
         });
         if reply.outcome == SwapOutcome::Refused {
@@ -133,13 +138,13 @@ impl Work {
 
 /// The overlay on the document itself, whether or not an overlay was in force.
 fn overlay(
-    written: &Written,
+    (written, document): (&Written, &Document),
     end: &PreLaunchEnd,
     constants: &[GyroConstants],
     run: &PreLaunchRun,
 ) -> Overlay {
     let deg_per_h = |rate: f64| AngularRate::from_rad_per_s(rate).as_deg_per_h();
-    let gyros = names(&written.document).zip(constants).map(|(name, found)| GyroOverlay {
+    let gyros = names(document).zip(constants).map(|(name, found)| GyroOverlay {
         name: name.to_owned(),
         static_bias_change_deg_per_h: deg_per_h(found.static_bias_change_rad_per_s),
         static_bias_sigma_deg_per_h: deg_per_h(found.static_bias_sigma_rad_per_s),
@@ -152,7 +157,7 @@ fn overlay(
     let found = Overlay {
         schema: OVERLAY_SCHEMA,
         overlay_of: written.digest.to_string(),
-        unit: written.document.unit.clone(),
+        unit: document.unit.clone(),
         created: now(),
         note: None,
         gyro: gyros.collect(),

@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use isotherm_correction::calibration::Calibration;
 use isotherm_protocol::digest::Digest;
-use isotherm_protocol::document::Document;
 use isotherm_protocol::overlay::Overlay;
 use isotherm_protocol::status::Swaps;
 
 use super::command::PreLaunchRun;
+use crate::kept_text::KeptText;
 use crate::unit::SwapAccount;
 
 /// What the registrar keeps of one unit.
@@ -19,7 +19,7 @@ pub(super) struct Record {
     /// What was accepted last, in force or to follow.
     pub(super) active: Option<Active>,
     /// What is in force while that one waits for its tick.
-    pub(super) before: Option<Active>,
+    pub(super) before: Option<Box<Active>>,
     /// Documents accepted since the service started.
     pub(super) accepted: u64,
     /// Documents refused since the service started.
@@ -50,23 +50,21 @@ pub(super) struct Active {
 pub(super) struct Written {
     /// SHA-256 of the text.
     pub(super) digest: Digest,
-    /// The document.
-    pub(super) document: Arc<Document>,
-    /// Its text.
-    pub(super) text: Arc<str>,
+    /// The document's text.
+    pub(super) text: KeptText,
     /// What it was made from, where it is a document with an overlay.
-    pub(super) layers: Option<Layers>,
+    pub(super) layers: Option<Box<Layers>>,
 }
 
 /// A document and the overlay that lies on it.
 #[derive(Debug, Clone)]
 pub(super) struct Layers {
     /// Text of the document below.
-    pub(super) base: Arc<str>,
+    pub(super) base: KeptText,
     /// The overlay.
     pub(super) overlay: Overlay,
     /// Its text, as it came.
-    pub(super) text: Arc<str>,
+    pub(super) text: KeptText,
     /// SHA-256 of the overlay's text.
     pub(super) digest: Digest,
 }
@@ -76,7 +74,7 @@ impl Record {
     pub(super) fn in_force(&self, waiting: Option<u64>) -> Option<&Active> {
         let active = self.active.as_ref()?;
         let waits = waiting == Some(active.revision);
-        self.before.as_ref().filter(|_| waits).or(Some(active))
+        self.before.as_deref().filter(|_| waits).or(Some(active))
     }
 
     /// Document and text of what was accepted last.
@@ -95,7 +93,7 @@ impl Record {
 impl Written {
     /// Text of the document that an overlay may lie on, by the digest that the overlay names: the one in force, or the one
     /// below the overlay in force.
-    pub(super) fn base(&self, named: &str) -> &Arc<str> {
+    pub(super) fn base(&self, named: &str) -> &KeptText {
         let below = self.layers.as_ref().filter(|layers| layers.overlay.overlay_of == named);
         below.map_or(&self.text, |layers| &layers.base)
     }

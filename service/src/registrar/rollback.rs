@@ -38,6 +38,7 @@ impl Work {
             ),
             source: Source::Rollback { to: set.revision },
             overlay: set.overlay,
+            read: None,
             options,
         })
     }

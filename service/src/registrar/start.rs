@@ -3,22 +3,25 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use isotherm_correction::calibration::Calibration;
 use isotherm_correction::units::Span;
 use isotherm_protocol::control::Schedule;
-use isotherm_protocol::corrected::Revision;
 use isotherm_protocol::digest::Digest;
 use isotherm_protocol::document::{Document, Problem};
 use isotherm_protocol::history::GoodSet;
 use isotherm_protocol::key::UnitId;
 use isotherm_protocol::overlay::Overlay;
+use isotherm_protocol::stream::Label;
 
 use super::admit::check_signature;
+use super::file::read_all;
 use super::record::{Active, Layers, Record, Written};
 use super::work::Work;
 use crate::calibrations::{Calibrations, Change, Installable, Plan};
+use crate::kept_text::KeptText;
 use crate::store::Store;
 use crate::text;
-use crate::watch::{Known, documents_in, read_document};
+use crate::watch::{Known, documents_in};
 
 /// How many units a line of the log names.
 const NAMED: usize = 8;
@@ -58,8 +61,15 @@ impl Work {
                         continue;
                     }
                 };
-                let (written, calibration) = written;
-                let next = installable(&set, &written, &calibration);
+                let (written, label, calibration) = written;
+                let next = Installable::of_document(
+                    set.revision,
+                    Arc::clone(&calibration),
+                    (label, set.overlay),
+                    written.text.clone(),
+                    &set.source,
+                );
+                let next = Arc::new(next);
                 if record.active.is_none() {
                     record.untrusted = self.distrust(&unit, set.revision, &written);
                 }
@@ -96,12 +106,12 @@ impl Work {
         let Some(folder) = self.folder.path().map(Path::to_owned) else { return Ok((found, 0)) };
         let mut contents = Vec::new();
         let mut bad = 0;
-        for file in documents_in(&folder)? {
-            match read_document(&file) {
-                Ok(bytes) => {
-                    found.insert(file.clone(), Known::Content(Digest::of(&bytes).0));
-                    self.folder.enter(&file, &bytes);
-                    contents.push((file, bytes));
+        for (file, read) in read_all(documents_in(&folder)?) {
+            match read {
+                Ok(read) => {
+                    found.insert(file.clone(), Known::Content(read.digest.0));
+                    self.folder.enter(&file, &read);
+                    contents.push((file, read));
                 }
                 Err(error) => {
                     let problem =
@@ -113,10 +123,12 @@ impl Work {
                 }
             }
         }
-        // All of them are entered by now: rivals know of each other.
-        for (file, bytes) in &contents {
-            bad += usize::from(!self.take_file(file, bytes, true));
+        // All of them are entered by now: rivals know of each other. What is accepted goes to the disk together.
+        self.group = Some(Vec::new());
+        for (file, read) in contents {
+            bad += usize::from(!self.take_file(&file, &read, true));
         }
+        bad += self.end_group();
         self.miss_documents();
         tracing::info!(
             folder = %folder.display(), count = self.records.len(), units = first_of(self.records.keys()),
@@ -142,10 +154,10 @@ impl Work {
         if !self.swap.require_signature {
             return None;
         }
-        let signed = written.layers.as_ref().map_or(&written.text, |layers| &layers.base);
+        let signed = written.layers.as_ref().map_or(&written.text, |layers| &layers.base).read();
         let name = format!("revision {revision}");
         let (mut problems, mut warnings) = (Vec::new(), Vec::new());
-        check_signature(&self.swap, signed, &name, &mut problems, &mut warnings);
+        check_signature(&self.swap, &signed, &name, &mut problems, &mut warnings);
         let first = problems.first()?;
         let words = format!(
             "revision {revision} is in force again, and would be refused today: {}; it stays in force, put a document in \
@@ -178,11 +190,11 @@ pub(super) fn first_of<'u>(units: impl ExactSizeIterator<Item = &'u UnitId>) -> 
     named.join(" ") + &more
 }
 
-/// Document, text and calibration of a good set.
+/// Text, label and calibration of a good set.
 pub(super) fn written(
     store: &Store,
     set: &GoodSet,
-) -> Result<(Written, Arc<isotherm_correction::calibration::Calibration>), Vec<Problem>> {
+) -> Result<(Written, Label, Arc<Calibration>), Vec<Problem>> {
     let file = store.document_file(&set.digest);
     let name = file.map_or_else(|| format!("document {}", set.digest), |file| file.display().to_string());
     let problem = |message: String| vec![text::whole(&name, message)];
@@ -192,34 +204,19 @@ pub(super) fn written(
     let parsed = Document::parse(document_text, Some(&name))?;
     let written = Written {
         digest: set.digest,
-        document: Arc::new(parsed.document),
-        text: document_text.into(),
-        layers: set.overlay.and_then(|overlay| layers(store, overlay)),
+        text: KeptText::new(document_text),
+        layers: set.overlay.and_then(|overlay| layers(store, overlay)).map(Box::new),
     };
-    Ok((written, Arc::new(parsed.calibration)))
+    let label = Label::of(&parsed.document, set.digest, "");
+    // A copy has no more room than it needs.
+    Ok((written, label, Arc::new(parsed.calibration.clone())))
 }
 
 /// What a document with an overlay was made from; `None` where that is not kept any more.
 pub(super) fn layers(store: &Store, digest: Digest) -> Option<Layers> {
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).ok();
     let overlay = store.overlay(&digest).ok().flatten().and_then(text)?;
-    let (text_of, overlay) = (overlay.as_str().into(), Overlay::parse(&overlay, None).ok()?.overlay);
+    let (text_of, overlay) = (KeptText::new(&overlay), Overlay::parse(&overlay, None).ok()?.overlay);
     let base = store.document(&overlay.overlay_of.parse().ok()?).ok().flatten().and_then(text)?;
-    Some(Layers { base: base.into(), overlay, text: text_of, digest })
-}
-
-fn installable(
-    set: &GoodSet,
-    written: &Written,
-    calibration: &Arc<isotherm_correction::calibration::Calibration>,
-) -> Installable {
-    Installable {
-        revision: Revision { counter: set.revision, digest: set.digest.head() },
-        calibration: Arc::clone(calibration),
-        digest: Some(set.digest),
-        document: Some(Arc::clone(&written.document)),
-        text: Some(Arc::clone(&written.text)),
-        overlay: set.overlay,
-        source: Some(set.source.clone()),
-    }
+    Some(Layers { base: KeptText::new(&base), overlay, text: text_of, digest })
 }

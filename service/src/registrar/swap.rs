@@ -1,23 +1,41 @@
 //! A verdict carried out: stored, written down, handed to the unit, answered.
 
+use std::path::Path;
+use std::sync::Arc;
+use std::time::SystemTime;
+
 use isotherm_correction::units::Span;
 use isotherm_protocol::control::{DocumentChange, Schedule, SwapOutcome, SwapReply};
-use isotherm_protocol::corrected::Revision;
-use isotherm_protocol::digest::Digest;
 use isotherm_protocol::document::Problem;
-use isotherm_protocol::history::{Acceptance, AuditEvent, Withdrawal, Withdrawn};
+use isotherm_protocol::history::{Acceptance, AuditEvent, Source, Withdrawal, Withdrawn};
 use isotherm_protocol::key::UnitId;
-use isotherm_protocol::overlay::Candidate;
-use std::sync::Arc;
 
-use super::admit::Verdict;
+use super::admit::{Verdict, refused};
 use super::order::Order;
+use super::reading::Reading;
 use super::record::{Active, Layers, Record, Written};
 use super::start;
 use super::work::Work;
 use crate::calibrations::{Change, Installable};
+use crate::kept_text::KeptText;
 use crate::store::StoreError;
 use crate::text;
+
+/// A document that was found good, before it is written down.
+#[derive(Debug)]
+pub(super) struct Judged {
+    /// What its problems are to call it.
+    name: String,
+    unit: UnitId,
+    source: Source,
+    by: String,
+    schedule: Schedule,
+    slew: Span,
+    /// What it changes, in words.
+    changed: Vec<String>,
+    layers: Option<Box<Layers>>,
+    reading: Reading,
+}
 
 impl Work {
     /// Takes an order through the whole path.
@@ -60,7 +78,7 @@ impl Work {
             return reply(self, SwapOutcome::Unchanged, verdict);
         }
         if order.options.dry_run {
-            let would = Digest(candidate.digest).to_string();
+            let would = candidate.digest.to_string();
             return SwapReply { digest: would, ..reply(self, SwapOutcome::WouldBeAccepted, verdict) };
         }
         match self.accept(order, unit, candidate, &verdict, slew) {
@@ -69,14 +87,19 @@ impl Work {
                 reply(self, SwapOutcome::Accepted, verdict)
             }
             Err(error) => {
-                tracing::error!(%unit, "a swap is refused, it cannot be written down: {error}");
-                let message = format!("the swap cannot be written down, nothing has changed: {error}");
-                let problems = vec![text::whole(order.name, message)];
-                let verdict = Verdict { problems, ..verdict };
-                self.count_refusal(&verdict);
-                reply(self, SwapOutcome::Refused, verdict)
+                let problems = vec![self.refuse_unwritten(unit, order.name, &error)];
+                reply(self, SwapOutcome::Refused, Verdict { problems, ..verdict })
             }
         }
+    }
+
+    /// Tells and counts that a document is refused because it cannot be written down.
+    fn refuse_unwritten(&mut self, unit: &UnitId, name: &str, error: &StoreError) -> Problem {
+        tracing::error!(%unit, "a swap is refused, it cannot be written down: {error}");
+        let message = format!("the swap cannot be written down, nothing has changed: {error}");
+        let problem = text::whole(name, message);
+        self.count_refusal(&refused(Some(unit.clone()), vec![problem.clone()]));
+        problem
     }
 
     /// What a unit corrects with at present.
@@ -86,34 +109,34 @@ impl Work {
     }
 
     /// Whether a candidate is what was accepted last, and nothing else is asked of it.
-    fn is_unchanged(&self, unit: &UnitId, candidate: &Candidate, schedule: Schedule) -> bool {
+    fn is_unchanged(&self, unit: &UnitId, candidate: &Reading, schedule: Schedule) -> bool {
         let record = self.records.get(unit);
         let Some((record, written)) = record.and_then(|record| Some((record, record.written()?))) else {
             return false;
         };
         let waits = self.intake.waiting(unit).filter(|(revision, _)| *revision == record.counter);
-        written.digest.0 == candidate.digest && waits.is_none_or(|(_, at)| at == schedule)
+        written.digest == candidate.digest && waits.is_none_or(|(_, at)| at == schedule)
     }
 
-    /// Stores, writes down, and only then hands over; on an error nothing has changed.
+    /// Stores, writes down, and only then hands over; on an error nothing has changed. In a group that is done when the
+    /// group is written.
     fn accept(
         &mut self,
         order: &Order<'_>,
         unit: &UnitId,
-        candidate: &Candidate,
+        candidate: &Reading,
         verdict: &Verdict,
         slew: Span,
     ) -> Result<(), StoreError> {
-        let digest = self.store.put_document(candidate.text.as_bytes())?;
         let layers = match &candidate.overlay {
-            Some(parsed) => {
+            Some(overlay) => {
                 // As it came, with its signature.
                 let digest = self.store.put_overlay(order.bytes)?;
-                let overlay = parsed.overlay.clone();
                 let below = self.records.get(unit).and_then(Record::written);
-                let text = String::from_utf8_lossy(order.bytes).into();
+                let text = KeptText::new(&String::from_utf8_lossy(order.bytes));
+                let overlay = overlay.clone();
                 below.map(|below| Layers {
-                    base: Arc::clone(below.base(&overlay.overlay_of)),
+                    base: below.base(&overlay.overlay_of).clone(),
                     overlay,
                     text,
                     digest,
@@ -121,64 +144,116 @@ impl Work {
             }
             None => order.overlay.and_then(|overlay| start::layers(&self.store, overlay)),
         };
-        let overlay = layers.as_ref().map(|layers| layers.digest);
+        let changed = verdict.difference.iter().flat_map(|difference| &difference.document);
+        let judged = Judged {
+            name: order.name.to_owned(),
+            unit: unit.clone(),
+            source: order.source.clone(),
+            by: order.options.by.clone(),
+            schedule: order.options.schedule,
+            slew,
+            changed: changed.map(DocumentChange::words).collect(),
+            layers: layers.map(Box::new),
+            reading: candidate.clone().small(),
+        };
+        if let Some(group) = &mut self.group {
+            group.push(judged);
+            return Ok(());
+        }
+        self.carry_out(&[judged])
+    }
+
+    /// Writes a group down, and hands it over. Where that fails as a whole it is tried one by one.
+    pub(super) fn write_group(&mut self) {
+        let group = self.group.as_mut().map(std::mem::take).unwrap_or_default();
+        if group.is_empty() || self.carry_out(&group).is_ok() {
+            return;
+        }
+        for judged in group {
+            if let Err(error) = self.carry_out(std::slice::from_ref(&judged)) {
+                let problem = self.refuse_unwritten(&judged.unit, &judged.name, &error);
+                self.unwritten.push((judged.name, problem));
+            }
+        }
+    }
+
+    /// Writes the group down, and ends it: how many documents of files could not be.
+    pub(super) fn end_group(&mut self) -> usize {
+        self.write_group();
+        self.group = None;
+        let unwritten = std::mem::take(&mut self.unwritten);
+        let count = unwritten.len();
+        for (file, problem) in unwritten {
+            self.folder.refuse(Path::new(&file), problem);
+        }
+        count
+    }
+
+    /// Documents first, all of them; then their acceptances; only then the units. On an error nothing has changed.
+    ///
+    /// Each is of another unit.
+    fn carry_out(&mut self, group: &[Judged]) -> Result<(), StoreError> {
+        let documents: Vec<_> =
+            group.iter().map(|judged| (judged.reading.digest, judged.reading.text.clone())).collect();
+        self.store.put_documents(&documents)?;
+        let accepted: Vec<_> = group.iter().map(|judged| self.acceptance(judged)).collect();
+        let entries = group.iter().zip(&accepted).map(|(judged, acceptance)| {
+            (Some(&judged.unit), judged.by.as_str(), AuditEvent::Accepted(acceptance.clone()))
+        });
+        self.entries = self.store.append_all(SystemTime::now(), entries)?;
+        for (judged, acceptance) in group.iter().zip(accepted) {
+            self.hand_over(judged, acceptance.revision);
+        }
+        Ok(())
+    }
+
+    fn acceptance(&self, judged: &Judged) -> Acceptance {
+        let Judged { unit, reading, layers, source, changed, schedule, slew, .. } = judged;
         let record = self.records.get(unit);
         let highest = record.map_or(0, |record| record.counter).max(self.store.highest_revision(unit));
-        let changed = verdict.difference.iter().flat_map(|difference| &difference.document);
-        let acceptance = Acceptance {
+        let base = self.in_force(unit).and_then(|active| active.written.as_ref());
+        Acceptance {
             revision: highest + 1,
-            digest,
-            overlay,
-            source: order.source.clone(),
-            base: self
-                .in_force(unit)
-                .and_then(|active| active.written.as_ref())
-                .map(|written| written.digest),
-            changed: changed.map(DocumentChange::words).collect(),
-            schedule: order.options.schedule,
+            digest: reading.digest,
+            overlay: layers.as_ref().map(|layers| layers.digest),
+            source: source.clone(),
+            base: base.map(|written| written.digest),
+            changed: changed.clone(),
+            schedule: *schedule,
             slew_ms: u64::try_from(slew.as_ns() / 1_000_000).unwrap_or(0),
-        };
-        self.append(Some(unit), &order.options.by, AuditEvent::Accepted(acceptance))?;
+        }
+    }
 
-        let revision = Revision { counter: highest + 1, digest: digest.head() };
-        let (document, calibration) =
-            (Arc::new(candidate.document.clone()), Arc::new(candidate.calibration.clone()));
-        let text: Arc<str> = candidate.text.as_str().into();
-        let written = Written { digest, document: Arc::clone(&document), text: Arc::clone(&text), layers };
-        let active = Active {
-            revision: revision.counter,
-            calibration: Arc::clone(&calibration),
-            written: Some(written),
-        };
+    /// Hands a calibration that is written down to its unit.
+    fn hand_over(&mut self, judged: &Judged, counter: u64) {
+        let Judged { unit, reading, layers, source, by, schedule, slew, .. } = judged;
+        let digest = reading.digest;
+        let overlay = layers.as_ref().map(|layers| layers.digest);
+        let calibration = Arc::clone(&reading.calibration);
+        let next = Installable::of_document(
+            counter,
+            Arc::clone(&calibration),
+            (reading.label.clone(), overlay),
+            reading.text.clone(),
+            source,
+        );
+        let written = Written { digest, text: reading.text.clone(), layers: layers.clone() };
+        let active = Active { revision: counter, calibration, written: Some(written) };
         let before = self.in_force(unit).cloned();
         let record = self.records.entry(unit.clone()).or_default();
-        record.before = before.filter(|_| order.options.schedule != Schedule::NextTick);
-        (record.counter, record.active) = (revision.counter, Some(active));
+        record.before = before.filter(|_| *schedule != Schedule::NextTick).map(Box::new);
+        (record.counter, record.active) = (counter, Some(active));
         // A rollback to an overlaid document asks for no signature either; a document under it was asked for one.
         record.untrusted = None;
         record.accepted += 1;
-        self.losses.retain(|(concerned, _)| concerned.as_ref() != Some(unit));
-        let source = Some(order.source.clone());
-        let next = Installable {
-            revision,
-            calibration,
-            digest: Some(digest),
-            document: Some(document),
-            text: Some(text),
-            overlay,
-            source,
-        };
         let account = record.account();
+        self.losses.retain(|(concerned, _)| concerned.as_ref() != Some(unit));
         self.refusals.forget(unit);
-        let counter = revision.counter;
-        tracing::info!(
-            %unit, revision = counter, %digest, source = %order.source, by = order.options.by, "calibration accepted"
-        );
-        let change = Change { next, at: order.options.schedule, slew };
+        tracing::info!(%unit, revision = counter, %digest, %source, by, "calibration accepted");
+        let change = Change { next: Arc::new(next), at: *schedule, slew: *slew };
         if let Some(replaced) = self.intake.change(unit, change, account) {
             self.note_withdrawn(unit, replaced, Withdrawn::Superseded { by_revision: counter });
         }
-        Ok(())
     }
 
     /// What is in force has passed every check of today.

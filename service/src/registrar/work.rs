@@ -7,6 +7,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, SystemTime};
 
 use isotherm_correction::prelaunch::PreLaunchSettings;
+use isotherm_protocol::document::Problem;
 use isotherm_protocol::history::AuditEvent;
 use isotherm_protocol::key::UnitId;
 
@@ -15,6 +16,7 @@ use super::desk::Request;
 use super::folder::Folder;
 use super::record::Record;
 use super::refusals::Refusals;
+use super::swap::Judged;
 use crate::config::{Settings, SwapSettings};
 use crate::intake::Intake;
 use crate::store::{Opened, Store, StoreError};
@@ -37,6 +39,10 @@ pub(crate) struct Work {
     pub(super) lost: Option<String>,
     /// What the state folder had lost when it was opened, with the unit that it concerns.
     pub(super) losses: Vec<(Option<UnitId>, String)>,
+    /// Documents that were found good and are to be written down together; `None` where each goes by itself.
+    pub(super) group: Option<Vec<Judged>>,
+    /// Files whose documents could not be written down, and why.
+    pub(super) unwritten: Vec<(String, Problem)>,
 }
 
 /// How often the state folder is looked at where nothing is asked for.
@@ -59,6 +65,8 @@ impl Work {
             board: Arc::default(),
             lost: None,
             losses: losses(opened),
+            group: None,
+            unwritten: Vec::new(),
         }
     }
 
@@ -102,12 +110,13 @@ impl Work {
 
     /// Sees to it that what is written down is found again, and tells where it is not.
     fn keep_store(&mut self) {
-        let actives = self.records.values().flat_map(|record| [&record.active, &record.before]).flatten();
+        let actives =
+            self.records.values().flat_map(|record| record.active.iter().chain(record.before.as_deref()));
         let written = actives.filter_map(|active| active.written.as_ref());
         let layers = written.clone().filter_map(|written| written.layers.as_ref());
-        let bases = layers.clone().map(|layers| layers.base.as_bytes());
-        let documents = written.map(|written| written.text.as_bytes()).chain(bases);
-        let overlays = layers.map(|layers| layers.text.as_bytes());
+        let bases = layers.clone().map(|layers| layers.base.read());
+        let documents = written.map(|written| written.text.read()).chain(bases);
+        let overlays = layers.map(|layers| layers.text.read());
         match self.store.keep(SystemTime::now(), documents, overlays) {
             Ok(false) => {
                 if self.lost.take().is_some() {
@@ -154,6 +163,8 @@ impl Work {
         by: &str,
         event: AuditEvent,
     ) -> Result<(), StoreError> {
+        // What was accepted before comes before.
+        self.write_group();
         self.entries = self.store.append(SystemTime::now(), unit, by, event)?;
         Ok(())
     }

@@ -64,6 +64,10 @@ impl Index {
                 }
                 of_unit.lost = of_unit.lost.filter(|lost| *lost > accepted.revision);
                 of_unit.highest_revision = of_unit.highest_revision.max(accepted.revision);
+                if of_unit.sets.is_empty() {
+                    // Mostly the only one.
+                    of_unit.sets.reserve_exact(1);
+                }
                 of_unit.sets.push_back(GoodSet::new(accepted, entry.time));
                 if of_unit.sets.len() > MAX_SETS {
                     of_unit.sets.pop_front();

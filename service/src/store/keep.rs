@@ -28,11 +28,11 @@ impl Store {
     /// # Errors
     /// [`StoreError::Lost`] while there is none; [`StoreError::Held`] where another instance has it; else as
     /// [`Store::open`]. Nothing can be written down then, and a later call may go well.
-    pub(crate) fn keep<'d>(
+    pub(crate) fn keep(
         &mut self,
         time: SystemTime,
-        documents: impl IntoIterator<Item = &'d [u8]>,
-        overlays: impl IntoIterator<Item = &'d [u8]>,
+        documents: impl IntoIterator<Item: AsRef<[u8]>>,
+        overlays: impl IntoIterator<Item: AsRef<[u8]>>,
     ) -> Result<bool, StoreError> {
         let lost = match self.check_held() {
             Ok(()) => return Ok(false),
@@ -47,8 +47,8 @@ impl Store {
         durable::sweep(&path).map_err(StoreError::write(&path))?;
         let mut shelves = [Shelf::open(path.join("documents"))?, Shelf::open(path.join("overlays"))?];
         let [of_documents, of_overlays] = &mut shelves;
-        documents.into_iter().try_for_each(|bytes| of_documents.put(bytes).map(drop))?;
-        overlays.into_iter().try_for_each(|bytes| of_overlays.put(bytes).map(drop))?;
+        documents.into_iter().try_for_each(|bytes| of_documents.put(bytes.as_ref()).map(drop))?;
+        overlays.into_iter().try_for_each(|bytes| of_overlays.put(bytes.as_ref()).map(drop))?;
         mark.write(&path).map_err(StoreError::write(&path))?;
         let mut log = Log::open(&path, &mut Opened::default(), &mut |_| {})?;
         let (lines, next_number) = self.carried_lines(time)?;

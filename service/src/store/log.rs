@@ -101,7 +101,7 @@ impl Log {
         Ok(self.is_empty() && last_full_file(&self.folder)?.is_some())
     }
 
-    /// Appends a line, which is on the disk when this returns. Where it fails, nothing of the line stays.
+    /// Appends a line or several, which are on the disk when this returns. Where it fails, nothing of them stays.
     ///
     /// # Errors
     /// [`StoreError::Write`]; a later line may go well.

@@ -8,6 +8,7 @@ use isotherm_protocol::digest::Digest;
 use isotherm_protocol::document::MAX_DOCUMENT_BYTES;
 
 use super::{StoreError, durable};
+use crate::kept_text::KeptText;
 use crate::text::read_bounded;
 
 /// Most bytes of documents that are kept in memory; beyond it the oldest go.
@@ -25,10 +26,34 @@ pub(super) enum Shelf {
 /// Documents in memory.
 #[derive(Debug, Default)]
 pub(super) struct Memory {
-    by_digest: BTreeMap<Digest, Vec<u8>>,
+    by_digest: BTreeMap<Digest, Kept>,
     /// The oldest first.
     order: VecDeque<Digest>,
     bytes: usize,
+}
+
+/// A document in memory.
+#[derive(Debug)]
+enum Kept {
+    Text(KeptText),
+    /// What is no text.
+    Bytes(Vec<u8>),
+}
+
+impl Kept {
+    fn len(&self) -> usize {
+        match self {
+            Self::Text(text) => text.len(),
+            Self::Bytes(bytes) => bytes.len(),
+        }
+    }
+
+    fn bytes(&self) -> Vec<u8> {
+        match self {
+            Self::Text(text) => text.read().into_bytes(),
+            Self::Bytes(bytes) => bytes.clone(),
+        }
+    }
 }
 
 impl Shelf {
@@ -67,9 +92,39 @@ impl Shelf {
                 put.map_err(StoreError::write(&folder.join(name)))?;
             }
             Self::Memory(_) if kept => {}
-            Self::Memory(memory) => memory.put(digest, bytes),
+            Self::Memory(memory) => {
+                let text = std::str::from_utf8(bytes).map(KeptText::new);
+                memory.put(digest, text.map_or_else(|_| Kept::Bytes(bytes.to_vec()), Kept::Text));
+            }
         }
         Ok(digest)
+    }
+
+    /// Keeps documents, each under its digest; as [`Self::put`] does one, but the disk is waited for by several at the same
+    /// time.
+    ///
+    /// # Errors
+    /// As [`Self::put`]; some may be kept then.
+    pub(super) fn put_all(&mut self, documents: &[(Digest, KeptText)]) -> Result<(), StoreError> {
+        if let Some((_, text)) = documents.iter().find(|(_, text)| text.len() > MAX_DOCUMENT_BYTES) {
+            return Err(StoreError::TooLong { bytes: text.len() });
+        }
+        let new: Vec<_> =
+            documents.iter().filter(|(digest, _)| !matches!(self.get(digest), Ok(Some(_)))).collect();
+        match self {
+            Self::Folder(folder) => {
+                let text = |text: &KeptText| text.read().into_bytes();
+                let files = new.into_iter().map(|(digest, kept)| (name(digest), kept));
+                durable::write_all(folder, files, text)
+                    .map_err(|(name, source)| StoreError::Write { path: folder.join(name), source })
+            }
+            Self::Memory(memory) => {
+                for (digest, text) in new {
+                    memory.put(*digest, Kept::Text(text.clone()));
+                }
+                Ok(())
+            }
+        }
     }
 
     /// The document of a digest, checked against it; `None` where it is not kept.
@@ -79,7 +134,7 @@ impl Shelf {
     pub(super) fn get(&self, digest: &Digest) -> Result<Option<Vec<u8>>, StoreError> {
         match self {
             Self::Folder(folder) => read(&folder.join(name(digest)), digest),
-            Self::Memory(memory) => Ok(memory.by_digest.get(digest).cloned()),
+            Self::Memory(memory) => Ok(memory.by_digest.get(digest).map(Kept::bytes)),
         }
     }
 
@@ -109,13 +164,17 @@ impl Shelf {
 }
 
 impl Memory {
-    fn put(&mut self, digest: Digest, bytes: &[u8]) {
-        self.bytes += bytes.len();
-        self.by_digest.insert(digest, bytes.to_vec());
+    fn put(&mut self, digest: Digest, kept: Kept) {
+        self.bytes += kept.len();
+        if let Some(before) = self.by_digest.insert(digest, kept) {
+            // The same once more, in one go.
+            self.bytes -= before.len();
+            return;
+        }
         self.order.push_back(digest);
         while self.bytes > MAX_MEMORY_BYTES {
             let Some(oldest) = self.order.pop_front() else { return };
-            self.bytes -= self.by_digest.remove(&oldest).map_or(0, |bytes| bytes.len());
+            self.bytes -= self.by_digest.remove(&oldest).map_or(0, |kept| kept.len());
         }
     }
 }

@@ -11,6 +11,7 @@ use isotherm_protocol::stream::UnitStream;
 use super::UnitActor;
 use crate::calibrations::{Change, Installable};
 use crate::fault::FaultKind;
+use crate::kept_text::KeptText;
 
 /// Where the frames of journals go; `Err` is one that could not be published.
 pub type JournalOutlet = dyn Fn(&UnitId, Vec<u8>) -> Result<(), zenoh::Error> + Send + Sync;
@@ -54,7 +55,7 @@ impl UnitActor {
     /// itself.
     #[must_use]
     pub(crate) fn memory(&self, instance: &str) -> JournalEntry {
-        let text = |next: &Installable| next.text.as_deref().map(str::to_owned);
+        let text = |next: &Arc<Installable>| next.text.as_ref().map(KeptText::read);
         JournalEntry {
             unit: self.id().to_string(),
             instance: instance.to_owned(),
@@ -110,9 +111,9 @@ pub(super) fn changed(change: &Change) -> JournalEvent {
         revision: next.revision,
         at: *at,
         slew_ns: slew.as_ns(),
-        document: next.text.as_deref().map(str::to_owned),
-        overlay: next.overlay,
-        source: next.source.as_ref().map(ToString::to_string).unwrap_or_default(),
+        document: next.text.as_ref().map(KeptText::read),
+        overlay: next.label.overlay,
+        source: next.label.source.clone(),
     }
 }
 

@@ -9,9 +9,11 @@ use isotherm_protocol::corrected::{CorrectedBatch, Revision};
 use isotherm_protocol::digest::Digest;
 use isotherm_protocol::document::Document;
 use isotherm_protocol::raw::{AccelBatch, GyroBatch};
+use isotherm_protocol::stream::Label;
 
 use super::*;
 use crate::UnitTotals;
+use crate::calibrations::Installable;
 
 mod journal;
 
@@ -61,7 +63,7 @@ fn example() -> (Arc<Calibration>, [u8; 8]) {
 /// Gives a unit a calibration from the next tick on, as the next revision.
 fn install(actor: &mut UnitActor, calibration: Arc<Calibration>, digest: [u8; 8]) -> Revision {
     let revision = Revision { counter: actor.stream.next_counter(), digest };
-    let next = Installable::plain(revision, calibration);
+    let next = Arc::new(Installable::plain(revision, calibration));
     actor.change(Change { next, at: Schedule::NextTick, slew: Span::ZERO });
     revision
 }
@@ -163,7 +165,8 @@ fn a_reset_keeps_a_change_that_waits_and_the_state() {
     install(&mut actor, Arc::clone(&calibration), digest);
     actor.command(&Command::Standby).unwrap();
     let revision = Revision { counter: 2, digest: [9; 8] };
-    let next = Installable { digest: Some(Digest([9; 32])), ..Installable::plain(revision, calibration) };
+    let label = Label { digest: Some(Digest([9; 32])), ..Label::default() };
+    let next = Arc::new(Installable { label, ..Installable::plain(revision, calibration) });
     actor.change(Change { next, at: Schedule::Sequence(70), slew: Span::ZERO });
     actor.reset("a test says so");
     assert_eq!(actor.waiting(), Some((2, Schedule::Sequence(70))));
@@ -177,8 +180,8 @@ fn a_revision_that_was_given_already_is_passed_over() {
     let mut actor = actor(sink.outlet());
     let (calibration, digest) = example();
     let revision = Revision { counter: 4, digest };
-    let change =
-        Change { next: Installable::plain(revision, calibration), at: Schedule::NextTick, slew: Span::ZERO };
+    let next = Arc::new(Installable::plain(revision, calibration));
+    let change = Change { next, at: Schedule::NextTick, slew: Span::ZERO };
     actor.change(change.clone());
     actor.take_status_due();
     assert_eq!(actor.change(change), None);

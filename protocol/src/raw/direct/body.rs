@@ -81,6 +81,13 @@ impl<'a> Body<'a> {
         Some(f64::from_le_bytes(*bytes))
     }
 
+    pub(super) fn str(&mut self) -> Option<&'a str> {
+        let length = usize::try_from(self.u64()?).ok()?;
+        let bytes = self.bytes.get(self.at..)?.get(..length)?;
+        self.at += length;
+        str::from_utf8(bytes).ok()
+    }
+
     #[inline]
     pub(super) fn bool(&mut self) -> Option<bool> {
         match self.byte()? {

@@ -95,4 +95,26 @@ proptest! {
         let decoded = codec::decode::<AccelBatch>(&frame);
         prop_assert_eq!(words(&direct), words(&decoded.map(|batch| (batch.output(), batch.to_core().collect()))));
     }
+
+    #[test]
+    fn a_temperature_frame_reads_as_its_batch(
+        channels in 0..=MAX_CHANNELS,
+        ticks in prop::collection::vec((any::<i64>(), any::<f64>(), prop::option::of(0..=MAX_CHANNELS)), 0..6),
+        damage in damage(),
+    ) {
+        let name = |index| ChannelName::from(&format!("channel {index}")).unwrap();
+        let tick = |(time_ns, raw, other): (i64, f64, Option<usize>)| raw::TemperatureTick {
+            time_ns,
+            raw: core::iter::repeat_n(raw, other.filter(|_| raw > 0.0).unwrap_or(channels)).collect(),
+        };
+        let batch = TemperatureBatch {
+            channels: (0..channels).map(name).collect(),
+            ticks: ticks.into_iter().map(tick).collect(),
+        };
+        let frame = frame_of(&batch, damage);
+        let mut readings = Vec::new();
+        let direct = read_temperatures(&frame, &mut readings).map(|()| (OutputKind::Mean, readings));
+        let decoded = codec::decode::<TemperatureBatch>(&frame);
+        prop_assert_eq!(words(&direct), words(&decoded.map(|batch| (OutputKind::Mean, batch.to_core().collect()))));
+    }
 }

@@ -6,6 +6,7 @@ use isotherm_protocol::journal::{Joiner, JournalEntry, JournalPart};
 use isotherm_protocol::key::Input;
 
 use super::*;
+use crate::kept_text::KeptText;
 
 const EXAMPLE: &str = include_str!("../../../../config/calibration/example-full.toml");
 
@@ -82,16 +83,14 @@ impl Bench {
     fn change(&mut self, at: Schedule, slew: Span) {
         let parsed = Document::parse(EXAMPLE, None).unwrap();
         let digest = Digest(parsed.digest);
-        let revision = Revision { counter: self.actor.stream.next_counter(), digest: digest.head() };
-        let next = Installable {
-            digest: Some(digest),
-            document: Some(Arc::new(parsed.document)),
-            text: Some(EXAMPLE.into()),
-            overlay: Some(Digest([3; 32])),
-            source: Some(isotherm_protocol::history::Source::Rollback { to: 1 }),
-            ..Installable::plain(revision, Arc::new(parsed.calibration))
-        };
-        self.actor.change(Change { next, at, slew });
+        let next = Installable::of_document(
+            self.actor.stream.next_counter(),
+            Arc::new(parsed.calibration),
+            (Label::of(&parsed.document, digest, ""), Some(Digest([3; 32]))),
+            KeptText::new(EXAMPLE),
+            &isotherm_protocol::history::Source::Rollback { to: 1 },
+        );
+        self.actor.change(Change { next: Arc::new(next), at, slew });
     }
 
     fn command(&mut self, command: &Command) {

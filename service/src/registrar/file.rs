@@ -1,0 +1,115 @@
+//! Files of the folder, read: each once, several at the same time.
+
+use std::io;
+use std::num::NonZero;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread;
+
+use isotherm_protocol::digest::Digest;
+use isotherm_protocol::document::Problem;
+use isotherm_protocol::key::UnitId;
+use isotherm_protocol::overlay::Candidate;
+
+use super::admit::unit_of;
+use super::reading::Reading;
+use crate::kept_text::KeptText;
+use crate::text;
+use crate::watch::read_document;
+
+/// Files from which on it is worth while to read several at the same time.
+const FEW: usize = 8;
+/// Most threads that read.
+const MOST_THREADS: usize = 8;
+
+/// The content of a file, and what was found in it.
+#[derive(Debug)]
+pub(super) struct Read {
+    content: Content,
+    /// SHA-256 of the content.
+    pub(super) digest: Digest,
+    /// Unit that it names, whatever else is wrong with it.
+    pub(super) hint: Option<UnitId>,
+    /// What it says, or everything that is wrong with it; `None` where it is no text.
+    pub(super) found: Option<Result<Reading, Vec<Problem>>>,
+}
+
+/// A content, in as little room as it can be kept.
+#[derive(Debug)]
+enum Content {
+    Text(KeptText),
+    Bytes(Vec<u8>),
+}
+
+impl Read {
+    /// Looks at the content of a file.
+    pub(super) fn of(path: &Path, bytes: Vec<u8>) -> Self {
+        let name = path.display().to_string();
+        let digest = Digest::of(&bytes);
+        let text = text::text(&bytes, &name).ok();
+        let found = text.map(|text| Candidate::parse(text, Some(&name), None).map(Reading::from));
+        let hint = match &found {
+            Some(Ok(reading)) => UnitId::new(&reading.unit).ok(),
+            _ => std::str::from_utf8(&bytes).ok().and_then(unit_of),
+        };
+        let content = match &found {
+            Some(Ok(reading)) => Content::Text(reading.text.clone()),
+            _ => Content::Bytes(bytes),
+        };
+        Self { content, digest, hint, found: found.map(|found| found.map(Reading::small)) }
+    }
+
+    /// The content.
+    pub(super) fn bytes(&self) -> Vec<u8> {
+        match &self.content {
+            Content::Text(text) => text.read().into_bytes(),
+            Content::Bytes(bytes) => bytes.clone(),
+        }
+    }
+
+    /// Unit that a valid document in it names.
+    pub(super) fn unit(&self) -> Option<UnitId> {
+        self.found.as_ref()?.as_ref().ok().and_then(|reading| UnitId::new(&reading.unit).ok())
+    }
+}
+
+/// Reads files, on as many threads as there are processors; in the order of the files.
+pub(super) fn read_all(files: Vec<PathBuf>) -> Vec<(PathBuf, io::Result<Read>)> {
+    let threads = thread::available_parallelism().map_or(1, NonZero::get).min(MOST_THREADS);
+    if files.len() <= FEW || threads == 1 {
+        return one_by_one(files);
+    }
+    let next = AtomicUsize::new(0);
+    let work = || {
+        let mut done = Vec::new();
+        loop {
+            let index = next.fetch_add(1, Ordering::Relaxed);
+            let Some(file) = files.get(index) else { return done };
+            done.push((index, read_file(file)));
+        }
+    };
+    let mut done: Vec<_> = thread::scope(|scope| {
+        let workers: Vec<_> = (1..threads).map(|_| scope.spawn(work)).collect();
+        let own = work();
+        let others = workers.into_iter().filter_map(|worker| worker.join().ok()).flatten();
+        own.into_iter().chain(others).collect()
+    });
+    done.sort_unstable_by_key(|(index, _)| *index);
+    // Where a reader has ended in a panic, it is to be seen here.
+    if done.len() < files.len() {
+        return one_by_one(files);
+    }
+    files.into_iter().zip(done).map(|(file, (_, read))| (file, read)).collect()
+}
+
+fn read_file(file: &Path) -> io::Result<Read> {
+    read_document(file).map(|bytes| Read::of(file, bytes))
+}
+
+fn one_by_one(files: Vec<PathBuf>) -> Vec<(PathBuf, io::Result<Read>)> {
+    let read = |file: PathBuf| {
+        let read = read_file(&file);
+        (file, read)
+    };
+    files.into_iter().map(read).collect()
+}
