@@ -8,7 +8,7 @@ use isotherm_log::file::refuse_overwriting;
 use isotherm_protocol::key::UnitId;
 
 use super::bar::Bar;
-use super::batch::{Outcome, close_batch};
+use super::batch::{Outcome, close};
 use super::place::PlaceArgs;
 use super::print;
 use super::runs::Reading;
@@ -176,14 +176,17 @@ impl ValidateArgs {
         end(report.refusals())
     }
 
-    fn several(&self, reports: &[Outcome]) -> Result<(), Error> {
+    fn several(&self, reports: &[Outcome<FitReport>]) -> Result<(), Error> {
         if let Some(html) = &self.html {
             for (unit, report) in reports.iter().filter_map(|(unit, came)| Some((unit, came.as_ref().ok()?)))
             {
                 write_file(&of_unit(html, unit), report.to_html().as_bytes(), true)?;
             }
         }
-        close_batch("Judgement of several units", reports, (self.html.as_deref(), true), self.json)
+        let (mut reasons, failed) =
+            close("Judgement of several units", reports, (self.html.as_deref(), true), self.json)?;
+        reasons.extend(failed);
+        end(reasons)
     }
 }
 
