@@ -13,10 +13,9 @@ use super::place::PlaceArgs;
 use super::print;
 use super::runs::Reading;
 use crate::error::Error;
-use crate::provenance::origin;
 use crate::report::{FitReport, in_parallel, of_unit};
 use crate::run::Watch;
-use crate::validate::{JudgedLog, Wanted, digests, validate};
+use crate::validate::{JudgedLog, Wanted, validate};
 use crate::written::{Written, write_file};
 
 /// Judge a calibration document on logs that it was not made from
@@ -155,12 +154,12 @@ impl ValidateArgs {
             });
             let (name, written) =
                 found.map_or((String::new(), None), |(name, written)| (name, Some(written)));
-            let known = written.as_ref().map(|written| digests(&written.document)).unwrap_or_default();
             let mut logs = Vec::new();
             for run in runs {
-                let known = !known.is_empty()
-                    && origin(run.files(), "")?.log.iter().any(|log| known.contains(&log.sha256));
-                logs.push(JudgedLog { run, known });
+                logs.push(match &written {
+                    Some(written) => JudgedLog::new(run, &written.document)?,
+                    None => JudgedLog { run, known: false },
+                });
             }
             work.push(Work { name, unit, written, logs });
         }

@@ -8,6 +8,7 @@
 //! | `modes_rates` | `modes` and `rates` as their users run them |
 //! | `drift`, `impact`, `logged` | noise and drift, what they mean for navigation, and logs in every form |
 //! | `agreement` | what reports state is what `isotherm-replay correct` gives with the written document, command by command |
+//! | `two_units` | a recording of two units through every command that reads logs |
 //! | `validate`, `documents` | documents judged, shown, compared and merged |
 //! | `skewed_six` | units of six sensors through all of them |
 //! | `pages` | pages to be looked at |
@@ -39,4 +40,5 @@ mod skewed_six;
 mod stand;
 mod thermal;
 mod tumble;
+mod two_units;
 mod validate;
