@@ -61,6 +61,8 @@ pub struct Fit {
     pub covariance: DMatrix<f64>,
     /// −2·ln of the restricted likelihood, up to a constant of the columns.
     pub minus_two_log: f64,
+    /// −2·ln of the plain likelihood, which fits with other things beside the noise can be compared by.
+    pub minus_two_log_of_readings: f64,
     /// Middle and half length of the log (h).
     pub span_h: [f64; 2],
     /// Size of the noise.
@@ -168,6 +170,7 @@ impl Fit {
             beta: solution.beta.iter().copied().collect(),
             covariance: &solution.inverse * variance,
             minus_two_log: solution.minus_two_log(),
+            minus_two_log_of_readings: solution.minus_two_log_of_readings(),
             span_h: problem.span_h,
             noise,
         }
@@ -202,16 +205,16 @@ impl Fit {
         Some((value / scale, error / scale))
     }
 
-    /// Slope of the trend (readings per h) and its standard error: the larger of that under this noise and of that under the noise
-    /// that is most likely where there is no trend. A slope may be a slow drift, and a fit with a straight line in it has taken that part
-    /// of the drift away before it looks for the noise.
+    /// Slope of the trend (readings per h), and the standard error that it must stand out of: so large that slope over error is the root
+    /// of the likelihood ratio against no trend at all, with the noise that is most likely then. A slope may be a slow drift, and the
+    /// error by this noise is too small for that: a fit with a straight line has taken that part of the drift away before it looks
+    /// for the noise.
     #[must_use]
     pub fn slope(&self, slow: &Slow) -> Option<(f64, f64)> {
         let (value, error) = self.power(1)?;
         let level = Beside { degree: 0, periods_h: self.beside.periods_h.clone() };
-        let without = Self::of(slow, &level)?;
-        let (_, under) = Self::with_noise(slow, &self.beside, without.noise)?.power(1)?;
-        Some((value, error.max(under)))
+        let ratio = Self::of(slow, &level)?.minus_two_log_of_readings - self.minus_two_log_of_readings;
+        Some((value, error.max(value.abs() / ratio.max(f64::MIN_POSITIVE).sqrt())))
     }
 
     /// Every line of the fit.

@@ -150,13 +150,13 @@ pub fn trend(analysis: &Analysis) -> Trend {
 impl Trend {
     /// Of a slope with its standard error, and a fit with a bend.
     #[must_use]
-    pub fn of(straight: Option<(f64, f64)>, bent: Option<&Fit>) -> Self {
+    pub fn of(straight: Option<(f64, f64)>, second_order: Option<&Fit>) -> Self {
         let (slope, error) = straight.unwrap_or((0.0, f64::INFINITY));
         if slope.abs() <= TREND_SIGMAS * error {
             return Self::NotSeen { error };
         }
         // A bend of c2·t² changes the slope by 2·c2 per hour.
-        let bend = bent.and_then(|fit| fit.power(2));
+        let bend = second_order.and_then(|fit| fit.power(2));
         let seen = bend.filter(|(bend, error)| bend.abs() > TREND_SIGMAS * error);
         let holds_h = seen.map_or(TREND_CORRELATION_TIME_H, |(bend, _)| (slope / (2.0 * bend)).abs());
         Self::Seen { slope, holds_h }

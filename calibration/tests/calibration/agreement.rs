@@ -1,6 +1,7 @@
 //! The fit and the service agree: what a report states of its residuals is what `isotherm-replay correct` leaves of the log with the
 //! document that was written, both run as their users run them. `thermal` has the same in [`crate::thermal`], by method.
 
+use std::fmt::Write as _;
 use std::path::Path;
 
 use isotherm_calibration::means::Size;
@@ -159,7 +160,7 @@ fn of_positions_at_two_temperatures() {
         let held: Vec<([f64; 2], usize)> =
             held.into_iter().map(|(span, position)| ([span[0] + 2.0, span[1] - 0.5], position)).collect();
         for ([from, to], position) in &held {
-            times += &format!("{from},{to},{},{name}\n", plan.positions[*position].name);
+            writeln!(times, "{from},{to},{},{name}", plan.positions[*position].name).unwrap();
         }
         held_by_log.push(held);
     }
@@ -336,7 +337,9 @@ fn of_noise_and_drift_and_of_a_judgement() {
     // All other figures of the same ticks as the program wrote them.
     let mut text = Vec::new();
     isotherm_log::offline::rows::write_header(&mut text).unwrap();
-    ticks.iter().for_each(|tick| isotherm_log::offline::rows::write_tick(&mut text, tick).unwrap());
+    for tick in &ticks {
+        isotherm_log::offline::rows::write_tick(&mut text, tick).unwrap();
+    }
     std::fs::write(&csv, text).unwrap();
     let of_csv = json(&["drift", &csv, "--json"]);
     for (one, other) in

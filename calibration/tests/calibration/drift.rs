@@ -7,11 +7,13 @@ use isotherm_calibration::allan::{Coefficient, Estimator, NoiseFit, Phase, Term}
 use isotherm_calibration::drift::markov::{Beside, Fit};
 use isotherm_calibration::drift::parameters::Trend;
 use isotherm_calibration::drift::slow::Slow;
+use isotherm_calibration::impact::monte_carlo::drift;
 use isotherm_calibration::impact::scenario::Care;
 use isotherm_protocol::document::Document;
 
 use crate::command::{calibrate, data, json, root};
 use crate::drift_generator::{Markov, Normal, recording};
+use crate::impact::{VOYAGE, parts};
 
 fn fit(readings: &[f64], tick_s: f64) -> NoiseFit {
     let phase = Phase::new([readings], 0.0);
@@ -154,83 +156,72 @@ fn trend_of(sigma: f64, tau_h: f64, slope: f64, length_h: f64, seed: u64) -> Tre
     Trend::of(fit.slope(&slow), Fit::with_noise(&slow, &beside, fit.noise).as_ref())
 }
 
+/// In how many logs of a Markov drift without any trend one is seen, and by what share the rms position error of voyages of the same
+/// gyros, each with what its log says, is larger than without trend states (0.01: 1 %).
+fn without_trend(length_h: f64, seeds: u64) -> (usize, f64) {
+    // Table 1's middle.
+    let (sigma, tau_h) = (0.0034, 9.5);
+    let (mut wrong, mut with, mut without) = (0, 0.0, 0.0);
+    for seed in 0..seeds {
+        let seen = match trend_of(sigma, tau_h, 0.0, length_h, 7000 + seed) {
+            Trend::Seen { slope, holds_h } => Some((slope.abs(), holds_h)),
+            Trend::NotSeen { .. } => None,
+        };
+        let drift = drift(&VOYAGE, &parts(sigma, 0.0, 0.0002), [0.0; 3], seed);
+        let sail = |care: Care, (trend_sigma, holds_h): (f64, f64)| {
+            let mut parts = parts(sigma, trend_sigma, 0.0002);
+            for parts in &mut parts {
+                parts.trend_correlation_time_s = holds_h * 3600.0;
+            }
+            let end = VOYAGE.sail(care, &drift, &parts).unwrap().figures().radial_at_end_m;
+            end * end
+        };
+        let best = sail(Care::WithoutTrend, (0.0, 140.0));
+        without += best;
+        with += seen.map_or(best, |trend| sail(Care::WithTrend, trend));
+        wrong += usize::from(seen.is_some());
+    }
+    let cost = (with / without).sqrt() - 1.0;
+    println!(
+        "{length_h} h without trend: on in {wrong} of {seeds}; rms after 48 h {:.0} m, {:.2} % more with what the logs say",
+        (without / seeds as f64).sqrt(),
+        100.0 * cost
+    );
+    (wrong, cost)
+}
+
+/// In how many logs of a trend it is seen.
+fn with_trend(length_h: f64, (sigma, slope): (f64, f64), seeds: u64) -> usize {
+    let seen = |seed: &u64| matches!(trend_of(sigma, 9.5, slope, length_h, 9000 + seed), Trend::Seen { .. });
+    let count = (0..seeds).filter(seen).count();
+    println!("{length_h} h of {slope} °/h² beside {sigma} °/h: seen in {count} of {seeds}");
+    count
+}
+
 #[test]
 fn a_trend_state_comes_with_a_trend_and_costs_nothing_without() {
-    const SEEDS: u64 = 100;
-    for length_h in [24.0, 72.0, 216.0] {
-        let ratios = |sigma: f64, slope: f64, base: u64| {
-            let mut all: Vec<f64> = (0..SEEDS)
-                .map(|seed| {
-                    let slow = markov_log(sigma, 9.5, slope, length_h, base + seed, &[]);
-                    let (fit, _) = Fit::with_daily_lines(&slow, 1).unwrap();
-                    let (value, error) = fit.slope(&slow).unwrap();
-                    value.abs() / error
-                })
-                .collect();
-            all.sort_by(f64::total_cmp);
-            [2, 10, 50, 80, 90, 95, 97, 98, 99].map(|at| all[at])
-        };
-        println!("RATIO {length_h}: none {:.1?}", ratios(0.0034, 0.0, 7000));
-        println!("RATIO {length_h}: 4e-4 beside 5e-4 {:.1?}", ratios(0.0005, 4e-4, 9000));
-        println!("RATIO {length_h}: 8e-5 beside 34e-4 {:.1?}", ratios(0.0034, 8e-5, 9500));
-        // Table 1's middle. Voyages of the same gyros without any trend, each with what its log says.
-        let (sigma, tau_h) = (0.0034, 9.5);
-        let (mut wrong, mut squares) = (0, [0.0; 2]);
-        for seed in 0..SEEDS {
-            let trend = trend_of(sigma, tau_h, 0.0, length_h, 7000 + seed);
-            let Trend::Seen { slope, holds_h } = trend else { continue };
-            wrong += 1;
-            let of = |trend_sigma: f64| {
-                let mut parts = crate::impact::parts(sigma, trend_sigma, 0.0002);
-                parts.iter_mut().for_each(|parts| parts.trend_correlation_time_s = holds_h * 3600.0);
-                parts
-            };
-            let drift = isotherm_calibration::impact::monte_carlo::drift(
-                &crate::impact::VOYAGE,
-                &of(0.0),
-                [0.0; 3],
-                seed,
-            );
-            println!("  {length_h} h, seed {seed}: {slope:.2e} °/h² for {holds_h:.0} h");
-            for (sum, care) in squares.iter_mut().zip([Care::WithoutTrend, Care::WithTrend]) {
-                let end = crate::impact::VOYAGE
-                    .sail(care, &drift, &of(slope.abs()))
-                    .unwrap()
-                    .figures()
-                    .radial_at_end_m;
-                *sum += end * end;
-            }
-        }
-        // The others have no trend state, and nothing differs.
-        let mut whole = 0.0;
-        for seed in 0..SEEDS {
-            let parts = crate::impact::parts(sigma, 0.0, 0.0002);
-            let drift = isotherm_calibration::impact::monte_carlo::drift(
-                &crate::impact::VOYAGE,
-                &parts,
-                [0.0; 3],
-                seed,
-            );
-            let end = crate::impact::VOYAGE
-                .sail(Care::WithoutTrend, &drift, &parts)
-                .unwrap()
-                .figures()
-                .radial_at_end_m;
-            whole += end * end;
-        }
-        let cost = ((whole - squares[0] + squares[1]) / whole).sqrt() - 1.0;
-        println!(
-            "{length_h} h without trend: on in {wrong} of {SEEDS}; rms after 48 h {:.0} m, {:.2} % more",
-            (whole / SEEDS as f64).sqrt(),
-            100.0 * cost
-        );
-        let seen = (0..40)
-            .filter(|seed| matches!(trend_of(0.0005, tau_h, 4e-4, length_h, 9000 + seed), Trend::Seen { .. }))
-            .count();
-        println!("{length_h} h with 0.0004 °/h² beside 0.0005 °/h: on in {seen} of 40");
-        assert!(wrong * 100 <= 3 * SEEDS, "{length_h} h: wrongly on in {wrong} of {SEEDS}");
-        assert!(cost < 0.01, "{length_h} h: {cost}");
-        assert!(seen >= 38 || length_h < 72.0, "{length_h} h: {seen} of 40");
+    let (wrong, cost) = without_trend(72.0, 24);
+    assert!(wrong <= 1 && cost < 0.01, "{wrong} {cost}");
+    assert!(with_trend(72.0, (0.0005, 4e-4), 8) >= 7);
+}
+
+#[test]
+#[ignore = "a survey by hand: what docs/calibration/drift.md states of trends that are seen"]
+fn survey_of_trends_72() {
+    survey(72.0);
+}
+
+#[test]
+#[ignore = "a survey by hand: what docs/calibration/drift.md states of trends that are seen"]
+fn survey_of_trends_24_and_216() {
+    survey(24.0);
+    survey(216.0);
+}
+
+fn survey(length_h: f64) {
+    without_trend(length_h, 60);
+    for case in [(0.0005, 4e-4), (0.0034, 4e-4)] {
+        with_trend(length_h, case, 20);
     }
 }
 

@@ -55,7 +55,9 @@ pub(crate) fn record_units(path: &Path, units: &[(&str, Vec<LogEvent>)]) {
     }
     all.sort_by_key(|message| message.received_ns);
     let mut writer = RecordingWriter::create(path, RecordingOptions::default()).unwrap();
-    all.iter().for_each(|message| writer.write(message).unwrap());
+    for message in &all {
+        writer.write(message).unwrap();
+    }
     writer.finish().unwrap();
 }
 

@@ -23,7 +23,7 @@ fn both(folder: &Path, of: impl Fn(u64, &str) -> Vec<LogEvent>) -> (String, Stri
     std::fs::create_dir(&documents).unwrap();
     for unit in UNITS {
         let mut document = Written::read(&shipped("FOG-0001.toml")).unwrap().document;
-        document.unit = unit.to_owned();
+        unit.clone_into(&mut document.unit);
         Written::of(&document).unwrap().save(&documents.join(format!("{unit}.toml")), false).unwrap();
     }
     (log.display().to_string(), documents.display().to_string())

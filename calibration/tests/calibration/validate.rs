@@ -275,7 +275,7 @@ fn faults_of_the_log_that_judges_are_told() {
     let jumping = warnings("swapped.mcap", &|index, event| {
         Some(match event {
             LogEvent::Temperature(mut reading) => {
-                reading.raw = if index % 2 == 0 { 1.2 } else { 2.4 };
+                reading.raw = 1.2 + 0.1 * (index * 7919 % 13) as f64;
                 LogEvent::Temperature(reading)
             }
             other => other,

@@ -24,6 +24,8 @@ pub(super) struct Solution {
     pub(super) inverse: DMatrix<f64>,
     pub(super) squares: f64,
     log_determinant: f64,
+    /// That of the readings' covariance alone.
+    own_determinant: f64,
     pub(super) degrees: f64,
 }
 
@@ -31,6 +33,17 @@ impl Solution {
     /// −2·ln of the restricted likelihood at the best variance.
     pub(super) fn minus_two_log(&self) -> f64 {
         self.degrees * libm::log(self.squares / self.degrees) + self.log_determinant
+    }
+
+    /// −2·ln of the plain likelihood at its best variance, which fits with other columns can be compared by.
+    pub(super) fn minus_two_log_of_readings(&self) -> f64 {
+        let count = self.degrees + self.count_of_columns();
+        count * libm::log(self.squares / count) + self.own_determinant
+    }
+
+    #[expect(clippy::cast_precision_loss, reason = "at most seven")]
+    fn count_of_columns(&self) -> f64 {
+        self.beta.len() as f64
     }
 
     /// The same at a given variance.
@@ -108,6 +121,7 @@ impl<'a> Problem<'a> {
 
     pub(super) fn solve(&self, noise: &Noise) -> Option<Solution> {
         let Rows { values, columns, mut log_determinant } = self.rows(noise);
+        let own_determinant = log_determinant;
         let (count, width) = columns.shape();
         let qr = columns.clone().qr();
         let inverse_r = qr.r().solve_upper_triangular(&DMatrix::identity(width, width))?;
@@ -122,6 +136,7 @@ impl<'a> Problem<'a> {
             inverse,
             squares,
             log_determinant,
+            own_determinant,
             degrees,
         })
     }
