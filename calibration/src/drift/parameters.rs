@@ -13,6 +13,9 @@ use crate::error::Error;
 pub const TREND_CORRELATION_TIME_H: f64 = 140.0;
 /// A trend counts from so many standard errors on.
 pub const TREND_SIGMAS: f64 = 3.0;
+/// Shortest log whose trend the estimator is to expect (h): in shorter ones one in twenty shows a trend that is none, which costs more
+/// than it helps.
+pub const LEAST_TREND_H: f64 = 48.0;
 /// The constant part where nobody states it, in standard deviations of the slow part.
 const CONSTANT_SIGMAS: f64 = 10.0;
 /// Length of a reference at rest (s).
@@ -56,6 +59,13 @@ impl Parameters {
         };
         let trend = trend(analysis);
         let (trend_sigma, trend_time_h) = match trend {
+            Trend::Seen { slope, .. } if length_h < LEAST_TREND_H => {
+                notes.push(format!(
+                    "a trend of {slope:.2e} °/h² shows, but in {length_h:.1} h a slow drift looks the same too often: it is left out; \
+                     log for {LEAST_TREND_H} h"
+                ));
+                (0.0, TREND_CORRELATION_TIME_H)
+            }
             Trend::Seen { slope, holds_h } => (slope.abs(), holds_h),
             Trend::NotSeen { error } => {
                 notes.push(format!(

@@ -293,6 +293,29 @@ fn a_recording_is_analysed_and_its_parameters_go_into_a_document() {
 }
 
 #[test]
+fn a_trend_goes_into_a_document_from_two_days_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let log = folder.path().join("trend.mcap");
+    for (tick_s, stated) in [(1_i64, 0.0), (6, 0.05)] {
+        // 10 h and 60 h of 0.05 °/h² beside 0.01 °/√h.
+        let mut normal = Normal::new(5);
+        let mut column = || -> Vec<f64> {
+            let white = normal.white(36_000, 0.6 / (tick_s as f64).sqrt());
+            white.iter().enumerate().map(|(k, w)| w + 0.05 * (k as i64 * tick_s) as f64 / 3600.0).collect()
+        };
+        recording(&log, "FOG-0001", &[column(), column(), column()], tick_s * 1_000_000_000, |_| true);
+        let report = json(&["drift", &log.display().to_string(), "--json"]);
+        for sensor in report["sensors"].as_array().unwrap() {
+            assert!((sensor["trend_per_h"]["value"].as_f64().unwrap() / 0.05 - 1.0).abs() < 0.05, "{sensor}");
+            let found = sensor["drift"]["trend_sigma_deg_per_h2"].as_f64().unwrap();
+            assert!((found - stated).abs() < 0.0025, "{found}");
+            let told = sensor["drift_notes"].to_string().contains("it is left out; log for 48 h");
+            assert_eq!(told, stated == 0.0, "{sensor}");
+        }
+    }
+}
+
+#[test]
 fn what_a_log_does_not_allow_is_refused_in_words() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).display().to_string();
