@@ -10,8 +10,10 @@
 //! | [`analysis`] | all of it for one sensor, and for all on both processor cores |
 //! | [`parameters`] | what the estimator is to expect: `[gyro.sensor.drift]`, as text and put into a document |
 //! | [`figures`], [`report`], [`page`] | digits and units; tables, JSON; the HTML report |
+//! | `closing` | its part in the table of several units |
 
 pub mod analysis;
+mod closing;
 pub mod columns;
 pub mod figures;
 pub mod markov;

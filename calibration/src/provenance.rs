@@ -67,7 +67,7 @@ fn of_folder(folder: &Path) -> Result<Digest, Error> {
 }
 
 /// The regular files of a folder, not those of folders in it.
-fn files_of(folder: &Path) -> Result<Vec<PathBuf>, Error> {
+pub(crate) fn files_of(folder: &Path) -> Result<Vec<PathBuf>, Error> {
     let failed = |source: io::Error| Error::file(folder, "read the folder", source);
     let mut files = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(failed)? {

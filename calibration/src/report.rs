@@ -26,7 +26,7 @@ use std::fmt::Write;
 
 use isotherm_log::plot::page::{Chart, Table};
 
-pub use batch::{BatchTable, in_parallel, of_unit};
+pub use batch::{BatchRow, BatchTable, UnitReport, in_parallel, of_unit};
 pub use curve::{Curve, Judged, Rest, judge};
 pub use sheet::Sheet;
 pub use sigma::Sigmas;

@@ -32,6 +32,8 @@ pub struct Run {
     /// The gyros whose readings are taken, by number; all without them.
     gyros: Option<[usize; 3]>,
     source: Source,
+    /// What was given for its files.
+    given: Vec<PathBuf>,
 }
 
 #[derive(Debug, Clone)]
@@ -48,13 +50,19 @@ impl Run {
     #[must_use]
     pub fn new(name: String, unit: UnitId, files: LogFiles, part: &Part) -> Self {
         let part = Part { units: [unit.clone()].into(), ..part.clone() };
-        Self { name, unit, gyros: None, source: Source::Files { files, part } }
+        Self { name, unit, gyros: None, source: Source::Files { files, part }, given: Vec::new() }
     }
 
     /// A run that is already in memory.
     #[must_use]
     pub fn of_events(name: String, unit: UnitId, events: Vec<LogEvent>) -> Self {
-        Self { name, unit, gyros: None, source: Source::Events(events.into()) }
+        Self { name, unit, gyros: None, source: Source::Events(events.into()), given: Vec::new() }
+    }
+
+    /// The same, where folders were given that have its files.
+    #[must_use]
+    pub fn given_as(self, given: Vec<PathBuf>) -> Self {
+        Self { given, ..self }
     }
 
     /// The same with three of its gyros only, for corrections with a document of these three.
@@ -87,6 +95,12 @@ impl Run {
             Source::Files { files: LogFiles::Recordings(paths) | LogFiles::Text { paths, .. }, .. } => paths,
             Source::Events(_) => &[],
         }
+    }
+
+    /// The files and folders that it was given as, which documents name; its files where nothing else is known.
+    #[must_use]
+    pub fn logs(&self) -> &[PathBuf] {
+        if self.given.is_empty() { self.files() } else { &self.given }
     }
 
     /// Its readings as columns.

@@ -17,9 +17,11 @@ use crate::error::Error;
 use crate::means::{Means, Size};
 use crate::report::{Curve, FitReport, Rest, Verdict};
 use crate::run::Watch;
+use crate::thermal::Stand;
+use crate::thermal::checks::judging;
 use crate::written::Written;
 use coverage::Coverage;
-pub use runs::{JudgedLog, digests};
+pub use runs::JudgedLog;
 
 /// How a document is judged.
 #[derive(Debug, Clone, Copy)]
@@ -64,10 +66,14 @@ pub fn validate(
                 run.name, run.unit, document.unit
             )]));
         }
+        let faults = judging(&run.name, &run.series(&mut watch)?, &Stand::default());
         let after = Means::of(run, &written.loaded, wanted.window_s, &mut watch)?;
         let nominal = Means::of(run, &bare.loaded, wanted.window_s, &mut watch)?;
         coverage.count(run, written, &mut watch)?;
-        at_rest(&run.name, &after)?;
+        if let Some(reason) = at_rest(&run.name, &after) {
+            return Err(Error::Refused([vec![reason], faults].concat()));
+        }
+        report.warnings.extend(faults);
         let rest = rest(&run.name, &after, wanted.place.as_ref())?;
         let sample = if log.known { Sample::In } else { Sample::Out };
         let curves = Curve::of_means(&run.name, sample, [&nominal, &after], document, &rest);
@@ -136,12 +142,12 @@ fn doubts(name: &str, curves: &[Curve], means: &Means) -> Vec<String> {
     doubts
 }
 
-/// Refuses a run in which the unit was moved: what is left would be its motion.
-fn at_rest(name: &str, means: &Means) -> Result<(), Error> {
+/// Why a run cannot judge in which the unit was moved: what is left would be its motion.
+fn at_rest(name: &str, means: &Means) -> Option<String> {
     let refuse = |what: String| {
-        Err(Error::Refused(vec![format!(
+        Some(format!(
             "{name}: the unit was not at rest: {what}. Cut the log to where it was, with --start and --duration"
-        )]))
+        ))
     };
     for (axis, of) in ["x", "y", "z"].into_iter().enumerate() {
         let range = Size::of(means.rate(axis)).peak_to_peak;
@@ -165,7 +171,7 @@ fn at_rest(name: &str, means: &Means) -> Result<(), Error> {
         let degrees = libm::asin(largest.min(1.0)).to_degrees();
         return refuse(format!("the specific force turns by {} °, at most 2 ° are drift", short(degrees)));
     }
-    Ok(())
+    None
 }
 
 /// What the unit would put out without error.

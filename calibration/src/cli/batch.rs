@@ -1,20 +1,21 @@
 //! One unit or several: what each has to work on, and how a command does the same to all of them.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use isotherm_protocol::key::UnitId;
 use serde_json::json;
 
 use super::bar::Bar;
-use super::output::{Fitted, OutputArgs};
+use super::output::OutputArgs;
 use super::print;
 use super::runs::Reading;
 use crate::error::Error;
-use crate::report::{BatchTable, FitReport, in_parallel, of_unit};
+use crate::report::{BatchTable, UnitReport, in_parallel, of_unit};
 use crate::run::Run;
 use crate::written::{Written, write_file};
 
-/// What a fit of one unit has to work on.
+/// What a command has to work on of one unit.
 pub(super) struct Work {
     /// Document that it starts from.
     pub(super) base: Option<Written>,
@@ -22,6 +23,8 @@ pub(super) struct Work {
     pub(super) runs: Vec<Run>,
     /// Runs that it is judged on.
     pub(super) judges: Vec<Run>,
+    /// What is to be said of the logs.
+    pub(super) warnings: Vec<String>,
 }
 
 /// Logs and documents as a command line names them.
@@ -30,6 +33,10 @@ pub(super) struct Named<'a> {
     pub(super) reading: &'a Reading,
     /// Logs.
     pub(super) logs: &'a [PathBuf],
+    /// Whether all files of a unit are one run; else each log is one.
+    pub(super) together: bool,
+    /// How logs to judge on are read.
+    pub(super) judging: &'a Reading,
     /// Logs to judge on.
     pub(super) judge: &'a [PathBuf],
     /// A document, or the folder that has UNIT.toml of each unit.
@@ -37,54 +44,68 @@ pub(super) struct Named<'a> {
 }
 
 /// A unit with its work, or with why there is none.
-type Unit = (UnitId, Result<Work, Error>);
+pub(super) type Unit = (UnitId, Result<Work, Error>);
 
 /// What came of a unit.
-pub(super) type Outcome = (String, Result<FitReport, Error>);
+pub(super) type Outcome<R> = (String, Result<R, Error>);
+
+type Runs = BTreeMap<UnitId, Vec<Run>>;
+
+const NOTHING: &str = "the logs have no raw readings of any unit: give recordings of the bus (isotherm-replay record), or text logs with \
+    --mapping; a ROS 2 bag holds other messages";
 
 impl Work {
-    /// Files of its runs, each once.
+    /// The logs of its runs as they were given, each once.
     pub(super) fn logs(&self) -> Vec<PathBuf> {
-        let mut files: Vec<PathBuf> = Vec::new();
-        for file in self.runs.iter().flat_map(Run::files) {
-            if !files.contains(file) {
-                files.push(file.clone());
+        let mut logs: Vec<PathBuf> = Vec::new();
+        for log in self.runs.iter().flat_map(Run::logs) {
+            if !logs.contains(log) {
+                logs.push(log.clone());
             }
         }
-        files
+        logs
+    }
+
+    /// Its only run, where all files of a unit are one.
+    pub(super) fn run(&self) -> Result<&Run, Error> {
+        self.runs.first().ok_or_else(|| Error::Refused(vec![NOTHING.to_owned()]))
     }
 }
 
 impl Named<'_> {
-    /// The units that there is something to fit of: that of the document, else all that the logs have.
+    /// The units that there is something to do of: that of the document, else all that the logs have.
     pub(super) fn units(&self) -> Result<Vec<Unit>, Error> {
         let folder = self.document.filter(|path| path.is_dir());
         if let Some(document) = self.document.filter(|_| folder.is_none()) {
             let base = Written::read(document)?;
             let unit = base.loaded.unit.clone();
-            let runs = of_document(self.reading, self.logs, &unit)?;
-            let judges = if self.judge.is_empty() {
-                Vec::new()
-            } else {
-                of_document(self.reading, self.judge, &unit)?
+            let (runs, others) = self.of_document(self.runs(Some(&unit))?, &unit)?;
+            let judges = match self.judges(Some(&unit))? {
+                Some(judges) => self.of_document(judges, &unit)?.0,
+                None => Vec::new(),
             };
-            return Ok(vec![(unit, Ok(Work { base: Some(base), runs, judges }))]);
+            let mut warnings = Vec::new();
+            if !others.is_empty() {
+                warnings.push(format!(
+                    "the logs have unit {} too, which is left alone: the document is of {unit}. For all of them give --document the \
+                     folder that has UNIT.toml of each",
+                    others.join(", ")
+                ));
+            }
+            return Ok(vec![(unit, Ok(Work { base: Some(base), runs, judges, warnings }))]);
         }
-        let of_units = self.reading.runs(self.logs, None)?;
+        let of_units = self.runs(None)?;
         if of_units.is_empty() {
-            return Err(Error::Refused(vec!["the logs have no raw readings".to_owned()]));
+            return Err(Error::Refused(vec![NOTHING.to_owned()]));
         }
-        let mut judging = match of_units.keys().next() {
-            Some(first) if !self.judge.is_empty() => self.reading.runs(self.judge, Some(first))?,
-            _ => std::collections::BTreeMap::new(),
-        };
+        let mut judging = self.judges(of_units.keys().next())?.unwrap_or_default();
         let mut work = |unit: &UnitId, runs| {
             let base = folder.map(|folder| of_folder(folder, unit)).transpose()?;
             let judges = judging.remove(unit).unwrap_or_default();
             if judges.is_empty() && !self.judge.is_empty() {
                 return Err(Error::Refused(vec![format!("--judge: the logs have nothing of unit {unit}")]));
             }
-            Ok(Work { base, runs, judges })
+            Ok(Work { base, runs, judges, warnings: Vec::new() })
         };
         let units = of_units.into_iter().map(|(unit, runs)| {
             let work = work(&unit, runs);
@@ -92,19 +113,36 @@ impl Named<'_> {
         });
         Ok(units.collect())
     }
-}
 
-/// The runs of the unit that a document is of, or that --unit names; what the logs have of other units is left alone.
-fn of_document(reading: &Reading, logs: &[PathBuf], unit: &UnitId) -> Result<Vec<Run>, Error> {
-    let mut runs = reading.runs(logs, Some(unit))?;
-    let wanted = reading.serial()?.unwrap_or_else(|| unit.clone());
-    runs.remove(&wanted).ok_or_else(|| {
-        let there: Vec<String> = runs.keys().map(ToString::to_string).collect();
-        Error::Refused(vec![format!(
-            "the logs are of unit {}, the document is of {unit}: give the document of that unit, or --unit where the serial has changed",
-            if there.is_empty() { "none".to_owned() } else { there.join(", ") }
-        )])
-    })
+    fn runs(&self, fallback: Option<&UnitId>) -> Result<Runs, Error> {
+        if !self.together {
+            return self.reading.runs(self.logs, fallback);
+        }
+        let one = self.reading.runs_in(self.logs, fallback)?.into_iter();
+        Ok(one.map(|(unit, run)| (unit, vec![run])).collect())
+    }
+
+    /// What the judging logs have, where there are any.
+    fn judges(&self, fallback: Option<&UnitId>) -> Result<Option<Runs>, Error> {
+        let given = (!self.judge.is_empty()).then_some(self.judge);
+        given.map(|logs| self.judging.runs(logs, fallback)).transpose()
+    }
+
+    /// The runs of the unit that a document is of, or that --unit names, and the other units that there are.
+    fn of_document(&self, mut runs: Runs, unit: &UnitId) -> Result<(Vec<Run>, Vec<String>), Error> {
+        let wanted = self.reading.serial()?.unwrap_or_else(|| unit.clone());
+        let own = runs.remove(&wanted);
+        let others: Vec<String> = runs.keys().map(ToString::to_string).collect();
+        match own {
+            Some(own) => Ok((own, others)),
+            None if others.is_empty() => Err(Error::Refused(vec![NOTHING.to_owned()])),
+            None => Err(Error::Refused(vec![format!(
+                "the logs are of unit {}, the document is of {unit}: give the document of that unit, or --unit where the serial has \
+                 changed",
+                others.join(", ")
+            )])),
+        }
+    }
 }
 
 /// The document of a unit in a folder, which must be of that unit.
@@ -127,47 +165,83 @@ fn of_folder(folder: &Path, unit: &UnitId) -> Result<Written, Error> {
     Ok(written)
 }
 
-/// Fits all units, as many at a time as there are processors, writes what comes of each, and closes several with one table.
-/// A unit that cannot be fitted does not stop the others. `fit` is told which bars to show: those of several units would fall over
-/// each other.
-pub(super) fn carry_out(
-    output: &OutputArgs,
-    title: &str,
-    mut units: Vec<Unit>,
-    fit: impl Fn(&Work, fn() -> Bar) -> Result<Fitted, Error> + Sync,
-) -> Result<(), Error> {
-    if units.len() == 1
-        && let Some((_, work)) = units.pop()
-    {
-        return output.finish(&fit(&work?, Bar::reading)?);
+/// What the files of a unit are called: as they were given, or with its serial where there are several units.
+pub(super) struct Names<'a>(Option<&'a str>);
+
+impl Names<'_> {
+    /// The name of one of them.
+    pub(super) fn of(&self, given: &Path) -> PathBuf {
+        self.0.map_or_else(|| given.to_path_buf(), |unit| of_unit(given, unit))
     }
-    units.iter().try_for_each(|(unit, _)| output.check_unit(unit.as_str()))?;
-    let bar = Bar::counting("units fitted", units.len());
-    let reports = in_parallel(
-        &units,
-        |ready| bar.at(ready),
-        |(unit, work)| {
-            let work = work.as_ref().map_err(|error| Error::Refused(vec![error.to_string()]))?;
-            let fitted = fit(work, Bar::hidden)?;
-            output.save(&fitted, |path| of_unit(path, unit.as_str()))?;
-            Ok(fitted.report)
-        },
-    );
-    bar.finish();
-    let names = units.into_iter().map(|(unit, _)| unit.to_string());
-    output.finish_batch(title, &names.zip(reports).collect::<Vec<_>>())
+
+    /// A bar over what is done without an end in sight, where it is the only unit: bars of several would fall over each other.
+    pub(super) fn at_work(&self, message: &'static str) -> Bar {
+        if self.0.is_none() { Bar::at_work(message) } else { Bar::hidden() }
+    }
+}
+
+/// How a command does the same to all units.
+pub(super) struct Batch<'a> {
+    /// Where what comes of it goes.
+    pub(super) output: &'a OutputArgs,
+    /// Heading of the page that has the table of several units.
+    pub(super) title: &'a str,
+    /// Whether a refused sensor is no failure.
+    pub(super) accept_partial: bool,
+}
+
+impl Batch<'_> {
+    /// Does `one` to all units, as many at a time as there are processors, and closes several with one table. `one` writes what
+    /// comes of a unit under the names that it is told, with the bars that it is told; a unit that comes to nothing does not stop the
+    /// others.
+    pub(super) fn carry_out<R: UnitReport + Send>(
+        &self,
+        mut units: Vec<Unit>,
+        one: impl Fn(&Work, &Names<'_>, fn() -> Bar) -> Result<R, Error> + Sync,
+    ) -> Result<(), Error> {
+        if units.len() == 1
+            && let Some((_, work)) = units.pop()
+        {
+            let report = one(&work?, &Names(None), Bar::reading)?;
+            let json = self.output.json;
+            print(if json { format!("{}\n", report.to_json()) } else { report.to_text() }.as_bytes())?;
+            return self.end(report.refusals(), Vec::new());
+        }
+        units.iter().try_for_each(|(unit, _)| self.output.check_unit(unit.as_str()))?;
+        let bar = Bar::counting("units done", units.len());
+        let came = in_parallel(
+            &units,
+            |ready| bar.at(ready),
+            |(unit, work)| {
+                let work = work.as_ref().map_err(|error| Error::Refused(vec![error.to_string()]))?;
+                one(work, &Names(Some(unit.as_str())), Bar::hidden)
+            },
+        );
+        bar.finish();
+        let names = units.into_iter().map(|(unit, _)| unit.to_string());
+        let (refused, failed) =
+            close(self.title, &names.zip(came).collect::<Vec<_>>(), self.output.page(), self.output.json)?;
+        self.end(refused, failed)
+    }
+
+    /// Ends with what was refused, unless that is no failure, and with the units that came to nothing.
+    fn end(&self, refused: Vec<String>, failed: Vec<String>) -> Result<(), Error> {
+        let mut reasons = if self.accept_partial { Vec::new() } else { refused };
+        reasons.extend(failed);
+        if reasons.is_empty() { Ok(()) } else { Err(Error::Refused(reasons)) }
+    }
 }
 
 /// Prints what came of several units, the table that closes them last; `html` is a page of that table, and whether it may replace
-/// another.
-pub(super) fn close_batch(
+/// another. What was refused comes back, and the units that came to nothing.
+pub(super) fn close<R: UnitReport>(
     title: &str,
-    units: &[Outcome],
+    units: &[Outcome<R>],
     html: (Option<&Path>, bool),
     as_json: bool,
-) -> Result<(), Error> {
-    let mut batch = BatchTable::default();
-    let (mut refusals, mut reports) = (Vec::new(), Vec::new());
+) -> Result<(Vec<String>, Vec<String>), Error> {
+    let mut batch = BatchTable::of::<R>();
+    let (mut refused, mut failed, mut reports) = (Vec::new(), Vec::new(), Vec::new());
     for (unit, came) in units {
         match came {
             Ok(report) => {
@@ -176,12 +250,12 @@ pub(super) fn close_batch(
                 } else {
                     print(format!("{}\n", report.to_text()).as_bytes())?;
                 }
-                batch.add(unit, Ok(report.verdicts.clone()));
-                refusals.extend(report.refusals());
+                batch.add(unit, Ok(report.rows()));
+                refused.extend(report.refusals());
             }
             Err(error) => {
                 batch.add(unit, Err(error.to_string()));
-                refusals.push(format!("{unit}: {error}"));
+                failed.push(format!("{unit}: {error}"));
             }
         }
     }
@@ -193,5 +267,5 @@ pub(super) fn close_batch(
     } else {
         print(batch.to_text().as_bytes())?;
     }
-    if refusals.is_empty() { Ok(()) } else { Err(Error::Refused(refusals)) }
+    Ok((refused, failed))
 }

@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use isotherm_log::diff::is_csv;
-use isotherm_log::offline::load_calibration;
+use isotherm_log::offline::unit_id;
 use serde_json::json;
 
 use super::bar::Bar;
-use super::output::{check_outputs, date};
-use super::print;
+use super::batch::{Batch, Named, Names, Unit, Work};
+use super::output::OutputArgs;
 use super::runs::LogArgs;
 use crate::drift::analysis::{Wanted, analyse};
 use crate::drift::columns::{Columns, Kind};
@@ -21,7 +21,7 @@ use crate::drift::trend::FIT_H;
 use crate::error::Error;
 use crate::provenance::{TOOL, command_line, origin};
 use crate::run::Watch;
-use crate::written::{Written, write_file};
+use crate::written::Written;
 
 /// Noise and drift of a log at rest: Allan deviation, Markov drift, trend, spectrum, estimator parameters
 #[derive(Debug, Args)]
@@ -31,7 +31,6 @@ use crate::written::{Written, write_file};
     isotherm-calibrate drift static.mcap --document unit.toml --out unit-drift.toml\n\n\
     With --document the log is corrected first, by the service's own code, and what is analysed is what the calibration leaves. \
     Rates are in °/h, N in °/√h, K in °/h/√h, R in °/h², Q in ″.")]
-#[expect(clippy::struct_excessive_bools, reason = "switches of a command line")]
 pub(super) struct DriftArgs {
     #[command(flatten)]
     log: LogArgs,
@@ -44,18 +43,10 @@ pub(super) struct DriftArgs {
     /// Angle that one count of a gyro stands for (″), where the readings are counts and there is no document
     #[arg(long, value_name = "ARCSEC", conflicts_with = "document")]
     increment_weight: Option<f64>,
-    /// Calibration document (TOML): the log is corrected with it first
+    /// Calibration document (TOML): the log is corrected with it first, and --out is it with what the estimator is to expect of its
+    /// gyros; for several units the folder that has UNIT.toml of each
     #[arg(long, short, value_name = "DOC")]
     document: Option<PathBuf>,
-    /// Write the document with what the estimator is to expect of its gyros
-    #[arg(long, short, value_name = "NEW", requires = "document", conflicts_with = "accelerometers")]
-    out: Option<PathBuf>,
-    /// Write over a file that is there
-    #[arg(long)]
-    overwrite: bool,
-    /// Date that the new document states (YYYY-MM-DD); that of the old one without it
-    #[arg(long, value_name = "DATE", requires = "out")]
-    created: Option<String>,
     /// Sigma of the constant part when the estimator starts (°/h), where you know it from several starts
     #[arg(long, value_name = "DEG_PER_H")]
     initial_sigma: Option<f64>,
@@ -65,12 +56,8 @@ pub(super) struct DriftArgs {
     /// Hours that the trend is fitted to before it is extrapolated
     #[arg(long, value_name = "HOURS", default_value_t = FIT_H)]
     fit_hours: f64,
-    /// Write the report with its diagrams as one HTML file
-    #[arg(long, value_name = "FILE")]
-    html: Option<PathBuf>,
-    /// Print everything as one JSON object
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    output: OutputArgs,
 }
 
 /// Distance of averaging times.
@@ -86,13 +73,43 @@ impl DriftArgs {
     /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
         self.check()?;
-        let columns = self.columns()?;
+        let title = "Noise and drift of several units";
+        let batch = Batch { output: &self.output, title, accept_partial: false };
+        batch.carry_out(self.units()?, |work, names, bar| self.report(work, names, bar))
+    }
+
+    /// The units of the logs; corrected ticks are read where they are analysed.
+    fn units(&self) -> Result<Vec<Unit>, Error> {
+        if self.is_corrected() {
+            let unit = self.log.reading.serial()?.map_or_else(|| unit_id("UNIT"), Ok)?;
+            let work = Work { base: None, runs: Vec::new(), judges: Vec::new(), warnings: Vec::new() };
+            return Ok(vec![(unit, Ok(work))]);
+        }
+        let named = Named {
+            reading: &self.log.reading,
+            logs: &self.log.log,
+            together: true,
+            judging: &self.log.reading,
+            judge: &[],
+            document: self.document.as_deref(),
+        };
+        named.units()
+    }
+
+    fn is_corrected(&self) -> bool {
+        self.corrected || self.log.log.iter().any(|path| is_csv(path))
+    }
+
+    /// Analyses a unit and writes what comes of it.
+    fn report(&self, work: &Work, names: &Names<'_>, bar: fn() -> Bar) -> Result<Report, Error> {
+        let columns = self.columns(work, names, bar)?;
         let (unit, kind, corrected) = (columns.unit.to_string(), columns.kind, columns.corrected);
-        let grid = Grid::of(columns)?;
-        let bar = Bar::at_work("Allan deviations, drift, spectrum");
+        let mut grid = Grid::of(columns)?;
+        grid.notes.extend(work.warnings.iter().cloned());
+        let working = names.at_work("Allan deviations, drift, spectrum");
         let factor = if self.taus == Taus::Decade { 10 } else { 2 };
         let sensors = analyse(&grid, Wanted { factor, fit_h: self.fit_hours });
-        bar.finish();
+        working.finish();
         let mut parameters = Vec::new();
         if kind == Kind::Rate {
             let of = |sensor: &crate::drift::analysis::Analysis| {
@@ -112,18 +129,8 @@ impl DriftArgs {
             sensors,
             parameters,
         };
-        if let (Some(document), Some(out)) = (&self.document, &self.out) {
-            self.write_document(document, out, &report)?;
-        }
-        if let Some(html) = &self.html {
-            write_file(html, page(&report).as_bytes(), true)?;
-        }
-        if self.json {
-            print(format!("{}\n", report.to_json()).as_bytes())?;
-        } else {
-            print(report.to_text().as_bytes())?;
-        }
-        if report.refused.is_empty() { Ok(()) } else { Err(Error::Refused(report.refused)) }
+        self.output.write(|| self.document(work, &report), || page(&report), names)?;
+        Ok(report)
     }
 
     /// What the arguments must hold before anything is read.
@@ -138,25 +145,31 @@ impl DriftArgs {
                 return Err(Error::Usage(format!("{name} is {value}, must be a number above 0")));
             }
         }
+        if self.output.writes() && (self.document.is_none() || self.accelerometers) {
+            return Err(Error::Usage(
+                "--out is the document with what the estimator is to expect of its gyros: give it with --document, and leave \
+                 --accelerometers out"
+                    .to_owned(),
+            ));
+        }
         let inputs: Vec<&Path> = self.log.log.iter().chain(&self.document).map(PathBuf::as_path).collect();
-        check_outputs(self.out.as_deref(), self.html.as_deref(), &inputs, self.overwrite)
+        self.output.check(&inputs)
     }
 
-    fn columns(&self) -> Result<Columns, Error> {
+    fn columns(&self, work: &Work, names: &Names<'_>, bar: fn() -> Bar) -> Result<Columns, Error> {
         let kind = if self.accelerometers { Kind::Force } else { Kind::Rate };
-        let unit = self.log.reading.serial()?;
-        if self.corrected || self.log.log.iter().any(|path| is_csv(path)) {
-            let mut bar = Bar::at_work("reading");
+        if self.is_corrected() {
+            let unit = self.log.reading.serial()?;
+            let mut bar = names.at_work("reading");
             let columns = Columns::of_corrected(&self.log.log, unit.as_ref(), kind, || bar.step());
             bar.finish();
             return columns;
         }
-        if let Some(document) = &self.document {
-            let loaded = load_calibration(document)?;
-            let run = self.log.run(Some(&loaded.unit))?;
-            return Columns::corrected_by(&run, &loaded, kind, Bar::reading());
+        let run = work.run()?;
+        if let Some(document) = &work.base {
+            return Columns::corrected_by(run, &document.loaded, kind, bar());
         }
-        let series = self.log.read()?;
+        let series = run.series(bar())?;
         if self.accelerometers {
             Columns::of_accelerometers(series)
         } else {
@@ -164,15 +177,18 @@ impl DriftArgs {
         }
     }
 
-    /// Puts the parameters into a document and writes it, after its own reader has taken it.
-    fn write_document(&self, path: &Path, out: &Path, report: &Report) -> Result<(), Error> {
-        let mut document = Written::read(path)?.document;
+    /// The unit's document with the parameters in it.
+    fn document(&self, work: &Work, report: &Report) -> Result<Written, Error> {
+        let Some(base) = &work.base else {
+            return Err(Error::Usage("--out needs --document".to_owned()));
+        };
+        let mut document = base.document.clone();
         // What the document says of the constant part holds, unless something else was stated.
         put(&mut document, &report.parameters, self.initial_sigma.is_none())?;
-        if let Some(created) = &self.created {
-            document.created = Some(date(created)?);
+        if let Some(date) = self.output.date()? {
+            document.created = Some(date);
         }
-        let of_log = origin(&self.log.log, &command_line())?;
+        let of_log = origin(&work.logs(), &command_line())?;
         let mut whole = document.origin.take().unwrap_or_default();
         let mut details = whole.details.take().unwrap_or_default();
         let notes: Vec<String> = report
@@ -195,6 +211,6 @@ impl DriftArgs {
         details.insert("drift".to_owned(), about);
         whole.details = Some(details);
         document.origin = Some(whole);
-        Written::of(&document)?.save(out, self.overwrite)
+        Written::of(&document)
     }
 }

@@ -6,7 +6,7 @@ use clap::Args;
 use isotherm_correction::earth::Place;
 
 use super::bar::Bar;
-use super::batch::{Named, Work, carry_out};
+use super::batch::{Batch, Named, Work};
 use super::output::{About, Fitted, OutputArgs};
 use super::place::PlaceArgs;
 use super::runs::LogArgs;
@@ -75,11 +75,15 @@ impl ModesArgs {
         let named = Named {
             reading: &self.log.reading,
             logs: &self.log.log,
+            together: false,
+            judging: &self.log.reading,
             judge: &self.judge,
             document: Some(document),
         };
-        carry_out(&self.output, "Mode-reversed gyros of several units", named.units()?, |work, bar| {
-            self.fit(work, place, bar)
+        let title = "Mode-reversed gyros of several units";
+        let batch = Batch { output: &self.output, title, accept_partial: false };
+        batch.carry_out(named.units()?, |work, names, bar| {
+            self.output.keep(self.fit(work, place, bar)?, work, names)
         })
     }
 

@@ -8,8 +8,7 @@ use isotherm_protocol::document::{Created, Document};
 use serde_json::json;
 use toml::Table;
 
-use super::batch::{Outcome, close_batch};
-use super::print;
+use super::batch::{Names, Work};
 use crate::error::Error;
 use crate::provenance::{command_line, origin};
 use crate::report::{FitReport, Sigmas, of_unit, residuals};
@@ -77,30 +76,38 @@ impl OutputArgs {
         outputs.try_for_each(|out| keep(&of_unit(out, unit), self.overwrite))
     }
 
-    /// Writes document and page of a fit, each under the name that `name` makes of what was given.
-    pub(super) fn save(&self, fitted: &Fitted, name: impl Fn(&Path) -> PathBuf) -> Result<(), Error> {
-        let Fitted { written, report, about } = fitted;
+    /// Writes document and page of a unit, each under the name that it has for it.
+    pub(super) fn write(
+        &self,
+        document: impl FnOnce() -> Result<Written, Error>,
+        page: impl FnOnce() -> String,
+        names: &Names<'_>,
+    ) -> Result<(), Error> {
         if let Some(out) = &self.out {
-            self.document(written.document.clone(), about, report)?.save(&name(out), self.overwrite)?;
+            document()?.save(&names.of(out), self.overwrite)?;
         }
         if let Some(html) = &self.html {
-            write_file(&name(html), report.to_html().as_bytes(), self.overwrite)?;
+            write_file(&names.of(html), page().as_bytes(), self.overwrite)?;
         }
         Ok(())
     }
 
-    /// Writes and prints the only fit of a command, and ends with the reasons of what was refused.
-    pub(super) fn finish(&self, fitted: &Fitted) -> Result<(), Error> {
-        self.save(fitted, Path::to_path_buf)?;
-        let report = &fitted.report;
-        print(if self.json { format!("{}\n", report.to_json()) } else { report.to_text() }.as_bytes())?;
-        let refusals = report.refusals();
-        if refusals.is_empty() { Ok(()) } else { Err(Error::Refused(refusals)) }
+    /// Writes what a fit came to; its report is left.
+    pub(super) fn keep(&self, fitted: Fitted, work: &Work, names: &Names<'_>) -> Result<FitReport, Error> {
+        let Fitted { written, mut report, about } = fitted;
+        report.warnings.extend(work.warnings.iter().cloned());
+        self.write(|| self.document(written.document, &about, &report), || report.to_html(), names)?;
+        Ok(report)
     }
 
-    /// Prints the fits of several units, the table that closes them last, and ends with the reasons of what was refused.
-    pub(super) fn finish_batch(&self, title: &str, units: &[Outcome]) -> Result<(), Error> {
-        close_batch(title, units, (self.html.as_deref(), self.overwrite), self.json)
+    /// The page of a batch's table, and whether it may replace another.
+    pub(super) fn page(&self) -> (Option<&Path>, bool) {
+        (self.html.as_deref(), self.overwrite)
+    }
+
+    /// Whether a document is to be written.
+    pub(super) fn writes(&self) -> bool {
+        self.out.is_some()
     }
 
     fn document(&self, mut document: Document, about: &About, report: &FitReport) -> Result<Written, Error> {
@@ -135,19 +142,6 @@ impl OutputArgs {
     }
 }
 
-/// Checks before anything is read: no output may fall on an input, and a document that is there stays without `overwrite`.
-pub(super) fn check_outputs(
-    out: Option<&Path>,
-    html: Option<&Path>,
-    inputs: &[&Path],
-    overwrite: bool,
-) -> Result<(), Error> {
-    for output in out.into_iter().chain(html) {
-        refuse_overwriting(output, inputs)?;
-    }
-    out.map_or(Ok(()), |out| keep(out, overwrite))
-}
-
 /// Leaves a file alone that is there, unless it may be written over.
 fn keep(out: &Path, overwrite: bool) -> Result<(), Error> {
     if out.exists() && !overwrite {
@@ -160,7 +154,7 @@ fn keep(out: &Path, overwrite: bool) -> Result<(), Error> {
 }
 
 /// The date that a document is to state.
-pub(super) fn date(text: &str) -> Result<Created, Error> {
+fn date(text: &str) -> Result<Created, Error> {
     let date = text.parse().ok().and_then(Created::new);
     date.ok_or_else(|| Error::Usage(format!("--created is {text:?}, must be a date such as 2026-11-22")))
 }

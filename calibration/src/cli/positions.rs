@@ -9,7 +9,7 @@ use clap::Args;
 use isotherm_protocol::document::AccelOutput;
 
 use super::bar::Bar;
-use super::batch::{Named, Work, carry_out};
+use super::batch::{Batch, Named, Work};
 use super::output::{About, Fitted, OutputArgs};
 use super::place::GravityArgs;
 use super::print;
@@ -113,11 +113,15 @@ impl PositionsArgs {
         let named = Named {
             reading: &self.reading,
             logs: &self.log,
+            together: false,
+            judging: &self.reading,
             judge: &self.judge,
             document: self.document.as_deref(),
         };
-        carry_out(&self.output, "Accelerometers of several units", named.units()?, |work, bar| {
-            self.fit(work, &settings, about_gravity.as_ref(), bar)
+        let batch =
+            Batch { output: &self.output, title: "Accelerometers of several units", accept_partial: false };
+        batch.carry_out(named.units()?, |work, names, bar| {
+            self.output.keep(self.fit(work, &settings, about_gravity.as_ref(), bar)?, work, names)
         })
     }
 

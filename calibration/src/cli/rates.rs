@@ -8,7 +8,7 @@ use isotherm_correction::sample::OutputKind;
 use isotherm_protocol::document::{Document, GyroOutput};
 
 use super::bar::Bar;
-use super::batch::{Named, Work, carry_out};
+use super::batch::{Batch, Named, Work};
 use super::output::{About, Fitted, OutputArgs};
 use super::place::PlaceArgs;
 use super::runs::LogArgs;
@@ -83,11 +83,14 @@ impl RatesArgs {
         let named = Named {
             reading: &self.log.reading,
             logs: &self.log.log,
+            together: false,
+            judging: &self.log.reading,
             judge: &self.judge,
             document: self.document.as_deref(),
         };
-        carry_out(&self.output, "Rate table, several units", named.units()?, |work, bar| {
-            self.fit(work, place.as_slice(), bar)
+        let batch = Batch { output: &self.output, title: "Rate table, several units", accept_partial: false };
+        batch.carry_out(named.units()?, |work, names, bar| {
+            self.output.keep(self.fit(work, place.as_slice(), bar)?, work, names)
         })
     }
 

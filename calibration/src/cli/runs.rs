@@ -15,7 +15,6 @@ use super::bar::Bar;
 use crate::error::Error;
 use crate::provenance::recordings_in;
 use crate::run::{Run, units_of};
-use crate::series::Series;
 
 /// Gyro ticks in a batch of a text log.
 const BATCH_TICKS: usize = 512;
@@ -62,11 +61,6 @@ impl LogArgs {
             (None, _) => Err(Error::Refused(vec!["the log has no raw readings".to_owned()])),
         }
     }
-
-    /// Reads all of the one unit.
-    pub(crate) fn read(&self) -> Result<Series, Error> {
-        self.run(None)?.series(Bar::reading())
-    }
 }
 
 impl Reading {
@@ -93,24 +87,32 @@ impl Reading {
         Ok(of_unit)
     }
 
-    /// The runs of every unit in files that are one log.
-    fn runs_in(&self, log: &[PathBuf], fallback: Option<&UnitId>) -> Result<BTreeMap<UnitId, Run>, Error> {
+    /// The run of every unit in files that are one log; of recordings, those that have the unit.
+    pub(super) fn runs_in(
+        &self,
+        log: &[PathBuf],
+        fallback: Option<&UnitId>,
+    ) -> Result<BTreeMap<UnitId, Run>, Error> {
         let end =
             self.duration.map(|length| Span::from_ns(self.start.as_ns().saturating_add(length.as_ns())));
         let part = Part { start: self.start, end, ..Part::default() };
         let given = self.serial()?;
         let name = names(log);
-        let log = &unfolded(log)?;
-        let run = |unit: UnitId, files| (unit.clone(), Run::new(name.clone(), unit, files, &part));
-        if !are_recordings(log)? {
+        let files = &unfolded(log)?;
+        if !are_recordings(files)? {
             let unit = match given.as_ref().or(fallback) {
                 Some(unit) => unit.clone(),
                 None => unit_id("UNIT")?,
             };
-            let mapping = Box::new(self.text_mapping(log)?);
-            let files =
-                LogFiles::Text { paths: log.clone(), mapping, unit: unit.clone(), batch_ticks: BATCH_TICKS };
-            return Ok([run(unit, files)].into());
+            let mapping = Box::new(self.text_mapping(files)?);
+            let text = LogFiles::Text {
+                paths: files.clone(),
+                mapping,
+                unit: unit.clone(),
+                batch_ticks: BATCH_TICKS,
+            };
+            let run = Run::new(name, unit.clone(), text, &part).given_as(log.to_vec());
+            return Ok([(unit, run)].into());
         }
         if let Some(mapping) = &self.mapping {
             let words = format!(
@@ -119,11 +121,25 @@ impl Reading {
             );
             return Err(Error::Usage(words));
         }
-        let units = match given {
-            Some(unit) => vec![unit],
-            None => units_of(&mut Log::recordings(log)?, Bar::reading())?,
+        let mut of_units: BTreeMap<UnitId, Vec<PathBuf>> = BTreeMap::new();
+        match given {
+            Some(unit) => drop(of_units.insert(unit, files.clone())),
+            None => {
+                for file in files {
+                    for unit in units_of(&mut Log::recordings(std::slice::from_ref(file))?, Bar::reading())? {
+                        of_units.entry(unit).or_default().push(file.clone());
+                    }
+                }
+            }
+        }
+        let of_unit = |(unit, own): (UnitId, Vec<PathBuf>)| {
+            let has =
+                |given: &&PathBuf| own.iter().any(|file| file == *given || file.parent() == Some(given));
+            let given: Vec<PathBuf> = log.iter().filter(has).cloned().collect();
+            let run = Run::new(names(&given), unit.clone(), LogFiles::Recordings(own), &part);
+            (unit, run.given_as(given))
         };
-        Ok(units.into_iter().map(|unit| run(unit, LogFiles::Recordings(log.clone()))).collect())
+        Ok(of_units.into_iter().map(of_unit).collect())
     }
 
     fn text_mapping(&self, logs: &[PathBuf]) -> Result<Mapping, Error> {

@@ -1,22 +1,19 @@
 //! `isotherm-calibrate thermal`.
 
-mod batch;
 mod stands;
-mod work;
 
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use isotherm_correction::units::Span;
 
-use super::bar::Bar;
-use super::output::{check_outputs, date};
-use super::print;
-use super::runs::LogArgs;
+use super::batch::{Batch, Named, Names, Work};
+use super::output::OutputArgs;
+use super::runs::{LogArgs, Reading};
 use crate::error::Error;
 use crate::provenance::{command_line, origin};
-use crate::thermal::{Fitted, Method, Settings, Terms};
-use crate::written::write_file;
+use crate::report::FitReport;
+use crate::thermal::{Fitted, Method, Settings, Terms, fit};
 use stands::StandArgs;
 
 /// Bias and scale factor over temperature from chamber runs of units at rest or on a rate table
@@ -52,24 +49,11 @@ pub(super) struct ThermalArgs {
     /// Document that the fit starts from and completes; for several units the folder that has UNIT.toml of each
     #[arg(long, short, value_name = "BASE")]
     document: Option<PathBuf>,
-    /// Write the new document; of several units each to NEW-UNIT.toml
-    #[arg(long, short, value_name = "NEW")]
-    out: Option<PathBuf>,
-    /// Write over files that are there
-    #[arg(long)]
-    overwrite: bool,
     /// End with 0 although a sensor was refused
     #[arg(long)]
     accept_partial: bool,
-    /// Date that the document states (YYYY-MM-DD); that of the base document without it
-    #[arg(long, value_name = "DATE")]
-    created: Option<String>,
-    /// Write the report with its diagrams as one HTML file; of several units each to FILE-UNIT.html
-    #[arg(long, value_name = "FILE")]
-    html: Option<PathBuf>,
-    /// Print everything as one JSON object
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    output: OutputArgs,
     #[command(flatten)]
     stands: StandArgs,
     /// Windows of the fit (s)
@@ -106,42 +90,42 @@ impl ThermalArgs {
     pub(super) fn run(&self) -> Result<(), Error> {
         let settings = self.settings()?;
         self.check()?;
-        let work = self.work(&settings)?;
-        let origin = origin(&self.log.log, &command_line())?;
-        if let [only] = work.as_slice() {
-            let fitted = only.fit(origin, Bar::at_work("fitting"))?;
-            self.give_out(&fitted, Path::to_path_buf)?;
-            let report = &fitted.report;
-            if self.json {
-                print(format!("{}\n", report.to_json()).as_bytes())?;
-            } else {
-                print(report.to_text().as_bytes())?;
-            }
-            let refusals = report.refusals();
-            return if refusals.is_empty() || self.accept_partial {
-                Ok(())
-            } else {
-                Err(Error::Refused(refusals))
-            };
-        }
-        self.batch(&work, &origin)
+        let judging = Reading {
+            start: self.judge_start.map_or(Span::ZERO, Span::from_s),
+            duration: self.judge_duration.map(Span::from_s),
+            ..self.log.reading.clone()
+        };
+        let named = Named {
+            reading: &self.log.reading,
+            logs: &self.log.log,
+            together: false,
+            judging: &judging,
+            judge: &self.judge,
+            document: self.document.as_deref(),
+        };
+        let title = "Thermal calibration of several units";
+        let batch = Batch { output: &self.output, title, accept_partial: self.accept_partial };
+        batch.carry_out(named.units()?, |work, names, _| self.fit(work, names, &settings))
     }
 
-    fn give_out(&self, fitted: &Fitted, name: impl Fn(&Path) -> PathBuf) -> Result<(), Error> {
-        if let Some(out) = &self.out {
-            fitted.written.save(&name(out), self.overwrite)?;
-        }
-        if let Some(html) = &self.html {
-            write_file(&name(html), fitted.report.to_html().as_bytes(), true)?;
-        }
-        Ok(())
+    /// Fits a unit and writes what comes of it.
+    fn fit(&self, work: &Work, names: &Names<'_>, settings: &Settings) -> Result<FitReport, Error> {
+        let stands = self.stands.stands(work.runs.len(), work.judges.len())?;
+        let settings = Settings { stands, ..settings.clone() };
+        let origin = origin(&work.logs(), &command_line())?;
+        let base = work.base.as_ref().map(|base| &base.document);
+        let bar = names.at_work("fitting");
+        let Fitted { written, mut report } = fit(base, (&work.runs, &work.judges), &settings, origin, bar)?;
+        report.warnings.extend(work.warnings.iter().cloned());
+        self.output.write(|| Ok(written), || report.to_html(), names)?;
+        Ok(report)
     }
 
     /// What the arguments must hold before anything is read.
     fn check(&self) -> Result<(), Error> {
         let inputs: Vec<&Path> =
             self.log.log.iter().chain(&self.judge).chain(&self.document).map(PathBuf::as_path).collect();
-        check_outputs(self.out.as_deref(), self.html.as_deref(), &inputs, self.overwrite)?;
+        self.output.check(&inputs)?;
         self.each_once()
     }
 
@@ -189,7 +173,7 @@ impl ThermalArgs {
                 return Err(Error::Usage(format!("{name} is {value} s, must be from {low} to {high} s")));
             }
         }
-        let created = self.created.as_deref().map(date).transpose()?;
+        let created = self.output.date()?;
         Ok(Settings {
             method: match self.method {
                 MethodArg::Sequential => Method::Sequential,

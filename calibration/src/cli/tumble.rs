@@ -7,6 +7,7 @@ use isotherm_correction::sample::OutputKind;
 use isotherm_protocol::document::AccelOutput;
 
 use super::bar::Bar;
+use super::batch::{Batch, Named, Names, Work};
 use super::output::{About, Fitted, OutputArgs};
 use super::place::GravityArgs;
 use super::runs::LogArgs;
@@ -30,7 +31,8 @@ use crate::written::Written;
 pub(super) struct TumbleArgs {
     #[command(flatten)]
     log: LogArgs,
-    /// Calibration document (TOML) that is completed; without it everything else stands as the log has it
+    /// Calibration document (TOML) that is completed; without it everything else stands as the log has it; for several units the
+    /// folder that has UNIT.toml of each
     #[arg(long, short, value_name = "DOC")]
     document: Option<PathBuf>,
     #[command(flatten)]
@@ -61,19 +63,44 @@ impl TumbleArgs {
     /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
         self.check()?;
-        let (gravity, about_gravity) = self.gravity.stated()?;
-        let base = self.document.as_deref().map(Written::read).transpose()?;
-        let run = self.log.run(base.as_ref().map(|base| &base.loaded.unit))?;
-        let base = match base {
+        let gravity = self.gravity.stated()?;
+        let named = Named {
+            reading: &self.log.reading,
+            logs: &self.log.log,
+            together: true,
+            judging: &self.log.reading,
+            judge: &[],
+            document: self.document.as_deref(),
+        };
+        let batch =
+            Batch { output: &self.output, title: "Several units tumbled by hand", accept_partial: false };
+        batch.carry_out(named.units()?, |work, names, bar| {
+            self.output.keep(self.fit(work, names, &gravity, bar)?, work, names)
+        })
+    }
+
+    fn fit(
+        &self,
+        work: &Work,
+        names: &Names<'_>,
+        (gravity, about_gravity): &(f64, Option<String>),
+        bar: fn() -> Bar,
+    ) -> Result<Fitted, Error> {
+        let (run, gravity) = (work.run()?, *gravity);
+        let first;
+        let base = match &work.base {
             Some(base) if base.document.accel.is_some() => base,
             Some(_) => {
                 return Err(Error::Refused(vec![
                     "the document has no accelerometers: add [accel], or leave the document out".to_owned(),
                 ]));
             }
-            None => self.first_document(&run)?,
+            None => {
+                first = self.first_document(run, bar())?;
+                &first
+            }
         };
-        let track = Track::of(&run, &base.loaded, Bar::reading())?;
+        let track = Track::of(run, &base.loaded, bar())?;
         let settings = Settings {
             gravity,
             limits: StillLimits {
@@ -86,18 +113,18 @@ impl TumbleArgs {
             search: self.threshold.is_none(),
             start_s: self.still_start,
         };
-        let bar = Bar::at_work("fitting");
+        let fitting = names.at_work("fitting");
         let found = analyse(&track, &settings);
-        bar.finish();
+        fitting.finish();
         let mut tumble = found.map_err(Error::Refused)?;
-        tumble.warnings.extend(about_gravity);
+        tumble.warnings.extend(about_gravity.clone());
         let (document, warnings) = complete(&base.document, &tumble);
         tumble.warnings.extend(warnings);
         let left = |written: &Written| -> Result<Left, Error> {
-            let track = Track::of(&run, &written.loaded, Bar::reading())?;
+            let track = Track::of(run, &written.loaded, bar())?;
             Ok(Left::of(&track, &tumble.poses, gravity))
         };
-        let before = left(&Written::of(&before(&base.document, &tumble, self.document.is_some()))?)?;
+        let before = left(&Written::of(&before(&base.document, &tumble, work.base.is_some()))?)?;
         let written = Written::of(&document)?;
         let after = left(&written)?;
         let report = report(&document, &tumble, &settings, &run.name, [&before, &after]);
@@ -107,9 +134,9 @@ impl TumbleArgs {
             details: details(&tumble, &settings, &report)?,
             sigmas: sigmas(&document, &tumble),
             range_deg_c: None,
-            logs: self.log.log.clone(),
+            logs: work.logs(),
         };
-        self.output.finish(&Fitted { written, report, about })
+        Ok(Fitted { written, report, about })
     }
 
     /// What the arguments must hold before anything is read.
@@ -131,8 +158,8 @@ impl TumbleArgs {
     }
 
     /// A document where there is none.
-    fn first_document(&self, run: &Run) -> Result<Written, Error> {
-        let series = run.series(Bar::reading())?;
+    fn first_document(&self, run: &Run, bar: Bar) -> Result<Written, Error> {
+        let series = run.series(bar)?;
         let output = match (series.accels.output, self.accelerometer_unit.as_str()) {
             (Some(OutputKind::Counts), _) => AccelOutput::Counts,
             (_, "V") => AccelOutput::Volts,

@@ -8,15 +8,14 @@ use isotherm_log::file::refuse_overwriting;
 use isotherm_protocol::key::UnitId;
 
 use super::bar::Bar;
-use super::batch::{Outcome, close_batch};
+use super::batch::{Outcome, close};
 use super::place::PlaceArgs;
 use super::print;
 use super::runs::Reading;
 use crate::error::Error;
-use crate::provenance::origin;
 use crate::report::{FitReport, in_parallel, of_unit};
 use crate::run::Watch;
-use crate::validate::{JudgedLog, Wanted, digests, validate};
+use crate::validate::{JudgedLog, Wanted, validate};
 use crate::written::{Written, write_file};
 
 /// Judge a calibration document on logs that it was not made from
@@ -155,12 +154,12 @@ impl ValidateArgs {
             });
             let (name, written) =
                 found.map_or((String::new(), None), |(name, written)| (name, Some(written)));
-            let known = written.as_ref().map(|written| digests(&written.document)).unwrap_or_default();
             let mut logs = Vec::new();
             for run in runs {
-                let known = !known.is_empty()
-                    && origin(run.files(), "")?.log.iter().any(|log| known.contains(&log.sha256));
-                logs.push(JudgedLog { run, known });
+                logs.push(match &written {
+                    Some(written) => JudgedLog::new(run, &written.document)?,
+                    None => JudgedLog { run, known: false },
+                });
             }
             work.push(Work { name, unit, written, logs });
         }
@@ -176,14 +175,17 @@ impl ValidateArgs {
         end(report.refusals())
     }
 
-    fn several(&self, reports: &[Outcome]) -> Result<(), Error> {
+    fn several(&self, reports: &[Outcome<FitReport>]) -> Result<(), Error> {
         if let Some(html) = &self.html {
             for (unit, report) in reports.iter().filter_map(|(unit, came)| Some((unit, came.as_ref().ok()?)))
             {
                 write_file(&of_unit(html, unit), report.to_html().as_bytes(), true)?;
             }
         }
-        close_batch("Judgement of several units", reports, (self.html.as_deref(), true), self.json)
+        let (mut reasons, failed) =
+            close("Judgement of several units", reports, (self.html.as_deref(), true), self.json)?;
+        reasons.extend(failed);
+        end(reasons)
     }
 }
 

@@ -61,6 +61,8 @@ pub struct Analysis {
     pub slow: Slow,
     /// Markov part and straight trend, and the lines of the day.
     pub markov: Option<(Fit, Vec<DailyLine>)>,
+    /// Slope of the straight trend (readings per h) and the standard error that it must stand out of.
+    pub slope: Option<(f64, f64)>,
     /// The same noise with a trend of second order.
     pub second_order: Option<Fit>,
     /// Autocorrelation of what is left of the slow part after trend and lines.
@@ -183,6 +185,7 @@ fn finish(
         allan: table(grid.tick_s, variances, noise.as_ref(), wanted.factor),
         fitted,
         noise,
+        slope: markov.as_ref().and_then(|(fit, _)| fit.slope(&slow)),
         extrapolation: Extrapolation::of(&slow, wanted.fit_h),
         markov,
         second_order,

@@ -12,7 +12,10 @@ use crate::error::Error;
 /// fit, and e^(−50/140) = 0.7.
 pub const TREND_CORRELATION_TIME_H: f64 = 140.0;
 /// A trend counts from so many standard errors on.
-pub const TREND_SIGMAS: f64 = 2.0;
+pub const TREND_SIGMAS: f64 = 3.0;
+/// Shortest log whose trend the estimator is to expect (h): in shorter ones one in twenty shows a trend that is none, which costs more
+/// than it helps.
+pub const LEAST_TREND_H: f64 = 48.0;
 /// The constant part where nobody states it, in standard deviations of the slow part.
 const CONSTANT_SIGMAS: f64 = 10.0;
 /// Length of a reference at rest (s).
@@ -56,6 +59,13 @@ impl Parameters {
         };
         let trend = trend(analysis);
         let (trend_sigma, trend_time_h) = match trend {
+            Trend::Seen { slope, .. } if length_h < LEAST_TREND_H => {
+                notes.push(format!(
+                    "a trend of {slope:.2e} °/h² shows, but in {length_h:.1} h a slow drift looks the same too often: it is left out; \
+                     log for {LEAST_TREND_H} h"
+                ));
+                (0.0, TREND_CORRELATION_TIME_H)
+            }
             Trend::Seen { slope, holds_h } => (slope.abs(), holds_h),
             Trend::NotSeen { error } => {
                 notes.push(format!(
@@ -144,16 +154,23 @@ pub enum Trend {
 /// What an analysis says of the trend, under the drift and noise that it found.
 #[must_use]
 pub fn trend(analysis: &Analysis) -> Trend {
-    let straight = analysis.markov.as_ref().and_then(|(fit, _)| fit.power(1));
-    let (slope, error) = straight.unwrap_or((0.0, f64::INFINITY));
-    if slope.abs() <= TREND_SIGMAS * error {
-        return Trend::NotSeen { error };
+    Trend::of(analysis.slope, analysis.second_order.as_ref())
+}
+
+impl Trend {
+    /// Of a slope with its standard error, and a fit with a bend.
+    #[must_use]
+    pub fn of(straight: Option<(f64, f64)>, second_order: Option<&Fit>) -> Self {
+        let (slope, error) = straight.unwrap_or((0.0, f64::INFINITY));
+        if slope.abs() <= TREND_SIGMAS * error {
+            return Self::NotSeen { error };
+        }
+        // A bend of c2·t² changes the slope by 2·c2 per hour.
+        let bend = second_order.and_then(|fit| fit.power(2));
+        let seen = bend.filter(|(bend, error)| bend.abs() > TREND_SIGMAS * error);
+        let holds_h = seen.map_or(TREND_CORRELATION_TIME_H, |(bend, _)| (slope / (2.0 * bend)).abs());
+        Self::Seen { slope, holds_h }
     }
-    // A bend of c2·t² changes the slope by 2·c2 per hour.
-    let bend = analysis.second_order.as_ref().and_then(|fit| fit.power(2));
-    let seen = bend.filter(|(bend, error)| bend.abs() > TREND_SIGMAS * error);
-    let holds_h = seen.map_or(TREND_CORRELATION_TIME_H, |(bend, _)| (slope / (2.0 * bend)).abs());
-    Trend::Seen { slope, holds_h }
 }
 
 /// σ and τ of a fit, where there are any.

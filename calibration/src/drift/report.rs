@@ -159,9 +159,7 @@ impl Report {
         row("the autocorrelation falls to 1/e at, h".to_owned(), &|a| {
             a.autocorrelation.as_ref().and_then(|auto| auto.correlation_time_h).map_or_else(none, short)
         });
-        row(format!("trend, {measure} per h"), &|a| {
-            power(a.markov.as_ref().and_then(|(fit, _)| fit.power(1)))
-        });
+        row(format!("trend, {measure} per h"), &|a| power(a.slope));
         row(format!("second order, {measure} per h²"), &|a| {
             power(a.second_order.as_ref().and_then(|fit| fit.power(2)))
         });
@@ -359,7 +357,7 @@ impl Report {
             "markov_sigma": fit.and_then(|fit| fit.sigma),
             "markov_correlation_time_h": fit.and_then(|fit| fit.correlation_time_h),
             "autocorrelation_time_h": sensor.autocorrelation.as_ref().and_then(|auto| auto.correlation_time_h),
-            "trend_per_h": power(fit.and_then(|fit| fit.power(1))),
+            "trend_per_h": power(sensor.slope),
             "second_order_per_h2": power(sensor.second_order.as_ref().and_then(|fit| fit.power(2))),
             "daily_lines": daily,
             "lines": others,

@@ -7,28 +7,67 @@ use std::thread;
 use isotherm_log::plot::page::{Page, Table};
 use serde_json::{Value, json};
 
+use super::FitReport;
 use super::verdict::Verdict;
 use crate::drift::figures::{short, table};
 
+/// What a report gives to a batch: what is said of one unit by itself, and its rows in the table that closes all of them.
+pub trait UnitReport {
+    /// Heads of the columns between the unit and what came of it.
+    const COLUMNS: &'static [&'static str];
+    /// What is said of a sensor that was not refused.
+    const DONE: &'static str;
+
+    /// Everything as text.
+    fn to_text(&self) -> String;
+    /// Everything as JSON.
+    fn to_json(&self) -> Value;
+    /// What was refused and why, for the end of a command.
+    fn refusals(&self) -> Vec<String>;
+    /// A row for each sensor.
+    fn rows(&self) -> Vec<BatchRow>;
+}
+
+/// One sensor in the table.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BatchRow {
+    /// A cell for each of [`UnitReport::COLUMNS`].
+    pub cells: Vec<String>,
+    /// Whether it was not refused.
+    pub accepted: bool,
+    /// What came of it, in words.
+    pub state: String,
+    /// The same as JSON.
+    pub json: Value,
+}
+
 /// One row per unit and sensor.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct BatchTable {
-    units: Vec<(String, Result<Vec<Verdict>, String>)>,
+    columns: &'static [&'static str],
+    done: &'static str,
+    units: Vec<(String, Result<Vec<BatchRow>, String>)>,
 }
 
 impl BatchTable {
-    /// Adds a unit with its verdicts, or with why there are none.
-    pub fn add(&mut self, unit: impl Into<String>, came: Result<Vec<Verdict>, String>) {
+    /// An empty one for reports of a kind.
+    #[must_use]
+    pub fn of<R: UnitReport>() -> Self {
+        Self { columns: R::COLUMNS, done: R::DONE, units: Vec::new() }
+    }
+
+    /// Adds a unit with its rows, or with why there are none.
+    pub fn add(&mut self, unit: impl Into<String>, came: Result<Vec<BatchRow>, String>) {
         self.units.push((unit.into(), came));
     }
 
     /// Sensors accepted, sensors refused, units that came to nothing.
     #[must_use]
     pub fn counts(&self) -> [usize; 3] {
-        let verdicts = || self.units.iter().filter_map(|(_, came)| came.as_ref().ok()).flatten();
-        let accepted = verdicts().filter(|verdict| verdict.accepted).count();
+        let rows = || self.units.iter().filter_map(|(_, came)| came.as_ref().ok()).flatten();
+        let accepted = rows().filter(|row| row.accepted).count();
         let failed = self.units.iter().filter(|(_, came)| came.is_err()).count();
-        [accepted, verdicts().count() - accepted, failed]
+        [accepted, rows().count() - accepted, failed]
     }
 
     /// What came of all of them, in one line.
@@ -39,27 +78,31 @@ impl BatchTable {
         let units = if count == 1 { "unit" } else { "units" };
         let failed =
             if failed == 0 { String::new() } else { format!(", {failed} of the units came to nothing") };
-        format!("{count} {units}: {accepted} of {} sensors accepted{failed}.", accepted + refused)
+        format!("{count} {units}: {accepted} of {} sensors {}{failed}.", accepted + refused, self.done)
     }
 
     /// As a table.
     #[must_use]
     pub fn rows(&self) -> Table {
-        let head =
-            ["unit", "of", "rms before", "after", "peak to peak before", "after", "measure", "sample", ""];
+        let head = ["unit"].iter().chain(self.columns).chain(&[""]);
         let mut rows = Vec::new();
         for (unit, came) in &self.units {
             match came {
-                Ok(verdicts) => rows.extend(verdicts.iter().map(|verdict| row(unit, verdict))),
+                Ok(own) => rows.extend(own.iter().map(|row| {
+                    let mut cells = vec![unit.clone()];
+                    cells.extend(row.cells.iter().cloned());
+                    cells.push(row.state.clone());
+                    cells
+                })),
                 Err(why) => {
                     let mut row = vec![unit.clone()];
-                    row.resize(head.len() - 1, "–".to_owned());
+                    row.resize(self.columns.len() + 1, "–".to_owned());
                     row.push(format!("failed: {why}"));
                     rows.push(row);
                 }
             }
         }
-        Table { head: head.map(str::to_owned).to_vec(), rows }
+        Table { head: head.map(|word| (*word).to_owned()).collect(), rows }
     }
 
     /// As text, its line first.
@@ -72,9 +115,9 @@ impl BatchTable {
     /// As JSON.
     #[must_use]
     pub fn to_json(&self) -> Value {
-        let unit = |(unit, came): &(String, Result<Vec<Verdict>, String>)| match came {
-            Ok(verdicts) => {
-                json!({ "unit": unit, "verdicts": verdicts.iter().map(Verdict::to_json).collect::<Vec<_>>() })
+        let unit = |(unit, came): &(String, Result<Vec<BatchRow>, String>)| match came {
+            Ok(rows) => {
+                json!({ "unit": unit, "verdicts": rows.iter().map(|row| row.json.clone()).collect::<Vec<_>>() })
             }
             Err(why) => json!({ "unit": unit, "failed": why }),
         };
@@ -91,22 +134,53 @@ impl BatchTable {
     }
 }
 
-fn row(unit: &str, verdict: &Verdict) -> Vec<String> {
-    let [before, after] = verdict.deciding();
-    let known = before.count > 0 || after.count > 0;
-    let figure = |value: f64| if known { short(value) } else { "–".to_owned() };
-    let state = if verdict.accepted { "accepted" } else { "refused" };
-    vec![
-        unit.to_owned(),
-        verdict.of.clone(),
-        figure(before.rms),
-        figure(after.rms),
-        figure(before.peak_to_peak),
-        figure(after.peak_to_peak),
-        verdict.measure.clone(),
-        if verdict.out_of_sample.is_some() { "out" } else { "in" }.to_owned(),
-        if verdict.reason.is_empty() { state.to_owned() } else { format!("{state}: {}", verdict.reason) },
-    ]
+impl UnitReport for FitReport {
+    const COLUMNS: &'static [&'static str] =
+        &["of", "rms before", "after", "peak to peak before", "after", "measure", "sample"];
+    const DONE: &'static str = "accepted";
+
+    fn to_text(&self) -> String {
+        Self::to_text(self)
+    }
+
+    fn to_json(&self) -> Value {
+        Self::to_json(self)
+    }
+
+    fn refusals(&self) -> Vec<String> {
+        Self::refusals(self)
+    }
+
+    fn rows(&self) -> Vec<BatchRow> {
+        self.verdicts.iter().map(BatchRow::from).collect()
+    }
+}
+
+impl From<&Verdict> for BatchRow {
+    fn from(verdict: &Verdict) -> Self {
+        let [before, after] = verdict.deciding();
+        let known = before.count > 0 || after.count > 0;
+        let figure = |value: f64| if known { short(value) } else { "–".to_owned() };
+        let state = if verdict.accepted { "accepted" } else { "refused" };
+        Self {
+            cells: vec![
+                verdict.of.clone(),
+                figure(before.rms),
+                figure(after.rms),
+                figure(before.peak_to_peak),
+                figure(after.peak_to_peak),
+                verdict.measure.clone(),
+                if verdict.out_of_sample.is_some() { "out" } else { "in" }.to_owned(),
+            ],
+            accepted: verdict.accepted,
+            state: if verdict.reason.is_empty() {
+                state.to_owned()
+            } else {
+                format!("{state}: {}", verdict.reason)
+            },
+            json: verdict.to_json(),
+        }
+    }
 }
 
 /// Does the same to every item, as many at a time as there are processors; what comes out stands in the order of the items,

@@ -117,8 +117,8 @@ fn a_batch_keeps_its_order_and_ends_with_one_table() {
     let items: Vec<u64> = (0..50).collect();
     let squares = in_parallel(&items, |_| (), |item| item * item);
     assert_eq!(squares, items.iter().map(|item| item * item).collect::<Vec<_>>());
-    let mut batch = BatchTable::default();
-    batch.add("A", Ok(vec![verdict(), verdict().refused("worse")]));
+    let mut batch = BatchTable::of::<FitReport>();
+    batch.add("A", Ok([verdict(), verdict().refused("worse")].iter().map(BatchRow::from).collect()));
     batch.add("B", Err("no raw ticks".into()));
     assert_eq!(batch.counts(), [1, 1, 1]);
     let text = batch.to_text();

@@ -59,7 +59,7 @@ pub fn raw(name: &str, series: &Series, stand: &Stand) -> Findings {
     }
     if series.gyros.len() < FEWEST {
         found.refusals.push(format!(
-            "{name}: {} gyro ticks are too few for a thermal fit, at least {FEWEST} are needed: is the whole log given?",
+            "{name}: {} gyro ticks are too few, at least {FEWEST} are needed: is the whole log given?",
             series.gyros.len()
         ));
     }
@@ -81,6 +81,18 @@ pub fn raw(name: &str, series: &Series, stand: &Stand) -> Findings {
         thermometer(&mut found, name, channel, readings);
     }
     found
+}
+
+/// What is wrong with the readings of a run that judges: it is said, and what can be judged is.
+#[must_use]
+pub fn judging(name: &str, series: &Series, stand: &Stand) -> Vec<String> {
+    let Findings { mut refusals, warnings, dead } = raw(name, series, stand);
+    refusals.extend(warnings);
+    refusals.extend(dead.into_iter().map(|(gyro, index, why)| {
+        let kind = if gyro { "gyro" } else { "accelerometer" };
+        format!("{name}: {kind} {index}: {why}")
+    }));
+    refusals
 }
 
 #[expect(clippy::cast_precision_loss, reason = "readings of a log are far below 2⁵³")]

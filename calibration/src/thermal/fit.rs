@@ -64,6 +64,10 @@ pub fn fit(
         dead.extend(found.dead);
         series.push(of_run);
     }
+    for (index, run) in judges.iter().enumerate() {
+        let stand = settings.stand(runs.len() + index);
+        warnings.extend(checks::judging(&run.name, &run.series(Lent(&mut watch))?, &stand));
+    }
     let first = series.first().ok_or_else(|| Error::Refused(vec!["there is no run to fit to".to_owned()]))?;
     if !refusals.is_empty() {
         return Err(Error::Refused(refusals));

@@ -3,6 +3,7 @@
 use isotherm_protocol::document::{Document, Filter, Origin, Sample};
 
 use super::branches::History;
+use super::checks::SMALLEST_RANGE_DEG_C;
 use super::columns::{Basis, Term};
 use super::fit::{Fitted, Lent, Sensor};
 use super::model::{Spec, put_accel, put_gyro};
@@ -11,9 +12,14 @@ use super::settings::Settings;
 use super::solve::Solution;
 use super::stand::Stand;
 use crate::error::Error;
+use crate::means::Size;
 use crate::report::{Curve, Figure, Rest, Verdict, judge};
 use crate::run::{Run, Watch};
 use crate::written::Written;
+
+/// Share of the rms in sample that the terms of a sensor which drifts with time may leave by themselves, without a judging run:
+/// where they leave more, less of the log is explained by what the document says than by what it does not.
+const LEFT_BESIDE_DRIFT: f64 = 0.5;
 
 /// What came of one sensor.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -28,6 +34,8 @@ pub(super) struct Found {
     pub(super) refused: Option<String>,
     /// What is to be known.
     pub(super) remarks: Vec<String>,
+    /// Whether a drift with time was estimated beside the terms, which is no part of the document.
+    pub(super) drifts: bool,
 }
 
 impl Found {
@@ -68,6 +76,7 @@ impl Found {
             choice: Some(choice),
             refused: None,
             remarks,
+            drifts: spec.trend,
         }
     }
 }
@@ -142,7 +151,6 @@ impl Outcome {
         self.found.sort_by_key(|(sensor, ..)| (!sensor.gyro, sensor.index));
         let before = Written::of(&self.plain())?;
         let window_s = self.settings.window_s.unwrap_or(self.settings.fit_window_s);
-        let mut again = true;
         let (document, curves, mut verdicts, troubles) = loop {
             let document = self.document();
             let written = Written::of(&document)?;
@@ -166,12 +174,12 @@ impl Outcome {
                     both_ways.curves.into_iter().filter(|curve| at_rest || curve.of.starts_with("gyro")),
                 );
             }
+            troubles.extend(constant(&curves));
             let verdicts = Curve::verdicts(&curves);
-            let worse = self.take_out(&verdicts);
-            if !again || !worse {
+            // Every time round there is a sensor less.
+            if !self.take_out(&verdicts) {
                 break (document, curves, verdicts, troubles);
             }
-            again = false;
         };
         self.say(&mut verdicts);
         for (sensor, _, found) in self.found.iter().filter(|(_, _, found)| found.refused.is_none()) {
@@ -231,16 +239,33 @@ impl Outcome {
         document
     }
 
-    /// Takes the terms of sensors out whose axis became worse out of sample; whether there was one.
+    /// Takes the terms of sensors out whose axis became worse, or whose drift with time hides what they are worth; whether there
+    /// was one.
     fn take_out(&mut self, verdicts: &[Verdict]) -> bool {
         let mut worse = false;
-        for verdict in verdicts.iter().filter(|verdict| !verdict.accepted) {
+        for verdict in verdicts {
             let mine = self.found.iter_mut().find(|(sensor, _, found)| {
                 axis_name(sensor).as_ref() == Some(&verdict.of) && found.refused.is_none()
             });
-            if let Some((_, _, found)) = mine {
-                let sample = if verdict.out_of_sample.is_some() { "on the judging run" } else { "in sample" };
-                found.refused = Some(format!("{sample} its {}", verdict.reason));
+            let Some((_, _, found)) = mine else { continue };
+            let judged = verdict.out_of_sample.is_some();
+            let [before, after] = verdict.in_sample.map(|size| size.rms);
+            let why = if !verdict.accepted {
+                let sample = if judged { "on the judging run" } else { "in sample" };
+                Some(format!("{sample} its {}", verdict.reason))
+            } else if found.drifts && !judged && after > LEFT_BESIDE_DRIFT * before {
+                Some(format!(
+                    "it drifts with time besides temperature, and its terms alone, without that drift, leave {:.0} % of its rms in \
+                     sample, more than {:.0} %: what is temperature and what is time cannot be told from this log. Judge it on another \
+                     run (--judge), or make one with a third pass",
+                    100.0 * after / before,
+                    100.0 * LEFT_BESIDE_DRIFT
+                ))
+            } else {
+                None
+            };
+            if let Some(why) = why {
+                found.refused = Some(why);
                 found.terms.clear();
                 worse = true;
             }
@@ -262,6 +287,25 @@ impl Outcome {
             }
         }
     }
+}
+
+/// Judging runs over which a temperature hardly moves.
+fn constant(curves: &[Curve]) -> Vec<String> {
+    let mut words: Vec<String> = Vec::new();
+    for curve in curves.iter().filter(|curve| curve.sample == Sample::Out) {
+        let range = Size::of(&curve.temperature_deg_c).peak_to_peak;
+        if !curve.temperature_deg_c.is_empty() && range < SMALLEST_RANGE_DEG_C {
+            let run = &curve.run;
+            let of = format!(
+                "{run}: its temperature moves by {range:.1} °C, at least {SMALLEST_RANGE_DEG_C} °C are needed to judge what follows \
+                 temperature: judge on a run through the chamber"
+            );
+            if words.iter().all(|other| !other.starts_with(&format!("{run}: "))) {
+                words.push(of);
+            }
+        }
+    }
+    words
 }
 
 /// The case axis that a sensor of a unit with three stands for, as the curves call it.

@@ -2,7 +2,10 @@
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use std::sync::Once;
 
+use isotherm_correction::sample::CorrectedTick;
+use isotherm_log::offline::rows::read_tick;
 use serde_json::Value;
 
 /// The workspace's root.
@@ -63,4 +66,37 @@ pub(crate) fn fails(arguments: &[&str], code: i32) -> String {
 #[track_caller]
 pub(crate) fn json(arguments: &[&str]) -> Value {
     serde_json::from_str(&succeeds(arguments)).unwrap()
+}
+
+/// What `isotherm-replay correct` makes of a log of one unit with a document, tick by tick as it wrote them.
+#[track_caller]
+pub(crate) fn replayed(log: &[&str], document: &str, more: &[&str]) -> Vec<CorrectedTick> {
+    static BUILD: Once = Once::new();
+    let own = Path::new(env!("CARGO_BIN_EXE_isotherm-calibrate"));
+    // `cargo test` builds the programs of the tested package only; built with all, so that features are the same.
+    BUILD.call_once(|| {
+        let target = own.parent().unwrap();
+        let mut cargo = Command::new(env!("CARGO"));
+        cargo.args(["build", "--quiet", "--workspace", "--bins", "--target-dir"]);
+        cargo.arg(target.parent().unwrap()).current_dir(root());
+        // What `cargo test` says of this package would look like a change to build scripts that ask for it.
+        for (name, _) in std::env::vars_os() {
+            if name.to_str().is_some_and(|n| n.starts_with("CARGO_PKG_") || n.starts_with("CARGO_MANIFEST_"))
+            {
+                cargo.env_remove(name);
+            }
+        }
+        if target.ends_with("release") {
+            cargo.arg("--release");
+        }
+        assert!(cargo.status().unwrap().success(), "the programs build");
+    });
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("corrected.csv");
+    let mut replay = Command::new(own.with_file_name("isotherm-replay"));
+    replay.arg("correct").args(log).args(["--calibration", document, "--out"]).arg(&out).args(more);
+    let (code, _, errors) = words(&replay.output().unwrap());
+    assert_eq!(code, Some(0), "{errors}");
+    let text = std::fs::read_to_string(&out).unwrap();
+    text.lines().skip(1).map(|row| read_tick(row).unwrap()).collect()
 }

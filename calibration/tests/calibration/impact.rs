@@ -7,7 +7,7 @@ use isotherm_correction::units::AngularRate;
 
 use crate::command::{calibrate, json, shipped};
 
-const VOYAGE: Voyage = Voyage {
+pub(crate) const VOYAGE: Voyage = Voyage {
     latitude_deg: 60.0,
     turn_ratio: 4.0,
     calibration_h: 21.0,
@@ -22,7 +22,7 @@ fn rad_per_s(deg_per_h: f64) -> f64 {
 }
 
 /// σ (°/h), σ1 (°/h²) and N (°/√h) of a gyro whose drift has a correlation time of 9.5 h and whose trend holds for 140 h.
-fn parts(sigma: f64, trend_sigma: f64, walk: f64) -> [DriftParts; 3] {
+pub(crate) fn parts(sigma: f64, trend_sigma: f64, walk: f64) -> [DriftParts; 3] {
     let parts = DriftParts {
         sigma_rad_per_s: rad_per_s(sigma),
         correlation_time_s: 9.5 * 3600.0,

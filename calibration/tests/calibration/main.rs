@@ -7,6 +7,8 @@
 //! | `tumble` | a unit put down by hand, real and simulated |
 //! | `modes_rates` | `modes` and `rates` as their users run them |
 //! | `drift`, `impact`, `logged` | noise and drift, what they mean for navigation, and logs in every form |
+//! | `agreement` | what reports state is what `isotherm-replay correct` gives with the written document, command by command |
+//! | `two_units` | a recording of two units through every command that reads logs |
 //! | `validate`, `documents` | documents judged, shown, compared and merged |
 //! | `skewed_six` | units of six sensors through all of them |
 //! | `pages` | pages to be looked at |
@@ -22,6 +24,7 @@
 )]
 #![expect(clippy::float_cmp, reason = "a document states what was printed")]
 
+mod agreement;
 mod command;
 mod documents;
 mod drift;
@@ -37,4 +40,5 @@ mod skewed_six;
 mod stand;
 mod thermal;
 mod tumble;
+mod two_units;
 mod validate;

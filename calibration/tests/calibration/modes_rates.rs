@@ -16,6 +16,11 @@ use crate::simulated_logs::record_events;
 
 /// Scenarios one after the other, as one recording; each starts where the last one ended.
 pub(crate) fn record(path: &Path, scenarios: &[Scenario]) {
+    record_events(path, &scenarios[0].unit, events(scenarios));
+}
+
+/// What the unit reads through scenarios one after the other.
+pub(crate) fn events(scenarios: &[Scenario]) -> Vec<LogEvent> {
     let (mut events, mut offset) = (Vec::new(), 0);
     for scenario in scenarios {
         let mut next = offset;
@@ -31,7 +36,7 @@ pub(crate) fn record(path: &Path, scenarios: &[Scenario]) {
         }
         offset = next;
     }
-    record_events(path, &scenarios[0].unit, events);
+    events
 }
 
 /// The Zeeman unit through a chamber programme at ten ticks a second, with its accelerometers.

@@ -20,16 +20,20 @@ pub(crate) fn fibre_optic(seed: u64, unit: &str, seconds: f64) -> Scenario {
 
 /// Writes a scenario as a recording, 256 ticks a message.
 pub(crate) fn record(path: &Path, scenario: &Scenario) {
+    record_events(path, &scenario.unit, events(scenario));
+}
+
+/// What a scenario's unit reads.
+pub(crate) fn events(scenario: &Scenario) -> impl Iterator<Item = LogEvent> {
     let output = scenario.instrument.gyros.output_kind();
     let accel_output = scenario.instrument.accel_output_kind();
-    let events = Simulation::new(scenario).unwrap().flat_map(|step| {
+    Simulation::new(scenario).unwrap().flat_map(move |step| {
         let accel = accel_output.zip(step.accel).map(|(output, tick)| LogEvent::Accel { output, tick });
         let temperatures = step.temperatures.into_iter().map(LogEvent::Temperature);
         let events: Vec<_> =
             temperatures.chain(accel).chain([LogEvent::Gyro { output, tick: step.gyro }]).collect();
         events
-    });
-    record_events(path, &scenario.unit, events);
+    })
 }
 
 /// Writes what a unit read as a recording, 256 ticks a message.
@@ -38,14 +42,38 @@ pub(crate) fn record_events<E: Borrow<LogEvent>>(
     unit: &str,
     events: impl IntoIterator<Item = E>,
 ) {
-    let unit = unit_id(unit).unwrap();
     let mut writer = RecordingWriter::create(path, RecordingOptions::default()).unwrap();
+    messages(unit, events, |message| writer.write(&message).unwrap());
+    writer.finish().unwrap();
+}
+
+/// Writes what several units read as one recording, in the order of their times.
+pub(crate) fn record_units(path: &Path, units: &[(&str, Vec<LogEvent>)]) {
+    let mut all = Vec::new();
+    for (unit, events) in units {
+        messages(unit, events, |message| all.push(message));
+    }
+    all.sort_by_key(|message| message.received_ns);
+    let mut writer = RecordingWriter::create(path, RecordingOptions::default()).unwrap();
+    for message in &all {
+        writer.write(message).unwrap();
+    }
+    writer.finish().unwrap();
+}
+
+/// What a unit read as messages.
+fn messages<E: Borrow<LogEvent>>(
+    unit: &str,
+    events: impl IntoIterator<Item = E>,
+    mut each: impl FnMut(Message),
+) {
+    let unit = unit_id(unit).unwrap();
     let mut batcher = Batcher::new(256);
     let mut write = |batcher: &mut Batcher| {
         while let Some(frame) = batcher.next_frame() {
             let topic = Topic::Raw(unit.clone(), frame.stream);
             let received_ns = u64::try_from(frame.time.as_ns()).unwrap();
-            writer.write(&Message { topic, received_ns, frame: frame.frame }).unwrap();
+            each(Message { topic, received_ns, frame: frame.frame });
         }
     };
     for event in events {
@@ -60,7 +88,6 @@ pub(crate) fn record_events<E: Borrow<LogEvent>>(
     }
     batcher.flush().unwrap();
     write(&mut batcher);
-    writer.finish().unwrap();
 }
 
 /// Writes a scenario as a text log with the mapping that reads it: mean rates in rad/s, accelerometers and temperatures as

@@ -115,6 +115,15 @@ fn tumbled(count: usize, how: &Stand) -> (Instrument, Track, Vec<[f64; 2]>) {
     (instrument, track, held)
 }
 
+/// What a unit that is tumbled reads, without temperatures.
+pub(crate) fn tumbled_log(count: usize, seed: u64) -> Vec<isotherm_log::text::LogEvent> {
+    let mut dice = Dice::new(seed + 77);
+    let attitudes: Vec<Matrix3<f64>> = (0..count).map(|_| stand::any_attitude(&mut dice)).collect();
+    let (mut events, _) = stand::through(&mems_chamber(0).instrument, 25.0, &attitudes, &how(seed));
+    events.retain(|event| !matches!(event, isotherm_log::text::LogEvent::Temperature(_)));
+    events
+}
+
 fn track(instrument: &Instrument, attitudes: &[Matrix3<f64>], how: &Stand) -> (Track, Vec<[f64; 2]>) {
     let (mut events, held) = stand::through(instrument, 25.0, attitudes, how);
     // No channels: the log has one temperature.

@@ -199,3 +199,87 @@ fn what_cannot_be_judged_is_refused_in_words() {
     refused(&["validate", &good, &path("none.mcap")], 1, "none.mcap");
     refused(&["validate", &good, &path("none.csv")], 1, "none.csv");
 }
+
+#[test]
+fn a_folder_that_was_fitted_is_known_whatever_is_given_of_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    for (name, seed) in [("pieces", 5), ("other", 6)] {
+        std::fs::create_dir(path(name)).unwrap();
+        record(Path::new(&path(&format!("{name}/run.mcap"))), &fibre_optic(seed, "FOG-0001", 1500.0));
+    }
+    let known = |document: &str, log: &str| {
+        let report = json(&["validate", &path(document), &path(log), "--json"]);
+        let said =
+            report["warnings"].to_string().contains("is among the logs that the document was made from");
+        assert_eq!(said, report["verdicts"][0]["out_of_sample"].is_null());
+        said
+    };
+    // From the folder, and from the file in it.
+    for (document, log) in [("of-folder.toml", "pieces"), ("of-file.toml", "pieces/run.mcap")] {
+        save(Path::new(&path(document)), |document| {
+            document.origin.get_or_insert_default().log = origin(&[path(log).into()], "test").unwrap().log;
+        });
+        assert!(known(document, "pieces") && known(document, "pieces/run.mcap"), "{document}");
+        assert!(!known(document, "other") && !known(document, "other/run.mcap"), "{document}");
+    }
+}
+
+#[test]
+fn faults_of_the_log_that_judges_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let good = shipped("FOG-0001.toml").display().to_string();
+    let healthy: Vec<LogEvent> = crate::simulated_logs::events(&fibre_optic(5, "FOG-0001", 1500.0)).collect();
+    let warnings = |name: &str, change: &dyn Fn(usize, LogEvent) -> Option<LogEvent>| {
+        let changed = healthy.iter().cloned().enumerate().filter_map(|(index, event)| change(index, event));
+        let log = path(name);
+        crate::simulated_logs::record_events(Path::new(&log), "FOG-0001", changed);
+        let (_, said, errors) = words(&calibrate(&["validate", &good, &log, "--json"]));
+        let report: Value = serde_json::from_str(&said).unwrap_or_default();
+        format!("{}{errors}", report["warnings"])
+    };
+    let gyro = |event: LogEvent, of: &dyn Fn(&mut isotherm_correction::sample::GyroTick)| match event {
+        LogEvent::Gyro { output, mut tick } => {
+            of(&mut tick);
+            LogEvent::Gyro { output, tick }
+        }
+        other => other,
+    };
+    let clean = warnings("clean.mcap", &|_, event| Some(event));
+    assert!(
+        !clean.contains("no numbers") && !clean.contains("gaps") && !clean.contains("reads zero"),
+        "{clean}"
+    );
+    let zero = warnings("zero.mcap", &|_, event| Some(gyro(event, &|tick| tick.readings[1] = 0.0)));
+    assert!(zero.contains("zero.mcap: gyro 1: it reads zero throughout: dead, not connected"), "{zero}");
+    let nan = warnings("nan.mcap", &|_, event| {
+        Some(gyro(event, &|tick| {
+            if tick.sequence % 300 == 7 {
+                tick.readings[0] = f64::NAN;
+            }
+        }))
+    });
+    assert!(nan.contains("gyro 0: 5 readings are no numbers"), "{nan}");
+    let gap = warnings("gap.mcap", &|_, event| {
+        let inside = matches!(&event, LogEvent::Gyro { tick, .. } if (400..480).contains(&tick.sequence));
+        (!inside).then_some(event)
+    });
+    assert!(gap.contains("gap.mcap: 1 gaps in the gyro ticks, 80.0 s in all"), "{gap}");
+    let units = warnings("units.mcap", &|_, event| {
+        Some(gyro(event, &|tick| {
+            tick.readings.iter_mut().for_each(|rate| *rate = rate.to_degrees() * 3600.0);
+        }))
+    });
+    assert!(units.contains("is the unit of measure in the mapping wrong"), "{units}");
+    let jumping = warnings("swapped.mcap", &|index, event| {
+        Some(match event {
+            LogEvent::Temperature(mut reading) => {
+                reading.raw = 1.2 + 0.1 * (index * 7919 % 13) as f64;
+                LogEvent::Temperature(reading)
+            }
+            other => other,
+        })
+    });
+    assert!(jumping.contains("that is no temperature; are columns swapped"), "{jumping}");
+}

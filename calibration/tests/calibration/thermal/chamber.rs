@@ -95,3 +95,35 @@ fn real_chamber_log_needs_data() {
         }
     }
 }
+
+#[test]
+fn without_a_judging_run_no_axis_of_the_real_log_gets_worse_needs_data() {
+    let Some(path) = log() else {
+        println!("skipped: no data");
+        return;
+    };
+    for method in [Method::Sequential, Method::Joint, Method::Lag] {
+        let settings = Settings { method, ..Settings::default() };
+        let train = part(&path, 0.0, Some(TURN_S));
+        let made = fit(None, (&[train], &[]), &settings, Origin::default(), ()).unwrap();
+        println!("{method:?}: {}", made.report.headline());
+        let out = out_of_sample(&path, &made.written);
+        for axis in 0..6 {
+            assert!(out[axis][1] <= 1.001 * RAW[axis], "{method:?} axis {axis}: {:e}", out[axis][1]);
+        }
+        if method != Method::Sequential {
+            let x = &made.report.verdicts[0];
+            assert!(
+                !x.accepted && x.reason.contains("drifts with time") && x.reason.contains("--judge"),
+                "{x:?}"
+            );
+            // What holds on the last cooling holds without knowing it.
+            for axis in [1, 3, 4, 5] {
+                assert!(
+                    made.report.verdicts[axis].accepted && out[axis][0] <= BETTER[axis],
+                    "{method:?} {axis}"
+                );
+            }
+        }
+    }
+}

@@ -70,11 +70,17 @@ fn folders_recordings_and_several_units() {
     assert_eq!(json(&["pieces"])["coefficients"], json(&["whole.mcap"])["coefficients"]);
 
     // Units: all of them, or the one that is wanted.
-    assert_eq!(json(&["whole.mcap", "other.mcap"])["units"].as_array().unwrap().len(), 2);
+    let both = json(&["whole.mcap", "other.mcap"]);
+    assert_eq!(both["batch"]["units"].as_array().unwrap().len(), 2);
+    assert_eq!(both["reports"][1]["unit"], "B");
     assert_eq!(json(&["other.mcap", "--unit", "B"])["unit"], "B");
     std::fs::write(at.join("a.toml"), read("of-file.toml").replace("\"UNIT\"", "\"A\"")).unwrap();
-    let (words, code) = said(at, &["whole.mcap", "other.mcap", "--document", "a.toml"]);
-    assert!(code == Some(1) && words.contains("several units") && words.contains("--unit"), "{words}");
+    let (words, code) = said(at, &["whole.mcap", "other.mcap", "--document", "a.toml", "--out", "of-a.toml"]);
+    assert!(
+        code == Some(0) && words.contains("warning: the logs have unit B too, which is left alone"),
+        "{words}"
+    );
+    assert!(read("of-a.toml").contains("whole.mcap") && !read("of-a.toml").contains("other.mcap\""));
 
     // What cannot be is said.
     std::fs::create_dir(at.join("empty")).unwrap();

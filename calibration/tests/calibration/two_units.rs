@@ -1,0 +1,127 @@
+//! Two units in one recording: every command does both and closes them with one table, does that of its document and says that it
+//! leaves the other alone, or refuses and says what to do.
+
+use std::path::Path;
+
+use isotherm_calibration::written::Written;
+use isotherm_log::text::LogEvent;
+use serde_json::Value;
+
+use crate::command::{calibrate, fails, json, shipped, succeeds, words};
+use crate::modes_rates::{self, table};
+use crate::simulated_logs::{events, fibre_optic, record_units};
+use crate::stand::GRAVITY;
+use crate::tumble::tumbled_log;
+
+const UNITS: [&str; 2] = ["FOG-0001", "FOG-0002"];
+
+/// A recording of both units, and a folder with the document of each.
+fn both(folder: &Path, of: impl Fn(u64, &str) -> Vec<LogEvent>) -> (String, String) {
+    let log = folder.join("both.mcap");
+    record_units(&log, &[(UNITS[0], of(1, UNITS[0])), (UNITS[1], of(2, UNITS[1]))]);
+    let documents = folder.join("documents");
+    std::fs::create_dir(&documents).unwrap();
+    for unit in UNITS {
+        let mut document = Written::read(&shipped("FOG-0001.toml")).unwrap().document;
+        unit.clone_into(&mut document.unit);
+        Written::of(&document).unwrap().save(&documents.join(format!("{unit}.toml")), false).unwrap();
+    }
+    (log.display().to_string(), documents.display().to_string())
+}
+
+fn at_rest(seconds: f64) -> impl Fn(u64, &str) -> Vec<LogEvent> {
+    move |seed, unit| events(&fibre_optic(seed, unit, seconds)).collect()
+}
+
+/// The serials that a batch's table has rows of.
+fn units(report: &Value) -> Vec<&str> {
+    report["batch"]["units"].as_array().unwrap().iter().map(|unit| unit["unit"].as_str().unwrap()).collect()
+}
+
+#[test]
+fn noise_and_drift_of_both_end_with_one_table() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let (log, documents) = both(folder.path(), at_rest(3000.0));
+    let (out, html) = (path("new.toml"), path("drift.html"));
+    let said = succeeds(&["drift", &log, "--document", &documents, "--out", &out, "--html", &html]);
+    let table = said.rsplit("\n\n").find(|part| part.starts_with("2 units: ")).unwrap();
+    assert!(table.starts_with("2 units: 6 of 6 sensors analysed.\n"), "{table}");
+    assert_eq!(table.lines().filter(|line| line.contains("FOG-0002") && line.contains("gyro ")).count(), 3);
+    assert!(table.contains("correlation time, h") && table.contains("°/√h"), "{table}");
+    assert!(std::fs::read_to_string(&html).unwrap().contains("2 units: 6 of 6"));
+    // A unit comes to the same by itself.
+    let of = |name: &str| Written::read(&folder.path().join(name)).unwrap().document;
+    let (one, alone) = (format!("{documents}/FOG-0002.toml"), path("alone.toml"));
+    let said = succeeds(&["drift", &log, "--document", &one, "--out", &alone]);
+    assert!(said.contains("the logs have unit FOG-0001 too, which is left alone"), "{said}");
+    assert_eq!(of("new-FOG-0002.toml").gyro, of("alone.toml").gyro);
+    assert!(
+        of("new-FOG-0001.toml").gyro.sensor[0].drift.is_some()
+            && Path::new(&path("drift-FOG-0001.html")).exists()
+    );
+    // Raw readings need no document; a unit without one does not stop the other.
+    assert_eq!(units(&json(&["drift", &log, "--json"])), UNITS);
+    std::fs::remove_file(&one).unwrap();
+    let (code, said, errors) = words(&calibrate(&["drift", &log, "--document", &documents]));
+    assert!(code == Some(1) && errors.contains("FOG-0002.toml is not there"), "{errors}");
+    assert!(said.contains("2 units: 3 of 3 sensors analysed, 1 of the units came to nothing."), "{said}");
+    assert!(fails(&["drift", &log, "--out", &out], 2).contains("give it with --document"));
+}
+
+#[test]
+fn both_put_down_by_hand_end_with_one_table() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let (log, _) = both(folder.path(), |seed, _| tumbled_log(16, seed));
+    let gravity = GRAVITY.to_string();
+    let fit = ["tumble", &log, "--gravity", &gravity, "--accelerometer-unit", "m/s2"];
+    let said = succeeds(&[&fit[..], &["--out", &path("new.toml"), "--html", &path("new.html")]].concat());
+    let table = said.rsplit("\n\n").find(|part| part.starts_with("2 units: ")).unwrap();
+    assert!(table.starts_with("2 units: 4 of 4 sensors accepted."), "{table}");
+    for unit in UNITS {
+        assert_eq!(
+            Written::read(&folder.path().join(format!("new-{unit}.toml"))).unwrap().document.unit,
+            unit
+        );
+        assert!(Path::new(&path(&format!("new-{unit}.html"))).exists());
+    }
+    // By itself, started from its own document: what is found does not depend on the company.
+    let alone = path("alone.toml");
+    succeeds(&[&fit[..], &["--unit", UNITS[1], "--out", &alone]].concat());
+    let accel = |name: &str| Written::read(&folder.path().join(name)).unwrap().document.accel;
+    assert_eq!(accel("alone.toml"), accel("new-FOG-0002.toml"));
+    let said = succeeds(&[&fit[..], &["--document", &alone]].concat());
+    assert!(said.contains("warning: the logs have unit FOG-0001 too, which is left alone"), "{said}");
+}
+
+#[test]
+fn both_on_a_table_are_fitted_and_one_document_takes_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let (log, _) =
+        both(folder.path(), |seed, _| modes_rates::events(&table(seed, [0.0, 0.0, 1.0], &[36.0, -36.0])));
+    let fit = "--axis z --rates 36,-36 --latitude 55.75 --heading 30 --pitch 0 --roll 0 --json";
+    let fit: Vec<&str> = ["rates", &log].into_iter().chain(fit.split(' ')).collect();
+    assert_eq!(units(&json(&[&fit[..], &["--out", &path("new.toml")]].concat())), UNITS);
+    let alone = json(&[&fit[..], &["--document", &path("new-FOG-0001.toml")]].concat());
+    assert_eq!(alone["unit"], "FOG-0001");
+    assert!(alone["warnings"].to_string().contains("unit FOG-0002 too, which is left alone"), "{alone}");
+}
+
+#[test]
+fn both_at_rest_are_judged_by_a_folder_and_refused_by_one_document() {
+    let folder = tempfile::tempdir().unwrap();
+    let (log, documents) = both(folder.path(), at_rest(1500.0));
+    let (code, said, _) = words(&calibrate(&["validate", &documents, &log, "--json"]));
+    assert!(matches!(code, Some(0 | 1)));
+    assert_eq!(units(&serde_json::from_str(&said).unwrap()), UNITS);
+    let one = format!("{documents}/FOG-0001.toml");
+    let refused = fails(&["validate", &one, &log], 1);
+    assert!(
+        refused.contains("several units (FOG-0001, FOG-0002): choose one with --unit, or give a folder"),
+        "{refused}"
+    );
+    let refused = fails(&["impact", &log, "--document", &one, "--calibration-hours", "0.5"], 1);
+    assert!(refused.contains("several units (FOG-0001, FOG-0002): choose one with --unit"), "{refused}");
+}
