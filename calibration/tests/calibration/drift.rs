@@ -295,8 +295,8 @@ fn a_recording_is_analysed_and_its_parameters_go_into_a_document() {
 #[test]
 fn a_trend_goes_into_a_document_from_two_days_on() {
     let folder = tempfile::tempdir().unwrap();
-    let log = folder.path().join("trend.mcap");
     for (tick_s, stated) in [(1_i64, 0.0), (6, 0.05)] {
+        let log = folder.path().join(format!("trend-{tick_s}.mcap"));
         // 10 h and 60 h of 0.05 °/h² beside 0.01 °/√h.
         let mut normal = Normal::new(5);
         let mut column = || -> Vec<f64> {
