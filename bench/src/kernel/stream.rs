@@ -3,11 +3,12 @@
 use std::sync::Arc;
 
 use isotherm_correction::calibration::Calibration;
+use isotherm_correction::sample::TemperatureReading;
 use isotherm_correction::unit::UnitSettings;
 use isotherm_protocol::codec;
 use isotherm_protocol::corrected::CorrectedBatch;
 use isotherm_protocol::key::{RawStream, UnitId};
-use isotherm_protocol::raw::{AccelBatch, GyroBatch};
+use isotherm_protocol::raw::{AccelBatch, GyroBatch, TemperatureBatch, TemperatureTick};
 use isotherm_protocol::stream::UnitStream;
 
 use super::codec::{TICKS, compare};
@@ -26,14 +27,20 @@ pub(super) struct Stream {
 }
 
 impl Stream {
-    /// Accelerometer and gyro frames of the Zeeman unit, in batches of `size`.
+    /// Frames of the Zeeman unit: temperatures when they are due, ticks in batches of `size`.
     pub(super) fn of(size: usize) -> Result<Self, Error> {
         let unit = unit::zeeman()?;
         let [output, accel_output] = unit.outputs();
         let gyros: Vec<_> = unit.gyro_ticks().take(TICKS).cloned().collect();
         let accels: Vec<_> = unit.accel_ticks().take(TICKS).cloned().collect();
+        let readings: Vec<_> = unit.temperatures().copied().collect();
+        let mut readings = readings.chunk_by(|a, b| a.time == b.time).peekable();
         let mut frames = Vec::new();
         for (gyros, accels) in gyros.chunks(size).zip(accels.chunks(size)) {
+            let end_time = gyros.last().map(|tick| tick.end_time);
+            while let Some(readings) = readings.next_if(|at| at.first().map(|it| it.time) < end_time) {
+                frames.extend(temperatures(readings).map(|frame| (RawStream::Temperature, frame)));
+            }
             let accels =
                 AccelBatch::from_core(accel_output, accels).and_then(|batch| codec::encode(&batch).ok());
             let gyros = GyroBatch::from_core(output, gyros).and_then(|batch| codec::encode(&batch).ok());
@@ -66,6 +73,14 @@ impl Stream {
             each(&self.room);
         }
     }
+}
+
+/// A frame of the readings of one time.
+fn temperatures(readings: &[TemperatureReading]) -> Option<Vec<u8>> {
+    let time_ns = readings.first()?.time.as_ns();
+    let raw = readings.iter().map(|reading| reading.raw).collect();
+    let channels = readings.iter().map(|reading| reading.channel).collect();
+    codec::encode(&TemperatureBatch { channels, ticks: vec![TemperatureTick { time_ns, raw }] }).ok()
 }
 
 impl Kernel for Stream {

@@ -257,6 +257,11 @@ impl UnitCase {
         self.bundles.iter().flat_map(|bundle| &bundle.accels)
     }
 
+    /// Its temperature readings in order.
+    pub(crate) fn temperatures(&self) -> impl Iterator<Item = &TemperatureReading> {
+        self.bundles.iter().flat_map(|bundle| &bundle.temperatures)
+    }
+
     /// What the readings of its gyros and of its accelerometers stand for.
     pub(crate) fn outputs(&self) -> [OutputKind; 2] {
         [self.output, self.accel_output]
