@@ -95,7 +95,10 @@ impl Registrar {
         let Opening { requests, receiver } = opening;
         let thread = std::thread::Builder::new()
             .name("isotherm-registrar".to_owned())
-            .spawn(move || work.run(receiver))?;
+            .spawn(move || {
+                yield_to_ticks();
+                work.run(receiver);
+            })?;
         Ok(Self { requests, thread: Some(thread) })
     }
 
@@ -103,6 +106,18 @@ impl Registrar {
     pub(crate) fn stop(mut self) -> bool {
         let asked = self.requests.send(Request::Stop).is_ok();
         asked & self.thread.take().is_some_and(|thread| thread.join().is_ok())
+    }
+}
+
+/// How much less this thread is worth than those that receive: a swap takes milliseconds, and ticks must not wait for a core meanwhile.
+#[cfg(target_os = "linux")]
+const NICENESS: i32 = 10;
+
+/// Has the thread give way to the others where there are too few cores. Only Linux knows priorities of single threads.
+fn yield_to_ticks() {
+    #[cfg(target_os = "linux")]
+    if let Err(error) = rustix::process::setpriority_process(None, NICENESS) {
+        tracing::debug!("the registrar keeps its priority: {error}");
     }
 }
 
