@@ -6,9 +6,10 @@ use isotherm_protocol::codec;
 use isotherm_protocol::corrected::CorrectedBatch;
 use isotherm_protocol::key::{self, UnitId};
 use tokio::sync::mpsc::{UnboundedReceiver, error::TryRecvError, unbounded_channel};
-use zenoh::Session;
 use zenoh::bytes::ZBytes;
+use zenoh::key_expr::KeyExpr;
 use zenoh::pubsub::Subscriber;
+use zenoh::{Session, Wait};
 
 use crate::{BusError, Continuity};
 
@@ -21,6 +22,10 @@ pub struct Consumer {
     frames: UnboundedReceiver<(String, ZBytes)>,
     accounts: BTreeMap<UnitId, Continuity>,
     rejected: u64,
+    session: Session,
+    // One for each unit heard of, for as long as anybody listens: Zenoh remembers the way to a declared key. For one that comes as
+    // text it looks for the subscribers anew with every message, among all keys that it knows, tokens of thousands of units included.
+    keys: Vec<KeyExpr<'static>>,
     // Dropping it ends the subscription.
     _subscriber: Subscriber<()>,
 }
@@ -45,7 +50,14 @@ impl Consumer {
             })
             .await
             .map_err(|source| BusError::Declare { key, source })?;
-        Ok(Self { frames, accounts: BTreeMap::new(), rejected: 0, _subscriber: subscriber })
+        Ok(Self {
+            frames,
+            accounts: BTreeMap::new(),
+            rejected: 0,
+            session: session.clone(),
+            keys: Vec::new(),
+            _subscriber: subscriber,
+        })
     }
 
     /// The next batch; `None` once the session is closed and everything received before has been taken.
@@ -81,6 +93,10 @@ impl Consumer {
         let batch = codec::decode::<CorrectedBatch>(&frame.to_bytes()).ok();
         match (unit, batch) {
             (Some(unit), Some(batch)) if batch.unit == unit.as_str() => {
+                if !self.accounts.contains_key(&unit) {
+                    // Slower without, and nothing else.
+                    self.keys.extend(self.session.declare_keyexpr(key.to_owned()).wait());
+                }
                 let account = self.accounts.entry(unit).or_default();
                 batch.ticks.iter().for_each(|tick| account.feed(tick));
                 Some(batch)

@@ -93,12 +93,10 @@ impl Registrar {
     /// Where the system gives no thread.
     pub(crate) fn start(opening: Opening, work: Work) -> std::io::Result<Self> {
         let Opening { requests, receiver } = opening;
-        let thread = std::thread::Builder::new()
-            .name("isotherm-registrar".to_owned())
-            .spawn(move || {
-                yield_to_ticks();
-                work.run(receiver);
-            })?;
+        let thread = std::thread::Builder::new().name("isotherm-registrar".to_owned()).spawn(move || {
+            yield_to_ticks();
+            work.run(receiver);
+        })?;
         Ok(Self { requests, thread: Some(thread) })
     }
 

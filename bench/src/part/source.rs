@@ -75,7 +75,7 @@ pub(crate) fn run(plan: &Plan) -> Result<(), Error> {
 /// are, and a session that is not read from for 5 s is closed.
 fn prelude(units: &[Outlets], bursts: Vec<Vec<Message>>) -> Result<(), Error> {
     /// Time for a unit to appear, for each unit that there is.
-    const APPEARANCE: Duration = Duration::from_micros(1);
+    const APPEARANCE: Duration = Duration::from_micros(2);
     for (index, burst) in bursts.into_iter().enumerate() {
         for (outlets, message) in units.iter().zip(burst) {
             outlets.put(message)?;

@@ -74,13 +74,14 @@ impl Declared {
 
 /// One declared publisher per unit, at one priority, so that its batches stay in order.
 ///
-/// With it the unit's raw keys are declared, for as long as the unit is there: Zenoh remembers the route to a declared key. To
-/// one that it only receives as text it looks for the subscribers anew with every message, among all keys of all units.
+/// With it the keys of the unit's raw streams and of its journal are declared, for as long as the unit is there: Zenoh remembers the
+/// route to a declared key. To one that it only has as text it looks for the subscribers anew with every message, among all keys
+/// of all units.
 pub(super) fn outlets(session: Session, congestion: CongestionControl) -> OutletMaker {
     Box::new(move |unit| {
-        let declare = |stream| session.declare_keyexpr(key::raw(unit, stream)).wait();
-        let received: Vec<KeyExpr<'static>> =
-            RawStream::ALL.into_iter().map(declare).collect::<Result<_, _>>()?;
+        let keys = RawStream::ALL.into_iter().map(|stream| key::raw(unit, stream));
+        let keys = keys.chain([key::journal(unit)]).map(|key| session.declare_keyexpr(key).wait());
+        let keys: Vec<KeyExpr<'static>> = keys.collect::<Result<_, _>>()?;
         let publisher = session
             .declare_publisher(key::corrected(unit))
             .congestion_control(congestion)
@@ -89,7 +90,7 @@ pub(super) fn outlets(session: Session, congestion: CongestionControl) -> Outlet
             .wait()?;
         let outlet: Outlet = Box::new(move |frame| {
             // Undeclared where they are dropped.
-            let _ = &received;
+            let _ = &keys;
             publisher.put(frame).wait()
         });
         Ok(outlet)
