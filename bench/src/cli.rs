@@ -151,6 +151,7 @@ pub(crate) fn plain(head: &[&str]) -> Table {
 }
 
 /// Runs the program.
+#[must_use]
 pub fn main() -> ExitCode {
     match run(Cli::parse().command) {
         Ok(text) => {

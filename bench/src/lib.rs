@@ -2,14 +2,14 @@
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`kernel`] | the state machine per tick, beside what an autopilot does per sample |
-//! | [`instructions`] | the same counted in instructions, for a machine that is never quiet |
-//! | [`chain`] | source, service or relay, and sink over TCP loopback: latency, throughput, loss |
-//! | [`scale`] | growth with the number of units; offline correction beside numpy |
-//! | [`report`] | tables and plots of `docs/performance.md` |
-//! | [`part`] | the processes of a chain |
-//! | [`rounds`] | interleaved rounds and their medians |
-//! | [`clock`], [`machine`], [`process`], [`progress`] | what the benches stand on |
+//! | `kernel` | the state machine per tick, beside what an autopilot does per sample |
+//! | `instructions` | the same counted in instructions, for a machine that is never quiet |
+//! | `chain` | source, service or relay, and sink over TCP loopback: latency, throughput, loss |
+//! | `scale` | growth with the number of units; offline correction beside numpy |
+//! | `report` | tables and plots of `docs/performance.md` |
+//! | `part` | the processes of a chain |
+//! | `rounds` | interleaved rounds and their medians |
+//! | `clock`, `machine`, `process`, `progress` | what the benches stand on |
 //!
 //! What a bench refuses to do: report the speed of a wrong result. Each case is checked before it is timed.
 

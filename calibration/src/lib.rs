@@ -7,7 +7,7 @@
 //! |---|---|
 //! | [`run`] | what a log has of one unit, to be corrected again and again |
 //! | [`series`], [`means`] | a run as columns: raw readings; corrected outputs averaged over windows |
-//! | [`nominal`], [`written`], [`provenance`] | a document: before a fit, on its way to a file, where its numbers come from |
+//! | [`written`], [`provenance`] | a document: on its way to a file, where its numbers come from |
 //! | [`drift`], [`allan`], [`spectrum`] | noise and drift of a static log |
 //! | [`report`] | what a fit says: verdicts, before and after, coefficients; text, JSON and page |
 //! | [`impact`] | what a drift that is left means for navigation |

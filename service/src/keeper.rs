@@ -146,7 +146,7 @@ impl Work {
         loop {
             let wait = next_status.min(next_look).saturating_duration_since(Instant::now());
             match requests.recv_timeout(wait) {
-                Ok(Request::Status) => self.publish(|actor| actor.take_status_due()),
+                Ok(Request::Status) => self.publish(UnitActor::take_status_due),
                 Ok(Request::Query(asked, query)) => self.answer(asked, &query),
                 Ok(Request::Stop) | Err(RecvTimeoutError::Disconnected) => break,
                 Err(RecvTimeoutError::Timeout) => {}
