@@ -10,6 +10,7 @@ mod plan;
 
 use alloc::sync::Arc;
 
+use arrayvec::ArrayVec;
 use serde::{Deserialize, Serialize};
 
 use plain::Tick;
@@ -26,7 +27,9 @@ use crate::drift::{DriftEstimator, DriftSettings};
 use crate::observation::Observation;
 use crate::orientation::{Inverse, Orientation, SensorMask};
 use crate::reversal::Substitution;
-use crate::sample::{AccelTick, CorrectedTick, GyroTick, MAX_SENSORS, SensorFlags, Sensors, TickFlags};
+use crate::sample::{
+    AccelTick, CorrectedTick, GyroTick, MAX_PARITY, MAX_SENSORS, MIN_SENSORS, SensorFlags, Sensors, TickFlags,
+};
 use crate::servo::ServoMemory;
 use crate::units::{Span, Timestamp};
 
@@ -254,6 +257,28 @@ fn of_length<T: Copy + Default>(list: &mut Sensors<T>, sensors: usize) {
     if list.len() != sensors {
         *list = core::iter::repeat_n(T::default(), sensors.min(MAX_SENSORS)).collect();
     }
+}
+
+/// Watches the parity of readings, where there are more sensors than axes: what is left over, for the corrected tick. Whether a
+/// sensor was excluded by it.
+fn watch_parity(
+    axes: &mut Axes,
+    orientation: &Orientation,
+    (mask, readings): (SensorMask, &[f64]),
+    (parity, flags): (&mut ArrayVec<f64, MAX_PARITY>, &mut TickFlags),
+    counters: &mut Counters,
+) -> bool {
+    if orientation.sensors() <= MIN_SENSORS {
+        return false;
+    }
+    let verdict = axes.watch(orientation, mask, readings);
+    *parity = verdict.residuals;
+    if verdict.exceeded {
+        *flags |= TickFlags::PARITY_EXCEEDED;
+    }
+    let excluded = verdict.exclude.is_some();
+    counters.sensors_excluded += u64::from(excluded);
+    excluded
 }
 
 /// Case axes from the usable sensors; where they are too few, from all that are not excluded, and not to be trusted.

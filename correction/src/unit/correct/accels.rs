@@ -1,10 +1,10 @@
 //! The accelerometers' part of a tick: bias, scale factor, board ratio, case axes.
 
 use super::gyros::UNSOUND;
-use super::{Corrector, of_length, resolve};
+use super::{Corrector, of_length, resolve, watch_parity};
 use crate::calibration::Calibration;
 use crate::observation::AccelSeen;
-use crate::sample::{AccelTick, CorrectedTick, MAX_SENSORS, MIN_SENSORS, OutputKind, SensorFlags, TickFlags};
+use crate::sample::{AccelTick, CorrectedTick, MAX_SENSORS, OutputKind, SensorFlags, TickFlags};
 use crate::thermal::AccelTerms;
 use crate::unit::counters::Counters;
 use crate::units::Timestamp;
@@ -108,14 +108,8 @@ impl Corrector {
             seen[i] = AccelSeen { reading, flags };
         }
         let Some(axes) = &mut self.thermal.accel_axes else { return };
-        if orientation.sensors() > MIN_SENSORS {
-            let verdict = axes.watch(orientation, mask, forces);
-            out.accel_parity = verdict.residuals;
-            if verdict.exceeded {
-                out.flags |= TickFlags::PARITY_EXCEEDED;
-            }
-            counters.sensors_excluded += u64::from(verdict.exclude.is_some());
-        }
+        let told = (&mut out.accel_parity, &mut out.flags);
+        watch_parity(axes, orientation, (mask, forces), told, counters);
         let (force, trusted) = resolve(axes, orientation, mask, forces, time);
         let slewed_from = self.slew.as_ref().and_then(|slew| slew.accel_axes.as_ref());
         let force = crate::unit::slew::axes(force, slewed_from, mask, forces, self.slew_share);

@@ -1,13 +1,11 @@
 //! The gyros' part of a tick: scale, bias, servo transient, substitution, case axes.
 
-use super::{Corrector, of_length, resolve};
+use super::{Corrector, of_length, resolve, watch_parity};
 use crate::calibration::Calibration;
 use crate::observation::GyroSeen;
 use crate::orientation::SensorMask;
 use crate::reversal::{Substitution, TickInput};
-use crate::sample::{
-    CorrectedTick, GyroTick, LasingMode, MAX_SENSORS, MIN_SENSORS, OutputKind, SensorFlags, TickFlags,
-};
+use crate::sample::{CorrectedTick, GyroTick, LasingMode, MAX_SENSORS, OutputKind, SensorFlags, TickFlags};
 use crate::servo::{ServoTick, Transient};
 use crate::thermal::{GyroModel, GyroTerms};
 use crate::unit::counters::Counters;
@@ -159,11 +157,9 @@ impl Corrector {
     ) {
         let orientation = &calibration.gyro_orientation;
         let axes = &mut self.thermal.gyro_axes;
-        if orientation.sensors() > MIN_SENSORS && !out.flags.contains(TickFlags::INTERPOLATED) {
-            let verdict = axes.watch(orientation, mask, rates);
-            out.gyro_parity = verdict.residuals;
-            out.flags.set(TickFlags::PARITY_EXCEEDED, verdict.exceeded);
-            counters.sensors_excluded += u64::from(verdict.exclude.is_some());
+        if !out.flags.contains(TickFlags::INTERPOLATED) {
+            let told = (&mut out.gyro_parity, &mut out.flags);
+            watch_parity(axes, orientation, (mask, rates), told, counters);
         }
         let (angle, trusted) = resolve(axes, orientation, mask, increments, out.end_time);
         let slewed_from = self.slew.as_ref().and_then(|slew| slew.gyro_axes.as_ref());

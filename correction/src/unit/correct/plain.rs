@@ -8,12 +8,12 @@ use core::array;
 
 use super::gyros::{Signs, input};
 use super::plan::Lines;
-use super::{Corrector, of_length};
+use super::{Corrector, of_length, watch_parity};
 use crate::calibration::Calibration;
 use crate::observation::{AccelSeen, GyroSeen};
 use crate::orientation::SensorMask;
 use crate::reversal::TickInput;
-use crate::sample::{AccelTick, CorrectedTick, MIN_SENSORS, OutputKind, SensorFlags, TickFlags};
+use crate::sample::{AccelTick, CorrectedTick, OutputKind, SensorFlags};
 use crate::thermal::GyroTerms;
 use crate::unit::counters::Counters;
 use crate::unit::release::Released;
@@ -189,16 +189,9 @@ impl Corrector {
         self.seen.settled = true;
         out.delta_angle = lines.gyro_axes.resolve(time, &increments);
 
-        let orientation = &calibration.gyro_orientation;
-        if orientation.sensors() <= MIN_SENSORS {
-            return false;
-        }
-        let rates = rates.get(..count).unwrap_or_default();
-        let verdict = self.thermal.gyro_axes.watch(orientation, SensorMask::all(count), rates);
-        out.gyro_parity = verdict.residuals;
-        out.flags.set(TickFlags::PARITY_EXCEEDED, verdict.exceeded);
-        counters.sensors_excluded += u64::from(verdict.exclude.is_some());
-        verdict.exclude.is_some()
+        let watched = (SensorMask::all(count), rates.get(..count).unwrap_or_default());
+        let told = (&mut out.gyro_parity, &mut out.flags);
+        watch_parity(&mut self.thermal.gyro_axes, &calibration.gyro_orientation, watched, told, counters)
     }
 
     /// As [`accels`](Self::accels); whether a sensor was excluded.
@@ -253,18 +246,10 @@ impl Corrector {
         out.delta_velocity = force.map(|force| force * duration_s);
         self.seen.specific_force = Some(force);
 
-        let Some(watched) = self.thermal.accel_axes.as_mut().filter(|_| orientation.sensors() > MIN_SENSORS)
-        else {
-            return false;
-        };
-        let forces = forces.get(..count).unwrap_or_default();
-        let verdict = watched.watch(orientation, SensorMask::all(count), forces);
-        out.accel_parity = verdict.residuals;
-        if verdict.exceeded {
-            out.flags |= TickFlags::PARITY_EXCEEDED;
-        }
-        counters.sensors_excluded += u64::from(verdict.exclude.is_some());
-        verdict.exclude.is_some()
+        let Some(axes) = &mut self.thermal.accel_axes else { return false };
+        let watched = (SensorMask::all(count), forces.get(..count).unwrap_or_default());
+        let told = (&mut out.accel_parity, &mut out.flags);
+        watch_parity(axes, orientation, watched, told, counters)
     }
 }
 

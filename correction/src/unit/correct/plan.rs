@@ -18,19 +18,13 @@ use crate::unit::thermal_memory::ThermalMemory;
 use crate::units::Timestamp;
 
 /// The plan of a unit, as wide as its sensors need; the rooms are kept.
+///
+/// One value for each sensor: four fill two registers of every x86-64, and suffice for most units.
 #[derive(Debug, Default)]
 pub(in crate::unit) struct Plan {
     holds: bool,
-    lines: Width,
-}
-
-/// One value for each sensor: four fill two registers of every x86-64, and suffice for most units.
-#[derive(Debug, Default)]
-enum Width {
-    #[default]
-    None,
-    Four(Box<Lines<4>>),
-    Eight(Box<Lines<8>>),
+    four: Option<Box<Lines<4>>>,
+    eight: Option<Box<Lines<8>>>,
 }
 
 /// Everything that up to `N` gyros and accelerometers are corrected with.
@@ -116,12 +110,12 @@ pub(super) struct AxesLines<const N: usize> {
 impl Plan {
     /// The lines for up to four sensors, where they hold.
     pub(super) fn four(&self) -> Option<&Lines<4>> {
-        if let Width::Four(lines) = &self.lines { self.holds.then_some(lines) } else { None }
+        self.four.as_deref().filter(|_| self.holds)
     }
 
     /// The lines for more than four sensors, where they hold.
     pub(super) fn eight(&self) -> Option<&Lines<8>> {
-        if let Width::Eight(lines) = &self.lines { self.holds.then_some(lines) } else { None }
+        self.eight.as_deref().filter(|_| self.holds)
     }
 
     /// Holds no longer: something was changed that it has copied.
@@ -131,28 +125,25 @@ impl Plan {
 
     /// Holds from the next tick on, where the corrector stands so that it can.
     pub(super) fn gather(&mut self, calibration: &Calibration, corrector: &Corrector) {
-        let Some(fresh_until) = fresh_until(corrector) else {
-            self.holds = false;
-            return;
-        };
         let sensors = calibration.gyros.len().max(calibration.accels.len());
-        self.holds = match &mut self.lines {
-            Width::Four(room) => {
-                Lines::of(calibration, &corrector.thermal, fresh_until).map(|lines| **room = lines).is_some()
+        self.holds = fresh_until(corrector).is_some_and(|fresh_until| {
+            if sensors <= 4 {
+                renew(&mut self.four, Lines::of(calibration, &corrector.thermal, fresh_until))
+            } else {
+                renew(&mut self.eight, Lines::of(calibration, &corrector.thermal, fresh_until))
             }
-            Width::Eight(room) => {
-                Lines::of(calibration, &corrector.thermal, fresh_until).map(|lines| **room = lines).is_some()
-            }
-            none @ Width::None => {
-                let made = if sensors <= 4 {
-                    Lines::of(calibration, &corrector.thermal, fresh_until).map(Box::new).map(Width::Four)
-                } else {
-                    Lines::of(calibration, &corrector.thermal, fresh_until).map(Box::new).map(Width::Eight)
-                };
-                made.map(|made| *none = made).is_some()
-            }
-        };
+        });
     }
+}
+
+/// Puts lines in their room, which is made with the first of them; whether there are any.
+fn renew<const N: usize>(room: &mut Option<Box<Lines<N>>>, lines: Option<Lines<N>>) -> bool {
+    let Some(lines) = lines else { return false };
+    match room {
+        Some(room) => **room = lines,
+        None => *room = Some(Box::new(lines)),
+    }
+    true
 }
 
 /// Up to which end ticks rest on fresh temperatures; `None` where a tick must look closer: in a slew, or where a temperature
