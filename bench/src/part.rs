@@ -14,7 +14,8 @@ use std::fs;
 use std::io::{self, BufRead, Write};
 use std::path::{Path, PathBuf};
 
-use isotherm_bus::SessionOptions;
+use isotherm_bus::{DeclaredKeys, SessionOptions};
+use isotherm_protocol::key::UnitId;
 use serde::Serialize;
 use zenoh::{Session, Wait};
 
@@ -65,6 +66,17 @@ fn open(plan: &Plan, listen: bool) -> Result<Session, Error> {
     let options = SessionOptions { config: plan.zenoh_config.clone(), connect, ..SessionOptions::default() };
     let session = zenoh::open(options.to_config()?).wait();
     session.map_err(|source| Error::Bus(isotherm_bus::BusError::Open(source)))
+}
+
+/// Declares keys of every unit, those that `of` names.
+fn declare_keys<K: IntoIterator<Item = String>>(
+    session: &Session,
+    plan: &Plan,
+    of: impl Fn(&UnitId) -> K,
+) -> Result<DeclaredKeys, Error> {
+    let units = (0..plan.units).map(unit_name).collect::<Result<Vec<_>, _>>()?;
+    let keys = DeclaredKeys::declare(session, units.iter().flat_map(of));
+    keys.map_err(|error| Error::zenoh("keys", &error))
 }
 
 /// Waits until the one in the middle answers: then it knows every subscription made before.

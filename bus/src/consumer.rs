@@ -6,12 +6,11 @@ use isotherm_protocol::codec;
 use isotherm_protocol::corrected::CorrectedBatch;
 use isotherm_protocol::key::{self, UnitId};
 use tokio::sync::mpsc::{UnboundedReceiver, error::TryRecvError, unbounded_channel};
+use zenoh::Session;
 use zenoh::bytes::ZBytes;
-use zenoh::key_expr::KeyExpr;
 use zenoh::pubsub::Subscriber;
-use zenoh::{Session, Wait};
 
-use crate::{BusError, Continuity};
+use crate::{BusError, Continuity, DeclaredKeys};
 
 /// Receives the corrected batches of one unit or of all, and keeps the account of each unit.
 ///
@@ -23,9 +22,8 @@ pub struct Consumer {
     accounts: BTreeMap<UnitId, Continuity>,
     rejected: u64,
     session: Session,
-    // One for each unit heard of, for as long as anybody listens: Zenoh remembers the way to a declared key. For one that comes as
-    // text it looks for the subscribers anew with every message, among all keys that it knows, tokens of thousands of units included.
-    keys: Vec<KeyExpr<'static>>,
+    // One for each unit heard of.
+    keys: DeclaredKeys,
     // Dropping it ends the subscription.
     _subscriber: Subscriber<()>,
 }
@@ -55,7 +53,7 @@ impl Consumer {
             accounts: BTreeMap::new(),
             rejected: 0,
             session: session.clone(),
-            keys: Vec::new(),
+            keys: DeclaredKeys::default(),
             _subscriber: subscriber,
         })
     }
@@ -95,7 +93,7 @@ impl Consumer {
             (Some(unit), Some(batch)) if batch.unit == unit.as_str() => {
                 if !self.accounts.contains_key(&unit) {
                     // Slower without, and nothing else.
-                    self.keys.extend(self.session.declare_keyexpr(key.to_owned()).wait());
+                    let _ = self.keys.add(&self.session, key.to_owned());
                 }
                 let account = self.accounts.entry(unit).or_default();
                 batch.ticks.iter().for_each(|tick| account.feed(tick));

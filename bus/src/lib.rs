@@ -15,6 +15,7 @@
 //! | [`consumer`] | corrected batches in |
 //! | [`continuity`] | the rule by which a consumer notices a lost tick |
 //! | [`presence`] | waiting until the service is there |
+//! | [`routes`] | keys whose routes Zenoh is to remember |
 
 pub mod consumer;
 pub mod continuity;
@@ -22,6 +23,7 @@ mod error;
 pub mod outlet;
 pub mod presence;
 pub mod producer;
+pub mod routes;
 pub mod session;
 
 pub use consumer::Consumer;
@@ -29,4 +31,5 @@ pub use continuity::Continuity;
 pub use error::{BusError, words};
 pub use outlet::{Outlet, OutletOptions};
 pub use producer::{Producer, ProducerOptions};
+pub use routes::DeclaredKeys;
 pub use session::{SessionOptions, close, locators, open};

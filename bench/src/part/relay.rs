@@ -1,19 +1,19 @@
 //! The bare relay: the same Zenoh configuration as the service, and a callback that only puts what came in on the output key.
 
-use isotherm_protocol::key::{self, RawStream};
-use zenoh::key_expr::KeyExpr;
+use isotherm_protocol::key::{self, RawStream, UnitId};
 use zenoh::qos::{CongestionControl, Priority};
 use zenoh::sample::Locality;
 use zenoh::{Session, Wait};
 
-use super::{Plan, Ready, head, hear, open, say, unit_name};
+use super::{Plan, Ready, declare_keys, head, hear, open, say, unit_name};
 use crate::error::Error;
 
 /// Relays until stdin ends.
 pub(crate) fn run(plan: &Plan) -> Result<(), Error> {
     let session = open(plan, true)?;
     let outputs = outputs(&session, plan)?;
-    let _declared = if plan.declare_keys { declare_keys(&session, plan)? } else { Vec::new() };
+    let of_unit = |unit: &UnitId| RawStream::ALL.map(|stream| key::raw(unit, stream));
+    let _declared = plan.declare_keys.then(|| declare_keys(&session, plan, of_unit)).transpose()?;
     let subscriber = session
         .declare_subscriber(key::ALL_RAW)
         .allowed_origin(Locality::Remote)
@@ -50,17 +50,4 @@ fn outputs(session: &Session, plan: &Plan) -> Result<Vec<zenoh::pubsub::Publishe
             .map_err(|error| Error::zenoh("relay", &error))
     };
     (0..plan.units).map(declare).collect()
-}
-
-/// Declares what comes in, for as long as it is kept. A key that comes as text and is declared nowhere has its subscribers looked for with
-/// every message, among all keys that this session knows; the route to a declared one is remembered.
-fn declare_keys(session: &Session, plan: &Plan) -> Result<Vec<KeyExpr<'static>>, Error> {
-    let mut declared = Vec::new();
-    for unit in 0..plan.units {
-        for stream in RawStream::ALL {
-            let key = session.declare_keyexpr(key::raw(&unit_name(unit)?, stream)).wait();
-            declared.push(key.map_err(|error| Error::zenoh("relay", &error))?);
-        }
-    }
-    Ok(declared)
 }

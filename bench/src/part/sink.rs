@@ -7,11 +7,10 @@ use std::time::{Duration, Instant};
 
 use isotherm_protocol::key;
 use serde::{Deserialize, Serialize};
-use zenoh::key_expr::KeyExpr;
+use zenoh::Wait;
 use zenoh::sample::Sample;
-use zenoh::{Session, Wait};
 
-use super::{Plan, Ready, head, hear, open, path, say, unit_name, wait_for_middle, write_numbers};
+use super::{Plan, Ready, declare_keys, head, hear, open, path, say, wait_for_middle, write_numbers};
 use crate::clock::now_ns;
 use crate::error::Error;
 
@@ -63,7 +62,8 @@ pub(crate) fn run(plan: &Plan) -> Result<(), Error> {
     }));
     lock(&book).came_ns.fill(0);
     let session = open(plan, false)?;
-    let _declared = declare_keys(&session, plan)?;
+    // As a consumer does: the sink has to keep up with thousands of units.
+    let _declared = declare_keys(&session, plan, |unit| [key::corrected(unit)])?;
     let writing = Arc::clone(&book);
     let subscriber = session
         .declare_subscriber(key::ALL_CORRECTED)
@@ -99,15 +99,6 @@ pub(crate) fn run(plan: &Plan) -> Result<(), Error> {
     write_numbers(&path(plan, "came.bin"), &book.came_ns)?;
     write_kept(&path(plan, "kept.bin"), &book.units)?;
     say(&book.account)
-}
-
-/// Declares what comes in, as [`isotherm_bus::Consumer`] does: the sink has to keep up with thousands of units.
-fn declare_keys(session: &Session, plan: &Plan) -> Result<Vec<KeyExpr<'static>>, Error> {
-    let declare = |unit| {
-        let key = session.declare_keyexpr(key::corrected(&unit_name(unit)?)).wait();
-        key.map_err(|error| Error::zenoh("sink", &error))
-    };
-    (0..plan.units).map(declare).collect()
 }
 
 /// How long nothing may come behind the last tick.

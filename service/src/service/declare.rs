@@ -3,8 +3,8 @@
 use std::sync::Arc;
 use std::time::Instant;
 
+use isotherm_bus::DeclaredKeys;
 use isotherm_protocol::key::{self, RawStream, UnitId};
-use zenoh::key_expr::KeyExpr;
 use zenoh::liveliness::LivelinessToken;
 use zenoh::pubsub::Subscriber;
 use zenoh::qos::{CongestionControl, Priority};
@@ -74,14 +74,11 @@ impl Declared {
 
 /// One declared publisher per unit, at one priority, so that its batches stay in order.
 ///
-/// With it the keys of the unit's raw streams and of its journal are declared, for as long as the unit is there: Zenoh remembers the
-/// route to a declared key. To one that it only has as text it looks for the subscribers anew with every message, among all keys
-/// of all units.
+/// With it the keys of the unit's raw streams and of its journal are declared, for as long as the unit is there.
 pub(super) fn outlets(session: Session, congestion: CongestionControl) -> OutletMaker {
     Box::new(move |unit| {
         let keys = RawStream::ALL.into_iter().map(|stream| key::raw(unit, stream));
-        let keys = keys.chain([key::journal(unit)]).map(|key| session.declare_keyexpr(key).wait());
-        let keys: Vec<KeyExpr<'static>> = keys.collect::<Result<_, _>>()?;
+        let keys = DeclaredKeys::declare(&session, keys.chain([key::journal(unit)]))?;
         let publisher = session
             .declare_publisher(key::corrected(unit))
             .congestion_control(congestion)
