@@ -9,19 +9,17 @@ use isotherm_bench::{Error, kernels};
 
 fn main() -> Result<(), Error> {
     // A wrong result has no speed.
-    kernels()?.iter_mut().try_for_each(|kernel| kernel.check())?;
+    kernels().try_for_each(|kernel| kernel?.check())?;
     divan::main();
     Ok(())
 }
 
 fn names() -> Vec<String> {
-    let kernels = kernels().unwrap_or_default();
-    kernels.iter().map(|kernel| kernel.name().to_owned()).collect()
+    kernels().flatten().map(|kernel| kernel.name().to_owned()).collect()
 }
 
 #[divan::bench(args = names())]
 fn pass(bencher: Bencher<'_, '_>, name: &String) {
-    let mut made = kernels().unwrap_or_default();
-    let Some(kernel) = made.iter_mut().find(|kernel| kernel.name() == name) else { return };
+    let Some(mut kernel) = kernels().flatten().find(|kernel| kernel.name() == name) else { return };
     bencher.counter(ItemsCount::new(kernel.ticks())).bench_local(|| kernel.pass());
 }

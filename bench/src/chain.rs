@@ -205,10 +205,10 @@ pub(crate) fn measure(args: &ChainArgs) -> Report {
 }
 
 /// What is run: a load, settings, and what stands in the middle.
-type Run = (Case, Profile, Subject);
+pub(crate) type Run = (Case, Profile, Subject);
 
 /// Every run once in each of so many rounds; the outcomes of each.
-fn take_turns(
+pub(crate) fn take_turns(
     runs: &[Run],
     rounds: usize,
     ends_too: bool,

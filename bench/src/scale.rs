@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 pub(crate) use offline::Offline;
 pub(crate) use table::{kib_per_unit, table};
 
-use crate::chain::{Case, Measure, Profile, Row, Subject, round};
+use crate::chain::{Case, Measure, Profile, Row, Run, Subject, take_turns};
 use crate::error::Error;
 use crate::machine::Machine;
 use crate::part::Pace;
@@ -117,18 +117,12 @@ fn live(args: &ScaleArgs, rounds: usize, report: &mut Report) -> Result<(), Erro
         .collect();
     let own = Profile::own();
     let bar = Bar::over((cases.len() + 2) * rounds);
-    let mut outcomes = vec![Vec::new(); cases.len()];
-    for _ in 0..rounds {
-        for (case, outcomes) in cases.iter().zip(&mut outcomes) {
-            bar.show(&case.words());
-            outcomes.push(round::run(case, Subject::Service, &own, None)?);
-            bar.step();
-        }
-    }
-    let row = |(case, outcomes): (&Case, Vec<_>)| {
+    let runs: Vec<Run> = cases.into_iter().map(|case| (case, own.clone(), Subject::Service)).collect();
+    let outcomes = take_turns(&runs, rounds, false, &bar)?;
+    let row = |((case, ..), outcomes): (&Run, Vec<_>)| {
         Row::new(Measure::Saturation, case, (Subject::Service, &own.name), outcomes.clone(), &outcomes)
     };
-    report.units = cases.iter().zip(outcomes).map(row).collect();
+    report.units = runs.iter().zip(outcomes).map(row).collect();
     report.growth = growth(&report.units);
 
     let most = units.iter().copied().max().unwrap_or(1);
@@ -138,21 +132,14 @@ fn live(args: &ScaleArgs, rounds: usize, report: &mut Report) -> Result<(), Erro
         ..Case::paced(most, RATE_HZ, BATCH, if args.quick { 1.0 } else { RATED_S })
     };
     // Beside thousands of units the other relay is no reference: it looks for the subscribers of every message among all keys.
-    let subjects = [Subject::Keyed, Subject::Service];
-    let mut outcomes = [Vec::new(), Vec::new()];
-    for _ in 0..rounds {
-        for (subject, outcomes) in subjects.iter().zip(&mut outcomes) {
-            bar.show(&format!("{}: {}", rated.words(), subject.name()));
-            outcomes.push(round::run(&rated, *subject, &own, None)?);
-            bar.step();
-        }
-    }
+    let runs = [Subject::Keyed, Subject::Service].map(|subject| (rated.clone(), own.clone(), subject));
+    let outcomes = take_turns(&runs, rounds, false, &bar)?;
     bar.finish();
-    let [reference, _] = outcomes.clone();
-    let rows = subjects.into_iter().zip(outcomes);
-    report.rated = rows
-        .map(|(subject, rounds)| Row::new(Measure::Latency, &rated, (subject, &own.name), rounds, &reference))
-        .collect();
+    let reference = outcomes.first().cloned().unwrap_or_default();
+    let row = |((case, _, subject), outcomes): (&Run, Vec<_>)| {
+        Row::new(Measure::Latency, case, (*subject, &own.name), outcomes, &reference)
+    };
+    report.rated = runs.iter().zip(outcomes).map(row).collect();
     Ok(())
 }
 
