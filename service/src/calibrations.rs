@@ -14,7 +14,7 @@ use isotherm_protocol::history::Source;
 use isotherm_protocol::key::UnitId;
 use isotherm_protocol::stream::Label;
 
-use crate::kept_text::KeptText;
+use crate::kept::KeptText;
 
 /// A calibration as a unit is given it.
 #[derive(Debug, Clone)]

@@ -9,7 +9,7 @@
 //! | [`cli`] | the commands |
 //! | [`config`] | the service configuration, checked |
 //! | [`calibrations`] | what each unit is to correct with |
-//! | [`kept_text`] | texts that are kept for long and read seldom |
+//! | [`kept`] | texts that are kept for long and read seldom |
 //! | [`watch`] | the calibration folder as it changes |
 //! | [`service`] | start and stop of the whole |
 //! | [`intake`] | what the receive threads do |
@@ -40,7 +40,7 @@ pub mod exit;
 pub mod fault;
 pub mod intake;
 mod keeper;
-pub mod kept_text;
+pub mod kept;
 pub mod latency;
 mod logging;
 mod metrics;

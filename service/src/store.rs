@@ -43,7 +43,7 @@ use log::{Found, Log};
 use mark::Mark;
 use shelf::Shelf;
 
-use crate::kept_text::KeptText;
+use crate::kept::KeptBytes;
 
 /// How long an audit file becomes before a new one is begun (bytes).
 const FULL_BYTES: u64 = 64 << 20;
@@ -167,7 +167,7 @@ impl Store {
     ///
     /// # Errors
     /// As [`Self::put_document`]; some may be kept then.
-    pub fn put_documents(&mut self, documents: &[(Digest, KeptText)]) -> Result<(), StoreError> {
+    pub fn put_documents(&mut self, documents: &[(Digest, KeptBytes)]) -> Result<(), StoreError> {
         self.check_held()?;
         self.documents.put_all(documents)
     }

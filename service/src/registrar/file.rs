@@ -3,7 +3,6 @@
 use std::io;
 use std::num::NonZero;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 
 use isotherm_protocol::digest::Digest;
@@ -13,7 +12,7 @@ use isotherm_protocol::overlay::Candidate;
 
 use super::admit::unit_of;
 use super::reading::Reading;
-use crate::kept_text::KeptText;
+use crate::kept::KeptBytes;
 use crate::text;
 use crate::watch::read_document;
 
@@ -25,20 +24,13 @@ const MOST_THREADS: usize = 8;
 /// The content of a file, and what was found in it.
 #[derive(Debug)]
 pub(super) struct Read {
-    content: Content,
+    content: KeptBytes,
     /// SHA-256 of the content.
     pub(super) digest: Digest,
     /// Unit that it names, whatever else is wrong with it.
     pub(super) hint: Option<UnitId>,
     /// What it says, or everything that is wrong with it; `None` where it is no text.
     pub(super) found: Option<Result<Reading, Vec<Problem>>>,
-}
-
-/// A content, in as little room as it can be kept.
-#[derive(Debug)]
-enum Content {
-    Text(KeptText),
-    Bytes(Vec<u8>),
 }
 
 impl Read {
@@ -53,18 +45,15 @@ impl Read {
             _ => std::str::from_utf8(&bytes).ok().and_then(unit_of),
         };
         let content = match &found {
-            Some(Ok(reading)) => Content::Text(reading.text.clone()),
-            _ => Content::Bytes(bytes),
+            Some(Ok(reading)) => reading.text.bytes().clone(),
+            _ => KeptBytes::new(&bytes),
         };
         Self { content, digest, hint, found: found.map(|found| found.map(Reading::small)) }
     }
 
     /// The content.
     pub(super) fn bytes(&self) -> Vec<u8> {
-        match &self.content {
-            Content::Text(text) => text.read().into_bytes(),
-            Content::Bytes(bytes) => bytes.clone(),
-        }
+        self.content.read()
     }
 
     /// Unit that a valid document in it names.
@@ -77,39 +66,19 @@ impl Read {
 pub(super) fn read_all(files: Vec<PathBuf>) -> Vec<(PathBuf, io::Result<Read>)> {
     let threads = thread::available_parallelism().map_or(1, NonZero::get).min(MOST_THREADS);
     if files.len() <= FEW || threads == 1 {
-        return one_by_one(files);
+        return read_some(&files);
     }
-    let next = AtomicUsize::new(0);
-    let work = || {
-        let mut done = Vec::new();
-        loop {
-            let index = next.fetch_add(1, Ordering::Relaxed);
-            let Some(file) = files.get(index) else { return done };
-            done.push((index, read_file(file)));
-        }
-    };
-    let mut done: Vec<_> = thread::scope(|scope| {
-        let workers: Vec<_> = (1..threads).map(|_| scope.spawn(work)).collect();
-        let own = work();
-        let others = workers.into_iter().filter_map(|worker| worker.join().ok()).flatten();
-        own.into_iter().chain(others).collect()
-    });
-    done.sort_unstable_by_key(|(index, _)| *index);
-    // Where a reader has ended in a panic, it is to be seen here.
-    if done.len() < files.len() {
-        return one_by_one(files);
-    }
-    files.into_iter().zip(done).map(|(file, (_, read))| (file, read)).collect()
+    thread::scope(|scope| {
+        let parts = files.chunks(files.len().div_ceil(threads));
+        let readers: Vec<_> = parts.map(|part| (part, scope.spawn(move || read_some(part)))).collect();
+        // Where a reader has ended in a panic, it is to be seen here.
+        let read =
+            readers.into_iter().map(|(part, reader)| reader.join().unwrap_or_else(|_| read_some(part)));
+        read.flatten().collect()
+    })
 }
 
-fn read_file(file: &Path) -> io::Result<Read> {
-    read_document(file).map(|bytes| Read::of(file, bytes))
-}
-
-fn one_by_one(files: Vec<PathBuf>) -> Vec<(PathBuf, io::Result<Read>)> {
-    let read = |file: PathBuf| {
-        let read = read_file(&file);
-        (file, read)
-    };
-    files.into_iter().map(read).collect()
+fn read_some(files: &[PathBuf]) -> Vec<(PathBuf, io::Result<Read>)> {
+    let read = |file: &PathBuf| read_document(file).map(|bytes| Read::of(file, bytes));
+    files.iter().map(|file| (file.clone(), read(file))).collect()
 }

@@ -10,7 +10,7 @@
 //! A refused document is told at every start for as long as it is there. A unit that has a calibration is not given it by
 //! a restart, though it would pass now: the restart may only have forgotten the temperature that spoke against it.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use isotherm_protocol::control::{SwapOptions, SwapOutcome};
@@ -32,8 +32,8 @@ use crate::watch::{FolderEvent, read_document};
 pub(super) struct Folder {
     path: Option<PathBuf>,
     files: BTreeMap<PathBuf, File>,
-    /// How many files name a unit.
-    naming: BTreeMap<UnitId, usize>,
+    /// Files whose documents name a unit.
+    naming: BTreeMap<UnitId, BTreeSet<PathBuf>>,
     gone: Option<String>,
     deaf: Option<String>,
 }
@@ -85,8 +85,7 @@ impl Folder {
 
     /// Files whose documents name a unit.
     fn naming(&self, unit: &UnitId) -> Vec<PathBuf> {
-        let naming = self.files.iter().filter(|(_, file)| file.unit.as_ref() == Some(unit));
-        naming.map(|(path, _)| path.clone()).collect()
+        self.naming.get(unit).into_iter().flatten().cloned().collect()
     }
 
     /// Enters a file that cannot be read.
@@ -107,8 +106,9 @@ impl Folder {
         file.hint = read.hint.clone().or_else(|| file.hint.take());
         let before = std::mem::replace(&mut file.unit, read.unit());
         let after = file.unit.clone();
-        for (unit, by) in [(&before, -1), (&after, 1)] {
-            self.count(unit.as_ref(), by);
+        self.names_no_more(path, before.as_ref());
+        if let Some(unit) = after {
+            self.naming.entry(unit).or_default().insert(path.to_owned());
         }
         before
     }
@@ -116,18 +116,16 @@ impl Folder {
     /// Enters that a file is gone; the unit that it named.
     fn remove(&mut self, path: &Path) -> Option<UnitId> {
         let unit = self.files.remove(path).and_then(|file| file.unit);
-        self.count(unit.as_ref(), -1);
+        self.names_no_more(path, unit.as_ref());
         unit
     }
 
-    /// One file more names a unit, or one less.
-    fn count(&mut self, unit: Option<&UnitId>, by: isize) {
+    fn names_no_more(&mut self, path: &Path, unit: Option<&UnitId>) {
         let Some(unit) = unit else { return };
-        let files = self.naming.get(unit).copied().unwrap_or(0).saturating_add_signed(by);
-        if files == 0 {
+        let Some(files) = self.naming.get_mut(unit) else { return };
+        files.remove(path);
+        if files.is_empty() {
             self.naming.remove(unit);
-        } else {
-            self.naming.insert(unit.clone(), files);
         }
     }
 
@@ -178,9 +176,9 @@ impl Work {
     /// Takes a file that was entered; `at_start` where the service has just started. Whether it is in order.
     pub(super) fn take_file(&mut self, path: &Path, read: &Read, at_start: bool) -> bool {
         let unit = self.folder.files.get(path).and_then(|file| file.unit.clone());
-        let rivals = unit.filter(|unit| self.folder.naming.get(unit).is_some_and(|files| *files > 1));
-        if let Some(unit) = rivals {
-            self.refuse_rivals(&unit, &self.folder.naming(&unit), at_start);
+        let naming = unit.map(|unit| (self.folder.naming(&unit), unit));
+        if let Some((files, unit)) = naming.filter(|(files, _)| files.len() > 1) {
+            self.refuse_rivals(&unit, &files, at_start);
             return false;
         }
         let problems = self.swap_file(path, read, at_start);

@@ -9,7 +9,7 @@ use isotherm_protocol::document::{Created, Document, Problem};
 use isotherm_protocol::overlay::{Candidate, Overlay};
 use isotherm_protocol::stream::Label;
 
-use crate::kept_text::KeptText;
+use crate::kept::KeptText;
 
 /// What may become active: a document, or an overlay on the one in force.
 #[derive(Debug, Clone)]
@@ -60,8 +60,7 @@ impl From<Candidate> for Reading {
             schema: document.schema,
             created: document.created,
             label: Label::of(&document, digest, ""),
-            // A copy has no more room than it needs.
-            calibration: Arc::new(calibration.clone()),
+            calibration: shared(&calibration),
             text: KeptText::new(&text),
             digest,
             overlay: overlay.map(|parsed| parsed.overlay),
@@ -69,6 +68,11 @@ impl From<Candidate> for Reading {
             document: Some(Box::new(document)),
         }
     }
+}
+
+/// A calibration to be kept: a copy has no more room than it needs.
+pub(super) fn shared(calibration: &Calibration) -> Arc<Calibration> {
+    Arc::new(calibration.clone())
 }
 
 /// What stands in a text that was found valid before.

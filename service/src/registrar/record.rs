@@ -8,7 +8,7 @@ use isotherm_protocol::overlay::Overlay;
 use isotherm_protocol::status::Swaps;
 
 use super::command::PreLaunchRun;
-use crate::kept_text::KeptText;
+use crate::kept::KeptText;
 use crate::unit::SwapAccount;
 
 /// What the registrar keeps of one unit.

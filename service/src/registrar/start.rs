@@ -15,10 +15,11 @@ use isotherm_protocol::stream::Label;
 
 use super::admit::check_signature;
 use super::file::read_all;
+use super::reading::shared;
 use super::record::{Active, Layers, Record, Written};
 use super::work::Work;
 use crate::calibrations::{Calibrations, Change, Installable, Plan};
-use crate::kept_text::KeptText;
+use crate::kept::KeptText;
 use crate::store::Store;
 use crate::text;
 use crate::watch::{Known, documents_in};
@@ -208,8 +209,7 @@ pub(super) fn written(
         layers: set.overlay.and_then(|overlay| layers(store, overlay)).map(Box::new),
     };
     let label = Label::of(&parsed.document, set.digest, "");
-    // A copy has no more room than it needs.
-    Ok((written, label, Arc::new(parsed.calibration.clone())))
+    Ok((written, label, shared(&parsed.calibration)))
 }
 
 /// What a document with an overlay was made from; `None` where that is not kept any more.

@@ -17,7 +17,7 @@ use super::record::{Active, Layers, Record, Written};
 use super::start;
 use super::work::Work;
 use crate::calibrations::{Change, Installable};
-use crate::kept_text::KeptText;
+use crate::kept::KeptText;
 use crate::store::StoreError;
 use crate::text;
 
@@ -194,7 +194,7 @@ impl Work {
     /// Each is of another unit.
     fn carry_out(&mut self, group: &[Judged]) -> Result<(), StoreError> {
         let documents: Vec<_> =
-            group.iter().map(|judged| (judged.reading.digest, judged.reading.text.clone())).collect();
+            group.iter().map(|judged| (judged.reading.digest, judged.reading.text.bytes().clone())).collect();
         self.store.put_documents(&documents)?;
         let accepted: Vec<_> = group.iter().map(|judged| self.acceptance(judged)).collect();
         let entries = group.iter().zip(&accepted).map(|(judged, acceptance)| {

@@ -9,9 +9,7 @@ const TEMPORARY: &str = ".new-";
 
 /// Writes a file beside its place and moves it there: whoever looks finds the old one or the new one, whole.
 pub(super) fn write(folder: &Path, name: &str, bytes: &[u8]) -> io::Result<()> {
-    let temporary = prepare(folder, name, bytes)?;
-    std::fs::rename(temporary, folder.join(name))?;
-    sync_folder(folder)
+    write_all(folder, [(name.to_owned(), bytes)], <[u8]>::to_vec).map_err(|(_, error)| error)
 }
 
 /// Files that are written before any of them is waited for.
@@ -30,24 +28,11 @@ pub(super) fn write_all<T>(
 ) -> Result<(), (String, io::Error)> {
     let mut files = files.into_iter().peekable();
     while files.peek().is_some() {
-        let mut begun = Vec::with_capacity(TOGETHER);
-        let written = files.by_ref().take(TOGETHER).try_for_each(|(name, content)| {
-            let path = folder.join(format!("{TEMPORARY}{name}"));
-            let file =
-                File::create(&path).and_then(|mut file| file.write_all(&bytes(content)).map(|()| file));
-            file.map(|file| begun.push((name.clone(), path, file))).map_err(|error| (name, error))
-        });
-        let moved = written.and_then(|()| {
-            sync_all(&begun)?;
-            begun.iter().try_for_each(|(name, path, _)| {
-                std::fs::rename(path, folder.join(name)).map_err(|error| (name.clone(), error))
-            })
-        });
-        if let Err(error) = moved {
-            // As far as they have not been moved; what is left goes at the next start at the latest.
-            for (_, path, _) in &begun {
-                let _ = std::fs::remove_file(path);
-            }
+        let group: Vec<_> = files.by_ref().take(TOGETHER).collect();
+        let temporaries: Vec<_> = group.iter().map(|(name, _)| temporary(folder, name)).collect();
+        if let Err(error) = write_group(folder, group, &bytes) {
+            // As far as they have not been moved.
+            temporaries.iter().for_each(|path| remove(path));
             return Err(error);
         }
     }
@@ -55,14 +40,33 @@ pub(super) fn write_all<T>(
     sync_folder(folder).map_err(|error| (String::new(), error))
 }
 
+/// Writes some files, and moves them when all of them are on the disk.
+fn write_group<T>(
+    folder: &Path,
+    group: Vec<(String, T)>,
+    bytes: &impl Fn(T) -> Vec<u8>,
+) -> Result<(), (String, io::Error)> {
+    let mut begun = Vec::with_capacity(group.len());
+    for (name, content) in group {
+        match begin(&temporary(folder, &name), &bytes(content)) {
+            Ok(file) => begun.push((name, file)),
+            Err(error) => return Err((name, error)),
+        }
+    }
+    sync_all(&begun)?;
+    begun.into_iter().try_for_each(|(name, _)| {
+        std::fs::rename(temporary(folder, &name), folder.join(&name)).map_err(|error| (name, error))
+    })
+}
+
 /// Makes the contents of files last.
-fn sync_all(files: &[(String, PathBuf, File)]) -> Result<(), (String, io::Error)> {
-    if let [(name, _, file)] = files {
+fn sync_all(files: &[(String, File)]) -> Result<(), (String, io::Error)> {
+    if let [(name, file)] = files {
         return file.sync_all().map_err(|error| (name.clone(), error));
     }
     let share = files.len().div_ceil(WAITING).max(1);
-    let sync = |files: &[(String, PathBuf, File)]| {
-        files.iter().try_for_each(|(name, _, file)| file.sync_all().map_err(|error| (name.clone(), error)))
+    let sync = |files: &[(String, File)]| {
+        files.iter().try_for_each(|(name, file)| file.sync_all().map_err(|error| (name.clone(), error)))
     };
     std::thread::scope(|scope| {
         let waiting: Vec<_> = files.chunks(share).map(|files| scope.spawn(move || sync(files))).collect();
@@ -74,21 +78,31 @@ fn sync_all(files: &[(String, PathBuf, File)]) -> Result<(), (String, io::Error)
 
 /// Writes a file under its temporary name, through to the disk.
 pub(super) fn prepare(folder: &Path, name: &str, bytes: &[u8]) -> io::Result<PathBuf> {
-    let temporary = folder.join(format!("{TEMPORARY}{name}"));
-    match write_through(&temporary, bytes) {
+    let temporary = temporary(folder, name);
+    match begin(&temporary, bytes).and_then(|file| file.sync_all()) {
         Ok(()) => Ok(temporary),
         Err(error) => {
-            // On a full disk it must not take the last room; what is left of it goes at the next start at the latest.
-            let _ = std::fs::remove_file(&temporary);
+            remove(&temporary);
             Err(error)
         }
     }
 }
 
-fn write_through(path: &Path, bytes: &[u8]) -> io::Result<()> {
+/// Where a file is written before it is moved to its place.
+fn temporary(folder: &Path, name: &str) -> PathBuf {
+    folder.join(format!("{TEMPORARY}{name}"))
+}
+
+fn begin(path: &Path, bytes: &[u8]) -> io::Result<File> {
     let mut file = File::create(path)?;
     file.write_all(bytes)?;
-    file.sync_all()
+    Ok(file)
+}
+
+/// Takes away what could not be written: on a full disk it must not take the last room; what is left of it goes at the next
+/// start at the latest.
+fn remove(temporary: &Path) {
+    let _ = std::fs::remove_file(temporary);
 }
 
 /// Makes the names in a folder last.

@@ -8,7 +8,7 @@ use isotherm_protocol::digest::Digest;
 use isotherm_protocol::document::MAX_DOCUMENT_BYTES;
 
 use super::{StoreError, durable};
-use crate::kept_text::KeptText;
+use crate::kept::KeptBytes;
 use crate::text::read_bounded;
 
 /// Most bytes of documents that are kept in memory; beyond it the oldest go.
@@ -26,34 +26,10 @@ pub(super) enum Shelf {
 /// Documents in memory.
 #[derive(Debug, Default)]
 pub(super) struct Memory {
-    by_digest: BTreeMap<Digest, Kept>,
+    by_digest: BTreeMap<Digest, KeptBytes>,
     /// The oldest first.
     order: VecDeque<Digest>,
     bytes: usize,
-}
-
-/// A document in memory.
-#[derive(Debug)]
-enum Kept {
-    Text(KeptText),
-    /// What is no text.
-    Bytes(Vec<u8>),
-}
-
-impl Kept {
-    fn len(&self) -> usize {
-        match self {
-            Self::Text(text) => text.len(),
-            Self::Bytes(bytes) => bytes.len(),
-        }
-    }
-
-    fn bytes(&self) -> Vec<u8> {
-        match self {
-            Self::Text(text) => text.read().into_bytes(),
-            Self::Bytes(bytes) => bytes.clone(),
-        }
-    }
 }
 
 impl Shelf {
@@ -78,25 +54,8 @@ impl Shelf {
     /// # Errors
     /// [`StoreError::TooLong`], or [`StoreError::Write`].
     pub(super) fn put(&mut self, bytes: &[u8]) -> Result<Digest, StoreError> {
-        if bytes.len() > MAX_DOCUMENT_BYTES {
-            return Err(StoreError::TooLong { bytes: bytes.len() });
-        }
         let digest = Digest::of(bytes);
-        let kept = matches!(self.get(&digest), Ok(Some(_)));
-        match self {
-            Self::Folder(folder) => {
-                let name = name(&digest);
-                // A process that ended right after it wrote the file may not have made its name last.
-                let put =
-                    if kept { durable::sync_folder(folder) } else { durable::write(folder, &name, bytes) };
-                put.map_err(StoreError::write(&folder.join(name)))?;
-            }
-            Self::Memory(_) if kept => {}
-            Self::Memory(memory) => {
-                let text = std::str::from_utf8(bytes).map(KeptText::new);
-                memory.put(digest, text.map_or_else(|_| Kept::Bytes(bytes.to_vec()), Kept::Text));
-            }
-        }
+        self.put_all(&[(digest, KeptBytes::new(bytes))])?;
         Ok(digest)
     }
 
@@ -105,22 +64,21 @@ impl Shelf {
     ///
     /// # Errors
     /// As [`Self::put`]; some may be kept then.
-    pub(super) fn put_all(&mut self, documents: &[(Digest, KeptText)]) -> Result<(), StoreError> {
-        if let Some((_, text)) = documents.iter().find(|(_, text)| text.len() > MAX_DOCUMENT_BYTES) {
-            return Err(StoreError::TooLong { bytes: text.len() });
+    pub(super) fn put_all(&mut self, documents: &[(Digest, KeptBytes)]) -> Result<(), StoreError> {
+        if let Some((_, kept)) = documents.iter().find(|(_, kept)| kept.len() > MAX_DOCUMENT_BYTES) {
+            return Err(StoreError::TooLong { bytes: kept.len() });
         }
         let new: Vec<_> =
             documents.iter().filter(|(digest, _)| !matches!(self.get(digest), Ok(Some(_)))).collect();
         match self {
             Self::Folder(folder) => {
-                let text = |text: &KeptText| text.read().into_bytes();
                 let files = new.into_iter().map(|(digest, kept)| (name(digest), kept));
-                durable::write_all(folder, files, text)
+                durable::write_all(folder, files, KeptBytes::read)
                     .map_err(|(name, source)| StoreError::Write { path: folder.join(name), source })
             }
             Self::Memory(memory) => {
-                for (digest, text) in new {
-                    memory.put(*digest, Kept::Text(text.clone()));
+                for (digest, kept) in new {
+                    memory.put(*digest, kept.clone());
                 }
                 Ok(())
             }
@@ -134,7 +92,7 @@ impl Shelf {
     pub(super) fn get(&self, digest: &Digest) -> Result<Option<Vec<u8>>, StoreError> {
         match self {
             Self::Folder(folder) => read(&folder.join(name(digest)), digest),
-            Self::Memory(memory) => Ok(memory.by_digest.get(digest).map(Kept::bytes)),
+            Self::Memory(memory) => Ok(memory.by_digest.get(digest).map(KeptBytes::read)),
         }
     }
 
@@ -164,7 +122,7 @@ impl Shelf {
 }
 
 impl Memory {
-    fn put(&mut self, digest: Digest, kept: Kept) {
+    fn put(&mut self, digest: Digest, kept: KeptBytes) {
         self.bytes += kept.len();
         if let Some(before) = self.by_digest.insert(digest, kept) {
             // The same once more, in one go.

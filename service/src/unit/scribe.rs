@@ -11,7 +11,7 @@ use isotherm_protocol::stream::UnitStream;
 use super::UnitActor;
 use crate::calibrations::{Change, Installable};
 use crate::fault::FaultKind;
-use crate::kept_text::KeptText;
+use crate::kept::KeptText;
 
 /// Where the frames of journals go; `Err` is one that could not be published.
 pub type JournalOutlet = dyn Fn(&UnitId, Vec<u8>) -> Result<(), zenoh::Error> + Send + Sync;

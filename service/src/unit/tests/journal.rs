@@ -6,7 +6,7 @@ use isotherm_protocol::journal::{Joiner, JournalEntry, JournalPart};
 use isotherm_protocol::key::Input;
 
 use super::*;
-use crate::kept_text::KeptText;
+use crate::kept::KeptText;
 
 const EXAMPLE: &str = include_str!("../../../../config/calibration/example-full.toml");
 
