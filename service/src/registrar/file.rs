@@ -35,18 +35,18 @@ pub(super) struct Read {
 
 impl Read {
     /// Looks at the content of a file.
-    pub(super) fn of(path: &Path, bytes: Vec<u8>) -> Self {
+    pub(super) fn of(path: &Path, bytes: &[u8]) -> Self {
         let name = path.display().to_string();
-        let digest = Digest::of(&bytes);
-        let text = text::text(&bytes, &name).ok();
+        let digest = Digest::of(bytes);
+        let text = text::text(bytes, &name).ok();
         let found = text.map(|text| Candidate::parse(text, Some(&name), None).map(Reading::from));
         let hint = match &found {
             Some(Ok(reading)) => UnitId::new(&reading.unit).ok(),
-            _ => std::str::from_utf8(&bytes).ok().and_then(unit_of),
+            _ => std::str::from_utf8(bytes).ok().and_then(unit_of),
         };
         let content = match &found {
             Some(Ok(reading)) => reading.text.bytes().clone(),
-            _ => KeptBytes::new(&bytes),
+            _ => KeptBytes::new(bytes),
         };
         Self { content, digest, hint, found: found.map(|found| found.map(Reading::small)) }
     }
@@ -63,10 +63,10 @@ impl Read {
 }
 
 /// Reads files, on as many threads as there are processors; in the order of the files.
-pub(super) fn read_all(files: Vec<PathBuf>) -> Vec<(PathBuf, io::Result<Read>)> {
+pub(super) fn read_all(files: &[PathBuf]) -> Vec<(PathBuf, io::Result<Read>)> {
     let threads = thread::available_parallelism().map_or(1, NonZero::get).min(MOST_THREADS);
     if files.len() <= FEW || threads == 1 {
-        return read_some(&files);
+        return read_some(files);
     }
     thread::scope(|scope| {
         let parts = files.chunks(files.len().div_ceil(threads));
@@ -79,6 +79,6 @@ pub(super) fn read_all(files: Vec<PathBuf>) -> Vec<(PathBuf, io::Result<Read>)> 
 }
 
 fn read_some(files: &[PathBuf]) -> Vec<(PathBuf, io::Result<Read>)> {
-    let read = |file: &PathBuf| read_document(file).map(|bytes| Read::of(file, bytes));
+    let read = |file: &PathBuf| read_document(file).map(|bytes| Read::of(file, &bytes));
     files.iter().map(|file| (file.clone(), read(file))).collect()
 }

@@ -142,7 +142,7 @@ impl Work {
     pub(super) fn folder_event(&mut self, event: FolderEvent) {
         match event {
             FolderEvent::Changed { file, bytes, .. } => {
-                let read = Read::of(&file, bytes);
+                let read = Read::of(&file, &bytes);
                 let before = self.folder.enter(&file, &read);
                 self.take_file(&file, &read, false);
                 self.look_for_survivor(before.as_ref());
@@ -286,7 +286,7 @@ impl Work {
         }
         match read_document(path) {
             Ok(bytes) => {
-                let read = Read::of(path, bytes);
+                let read = Read::of(path, &bytes);
                 self.folder.enter(path, &read);
                 self.take_file(path, &read, false);
             }

@@ -107,7 +107,7 @@ impl Work {
         let Some(folder) = self.folder.path().map(Path::to_owned) else { return Ok((found, 0)) };
         let mut contents = Vec::new();
         let mut bad = 0;
-        for (file, read) in read_all(documents_in(&folder)?) {
+        for (file, read) in read_all(&documents_in(&folder)?) {
             match read {
                 Ok(read) => {
                     found.insert(file.clone(), Known::Content(read.digest.0));

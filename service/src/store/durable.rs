@@ -32,7 +32,9 @@ pub(super) fn write_all<T>(
         let temporaries: Vec<_> = group.iter().map(|(name, _)| temporary(folder, name)).collect();
         if let Err(error) = write_group(folder, group, &bytes) {
             // As far as they have not been moved.
-            temporaries.iter().for_each(|path| remove(path));
+            for path in &temporaries {
+                remove(path);
+            }
             return Err(error);
         }
     }
