@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use isotherm_correction::sample::{CorrectedTick, GyroTick};
 use isotherm_correction::unit::{Unit, UnitSettings};
-use isotherm_log::message::Topic;
+use isotherm_log::message::{Message, Topic};
 use isotherm_log::offline::{Loaded, Offline};
 use isotherm_log::part::{LogFiles, Part};
 use isotherm_log::progress::Progress;
@@ -40,6 +40,28 @@ pub struct Run {
 enum Source {
     Files { files: LogFiles, part: Part },
     Events(Arc<[LogEvent]>),
+}
+
+/// A piece of what a run has.
+enum Piece<'a> {
+    Event(&'a LogEvent),
+    Message(&'a Message),
+}
+
+/// What a correction is fed with.
+enum Fed<'a> {
+    Event(&'a LogEvent),
+    /// A frame that is no readings one by one.
+    Frame(RawStream, &'a [u8]),
+}
+
+impl Fed<'_> {
+    fn give(&self, unit: &mut Offline) {
+        match self {
+            Self::Event(event) => unit.handle(event),
+            Self::Frame(input, frame) => unit.receive(*input, frame),
+        }
+    }
 }
 
 /// What a correction passed over, as `isotherm-replay correct` says it; empty where all is well.
@@ -107,22 +129,14 @@ impl Run {
     ///
     /// # Errors
     /// [`Error::Log`]; as [`Series::take_message`].
-    pub fn series(&self, mut watch: impl Watch) -> Result<Series, Error> {
+    pub fn series(&self, watch: impl Watch) -> Result<Series, Error> {
         let mut series = Series::empty(self.unit.clone());
-        match &self.source {
-            Source::Events(events) => events.iter().try_for_each(|event| series.take_event(event))?,
-            Source::Files { files, part } => {
-                let mut messages = files.open(part)?;
-                watch.begin(messages.progress());
-                while let Some(message) = messages.next_message()? {
-                    series.take_message(&message)?;
-                    watch.step();
-                }
-                watch.end();
-                if let LogReport::Recording(report) = messages.report() {
-                    series.cut_short = report.cut_short;
-                }
-            }
+        let report = self.walk(watch, |piece| match piece {
+            Piece::Event(event) => series.take_event(event),
+            Piece::Message(message) => series.take_message(message),
+        })?;
+        if let Some(LogReport::Recording(report)) = report {
+            series.cut_short = report.cut_short;
         }
         if series.gyros.is_empty() && series.accels.is_empty() {
             return Err(Error::Refused(vec![format!(
@@ -141,7 +155,7 @@ impl Run {
     pub fn correct(
         &self,
         loaded: &Loaded,
-        mut watch: impl Watch,
+        watch: impl Watch,
         mut each: impl FnMut(&CorrectedTick, &Unit),
     ) -> Result<Troubles, Error> {
         let mut unit = Offline::new(loaded, UnitSettings::default());
@@ -152,45 +166,69 @@ impl Run {
                 each(tick, unit.unit());
             }
         };
+        self.feed(watch, |fed| {
+            fed.give(&mut unit);
+            give_out(&mut unit);
+        })?;
+        unit.finish();
+        give_out(&mut unit);
+        self.judge_troubles(count, unit.troubles())
+    }
+
+    /// Goes through everything that it has; what the reading of files is to report comes back.
+    fn walk(
+        &self,
+        mut watch: impl Watch,
+        mut each: impl FnMut(Piece<'_>) -> Result<(), Error>,
+    ) -> Result<Option<LogReport>, Error> {
         match &self.source {
             Source::Events(events) => {
-                for event in events.iter() {
-                    unit.handle(&self.taken(event));
-                    give_out(&mut unit);
-                }
+                events.iter().try_for_each(|event| each(Piece::Event(event)))?;
+                Ok(None)
             }
             Source::Files { files, part } => {
                 let mut messages = files.open(part)?;
                 watch.begin(messages.progress());
                 while let Some(message) = messages.next_message()? {
-                    if let Topic::Raw(_, input) = &message.topic {
-                        // Tick by tick: behind a whole frame the unit, and its temperatures, stand at the frame's end.
-                        match events(*input, &message.frame) {
-                            Some(events) => events.iter().for_each(|event| {
-                                unit.handle(&self.taken(event));
-                                give_out(&mut unit);
-                            }),
-                            None => unit.receive(*input, &message.frame),
-                        }
-                        give_out(&mut unit);
-                    }
+                    each(Piece::Message(&message))?;
                     watch.step();
                 }
                 watch.end();
+                Ok(Some(messages.report()))
             }
         }
-        unit.finish();
-        give_out(&mut unit);
-        let troubles = unit.troubles();
-        if count == 0 {
-            let mut reasons = vec![format!(
-                "{}: nothing of unit {} could be corrected: is the document for this unit, and the mapping right?",
-                self.name, self.unit
-            )];
-            reasons.extend(troubles);
-            return Err(Error::Refused(reasons));
+    }
+
+    /// Goes through what a correction is fed with, tick by tick: behind a whole frame the unit, and its temperatures, would stand at
+    /// the frame's end.
+    fn feed(&self, watch: impl Watch, mut each: impl FnMut(Fed<'_>)) -> Result<(), Error> {
+        self.walk(watch, |piece| {
+            match piece {
+                Piece::Event(event) => each(Fed::Event(&self.taken(event))),
+                Piece::Message(message) => {
+                    let Topic::Raw(_, input) = message.topic else { return Ok(()) };
+                    match events(input, &message.frame) {
+                        Some(events) => events.iter().for_each(|event| each(Fed::Event(&self.taken(event)))),
+                        None => each(Fed::Frame(input, &message.frame)),
+                    }
+                }
+            }
+            Ok(())
+        })?;
+        Ok(())
+    }
+
+    /// What a correction passed over; a refusal where nothing came out of it.
+    fn judge_troubles(&self, ticks: u64, troubles: Troubles) -> Result<Troubles, Error> {
+        if ticks > 0 {
+            return Ok(troubles);
         }
-        Ok(troubles)
+        let mut reasons = vec![format!(
+            "{}: nothing of unit {} could be corrected: is the document for this unit, and the mapping right?",
+            self.name, self.unit
+        )];
+        reasons.extend(troubles);
+        Err(Error::Refused(reasons))
     }
 }
 

@@ -11,7 +11,7 @@ use isotherm_protocol::codec;
 use isotherm_protocol::key::RawStream;
 use isotherm_protocol::raw::GyroBatch;
 
-use super::{Run, Source, Troubles, Watch};
+use super::{Fed, Piece, Run, Troubles, Watch};
 use crate::error::Error;
 
 impl Run {
@@ -21,31 +21,21 @@ impl Run {
     /// [`Error::Log`] where the log cannot be read.
     pub fn gyro_ticks(
         &self,
-        mut watch: impl Watch,
+        watch: impl Watch,
         mut each: impl FnMut(OutputKind, &GyroTick),
     ) -> Result<(), Error> {
-        match &self.source {
-            Source::Events(events) => {
-                for event in events.iter() {
-                    if let LogEvent::Gyro { output, tick } = event {
-                        each(*output, tick);
-                    }
-                }
-            }
-            Source::Files { files, part } => {
-                let mut messages = files.open(part)?;
-                watch.begin(messages.progress());
-                while let Some(message) = messages.next_message()? {
-                    if let Topic::Raw(_, RawStream::Gyro) = &message.topic
-                        && let Ok(batch) = codec::decode::<GyroBatch>(&message.frame)
-                    {
+        self.walk(watch, |piece| {
+            match piece {
+                Piece::Event(LogEvent::Gyro { output, tick }) => each(*output, tick),
+                Piece::Message(message) if matches!(message.topic, Topic::Raw(_, RawStream::Gyro)) => {
+                    if let Ok(batch) = codec::decode::<GyroBatch>(&message.frame) {
                         batch.to_core().for_each(|tick| each(batch.output(), &tick));
                     }
-                    watch.step();
                 }
-                watch.end();
+                Piece::Event(_) | Piece::Message(_) => {}
             }
-        }
+            Ok(())
+        })?;
         Ok(())
     }
 
@@ -57,46 +47,15 @@ impl Run {
     pub fn correct_together(
         &self,
         loaded: &[Loaded],
-        mut watch: impl Watch,
+        watch: impl Watch,
         each: impl FnMut(&GyroTick, &[CorrectedTick], &Unit),
     ) -> Result<Troubles, Error> {
         let mut units = Together::new(loaded, each);
-        match &self.source {
-            Source::Events(events) => {
-                for event in events.iter() {
-                    units.take(&self.taken(event));
-                }
-            }
-            Source::Files { files, part } => {
-                let mut messages = files.open(part)?;
-                watch.begin(messages.progress());
-                while let Some(message) = messages.next_message()? {
-                    if let Topic::Raw(_, input) = &message.topic {
-                        match super::events(*input, &message.frame) {
-                            Some(events) => events.iter().for_each(|event| units.take(&self.taken(event))),
-                            None => {
-                                units.units.iter_mut().for_each(|unit| unit.receive(*input, &message.frame));
-                            }
-                        }
-                        units.give_out();
-                    }
-                    watch.step();
-                }
-                watch.end();
-            }
-        }
+        self.feed(watch, |fed| units.take(&fed))?;
         units.units.iter_mut().for_each(Offline::finish);
         units.give_out();
         let troubles = units.units.first().map(Offline::troubles).unwrap_or_default();
-        if units.count == 0 {
-            let mut reasons = vec![format!(
-                "{}: nothing of unit {} could be corrected: is the document for this unit, and the mapping right?",
-                self.name, self.unit
-            )];
-            reasons.extend(troubles);
-            return Err(Error::Refused(reasons));
-        }
-        Ok(troubles)
+        self.judge_troubles(units.count, troubles)
     }
 }
 
@@ -117,11 +76,11 @@ impl<F: FnMut(&GyroTick, &[CorrectedTick], &Unit)> Together<F> {
         Self { units, raw: VecDeque::new(), corrected, each, count: 0 }
     }
 
-    fn take(&mut self, event: &LogEvent) {
-        if let LogEvent::Gyro { tick, .. } = event {
+    fn take(&mut self, fed: &Fed<'_>) {
+        if let Fed::Event(LogEvent::Gyro { tick, .. }) = fed {
             self.raw.push_back(tick.clone());
         }
-        self.units.iter_mut().for_each(|unit| unit.handle(event));
+        self.units.iter_mut().for_each(|unit| fed.give(unit));
         self.give_out();
     }
 
