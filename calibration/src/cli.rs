@@ -80,6 +80,14 @@ fn run(cli: Cli) -> Result<(), Error> {
     }
 }
 
+/// Refuses an argument that is no number above 0.
+pub(crate) fn above_0(name: &str, value: f64) -> Result<(), Error> {
+    if value.is_finite() && value > 0.0 {
+        return Ok(());
+    }
+    Err(Error::Usage(format!("{name} is {value}, must be a number above 0")))
+}
+
 /// Writes to standard output; a reader that has gone away is no error.
 pub(crate) fn print(text: &[u8]) -> Result<(), Error> {
     let mut stdout = io::stdout().lock();

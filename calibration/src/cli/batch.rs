@@ -72,7 +72,23 @@ impl Work {
     }
 }
 
-impl Named<'_> {
+impl<'a> Named<'a> {
+    /// Logs that are one run of each unit.
+    pub(super) fn together(reading: &'a Reading, logs: &'a [PathBuf], document: Option<&'a PathBuf>) -> Self {
+        let document = document.map(PathBuf::as_path);
+        Self { reading, logs, together: true, judging: reading, judge: &[], document }
+    }
+
+    /// Logs of which each is a run, and others to judge on.
+    pub(super) fn apart(
+        reading: &'a Reading,
+        logs: &'a [PathBuf],
+        judge: &'a [PathBuf],
+        document: Option<&'a PathBuf>,
+    ) -> Self {
+        Self { together: false, judge, ..Self::together(reading, logs, document) }
+    }
+
     /// The units that there is something to do of: that of the document, else all that the logs have.
     pub(super) fn units(&self) -> Result<Vec<Unit>, Error> {
         let folder = self.document.filter(|path| path.is_dir());

@@ -7,6 +7,7 @@ use isotherm_log::diff::is_csv;
 use isotherm_log::offline::unit_id;
 use serde_json::json;
 
+use super::above_0;
 use super::bar::Bar;
 use super::batch::{Batch, Named, Names, Unit, Work};
 use super::output::OutputArgs;
@@ -85,14 +86,7 @@ impl DriftArgs {
             let work = Work { base: None, runs: Vec::new(), judges: Vec::new(), warnings: Vec::new() };
             return Ok(vec![(unit, Ok(work))]);
         }
-        let named = Named {
-            reading: &self.log.reading,
-            logs: &self.log.log,
-            together: true,
-            judging: &self.log.reading,
-            judge: &[],
-            document: self.document.as_deref(),
-        };
+        let named = Named::together(&self.log.reading, &self.log.log, self.document.as_ref());
         named.units()
     }
 
@@ -140,11 +134,9 @@ impl DriftArgs {
             ("--initial-sigma", self.initial_sigma),
             ("--fit-hours", Some(self.fit_hours)),
         ];
-        for (name, value) in positive {
-            if let Some(value) = value.filter(|value| !(value.is_finite() && *value > 0.0)) {
-                return Err(Error::Usage(format!("{name} is {value}, must be a number above 0")));
-            }
-        }
+        positive
+            .into_iter()
+            .try_for_each(|(name, value)| value.map_or(Ok(()), |value| above_0(name, value)))?;
         if self.output.writes() && (self.document.is_none() || self.accelerometers) {
             return Err(Error::Usage(
                 "--out is the document with what the estimator is to expect of its gyros: give it with --document, and leave \
@@ -185,9 +177,7 @@ impl DriftArgs {
         let mut document = base.document.clone();
         // What the document says of the constant part holds, unless something else was stated.
         put(&mut document, &report.parameters, self.initial_sigma.is_none())?;
-        if let Some(date) = self.output.date()? {
-            document.created = Some(date);
-        }
+        self.output.put_date(&mut document)?;
         let of_log = origin(&work.logs(), &command_line())?;
         let mut whole = document.origin.take().unwrap_or_default();
         let mut details = whole.details.take().unwrap_or_default();
@@ -196,8 +186,6 @@ impl DriftArgs {
             .iter()
             .flat_map(|(name, found)| found.notes.iter().map(move |note| format!("gyro {name}: {note}")))
             .collect();
-        let log: Vec<_> =
-            of_log.log.iter().map(|log| json!({ "name": log.name, "sha256": log.sha256 })).collect();
         let about = json!({
             "tool": TOOL,
             "command": of_log.command,
@@ -205,7 +193,7 @@ impl DriftArgs {
             "length_h": report.length_h,
             "verdict": report.verdict(),
             "notes": notes,
-            "log": log,
+            "log": of_log.log,
         });
         let about = toml::Value::try_from(about).map_err(|error| Error::Document(vec![error.to_string()]))?;
         details.insert("drift".to_owned(), about);

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use isotherm_log::file::refuse_overwriting;
-use isotherm_protocol::document::Created;
 
+use super::output::{date, keep};
 use super::print;
 use crate::error::Error;
 use crate::merge::{Merged, Named, Take, merge};
@@ -47,20 +47,13 @@ impl MergeArgs {
     pub(super) fn run(&self) -> Result<(), Error> {
         let inputs: Vec<&Path> = self.part.iter().chain([&self.base]).map(PathBuf::as_path).collect();
         refuse_overwriting(&self.out, &inputs)?;
-        if self.out.exists() && !self.overwrite {
-            let out = self.out.display();
-            return Err(Error::Usage(format!("{out} is there already: give another name, or --overwrite")));
-        }
+        keep(&self.out, self.overwrite)?;
         let base = named(&self.base)?;
         let parts = self.part.iter().map(|path| named(path)).collect::<Result<Vec<_>, _>>()?;
         let mut merged: Merged = merge(&base, &parts, &self.take)?;
         if let Some(created) = &self.created {
-            let date = created.parse().ok().and_then(Created::new);
-            let date = date.ok_or_else(|| {
-                Error::Usage(format!("--created is {created:?}, must be a date such as 2026-11-22"))
-            })?;
             let mut document = merged.written.document.clone();
-            document.created = Some(date);
+            document.created = Some(date(created)?);
             merged.written = Written::of(&document)?;
         }
         merged.written.save(&self.out, self.overwrite)?;

@@ -72,14 +72,7 @@ impl ModesArgs {
             return Err(Error::Usage(NO_DOCUMENT.to_owned()));
         };
         let place = self.place.place()?;
-        let named = Named {
-            reading: &self.log.reading,
-            logs: &self.log.log,
-            together: false,
-            judging: &self.log.reading,
-            judge: &self.judge,
-            document: Some(document),
-        };
+        let named = Named::apart(&self.log.reading, &self.log.log, &self.judge, Some(document));
         let title = "Mode-reversed gyros of several units";
         let batch = Batch { output: &self.output, title, accept_partial: false };
         batch.carry_out(named.units()?, |work, names, bar| {

@@ -119,9 +119,8 @@ impl OutputArgs {
         let mut details = before.as_ref().and_then(|before| before.details.clone()).unwrap_or_default();
         if let Some(before) = before.filter(|before| before.tool.is_some() || before.method.is_some()) {
             // What the rest of the document rests on.
-            let log: Vec<_> =
-                before.log.iter().map(|log| json!({ "name": log.name, "sha256": log.sha256 })).collect();
-            let earlier = json!({ "tool": before.tool.unwrap_or_default(), "method": before.method.unwrap_or_default(), "log": log });
+            let [tool, method] = [before.tool, before.method].map(Option::unwrap_or_default);
+            let earlier = json!({ "tool": tool, "method": method, "log": before.log });
             let earlier =
                 toml::Value::try_from(earlier).map_err(|error| Error::Document(vec![error.to_string()]))?;
             details.insert("before".to_owned(), earlier);
@@ -130,10 +129,14 @@ impl OutputArgs {
         about.sigmas.write(&mut details);
         origin.details = Some(details);
         document.origin = Some(origin);
-        if let Some(date) = self.date()? {
-            document.created = Some(date);
-        }
+        self.put_date(&mut document)?;
         Written::of(&document)
+    }
+
+    /// Gives a new document its date; without one it keeps the old one's.
+    pub(super) fn put_date(&self, document: &mut Document) -> Result<(), Error> {
+        document.created = self.date()?.or(document.created);
+        Ok(())
     }
 
     /// The date that the new document is to state.
@@ -143,7 +146,7 @@ impl OutputArgs {
 }
 
 /// Leaves a file alone that is there, unless it may be written over.
-fn keep(out: &Path, overwrite: bool) -> Result<(), Error> {
+pub(super) fn keep(out: &Path, overwrite: bool) -> Result<(), Error> {
     if out.exists() && !overwrite {
         return Err(Error::Usage(format!(
             "{} is there already: give another name, or --overwrite",
@@ -154,7 +157,7 @@ fn keep(out: &Path, overwrite: bool) -> Result<(), Error> {
 }
 
 /// The date that a document is to state.
-fn date(text: &str) -> Result<Created, Error> {
+pub(super) fn date(text: &str) -> Result<Created, Error> {
     let date = text.parse().ok().and_then(Created::new);
     date.ok_or_else(|| Error::Usage(format!("--created is {text:?}, must be a date such as 2026-11-22")))
 }

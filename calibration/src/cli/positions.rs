@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use isotherm_protocol::document::AccelOutput;
 
+use super::above_0;
 use super::bar::Bar;
 use super::batch::{Batch, Named, Work};
 use super::output::{About, Fitted, OutputArgs};
@@ -110,14 +111,7 @@ impl PositionsArgs {
             return self.print_budget(&plan);
         }
         let (settings, about_gravity) = self.settings(plan)?;
-        let named = Named {
-            reading: &self.reading,
-            logs: &self.log,
-            together: false,
-            judging: &self.reading,
-            judge: &self.judge,
-            document: self.document.as_deref(),
-        };
+        let named = Named::apart(&self.reading, &self.log, &self.judge, self.document.as_ref());
         let batch =
             Batch { output: &self.output, title: "Accelerometers of several units", accept_partial: false };
         batch.carry_out(named.units()?, |work, names, bar| {
@@ -138,11 +132,7 @@ impl PositionsArgs {
             ("--seconds", self.planned.seconds),
             ("--scale", self.planned.scale),
         ];
-        for (name, value) in positive {
-            if !(value.is_finite() && value > 0.0) {
-                return Err(Error::Usage(format!("{name} is {value}, must be a number above 0")));
-            }
-        }
+        positive.into_iter().try_for_each(|(name, value)| above_0(name, value))?;
         for (name, value) in [("--run-out", self.run_out), ("--settle", self.settle)] {
             if !(value.is_finite() && value >= 0.0) {
                 return Err(Error::Usage(format!("{name} is {value}, must be a number, 0 or above")));

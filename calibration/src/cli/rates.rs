@@ -80,14 +80,7 @@ impl RatesArgs {
             )));
         }
         let place = self.place.place()?;
-        let named = Named {
-            reading: &self.log.reading,
-            logs: &self.log.log,
-            together: false,
-            judging: &self.log.reading,
-            judge: &self.judge,
-            document: self.document.as_deref(),
-        };
+        let named = Named::apart(&self.log.reading, &self.log.log, &self.judge, self.document.as_ref());
         let batch = Batch { output: &self.output, title: "Rate table, several units", accept_partial: false };
         batch.carry_out(named.units()?, |work, names, bar| {
             self.output.keep(self.fit(work, place.as_slice(), bar)?, work, names)

@@ -96,12 +96,8 @@ impl ThermalArgs {
             ..self.log.reading.clone()
         };
         let named = Named {
-            reading: &self.log.reading,
-            logs: &self.log.log,
-            together: false,
             judging: &judging,
-            judge: &self.judge,
-            document: self.document.as_deref(),
+            ..Named::apart(&self.log.reading, &self.log.log, &self.judge, self.document.as_ref())
         };
         let title = "Thermal calibration of several units";
         let batch = Batch { output: &self.output, title, accept_partial: self.accept_partial };

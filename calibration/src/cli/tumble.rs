@@ -6,6 +6,7 @@ use clap::Args;
 use isotherm_correction::sample::OutputKind;
 use isotherm_protocol::document::AccelOutput;
 
+use super::above_0;
 use super::bar::Bar;
 use super::batch::{Batch, Named, Names, Work};
 use super::output::{About, Fitted, OutputArgs};
@@ -64,14 +65,7 @@ impl TumbleArgs {
     pub(super) fn run(&self) -> Result<(), Error> {
         self.check()?;
         let gravity = self.gravity.stated()?;
-        let named = Named {
-            reading: &self.log.reading,
-            logs: &self.log.log,
-            together: true,
-            judging: &self.log.reading,
-            judge: &[],
-            document: self.document.as_deref(),
-        };
+        let named = Named::together(&self.log.reading, &self.log.log, self.document.as_ref());
         let batch =
             Batch { output: &self.output, title: "Several units tumbled by hand", accept_partial: false };
         batch.carry_out(named.units()?, |work, names, bar| {
@@ -148,11 +142,7 @@ impl TumbleArgs {
             ("--still-rate", self.still_rate),
             ("--least", self.least),
         ];
-        for (name, value) in positive {
-            if !(value.is_finite() && value > 0.0) {
-                return Err(Error::Usage(format!("{name} is {value}, must be a number above 0")));
-            }
-        }
+        positive.into_iter().try_for_each(|(name, value)| above_0(name, value))?;
         let inputs: Vec<&Path> = self.log.log.iter().chain(&self.document).map(PathBuf::as_path).collect();
         self.output.check(&inputs)
     }

@@ -21,6 +21,7 @@ use crate::written::Written;
 
 /// Highest powers of temperature that are tried.
 const DEGREES: [usize; 5] = [1, 2, 3, 4, 5];
+
 /// A document and what is to be said of it.
 #[derive(Debug)]
 pub struct Fitted {
@@ -57,7 +58,7 @@ pub fn fit(
     let mut series = Vec::new();
     let stands: Vec<Stand> = (0..runs.len()).map(|run| settings.stand(run)).collect();
     for (run, stand) in runs.iter().zip(&stands) {
-        let of_run = run.series(Lent(&mut watch))?;
+        let of_run = run.series(&mut watch)?;
         let found = checks::raw(&run.name, &of_run, stand);
         refusals.extend(found.refusals);
         warnings.extend(found.warnings);
@@ -66,7 +67,7 @@ pub fn fit(
     }
     for (index, run) in judges.iter().enumerate() {
         let stand = settings.stand(runs.len() + index);
-        warnings.extend(checks::judging(&run.name, &run.series(Lent(&mut watch))?, &stand));
+        warnings.extend(checks::judging(&run.name, &run.series(&mut watch)?, &stand));
     }
     let first = series.first().ok_or_else(|| Error::Refused(vec!["there is no run to fit to".to_owned()]))?;
     if !refusals.is_empty() {
@@ -93,10 +94,10 @@ pub fn fit(
     let mut rests = Vec::new();
     for ((run, series), stand) in runs.iter().zip(&series).zip(&stands) {
         let window_s = stand.window_s(settings.fit_window_s);
-        let of_run = Samples::of(run, series, &plain, window_s, Lent(&mut watch))?;
+        let of_run = Samples::of(run, series, &plain, window_s, &mut watch)?;
         let mut found = checks::corrected(&of_run, stand, &dead);
         if found.refusals.is_empty() {
-            let of_rest = rest(run, &base, stand, Lent(&mut watch))?;
+            let of_rest = rest(run, &base, stand, &mut watch)?;
             found.refusals.extend(checks::turning(&of_run, &plain, stand));
             rests.push(of_rest);
         }
@@ -137,23 +138,6 @@ pub fn fit(
         outcome.history(name, &known.history);
     }
     outcome.finish((runs, judges), origin, |run, stand| rest(run, &base, stand, ()), watch)
-}
-
-/// A watch that is lent.
-pub(super) struct Lent<'a, W: Watch>(pub(super) &'a mut W);
-
-impl<W: Watch> Watch for Lent<'_, W> {
-    fn begin(&mut self, progress: isotherm_log::progress::Progress) {
-        self.0.begin(progress);
-    }
-
-    fn step(&mut self) {
-        self.0.step();
-    }
-
-    fn end(&mut self) {
-        self.0.end();
-    }
 }
 
 /// Length of the windows that residuals are stated over (s): in long runs several of the fit's, so that white noise does not hide

@@ -5,7 +5,7 @@ use isotherm_protocol::document::{Document, Filter, Origin, Sample};
 use super::branches::History;
 use super::checks::SMALLEST_RANGE_DEG_C;
 use super::columns::{Basis, Term};
-use super::fit::{Fitted, Lent, Sensor};
+use super::fit::{Fitted, Sensor};
 use super::model::{Spec, put_accel, put_gyro};
 use super::select::{Choice, WORTH_IT};
 use super::settings::Settings;
@@ -165,7 +165,7 @@ impl Outcome {
                     (&before.loaded, &written.loaded),
                     (&written.document, &rest(run, &stand)?),
                     stand.window_s(window_s),
-                    Lent(&mut watch),
+                    &mut watch,
                 )?;
                 troubles.extend(both_ways.troubles.iter().map(|words| format!("{}: {words}", run.name)));
                 // On a table the accelerometers feel its turning, too.
