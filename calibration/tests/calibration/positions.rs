@@ -13,7 +13,7 @@ use isotherm_log::offline::Offline;
 use nalgebra::DVector;
 
 use crate::stand::judging::{
-    HOUSING_ABOVE_DEG_C, away, chi_square, plausible, quick, settings, times, tracks,
+    HOUSING_ABOVE_DEG_C, away, chi_square, found_in_room, plausible, quick, settings, times, tracks,
 };
 use crate::stand::{self, ARCSEC, GRAVITY, HZ_PER_V, Stand};
 
@@ -25,10 +25,7 @@ fn twelve_positions_with_random_stand_errors_find_the_axes_within_their_covarian
     let (mut axes, mut stands, mut fits) = (Vec::new(), Vec::new(), Vec::new());
     for seed in 0..200 {
         let how = quick(seed);
-        let (events, held) = stand::log(&instrument, 20.0, &plan, &(0..12).collect::<Vec<_>>(), &how);
-        let runs = [stand::run("room", events)];
-        let settings = settings(plan.clone(), Some(times(&plan, "room", &held)));
-        let found = analyse(&tracks(&runs, &document), &document.document, &settings).unwrap();
+        let found = found_in_room(&instrument, &plan, &document, &how);
         let error = away(&found, &truth, 0, false);
         axes.push(chi_square(&error, found.fit.axes_covariance(&plan, 0)));
         let from = found.fit.solution.parameters.len() - 3;

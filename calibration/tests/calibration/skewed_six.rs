@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use isotherm_calibration::positions::analysis::analyse;
 use isotherm_calibration::positions::document::complete;
 use isotherm_calibration::positions::plan::Plan;
 use isotherm_calibration::written::Written;
@@ -17,9 +16,7 @@ use isotherm_simulator::presets::skewed_six;
 use crate::command::{calibrate, fails, json, words};
 use crate::modes_rates;
 use crate::simulated_logs::record;
-use crate::stand::judging::{
-    HOUSING_ABOVE_DEG_C, away, chi_square, plausible, quick, settings, times, tracks,
-};
+use crate::stand::judging::{HOUSING_ABOVE_DEG_C, away, chi_square, found_in_room, plausible, quick};
 use crate::stand::{self, ARCSEC};
 
 const NAMES: [&str; 6] = ["a", "b", "c", "d", "e", "f"];
@@ -85,10 +82,7 @@ fn positions_find_six_accelerometers_within_their_covariance() {
     let mut axes = Vec::new();
     for seed in 0..30 {
         let how = quick(seed);
-        let (events, held) = stand::log(&instrument, 20.0, &plan, &(0..12).collect::<Vec<_>>(), &how);
-        let runs = [stand::run("room", events)];
-        let settings = settings(plan.clone(), Some(times(&plan, "room", &held)));
-        let found = analyse(&tracks(&runs, &document), &document.document, &settings).unwrap();
+        let found = found_in_room(&instrument, &plan, &document, &how);
         let error = away(&found, &truth, 0, false);
         assert_eq!(error.len(), 12);
         axes.push(chi_square(&error, found.fit.axes_covariance(&plan, 0)));

@@ -7,7 +7,6 @@
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
     clippy::panic,
-    clippy::default_trait_access,
     reason = "a test stops where something is missing, and its numbers are small"
 )]
 

@@ -1,4 +1,4 @@
-//! Gyro and accelerometer frames straight into the core's ticks, into room that is used again.
+//! Frames of raw readings straight into the core's ticks, into room that is used again.
 //!
 //! This is what becomes of every message in the service: nothing is allocated, and no tick is written twice. The bytes are
 //! those of [`GyroBatch`], [`AccelBatch`] and [`TemperatureBatch`], which say what they mean; a test holds both readings of them together.

@@ -1,12 +1,13 @@
 //! How what was found on the stand is held against the truth.
 
-use isotherm_calibration::positions::analysis::{Analysis, Settings};
+use isotherm_calibration::positions::analysis::{Analysis, Settings, analyse};
 use isotherm_calibration::positions::plan::Plan;
 use isotherm_calibration::positions::still::StillLimits;
 use isotherm_calibration::positions::times::Times;
 use isotherm_calibration::positions::track::Track;
 use isotherm_calibration::run::Run;
 use isotherm_calibration::written::Written;
+use isotherm_simulator::instrument::Instrument;
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -48,6 +49,20 @@ pub(crate) fn times(plan: &Plan, log: &str, held: &[([f64; 2], usize)]) -> Times
         (*span, plan.positions[*position].name.clone(), Some(log.to_owned()))
     };
     Times { rows: held.iter().map(row).collect() }
+}
+
+/// What is found of a unit that a stand with random errors held in all positions of a plan at 20 °C.
+pub(crate) fn found_in_room(
+    instrument: &Instrument,
+    plan: &Plan,
+    document: &Written,
+    how: &Stand,
+) -> Analysis {
+    let all: Vec<usize> = (0..plan.positions.len()).collect();
+    let (events, held) = super::log(instrument, 20.0, plan, &all, how);
+    let runs = [super::run("room", events)];
+    let settings = settings(plan.clone(), Some(times(plan, "room", &held)));
+    analyse(&tracks(&runs, document), &document.document, &settings).unwrap()
 }
 
 pub(crate) fn tracks(runs: &[Run], written: &Written) -> Vec<Track> {

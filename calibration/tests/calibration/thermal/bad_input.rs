@@ -59,11 +59,7 @@ fn run(seconds: std::ops::Range<u32>, read: impl Fn(u32) -> Second) -> Run {
             end_time,
             duration,
             readings: rates.into_iter().collect(),
-            mode: None,
-            switch_command: false,
-            meander: None,
-            half_periods: Default::default(),
-            series: 0,
+            ..GyroTick::default()
         };
         events.push(LogEvent::Gyro { output: OutputKind::Mean, tick });
     }
@@ -240,11 +236,7 @@ fn run_at(seconds: &[u32]) -> Run {
             end_time: Timestamp::from_ns(i64::from(second + 1) * 1_000_000_000),
             duration: Span::from_s(1.0),
             readings: rates.into_iter().collect(),
-            mode: None,
-            switch_command: false,
-            meander: None,
-            half_periods: Default::default(),
-            series: 0,
+            ..GyroTick::default()
         };
         events.push(LogEvent::Gyro { output: OutputKind::Mean, tick });
     }

@@ -149,11 +149,7 @@ fn simulated(coil: &Coil, profile: &Profile, seed: u64) -> Run {
             end_time: Timestamp::from_ns(end_ns),
             duration: Span::from_s(TICK_S),
             readings: readings.into_iter().collect(),
-            mode: None,
-            switch_command: false,
-            meander: None,
-            half_periods: Default::default(),
-            series: 0,
+            ..GyroTick::default()
         };
         events.push(LogEvent::Gyro { output: OutputKind::Mean, tick });
     }
