@@ -16,7 +16,7 @@ use alloc::vec::Vec;
 
 use serde::{Deserialize, Serialize};
 
-use linear::{Rows, condition_number, orthonormal_columns};
+use linear::{Rows, condition_number, is_conditioned, orthonormal_columns};
 
 pub use parity::{ISOLATION_RATIO, ParityCheck, ParityVerdict};
 pub use parts::{
@@ -174,8 +174,7 @@ impl Orientation {
             return None;
         }
         let rows = masked(self.rows_at(temperature_deg_c), mask);
-        let condition = condition_number(&rows);
-        if condition.is_nan() || condition > CONDITION_LIMIT {
+        if !is_conditioned(&rows, CONDITION_LIMIT) {
             return None;
         }
         // √W·C = Q·R, hence (CᵀWC)⁻¹CᵀW = R⁻¹·Qᵀ·√W; the condition number is not squared this way.

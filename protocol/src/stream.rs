@@ -271,8 +271,8 @@ impl UnitStream {
 
     /// Takes the corrected ticks as they are.
     pub fn take_ready(&mut self) -> Vec<CorrectedTick> {
-        let ticks: Vec<_> = self.ready.iter().cloned().collect();
-        self.drop_ready(ticks.len());
+        let mut ticks = Vec::with_capacity(self.ready.len());
+        self.let_go(self.ready.len(), |tick| ticks.push(tick));
         ticks
     }
 
@@ -295,11 +295,15 @@ impl UnitStream {
 
     /// Drops the first ready ticks: they were taken.
     pub fn drop_ready(&mut self, count: usize) {
-        let count = count.min(self.ready.len());
+        self.let_go(count.min(self.ready.len()), drop);
+    }
+
+    /// Lets the first ready ticks go; there must be so many.
+    fn let_go(&mut self, count: usize, each: impl FnMut(CorrectedTick)) {
         let last = count.checked_sub(1).and_then(|last| self.ready.get(last));
         let last = last.map(|tick| (tick.end_time.as_ns(), tick.sequence, tick.revision));
         self.note_taken(last);
-        self.ready.drain(..count);
+        self.ready.drain(..count).for_each(each);
         if self.ready.is_empty() {
             room::with(|room| room.queues.take_ready(&mut self.ready));
         }

@@ -1,7 +1,7 @@
 //! Linear algebra on at most eight rows of three, without allocation.
 
 use arrayvec::ArrayVec;
-use nalgebra::SMatrix;
+use nalgebra::{Matrix3, SMatrix};
 
 use crate::sample::{MAX_PARITY, MAX_SENSORS};
 
@@ -16,10 +16,21 @@ pub(super) type Triangle = [[f64; 3]; 3];
 /// a later one always brings the missing row.
 const SHORTEST_PARITY: f64 = 1e-6;
 
+/// Whether the condition number is at most `limit`.
+pub(super) fn is_conditioned(rows: &Rows, limit: f64) -> bool {
+    // Where the columns are near to orthogonal Gershgorin's circles tell it without eigenvalues; well within, so that rounding
+    // does not decide.
+    let gram = gram(rows);
+    let radius = |i: usize| (0..3).filter(|j| *j != i).map(|j| gram[(i, j)].abs()).sum::<f64>();
+    let smallest = (0..3).map(|i| gram[(i, i)] - radius(i)).fold(f64::INFINITY, f64::min);
+    let largest = (0..3).map(|i| gram[(i, i)] + radius(i)).fold(0.0, f64::max);
+    let near = smallest > 0.0 && largest <= 0.5 * limit * limit * smallest;
+    near && largest.is_finite() || condition_number(rows) <= limit
+}
+
 /// Ratio of the largest to the smallest singular value; infinite or NaN for a singular or broken matrix.
 pub(super) fn condition_number(rows: &Rows) -> f64 {
-    let matrix = matrix(rows);
-    let gram = matrix.tr_mul(&matrix);
+    let gram = gram(rows);
     if gram.iter().any(|value| !value.is_finite()) {
         return f64::NAN;
     }
@@ -43,6 +54,12 @@ pub(super) fn orthonormal_columns(a: &Rows) -> Option<(Rows, Triangle)> {
         }
         (columns, r.transpose().into())
     })
+}
+
+/// Scalar products of the columns.
+fn gram(rows: &Rows) -> Matrix3<f64> {
+    let matrix = matrix(rows);
+    matrix.tr_mul(&matrix)
 }
 
 /// The rows as a matrix.

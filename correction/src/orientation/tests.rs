@@ -3,7 +3,7 @@ use alloc::vec::Vec;
 
 use proptest::prelude::*;
 
-use super::linear::{condition_number, orthonormal_columns, parity_rows};
+use super::linear::{condition_number, is_conditioned, orthonormal_columns, parity_rows};
 use super::*;
 
 const MASK_6: SensorMask = SensorMask::all(6);
@@ -280,6 +280,19 @@ proptest! {
                 prop_assert!((a - b).abs() < 1e-9, "{} for {}", a, b);
             }
         }
+    }
+
+    #[test]
+    fn a_matrix_is_conditioned_where_its_condition_number_says_so(
+        rows in prop::collection::vec(unit_vector(), 3..=8),
+        limit in prop::sample::select(vec![1.5, 3.0, CONDITION_LIMIT]),
+        scale in prop::sample::select(vec![0.0, 1e-160, 1e-3, 1.0, 1e200, f64::NAN]),
+    ) {
+        let mut a = Rows::default();
+        for (to, from) in a.iter_mut().zip(&rows) {
+            *to = from.map(|c| c * scale);
+        }
+        prop_assert_eq!(is_conditioned(&a, limit), condition_number(&a) <= limit);
     }
 
     #[test]

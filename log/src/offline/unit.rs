@@ -233,8 +233,9 @@ impl Taker {
             Form::Sums => stream.drop_ready(usize::MAX),
             // Writing to a vector does not fail.
             Form::Csv => {
-                let ticks = stream.take_ready();
-                let _ = ticks.iter().try_for_each(|tick| write_tick(&mut self.output.bytes, tick));
+                let mut ticks = stream.ready().iter();
+                let _ = ticks.try_for_each(|tick| write_tick(&mut self.output.bytes, tick));
+                stream.drop_ready(usize::MAX);
             }
             Form::Wire => {
                 while stream.next_frame(&mut self.frame) {
