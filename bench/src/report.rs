@@ -58,7 +58,7 @@ pub(crate) fn write(args: &ReportArgs) -> Result<String, Error> {
     }
     if let Some(scale) = &scale {
         sections.push(("scale", tables::machine(&scale.machine, &scale.skipped)));
-        sections.push(("units", tables::units(&scale.units, &scale.growth)));
+        sections.push(("units", tables::units(&scale.units, &scale.zenoh, &scale.growth)));
         sections.push(("rated", tables::rated(&scale.rated)));
         sections.extend(scale.offline.as_ref().map(|offline| ("offline", tables::offline(offline))));
     }

@@ -7,7 +7,7 @@ mod table;
 use serde::{Deserialize, Serialize};
 
 pub(crate) use offline::Offline;
-pub(crate) use table::{kib_per_unit, table};
+pub(crate) use table::{alone, beyond_first, table};
 
 use crate::chain::{Case, Measure, Profile, Row, Run, Subject, take_turns};
 use crate::error::Error;
@@ -46,7 +46,9 @@ pub(crate) struct Report {
     pub(crate) machine: Machine,
     /// The service with as much as will go through, by number of units.
     pub(crate) units: Vec<Row>,
-    /// How that grows.
+    /// The relay that declares its keys under the same loads: what Zenoh takes by itself.
+    pub(crate) zenoh: Vec<Row>,
+    /// How both grow.
     pub(crate) growth: Vec<Growth>,
     /// The greatest number of units at 200 Hz, in the service and in the relay that declares its keys.
     pub(crate) rated: Vec<Row>,
@@ -84,6 +86,7 @@ pub(crate) fn measure(args: &ScaleArgs) -> Result<Report, Error> {
     let mut report = Report {
         machine: machine.clone(),
         units: Vec::new(),
+        zenoh: Vec::new(),
         growth: Vec::new(),
         rated: Vec::new(),
         offline: None,
@@ -116,14 +119,16 @@ fn live(args: &ScaleArgs, rounds: usize, report: &mut Report) -> Result<(), Erro
         })
         .collect();
     let own = Profile::own();
-    let bar = Bar::over((cases.len() + 2) * rounds);
-    let runs: Vec<Run> = cases.into_iter().map(|case| (case, own.clone(), Subject::Service)).collect();
+    let bar = Bar::over((2 * cases.len() + 2) * rounds);
+    let subjects =
+        |case: &Case| [Subject::Keyed, Subject::Service].map(|subject| (case.clone(), own.clone(), subject));
+    let runs: Vec<Run> = cases.iter().flat_map(subjects).collect();
     let outcomes = take_turns(&runs, rounds, false, &bar)?;
-    let row = |((case, ..), outcomes): (&Run, Vec<_>)| {
-        Row::new(Measure::Saturation, case, (Subject::Service, &own.name), outcomes.clone(), &outcomes)
-    };
-    report.units = runs.iter().zip(outcomes).map(row).collect();
-    report.growth = growth(&report.units);
+    for ((case, _, subject), outcomes) in runs.iter().zip(outcomes) {
+        let row = Row::new(Measure::Saturation, case, (*subject, &own.name), outcomes.clone(), &outcomes);
+        if *subject == Subject::Service { report.units.push(row) } else { report.zenoh.push(row) }
+    }
+    report.growth = growth(&report.units, &report.zenoh);
 
     let most = units.iter().copied().max().unwrap_or(1);
     let rated = Case {
@@ -132,7 +137,7 @@ fn live(args: &ScaleArgs, rounds: usize, report: &mut Report) -> Result<(), Erro
         ..Case::paced(most, RATE_HZ, BATCH, if args.quick { 1.0 } else { RATED_S })
     };
     // Beside thousands of units the other relay is no reference: it looks for the subscribers of every message among all keys.
-    let runs = [Subject::Keyed, Subject::Service].map(|subject| (rated.clone(), own.clone(), subject));
+    let runs = subjects(&rated);
     let outcomes = take_turns(&runs, rounds, false, &bar)?;
     bar.finish();
     let reference = outcomes.first().cloned().unwrap_or_default();
@@ -145,21 +150,23 @@ fn live(args: &ScaleArgs, rounds: usize, report: &mut Report) -> Result<(), Erro
 
 /// Exponents of what grows; what the first unit costs alone is taken off where it is there without any unit.
 #[expect(clippy::cast_precision_loss, reason = "far below 2⁵³")]
-fn growth(rows: &[Row]) -> Vec<Growth> {
-    let over = |what: &str, alone: bool, of: &dyn Fn(&Row) -> f64| {
+fn growth(service: &[Row], zenoh: &[Row]) -> Vec<Growth> {
+    let over = |rows: &[Row], what: &str, alone: bool, of: &dyn Fn(&Row) -> f64| {
         let first = rows.first().map_or(0.0, of);
         let rows = rows.iter().skip(usize::from(!alone));
         let points: Vec<[f64; 2]> =
             rows.map(|row| [row.case.units as f64, if alone { of(row) } else { of(row) - first }]).collect();
         Growth { what: what.to_owned(), exponent: fit::exponent(&points) }
     };
+    let time = |row: &Row| row.median.cpu_us_per_tick * row.case.units as f64;
+    let memory = |row: &Row| row.median.resident_kib as f64;
     let growth = [
-        over("processor time of all units, each at one rate", true, &|row| {
-            row.median.cpu_us_per_tick * row.case.units as f64
-        }),
-        over("resident memory beyond that of one unit", false, &|row| row.median.resident_kib as f64),
-        over("start-up beyond that of one unit", false, &|row| row.median.start_s),
-        over("time of one swap", true, &|row| row.median.swap_ms),
+        over(service, "processor time of all units, each at one rate", true, &time),
+        over(zenoh, "the same of Zenoh alone", true, &time),
+        over(service, "resident memory beyond that of one unit", false, &memory),
+        over(zenoh, "the same of Zenoh alone", false, &memory),
+        over(service, "start-up beyond that of one unit", false, &|row| row.median.start_s),
+        over(service, "time of one swap", true, &|row| row.median.swap_ms),
     ];
     // Of a single point there is none.
     growth.into_iter().filter(|growth| growth.exponent.is_finite()).collect()

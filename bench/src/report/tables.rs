@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use super::Kernel;
 use crate::chain::{Measure, Row, middle};
 use crate::machine::Machine;
-use crate::scale::{Growth, Offline, kib_per_unit};
+use crate::scale::{Growth, Offline, alone, beyond_first};
 
 /// A table; the first column is text.
 fn markdown(head: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
@@ -128,22 +128,34 @@ pub(super) fn kernel(rows: &[Kernel]) -> String {
 
 /// By number of units, and how that grows.
 #[expect(clippy::cast_precision_loss, reason = "far below 2⁵³")]
-pub(super) fn units(rows: &[Row], growth: &[Growth]) -> String {
-    let head =
-        ["units", "ticks/s", "CPU µs/tick", "lost", "resident MiB", "KiB per unit", "start s", "swap ms"];
+pub(super) fn units(rows: &[Row], zenoh: &[Row], growth: &[Growth]) -> String {
+    let head = [
+        "units",
+        "ticks/s",
+        "CPU µs/tick",
+        "lost",
+        "resident MiB",
+        "KiB per unit",
+        "start s",
+        "swap ms",
+        "Zenoh alone: CPU µs/tick",
+        "KiB per unit",
+    ];
     let table = markdown(
         &head,
         rows.iter().map(|row| {
-            let first = rows.first().filter(|first| first.case.units < row.case.units);
+            let zenoh_alone = alone(row, zenoh);
             vec![
                 thousands(row.case.units as f64),
                 thousands(row.median.ticks_per_s),
                 format!("{:.2}", row.median.cpu_us_per_tick),
                 row.median.lost.to_string(),
                 format!("{:.1}", row.median.resident_kib as f64 / 1024.0),
-                first.map_or_else(String::new, |first| format!("{:.1}", kib_per_unit(row, first))),
+                beyond_first(row, rows),
                 format!("{:.2}", row.median.start_s),
                 format!("{:.1}", row.median.swap_ms),
+                zenoh_alone.map_or_else(String::new, |row| format!("{:.2}", row.median.cpu_us_per_tick)),
+                zenoh_alone.map_or_else(String::new, |row| beyond_first(row, zenoh)),
             ]
         }),
     );

@@ -10,7 +10,7 @@ use crate::cli::plain;
 pub(crate) fn table(report: &Report) -> String {
     let mut text = format!("{}\n", report.machine.words());
     if !report.units.is_empty() {
-        let _ = writeln!(text, "\n{}", units(&report.units));
+        let _ = writeln!(text, "\n{}", units(&report.units, &report.zenoh));
         for growth in &report.growth {
             let _ = writeln!(text, " exponent {:6.3}  {}", growth.exponent, growth.what);
         }
@@ -27,15 +27,26 @@ pub(crate) fn table(report: &Report) -> String {
     text
 }
 
+/// What Zenoh takes by itself where the service has so many units.
+pub(crate) fn alone<'a>(service: &Row, zenoh: &'a [Row]) -> Option<&'a Row> {
+    zenoh.iter().find(|row| row.case.units == service.case.units)
+}
+
+/// Resident memory per unit beyond the first row's, in words; none of that row itself.
+pub(crate) fn beyond_first(row: &Row, rows: &[Row]) -> String {
+    let first = rows.first().filter(|first| first.case.units < row.case.units);
+    first.map_or_else(String::new, |first| format!("{:.1}", kib_per_unit(row, first)))
+}
+
 /// Resident memory per unit beyond the first (KiB).
 #[expect(clippy::cast_precision_loss, reason = "far below 2⁵³")]
-pub(crate) fn kib_per_unit(row: &Row, first: &Row) -> f64 {
+fn kib_per_unit(row: &Row, first: &Row) -> f64 {
     (row.median.resident_kib as f64 - first.median.resident_kib as f64)
         / (row.case.units as f64 - first.case.units as f64)
 }
 
 #[expect(clippy::cast_precision_loss, reason = "far below 2⁵³")]
-fn units(rows: &[Row]) -> comfy_table::Table {
+fn units(rows: &[Row], zenoh: &[Row]) -> comfy_table::Table {
     let mut table = plain(&[
         "units",
         "ticks/s",
@@ -45,6 +56,8 @@ fn units(rows: &[Row]) -> comfy_table::Table {
         "KiB per unit",
         "start s",
         "swap ms",
+        "Zenoh alone: CPU µs/tick",
+        "KiB per unit",
     ]);
     for row in rows {
         let outcome = &row.median;
@@ -54,11 +67,11 @@ fn units(rows: &[Row]) -> comfy_table::Table {
             format!("{:.3}", outcome.cpu_us_per_tick),
             outcome.lost.to_string(),
             format!("{:.1}", outcome.resident_kib as f64 / 1024.0),
-            rows.first()
-                .filter(|first| first.case.units < row.case.units)
-                .map_or_else(String::new, |first| format!("{:.1}", kib_per_unit(row, first))),
+            beyond_first(row, rows),
             format!("{:.2}", outcome.start_s),
             format!("{:.1}", outcome.swap_ms),
+            alone(row, zenoh).map_or_else(String::new, |row| format!("{:.3}", row.median.cpu_us_per_tick)),
+            alone(row, zenoh).map_or_else(String::new, |row| beyond_first(row, zenoh)),
         ]);
     }
     table
