@@ -3,12 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use isotherm_log::file::refuse_overwriting;
 use isotherm_protocol::document::{Created, Document};
 use serde_json::json;
 use toml::Table;
 
 use super::batch::{Names, Work};
+use super::page::{keep, writable};
 use crate::error::Error;
 use crate::provenance::{command_line, origin};
 use crate::report::{FitReport, Sigmas, of_unit, residuals};
@@ -63,9 +63,12 @@ pub(crate) struct About {
 impl OutputArgs {
     /// Checks before anything is read; `inputs` may not be overwritten.
     pub(crate) fn check(&self, inputs: &[&Path]) -> Result<(), Error> {
-        for out in self.out.iter().chain(&self.html) {
-            refuse_overwriting(out, inputs)?;
-            keep(out, self.overwrite)?;
+        for out in &self.out {
+            let page = self.html.as_deref();
+            writable(out, &inputs.iter().copied().chain(page).collect::<Vec<_>>(), self.overwrite)?;
+        }
+        for html in &self.html {
+            writable(html, inputs, self.overwrite)?;
         }
         self.date().map(|_| ())
     }
@@ -95,7 +98,7 @@ impl OutputArgs {
     /// Writes what a fit came to; its report is left.
     pub(super) fn keep(&self, fitted: Fitted, work: &Work, names: &Names<'_>) -> Result<FitReport, Error> {
         let Fitted { written, mut report, about } = fitted;
-        report.warnings.extend(work.warnings.iter().cloned());
+        report.warnings.extend(work.told());
         self.write(|| self.document(written.document, &about, &report), || report.to_html(), names)?;
         Ok(report)
     }
@@ -143,17 +146,6 @@ impl OutputArgs {
     pub(super) fn date(&self) -> Result<Option<Created>, Error> {
         self.created.as_deref().map(date).transpose()
     }
-}
-
-/// Leaves a file alone that is there, unless it may be written over.
-pub(super) fn keep(out: &Path, overwrite: bool) -> Result<(), Error> {
-    if out.exists() && !overwrite {
-        return Err(Error::Usage(format!(
-            "{} is there already: give another name, or --overwrite",
-            out.display()
-        )));
-    }
-    Ok(())
 }
 
 /// The date that a document is to state.

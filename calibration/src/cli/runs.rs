@@ -126,7 +126,12 @@ impl Reading {
             Some(unit) => drop(of_units.insert(unit, files.clone())),
             None => {
                 for file in files {
-                    for unit in units_of(&mut Log::recordings(std::slice::from_ref(file))?, Bar::reading())? {
+                    let mut log = Log::recordings(std::slice::from_ref(file))?;
+                    let (units, cut) = units_of(&mut log, Bar::reading())?;
+                    if let (true, Some(cut)) = (units.is_empty(), cut.words()) {
+                        return Err(Error::Refused(vec![format!("no raw readings can be read: {cut}")]));
+                    }
+                    for unit in units {
                         of_units.entry(unit).or_default().push(file.clone());
                     }
                 }

@@ -112,7 +112,7 @@ impl ThermalArgs {
         let base = work.base.as_ref().map(|base| &base.document);
         let bar = names.at_work("fitting");
         let Fitted { written, mut report } = fit(base, (&work.runs, &work.judges), &settings, origin, bar)?;
-        report.warnings.extend(work.warnings.iter().cloned());
+        report.warnings.extend(work.told());
         self.output.write(|| Ok(written), || report.to_html(), names)?;
         Ok(report)
     }

@@ -66,11 +66,6 @@ pub fn raw(name: &str, series: &Series, stand: &Stand) -> Findings {
     if series.gyros.output == Some(OutputKind::Mean) && stand.turning.is_none() {
         rates(&mut found, name, &series.gyros);
     }
-    if let Some(words) = &series.cut_short {
-        found.warnings.push(format!(
-            "the recording is cut short, and is taken to where it is whole: {words}; isotherm-replay recover may save more"
-        ));
-    }
     if series.bad_frames > 0 {
         found.warnings.push(format!(
             "{name}: {} frames could not be read and are left out; isotherm-replay recover may save them",
