@@ -76,13 +76,27 @@ impl Run {
     #[must_use]
     pub fn new(name: String, unit: UnitId, files: LogFiles, part: &Part) -> Self {
         let part = Part { units: [unit.clone()].into(), ..part.clone() };
-        Self { name, unit, gyros: None, source: Source::Files { files, part }, given: Vec::new(), cut: Cut::default() }
+        Self {
+            name,
+            unit,
+            gyros: None,
+            source: Source::Files { files, part },
+            given: Vec::new(),
+            cut: Cut::default(),
+        }
     }
 
     /// A run that is already in memory.
     #[must_use]
     pub fn of_events(name: String, unit: UnitId, events: Vec<LogEvent>) -> Self {
-        Self { name, unit, gyros: None, source: Source::Events(events.into()), given: Vec::new(), cut: Cut::default() }
+        Self {
+            name,
+            unit,
+            gyros: None,
+            source: Source::Events(events.into()),
+            given: Vec::new(),
+            cut: Cut::default(),
+        }
     }
 
     /// The same, where folders were given that have its files.
@@ -193,9 +207,7 @@ impl Run {
         mut each: impl FnMut(Piece<'_>) -> Result<(), Error>,
     ) -> Result<(), Error> {
         match &self.source {
-            Source::Events(events) => {
-                events.iter().try_for_each(|event| each(Piece::Event(event)))
-            }
+            Source::Events(events) => events.iter().try_for_each(|event| each(Piece::Event(event))),
             Source::Files { files, part } => {
                 let mut messages = files.open(part)?;
                 watch.begin(messages.progress());

@@ -265,7 +265,8 @@ impl Batch<'_> {
             |ready| bar.at(ready),
             |(unit, work)| {
                 let work = work.as_ref().map_err(|error| Error::Refused(vec![error.to_string()]))?;
-                one(work, &Names(Some(unit.as_str())), Bar::hidden).map_err(|error| error.beside(&work.cuts()))
+                one(work, &Names(Some(unit.as_str())), Bar::hidden)
+                    .map_err(|error| error.beside(&work.cuts()))
             },
         );
         bar.finish();

@@ -123,7 +123,7 @@ impl DriftArgs {
             sensors,
             parameters,
         };
-        self.output.write(|| self.document(work, &report), || page(&report), names)?;
+        self.output.write(|| self.document(work, &report).map(Some), || page(&report), names)?;
         Ok(report)
     }
 

@@ -274,12 +274,7 @@ impl ImpactArgs {
         Ok(Report { voyage: *voyage, source, seeds: seeds.len(), rows: rows.collect(), notes })
     }
 
-    fn sail_log(
-        &self,
-        voyage: &mut Voyage,
-        parts: &[DriftParts; 3],
-        cut: &Cut,
-    ) -> Result<Report, Error> {
+    fn sail_log(&self, voyage: &mut Voyage, parts: &[DriftParts; 3], cut: &Cut) -> Result<Report, Error> {
         let columns = self.columns(cut)?;
         let words: Vec<String> = cut.words().map(str::to_owned).into_iter().collect();
         let (drift, mut notes) = logged::drift(&columns, voyage).map_err(|error| error.beside(&words))?;

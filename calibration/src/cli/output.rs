@@ -63,11 +63,11 @@ pub(crate) struct About {
 impl OutputArgs {
     /// Checks before anything is read; `inputs` may not be overwritten.
     pub(crate) fn check(&self, inputs: &[&Path]) -> Result<(), Error> {
-        for out in &self.out {
+        if let Some(out) = &self.out {
             let page = self.html.as_deref();
             writable(out, &inputs.iter().copied().chain(page).collect::<Vec<_>>(), self.overwrite)?;
         }
-        for html in &self.html {
+        if let Some(html) = &self.html {
             writable(html, inputs, self.overwrite)?;
         }
         self.date().map(|_| ())
@@ -79,15 +79,17 @@ impl OutputArgs {
         outputs.try_for_each(|out| keep(&of_unit(out, unit), self.overwrite))
     }
 
-    /// Writes document and page of a unit, each under the name that it has for it.
+    /// Writes document and page of a unit, each under the name that it has for it; no document where there is nothing new to say.
     pub(super) fn write(
         &self,
-        document: impl FnOnce() -> Result<Written, Error>,
+        document: impl FnOnce() -> Result<Option<Written>, Error>,
         page: impl FnOnce() -> String,
         names: &Names<'_>,
     ) -> Result<(), Error> {
-        if let Some(out) = &self.out {
-            document()?.save(&names.of(out), self.overwrite)?;
+        if let Some(out) = &self.out
+            && let Some(document) = document()?
+        {
+            document.save(&names.of(out), self.overwrite)?;
         }
         if let Some(html) = &self.html {
             write_file(&names.of(html), page().as_bytes(), self.overwrite)?;
@@ -99,13 +101,23 @@ impl OutputArgs {
     pub(super) fn keep(&self, fitted: Fitted, work: &Work, names: &Names<'_>) -> Result<FitReport, Error> {
         let Fitted { written, mut report, about } = fitted;
         report.warnings.extend(work.told());
-        self.write(|| self.document(written.document, &about, &report), || report.to_html(), names)?;
+        self.write(
+            || self.document(written.document, &about, &report).map(Some),
+            || report.to_html(),
+            names,
+        )?;
         Ok(report)
     }
 
     /// The page of a batch's table, and whether it may replace another.
     pub(super) fn page(&self) -> (Option<&Path>, bool) {
         (self.html.as_deref(), self.overwrite)
+    }
+
+    /// What is said where every sensor is refused; nothing where no document was wanted.
+    pub(super) fn nothing_new(&self, names: &Names<'_>) -> Option<String> {
+        let out = names.of(self.out.as_ref()?);
+        Some(format!("every sensor is refused: nothing is written to {}", out.display()))
     }
 
     /// Whether a document is to be written.

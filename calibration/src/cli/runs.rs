@@ -152,7 +152,14 @@ impl Reading {
             return Ok(Mapping::load(mapping)?);
         }
         for path in logs {
-            std::fs::metadata(path).map_err(|source| Error::file(path, "open the log", source))?;
+            let about =
+                std::fs::metadata(path).map_err(|source| Error::file(path, "open the log", source))?;
+            if about.is_file() && about.len() == 0 {
+                return Err(Error::Refused(vec![format!(
+                    "{} is empty, it has 0 bytes: was it recorded, and copied to its end?",
+                    path.display()
+                )]));
+            }
         }
         let folder = logs.iter().find(|path| path.is_dir());
         Err(Error::Usage(match folder {

@@ -8,8 +8,8 @@ use isotherm_protocol::key::UnitId;
 
 use super::bar::Bar;
 use super::batch::{Outcome, close};
-use super::place::PlaceArgs;
 use super::page::PageArgs;
+use super::place::PlaceArgs;
 use super::print;
 use super::runs::Reading;
 use crate::error::Error;

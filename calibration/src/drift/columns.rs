@@ -159,13 +159,13 @@ impl Columns {
             }
             log.cut_short().iter().for_each(|words| cut.recording(words));
         }
-        match columns {
-            Some(columns) => columns.finish(),
-            None => {
+        columns.map_or_else(
+            || {
                 let none = nothing("corrected ticks", "isotherm-replay correct makes them of a raw log");
                 Err(none.beside(cut.words().map(str::to_owned).as_slice()))
-            }
-        }
+            },
+            Self::finish,
+        )
     }
 
     fn empty(unit: UnitId, kind: Kind) -> Self {
@@ -241,7 +241,8 @@ enum Scale {
 }
 
 /// x, y, z for three sensors, numbers from 1 for more.
-fn name(index: usize, of: usize) -> String {
+#[must_use]
+pub fn name(index: usize, of: usize) -> String {
     match AXES.get(index).filter(|_| of == AXES.len()) {
         Some(axis) => (*axis).to_owned(),
         None => (index + 1).to_string(),

@@ -137,6 +137,13 @@ impl Verdict {
     }
 }
 
+/// Whether what is left has grown, in the digits that are shown: no sentence says that 2.87 grows to 2.87. The one rule for "made
+/// worse", of every figure.
+#[must_use]
+pub fn made_worse(before: f64, after: f64) -> bool {
+    after > before && short(after) != short(before)
+}
+
 /// All verdicts in one line.
 pub(super) fn headline(verdicts: &[Verdict]) -> String {
     if verdicts.is_empty() {

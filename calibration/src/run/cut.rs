@@ -48,3 +48,25 @@ impl Cut {
         self.0.get().map(String::as_str)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn copies_know_what_one_of_them_has_found() {
+        let cut = Cut::default();
+        let copy = cut.clone();
+        cut.note("log.csv.gz", &LogReport::Text(ReadReport { skipped_rows: 3, ..ReadReport::default() }));
+        assert_eq!(copy.words(), None, "rows that are passed over are no cut");
+        cut.note("log.csv.gz", &LogReport::Text(ReadReport { cut_short: true, ..ReadReport::default() }));
+        assert!(
+            copy.words().is_some_and(|words| words.contains("log.csv.gz") && words.contains("cut short"))
+        );
+        // The first place counts.
+        copy.recording("other.mcap: ends in the middle");
+        let other = Cut::default();
+        cut.hand_on(&other);
+        assert!(other.words().is_some_and(|words| !words.contains("other.mcap")));
+    }
+}
