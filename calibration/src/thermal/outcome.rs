@@ -196,8 +196,8 @@ impl Outcome {
                 self.warnings.push(words);
             }
         }
-        self.warnings.extend(self.kept_terms());
         let any_accepted = self.found.iter().any(|(.., found)| found.refused.is_none());
+        self.warnings.extend(any_accepted.then(|| self.kept_terms()).flatten());
         let report = self.report(verdicts, curves);
         Ok(Fitted { written, report, any_accepted })
     }

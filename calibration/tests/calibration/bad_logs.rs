@@ -139,6 +139,7 @@ fn swapped_columns_are_pointed_out_where_the_attitude_is_stated() {
             change(&mut event);
             event
         });
+        let _ = std::fs::remove_file(&log);
         record_events(Path::new(&log), "FOG-0001", all);
         let stated = ["--latitude", "55.75", "--heading", "30", "--pitch", "0", "--roll", "0", "--json"];
         let (_, said, errors) = words(&calibrate(&[&["validate", &fog(), &log][..], &stated].concat()));

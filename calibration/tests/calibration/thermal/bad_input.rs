@@ -7,7 +7,7 @@ use isotherm_correction::sample::{AccelTick, GyroTick, OutputKind, TemperatureRe
 use isotherm_correction::units::{Span, Timestamp};
 use isotherm_log::offline::unit_id;
 use isotherm_log::text::LogEvent;
-use isotherm_protocol::document::Origin;
+use isotherm_protocol::document::{Curve, Lag, Origin, Shape};
 
 /// A made-up unit: what one second of it reads.
 struct Second {
@@ -142,6 +142,28 @@ fn a_dead_sensor_is_refused_and_the_others_are_fitted() {
     assert!(of("gyro y").words().starts_with("gyro y: refused: it reads zero"), "{}", of("gyro y").words());
     assert!(of("gyro x").accepted && of("gyro z").accepted);
     assert!(made.written.document.gyro.sensor[1].static_bias.is_none());
+}
+
+#[test]
+fn terms_that_are_kept_under_another_filter_are_told() {
+    let zero = || {
+        run(0..5400, |s| {
+            let mut second = usual(s);
+            second.rates[1] = 0.0;
+            second
+        })
+    };
+    let mut base = tried(run(0..5400, usual), Method::Joint).unwrap().written.document;
+    let gain = Curve::new(Shape::Constant { value: 5.0 });
+    base.gyro.sensor[1].lag = vec![Lag { time_constant_s: 300.0, gain }];
+    let old_s = base.temperature.filter.as_ref().unwrap().smoothing_s;
+    let told = |smoothing_s: f64| {
+        let settings = Settings { smoothing_s: Some(smoothing_s), ..Settings::default() };
+        let made = fit(Some(&base), (&[zero()], &[]), &settings, Origin::default(), ()).unwrap();
+        assert!(made.any_accepted && made.written.document.gyro.sensor[1].lag == base.gyro.sensor[1].lag);
+        made.report.warnings.iter().any(|words| words.starts_with("gyro y: refused, with terms from before"))
+    };
+    assert!(told(old_s + 30.0) && !told(old_s));
 }
 
 #[test]
