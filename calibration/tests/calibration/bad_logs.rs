@@ -13,9 +13,9 @@ fn fog() -> String {
 }
 
 /// The beginning of a file, as a recorder leaves it that was killed.
-fn cut(from: &str, to: &str, share: f64) {
+fn cut(from: &str, to: &str, per_mille: usize) {
     let bytes = std::fs::read(from).unwrap();
-    std::fs::write(to, &bytes[..(bytes.len() as f64 * share) as usize]).unwrap();
+    std::fs::write(to, &bytes[..bytes.len() * per_mille / 1000]).unwrap();
 }
 
 #[test]
@@ -77,7 +77,7 @@ fn a_recording_that_is_cut_short_is_told_by_every_command_and_ends_with_3() {
     let path = |name: &str| folder.path().join(name).display().to_string();
     let (whole, log, nothing) = (path("whole.mcap"), path("cut.mcap"), path("nothing.mcap"));
     record(Path::new(&whole), &fibre_optic(5, "FOG-0001", 9000.0));
-    cut(&whole, &log, 0.9);
+    cut(&whole, &log, 900);
     let (fog, page) = (fog(), path("page.html"));
     let commands: [&[&str]; 5] = [
         &["drift", &log, "--html", &page],
@@ -106,11 +106,11 @@ fn a_recording_that_is_cut_short_is_told_by_every_command_and_ends_with_3() {
     };
     record_units(Path::new(&both), &[of(1, "A"), of(2, "B")]);
     let cut_both = path("cut-both.mcap");
-    cut(&both, &cut_both, 0.9);
+    cut(&both, &cut_both, 900);
     let (code, said, errors) = words(&calibrate(&["drift", &cut_both]));
     assert!(code == Some(3) && said.contains("2 units: ") && errors.contains("cut-both.mcap"), "{errors}");
     // Nothing whole is left of it: the refusal says why.
-    cut(&whole, &nothing, 0.002);
+    cut(&whole, &nothing, 2);
     let commands: [&[&str]; 7] = [
         &["thermal", &nothing],
         &["drift", &nothing],
