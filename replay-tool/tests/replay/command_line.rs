@@ -181,10 +181,11 @@ fn the_scenario_of_the_page_runs() {
     let example = page.split("```toml\n").nth(1).unwrap().split("```").next().unwrap();
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("mine.toml"), example).unwrap();
-    let output = replay(folder.path(), &["simulate", "mine.toml", "--duration", "2", "--out", "mine.csv"]);
+    let short = ["simulate", "mine.toml", "--duration", "2", "--out", "mine.csv", "--json"];
+    let output = replay(folder.path(), &short);
     check(&output, 0, "");
-    assert!(stdout(&output).contains("MINE-0001"), "{}", stdout(&output));
-    assert_eq!(fs::read_to_string(folder.path().join("mine.csv")).unwrap().lines().count(), 201);
+    let made: serde_json::Value = serde_json::from_str(&stdout(&output)).unwrap();
+    assert_eq!((made["unit"].as_str(), made["ticks"].as_u64()), (Some("MINE-0001"), Some(200)));
 }
 
 #[test]
