@@ -15,7 +15,7 @@ use isotherm_protocol::document::{Document, Sample};
 use crate::drift::figures::short;
 use crate::error::Error;
 use crate::means::{Means, Size};
-use crate::report::{Curve, FitReport, Rest, Verdict};
+use crate::report::{Curve, FitReport, Rest, SAME_SHARE, Verdict};
 use crate::run::Watch;
 use crate::swapped::{Shown, up};
 use crate::thermal::Stand;
@@ -102,8 +102,8 @@ pub fn validate(
                 verdict.clone().refused("it does not change: the sensor is dead, or its column is wrong");
         } else if verdict.accepted && (after.rms - before.rms).abs() <= before.rms * SAME {
             "the document changes nothing of it".clone_into(&mut verdict.reason);
-        } else if verdict.accepted && short(after.rms) == short(before.rms) {
-            "unchanged".clone_into(&mut verdict.reason);
+        } else if verdict.accepted && (after.rms - before.rms).abs() <= before.rms * SAME_SHARE {
+            "unchanged within 1 %".clone_into(&mut verdict.reason);
         }
     }
     missing(document, &mut report)?;

@@ -137,11 +137,14 @@ impl Verdict {
     }
 }
 
-/// Whether what is left has grown, in the digits that are shown: no sentence says that 2.87 grows to 2.87. The one rule for "made
+/// Share by which a figure may change and still be the same: what noise does to it, and less than its digits tell.
+pub const SAME_SHARE: f64 = 0.01;
+
+/// Whether what is left has grown, by more than [`SAME_SHARE`]: no sentence says that 2.87 grows to 2.87. The one rule for "made
 /// worse", of every figure.
 #[must_use]
 pub fn made_worse(before: f64, after: f64) -> bool {
-    after > before && short(after) != short(before)
+    after > before * (1.0 + SAME_SHARE)
 }
 
 /// All verdicts in one line.
