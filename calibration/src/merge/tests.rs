@@ -29,7 +29,8 @@ fn from<'a>(merged: &'a Merged, key: &str) -> &'a str {
 
 #[test]
 fn what_the_readings_stand_for_is_told_in_words_of_documents() {
-    let counts = named("counts.toml", |document| document.gyro.output = GyroOutput::Counts);
+    let mut counts = named("counts.toml", |_| ());
+    counts.written.document.gyro.output = GyroOutput::Counts;
     let error = same_unit(&named("base.toml", |_| ()), &[counts]).unwrap_err().to_string();
     assert!(error.contains("gyro.output is mean rate in base.toml and counts in counts.toml"), "{error}");
 }
