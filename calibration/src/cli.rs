@@ -8,6 +8,7 @@ mod impact;
 mod merge;
 mod modes;
 mod output;
+mod page;
 mod place;
 mod positions;
 mod rates;

@@ -21,6 +21,9 @@ pub enum Error {
     /// Arguments that do not go together.
     #[error("{0}")]
     Usage(String),
+    /// Everything was done, but logs are cut short: every one of them, where.
+    #[error("finished with data loss:\n{}", .0.join("\n"))]
+    CutShort(Vec<String>),
     /// Standard output that cannot be written.
     #[error("cannot write to standard output: {source}")]
     Stdout {
@@ -36,12 +39,38 @@ impl Error {
         isotherm_log::error::Error::file(path, action, source).into()
     }
 
-    /// The program's exit code: 1 failed or refused, 2 usage, 78 bad mapping or calibration document.
+    /// The same, with the logs that are cut short where that may be why.
+    #[must_use]
+    pub fn beside(self, cuts: &[String]) -> Self {
+        match self {
+            Self::Refused(mut reasons) => {
+                let all = reasons.join("\n");
+                reasons.extend(cuts.iter().filter(|words| !all.contains(*words)).cloned());
+                Self::Refused(reasons)
+            }
+            other => other,
+        }
+    }
+
+    /// How a command ends that did everything: well, or with what was refused, or with data loss.
+    ///
+    /// # Errors
+    /// [`Error::Refused`], [`Error::CutShort`].
+    pub fn end(refused: Vec<String>, cuts: Vec<String>) -> Result<(), Self> {
+        match (refused.is_empty(), cuts.is_empty()) {
+            (true, true) => Ok(()),
+            (true, false) => Err(Self::CutShort(cuts)),
+            (false, _) => Err(Self::Refused(refused).beside(&cuts)),
+        }
+    }
+
+    /// The program's exit code: 1 failed or refused, 2 usage, 3 finished with data loss, 78 bad mapping or calibration document.
     #[must_use]
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Log(error) => error.exit_code(),
             Self::Usage(_) => 2,
+            Self::CutShort(_) => 3,
             _ => 1,
         }
     }

@@ -14,6 +14,7 @@
 //! | [`diff`] | what has changed between two documents |
 //! | [`merge`] | parts of a calibration in one document |
 //! | [`show`] | a document in words and curves |
+//! | [`swapped`] | columns that look swapped |
 //! | [`validate`] | a document judged on other logs |
 //! | [`positions`], [`tumble`] | accelerometers on a stand; a unit tumbled by hand |
 //! | [`modes`] | drift polynomials and switch parameters of a mode-reversed laser gyro |
@@ -40,6 +41,7 @@ pub mod run;
 pub mod series;
 pub mod show;
 pub mod spectrum;
+pub mod swapped;
 pub mod thermal;
 pub mod tumble;
 pub mod validate;

@@ -1,5 +1,6 @@
 //! A run: what one log has of one unit, to be corrected again and again by the service's own code.
 
+pub mod cut;
 mod together;
 
 use std::borrow::Cow;
@@ -13,7 +14,7 @@ use isotherm_log::message::{Message, Topic};
 use isotherm_log::offline::{Loaded, Offline};
 use isotherm_log::part::{LogFiles, Part};
 use isotherm_log::progress::Progress;
-use isotherm_log::source::{Log, LogReport};
+use isotherm_log::source::Log;
 use isotherm_log::text::LogEvent;
 use isotherm_protocol::codec;
 use isotherm_protocol::key::{RawStream, UnitId};
@@ -21,6 +22,7 @@ use isotherm_protocol::raw::{AccelBatch, GyroBatch};
 
 use crate::error::Error;
 use crate::series::Series;
+use cut::Cut;
 
 /// What one log has of one unit.
 #[derive(Debug, Clone)]
@@ -34,6 +36,8 @@ pub struct Run {
     source: Source,
     /// What was given for its files.
     given: Vec<PathBuf>,
+    /// Where it was found to be cut short.
+    cut: Cut,
 }
 
 #[derive(Debug, Clone)]
@@ -72,13 +76,27 @@ impl Run {
     #[must_use]
     pub fn new(name: String, unit: UnitId, files: LogFiles, part: &Part) -> Self {
         let part = Part { units: [unit.clone()].into(), ..part.clone() };
-        Self { name, unit, gyros: None, source: Source::Files { files, part }, given: Vec::new() }
+        Self {
+            name,
+            unit,
+            gyros: None,
+            source: Source::Files { files, part },
+            given: Vec::new(),
+            cut: Cut::default(),
+        }
     }
 
     /// A run that is already in memory.
     #[must_use]
     pub fn of_events(name: String, unit: UnitId, events: Vec<LogEvent>) -> Self {
-        Self { name, unit, gyros: None, source: Source::Events(events.into()), given: Vec::new() }
+        Self {
+            name,
+            unit,
+            gyros: None,
+            source: Source::Events(events.into()),
+            given: Vec::new(),
+            cut: Cut::default(),
+        }
     }
 
     /// The same, where folders were given that have its files.
@@ -131,18 +149,14 @@ impl Run {
     /// [`Error::Log`]; as [`Series::take_message`].
     pub fn series(&self, watch: impl Watch) -> Result<Series, Error> {
         let mut series = Series::empty(self.unit.clone());
-        let report = self.walk(watch, |piece| match piece {
+        self.walk(watch, |piece| match piece {
             Piece::Event(event) => series.take_event(event),
             Piece::Message(message) => series.take_message(message),
         })?;
-        if let Some(LogReport::Recording(report)) = report {
-            series.cut_short = report.cut_short;
-        }
         if series.gyros.is_empty() && series.accels.is_empty() {
-            return Err(Error::Refused(vec![format!(
-                "{} has no raw ticks of unit {}",
-                self.name, self.unit
-            )]));
+            let mut reasons = vec![format!("{} has no raw ticks of unit {}", self.name, self.unit)];
+            reasons.extend(self.cut_short().map(str::to_owned));
+            return Err(Error::Refused(reasons));
         }
         Ok(series)
     }
@@ -175,17 +189,25 @@ impl Run {
         self.judge_troubles(count, unit.troubles())
     }
 
-    /// Goes through everything that it has; what the reading of files is to report comes back.
+    /// That its recording was cut short, and where, once that was found by reading it.
+    #[must_use]
+    pub fn cut_short(&self) -> Option<&str> {
+        self.cut.words()
+    }
+
+    /// The same, for someone who is to know it later.
+    pub fn hand_on(&self, cut: &Cut) {
+        self.cut.hand_on(cut);
+    }
+
+    /// Goes through everything that it has.
     fn walk(
         &self,
         mut watch: impl Watch,
         mut each: impl FnMut(Piece<'_>) -> Result<(), Error>,
-    ) -> Result<Option<LogReport>, Error> {
+    ) -> Result<(), Error> {
         match &self.source {
-            Source::Events(events) => {
-                events.iter().try_for_each(|event| each(Piece::Event(event)))?;
-                Ok(None)
-            }
+            Source::Events(events) => events.iter().try_for_each(|event| each(Piece::Event(event))),
             Source::Files { files, part } => {
                 let mut messages = files.open(part)?;
                 watch.begin(messages.progress());
@@ -194,7 +216,8 @@ impl Run {
                     watch.step();
                 }
                 watch.end();
-                Ok(Some(messages.report()))
+                self.cut.note(&self.name, &messages.report());
+                Ok(())
             }
         }
     }
@@ -214,8 +237,7 @@ impl Run {
                 }
             }
             Ok(())
-        })?;
-        Ok(())
+        })
     }
 
     /// What a correction passed over; a refusal where nothing came out of it.
@@ -228,6 +250,7 @@ impl Run {
             self.name, self.unit
         )];
         reasons.extend(troubles);
+        reasons.extend(self.cut_short().map(str::to_owned));
         Err(Error::Refused(reasons))
     }
 }
@@ -249,11 +272,11 @@ fn events(input: RawStream, frame: &[u8]) -> Option<Vec<LogEvent>> {
     }
 }
 
-/// The units that recordings have raw readings of.
+/// The units that recordings have raw readings of, and where they are cut short.
 ///
 /// # Errors
 /// [`Error::Log`].
-pub fn units_of(log: &mut Log, mut watch: impl Watch) -> Result<Vec<UnitId>, Error> {
+pub fn units_of(log: &mut Log, mut watch: impl Watch) -> Result<(Vec<UnitId>, Cut), Error> {
     let mut units = BTreeSet::new();
     watch.begin(log.progress());
     while let Some(message) = log.next_message()? {
@@ -263,7 +286,9 @@ pub fn units_of(log: &mut Log, mut watch: impl Watch) -> Result<Vec<UnitId>, Err
         watch.step();
     }
     watch.end();
-    Ok(units.into_iter().collect())
+    let cut = Cut::default();
+    cut.note("", &log.report());
+    Ok((units.into_iter().collect(), cut))
 }
 
 /// Whoever watches a long reading.

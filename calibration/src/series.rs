@@ -50,8 +50,6 @@ pub struct Series {
     pub temperatures: BTreeMap<String, Channel>,
     /// Frames that could not be read.
     pub bad_frames: u64,
-    /// Why reading stopped before the end of a recording, if it did.
-    pub cut_short: Option<String>,
 }
 
 impl Series {
@@ -65,7 +63,6 @@ impl Series {
             accels: Ticks::default(),
             temperatures: BTreeMap::new(),
             bad_frames: 0,
-            cut_short: None,
         }
     }
 

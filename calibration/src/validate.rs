@@ -15,8 +15,9 @@ use isotherm_protocol::document::{Document, Sample};
 use crate::drift::figures::short;
 use crate::error::Error;
 use crate::means::{Means, Size};
-use crate::report::{Curve, FitReport, Rest, Verdict};
+use crate::report::{Curve, FitReport, Rest, SAME_SHARE, Verdict};
 use crate::run::Watch;
+use crate::swapped::{Shown, up};
 use crate::thermal::Stand;
 use crate::thermal::checks::judging;
 use crate::written::Written;
@@ -32,7 +33,7 @@ pub struct Wanted {
     pub place: Option<Place>,
 }
 
-/// By how much a figure may grow and still count as the same: rounding of sums.
+/// By how much a figure may change where the document says nothing of it: rounding of sums.
 const SAME: f64 = 1e-9;
 /// Share of the deviation of the most lively axis below which a sensor is dead: what is left comes through the axes.
 const DEAD: f64 = 1e-3;
@@ -78,6 +79,7 @@ pub fn validate(
         let sample = if log.known { Sample::In } else { Sample::Out };
         let curves = Curve::of_means(&run.name, sample, [&nominal, &after], document, &rest);
         report.warnings.extend(doubts(&run.name, &curves, &after));
+        report.warnings.extend(looks_swapped(&run.name, &nominal, (&rest, wanted.place.as_ref())));
         report.residuals.extend(curves);
         report.warnings.extend(after.troubles.iter().map(|words| format!("{}: {words}", run.name)));
         if log.known {
@@ -95,15 +97,13 @@ pub fn validate(
     let limits: Vec<f64> = report.verdicts.iter().map(|verdict| DEAD * liveliest(verdict)).collect();
     for (verdict, limit) in report.verdicts.iter_mut().zip(limits) {
         let [before, after] = verdict.deciding();
-        if after.rms > before.rms && after.rms <= before.rms * (1.0 + SAME) {
-            verdict.accepted = true;
-            verdict.reason.clear();
-        }
         if before.count > 1 && before.deviation <= limit {
             *verdict =
                 verdict.clone().refused("it does not change: the sensor is dead, or its column is wrong");
         } else if verdict.accepted && (after.rms - before.rms).abs() <= before.rms * SAME {
             "the document changes nothing of it".clone_into(&mut verdict.reason);
+        } else if verdict.accepted && (after.rms - before.rms).abs() <= before.rms * SAME_SHARE {
+            "unchanged within 1 %".clone_into(&mut verdict.reason);
         }
     }
     missing(document, &mut report)?;
@@ -140,6 +140,20 @@ fn doubts(name: &str, curves: &[Curve], means: &Means) -> Vec<String> {
         }
     }
     doubts
+}
+
+/// Columns that look swapped, where the attitude is known.
+fn looks_swapped(name: &str, means: &Means, (rest, place): (&Rest, Option<&Place>)) -> Vec<String> {
+    let looks = |(kind, measure): (&str, &str), sizes: [Size; 3], stated: Option<[f64; 3]>| {
+        let deviation = sizes.iter().map(|size| size.deviation).fold(0.0, f64::hypot);
+        Shown { kind, measure, mean: sizes.map(|size| size.mean), stated: stated?, deviation }.swapped()
+    };
+    let force = place.and_then(up).map(|up| up.map(|part| part * STANDARD_GRAVITY_M_PER_S2));
+    let words = [
+        looks(("gyros", "°/h"), [0, 1, 2].map(|axis| Size::of(means.rate(axis))), rest.rate_deg_per_h),
+        looks(("accelerometers", "m/s²"), [0, 1, 2].map(|axis| Size::of(means.force(axis))), force),
+    ];
+    words.into_iter().flatten().map(|words| format!("{name}: {words}")).collect()
 }
 
 /// Why a run cannot judge in which the unit was moved: what is left would be its motion.

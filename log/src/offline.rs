@@ -161,7 +161,18 @@ impl Offline {
             "wrong_output_kind" => {
                 format!("{value} ticks refused: counts where the calibration has means, or the reverse")
             }
-            _ => format!("{value} {name}"),
+            "not_finite_readings" => format!("{value} sensor readings are no numbers"),
+            "overrange_readings" => format!("{value} sensor readings are at or beyond the input range"),
+            "temperature_rejected" => {
+                format!("{value} temperature readings are no numbers, out of range, or spikes")
+            }
+            "temperature_late" => {
+                format!("{value} temperature readings came later than ticks that should have felt them")
+            }
+            "temperature_out_of_order" => {
+                format!("{value} temperature readings are not newer than the one before")
+            }
+            _ => format!("{value} {}", name.replace('_', " ")),
         });
         words.collect()
     }

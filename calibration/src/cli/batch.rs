@@ -13,6 +13,7 @@ use super::runs::Reading;
 use crate::error::Error;
 use crate::report::{BatchTable, UnitReport, in_parallel, of_unit};
 use crate::run::Run;
+use crate::run::cut::Cut;
 use crate::written::{Written, write_file};
 
 /// What a command has to work on of one unit.
@@ -25,6 +26,8 @@ pub(super) struct Work {
     pub(super) judges: Vec<Run>,
     /// What is to be said of the logs.
     pub(super) warnings: Vec<String>,
+    /// Where a log that is not read as runs was found to be cut short.
+    pub(super) cut: Cut,
 }
 
 /// Logs and documents as a command line names them.
@@ -55,6 +58,28 @@ const NOTHING: &str = "the logs have no raw readings of any unit: give recording
     --mapping; a ROS 2 bag holds other messages";
 
 impl Work {
+    /// A unit's work with nothing to be said of its logs yet.
+    pub(super) fn new(base: Option<Written>, runs: Vec<Run>, judges: Vec<Run>) -> Self {
+        Self { base, runs, judges, warnings: Vec::new(), cut: Cut::default() }
+    }
+
+    /// Where its logs are cut short, as far as they have been read.
+    pub(super) fn cuts(&self) -> Vec<String> {
+        let mut cuts: Vec<String> = Vec::new();
+        let runs = self.runs.iter().chain(&self.judges).filter_map(Run::cut_short);
+        for words in runs.chain(self.cut.words()) {
+            if cuts.iter().all(|known| known != words) {
+                cuts.push(words.to_owned());
+            }
+        }
+        cuts
+    }
+
+    /// What is to be said of its logs once they have been read.
+    pub(super) fn told(&self) -> Vec<String> {
+        [self.warnings.clone(), self.cuts()].concat()
+    }
+
     /// The logs of its runs as they were given, each once.
     pub(super) fn logs(&self) -> Vec<PathBuf> {
         let mut logs: Vec<PathBuf> = Vec::new();
@@ -100,28 +125,36 @@ impl<'a> Named<'a> {
                 Some(judges) => self.of_document(judges, &unit)?.0,
                 None => Vec::new(),
             };
-            let mut warnings = Vec::new();
+            let mut work = Work::new(Some(base), runs, judges);
             if !others.is_empty() {
-                warnings.push(format!(
+                work.warnings.push(format!(
                     "the logs have unit {} too, which is left alone: the document is of {unit}. For all of them give --document the \
                      folder that has UNIT.toml of each",
                     others.join(", ")
                 ));
             }
-            return Ok(vec![(unit, Ok(Work { base: Some(base), runs, judges, warnings }))]);
+            return Ok(vec![(unit, Ok(work))]);
         }
         let of_units = self.runs(None)?;
         if of_units.is_empty() {
             return Err(Error::Refused(vec![NOTHING.to_owned()]));
         }
         let mut judging = self.judges(of_units.keys().next())?.unwrap_or_default();
+        let several = of_units.len() > 1;
         let mut work = |unit: &UnitId, runs| {
             let base = folder.map(|folder| of_folder(folder, unit)).transpose()?;
             let judges = judging.remove(unit).unwrap_or_default();
-            if judges.is_empty() && !self.judge.is_empty() {
+            let unjudged = judges.is_empty() && !self.judge.is_empty();
+            if unjudged && !several {
                 return Err(Error::Refused(vec![format!("--judge: the logs have nothing of unit {unit}")]));
             }
-            Ok(Work { base, runs, judges, warnings: Vec::new() })
+            let mut work = Work::new(base, runs, judges);
+            if unjudged {
+                work.warnings.push(format!(
+                    "the logs of --judge have nothing of unit {unit}: it is fitted, and is judged by what it was fitted to only"
+                ));
+            }
+            Ok(work)
         };
         let units = of_units.into_iter().map(|(unit, runs)| {
             let work = work(&unit, runs);
@@ -218,10 +251,12 @@ impl Batch<'_> {
         if units.len() == 1
             && let Some((_, work)) = units.pop()
         {
-            let report = one(&work?, &Names(None), Bar::reading)?;
+            let work = work?;
+            let report =
+                one(&work, &Names(None), Bar::reading).map_err(|error| error.beside(&work.cuts()))?;
             let json = self.output.json;
             print(if json { format!("{}\n", report.to_json()) } else { report.to_text() }.as_bytes())?;
-            return self.end(report.refusals(), Vec::new());
+            return self.end(report.refusals(), Vec::new(), work.cuts());
         }
         units.iter().try_for_each(|(unit, _)| self.output.check_unit(unit.as_str()))?;
         let bar = Bar::counting("units done", units.len());
@@ -231,20 +266,25 @@ impl Batch<'_> {
             |(unit, work)| {
                 let work = work.as_ref().map_err(|error| Error::Refused(vec![error.to_string()]))?;
                 one(work, &Names(Some(unit.as_str())), Bar::hidden)
+                    .map_err(|error| error.beside(&work.cuts()))
             },
         );
         bar.finish();
+        let mut cuts: Vec<String> =
+            units.iter().filter_map(|(_, work)| work.as_ref().ok()).flat_map(Work::cuts).collect();
+        cuts.sort();
+        cuts.dedup();
         let names = units.into_iter().map(|(unit, _)| unit.to_string());
         let (refused, failed) =
             close(self.title, &names.zip(came).collect::<Vec<_>>(), self.output.page(), self.output.json)?;
-        self.end(refused, failed)
+        self.end(refused, failed, cuts)
     }
 
-    /// Ends with what was refused, unless that is no failure, and with the units that came to nothing.
-    fn end(&self, refused: Vec<String>, failed: Vec<String>) -> Result<(), Error> {
+    /// Ends with what was refused, unless that is no failure, with the units that came to nothing, or with what is cut short.
+    fn end(&self, refused: Vec<String>, failed: Vec<String>, cuts: Vec<String>) -> Result<(), Error> {
         let mut reasons = if self.accept_partial { Vec::new() } else { refused };
         reasons.extend(failed);
-        if reasons.is_empty() { Ok(()) } else { Err(Error::Refused(reasons)) }
+        Error::end(reasons, cuts)
     }
 }
 

@@ -3,12 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use isotherm_log::file::refuse_overwriting;
 
+use super::page::PageArgs;
 use super::print;
 use crate::diff::changes;
 use crate::error::Error;
-use crate::written::{Written, write_file};
+use crate::written::Written;
 
 /// Compare two calibration documents, such as those before and after shock or vibration
 #[derive(Debug, Args)]
@@ -27,9 +27,8 @@ pub(super) struct DiffArgs {
     /// Standard error of a direction cosine (″), for a document that states none
     #[arg(long, value_name = "ARCSEC")]
     axis_sigma: Option<f64>,
-    /// Write it with its diagrams as one HTML file
-    #[arg(long, value_name = "FILE")]
-    html: Option<PathBuf>,
+    #[command(flatten)]
+    page: PageArgs,
     /// Print everything as one JSON object
     #[arg(long)]
     json: bool,
@@ -41,9 +40,7 @@ impl DiffArgs {
         if let Some(sigma) = self.axis_sigma.filter(|sigma| !(sigma.is_finite() && *sigma > 0.0)) {
             return Err(Error::Usage(format!("--axis-sigma is {sigma}, must be a number of ″ above 0")));
         }
-        if let Some(html) = &self.html {
-            refuse_overwriting(html, &[&self.before, &self.after])?;
-        }
+        self.page.check(&[&self.before, &self.after])?;
         let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let names = [name(&self.before), name(&self.after)];
         // Of two folders: the folder tells them apart.
@@ -54,9 +51,7 @@ impl DiffArgs {
         };
         let (before, after) = (Written::read(&self.before)?, Written::read(&self.after)?);
         let changes = changes(names, [&before, &after], self.axis_sigma)?;
-        if let Some(html) = &self.html {
-            write_file(html, changes.sheet().to_html().as_bytes(), true)?;
-        }
+        self.page.write(|| changes.sheet().to_html())?;
         let text = if self.json { format!("{}\n", changes.to_json()) } else { changes.sheet().to_text() };
         print(text.as_bytes())
     }

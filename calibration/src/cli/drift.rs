@@ -83,7 +83,7 @@ impl DriftArgs {
     fn units(&self) -> Result<Vec<Unit>, Error> {
         if self.is_corrected() {
             let unit = self.log.reading.serial()?.map_or_else(|| unit_id("UNIT"), Ok)?;
-            let work = Work { base: None, runs: Vec::new(), judges: Vec::new(), warnings: Vec::new() };
+            let work = Work::new(None, Vec::new(), Vec::new());
             return Ok(vec![(unit, Ok(work))]);
         }
         let named = Named::together(&self.log.reading, &self.log.log, self.document.as_ref());
@@ -99,7 +99,7 @@ impl DriftArgs {
         let columns = self.columns(work, names, bar)?;
         let (unit, kind, corrected) = (columns.unit.to_string(), columns.kind, columns.corrected);
         let mut grid = Grid::of(columns)?;
-        grid.notes.extend(work.warnings.iter().cloned());
+        grid.notes.extend(work.told());
         let working = names.at_work("Allan deviations, drift, spectrum");
         let factor = if self.taus == Taus::Decade { 10 } else { 2 };
         let sensors = analyse(&grid, Wanted { factor, fit_h: self.fit_hours });
@@ -123,7 +123,7 @@ impl DriftArgs {
             sensors,
             parameters,
         };
-        self.output.write(|| self.document(work, &report), || page(&report), names)?;
+        self.output.write(|| self.document(work, &report).map(Some), || page(&report), names)?;
         Ok(report)
     }
 
@@ -153,7 +153,7 @@ impl DriftArgs {
         if self.is_corrected() {
             let unit = self.log.reading.serial()?;
             let mut bar = names.at_work("reading");
-            let columns = Columns::of_corrected(&self.log.log, unit.as_ref(), kind, || bar.step());
+            let columns = Columns::of_corrected(&self.log.log, unit.as_ref(), kind, &work.cut, || bar.step());
             bar.finish();
             return columns;
         }

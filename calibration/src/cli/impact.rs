@@ -6,11 +6,12 @@ use clap::{Args, ValueEnum};
 use isotherm_correction::drift::DriftParts;
 use isotherm_correction::units::AngularRate;
 use isotherm_log::diff::is_csv;
-use isotherm_log::file::{read_small_text, refuse_overwriting};
+use isotherm_log::file::read_small_text;
 use isotherm_log::offline::load_calibration;
 use isotherm_protocol::document::Document;
 
 use super::bar::Bar;
+use super::page::PageArgs;
 use super::print;
 use super::runs::{LogArgs, Reading};
 use crate::drift::HOUR_S;
@@ -22,7 +23,7 @@ use crate::impact::monte_carlo::{Voyages, sail_all};
 use crate::impact::report::{Report, Row};
 use crate::impact::scenario::{CARES, Drift, Voyage};
 use crate::run::Watch;
-use crate::written::write_file;
+use crate::run::cut::Cut;
 
 /// Seeds where nobody says.
 const SEEDS: u32 = 50;
@@ -88,9 +89,8 @@ pub(super) struct ImpactArgs {
     /// The velocity log does not keep the level gyros observable
     #[arg(long)]
     no_log_aid: bool,
-    /// Write the report with its diagrams as one HTML file
-    #[arg(long, value_name = "FILE")]
-    html: Option<PathBuf>,
+    #[command(flatten)]
+    page: PageArgs,
     /// Print everything as one JSON object, with the curves
     #[arg(long)]
     json: bool,
@@ -122,8 +122,9 @@ impl ImpactArgs {
     pub(super) fn run(&self) -> Result<(), Error> {
         let mut voyage = self.voyage()?;
         let parts = self.parts()?;
+        let cut = Cut::default();
         let report = if !self.log.is_empty() {
-            self.sail_log(&mut voyage, &parts)?
+            self.sail_log(&mut voyage, &parts, &cut)?
         } else if self.seeds.is_some()
             || (self.trend.is_none() && self.constant.is_none() && self.document.is_some())
         {
@@ -134,14 +135,13 @@ impl ImpactArgs {
             let words = "say which drift: a LOG, --document DOC, --trend DEG_PER_H2 or --constant DEG_PER_H";
             return Err(Error::Usage(words.to_owned()));
         };
-        if let Some(html) = &self.html {
-            write_file(html, report.to_html().as_bytes(), true)?;
-        }
+        self.page.write(|| report.to_html())?;
         if self.json {
-            print(format!("{}\n", report.to_json()).as_bytes())
+            print(format!("{}\n", report.to_json()).as_bytes())?;
         } else {
-            print(report.to_text().as_bytes())
+            print(report.to_text().as_bytes())?;
         }
+        Error::end(Vec::new(), cut.words().map(str::to_owned).into_iter().collect())
     }
 
     /// Checks the numbers.
@@ -162,9 +162,7 @@ impl ImpactArgs {
             }
         }
         let inputs: Vec<&Path> = self.log.iter().chain(&self.document).map(PathBuf::as_path).collect();
-        if let Some(html) = &self.html {
-            refuse_overwriting(html, &inputs)?;
-        }
+        self.page.check(&inputs)?;
         Ok(Voyage {
             latitude_deg: self.latitude,
             turn_ratio: self.turn_ratio,
@@ -276,9 +274,11 @@ impl ImpactArgs {
         Ok(Report { voyage: *voyage, source, seeds: seeds.len(), rows: rows.collect(), notes })
     }
 
-    fn sail_log(&self, voyage: &mut Voyage, parts: &[DriftParts; 3]) -> Result<Report, Error> {
-        let columns = self.columns()?;
-        let (drift, mut notes) = logged::drift(&columns, voyage)?;
+    fn sail_log(&self, voyage: &mut Voyage, parts: &[DriftParts; 3], cut: &Cut) -> Result<Report, Error> {
+        let columns = self.columns(cut)?;
+        let words: Vec<String> = cut.words().map(str::to_owned).into_iter().collect();
+        let (drift, mut notes) = logged::drift(&columns, voyage).map_err(|error| error.beside(&words))?;
+        notes.extend(words);
         if *parts == [sizes(); 3] {
             notes.push(
                 "The estimators expect gyros of the size of tables 1 and 2 of 002: no document states what the drift of these is."
@@ -302,13 +302,13 @@ impl ImpactArgs {
         Ok(Report { voyage: *voyage, source, seeds: 0, rows, notes })
     }
 
-    fn columns(&self) -> Result<Columns, Error> {
+    fn columns(&self, cut: &Cut) -> Result<Columns, Error> {
         let args = LogArgs { log: self.log.clone(), reading: self.reading.clone() };
         let unit = self.reading.serial()?;
         let raw = self.reading.mapping.is_some();
         if !raw && (self.log.iter().all(|path| is_csv(path)) || self.document.is_none()) {
             let mut bar = Bar::at_work("reading");
-            let columns = Columns::of_corrected(&self.log, unit.as_ref(), Kind::Rate, || bar.step());
+            let columns = Columns::of_corrected(&self.log, unit.as_ref(), Kind::Rate, cut, || bar.step());
             bar.finish();
             return columns;
         }
@@ -316,7 +316,10 @@ impl ImpactArgs {
             return Err(Error::Usage("a raw log needs --document, to be corrected with".to_owned()));
         };
         let loaded = load_calibration(document)?;
-        Columns::corrected_by(&args.run(Some(&loaded.unit))?, &loaded, Kind::Rate, Bar::reading())
+        let run = args.run(Some(&loaded.unit))?;
+        let columns = Columns::corrected_by(&run, &loaded, Kind::Rate, Bar::reading());
+        run.hand_on(cut);
+        columns
     }
 }
 

@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use isotherm_log::file::refuse_overwriting;
 
-use super::output::{date, keep};
+use super::output::date;
+use super::page::writable;
 use super::print;
 use crate::error::Error;
 use crate::merge::{Merged, Named, Take, merge};
@@ -46,8 +46,7 @@ impl MergeArgs {
     /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
         let inputs: Vec<&Path> = self.part.iter().chain([&self.base]).map(PathBuf::as_path).collect();
-        refuse_overwriting(&self.out, &inputs)?;
-        keep(&self.out, self.overwrite)?;
+        writable(&self.out, &inputs, self.overwrite)?;
         let base = named(&self.base)?;
         let parts = self.part.iter().map(|path| named(path)).collect::<Result<Vec<_>, _>>()?;
         let mut merged: Merged = merge(&base, &parts, &self.take)?;

@@ -3,12 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use isotherm_log::file::refuse_overwriting;
 use isotherm_protocol::document::{Created, Document};
 use serde_json::json;
 use toml::Table;
 
 use super::batch::{Names, Work};
+use super::page::{keep, writable};
 use crate::error::Error;
 use crate::provenance::{command_line, origin};
 use crate::report::{FitReport, Sigmas, of_unit, residuals};
@@ -63,9 +63,12 @@ pub(crate) struct About {
 impl OutputArgs {
     /// Checks before anything is read; `inputs` may not be overwritten.
     pub(crate) fn check(&self, inputs: &[&Path]) -> Result<(), Error> {
-        for out in self.out.iter().chain(&self.html) {
-            refuse_overwriting(out, inputs)?;
-            keep(out, self.overwrite)?;
+        if let Some(out) = &self.out {
+            let page = self.html.as_deref();
+            writable(out, &inputs.iter().copied().chain(page).collect::<Vec<_>>(), self.overwrite)?;
+        }
+        if let Some(html) = &self.html {
+            writable(html, inputs, self.overwrite)?;
         }
         self.date().map(|_| ())
     }
@@ -76,15 +79,17 @@ impl OutputArgs {
         outputs.try_for_each(|out| keep(&of_unit(out, unit), self.overwrite))
     }
 
-    /// Writes document and page of a unit, each under the name that it has for it.
+    /// Writes document and page of a unit, each under the name that it has for it; no document where there is nothing new to say.
     pub(super) fn write(
         &self,
-        document: impl FnOnce() -> Result<Written, Error>,
+        document: impl FnOnce() -> Result<Option<Written>, Error>,
         page: impl FnOnce() -> String,
         names: &Names<'_>,
     ) -> Result<(), Error> {
-        if let Some(out) = &self.out {
-            document()?.save(&names.of(out), self.overwrite)?;
+        if let Some(out) = &self.out
+            && let Some(document) = document()?
+        {
+            document.save(&names.of(out), self.overwrite)?;
         }
         if let Some(html) = &self.html {
             write_file(&names.of(html), page().as_bytes(), self.overwrite)?;
@@ -95,14 +100,24 @@ impl OutputArgs {
     /// Writes what a fit came to; its report is left.
     pub(super) fn keep(&self, fitted: Fitted, work: &Work, names: &Names<'_>) -> Result<FitReport, Error> {
         let Fitted { written, mut report, about } = fitted;
-        report.warnings.extend(work.warnings.iter().cloned());
-        self.write(|| self.document(written.document, &about, &report), || report.to_html(), names)?;
+        report.warnings.extend(work.told());
+        self.write(
+            || self.document(written.document, &about, &report).map(Some),
+            || report.to_html(),
+            names,
+        )?;
         Ok(report)
     }
 
     /// The page of a batch's table, and whether it may replace another.
     pub(super) fn page(&self) -> (Option<&Path>, bool) {
         (self.html.as_deref(), self.overwrite)
+    }
+
+    /// What is said where every sensor is refused; nothing where no document was wanted.
+    pub(super) fn nothing_new(&self, names: &Names<'_>) -> Option<String> {
+        let out = names.of(self.out.as_ref()?);
+        Some(format!("every sensor is refused: nothing is written to {}", out.display()))
     }
 
     /// Whether a document is to be written.
@@ -143,17 +158,6 @@ impl OutputArgs {
     pub(super) fn date(&self) -> Result<Option<Created>, Error> {
         self.created.as_deref().map(date).transpose()
     }
-}
-
-/// Leaves a file alone that is there, unless it may be written over.
-pub(super) fn keep(out: &Path, overwrite: bool) -> Result<(), Error> {
-    if out.exists() && !overwrite {
-        return Err(Error::Usage(format!(
-            "{} is there already: give another name, or --overwrite",
-            out.display()
-        )));
-    }
-    Ok(())
 }
 
 /// The date that a document is to state.

@@ -126,7 +126,12 @@ impl Reading {
             Some(unit) => drop(of_units.insert(unit, files.clone())),
             None => {
                 for file in files {
-                    for unit in units_of(&mut Log::recordings(std::slice::from_ref(file))?, Bar::reading())? {
+                    let mut log = Log::recordings(std::slice::from_ref(file))?;
+                    let (units, cut) = units_of(&mut log, Bar::reading())?;
+                    if let (true, Some(cut)) = (units.is_empty(), cut.words()) {
+                        return Err(Error::Refused(vec![format!("no raw readings can be read: {cut}")]));
+                    }
+                    for unit in units {
                         of_units.entry(unit).or_default().push(file.clone());
                     }
                 }
@@ -147,7 +152,14 @@ impl Reading {
             return Ok(Mapping::load(mapping)?);
         }
         for path in logs {
-            std::fs::metadata(path).map_err(|source| Error::file(path, "open the log", source))?;
+            let about =
+                std::fs::metadata(path).map_err(|source| Error::file(path, "open the log", source))?;
+            if about.is_file() && about.len() == 0 {
+                return Err(Error::Refused(vec![format!(
+                    "{} is empty, it has 0 bytes: was it recorded, and copied to its end?",
+                    path.display()
+                )]));
+            }
         }
         let folder = logs.iter().find(|path| path.is_dir());
         Err(Error::Usage(match folder {

@@ -3,12 +3,12 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use isotherm_log::file::refuse_overwriting;
 
+use super::page::PageArgs;
 use super::print;
 use crate::error::Error;
 use crate::show::show;
-use crate::written::{Written, write_file};
+use crate::written::Written;
 
 /// Show a calibration document in words, as tables and as curves
 #[derive(Debug, Args)]
@@ -19,9 +19,8 @@ pub(super) struct ShowArgs {
     /// The document (TOML)
     #[arg(value_name = "DOC")]
     document: PathBuf,
-    /// Write it with its curves as one HTML file
-    #[arg(long, value_name = "FILE")]
-    html: Option<PathBuf>,
+    #[command(flatten)]
+    page: PageArgs,
     /// Print document and curves as one JSON object
     #[arg(long)]
     json: bool,
@@ -30,15 +29,11 @@ pub(super) struct ShowArgs {
 impl ShowArgs {
     /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
-        if let Some(html) = &self.html {
-            refuse_overwriting(html, &[&self.document])?;
-        }
+        self.page.check(&[&self.document])?;
         let written = Written::read(&self.document)?;
         let name = self.document.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let shown = show(&name, &written)?;
-        if let Some(html) = &self.html {
-            write_file(html, shown.sheet.to_html().as_bytes(), true)?;
-        }
+        self.page.write(|| shown.sheet.to_html())?;
         let text = if self.json { format!("{}\n", shown.to_json()) } else { shown.sheet.to_text() };
         print(text.as_bytes())
     }

@@ -4,19 +4,19 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use isotherm_log::file::refuse_overwriting;
 use isotherm_protocol::key::UnitId;
 
 use super::bar::Bar;
 use super::batch::{Outcome, close};
+use super::page::PageArgs;
 use super::place::PlaceArgs;
 use super::print;
 use super::runs::Reading;
 use crate::error::Error;
-use crate::report::{FitReport, in_parallel, of_unit};
-use crate::run::Watch;
+use crate::report::{FitReport, in_parallel};
+use crate::run::{Run, Watch};
 use crate::validate::{JudgedLog, Wanted, validate};
-use crate::written::{Written, write_file};
+use crate::written::Written;
 
 /// Judge a calibration document on logs that it was not made from
 #[derive(Debug, Args)]
@@ -41,9 +41,8 @@ pub(super) struct ValidateArgs {
     window: f64,
     #[command(flatten)]
     place: PlaceArgs,
-    /// Write the report with its diagrams as one HTML file
-    #[arg(long, value_name = "FILE")]
-    html: Option<PathBuf>,
+    #[command(flatten)]
+    page: PageArgs,
     /// Print everything as one JSON object
     #[arg(long)]
     json: bool,
@@ -64,28 +63,31 @@ impl ValidateArgs {
     /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
         let wanted = self.wanted()?;
+        let mut inputs: Vec<&Path> = self.log.iter().map(PathBuf::as_path).collect();
+        inputs.push(&self.document);
+        self.page.check(&inputs)?;
         let (documents, folder) = self.documents()?;
         let fallback =
             if folder { None } else { documents.values().next().map(|(_, d)| d.loaded.unit.clone()) };
-        if let Some(html) = &self.html {
-            let mut inputs: Vec<&Path> = self.log.iter().map(PathBuf::as_path).collect();
-            inputs.push(&self.document);
-            refuse_overwriting(html, &inputs)?;
-        }
         let work = self.work(documents, folder, fallback.as_ref())?;
         let reports = if let [only] = work.as_slice() {
-            vec![judged(only, wanted, Bar::reading())]
+            vec![only.judged(wanted, Bar::reading())]
         } else {
+            work.iter().try_for_each(|work| self.page.check_unit(work.unit.as_str()))?;
             let bar = Bar::counting("units judged", work.len());
-            let reports = in_parallel(&work, |ready| bar.at(ready), |work| judged(work, wanted, ()));
+            let reports = in_parallel(&work, |ready| bar.at(ready), |work| work.judged(wanted, ()));
             bar.finish();
             reports
         };
         if reports.len() > 1 {
             let names = work.iter().map(|work| work.unit.to_string());
-            return self.several(&names.zip(reports).collect::<Vec<_>>());
+            let (mut reasons, failed) = self.several(&names.zip(reports).collect::<Vec<_>>())?;
+            reasons.extend(failed);
+            return Error::end(reasons, cuts(&work));
         }
-        self.one(&reports.into_iter().next().unwrap_or_else(|| Err(nothing()))?)
+        let report = reports.into_iter().next().unwrap_or_else(|| Err(nothing()))?;
+        self.one(&report)?;
+        Error::end(report.refusals(), cuts(&work))
     }
 
     fn wanted(&self) -> Result<Wanted, Error> {
@@ -167,40 +169,42 @@ impl ValidateArgs {
     }
 
     fn one(&self, report: &FitReport) -> Result<(), Error> {
-        if let Some(html) = &self.html {
-            write_file(html, report.to_html().as_bytes(), true)?;
-        }
+        self.page.write(|| report.to_html())?;
         let text = if self.json { format!("{}\n", report.to_json()) } else { report.to_text() };
-        print(text.as_bytes())?;
-        end(report.refusals())
+        print(text.as_bytes())
     }
 
-    fn several(&self, reports: &[Outcome<FitReport>]) -> Result<(), Error> {
-        if let Some(html) = &self.html {
-            for (unit, report) in reports.iter().filter_map(|(unit, came)| Some((unit, came.as_ref().ok()?)))
-            {
-                write_file(&of_unit(html, unit), report.to_html().as_bytes(), true)?;
-            }
+    fn several(&self, reports: &[Outcome<FitReport>]) -> Result<(Vec<String>, Vec<String>), Error> {
+        for (unit, report) in reports.iter().filter_map(|(unit, came)| Some((unit, came.as_ref().ok()?))) {
+            self.page.write_unit(unit, || report.to_html())?;
         }
-        let (mut reasons, failed) =
-            close("Judgement of several units", reports, (self.html.as_deref(), true), self.json)?;
-        reasons.extend(failed);
-        end(reasons)
+        close("Judgement of several units", reports, self.page.table(), self.json)
     }
 }
 
-fn judged(work: &Work, wanted: Wanted, watch: impl Watch) -> Result<FitReport, Error> {
-    match &work.written {
-        Some(written) => validate(&work.name, written, &work.logs, wanted, watch),
-        None => Err(Error::Refused(vec![format!(
-            "no document of the folder is for unit {}: put one there, or leave the unit out with --unit",
-            work.unit
-        )])),
+impl Work {
+    fn judged(&self, wanted: Wanted, watch: impl Watch) -> Result<FitReport, Error> {
+        let Some(written) = &self.written else {
+            return Err(Error::Refused(vec![format!(
+                "no document of the folder is for unit {}: put one there, or leave the unit out with --unit",
+                self.unit
+            )]));
+        };
+        let judged = validate(&self.name, written, &self.logs, wanted, watch);
+        let cuts = cuts(std::slice::from_ref(self));
+        let mut report = judged.map_err(|error| error.beside(&cuts))?;
+        report.warnings.extend(cuts);
+        Ok(report)
     }
 }
 
-fn end(refusals: Vec<String>) -> Result<(), Error> {
-    if refusals.is_empty() { Ok(()) } else { Err(Error::Refused(refusals)) }
+/// Where logs are cut short, each once.
+fn cuts(work: &[Work]) -> Vec<String> {
+    let runs = work.iter().flat_map(|work| &work.logs).map(|log| &log.run);
+    let mut cuts: Vec<String> = runs.filter_map(Run::cut_short).map(str::to_owned).collect();
+    cuts.sort();
+    cuts.dedup();
+    cuts
 }
 
 fn nothing() -> Error {

@@ -47,7 +47,9 @@ impl Report {
             Some(Coefficient::NotObservable { below }) => format!("< {} {unit}", short(below * factor)),
             None => "–".to_owned(),
         };
-        let part = markov(sensor.markov.as_ref().map(|(fit, _)| fit));
+        // A correlation time beyond the log's length is not in it.
+        let part = markov(sensor.markov.as_ref().map(|(fit, _)| fit))
+            .filter(|(_, time)| time.value <= self.length_h);
         let slope = match trend(sensor) {
             Trend::Seen { slope, .. } => Some(slope),
             Trend::NotSeen { .. } => None,

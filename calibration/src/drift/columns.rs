@@ -9,6 +9,7 @@ use isotherm_protocol::key::UnitId;
 
 use super::DEG_PER_H_IN_RAD_PER_S;
 use crate::error::Error;
+use crate::run::cut::Cut;
 use crate::run::{Run, Watch};
 use crate::series::{Series, Ticks};
 
@@ -129,7 +130,7 @@ impl Columns {
         columns.finish()
     }
 
-    /// From a log of corrected ticks, as `isotherm-replay correct` writes it.
+    /// From a log of corrected ticks, as `isotherm-replay correct` writes it; `cut` learns where it is cut short.
     ///
     /// # Errors
     /// [`Error::Refused`] where it has none, or of several units; [`Error::Log`].
@@ -137,6 +138,7 @@ impl Columns {
         paths: &[PathBuf],
         unit: Option<&UnitId>,
         kind: Kind,
+        cut: &Cut,
         mut progress: impl FnMut(),
     ) -> Result<Self, Error> {
         let unnamed = isotherm_log::offline::unit_id("UNIT")?;
@@ -155,11 +157,15 @@ impl Columns {
                 ticks.ticks.iter().for_each(|tick| columns.push(&tick.tick));
                 progress();
             }
+            log.cut_short().iter().for_each(|words| cut.recording(words));
         }
-        match columns {
-            Some(columns) => columns.finish(),
-            None => Err(nothing("corrected ticks", "isotherm-replay correct makes them of a raw log")),
-        }
+        columns.map_or_else(
+            || {
+                let none = nothing("corrected ticks", "isotherm-replay correct makes them of a raw log");
+                Err(none.beside(cut.words().map(str::to_owned).as_slice()))
+            },
+            Self::finish,
+        )
     }
 
     fn empty(unit: UnitId, kind: Kind) -> Self {
@@ -235,7 +241,8 @@ enum Scale {
 }
 
 /// x, y, z for three sensors, numbers from 1 for more.
-fn name(index: usize, of: usize) -> String {
+#[must_use]
+pub fn name(index: usize, of: usize) -> String {
     match AXES.get(index).filter(|_| of == AXES.len()) {
         Some(axis) => (*axis).to_owned(),
         None => (index + 1).to_string(),

@@ -57,6 +57,13 @@ impl Report {
                 None => "too short for noise coefficients".to_owned(),
             };
             match markov(analysis.markov.as_ref().map(|(fit, _)| fit)) {
+                Some((_, time)) if time.value > self.length_h => {
+                    let _ = write!(
+                        words,
+                        ", a drift slower than this log of {} h can tell",
+                        short(self.length_h)
+                    );
+                }
                 Some((sigma, time)) => {
                     let _ = write!(
                         words,

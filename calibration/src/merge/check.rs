@@ -2,6 +2,8 @@
 
 use std::collections::BTreeSet;
 
+use isotherm_protocol::document::{AccelOutput, GyroOutput};
+
 use super::sections::is_about;
 use super::{Named, Take};
 use crate::error::Error;
@@ -13,9 +15,9 @@ pub(super) fn same_unit(base: &Named, parts: &[Named]) -> Result<(), Error> {
         let gyros: Vec<String> = document.gyro.sensor.iter().map(|sensor| sensor.name.clone()).collect();
         let accels = document.accel.as_ref().map(|accel| {
             let names = accel.sensor.iter().map(|sensor| sensor.name.clone()).collect::<Vec<_>>();
-            (names, format!("{:?}", accel.output))
+            (names, accel_words(accel.output))
         });
-        (document.unit.clone(), gyros, format!("{:?}", document.gyro.output), accels)
+        (document.unit.clone(), gyros, gyro_words(document.gyro.output), accels)
     };
     let (unit, gyros, output, accels) = shape(base);
     let mut reasons = Vec::new();
@@ -46,6 +48,25 @@ pub(super) fn same_unit(base: &Named, parts: &[Named]) -> Result<(), Error> {
         }
     }
     if reasons.is_empty() { Ok(()) } else { Err(Error::Refused(reasons)) }
+}
+
+/// What a gyro's readings stand for.
+fn gyro_words(output: GyroOutput) -> String {
+    match output {
+        GyroOutput::Counts => "counts",
+        GyroOutput::Mean => "mean rate",
+    }
+    .to_owned()
+}
+
+/// What an accelerometer's readings stand for.
+fn accel_words(output: AccelOutput) -> String {
+    match output {
+        AccelOutput::Counts => "counts",
+        AccelOutput::Volts => "volts (V)",
+        AccelOutput::MetresPerSecondSquared => "specific force (m/s²)",
+    }
+    .to_owned()
 }
 
 fn differing(key: &str, here: &str, base: &str, there: &str, part: &str) -> String {

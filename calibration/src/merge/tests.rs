@@ -1,4 +1,4 @@
-use isotherm_protocol::document::{Branches, Curve, Lag, Shape};
+use isotherm_protocol::document::{Branches, Curve, GyroOutput, Lag, Shape};
 
 use super::*;
 use crate::report::Sigmas;
@@ -25,6 +25,14 @@ fn bias(value: f64) -> impl FnOnce(&mut Document) {
 
 fn from<'a>(merged: &'a Merged, key: &str) -> &'a str {
     merged.taken.iter().find(|(taken, _)| taken == key).map_or("", |(_, from)| from)
+}
+
+#[test]
+fn what_the_readings_stand_for_is_told_in_words_of_documents() {
+    let mut counts = named("counts.toml", |_| ());
+    counts.written.document.gyro.output = GyroOutput::Counts;
+    let error = same_unit(&named("base.toml", |_| ()), &[counts]).unwrap_err().to_string();
+    assert!(error.contains("gyro.output is mean rate in base.toml and counts in counts.toml"), "{error}");
 }
 
 #[test]

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use isotherm_log::offline::Loaded;
 use isotherm_protocol::document::{Document, Sample};
 
-use super::verdict::{Figure, Verdict};
+use super::verdict::{Figure, Verdict, made_worse};
 use crate::error::Error;
 use crate::means::{Means, Size};
 use crate::run::{Run, Troubles, Watch};
@@ -120,7 +120,7 @@ impl Curve {
     }
 
     /// One verdict for each sensor of some curves, in the order of their first appearance, over all runs in and out of
-    /// sample together. Accepted where the rms of the deciding sample has not grown.
+    /// sample together. Accepted where the rms of the deciding sample is not [`made_worse`].
     #[must_use]
     pub fn verdicts(curves: &[Self]) -> Vec<Verdict> {
         let mut names: Vec<&Self> = Vec::new();
@@ -141,7 +141,7 @@ impl Curve {
             let outside = sizes(&named.of, Sample::Out);
             let verdict = Verdict::new(&named.of, &named.measure, inside).out_of_sample(outside);
             let [before, after] = verdict.deciding();
-            if after.rms <= before.rms {
+            if !made_worse(before.rms, after.rms) {
                 return verdict;
             }
             let grown = format!(

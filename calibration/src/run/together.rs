@@ -35,8 +35,7 @@ impl Run {
                 Piece::Event(_) | Piece::Message(_) => {}
             }
             Ok(())
-        })?;
-        Ok(())
+        })
     }
 
     /// Corrects the run with several calibrations of the same channels and sensors at once. `each` sees every raw gyro

@@ -7,7 +7,11 @@ use isotherm_protocol::document::Document;
 use super::samples::Samples;
 use super::solve::median;
 use super::stand::Stand;
+use crate::drift::columns::name as sensor_name;
+use crate::means::Size;
+use crate::report::Rest;
 use crate::series::{Series, Ticks};
+use crate::swapped::Shown;
 
 /// Mean rate of a gyro at rest beyond which it does not rest, or its unit is wrong (°/s): Earth's rate and the bias of a poor
 /// micromechanical gyro stay below.
@@ -53,7 +57,8 @@ pub fn raw(name: &str, series: &Series, stand: &Stand) -> Findings {
             continue;
         }
         for (index, readings) in ticks.readings.iter().enumerate() {
-            sensor(&mut found, name, (gyro, kind, index), readings);
+            let of = format!("{kind} {}", sensor_name(index, ticks.readings.len()));
+            sensor(&mut found, name, (gyro, &of, index), readings);
         }
         gaps(&mut found, name, kind, ticks);
     }
@@ -65,11 +70,6 @@ pub fn raw(name: &str, series: &Series, stand: &Stand) -> Findings {
     }
     if series.gyros.output == Some(OutputKind::Mean) && stand.turning.is_none() {
         rates(&mut found, name, &series.gyros);
-    }
-    if let Some(words) = &series.cut_short {
-        found.warnings.push(format!(
-            "the recording is cut short, and is taken to where it is whole: {words}; isotherm-replay recover may save more"
-        ));
     }
     if series.bad_frames > 0 {
         found.warnings.push(format!(
@@ -89,19 +89,19 @@ pub fn judging(name: &str, series: &Series, stand: &Stand) -> Vec<String> {
     let Findings { mut refusals, warnings, dead } = raw(name, series, stand);
     refusals.extend(warnings);
     refusals.extend(dead.into_iter().map(|(gyro, index, why)| {
-        let kind = if gyro { "gyro" } else { "accelerometer" };
-        format!("{name}: {kind} {index}: {why}")
+        let (kind, ticks) = if gyro { ("gyro", &series.gyros) } else { ("accelerometer", &series.accels) };
+        format!("{name}: {kind} {}: {why}", sensor_name(index, ticks.readings.len()))
     }));
     refusals
 }
 
 #[expect(clippy::cast_precision_loss, reason = "readings of a log are far below 2⁵³")]
-fn sensor(found: &mut Findings, name: &str, (gyro, kind, index): (bool, &str, usize), readings: &[f64]) {
+fn sensor(found: &mut Findings, name: &str, (gyro, of, index): (bool, &str, usize), readings: &[f64]) {
     let bad = readings.iter().filter(|reading| !reading.is_finite()).count();
     let share = bad as f64 / readings.len().max(1) as f64;
     if share > 0.5 {
         let why = format!(
-            "{name}: {kind} {index}: {:.0} % of its readings are no numbers: check the sensor, and the column in the mapping",
+            "{name}: {of}: {:.0} % of its readings are no numbers: check the sensor, and the column in the mapping",
             100.0 * share
         );
         found.refusals.push(why);
@@ -109,7 +109,7 @@ fn sensor(found: &mut Findings, name: &str, (gyro, kind, index): (bool, &str, us
     }
     if bad > 0 {
         found.warnings.push(format!(
-            "{name}: {kind} {index}: {bad} readings are no numbers ({:.3} %); the windows with them are left out",
+            "{name}: {of}: {bad} readings are no numbers ({:.3} %); the windows with them are left out",
             100.0 * share
         ));
     }
@@ -158,8 +158,9 @@ fn rates(found: &mut Findings, name: &str, ticks: &Ticks) {
         let Some(usual) = median(&mut sizes) else { continue };
         if usual > FASTEST_DEG_PER_S {
             found.refusals.push(format!(
-                "{name}: gyro {index} reads {usual:.1} °/s in the median, at most {FASTEST_DEG_PER_S} °/s is rest: does the unit move, \
+                "{name}: gyro {} reads {usual:.1} °/s in the median, at most {FASTEST_DEG_PER_S} °/s is rest: does the unit move, \
                  are columns swapped, or is the unit of measure in the mapping wrong ({:.3} as °/s, {:.3} as °/h)?",
+                sensor_name(index, ticks.readings.len()),
                 usual.to_radians(),
                 usual.to_radians() / 3600.0
             ));
@@ -210,9 +211,10 @@ pub fn turning(samples: &Samples, document: &Document, stand: &Stand) -> Option<
         if 2 * away.len() > shown.len() {
             let mut good: Vec<f64> = shown.iter().copied().filter(|shown| shown.is_finite()).collect();
             return Some(format!(
-                "{}: gyro {index} shows {:.3} °/s in the median, {:.3} °/s are stated along it: is --rate or --axis that of another log, \
+                "{}: gyro {} shows {:.3} °/s in the median, {:.3} °/s are stated along it: is --rate or --axis that of another log, \
                  or its sign the other one?",
                 samples.name,
+                sensor_name(index, samples.gyros.len()),
                 median(&mut good).unwrap_or(f64::NAN) / 3600.0,
                 along / 3600.0
             ));
@@ -228,6 +230,32 @@ pub fn turning(samples: &Samples, document: &Document, stand: &Stand) -> Option<
         time(first) - 0.5 * samples.window_s,
         time(last) + 0.5 * samples.window_s
     ))
+}
+
+/// Columns that look swapped in a run at rest in a known attitude.
+#[must_use]
+pub fn swapped(samples: &Samples, document: &Document, (rest, stand): (&Rest, &Stand)) -> Vec<String> {
+    let along = |rows: &[[f64; 3]], vector: [f64; 3]| -> Option<[f64; 3]> {
+        let along = |row: &[f64; 3]| row.iter().zip(vector).map(|(r, v)| r * v).sum();
+        <[f64; 3]>::try_from(rows.iter().map(along).collect::<Vec<f64>>()).ok()
+    };
+    let looks = |(kind, measure): (&str, &str), columns: &[Vec<f64>], stated: Option<[f64; 3]>| {
+        let sizes: Vec<Size> = columns.iter().map(|values| Size::of(values)).collect();
+        let mean = <[f64; 3]>::try_from(sizes.iter().map(|size| size.mean).collect::<Vec<f64>>()).ok()?;
+        let deviation = sizes.iter().map(|size| size.deviation).fold(0.0, f64::hypot);
+        Shown { kind, measure, mean, stated: stated?, deviation }.swapped()
+    };
+    if stand.turning.is_some() {
+        return Vec::new();
+    }
+    let rate = rest.rate_deg_per_h.and_then(|rate| along(&document.gyro.orientation.rows, rate));
+    let accel = document.accel.as_ref();
+    let force = rest.force_m_per_s2.zip(accel).and_then(|(force, a)| along(&a.orientation.rows, force));
+    let words = [
+        looks(("gyros", "°/h"), &samples.gyros, rate),
+        looks(("accelerometers", "m/s²"), &samples.forces, force),
+    ];
+    words.into_iter().flatten().map(|words| format!("{}: {words}", samples.name)).collect()
 }
 
 /// Looks at a run that went through the corrector: the accelerometers must feel about one g.

@@ -29,6 +29,8 @@ pub struct Fitted {
     pub written: Written,
     /// The report.
     pub report: FitReport,
+    /// Whether any sensor has new terms; without one the document says nothing new.
+    pub any_accepted: bool,
 }
 
 /// One sensor on its way.
@@ -99,6 +101,7 @@ pub fn fit(
         if found.refusals.is_empty() {
             let of_rest = rest(run, &base, stand, &mut watch)?;
             found.refusals.extend(checks::turning(&of_run, &plain, stand));
+            found.warnings.extend(checks::swapped(&of_run, &plain, (&of_rest, stand)));
             rests.push(of_rest);
         }
         refusals.extend(found.refusals);
@@ -181,7 +184,7 @@ fn find(
     settings: &Settings,
 ) -> Result<Found, Error> {
     if let Some(why) = &sensor.dead {
-        return Ok(Found::refused(why));
+        return Ok(Found { dead: true, ..Found::refused(why) });
     }
     let history = &known.history;
     if settings.method == Method::Sequential {

@@ -9,6 +9,7 @@ use super::checks::SMALLEST_RANGE_DEG_C;
 use super::columns::{Basis, Columns};
 use super::fit::Sensor;
 use super::samples::Samples;
+use crate::drift::figures::short;
 use crate::error::Error;
 
 /// What chambers for instruments hardly reach (°C).
@@ -63,6 +64,7 @@ pub(super) fn histories(
             continue;
         }
         let channel = channel(bare, name)?;
+        let plain = channel.conversion_deg_c == [0.0, 1.0];
         let basis =
             Basis { channel, filter: filter.clone(), reference_deg_c: 0.0, range_deg_c: [-300.0, 1000.0] };
         let (temperature, _) = Columns::new(basis, samples).temperature()?;
@@ -76,10 +78,7 @@ pub(super) fn histories(
         let history = History::of(&parts);
         let [low, high] = history.range_deg_c;
         if high.is_nan() || high - low < SMALLEST_RANGE_DEG_C {
-            refusals.push(format!(
-                "temperature channel {name:?} stays between {low:.1} and {high:.1} °C: a fit over temperature needs at least \
-                 {SMALLEST_RANGE_DEG_C} °C, better the whole range of use; run the chamber through it"
-            ));
+            refusals.push(stays(name, [low, high], plain));
         }
         if high > HOTTEST_DEG_C || low < COLDEST_DEG_C {
             warnings.push(format!(
@@ -91,6 +90,25 @@ pub(super) fn histories(
         known.insert(name.clone(), Known { history, temperature });
     }
     if refusals.is_empty() { Ok(known) } else { Err(Error::Refused(refusals)) }
+}
+
+/// That a channel hardly moves; `plain` where its readings are taken as °C just as they are.
+fn stays(name: &str, [low, high]: [f64; 2], plain: bool) -> String {
+    let needed = format!(
+        "a fit over temperature needs at least {SMALLEST_RANGE_DEG_C} °C, better the whole range of use"
+    );
+    if !plain {
+        return format!(
+            "temperature channel {name:?} stays between {low:.1} and {high:.1} °C: {needed}; run the chamber through it"
+        );
+    }
+    format!(
+        "temperature channel {name:?} stays between {} and {}, which are taken as °C, because nothing converts them: {needed}. Where the \
+         channel is not in °C, as with volts or counts of a thermometer, give a document with its conversion (--document); where it is no \
+         thermometer, name the right column in the mapping; else run the chamber",
+        short(low),
+        short(high)
+    )
 }
 
 /// What a channel's history leaves to be wished for.

@@ -36,6 +36,8 @@ pub(super) struct Found {
     pub(super) remarks: Vec<String>,
     /// Whether a drift with time was estimated beside the terms, which is no part of the document.
     pub(super) drifts: bool,
+    /// Whether the sensor does not work at all.
+    pub(super) dead: bool,
 }
 
 impl Found {
@@ -77,6 +79,7 @@ impl Found {
             refused: None,
             remarks,
             drifts: spec.trend,
+            dead: false,
         }
     }
 }
@@ -193,8 +196,10 @@ impl Outcome {
                 self.warnings.push(words);
             }
         }
+        let any_accepted = self.found.iter().any(|(.., found)| found.refused.is_none());
+        self.warnings.extend(any_accepted.then(|| self.kept_terms()).flatten());
         let report = self.report(verdicts, curves);
-        Ok(Fitted { written, report })
+        Ok(Fitted { written, report, any_accepted })
     }
 
     /// The document without the fitted terms, with the filter of the fit.
@@ -273,6 +278,40 @@ impl Outcome {
         worse
     }
 
+    /// That a refused sensor keeps terms which were made with another filter: a document has one for all its sensors.
+    fn kept_terms(&self) -> Option<String> {
+        let old = self.base.temperature.filter.as_ref()?;
+        let lengths = |filter: &Filter| [filter.smoothing_s, filter.derivative_step_s];
+        if lengths(old).iter().zip(lengths(&self.filter)).all(|(a, b)| (a - b).abs() <= 1e-9 * b) {
+            return None;
+        }
+        let follows = |sensor: &Sensor| {
+            if sensor.gyro {
+                let gyro = self.base.gyro.sensor.get(sensor.index);
+                gyro.is_some_and(|gyro| {
+                    gyro.thermal_rate.is_some() || gyro.thermal_acceleration.is_some() || !gyro.lag.is_empty()
+                })
+            } else {
+                let accel = self.base.accel.as_ref().and_then(|accel| accel.sensor.get(sensor.index));
+                accel.is_some_and(|accel| !accel.lag.is_empty())
+            }
+        };
+        let refused = self.found.iter().filter(|(.., found)| found.refused.is_some());
+        let names: Vec<&str> =
+            refused.filter(|(sensor, ..)| follows(sensor)).map(|(sensor, ..)| sensor.name.as_str()).collect();
+        (!names.is_empty()).then(|| {
+            format!(
+                "{}: refused, with terms from before that follow the change of temperature; they were made with a smoothing of {} s and a                  derivative step of {} s, and the document now has {} s and {} s for all sensors: what they take off is another thing.                  --smoothing {} keeps the old filter",
+                names.join(", "),
+                old.smoothing_s,
+                old.derivative_step_s,
+                self.filter.smoothing_s,
+                self.filter.derivative_step_s,
+                old.smoothing_s
+            )
+        })
+    }
+
     /// Gives the verdicts their reasons.
     fn say(&self, verdicts: &mut [Verdict]) {
         for verdict in verdicts {
@@ -281,6 +320,10 @@ impl Outcome {
             let Some((_, _, found)) = mine else { continue };
             if let Some(why) = &found.refused {
                 *verdict = verdict.clone().refused(why.clone());
+                if found.dead {
+                    // What comes out along its axis is not its own.
+                    (verdict.in_sample, verdict.out_of_sample) = ([Size::default(); 2], None);
+                }
             } else {
                 verdict.accepted = true;
                 *verdict = verdict.clone().remark(found.words.clone());

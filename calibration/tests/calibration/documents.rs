@@ -26,7 +26,7 @@ fn every_document_that_is_shipped_can_be_shown() {
         }
         let path = path.display().to_string();
         count += 1;
-        let output = calibrate(&["show", &path, "--html", &html]);
+        let output = calibrate(&["show", &path, "--html", &html, "--overwrite"]);
         assert!(output.status.success(), "{path}: {}", String::from_utf8_lossy(&output.stderr));
         let text = String::from_utf8(output.stdout).unwrap();
         let page = std::fs::read_to_string(&html).unwrap();

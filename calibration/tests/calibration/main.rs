@@ -8,6 +8,7 @@
 //! | `modes_rates` | `modes` and `rates` as their users run them |
 //! | `drift`, `impact`, `logged` | noise and drift, what they mean for navigation, and logs in every form |
 //! | `agreement` | what reports state is what `isotherm-replay correct` gives with the written document, command by command |
+//! | `bad_logs` | files that may not be written, logs that are cut short, empty, swapped or not judged |
 //! | `two_units` | a recording of two units through every command that reads logs |
 //! | `validate`, `documents` | documents judged, shown, compared and merged |
 //! | `skewed_six` | units of six sensors through all of them |
@@ -25,6 +26,7 @@
 #![expect(clippy::float_cmp, reason = "a document states what was printed")]
 
 mod agreement;
+mod bad_logs;
 mod command;
 mod documents;
 mod drift;

@@ -11,6 +11,9 @@ use isotherm_log::text::LogEvent;
 use isotherm_protocol::raw::Batcher;
 use isotherm_simulator::{Scenario, Simulation};
 
+/// Chunks so short that a recording which is cut loses its end only.
+const OPTIONS: RecordingOptions = RecordingOptions { compress: true, chunk_bytes: 20_000, overwrite: false };
+
 /// The fibre-optic unit through the beginning of the judging profile, one tick a second.
 pub(crate) fn fibre_optic(seed: u64, unit: &str, seconds: f64) -> Scenario {
     let profile = isotherm_simulator::presets::judging_profile();
@@ -42,7 +45,7 @@ pub(crate) fn record_events<E: Borrow<LogEvent>>(
     unit: &str,
     events: impl IntoIterator<Item = E>,
 ) {
-    let mut writer = RecordingWriter::create(path, RecordingOptions::default()).unwrap();
+    let mut writer = RecordingWriter::create(path, OPTIONS).unwrap();
     messages(unit, events, |message| writer.write(&message).unwrap());
     writer.finish().unwrap();
 }
@@ -54,7 +57,7 @@ pub(crate) fn record_units(path: &Path, units: &[(&str, Vec<LogEvent>)]) {
         messages(unit, events, |message| all.push(message));
     }
     all.sort_by_key(|message| message.received_ns);
-    let mut writer = RecordingWriter::create(path, RecordingOptions::default()).unwrap();
+    let mut writer = RecordingWriter::create(path, OPTIONS).unwrap();
     for message in &all {
         writer.write(message).unwrap();
     }

@@ -19,9 +19,11 @@ use isotherm_log::file::{read_small_text, refuse_overwriting};
 /// Simulate a log, with the mapping that reads it back beside it
 #[derive(Debug, Args)]
 #[command(
-    group = ArgGroup::new("what").required(true).args(["scenario", "preset", "list_presets"]),
+    group = ArgGroup::new("what").required(true).args(["scenario", "preset", "list_presets", "print_preset"]),
     after_help = "Example:\n  isotherm-replay simulate --preset zeeman-sine --duration 60 --out zeeman.csv --truth truth.csv\n\n\
-        Writes zeeman.csv and zeeman.mapping.toml; a name that ends in .gz is compressed."
+        Writes zeeman.csv and zeeman.mapping.toml; a name that ends in .gz is compressed.\n\n\
+        A scenario of one's own begins with a ready-made one:\n  \
+        isotherm-replay simulate --print-preset mems-chamber > mine.toml"
 )]
 pub(super) struct SimulateArgs {
     /// Scenario (TOML)
@@ -33,8 +35,11 @@ pub(super) struct SimulateArgs {
     /// List the ready-made scenarios
     #[arg(long)]
     list_presets: bool,
+    /// Print a ready-made scenario as TOML, with --seed and --duration in it
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["out", "truth", "json"])]
+    print_preset: Option<String>,
     /// Where the log goes
-    #[arg(long, short, value_name = "FILE", required_unless_present = "list_presets")]
+    #[arg(long, short, value_name = "FILE", required_unless_present_any = ["list_presets", "print_preset"])]
     out: Option<PathBuf>,
     /// Where the truth goes: true increments, temperatures and drifts
     #[arg(long, value_name = "FILE")]
@@ -106,7 +111,7 @@ struct Report {
 impl SimulateArgs {
     /// The scenario that the arguments name.
     fn scenario(&self) -> Result<Scenario, Error> {
-        let mut scenario = match (&self.scenario, &self.preset) {
+        let mut scenario = match (&self.scenario, self.preset.as_ref().or(self.print_preset.as_ref())) {
             (Some(path), _) => load(path)?,
             (None, Some(name)) => {
                 let preset = PRESETS.iter().find(|preset| preset.name == name).ok_or_else(|| {
@@ -149,6 +154,12 @@ pub(super) fn run(args: &SimulateArgs) -> Result<Outcome, Error> {
         let rows: Vec<_> =
             PRESETS.iter().map(|preset| format!("{:21} {}\n", preset.name, preset.about)).collect();
         print(rows.concat().as_bytes())?;
+        return Ok(Outcome::Complete);
+    }
+    if args.print_preset.is_some() {
+        let text =
+            toml::to_string(&args.scenario()?).map_err(|error| Error::Scenario(vec![error.to_string()]))?;
+        print(text.as_bytes())?;
         return Ok(Outcome::Complete);
     }
     let Some(out) = &args.out else { return Err(Error::Usage("give --out".into())) };

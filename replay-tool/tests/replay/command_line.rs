@@ -163,7 +163,29 @@ fn completions_and_presets_go_to_standard_output() {
         let output =
             replay(folder.path(), &["simulate", "--preset", name, "--duration", "1", "--out", "x.csv.gz"]);
         check(&output, 0, "");
+        // What is printed is the same scenario.
+        let bytes = fs::read(folder.path().join("x.csv.gz")).unwrap();
+        let printed = replay(folder.path(), &["simulate", "--print-preset", name, "--duration", "1"]);
+        fs::write(folder.path().join("mine.toml"), stdout(&printed)).unwrap();
+        check(&replay(folder.path(), &["simulate", "mine.toml", "--out", "x.csv.gz"]), 0, "");
+        assert_eq!(fs::read(folder.path().join("x.csv.gz")).unwrap(), bytes, "{name}");
     }
+    let output = replay(folder.path(), &["simulate", "--print-preset", "none"]);
+    check(&output, 2, "there is no preset \"none\"");
+}
+
+/// The example of the page on scenarios.
+#[test]
+fn the_scenario_of_the_page_runs() {
+    let page = include_str!("../../../docs/scenario.md");
+    let example = page.split("```toml\n").nth(1).unwrap().split("```").next().unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("mine.toml"), example).unwrap();
+    let short = ["simulate", "mine.toml", "--duration", "2", "--out", "mine.csv", "--json"];
+    let output = replay(folder.path(), &short);
+    check(&output, 0, "");
+    let made: serde_json::Value = serde_json::from_str(&stdout(&output)).unwrap();
+    assert_eq!((made["unit"].as_str(), made["ticks"].as_u64()), (Some("MINE-0001"), Some(200)));
 }
 
 #[test]

@@ -7,7 +7,7 @@ use isotherm_correction::sample::{AccelTick, GyroTick, OutputKind, TemperatureRe
 use isotherm_correction::units::{Span, Timestamp};
 use isotherm_log::offline::unit_id;
 use isotherm_log::text::LogEvent;
-use isotherm_protocol::document::Origin;
+use isotherm_protocol::document::{Curve, Lag, Origin, Shape};
 
 /// A made-up unit: what one second of it reads.
 struct Second {
@@ -94,6 +94,11 @@ fn constant_temperature_is_refused() {
         run(0..3000, |s| Second { deg_c: 20.0 + 1e-3 * f64::from(s % 7), ..usual(s) }),
         &["5 °C", "run the chamber"],
     );
+    // Volts of a thermometer, which nothing converts.
+    refused(
+        run(0..5400, |s| Second { deg_c: 1.5 + 0.01 * usual(s).deg_c, ..usual(s) }),
+        &["stays between 1.40 and 1.90, which are taken as °C", "volts", "--document", "right column"],
+    );
 }
 
 #[test]
@@ -104,7 +109,7 @@ fn swapped_columns_are_refused() {
         std::mem::swap(&mut rates[2], &mut forces[2]);
         Second { rates, forces, deg_c }
     });
-    refused(swapped, &["gyro 2", "columns swapped"]);
+    refused(swapped, &["gyro z", "columns swapped"]);
     let noise = run(0..3000, |s| Second { deg_c: 30.0 * f64::from((s * 7919) % 97) / 97.0, ..usual(s) });
     refused(noise, &["no temperature", "columns swapped"]);
 }
@@ -133,8 +138,32 @@ fn a_dead_sensor_is_refused_and_the_others_are_fitted() {
         "{:?}",
         of("gyro y")
     );
+    // No figures of what comes through the other axes.
+    assert!(of("gyro y").words().starts_with("gyro y: refused: it reads zero"), "{}", of("gyro y").words());
     assert!(of("gyro x").accepted && of("gyro z").accepted);
     assert!(made.written.document.gyro.sensor[1].static_bias.is_none());
+}
+
+#[test]
+fn terms_that_are_kept_under_another_filter_are_told() {
+    let zero = || {
+        run(0..5400, |s| {
+            let mut second = usual(s);
+            second.rates[1] = 0.0;
+            second
+        })
+    };
+    let mut base = tried(run(0..5400, usual), Method::Joint).unwrap().written.document;
+    let gain = Curve::new(Shape::Constant { value: 5.0 });
+    base.gyro.sensor[1].lag = vec![Lag { time_constant_s: 300.0, gain }];
+    let old_s = base.temperature.filter.as_ref().unwrap().smoothing_s;
+    let told = |smoothing_s: f64| {
+        let settings = Settings { smoothing_s: Some(smoothing_s), ..Settings::default() };
+        let made = fit(Some(&base), (&[zero()], &[]), &settings, Origin::default(), ()).unwrap();
+        assert!(made.any_accepted && made.written.document.gyro.sensor[1].lag == base.gyro.sensor[1].lag);
+        made.report.warnings.iter().any(|words| words.starts_with("gyro y: refused, with terms from before"))
+    };
+    assert!(told(old_s + 30.0) && !told(old_s));
 }
 
 #[test]
@@ -210,6 +239,7 @@ fn one_direction_and_too_few_plateaus_are_told() {
             .all(|gyro| gyro.lag.is_empty() && gyro.thermal_rate.is_none())
     );
     let made = tried(upwards(), Method::Sequential).unwrap();
+    assert!(!made.any_accepted);
     assert!(
         made.report.verdicts.iter().all(|verdict| !verdict.accepted && verdict.reason.contains("both ways"))
     );

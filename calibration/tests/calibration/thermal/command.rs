@@ -105,6 +105,27 @@ fn folders_recordings_and_several_units() {
     // A recording that a kill cut short is taken to where it is whole.
     let bytes = std::fs::read(at.join("whole.mcap")).unwrap();
     std::fs::write(at.join("cut.mcap"), &bytes[..bytes.len() * 9 / 10]).unwrap();
-    let (words, _) = said(at, &["cut.mcap"]);
+    let (words, code) = said(at, &["cut.mcap"]);
     assert!(words.contains("cut short") && words.contains("isotherm-replay recover"), "{words}");
+    assert!(code == Some(3) && words.contains("finished with data loss"), "{words}");
+
+    // A run that goes one way only: every sensor is refused, with --accept-partial too, and no document says so.
+    std::fs::write(at.join("b.toml"), read("of-file.toml").replace("\"UNIT\"", "\"B\"")).unwrap();
+    let mut one_way =
+        vec!["other.mcap", "--duration", "2800", "--method", "sequential", "--document", "b.toml"];
+    one_way.extend(["--accept-partial", "--out", "none.toml", "--html", "none.html"]);
+    let (words, code) = said(at, &one_way);
+    assert!(
+        code == Some(0) && words.contains("every sensor is refused: nothing is written to none.toml"),
+        "{words}"
+    );
+    assert!(!at.join("none.toml").exists() && at.join("none.html").exists());
+
+    // Of several units one is not judged: it is fitted, and that is said.
+    let (words, _) = said(
+        at,
+        &["whole.mcap", "other.mcap", "--duration", "5000", "--judge", "other.mcap", "--judge-start", "5000"],
+    );
+    assert!(words.contains("the logs of --judge have nothing of unit A: it is fitted"), "{words}");
+    assert!(words.contains("2 units: ") && !words.contains("came to nothing"), "{words}");
 }

@@ -1,0 +1,115 @@
+//! Columns that look swapped: at rest, in a stated attitude, gravity and the Earth's rate tell the axes.
+
+use isotherm_correction::earth::{Place, Tilt};
+
+use crate::drift::figures::short;
+
+/// Orders of three axes: the swaps of two first, which need the fewest mistakes.
+const ORDERS: [[usize; 3]; 5] = [[1, 0, 2], [2, 1, 0], [0, 2, 1], [1, 2, 0], [2, 0, 1]];
+/// How far from what is stated the means must be, as a share of it: 20° of gravity.
+const AWAY: f64 = 0.35;
+/// And in standard deviations of the means themselves, which a bias that moves has.
+const AWAY_DEVIATIONS: f64 = 5.0;
+/// What another order may leave of that.
+const LEFT: f64 = 0.25;
+
+/// What three sensors show in the mean beside what they must.
+#[derive(Debug, Clone, Copy)]
+pub struct Shown<'a> {
+    /// Of what kind they are, as in "gyros".
+    pub kind: &'a str,
+    /// Symbol of the unit of measure.
+    pub measure: &'a str,
+    /// Means of the sensors.
+    pub mean: [f64; 3],
+    /// What each would show without error, in the stated attitude.
+    pub stated: [f64; 3],
+    /// How far the means move over the run.
+    pub deviation: f64,
+}
+
+impl Shown<'_> {
+    /// Which axes look swapped, in words: another order fits by far better than that of the log; `None` where none does.
+    #[must_use]
+    pub fn swapped(&self) -> Option<String> {
+        let off = |order: [usize; 3]| {
+            let square = |axis: usize| {
+                let off = self.mean[order[axis]] - self.stated[axis];
+                off * off
+            };
+            (square(0) + square(1) + square(2)).sqrt()
+        };
+        let as_logged = off([0, 1, 2]);
+        let size = self.stated.iter().map(|part| part * part).sum::<f64>().sqrt();
+        // False for NaN too.
+        let is_away = as_logged > AWAY * size && as_logged > AWAY_DEVIATIONS * self.deviation;
+        if !is_away {
+            return None;
+        }
+        let fits = |order: &[usize; 3]| off(*order) < LEFT * as_logged;
+        let best = ORDERS.into_iter().filter(fits).reduce(|best, order| {
+            if off(order) < 0.5 * off(best) && off(best) > 0.05 * size { order } else { best }
+        })?;
+        let named: Vec<&str> = ["x", "y", "z"]
+            .into_iter()
+            .enumerate()
+            .filter(|(axis, _)| best[*axis] != *axis)
+            .map(|(_, n)| n)
+            .collect();
+        let list = |v: [f64; 3]| v.map(short).join(", ");
+        Some(format!(
+            "{} {} look swapped: their means are {} {}, in the stated attitude they would be {}; check the columns in the mapping, and the \
+             attitude",
+            self.kind,
+            named.join(" and "),
+            list(self.mean),
+            self.measure,
+            list(self.stated)
+        ))
+    }
+}
+
+/// Direction of the specific force at rest in case axes, a unit vector, where pitch and roll were stated.
+#[must_use]
+pub fn up(place: &Place) -> Option<[f64; 3]> {
+    let Tilt::Given { pitch_rad, roll_rad } = place.tilt() else { return None };
+    // At the pole the Earth turns about the vertical: where that axis is in the case, there gravity is.
+    let tilt_deg = [pitch_rad.to_degrees(), roll_rad.to_degrees()];
+    let rate = Place::new(90.0, 0.0, Some(tilt_deg)).ok()?.earth_rate_in_case(None)?;
+    let size = rate.iter().map(|part| part * part).sum::<f64>().sqrt();
+    Some(rate.map(|part| part / size))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn words(kind: &str, mean: [f64; 3], stated: [f64; 3], deviation: f64) -> String {
+        Shown { kind, measure: "m/s²", mean, stated, deviation }.swapped().unwrap_or_default()
+    }
+
+    #[test]
+    fn another_order_that_fits_is_named() {
+        let level = [0.1, -0.2, -9.8];
+        let swap = words("accelerometers", [-9.79, -0.2, 0.1], level, 0.01);
+        assert!(
+            swap.starts_with("accelerometers x and z look swapped: ") && swap.contains("mapping"),
+            "{swap}"
+        );
+        let earth = [7.3, -4.2, -12.4];
+        assert!(
+            words("gyros", [-12.6, 7.1, -4.3], earth, 0.3).starts_with("gyros x and y and z look swapped")
+        );
+        assert!(words("gyros", [-4.0, 7.5, -12.0], earth, 0.3).starts_with("gyros x and y look swapped"));
+    }
+
+    #[test]
+    fn biases_and_motion_of_the_means_are_no_swap() {
+        let (level, earth) = ([0.1, -0.2, -9.8], [7.3, -4.2, -12.4]);
+        assert_eq!(words("accelerometers", [0.3, 0.1, -9.7], level, 0.01), "");
+        // A bias of many times the Earth's rate, and one that moves as much as it.
+        assert_eq!(words("gyros", [190.0, -80.0, 30.0], earth, 1.0), "");
+        assert_eq!(words("gyros", [-12.6, -4.0, 7.1], earth, 10.0), "");
+        assert_eq!(words("gyros", [f64::NAN, -4.0, 7.1], earth, 0.1), "");
+    }
+}

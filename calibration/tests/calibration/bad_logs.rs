@@ -1,0 +1,178 @@
+//! What a user does wrong, or a recorder: files that may not be written, logs that are cut short, empty, swapped, or too short.
+
+use std::path::Path;
+
+use isotherm_log::text::LogEvent;
+use serde_json::Value;
+
+use crate::command::{calibrate, fails, shipped, succeeds, words};
+use crate::simulated_logs::{events, fibre_optic, record, record_events, record_units};
+
+fn fog() -> String {
+    shipped("FOG-0001.toml").display().to_string()
+}
+
+/// The beginning of a file, as a recorder leaves it that was killed.
+fn cut(from: &str, to: &str, per_mille: usize) {
+    let bytes = std::fs::read(from).unwrap();
+    std::fs::write(to, &bytes[..bytes.len() * per_mille / 1000]).unwrap();
+}
+
+#[test]
+fn nothing_is_replaced_without_overwrite() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let (notes, log) = (path("notes.txt"), path("log.mcap"));
+    record(Path::new(&log), &fibre_optic(5, "FOG-0001", 900.0));
+    std::fs::write(&notes, "mine").unwrap();
+    let (fog, mems) = (fog(), shipped("MEMS-0001.toml").display().to_string());
+    let commands: [&[&str]; 4] = [
+        &["impact", "--trend", "0.00008", "--hours", "1"],
+        &["show", &fog],
+        &["diff", &mems, &mems],
+        &["validate", &fog, &log],
+    ];
+    for command in commands {
+        let html = |more: &[&'static str]| [command, &["--html", &notes], more].concat();
+        let refused = fails(&html(&[]), 2);
+        assert!(
+            refused.contains("notes.txt is there already") && refused.contains("--overwrite"),
+            "{refused}"
+        );
+        assert_eq!(std::fs::read_to_string(&notes).unwrap(), "mine", "{command:?}");
+        calibrate(&html(&["--overwrite"]));
+        assert!(std::fs::read_to_string(&notes).unwrap().contains("<html"), "{command:?}");
+        std::fs::write(&notes, "mine").unwrap();
+    }
+}
+
+#[test]
+fn outputs_are_checked_before_anything_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    // None of these logs and documents is there: that would be told next.
+    let (log, document) = (path("none.mcap"), path("none.toml"));
+    let (out, page) = (path("made/x.toml"), path("made/x.html"));
+    let commands: [&[&str]; 7] = [
+        &["thermal", &log, "--out", &out],
+        &["drift", &log, "--html", &page],
+        &["tumble", &log, "--out", &out],
+        &["validate", &document, &log, "--html", &page],
+        &["show", &document, "--html", &page],
+        &["impact", &log, "--html", &page],
+        &["merge", &document, &document, "--out", &out],
+    ];
+    for command in commands {
+        let refused = fails(command, 2);
+        assert!(refused.contains(&format!("make the folder first: mkdir -p {}", path("made"))), "{refused}");
+    }
+    let both = path("both");
+    let refused = fails(&["thermal", &log, "--out", &both, "--html", &both], 2);
+    assert!(refused.contains("would be written over"), "{refused}");
+}
+
+#[test]
+fn a_recording_that_is_cut_short_is_told_by_every_command_and_ends_with_3() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let (whole, log, nothing) = (path("whole.mcap"), path("cut.mcap"), path("nothing.mcap"));
+    record(Path::new(&whole), &fibre_optic(5, "FOG-0001", 9000.0));
+    cut(&whole, &log, 900);
+    let (fog, page) = (fog(), path("page.html"));
+    let commands: [&[&str]; 5] = [
+        &["drift", &log, "--html", &page],
+        &["drift", &log, "--document", &fog, "--json"],
+        &["validate", &fog, &log],
+        &["validate", &fog, &log, "--json"],
+        &["impact", &log, "--document", &fog, "--calibration-hours", "0.5", "--hours", "0.5"],
+    ];
+    for command in commands {
+        let (code, said, errors) = words(&calibrate(command));
+        assert!(code == Some(3) && errors.contains("finished with data loss:"), "{command:?}: {errors}");
+        assert!(
+            said.contains("cut short") && said.contains("isotherm-replay recover"),
+            "{command:?}: {said}"
+        );
+    }
+    assert!(std::fs::read_to_string(&page).unwrap().contains("cut short"));
+    // A batch, of which one log is cut.
+    let other = path("other.mcap");
+    record(Path::new(&other), &fibre_optic(6, "FOG-0002", 3000.0));
+    let (code, said, errors) = words(&calibrate(&["drift", &log, "--json"]));
+    assert!(code == Some(3) && serde_json::from_str::<Value>(&said).is_ok(), "{errors}");
+    let both = path("both.mcap");
+    let of = |seed, unit: &'static str| {
+        (unit, events(&fibre_optic(seed, unit, 3000.0)).collect::<Vec<LogEvent>>())
+    };
+    record_units(Path::new(&both), &[of(1, "A"), of(2, "B")]);
+    let cut_both = path("cut-both.mcap");
+    cut(&both, &cut_both, 900);
+    let (code, said, errors) = words(&calibrate(&["drift", &cut_both]));
+    assert!(code == Some(3) && said.contains("2 units: ") && errors.contains("cut-both.mcap"), "{errors}");
+    // Nothing whole is left of it: the refusal says why.
+    cut(&whole, &nothing, 2);
+    let commands: [&[&str]; 7] = [
+        &["thermal", &nothing],
+        &["drift", &nothing],
+        &["modes", &nothing, "--document", &fog, "--remove-mean"],
+        &["positions", &nothing],
+        &["tumble", &nothing],
+        &["rates", &nothing, "--axis", "z", "--rates", "1,-1", "--remove-mean"],
+        &["drift", &nothing, "--unit", "FOG-0001"],
+    ];
+    for command in commands {
+        let refused = fails(command, 1);
+        assert!(refused.contains("cut short") && refused.contains("nothing.mcap"), "{command:?}: {refused}");
+    }
+    std::fs::write(&nothing, "").unwrap();
+    let refused = fails(&["drift", &nothing], 1);
+    assert!(refused.contains("nothing.mcap is empty, it has 0 bytes"), "{refused}");
+}
+
+#[test]
+fn swapped_columns_are_pointed_out_where_the_attitude_is_stated() {
+    let folder = tempfile::tempdir().unwrap();
+    let log = folder.path().join("swapped.mcap").display().to_string();
+    let warnings = |change: &dyn Fn(&mut LogEvent)| {
+        let scenario = fibre_optic(5, "FOG-0001", 900.0);
+        let all = events(&scenario).map(|mut event| {
+            change(&mut event);
+            event
+        });
+        let _ = std::fs::remove_file(&log);
+        record_events(Path::new(&log), "FOG-0001", all);
+        let stated = ["--latitude", "55.75", "--heading", "30", "--pitch", "0", "--roll", "0", "--json"];
+        let (_, said, errors) = words(&calibrate(&[&["validate", &fog(), &log][..], &stated].concat()));
+        let report: Value = serde_json::from_str(&said).unwrap_or_default();
+        format!("{}{errors}", report["warnings"])
+    };
+    let sound = warnings(&|_| ());
+    assert!(!sound.contains("look swapped"), "{sound}");
+    let gyros = warnings(&|event| {
+        if let LogEvent::Gyro { tick, .. } = event {
+            tick.readings.swap(0, 2);
+        }
+    });
+    assert!(gyros.contains("swapped.mcap: gyros x and z look swapped"), "{gyros}");
+    let accelerometers = warnings(&|event| {
+        if let LogEvent::Accel { tick, .. } = event {
+            tick.readings.swap(1, 2);
+        }
+    });
+    assert!(accelerometers.contains("accelerometers y and z look swapped"), "{accelerometers}");
+}
+
+#[test]
+fn a_log_that_is_too_short_for_a_drift_says_so_in_its_first_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let log = folder.path().join("ramp.mcap").display().to_string();
+    // Heating for a quarter of an hour: what moves is temperature.
+    let mut scenario = isotherm_simulator::presets::mems_chamber(5);
+    scenario.chamber = isotherm_simulator::chamber::Profile::constant(20.0).ramp(60.0, 3.0);
+    (scenario.tick_ns, scenario.duration_s) = (100_000_000, 800.0);
+    record(Path::new(&log), &scenario);
+    let said = succeeds(&["drift", &log]);
+    let first = said.lines().next().unwrap();
+    assert!(first.contains("a drift slower than this log of 0.222 h can tell"), "{first}");
+    assert!(!first.contains("drift σ"), "{first}");
+}
