@@ -92,11 +92,19 @@ impl OutputArgs {
         Ok(())
     }
 
-    /// Writes what a fit came to; its report is left.
+    /// Writes what a fit came to; its report is left. Where everything is refused there is no new document.
     pub(super) fn keep(&self, fitted: Fitted, work: &Work, names: &Names<'_>) -> Result<FitReport, Error> {
         let Fitted { written, mut report, about } = fitted;
         report.warnings.extend(work.warnings.iter().cloned());
-        self.write(|| self.document(written.document, &about, &report), || report.to_html(), names)?;
+        if report.verdicts.is_empty() || report.verdicts.iter().any(|verdict| verdict.accepted) {
+            self.write(|| self.document(written.document, &about, &report), || report.to_html(), names)?;
+            return Ok(report);
+        }
+        if let Some(out) = &self.out {
+            let out = names.of(out);
+            report.warnings.push(format!("all is refused: {} is not written, the old document stays", out.display()));
+        }
+        Self { out: None, ..self.clone() }.write(|| Ok(written), || report.to_html(), names)?;
         Ok(report)
     }
 

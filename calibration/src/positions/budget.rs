@@ -3,7 +3,7 @@
 use isotherm_log::plot::page::Table;
 use serde_json::{Value, json};
 
-use super::fit::{Weights, fit, guesses};
+use super::fit::{Weights, guesses, planned};
 use super::model::{Degrees, Taken};
 use super::plan::Plan;
 use crate::drift::figures::{short, table};
@@ -112,7 +112,7 @@ impl Budget {
         let guess = guesses(plan, &taken, 3).ok()?;
         let positioning = self.positioning_arcsec.hypot(self.run_out_arcsec) / ARCSEC_PER_RAD;
         let weights = Weights { intensity: vec![self.noise; 3], positioning_rad: positioning, levelling_rad };
-        let found = fit(plan, &taken, &guess, &weights, Degrees { sensor: 0, axes: 0 }).ok()?;
+        let found = planned(plan, &taken, &guess, &weights, Degrees { sensor: 0, axes: 0 }).ok()?;
         let covariance = found.axes_covariance(plan, 0);
         let sigma: Vec<f64> = covariance.diagonal().iter().map(|v| v.sqrt() * ARCSEC_PER_RAD).collect();
         let mean = (sigma.iter().map(|s| s * s).sum::<f64>() / sigma.len() as f64).sqrt();

@@ -74,6 +74,35 @@ impl Verdict {
         }
     }
 
+    /// Of the values before and after, in and out of sample: refused where what is left in the deciding sample has grown by more
+    /// than noise. This is how all commands judge.
+    #[must_use]
+    pub fn of_values(
+        of: impl Into<String>,
+        measure: impl Into<String>,
+        inside: [Vec<f64>; 2],
+        outside: Option<[Vec<f64>; 2]>,
+    ) -> Self {
+        let sizes = |values: &[Vec<f64>; 2]| values.each_ref().map(|values| Size::of(values));
+        let verdict = Self::new(of, measure, sizes(&inside)).out_of_sample(outside.as_ref().map(sizes));
+        let [before, after] = outside.unwrap_or(inside);
+        verdict.unless_worse(&before, &after)
+    }
+
+    /// Refused where these values have grown by more than noise.
+    fn unless_worse(self, before: &[f64], after: &[f64]) -> Self {
+        let figure = |values: &[f64]| short(Size::of(values).rms);
+        match worse(before, after) {
+            Worse::No => self,
+            Worse::ByNoise => self.remark("its rms grows by no more than noise"),
+            Worse::Yes => {
+                let grown =
+                    format!("rms grows from {} to {} {}", figure(before), figure(after), self.measure);
+                self.refused(grown)
+            }
+        }
+    }
+
     /// With sizes out of sample.
     #[must_use]
     pub fn out_of_sample(mut self, sizes: Option<[Size; 2]>) -> Self {
@@ -137,12 +166,46 @@ impl Verdict {
     }
 }
 
+/// Standard errors by which what is left must follow the change to count as made worse by it.
+const SEEN: f64 = 3.0;
+
+/// Whether a change made something worse.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Worse {
+    No,
+    ByNoise,
+    Yes,
+}
+
+/// Whether a change made something worse: what is left grows, and follows the change itself.
+///
+/// Were the change right, what is left after it would be noise, and its part along the change no larger than that of any other
+/// direction. The rule of all commands: a rms alone grows or falls by chance where nothing has changed but its last digits.
+fn worse(before: &[f64], after: &[f64]) -> Worse {
+    let both = || before.iter().zip(after).filter(|(a, b)| a.is_finite() && b.is_finite());
+    let sum = |of: fn(f64, f64) -> f64| both().map(|(before, after)| of(*before, *after)).sum::<f64>();
+    let (squares, left) = (sum(|before, _| before * before), sum(|_, after| after * after));
+    if left <= squares {
+        return Worse::No;
+    }
+    let change = sum(|before, after| (after - before).powi(2)).sqrt();
+    let along = sum(|before, after| after * (after - before)) / change;
+    #[expect(clippy::cast_precision_loss, reason = "values of a log are far below 2⁵³")]
+    let others = both().count().saturating_sub(1) as f64;
+    let noise = ((left - along * along).max(0.0) / others).sqrt();
+    if along <= SEEN * noise { Worse::ByNoise } else { Worse::Yes }
+}
+
 /// All verdicts in one line.
 pub(super) fn headline(verdicts: &[Verdict]) -> String {
     if verdicts.is_empty() {
         return "No verdict.".to_owned();
     }
-    verdicts.iter().map(|verdict| format!("{}.", verdict.words())).collect::<Vec<_>>().join(" ")
+    let sentence = |verdict: &Verdict| {
+        let words = verdict.words();
+        if words.ends_with(['.', '?']) { words } else { format!("{words}.") }
+    };
+    verdicts.iter().map(sentence).collect::<Vec<_>>().join(" ")
 }
 
 /// All sizes as a table.
@@ -198,4 +261,38 @@ pub fn residuals(verdicts: &[Verdict]) -> Vec<Residual> {
         }
     }
     residuals
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn judged(before: &[f64], after: &[f64]) -> Verdict {
+        let sizes = [Size::of(before), Size::of(after)];
+        Verdict::new("gyro x", "°/h", sizes).unless_worse(before, after)
+    }
+
+    #[test]
+    fn noise_is_told_from_what_a_change_made_worse() {
+        // Steps on a rate table: a part in a million of 72 °/s, beside noise of some °/h.
+        let before = [-6.46, -0.5, -0.33, 0.75, -3.77];
+        let after = [-6.46, -0.75, -0.33, 1.0, -3.77];
+        let verdict = judged(&before, &after);
+        assert!(verdict.accepted && verdict.reason.contains("no more than noise"), "{}", verdict.words());
+        // A scale factor that is as wrong as the old one was right.
+        let verdict = judged(&before, &[-6.46, -80.5, -0.33, 80.75, -3.77]);
+        assert!(!verdict.accepted && verdict.reason.contains("rms grows from 3.37 to "), "{}", verdict.words());
+        // A constant error thirty times the noise.
+        let noise: Vec<f64> = (0..12).map(|k| libm::sin(f64::from(k * k))).collect();
+        let shifted: Vec<f64> = noise.iter().map(|x| x + 30.0).collect();
+        assert!(!judged(&noise, &shifted).accepted);
+        assert!(judged(&shifted, &noise).reason.is_empty());
+        assert!(!judged(&[1.0], &[2.0]).accepted, "one value tells no noise");
+    }
+
+    #[test]
+    fn a_question_ends_without_a_full_stop() {
+        let verdict = judged(&[1.0], &[1.0]).refused("is it right?");
+        assert!(headline(&[verdict]).ends_with("is it right?"));
+    }
 }
