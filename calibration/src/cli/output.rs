@@ -102,7 +102,9 @@ impl OutputArgs {
         }
         if let Some(out) = &self.out {
             let out = names.of(out);
-            report.warnings.push(format!("all is refused: {} is not written, the old document stays", out.display()));
+            report
+                .warnings
+                .push(format!("all is refused: {} is not written, the old document stays", out.display()));
         }
         Self { out: None, ..self.clone() }.write(|| Ok(written), || report.to_html(), names)?;
         Ok(report)

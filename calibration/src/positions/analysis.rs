@@ -10,7 +10,9 @@ use super::model::{Degrees, Guess, Taken};
 use super::plan::Plan;
 use super::pose::{Pose, intensities};
 use super::still::{StillLimits, still};
-use super::temperature::{Temperatures, blind, board_ratio, channels, levels, own_deg_c, reference, slopes_deg_c};
+use super::temperature::{
+    Temperatures, blind, board_ratio, channels, levels, own_deg_c, reference, slopes_deg_c,
+};
 use super::times::Times;
 use super::track::Track;
 

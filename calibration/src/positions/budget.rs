@@ -213,6 +213,20 @@ mod tests {
     }
 
     #[test]
+    fn a_plan_without_a_stand_is_budgeted_as_it_is_fitted() {
+        use crate::positions::plan::Attitude;
+        let mut plan = Plan::twelve();
+        for position in &mut plan.positions {
+            position.attitude = Attitude::Up(Plan::twelve().up(&position.attitude, [0.0; 3]).map(f64::round));
+        }
+        // Two pairs for every element, each out of level by the stand's 60″: half of that, as the fit says.
+        let [mean, most] = Budget::default().of_plan(&plan, 60.0 / ARCSEC_PER_RAD).unwrap();
+        assert!((mean - 30.1).abs() < 0.2 && (most - 30.1).abs() < 0.2, "{mean} {most}");
+        plan.positions.retain(|position| !position.name.starts_with('Z'));
+        assert!(Budget::default().of_plan(&plan, 3e-4).is_none(), "z is seen neither up nor down");
+    }
+
+    #[test]
     fn twelve_positions_know_more_than_six() {
         let budget = Budget::default();
         let [twelve, _] = budget.of_plan(&Plan::twelve(), 3e-4).unwrap();

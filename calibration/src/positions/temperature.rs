@@ -61,7 +61,11 @@ pub(super) fn own_deg_c(
         let in_pose = |pose: &Pose| channel.and_then(|name| pose.temperature_deg_c.get(name).copied());
         let reads = poses.iter().any(|(pose, _)| in_pose(pose).is_some());
         let without = |axes: f64| if reads { axes } else { document.temperature.assumed_deg_c };
-        poses.iter().zip(axes).map(|((pose, _), axes)| in_pose(pose).unwrap_or_else(|| without(*axes))).collect()
+        poses
+            .iter()
+            .zip(axes)
+            .map(|((pose, _), axes)| in_pose(pose).unwrap_or_else(|| without(*axes)))
+            .collect()
     };
     (0..sensors).map(of).collect()
 }
@@ -72,7 +76,9 @@ pub(super) fn blind(document: &Document, own: &[Vec<f64>], levels: usize) -> Vec
         let [low, high] = Temperatures::of(deg_c).range;
         let known = document.accel.as_ref().and_then(|accel| accel.sensor.get(sensor));
         let name = known.map_or_else(|| faults::name(sensor), |sensor| sensor.name.clone());
-        let channel = known.and_then(|sensor| sensor.channel.as_deref()).map_or("no channel".to_owned(), |channel| format!("channel {channel:?}"));
+        let channel = known
+            .and_then(|sensor| sensor.channel.as_deref())
+            .map_or("no channel".to_owned(), |channel| format!("channel {channel:?}"));
         (high - low <= LEVEL_GAP_DEG_C).then(|| {
             format!(
                 "accelerometer {name}: it follows {channel}, which goes from {low:.1} to {high:.1} °C over {levels} temperatures of the \

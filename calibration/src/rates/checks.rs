@@ -32,7 +32,9 @@ pub(super) fn turned_as_stated(
     let in_case = in_case(&axes);
     let rest: Vec<f64> = (0..sensors).map(|sensor| at_rest(matched, sensor)).collect();
     let fastest = matched.iter().map(|one| one.step.rate_deg_per_s.abs()).fold(0.0, f64::max);
-    for one in matched.iter().filter(|one| one.step.rate_deg_per_s.abs() >= FAST * fastest.max(f64::MIN_POSITIVE)) {
+    for one in
+        matched.iter().filter(|one| one.step.rate_deg_per_s.abs() >= FAST * fastest.max(f64::MIN_POSITIVE))
+    {
         let shown = |sensor: usize| (one.plateau.rate[sensor] - rest[sensor]) / 3600.0;
         let rate = one.step.rate_deg_per_s;
         let turned = in_case(&shown).map(|x| x * rate.signum());

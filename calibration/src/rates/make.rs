@@ -113,7 +113,8 @@ pub fn make<W: Watch>(wanted: &Wanted<'_>, mut watch: impl FnMut() -> W) -> Resu
     let flat: Vec<[f64; 3]> = rates.iter().flatten().copied().collect();
     let mut doubted = Vec::new();
     for (sensor, found) in gyros.iter_mut().enumerate() {
-        let what = found.as_ref().ok().and_then(|found| no_result(found, &flat, axes[sensor], wanted.scale_known));
+        let what =
+            found.as_ref().ok().and_then(|found| no_result(found, &flat, axes[sensor], wanted.scale_known));
         if let Some(what) = what {
             *found = Err(what.clone());
             doubted.push((sensor, what));
@@ -196,10 +197,12 @@ impl Made {
         self.judge(wanted, 0, watch)?;
         self.write(wanted, axes_deg_c, watch)?;
         self.verdicts = verdicts(&self.steps, &self.judged);
-        let worse: Vec<usize> = (0..self.verdicts.len()).filter(|axis| !self.verdicts[*axis].accepted).collect();
+        let worse: Vec<usize> =
+            (0..self.verdicts.len()).filter(|axis| !self.verdicts[*axis].accepted).collect();
         let main_axes: Vec<usize> = wanted.base.gyro.orientation.rows.iter().map(main_axis).collect();
         if !worse.is_empty() {
-            for (main, gyro) in main_axes.iter().zip(&mut self.gyros).filter(|(main, _)| worse.contains(main)) {
+            for (main, gyro) in main_axes.iter().zip(&mut self.gyros).filter(|(main, _)| worse.contains(main))
+            {
                 let axis = ["x", "y", "z"][*main];
                 *gyro = Err(format!("its weight and axis make the rate about {axis} worse than it was"));
             }

@@ -2,6 +2,7 @@
 
 use isotherm_log::plot::page::Table;
 use isotherm_protocol::document::{Measure, Residual, Sample};
+use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::drift::figures::short;
 use crate::means::Size;
@@ -166,8 +167,10 @@ impl Verdict {
     }
 }
 
-/// Standard errors by which what is left must follow the change to count as made worse by it.
-const SEEN: f64 = 3.0;
+/// Probability below which it is no accident that what is left follows the change.
+const ACCIDENT: f64 = 1e-3;
+/// Times by which an rms grows at most by noise.
+const LARGEST_GROWTH: f64 = 2.0;
 
 /// Whether a change made something worse.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -180,7 +183,7 @@ enum Worse {
 /// Whether a change made something worse: what is left grows, and follows the change itself.
 ///
 /// Were the change right, what is left after it would be noise, and its part along the change no larger than that of any other
-/// direction. The rule of all commands: a rms alone grows or falls by chance where nothing has changed but its last digits.
+/// direction (Student's law). An rms alone grows or falls by chance where nothing has changed but its last digits.
 fn worse(before: &[f64], after: &[f64]) -> Worse {
     let both = || before.iter().zip(after).filter(|(a, b)| a.is_finite() && b.is_finite());
     let sum = |of: fn(f64, f64) -> f64| both().map(|(before, after)| of(*before, *after)).sum::<f64>();
@@ -193,7 +196,9 @@ fn worse(before: &[f64], after: &[f64]) -> Worse {
     #[expect(clippy::cast_precision_loss, reason = "values of a log are far below 2⁵³")]
     let others = both().count().saturating_sub(1) as f64;
     let noise = ((left - along * along).max(0.0) / others).sqrt();
-    if along <= SEEN * noise { Worse::ByNoise } else { Worse::Yes }
+    let by_chance = StudentsT::new(0.0, 1.0, others).map_or(0.0, |law| law.sf(along / noise));
+    let doubled = left > LARGEST_GROWTH * LARGEST_GROWTH * squares;
+    if by_chance >= ACCIDENT && !doubled { Worse::ByNoise } else { Worse::Yes }
 }
 
 /// All verdicts in one line.
@@ -281,12 +286,20 @@ mod tests {
         assert!(verdict.accepted && verdict.reason.contains("no more than noise"), "{}", verdict.words());
         // A scale factor that is as wrong as the old one was right.
         let verdict = judged(&before, &[-6.46, -80.5, -0.33, 80.75, -3.77]);
-        assert!(!verdict.accepted && verdict.reason.contains("rms grows from 3.37 to "), "{}", verdict.words());
+        assert!(
+            !verdict.accepted && verdict.reason.contains("rms grows from 3.37 to "),
+            "{}",
+            verdict.words()
+        );
         // A constant error thirty times the noise.
         let noise: Vec<f64> = (0..12).map(|k| libm::sin(f64::from(k * k))).collect();
         let shifted: Vec<f64> = noise.iter().map(|x| x + 30.0).collect();
         assert!(!judged(&noise, &shifted).accepted);
         assert!(judged(&shifted, &noise).reason.is_empty());
+        // Few values leave much open, but no doubling.
+        assert!(judged(&[1.0, -1.0, 1.0], &[1.5, -1.1, 1.2]).accepted);
+        assert!(!judged(&[1.0, -1.0, 1.0], &[4.0, -1.0, 1.0]).accepted);
+        assert!(!judged(&[0.0; 3], &[1e-3; 3]).accepted, "there was nothing left before");
         assert!(!judged(&[1.0], &[2.0]).accepted, "one value tells no noise");
     }
 
