@@ -50,14 +50,17 @@ pub(super) fn turned_as_stated(
         let along = |sensor: usize| axes.get(sensor).map_or(0.0, |axis| dot(*axis, one.step.axis).abs());
         let nearest = largest(sensors, along);
         let liveliest = largest(sensors, |sensor| shown(sensor).abs());
-        let mut shows = format!("gyro {} shows {} °/s", name(nearest), short(shown(nearest)));
-        if liveliest != nearest {
-            shows.push_str(&format!(" and gyro {} {}", name(liveliest), short(shown(liveliest))));
-        }
+        let other = if liveliest == nearest {
+            String::new()
+        } else {
+            format!(" and gyro {} {}", name(liveliest), short(shown(liveliest)))
+        };
         let stated = format!(
-            "log {}: in the step of {from:.1}…{to:.1} s, stated as {rate} °/s about {}, {shows}",
+            "log {}: in the step of {from:.1}…{to:.1} s, stated as {rate} °/s about {}, gyro {} shows {} °/s{other}",
             one.step.run + 1,
-            words(one.step.axis)
+            words(one.step.axis),
+            name(nearest),
+            short(shown(nearest))
         );
         return Err(if right_size {
             format!(
@@ -133,4 +136,40 @@ fn words(axis: [f64; 3]) -> String {
     }
     let [x, y, z] = axis;
     format!("{x:.2},{y:.2},{z:.2}")
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::DMatrix;
+
+    use super::*;
+
+    #[test]
+    fn a_gyro_is_one_whose_scale_and_line_are_near_what_was_stated() {
+        let gyro = |gain: f64, left: f64, widened: bool| GyroRates {
+            gain: [gain, 1e-6],
+            axis: None,
+            axis_sigma: [f64::NAN; 3],
+            asymmetry: None,
+            bias: [0.0, 1.0],
+            covariance: DMatrix::identity(2, 2),
+            left: vec![left, -left],
+            chi_square: 1e9,
+            widened,
+        };
+        // 100 °/s about x.
+        let rates = [[360_000.0, 0.0, 0.0], [-360_000.0, 0.0, 0.0]];
+        let doubt = |found: &GyroRates, known: bool| no_result(found, &rates, [1.0, 0.0, 0.0], known);
+        assert_eq!(doubt(&gyro(1.002, 3000.0, true), true), None, "0.8 % of the largest rate");
+        assert_eq!(doubt(&gyro(0.3, 1.0, false), false), None, "counts without a document");
+        for (found, words) in [
+            (gyro(-2e-4, 1.0, false), "-2.00e-4 times the rate"),
+            (gyro(2.1, 1.0, false), "2.10 times the rate"),
+            (gyro(1.0, 36_000.0, true), "leaves 10.0 °/s of a step, 10.0 % of the largest rate, at most 1 %"),
+        ] {
+            let doubt = doubt(&found, true).unwrap();
+            assert!(doubt.contains(words), "{doubt}");
+        }
+        assert!(doubt(&gyro(-1.0, 1.0, false), false).is_some(), "the wrong sense is wrong at any scale");
+    }
 }
