@@ -5,12 +5,13 @@
 //! | [`steps`] | what the table was told to do |
 //! | [`bins`] | what the gyros gave, in short means along their own input axes |
 //! | [`plateaus`] | where the table turned steadily |
-//! | [`matching`] | which plateau is which step |
+//! | [`matching`], `checks` | which plateau is which step; whether the unit turned as stated |
 //! | [`earth`] | Earth rate in a case that turns |
 //! | [`solve`] | least squares over the steps, one gyro at a time |
 //! | [`make`], [`document`] | the whole procedure; the document |
 
 pub mod bins;
+mod checks;
 pub mod document;
 pub mod earth;
 mod judge;

@@ -30,7 +30,7 @@ pub use batch::{BatchRow, BatchTable, UnitReport, in_parallel, of_unit};
 pub use curve::{Curve, Judged, Rest, judge};
 pub use sheet::Sheet;
 pub use sigma::Sigmas;
-pub use verdict::{Figure, SAME_SHARE, Verdict, made_worse, residuals};
+pub use verdict::{Figure, SAME_SHARE, Verdict, residuals};
 
 use crate::drift::figures::{short, table};
 

@@ -1,11 +1,9 @@
 //! A calibration document on its way to a file: what is judged is what its own reader makes of the text.
 
-use std::fs::OpenOptions;
-use std::io::Write;
 use std::path::Path;
 use std::sync::Arc;
 
-use isotherm_log::file::read_small_text;
+use isotherm_log::file::{read_small_text, write_whole};
 use isotherm_log::offline::{Loaded, unit_id};
 use isotherm_protocol::document::{Document, Parsed, Problem};
 
@@ -82,15 +80,7 @@ pub fn tidy(value: f64) -> f64 {
 /// # Errors
 /// [`Error::Log`] where that cannot be done.
 pub fn write_file(path: &Path, bytes: &[u8], overwrite: bool) -> Result<(), Error> {
-    let mut options = OpenOptions::new();
-    options.write(true);
-    if overwrite {
-        options.create(true).truncate(true)
-    } else {
-        options.create_new(true)
-    };
-    let written = options.open(path).and_then(|mut file| file.write_all(bytes));
-    written.map_err(|source| Error::file(path, "write", source))
+    write_whole(path, bytes, overwrite).map_err(|source| Error::file(path, "write", source))
 }
 
 fn words(problems: &[Problem]) -> Vec<String> {

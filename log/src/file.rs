@@ -1,7 +1,8 @@
-//! Small files read whole, and outputs that must not fall on inputs.
+//! Small files read and written whole, and outputs that must not fall on inputs.
 
-use std::fs::{File, canonicalize};
-use std::io::{self, Read};
+use std::fs::{File, Permissions, canonicalize};
+use std::io::{self, Read, Write};
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, absolute};
 
 use isotherm_protocol::document::MAX_DOCUMENT_BYTES;
@@ -53,6 +54,29 @@ pub fn refuse_overwriting(out: &Path, others: &[&Path]) -> Result<(), Error> {
     }
 }
 
+/// Writes a file beside its place and moves it there: on a full disk the old one stays, and nothing is there by halves. One that is
+/// there only where that is allowed.
+///
+/// # Errors
+/// That of the folder or the disk.
+pub fn write_whole(path: &Path, bytes: &[u8], overwrite: bool) -> io::Result<()> {
+    // What a link names is replaced, not the link; a device is written to as it is.
+    let path =
+        &if overwrite { canonicalize(path).unwrap_or_else(|_| path.to_owned()) } else { path.to_owned() };
+    if overwrite && path.exists() && !path.is_file() {
+        return std::fs::write(path, bytes);
+    }
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let mut file = tempfile::Builder::new()
+        .prefix(".new-")
+        .permissions(Permissions::from_mode(0o666))
+        .tempfile_in(folder.unwrap_or(Path::new(".")))?;
+    file.write_all(bytes)?;
+    file.as_file().sync_all()?;
+    let placed = if overwrite { file.persist(path) } else { file.persist_noclobber(path) };
+    placed.map(drop).map_err(|failed| failed.error)
+}
+
 /// Whether a file begins with these bytes; what cannot be read does not.
 pub(crate) fn begins_with(path: &Path, magic: &[u8]) -> bool {
     let mut start = Vec::with_capacity(magic.len());
@@ -90,5 +114,28 @@ mod tests {
             error,
             "/dev/zero: cannot read the mapping: longer than 1048576 bytes: is it the right file?"
         );
+    }
+
+    #[test]
+    fn a_file_is_there_whole_or_as_it_was() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        let text = |name: &str| std::fs::read_to_string(path(name)).unwrap();
+        write_whole(&path("a.toml"), b"one", false).unwrap();
+        assert!(write_whole(&path("a.toml"), b"two", false).is_err());
+        assert_eq!(text("a.toml"), "one");
+        std::os::unix::fs::symlink(path("a.toml"), path("link.toml")).unwrap();
+        write_whole(&path("link.toml"), b"two", true).unwrap();
+        assert_eq!(text("a.toml"), "two");
+        assert!(path("link.toml").is_symlink());
+        write_whole(Path::new("/dev/null"), b"three", true).unwrap();
+        assert!(!Path::new("/dev/null").is_file());
+        // As any other new file, for others to read.
+        std::fs::write(path("other"), "").unwrap();
+        let mode = |name: &str| std::fs::metadata(path(name)).unwrap().permissions().mode();
+        assert_eq!(mode("a.toml"), mode("other"));
+        assert!(write_whole(&path("none/b.toml"), b"", true).is_err());
+        let left = std::fs::read_dir(folder.path()).unwrap().count();
+        assert_eq!(left, 3, "no temporary file stays");
     }
 }

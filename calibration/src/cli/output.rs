@@ -97,15 +97,16 @@ impl OutputArgs {
         Ok(())
     }
 
-    /// Writes what a fit came to; its report is left.
+    /// Writes what a fit came to; its report is left. Where everything is refused there is no new document.
     pub(super) fn keep(&self, fitted: Fitted, work: &Work, names: &Names<'_>) -> Result<FitReport, Error> {
         let Fitted { written, mut report, about } = fitted;
         report.warnings.extend(work.told());
-        self.write(
-            || self.document(written.document, &about, &report).map(Some),
-            || report.to_html(),
-            names,
-        )?;
+        let any_accepted = report.verdicts.is_empty() || report.verdicts.iter().any(|verdict| verdict.accepted);
+        if !any_accepted {
+            report.warnings.extend(self.nothing_new(names));
+        }
+        let document = || self.document(written.document, &about, &report);
+        self.write(|| any_accepted.then(document).transpose(), || report.to_html(), names)?;
         Ok(report)
     }
 

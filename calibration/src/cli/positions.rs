@@ -225,14 +225,12 @@ impl PositionsArgs {
             key: "positions",
             details: details(&analysis, settings, &report)?,
             sigmas: sigmas(&document, &analysis, settings),
-            range_deg_c: Some(if analysis.levels_deg_c.len() > 1 {
-                analysis.range_deg_c
-            } else {
-                range(&analysis)
-            }),
+            range_deg_c: Some(range(&analysis)),
             logs: work.logs(),
         };
-        Ok(Fitted { written: after, report, about })
+        let accepted = report.verdicts.iter().all(|verdict| verdict.accepted);
+        let written = if accepted { after } else { Written::of(&base.document)? };
+        Ok(Fitted { written, report, about })
     }
 }
 

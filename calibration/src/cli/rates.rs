@@ -102,6 +102,7 @@ impl RatesArgs {
             runs: &work.runs,
             judge: &work.judges,
             steps: &steps,
+            scale_known: work.base.is_some() || base.gyro.output == GyroOutput::Mean,
             base,
             place,
             table_ppm: self.table_ppm,

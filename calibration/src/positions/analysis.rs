@@ -10,7 +10,9 @@ use super::model::{Degrees, Guess, Taken};
 use super::plan::Plan;
 use super::pose::{Pose, intensities};
 use super::still::{StillLimits, still};
-use super::temperature::{board_ratio, channels, levels, own_channels, reference};
+use super::temperature::{
+    Temperatures, blind, board_ratio, channels, levels, own_deg_c, reference, slopes_deg_c,
+};
 use super::times::Times;
 use super::track::Track;
 
@@ -55,8 +57,12 @@ pub struct Analysis {
     pub reference_deg_c: f64,
     /// Half the range of temperature, which polynomials are scaled by (°C).
     pub half_deg_c: f64,
-    /// Lowest and highest temperature (°C).
+    /// Lowest and highest temperature that the orientation follows (°C).
     pub range_deg_c: [f64; 2],
+    /// What K and S of each accelerometer were taken at: the temperatures of its own channel.
+    pub sensors_deg_c: Vec<Temperatures>,
+    /// Mean temperature of the channels that the slopes of the document's C follow (°C).
+    pub slopes_deg_c: f64,
     /// Channels that the orientation follows.
     pub channels: Vec<String>,
     /// Weights that it was found with.
@@ -79,13 +85,17 @@ pub fn analyse(tracks: &[Track], document: &Document, settings: &Settings) -> Re
     let (poses, mut warnings) = positions(tracks, settings)?;
     let sensors = tracks.iter().map(|track| track.outputs.len()).max().unwrap_or(0);
     let channels = channels(document, settings);
-    let own = own_channels(document, sensors);
     let temperature = |pose: &Pose, channels: &[String]| pose.mean_temperature(channels);
     let axes: Vec<Option<f64>> = poses.iter().map(|(pose, _)| temperature(pose, &channels)).collect();
     let known = !channels.is_empty() && axes.iter().all(Option::is_some);
     let axes: Vec<f64> =
         axes.iter().map(|t| t.filter(|_| known).unwrap_or(document.temperature.assumed_deg_c)).collect();
     let (level_of, levels_deg_c) = levels(&axes);
+    let own = own_deg_c(document, &poses, &axes, sensors);
+    let blind = blind(document, &own, levels_deg_c.len());
+    if !blind.is_empty() {
+        return Err(blind);
+    }
     let (low, high) =
         axes.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), t| (a.min(*t), b.max(*t)));
     let reference = settings.reference_deg_c.unwrap_or_else(|| reference(low, high));
@@ -94,18 +104,13 @@ pub fn analyse(tracks: &[Track], document: &Document, settings: &Settings) -> Re
     let taken: Vec<Taken> = poses
         .iter()
         .zip(axes.iter().zip(&level_of))
-        .map(|((pose, position), (axes_t, level))| Taken {
+        .enumerate()
+        .map(|(taken, ((pose, position), (axes_t, level)))| Taken {
             position: *position,
             outputs: pose.outputs.clone(),
             ratio: (0..sensors).map(|sensor| board_ratio(document, sensor, pose)).collect(),
             duration_s: pose.duration_s,
-            sensor_t: own
-                .iter()
-                .map(|channel| {
-                    let t = channel.as_ref().and_then(|name| pose.temperature_deg_c.get(name).copied());
-                    scaled(t.unwrap_or(*axes_t))
-                })
-                .collect(),
+            sensor_t: own.iter().map(|deg_c| scaled(deg_c.get(taken).copied().unwrap_or(*axes_t))).collect(),
             axes_t: scaled(*axes_t),
             level: *level,
         })
@@ -159,6 +164,8 @@ pub fn analyse(tracks: &[Track], document: &Document, settings: &Settings) -> Re
         reference_deg_c: reference,
         half_deg_c: half,
         range_deg_c: [low, high],
+        sensors_deg_c: own.iter().map(|deg_c| Temperatures::of(deg_c)).collect(),
+        slopes_deg_c: slopes_deg_c(document, &plain).unwrap_or(document.temperature.assumed_deg_c),
         channels: if known { channels } else { Vec::new() },
         weights,
         widened,

@@ -3,7 +3,7 @@
 use isotherm_log::plot::page::Table;
 use serde_json::{Value, json};
 
-use super::fit::{Weights, fit, guesses};
+use super::fit::{Weights, guesses, planned};
 use super::model::{Degrees, Taken};
 use super::plan::Plan;
 use crate::drift::figures::{short, table};
@@ -112,7 +112,7 @@ impl Budget {
         let guess = guesses(plan, &taken, 3).ok()?;
         let positioning = self.positioning_arcsec.hypot(self.run_out_arcsec) / ARCSEC_PER_RAD;
         let weights = Weights { intensity: vec![self.noise; 3], positioning_rad: positioning, levelling_rad };
-        let found = fit(plan, &taken, &guess, &weights, Degrees { sensor: 0, axes: 0 }).ok()?;
+        let found = planned(plan, &taken, &guess, &weights, Degrees { sensor: 0, axes: 0 }).ok()?;
         let covariance = found.axes_covariance(plan, 0);
         let sigma: Vec<f64> = covariance.diagonal().iter().map(|v| v.sqrt() * ARCSEC_PER_RAD).collect();
         let mean = (sigma.iter().map(|s| s * s).sum::<f64>() / sigma.len() as f64).sqrt();
@@ -210,6 +210,20 @@ mod tests {
         for words in ["11.5", "10.6", "0.3″ for quartz", "1.2″ for silicon", "15.7″"] {
             assert!(text.contains(words), "{words} is not in\n{text}");
         }
+    }
+
+    #[test]
+    fn a_plan_without_a_stand_is_budgeted_as_it_is_fitted() {
+        use crate::positions::plan::Attitude;
+        let mut plan = Plan::twelve();
+        for position in &mut plan.positions {
+            position.attitude = Attitude::Up(Plan::twelve().up(&position.attitude, [0.0; 3]).map(f64::round));
+        }
+        // Two pairs for every element, each out of level by the stand's 60″: half of that, as the fit says.
+        let [mean, most] = Budget::default().of_plan(&plan, 60.0 / ARCSEC_PER_RAD).unwrap();
+        assert!((mean - 30.1).abs() < 0.2 && (most - 30.1).abs() < 0.2, "{mean} {most}");
+        plan.positions.retain(|position| !position.name.starts_with('Z'));
+        assert!(Budget::default().of_plan(&plan, 3e-4).is_none(), "z is seen neither up nor down");
     }
 
     #[test]

@@ -27,24 +27,30 @@ pub fn complete(document: &Document, analysis: &Analysis, gravity: f64) -> Docum
     let mut document = document.clone();
     let Some(accel) = &mut document.accel else { return document };
     let (scale_unit, bias_unit) = units(accel.output);
-    let range = range(analysis);
-    for (sensor, found) in accel.sensor.iter_mut().zip(&analysis.fit.sensors) {
+    let found = analysis.fit.sensors.iter().zip(&analysis.sensors_deg_c);
+    for (sensor, (found, deg_c)) in accel.sensor.iter_mut().zip(found) {
+        let range = with_room(deg_c.range);
         let scale: Vec<f64> = found.scale.iter().map(|k| k / gravity).collect();
         if analysis.levels_deg_c.len() > 1 {
             sensor.scale_factor = curve(analysis, &scale, range).in_unit(scale_unit);
             sensor.bias = Some(curve(analysis, &found.bias, range).in_unit(bias_unit));
         } else {
-            level(sensor, scale[0], found.bias[0], analysis.levels_deg_c[0], (scale_unit, bias_unit));
+            level(sensor, scale[0], found.bias[0], deg_c.mean, (scale_unit, bias_unit));
         }
     }
-    orient(accel, analysis, range);
+    orient(accel, analysis, with_room(analysis.range_deg_c));
     document
 }
 
-/// Range of the curves (°C), in whole degrees.
+/// Range of the document (°C): of all curves, and of the axes.
 #[must_use]
 pub fn range(analysis: &Analysis) -> [f64; 2] {
-    let [low, high] = analysis.range_deg_c;
+    let own = analysis.sensors_deg_c.iter().map(|deg_c| deg_c.range);
+    with_room(own.fold(analysis.range_deg_c, |[low, high], own| [low.min(own[0]), high.max(own[1])]))
+}
+
+/// Range of a curve (°C), in whole degrees.
+fn with_room([low, high]: [f64; 2]) -> [f64; 2] {
     [(low - ROOM_DEG_C).floor(), (high + ROOM_DEG_C).ceil()]
 }
 
@@ -120,7 +126,7 @@ fn orient(accel: &mut isotherm_protocol::document::Accel, analysis: &Analysis, r
     let old = |sensor: usize| {
         let Some(thermal) = &orientation.thermal else { return [0.0; 3] };
         let [low, high] = thermal.range_deg_c;
-        let away = analysis.levels_deg_c[0].max(low).min(high) - thermal.reference_deg_c;
+        let away = analysis.slopes_deg_c.max(low).min(high) - thermal.reference_deg_c;
         let slope = thermal.slopes_arcsec_per_deg_c.get(sensor).copied().unwrap_or_default();
         slope.map(|c| Angle::from_arcsec(c * away).as_rad())
     };

@@ -15,7 +15,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::model::{Degrees, Guess, Model, SMALL, Sensor, Taken};
 use super::plan::{Attitude, Plan};
-use super::solve::{NoSolution, Solution, solve};
+use super::solve::{NoSolution, Solution, known, solve};
 
 /// What is known of the errors beforehand.
 #[derive(Debug, Clone, PartialEq)]
@@ -108,6 +108,31 @@ pub fn fit(
     weights: &Weights,
     degrees: Degrees,
 ) -> Result<Fit, NoSolution> {
+    found(plan, taken, guess, weights, degrees, |start, residuals| solve(start, residuals))
+}
+
+/// What [`fit`] will find of positions that are only planned, so that the first guess is the truth: nothing is searched for.
+///
+/// # Errors
+/// Where they do not determine it.
+pub fn planned(
+    plan: &Plan,
+    taken: &[Taken],
+    guess: &[Guess],
+    weights: &Weights,
+    degrees: Degrees,
+) -> Result<Fit, NoSolution> {
+    found(plan, taken, guess, weights, degrees, |start, residuals| known(start, residuals))
+}
+
+fn found(
+    plan: &Plan,
+    taken: &[Taken],
+    guess: &[Guess],
+    weights: &Weights,
+    degrees: Degrees,
+    solve: impl Fn(&[f64], &dyn Fn(&[f64]) -> Vec<f64>) -> Result<Solution, NoSolution>,
+) -> Result<Fit, NoSolution> {
     let model = Model { plan, guess: guess.to_vec(), degrees };
     let start = vec![0.0; model.count()];
     let whitening: Vec<DMatrix<f64>> =
@@ -126,7 +151,7 @@ pub fn fit(
         all.extend(p[p.len() - 3..].iter().map(|error| error / prior));
         all
     };
-    let solution = solve(&start, residuals)?;
+    let solution = solve(&start, &residuals)?;
     let errors = model.errors(&solution.parameters);
     let from = model.count() - 3;
     let stand = [0, 1, 2].map(|i| (errors[i], solution.sigma(from + i) * SMALL));

@@ -7,7 +7,6 @@ use isotherm_protocol::document::Sample;
 use super::plan::{Plan, StandErrors};
 use super::pose::Pose;
 use super::track::Track;
-use crate::means::Size;
 use crate::report::Curve;
 
 const AXES: [&str; 3] = ["x", "y", "z"];
@@ -84,8 +83,8 @@ pub fn curves(judged: &[Judgement], names: &[String], sample: Sample) -> Vec<Cur
     curves
 }
 
-/// |f| − g before and after.
+/// |f| − g before and after (m/s²).
 #[must_use]
-pub fn lengths(judged: &[Judgement]) -> [Size; 2] {
-    [0, 1].map(|which| Size::of(&judged.iter().map(|judgement| judgement.length[which]).collect::<Vec<_>>()))
+pub fn lengths(judged: &[Judgement]) -> [Vec<f64>; 2] {
+    [0, 1].map(|which| judged.iter().map(|judgement| judgement.length[which]).collect())
 }

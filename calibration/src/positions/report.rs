@@ -34,10 +34,10 @@ pub fn report(
     if let Some(set) = outside {
         report.residuals.extend(curves(set.judged, set.runs, Sample::Out));
     }
-    report.verdicts =
-        Curve::verdicts(&report.residuals).into_iter().map(|v| v.stated_as(Figure::Rms)).collect();
-    let length = Verdict::new("|f|−g", "m/s²", lengths(inside.judged)).stated_as(Figure::Rms);
-    report.verdicts.push(length.out_of_sample(outside.map(|set| lengths(set.judged))));
+    report.verdicts = Curve::verdicts(&report.residuals);
+    let [length, outside] = [Some(inside), outside].map(|set| set.map(|set| lengths(set.judged)));
+    report.verdicts.push(Verdict::of_values("|f|−g", "m/s²", length.unwrap_or_default(), outside));
+    report.verdicts = as_a_whole(report.verdicts).into_iter().map(|v| v.stated_as(Figure::Rms)).collect();
     report.warnings.clone_from(&analysis.warnings);
     report.notes = notes(analysis, settings);
     let names = names(document, analysis.fit.guess.len());
@@ -49,6 +49,22 @@ pub fn report(
         report.charts.push(("Axes over temperature".to_owned(), axes_chart(analysis, settings, &names)));
     }
     report
+}
+
+/// K, S and C of all accelerometers are of one mounting of the unit and of the same temperatures: with one axis all are refused.
+fn as_a_whole(verdicts: Vec<Verdict>) -> Vec<Verdict> {
+    let bad: Vec<String> =
+        verdicts.iter().filter(|verdict| !verdict.accepted).map(|verdict| verdict.of.clone()).collect();
+    let with = |verdict: Verdict| {
+        if bad.is_empty() || !verdict.accepted {
+            return verdict;
+        }
+        verdict.refused(format!(
+            "K, S and C of all accelerometers are one fit and are taken as a whole, and {} is refused",
+            bad.join(", ")
+        ))
+    };
+    verdicts.into_iter().map(with).collect()
 }
 
 /// Names of the accelerometers.

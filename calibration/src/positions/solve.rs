@@ -65,6 +65,18 @@ pub fn solve(start: &[f64], residuals: impl Fn(&[f64]) -> Vec<f64>) -> Result<So
     if !good {
         return Err(NoSolution::NoMinimum(format!("{:?}", report.termination)));
     }
+    solution(&problem)
+}
+
+/// The solution where it is known beforehand: what residuals of variance one will make of its covariance.
+///
+/// # Errors
+/// Where the residuals do not determine the parameters.
+pub fn known(parameters: &[f64], residuals: impl Fn(&[f64]) -> Vec<f64>) -> Result<Solution, NoSolution> {
+    solution(&Problem { parameters: minpack::DVector::from_column_slice(parameters), residuals })
+}
+
+fn solution<F: Fn(&[f64]) -> Vec<f64>>(problem: &Problem<F>) -> Result<Solution, NoSolution> {
     let parameters: Vec<f64> = problem.parameters.iter().copied().collect();
     let residuals = (problem.residuals)(&parameters);
     let slopes = problem.slopes();

@@ -3,6 +3,7 @@
 use isotherm_protocol::document::Document;
 
 use super::analysis::Settings;
+use super::faults;
 use super::pose::Pose;
 
 /// Distance of temperatures that are two (°C).
@@ -26,10 +27,74 @@ pub(super) fn channels(document: &Document, settings: &Settings) -> Vec<String> 
     own
 }
 
-/// The channel of each accelerometer.
-pub(super) fn own_channels(document: &Document, sensors: usize) -> Vec<Option<String>> {
-    let of = |sensor: usize| document.accel.as_ref()?.sensor.get(sensor)?.channel.clone();
+/// Temperatures that something was taken at (°C).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Temperatures {
+    /// Their mean.
+    pub mean: f64,
+    /// Lowest and highest.
+    pub range: [f64; 2],
+}
+
+impl Temperatures {
+    /// Of some temperatures.
+    #[expect(clippy::cast_precision_loss, reason = "positions")]
+    pub(super) fn of(deg_c: &[f64]) -> Self {
+        let ends = |[low, high]: [f64; 2], t: &f64| [low.min(*t), high.max(*t)];
+        Self {
+            mean: deg_c.iter().sum::<f64>() / deg_c.len() as f64,
+            range: deg_c.iter().fold([f64::INFINITY, f64::NEG_INFINITY], ends),
+        }
+    }
+}
+
+/// The temperature of each accelerometer in each pose (°C), as the service has it: that of its own channel, that of the axes
+/// (`axes`) where the channel has gaps, the assumed one without a channel or without any reading.
+pub(super) fn own_deg_c(
+    document: &Document,
+    poses: &[(Pose, usize)],
+    axes: &[f64],
+    sensors: usize,
+) -> Vec<Vec<f64>> {
+    let of = |sensor: usize| -> Vec<f64> {
+        let channel = document.accel.as_ref().and_then(|accel| accel.sensor.get(sensor)?.channel.as_ref());
+        let in_pose = |pose: &Pose| channel.and_then(|name| pose.temperature_deg_c.get(name).copied());
+        let reads = poses.iter().any(|(pose, _)| in_pose(pose).is_some());
+        let without = |axes: f64| if reads { axes } else { document.temperature.assumed_deg_c };
+        poses
+            .iter()
+            .zip(axes)
+            .map(|((pose, _), axes)| in_pose(pose).unwrap_or_else(|| without(*axes)))
+            .collect()
+    };
     (0..sensors).map(of).collect()
+}
+
+/// Accelerometers whose own channel does not see that there are several temperatures, in words.
+pub(super) fn blind(document: &Document, own: &[Vec<f64>], levels: usize) -> Vec<String> {
+    let of = |(sensor, deg_c): (usize, &Vec<f64>)| {
+        let [low, high] = Temperatures::of(deg_c).range;
+        let known = document.accel.as_ref().and_then(|accel| accel.sensor.get(sensor));
+        let name = known.map_or_else(|| faults::name(sensor), |sensor| sensor.name.clone());
+        let channel = known
+            .and_then(|sensor| sensor.channel.as_deref())
+            .map_or("no channel".to_owned(), |channel| format!("channel {channel:?}"));
+        (high - low <= LEVEL_GAP_DEG_C).then(|| {
+            format!(
+                "accelerometer {name}: it follows {channel}, which goes from {low:.1} to {high:.1} °C over {levels} temperatures of the \
+                 axes, more than {LEVEL_GAP_DEG_C} °C are needed: name the channel that measures it in the document, or give the logs \
+                 of one temperature"
+            )
+        })
+    };
+    if levels > 1 { own.iter().enumerate().filter_map(of).collect() } else { Vec::new() }
+}
+
+/// Mean temperature of the channels that the slopes of the document's C follow (°C); `None` without slopes or readings.
+pub(super) fn slopes_deg_c(document: &Document, poses: &[Pose]) -> Option<f64> {
+    let thermal = document.accel.as_ref()?.orientation.thermal.as_ref()?;
+    let of: Vec<f64> = poses.iter().filter_map(|pose| pose.mean_temperature(&thermal.channels)).collect();
+    (!of.is_empty()).then(|| Temperatures::of(&of).mean)
 }
 
 /// r of the board of an accelerometer in a pose, by the document.

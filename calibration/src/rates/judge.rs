@@ -32,24 +32,26 @@ pub(super) fn errors<W: Watch>(
 /// Before and after by case axis, of the steps that were fitted and of those that were not, which decide where there are any; the
 /// bias is not what rates are about, so means are taken off.
 pub(super) fn verdicts(steps: &[Measured], judged: &[Measured]) -> Vec<Verdict> {
-    let of = |steps: &[Measured], axis: usize, sample: usize| {
+    let of = |steps: &[Measured], axis: usize, sample: usize| -> Vec<f64> {
         let errors: Vec<f64> = steps.iter().map(|step| step.error[sample][axis]).collect();
         let mean = Size::of(&errors).mean;
-        Size::of(&errors.iter().map(|error| error - mean).collect::<Vec<_>>())
+        errors.iter().map(|error| error - mean).collect()
     };
     ["x", "y", "z"]
         .iter()
         .enumerate()
         .map(|(axis, name)| {
-            let sizes = |steps: &[Measured]| [of(steps, axis, 0), of(steps, axis, 1)];
-            let outside = (!judged.is_empty()).then(|| sizes(judged));
-            let verdict = Verdict::new(format!("gyro {name}"), "°/h", sizes(steps)).out_of_sample(outside);
-            let [before, after] = verdict.deciding();
-            if after.rms <= before.rms {
-                verdict
-            } else {
-                verdict.refused("the errors of its steps grow: are the table's axis and rates right?")
+            let both = |steps: &[Measured]| [of(steps, axis, 0), of(steps, axis, 1)];
+            let outside = (!judged.is_empty()).then(|| both(judged));
+            let verdict = Verdict::of_values(format!("gyro {name}"), "°/h", both(steps), outside);
+            if verdict.accepted {
+                return verdict;
             }
+            let grown = format!(
+                "the errors of its steps grow, {}: are the table's axis and rates, and the temperature of all logs, as stated?",
+                verdict.reason
+            );
+            verdict.refused(grown)
         })
         .collect()
 }

@@ -3,6 +3,7 @@
 use isotherm_correction::earth::Place;
 use isotherm_protocol::document::Document;
 
+use super::checks::no_result;
 use super::document;
 use super::judge::{errors, verdicts};
 use super::matching::Matched;
@@ -29,6 +30,8 @@ pub struct Wanted<'a> {
     pub judge: &'a [Run],
     /// What the table did in all of them; the numbers of the judging runs follow on those of the others.
     pub steps: &'a [Step],
+    /// Whether the document's weights are near those of the unit; without a document those of counts are not.
+    pub scale_known: bool,
     /// Document that gives channels, filter, biases, and the scale and axes that are to be replaced.
     pub base: &'a Document,
     /// Where the table is, and how the case stands on it at the beginning of each run; one for all, one for each, or none.
@@ -107,6 +110,16 @@ pub fn make<W: Watch>(wanted: &Wanted<'_>, mut watch: impl FnMut() -> W) -> Resu
             }
         }
     }
+    let flat: Vec<[f64; 3]> = rates.iter().flatten().copied().collect();
+    let mut doubted = Vec::new();
+    for (sensor, found) in gyros.iter_mut().enumerate() {
+        let what =
+            found.as_ref().ok().and_then(|found| no_result(found, &flat, axes[sensor], wanted.scale_known));
+        if let Some(what) = what {
+            *found = Err(what.clone());
+            doubted.push((sensor, what));
+        }
+    }
     if gyros.iter().all(Result::is_err) {
         let name = |sensor: usize| &wanted.base.gyro.sensor[sensor].name;
         let of = gyros
@@ -129,7 +142,7 @@ pub fn make<W: Watch>(wanted: &Wanted<'_>, mut watch: impl FnMut() -> W) -> Resu
         temperatures_deg_c: temperatures,
         warnings,
     };
-    made.settle(wanted, axes_deg_c, &mut watch)?;
+    made.settle(wanted, axes_deg_c, &doubted, &mut watch)?;
     Ok(made)
 }
 
@@ -172,33 +185,37 @@ fn measured(runs: &[Turned], rates: &[Vec<[f64; 3]>]) -> Vec<Measured> {
 }
 
 impl Made {
-    /// Writes and judges; gyros that make an axis worse keep weight and axis, and all is judged once more.
+    /// Writes and judges; gyros that make an axis worse keep weight and axis, and all is judged once more. Axes of gyros that
+    /// came to nothing are refused.
     fn settle<W: Watch>(
         &mut self,
         wanted: &Wanted<'_>,
         axes_deg_c: Option<f64>,
+        doubted: &[(usize, String)],
         watch: &mut impl FnMut() -> W,
     ) -> Result<(), Error> {
         self.judge(wanted, 0, watch)?;
         self.write(wanted, axes_deg_c, watch)?;
-        let first = verdicts(&self.steps, &self.judged);
-        let worse: Vec<usize> = (0..first.len()).filter(|axis| !first[*axis].accepted).collect();
-        self.verdicts = first;
-        if worse.is_empty() {
-            return Ok(());
-        }
-        for (sensor, row) in wanted.base.gyro.orientation.rows.iter().enumerate() {
-            let main =
-                (0..3).fold(0, |best, axis| if row[axis].abs() > row[best].abs() { axis } else { best });
-            if let (true, Some(gyro)) = (worse.contains(&main), self.gyros.get_mut(sensor)) {
-                let axis = ["x", "y", "z"][main];
+        self.verdicts = verdicts(&self.steps, &self.judged);
+        let worse: Vec<usize> =
+            (0..self.verdicts.len()).filter(|axis| !self.verdicts[*axis].accepted).collect();
+        let main_axes: Vec<usize> = wanted.base.gyro.orientation.rows.iter().map(main_axis).collect();
+        if !worse.is_empty() {
+            for (main, gyro) in main_axes.iter().zip(&mut self.gyros).filter(|(main, _)| worse.contains(main))
+            {
+                let axis = ["x", "y", "z"][*main];
                 *gyro = Err(format!("its weight and axis make the rate about {axis} worse than it was"));
             }
+            self.write(wanted, axes_deg_c, watch)?;
+            for (axis, verdict) in verdicts(&self.steps, &self.judged).into_iter().enumerate() {
+                if !worse.contains(&axis) {
+                    self.verdicts[axis] = verdict;
+                }
+            }
         }
-        self.write(wanted, axes_deg_c, watch)?;
-        for (axis, verdict) in verdicts(&self.steps, &self.judged).into_iter().enumerate() {
-            if !worse.contains(&axis) {
-                self.verdicts[axis] = verdict;
+        for (sensor, what) in doubted {
+            if let Some(verdict) = main_axes.get(*sensor).and_then(|axis| self.verdicts.get_mut(*axis)) {
+                *verdict = verdict.clone().refused(what.clone());
             }
         }
         Ok(())
@@ -248,6 +265,11 @@ impl Made {
     pub fn report(&self) -> FitReport {
         super::report::report(self)
     }
+}
+
+/// The case axis that an input axis looks along more than along the others.
+fn main_axis(row: &[f64; 3]) -> usize {
+    (0..3).fold(0, |best, axis| if row[axis].abs() > row[best].abs() { axis } else { best })
 }
 
 fn axes_of(base: &Document, sensor: usize) -> [f64; 3] {

@@ -3,9 +3,16 @@
 use super::bins::Bin;
 use super::plateaus::{Plateau, within};
 use super::steps::Step;
+use crate::modes::robust::median;
 
 /// Share of the smallest stated rate below which a plateau is a rest.
 const REST: f64 = 0.5;
+/// Share of the smallest stated rate that a rest may still show: bias, and what the document does not know of it.
+const AT_REST: f64 = 0.2;
+/// Share of the smallest stated rate by which rests may differ from each other.
+const RESTS_ALIKE: f64 = 0.05;
+/// What rests may show and differ by in any case (°/h): three times the Earth's rate, which turns with the case.
+const EARTH_DEG_PER_H: f64 = 45.0;
 /// Share by which a plateau may differ from its step, scale and axes being as good as unknown.
 const MISMATCH: f64 = 0.05;
 
@@ -42,7 +49,6 @@ pub fn matched(steps: &[Step], bins: &[Bin], plateaus: &[Plateau]) -> Result<Vec
         return Err("either all steps of a log state begin_s and end_s, or none".to_owned());
     }
     let turning: Vec<&Step> = steps.iter().filter(|step| step.rate_deg_per_s != 0.0).collect();
-    let size = |plateau: &Plateau| plateau.rate.iter().map(|x| x * x).sum::<f64>().sqrt();
     let fastest = plateaus.iter().map(size).fold(0.0, f64::max);
     let (least, most) = turning
         .iter()
@@ -57,7 +63,7 @@ pub fn matched(steps: &[Step], bins: &[Bin], plateaus: &[Plateau]) -> Result<Vec
             first.run + 1,
             turning.len(),
             moving.len(),
-            words(&plateaus.iter().filter(|plateau| size(plateau) > SEEN * fastest).collect::<Vec<_>>())
+            listed(plateaus)
         ));
     }
     let mut all: Vec<Matched> = turning
@@ -65,16 +71,50 @@ pub fn matched(steps: &[Step], bins: &[Bin], plateaus: &[Plateau]) -> Result<Vec
         .zip(&moving)
         .map(|(step, plateau)| Matched { step: *step, plateau: (*plateau).clone() })
         .collect();
-    check(&all)?;
-    let rests = plateaus.iter().filter(|plateau| size(plateau) <= limit);
+    check(&all).map_err(|what| format!("{what} Found were {}", listed(plateaus)))?;
+    let rests: Vec<&Plateau> = plateaus.iter().filter(|plateau| size(plateau) <= limit).collect();
+    // The table's rates by the scale of the fastest plateau: weights may be as good as unknown.
+    let scale = fastest / (3600.0 * most);
+    let of_slowest = |share: f64| (3600.0 * share * least).max(EARTH_DEG_PER_H) * scale;
+    if let Some(turns) = no_rest(&rests, [of_slowest(AT_REST), of_slowest(RESTS_ALIKE)]) {
+        return Err(format!(
+            "log {}: a plateau turns steadily that is none of the {} stated steps: {}. A rest shows {:.4} °/s at most and differs \
+             from the others by {:.4} °/s at most. Found were {}. State all steps in their order, or their begin_s and end_s with \
+             --steps",
+            first.run + 1,
+            all.len(),
+            words(&[turns]),
+            of_slowest(AT_REST) / 3600.0,
+            of_slowest(RESTS_ALIKE) / 3600.0,
+            listed(plateaus)
+        ));
+    }
     all.extend(
-        rests.map(|plateau| Matched {
+        rests.into_iter().map(|plateau| Matched {
             step: Step { rate_deg_per_s: 0.0, ..*first },
             plateau: plateau.clone(),
         }),
     );
     all.sort_by_key(|one| one.plateau.bins[0]);
     Ok(all)
+}
+
+/// The plateau among the rests that is none: it turns, or not as the others do.
+fn no_rest<'a>(rests: &[&'a Plateau], [most, alike]: [f64; 2]) -> Option<&'a Plateau> {
+    let sensors = rests.first().map_or(0, |rest| rest.rate.len());
+    let middle: Vec<f64> = (0..sensors)
+        .map(|sensor| median(&rests.iter().map(|rest| rest.rate[sensor]).collect::<Vec<_>>()))
+        .collect();
+    let away = |rest: &Plateau| {
+        let squares = rest.rate.iter().zip(&middle).map(|(rate, middle)| (rate - middle).powi(2));
+        squares.sum::<f64>().sqrt()
+    };
+    rests.iter().copied().find(|rest| size(rest) > most || away(rest) > alike)
+}
+
+/// Length of what the gyros show in a plateau (°/h).
+fn size(plateau: &Plateau) -> f64 {
+    plateau.rate.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
 /// Plateaus must be in proportion to their steps about each axis.
@@ -105,6 +145,12 @@ fn check(all: &[Matched]) -> Result<(), String> {
         }
     }
     Ok(())
+}
+
+/// The plateaus that turn, in words.
+fn listed(plateaus: &[Plateau]) -> String {
+    let fastest = plateaus.iter().map(size).fold(0.0, f64::max);
+    words(&plateaus.iter().filter(|plateau| size(plateau) > SEEN * fastest).collect::<Vec<_>>())
 }
 
 fn words(plateaus: &[&Plateau]) -> String {

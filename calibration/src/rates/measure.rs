@@ -64,6 +64,22 @@ pub(super) fn first_gains(runs: &[Turned], axes: &[[f64; 3]]) -> Vec<f64> {
         .collect()
 }
 
+/// What makes a rate in case axes of the rates along input axes, by least squares.
+pub(super) fn in_case(axes: &[[f64; 3]]) -> impl Fn(&dyn Fn(usize) -> f64) -> [f64; 3] + '_ {
+    let sum = axes.iter().fold(nalgebra::Matrix3::zeros(), |sum, axis| {
+        let row = nalgebra::Vector3::from(*axis);
+        sum + row * row.transpose()
+    });
+    let inverse = sum.try_inverse().unwrap_or_else(nalgebra::Matrix3::identity);
+    move |along| {
+        let mut vector = nalgebra::Vector3::zeros();
+        for (sensor, axis) in axes.iter().enumerate() {
+            vector += nalgebra::Vector3::from(*axis) * along(sensor);
+        }
+        (inverse * vector).into()
+    }
+}
+
 /// Mean of the Earth's rate in case axes over each bin of each run (°/h); none where it is not known.
 pub(super) fn earth_in_bins(
     runs: &[Turned],
@@ -71,18 +87,8 @@ pub(super) fn earth_in_bins(
     gains: &[f64],
     biases: &[f64],
 ) -> Vec<Vec<[f64; 3]>> {
-    let sum = axes.iter().fold(nalgebra::Matrix3::zeros(), |sum, axis| {
-        let row = nalgebra::Vector3::from(*axis);
-        sum + row * row.transpose()
-    });
-    let inverse = sum.try_inverse().unwrap_or_else(nalgebra::Matrix3::identity);
-    let turning = |bin: &Bin| {
-        let mut vector = nalgebra::Vector3::zeros();
-        for (sensor, axis) in axes.iter().enumerate() {
-            vector += nalgebra::Vector3::from(*axis) * ((bin.rate[sensor] - biases[sensor]) / gains[sensor]);
-        }
-        <[f64; 3]>::from(inverse * vector)
-    };
+    let in_case = in_case(axes);
+    let turning = |bin: &Bin| in_case(&|sensor| (bin.rate[sensor] - biases[sensor]) / gains[sensor]);
     let of_run = |run: &Turned| {
         run.earth_start.map(|start| carried(&run.binned.bins, start, turning)).unwrap_or_default()
     };

@@ -1,6 +1,7 @@
 //! A run on the table: its bins and its steps.
 
 use super::bins::{BIN_S, Binned, binned};
+use super::checks::turned_as_stated;
 use super::make::Wanted;
 use super::matching::{Matched, matched};
 use super::plateaus;
@@ -47,6 +48,9 @@ pub(super) fn read<W: Watch>(
         Ok(matched) => matched,
         Err(reason) => return Ok(Err(reason)),
     };
+    if let Err(reason) = turned_as_stated(&matched, wanted.base, wanted.scale_known) {
+        return Ok(Err(reason));
+    }
     for one in &matched {
         let bins = binned.bins.get(one.plateau.bins[0]..one.plateau.bins[1]).unwrap_or_default();
         let [good, all] =

@@ -74,7 +74,18 @@ fn steps(runs: usize) -> Vec<Step> {
 }
 
 fn made(runs: &[Run], steps: &[Step], place: &[Place]) -> Result<Made, Error> {
-    make(&Wanted { runs, judge: &[], steps, base: &base(), place, table_ppm: 0.0, with_bias: false }, || ())
+    let base = base();
+    let given = Wanted {
+        runs,
+        judge: &[],
+        steps,
+        scale_known: true,
+        base: &base,
+        place,
+        table_ppm: 0.0,
+        with_bias: false,
+    };
+    make(&given, || ())
 }
 
 /// Three runs, one about each axis.

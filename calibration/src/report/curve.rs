@@ -5,7 +5,7 @@ use std::sync::Arc;
 use isotherm_log::offline::Loaded;
 use isotherm_protocol::document::{Document, Sample};
 
-use super::verdict::{Figure, Verdict, made_worse};
+use super::verdict::Verdict;
 use crate::error::Error;
 use crate::means::{Means, Size};
 use crate::run::{Run, Troubles, Watch};
@@ -120,7 +120,7 @@ impl Curve {
     }
 
     /// One verdict for each sensor of some curves, in the order of their first appearance, over all runs in and out of
-    /// sample together. Accepted where the rms of the deciding sample is not [`made_worse`].
+    /// sample together, as [`Verdict::of_values`].
     #[must_use]
     pub fn verdicts(curves: &[Self]) -> Vec<Verdict> {
         let mut names: Vec<&Self> = Vec::new();
@@ -129,36 +129,18 @@ impl Curve {
                 names.push(curve);
             }
         }
-        let sizes = |of: &str, sample: Sample| {
+        let values = |of: &str, sample: Sample| {
             let mine = || curves.iter().filter(|curve| curve.of == of && curve.sample == sample);
-            let all = |values: fn(&Self) -> &[f64]| {
-                Size::of(&mine().flat_map(|curve| values(curve).iter().copied()).collect::<Vec<_>>())
+            let all = |values: fn(&Self) -> &[f64]| -> Vec<f64> {
+                mine().flat_map(|curve| values(curve).iter().copied()).collect()
             };
             mine().next().map(|_| [all(|curve| &curve.before), all(|curve| &curve.after)])
         };
         let verdict = |named: &Self| {
-            let inside = sizes(&named.of, Sample::In).unwrap_or_default();
-            let outside = sizes(&named.of, Sample::Out);
-            let verdict = Verdict::new(&named.of, &named.measure, inside).out_of_sample(outside);
-            let [before, after] = verdict.deciding();
-            if !made_worse(before.rms, after.rms) {
-                return verdict;
-            }
-            let grown = format!(
-                "rms grows from {} to {} {}",
-                Figure::Rms.words(&before),
-                Figure::Rms.words(&after),
-                verdict.measure
-            );
-            verdict.refused(grown)
+            let inside = values(&named.of, Sample::In).unwrap_or_default();
+            Verdict::of_values(&named.of, &named.measure, inside, values(&named.of, Sample::Out))
         };
         names.into_iter().map(verdict).collect()
-    }
-}
-
-impl Figure {
-    fn words(self, size: &Size) -> String {
-        crate::drift::figures::short(self.of(size))
     }
 }
 

@@ -74,6 +74,28 @@ impl Verdict {
         }
     }
 
+    /// Of the values before and after, in and out of sample; refused where they were made worse.
+    #[must_use]
+    pub fn of_values(
+        of: impl Into<String>,
+        measure: impl Into<String>,
+        inside: [Vec<f64>; 2],
+        outside: Option<[Vec<f64>; 2]>,
+    ) -> Self {
+        let sizes = |values: [Vec<f64>; 2]| values.map(|values| Size::of(&values));
+        Self::new(of, measure, sizes(inside)).out_of_sample(outside.map(sizes)).unless_worse()
+    }
+
+    /// Refused where the rms of the sample that decides is made worse. This is how all commands judge.
+    fn unless_worse(self) -> Self {
+        let [before, after] = self.deciding().map(|size| size.rms);
+        if !made_worse(before, after) {
+            return self;
+        }
+        let grown = format!("rms grows from {} to {} {}", short(before), short(after), self.measure);
+        self.refused(grown)
+    }
+
     /// With sizes out of sample.
     #[must_use]
     pub fn out_of_sample(mut self, sizes: Option<[Size; 2]>) -> Self {
@@ -142,8 +164,7 @@ pub const SAME_SHARE: f64 = 0.01;
 
 /// Whether what is left has grown, by more than [`SAME_SHARE`]: no sentence says that 2.87 grows to 2.87. The one rule for "made
 /// worse", of every figure.
-#[must_use]
-pub fn made_worse(before: f64, after: f64) -> bool {
+fn made_worse(before: f64, after: f64) -> bool {
     after > before * (1.0 + SAME_SHARE)
 }
 
@@ -152,7 +173,11 @@ pub(super) fn headline(verdicts: &[Verdict]) -> String {
     if verdicts.is_empty() {
         return "No verdict.".to_owned();
     }
-    verdicts.iter().map(|verdict| format!("{}.", verdict.words())).collect::<Vec<_>>().join(" ")
+    let sentence = |verdict: &Verdict| {
+        let words = verdict.words();
+        if words.ends_with(['.', '?']) { words } else { format!("{words}.") }
+    };
+    verdicts.iter().map(sentence).collect::<Vec<_>>().join(" ")
 }
 
 /// All sizes as a table.
@@ -208,4 +233,35 @@ pub fn residuals(verdicts: &[Verdict]) -> Vec<Residual> {
         }
     }
     residuals
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn judged(before: f64, after: f64) -> Verdict {
+        let size = |rms: f64| Size::of(&[rms, -rms]);
+        Verdict::new("gyro x", "°/h", [size(before), size(after)]).unless_worse()
+    }
+
+    #[test]
+    fn what_differs_by_less_than_noise_makes_it_is_not_worse() {
+        for (before, after) in [(2.868, 2.871), (6.94, 6.99), (2.0, 1.0), (0.0, 0.0)] {
+            assert!(judged(before, after).accepted, "{before} {after}");
+        }
+        for (before, after) in [(2.80, 2.88), (0.0, 1.0)] {
+            let verdict = judged(before, after);
+            let words = format!("rms grows from {} to {} °/h", short(before), short(after));
+            assert!(!verdict.accepted && verdict.reason == words, "{}", verdict.words());
+        }
+        let in_sample = judged(1.0, 2.0).in_sample;
+        let better = Verdict::new("gyro x", "°/h", in_sample).out_of_sample(Some([in_sample[1], in_sample[0]]));
+        assert!(better.unless_worse().accepted, "out of sample decides");
+    }
+
+    #[test]
+    fn a_question_ends_without_a_full_stop() {
+        let verdict = judged(1.0, 1.0).refused("is it right?");
+        assert!(headline(&[verdict]).ends_with("is it right?"));
+    }
 }

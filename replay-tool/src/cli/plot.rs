@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 use clap::Args;
-use isotherm_log::file::{read_small_text, refuse_overwriting};
+use isotherm_log::file::{read_small_text, refuse_overwriting, write_whole};
 use isotherm_log::plot::{PlotLog, PlotOptions, PlotSummary, plot};
 use isotherm_log::source::LogReport;
 use isotherm_protocol::key::UnitId;
@@ -113,7 +113,8 @@ pub(super) fn run(args: &PlotArgs) -> Result<Outcome, Error> {
         }
     })?;
     let html = page.to_html();
-    std::fs::write(&args.out, &html).map_err(|source| Error::file(&args.out, "write the page", source))?;
+    write_whole(&args.out, html.as_bytes(), true)
+        .map_err(|source| Error::file(&args.out, "write the page", source))?;
     if let Some(bar) = &bar {
         bar.finish();
     }

@@ -1,0 +1,175 @@
+//! Whether a unit turned as was stated, and whether what was fitted is a gyro.
+
+use isotherm_protocol::document::Document;
+
+use super::matching::Matched;
+use super::measure::in_case;
+use super::solve::GyroRates;
+use crate::drift::figures::short;
+use crate::modes::document::row;
+use crate::modes::robust::median;
+
+/// Share of a run's fastest step from which on a step shows what the table turned about.
+const FAST: f64 = 0.5;
+/// Largest angle between the stated axis and the one that the gyros show (°). Mountings are good to a degree.
+const LARGEST_ANGLE_DEG: f64 = 30.0;
+/// Most times by which a scale factor may differ from the document's.
+const LARGEST_FACTOR: f64 = 2.0;
+/// Share of the largest rate that the straight line may leave of a step, where noise does not explain it.
+const LARGEST_LEFT: f64 = 0.01;
+
+/// The fast steps of a run must turn about the stated axis, and about as fast as stated where the scale is known.
+///
+/// # Errors
+/// What the gyros show instead.
+pub(super) fn turned_as_stated(
+    matched: &[Matched],
+    document: &Document,
+    scale_known: bool,
+) -> Result<(), String> {
+    let sensors = document.gyro.sensor.len();
+    let axes: Vec<[f64; 3]> = (0..sensors).map(|sensor| row(document, sensor, f64::NAN)).collect();
+    let in_case = in_case(&axes);
+    let rest: Vec<f64> = (0..sensors).map(|sensor| at_rest(matched, sensor)).collect();
+    let fastest = matched.iter().map(|one| one.step.rate_deg_per_s.abs()).fold(0.0, f64::max);
+    for one in
+        matched.iter().filter(|one| one.step.rate_deg_per_s.abs() >= FAST * fastest.max(f64::MIN_POSITIVE))
+    {
+        let shown = |sensor: usize| (one.plateau.rate[sensor] - rest[sensor]) / 3600.0;
+        let rate = one.step.rate_deg_per_s;
+        let turned = in_case(&shown).map(|x| x * rate.signum());
+        let size = dot(turned, turned).sqrt();
+        let angle_deg = libm::acos((dot(turned, one.step.axis) / size).clamp(-1.0, 1.0)).to_degrees();
+        let factor = size / rate.abs();
+        let right_size = !scale_known || (1.0 / LARGEST_FACTOR..=LARGEST_FACTOR).contains(&factor);
+        if angle_deg <= LARGEST_ANGLE_DEG && right_size {
+            continue;
+        }
+        let [from, to] = one.plateau.window_s;
+        let name = |sensor: usize| document.gyro.sensor.get(sensor).map_or("", |sensor| sensor.name.as_str());
+        let along = |sensor: usize| axes.get(sensor).map_or(0.0, |axis| dot(*axis, one.step.axis).abs());
+        let nearest = largest(sensors, along);
+        let liveliest = largest(sensors, |sensor| shown(sensor).abs());
+        let other = if liveliest == nearest {
+            String::new()
+        } else {
+            format!(" and gyro {} {}", name(liveliest), short(shown(liveliest)))
+        };
+        let stated = format!(
+            "log {}: in the step of {from:.1}…{to:.1} s, stated as {rate} °/s about {}, gyro {} shows {} °/s{other}",
+            one.step.run + 1,
+            words(one.step.axis),
+            name(nearest),
+            short(shown(nearest))
+        );
+        return Err(if right_size {
+            format!(
+                "{stated}: the unit turned about {}, {angle_deg:.0}° off the stated axis, {LARGEST_ANGLE_DEG}° are allowed. State axis \
+                 and sign of the rates as they were, or mend the order of the columns in the mapping",
+                words(turned.map(|x| x / size))
+            )
+        } else {
+            format!(
+                "{stated}: that is {} times the stated rate by the document's weights, {} to {LARGEST_FACTOR} times are allowed. State \
+                 axis and rates (°/s) as they were, or mend the columns of the mapping or the weights of the document",
+                short(factor),
+                1.0 / LARGEST_FACTOR
+            )
+        });
+    }
+    Ok(())
+}
+
+/// Why what was fitted is no gyro: `rates` are the true rates of the steps (°/h), `axis` its input axis.
+pub(super) fn no_result(
+    found: &GyroRates,
+    rates: &[[f64; 3]],
+    axis: [f64; 3],
+    scale_known: bool,
+) -> Option<String> {
+    let [gain, _] = found.gain;
+    let sense = gain.is_finite() && gain > 0.0;
+    if !sense || (scale_known && !(1.0 / LARGEST_FACTOR..=LARGEST_FACTOR).contains(&gain)) {
+        return Some(format!(
+            "it shows {} times the rate that the document's weight makes of it, {} to {LARGEST_FACTOR} times are a result: are the \
+             table's axis, the sign and the unit of its rates right, and the document's weight too?",
+            short(gain),
+            1.0 / LARGEST_FACTOR
+        ));
+    }
+    let full = rates.iter().map(|rate| dot(*rate, axis).abs()).fold(0.0, f64::max);
+    let left = found.left.iter().map(|left| left.abs()).fold(0.0, f64::max);
+    (found.widened && left > LARGEST_LEFT * full).then(|| {
+        format!(
+            "the straight line leaves {} °/s of a step, {} % of the largest rate, at most {} % are a result (χ² {} per degree of \
+             freedom): are the stated rates those of the log?",
+            short(left / 3600.0),
+            short(100.0 * left / full),
+            100.0 * LARGEST_LEFT,
+            short(found.chi_square)
+        )
+    })
+}
+
+/// What a gyro shows at rest (°/h): the median of a run's rests, 0 without any.
+fn at_rest(matched: &[Matched], sensor: usize) -> f64 {
+    let rests = matched.iter().filter(|one| one.step.rate_deg_per_s == 0.0);
+    let shown: Vec<f64> = rests.map(|one| one.plateau.rate[sensor]).collect();
+    if shown.is_empty() { 0.0 } else { median(&shown) }
+}
+
+/// The number below `count` with the largest value.
+fn largest(count: usize, value: impl Fn(usize) -> f64) -> usize {
+    (0..count).fold(0, |best, index| if value(index) > value(best) { index } else { best })
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// An axis by its name where it is near a case axis, else as three numbers.
+fn words(axis: [f64; 3]) -> String {
+    const NEAR: f64 = 0.985;
+    let main = largest(3, |index| axis[index].abs());
+    if axis[main].abs() > NEAR {
+        return format!("{}{}", if axis[main] < 0.0 { "-" } else { "" }, ["x", "y", "z"][main]);
+    }
+    let [x, y, z] = axis;
+    format!("{x:.2},{y:.2},{z:.2}")
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::DMatrix;
+
+    use super::*;
+
+    #[test]
+    fn a_gyro_is_one_whose_scale_and_line_are_near_what_was_stated() {
+        let gyro = |gain: f64, left: f64, widened: bool| GyroRates {
+            gain: [gain, 1e-6],
+            axis: None,
+            axis_sigma: [f64::NAN; 3],
+            asymmetry: None,
+            bias: [0.0, 1.0],
+            covariance: DMatrix::identity(2, 2),
+            left: vec![left, -left],
+            chi_square: 1e9,
+            widened,
+        };
+        // 100 °/s about x.
+        let rates = [[360_000.0, 0.0, 0.0], [-360_000.0, 0.0, 0.0]];
+        let doubt = |found: &GyroRates, known: bool| no_result(found, &rates, [1.0, 0.0, 0.0], known);
+        assert_eq!(doubt(&gyro(1.002, 3000.0, true), true), None, "0.8 % of the largest rate");
+        assert_eq!(doubt(&gyro(0.3, 1.0, false), false), None, "counts without a document");
+        for (found, words) in [
+            (gyro(-2e-4, 1.0, false), "-2.00e-4 times the rate"),
+            (gyro(2.1, 1.0, false), "2.10 times the rate"),
+            (gyro(1.0, 36_000.0, true), "leaves 10.0 °/s of a step, 10.0 % of the largest rate, at most 1 %"),
+        ] {
+            let doubt = doubt(&found, true).unwrap();
+            assert!(doubt.contains(words), "{doubt}");
+        }
+        assert!(doubt(&gyro(-1.0, 1.0, false), false).is_some(), "the wrong sense is wrong at any scale");
+    }
+}
