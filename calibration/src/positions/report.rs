@@ -8,8 +8,8 @@ use super::budget::ARCSEC_PER_RAD;
 use super::charts::{AXES, across, axes_chart, bend, left_chart, shown};
 use super::fit::Fit;
 use super::judged::{Judgement, curves, lengths};
-use crate::drift::figures::short;
-use crate::report::{Coefficient, Curve, Figure, FitReport, Verdict};
+use crate::drift::figures::{per_deg_c, short, six};
+use crate::report::{Coefficient, Curve, Figure, FitReport, Verdict, output_unit};
 
 /// A set of judged positions with the names of its runs.
 #[derive(Debug, Clone, Copy)]
@@ -70,8 +70,8 @@ fn notes(analysis: &Analysis, settings: &Settings) -> Vec<String> {
             "{} positions at {} °C; g = {} m/s²; C about {} °C.",
             analysis.poses.len(),
             levels.join(", "),
-            settings.gravity,
-            analysis.reference_deg_c
+            six(settings.gravity),
+            six(analysis.reference_deg_c)
         ),
         format!(
             "Weighted with a stand of {:.1}″ (positioning and run-out) and white noise of {} output²·s; level known to {:.0}″ \
@@ -101,12 +101,7 @@ fn coefficients(
     names: &[String],
 ) -> Vec<Coefficient> {
     let fit = &analysis.fit;
-    let output = document.accel.as_ref().map_or("", |accel| match accel.output {
-        isotherm_protocol::document::AccelOutput::Counts => "counts/s",
-        isotherm_protocol::document::AccelOutput::Volts => "V",
-        isotherm_protocol::document::AccelOutput::MetresPerSecondSquared => "m/s²",
-    });
-    let powers = ["", "/°C", "/°C²"];
+    let output = output_unit(document);
     let mut all = Vec::new();
     let of_sensor = fit.solution.parameters.len().saturating_sub(3) / names.len().max(1);
     let s = fit.degrees.sensor + 1;
@@ -123,13 +118,13 @@ fn coefficients(
         for (power, k) in sensor.scale.iter().enumerate() {
             let factor = analysis.half_deg_c.powi(-i32::try_from(power).unwrap_or(0));
             let value = k * factor / settings.gravity;
-            let unit = format!("{output}/(m/s²){}", powers[power]);
+            let unit = per_deg_c(&format!("{output}/(m/s²)"), power);
             let sigma = sigma(power, guess / settings.gravity * factor);
             all.push(Coefficient::new(format!("accelerometer {name} K{power}"), unit, value, sigma));
         }
         for (power, bias) in sensor.bias.iter().enumerate() {
             let factor = analysis.half_deg_c.powi(-i32::try_from(power).unwrap_or(0));
-            let unit = format!("{output}{}", powers[power]);
+            let unit = per_deg_c(output, power);
             let sigma = sigma(s + power, guess * factor);
             all.push(Coefficient::new(format!("accelerometer {name} S{power}"), unit, bias * factor, sigma));
         }
@@ -142,7 +137,7 @@ fn coefficients(
                 for i in across(sensor.axis[0]) {
                     all.push(Coefficient::new(
                         format!("accelerometer {name} C{power}{what} along {}", AXES[i]),
-                        format!("″{}", powers[power]),
+                        per_deg_c("″", power),
                         row[i] * factor,
                         Some(sigma[i] * factor * analysis.widened),
                     ));

@@ -116,16 +116,21 @@ impl Verdict {
         (after.count > 0 && after.rms > 0.0).then(|| before.rms / after.rms)
     }
 
-    /// Its sentence, without a full stop.
+    /// Its sentence with the reason, without a full stop.
     #[must_use]
     pub fn words(&self) -> String {
+        match (self.accepted, self.reason.is_empty()) {
+            (_, true) => self.sentence(),
+            (true, false) => format!("{}, {}", self.sentence(), self.reason),
+            (false, false) => format!("{}: {}", self.sentence(), self.reason),
+        }
+    }
+
+    /// Its sentence without the reason and without a full stop: "gyro x: 1.68 → 0.170 °/h peak to peak out of sample; accepted".
+    #[must_use]
+    pub fn sentence(&self) -> String {
         let [before, after] = self.deciding();
-        let state = match (self.accepted, self.reason.is_empty()) {
-            (true, true) => "accepted".to_owned(),
-            (true, false) => format!("accepted, {}", self.reason),
-            (false, true) => "refused".to_owned(),
-            (false, false) => format!("refused: {}", self.reason),
-        };
+        let state = if self.accepted { "accepted" } else { "refused" };
         if before.count == 0 && after.count == 0 {
             return format!("{}: {state}", self.of);
         }
@@ -137,12 +142,12 @@ impl Verdict {
     }
 }
 
-/// All verdicts in one line.
-pub(super) fn headline(verdicts: &[Verdict]) -> String {
+/// All verdicts, one sentence each.
+pub(super) fn sentences(verdicts: &[Verdict]) -> Vec<String> {
     if verdicts.is_empty() {
-        return "No verdict.".to_owned();
+        return vec!["No verdict.".to_owned()];
     }
-    verdicts.iter().map(|verdict| format!("{}.", verdict.words())).collect::<Vec<_>>().join(" ")
+    verdicts.iter().map(|verdict| format!("{}.", verdict.words())).collect()
 }
 
 /// All sizes as a table.
