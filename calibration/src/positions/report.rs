@@ -39,7 +39,7 @@ pub fn report(
     let length = Verdict::new("|f|−g", "m/s²", lengths(inside.judged)).stated_as(Figure::Rms);
     report.verdicts.push(length.out_of_sample(outside.map(|set| lengths(set.judged))));
     report.warnings.clone_from(&analysis.warnings);
-    report.notes = notes(analysis, settings);
+    report.notes = notes(document, analysis, settings);
     let names = names(document, analysis.fit.guess.len());
     report.coefficients = coefficients(document, analysis, settings, &names);
     report.charts.push(("What is left".to_owned(), left_chart(settings, inside.judged)));
@@ -60,7 +60,7 @@ fn names(document: &Document, count: usize) -> Vec<String> {
     (0..count).map(of).collect()
 }
 
-fn notes(analysis: &Analysis, settings: &Settings) -> Vec<String> {
+fn notes(document: &Document, analysis: &Analysis, settings: &Settings) -> Vec<String> {
     let fit = &analysis.fit.solution;
     let levels: Vec<String> = analysis.levels_deg_c.iter().map(|t| format!("{t:.1}")).collect();
     let arcsec = |rad: f64| rad * ARCSEC_PER_RAD;
@@ -74,10 +74,11 @@ fn notes(analysis: &Analysis, settings: &Settings) -> Vec<String> {
             six(analysis.reference_deg_c)
         ),
         format!(
-            "Weighted with a stand of {:.1}″ (positioning and run-out) and white noise of {} output²·s; level known to {:.0}″ \
+            "Weighted with a stand of {:.1}″ (positioning and run-out) and white noise of {} ({})²·s; level known to {:.0}″ \
              beforehand. χ² {:.1} with {} degrees of freedom.",
             arcsec(analysis.weights.positioning_rad),
             noise.join(", "),
+            output_unit(document),
             arcsec(analysis.weights.levelling_rad),
             fit.chi_square,
             fit.degrees

@@ -167,7 +167,7 @@ function drawMarks(g, view, marks, colours) {
     if (mark.x < view.range[0] || mark.x > view.range[1]) continue;
     inks.set(Math.round(view.left + view.to(mark.x)) + 0.5, colours[mark.ink]);
   }
-  const many = inks.size > Math.max(view.width / 40, 3);
+  const many = inks.size > Math.max(view.width / 60, 3);
   g.lineWidth = 1.2;
   g.setLineDash(many ? [] : [5, 3]);
   for (const [p, ink] of inks) {

@@ -58,7 +58,8 @@ function grouped(text) {
 /** A number beside a tick mark. */
 function tickLabel(value, decimals) {
   const size = Math.abs(value);
-  if (decimals === null || size >= 1e9) return plain(value, 3);
+  if (decimals === null) return placed(value, size / 200);
+  if (size >= 1e9) return plain(value, 3);
   if (size === 0 && decimals > 4) return "0";
   // As many digits as tell it from its neighbours.
   if (size > 0 && decimals > 5 && size < 1e-3) return plain(value, Math.max(3, Math.floor(Math.log10(size) + 1e-9) + 1 + decimals));

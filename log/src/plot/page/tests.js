@@ -18,6 +18,7 @@ equal(tickLabel(123456, 0), "123\u202f456");
 equal([0.0001845, 0.0001846].map(value => tickLabel(value, 7)), ["0.0001845", "0.0001846"]);
 equal(tickLabel(9.3e-5, 8), "9.3\u00d710\u207b\u2075");
 equal([0, -5e-6].map(value => tickLabel(value, 9)), ["0", "\u22125\u00d710\u207b\u2076"]);
+equal([100, 1, 0.05, 1e-5].map(value => tickLabel(value, null)), ["100", "1", "0.05", "1\u00d710\u207b\u2075"]);
 // One mark by itself tells no scale.
 assert(linearTicks(-3.6, 4.4, 2).values.length > 1 && linearTicks(-0.9, 0.9, 2).values.length > 1);
 for (const [low, high] of [[2.1, 4.9], [0.3, 7], [30, 400], [3, 3.4]]) assert(logTicks(low, high, 2).values.length > 1);
