@@ -27,7 +27,7 @@ use std::fmt::Write;
 use isotherm_log::plot::page::{Chart, Table};
 
 pub use batch::{BatchRow, BatchTable, UnitReport, in_parallel, of_unit};
-pub use curve::{Curve, Judged, Rest, judge};
+pub use curve::{Curve, Judged, Rest, judge, output_unit};
 pub use sheet::Sheet;
 pub use sigma::Sigmas;
 pub use verdict::{Figure, SAME_SHARE, Verdict, residuals};
@@ -62,7 +62,7 @@ pub struct FitReport {
     pub title: String,
     /// Serial of the unit.
     pub unit: String,
-    /// What came of each sensor: the first line.
+    /// What came of each sensor: the first lines.
     pub verdicts: Vec<Verdict>,
     /// What is to be looked at, and what to do about it.
     pub warnings: Vec<String>,
@@ -87,10 +87,10 @@ impl FitReport {
         Self { title: title.into(), unit: unit.into(), ..Self::default() }
     }
 
-    /// The first line: every verdict, one sentence each.
+    /// Every verdict, one sentence each, in one line.
     #[must_use]
     pub fn headline(&self) -> String {
-        verdict::headline(&self.verdicts)
+        verdict::sentences(&self.verdicts).join(" ")
     }
 
     /// Whether every sensor was accepted.
@@ -106,10 +106,15 @@ impl FitReport {
         refused.map(|verdict| format!("{}: {}: {}", self.unit, verdict.of, verdict.reason)).collect()
     }
 
-    /// Everything as text, the verdict in the first line.
+    /// Everything as text, the verdicts in the first lines.
     #[must_use]
     pub fn to_text(&self) -> String {
-        let mut text = format!("{}\n\n{}, unit {}\n", self.headline(), self.title, self.unit);
+        let mut text = format!(
+            "{}\n\n{}, unit {}\n",
+            verdict::sentences(&self.verdicts).join("\n"),
+            self.title,
+            self.unit
+        );
         self.notes.iter().for_each(|note| {
             let _ = writeln!(text, "{note}");
         });

@@ -10,7 +10,7 @@ use isotherm_correction::channel::ThermalState;
 use isotherm_correction::units::{AngularRate, SpecificForce};
 use serde_json::{Value, json};
 
-use crate::drift::figures::short;
+use crate::drift::figures::{alike, short};
 use crate::error::Error;
 use crate::report::Sheet;
 use crate::written::Written;
@@ -20,6 +20,8 @@ use terms::{Term, terms, tree};
 const COLUMNS: usize = 7;
 /// Temperatures that are shown where no term has a range (°C).
 const USUAL: [f64; 2] = [-40.0, 60.0];
+/// Digits that the change of a term over the range has in a table.
+const RANGE_DIGITS: f64 = 3.0;
 /// Ramps that the sums are shown on (°C/min).
 const RAMPS: [f64; 3] = [0.0, 1.0, -1.0];
 
@@ -75,7 +77,13 @@ pub fn show(name: &str, written: &Written) -> Result<Shown, Error> {
 
 /// The term as people call it: "gyro x lag of 300 s".
 pub(crate) fn title(term: &Term) -> String {
-    format!("{} {} {}", if term.kind == "gyro" { "gyro" } else { "accelerometer" }, term.sensor, term.name)
+    let kind = if term.kind == "gyro" { "gyro" } else { "accelerometer" };
+    format!("{kind} {} {}", term.sensor, spoken(&term.name))
+}
+
+/// The name of a term as people say it: "static bias".
+pub(crate) fn spoken(name: &str) -> String {
+    name.replace('_', " ")
 }
 
 /// The range of temperature that all terms over it reach over together.
@@ -109,11 +117,13 @@ fn over_temperature(sheet: &mut Sheet, terms: &[Term], range: [f64; 2]) {
         let mut head = vec![String::new()];
         head.extend(at.iter().map(|x| format!("{} {argument}", short(*x))));
         let row = |term: &Term| {
-            let cell = |x: &f64| {
-                let (value, clamped) = term.at(*x);
-                if clamped { format!("({})", short(value)) } else { short(value) }
+            let values: Vec<(f64, bool)> = at.iter().map(|x| term.at(*x)).collect();
+            let words = alike(&values.iter().map(|(value, _)| *value).collect::<Vec<_>>(), RANGE_DIGITS);
+            let cell = |(word, (_, clamped)): (String, &(f64, bool))| {
+                if *clamped { format!("({word})") } else { word }
             };
-            std::iter::once(format!("{}, {}", title(term), term.unit)).chain(at.iter().map(cell)).collect()
+            let cells = words.into_iter().zip(&values).map(cell);
+            std::iter::once(format!("{}, {}", title(term), term.unit)).chain(cells).collect()
         };
         let head: Vec<&str> = head.iter().map(String::as_str).collect();
         let heading = match argument {
@@ -138,7 +148,9 @@ fn sums(sheet: &mut Sheet, written: &Written, range: [f64; 2]) {
     head.extend(at.iter().map(|x| format!("{} °C", short(*x))));
     let mut rows = Vec::new();
     let mut row = |name: String, of: &dyn Fn(f64) -> Option<f64>| {
-        let cells = at.iter().map(|x| of(*x).map_or_else(|| "–".to_owned(), short));
+        let values: Vec<f64> = at.iter().map(|x| of(*x).unwrap_or(f64::NAN)).collect();
+        let cells = alike(&values, RANGE_DIGITS).into_iter().zip(&values);
+        let cells = cells.map(|(word, value)| if value.is_nan() { "–".to_owned() } else { word });
         rows.push(std::iter::once(name).chain(cells).collect::<Vec<_>>());
     };
     for (index, gyro) in written.document.gyro.sensor.iter().enumerate() {

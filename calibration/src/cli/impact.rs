@@ -270,7 +270,20 @@ impl ImpactArgs {
             |path| format!("gyros as {} states them", path.display()),
         );
         let source = format!("Drifts of {count} seeds from {}, {from}{trend}", self.seed);
-        let notes = vec!["Figures are the middle of all seeds, and what 95 % of them stay below.".to_owned()];
+        let mut notes =
+            vec!["Figures are the middle of all seeds, and what 95 % of them stay below.".to_owned()];
+        notes.push(
+            "A drift that is held at its last value is held at what it truly is at departure, which no measurement gives: the row is a \
+             bound. The estimators see the drift through the angle random walk of the gyros and the noise of the references."
+                .to_owned(),
+        );
+        if parts.iter().all(|gyro| gyro.sigma_rad_per_s == 0.0 && gyro.trend_sigma_rad_per_s2 == 0.0) {
+            notes.push(
+                "These gyros have a constant part only, neither a slow drift nor a trend: held, it leaves nothing, and the trend state \
+                 has nothing to do."
+                    .to_owned(),
+            );
+        }
         Ok(Report { voyage: *voyage, source, seeds: seeds.len(), rows: rows.collect(), notes })
     }
 

@@ -101,7 +101,8 @@ impl OutputArgs {
     pub(super) fn keep(&self, fitted: Fitted, work: &Work, names: &Names<'_>) -> Result<FitReport, Error> {
         let Fitted { written, mut report, about } = fitted;
         report.warnings.extend(work.told());
-        let any_accepted = report.verdicts.is_empty() || report.verdicts.iter().any(|verdict| verdict.accepted);
+        let any_accepted =
+            report.verdicts.is_empty() || report.verdicts.iter().any(|verdict| verdict.accepted);
         if !any_accepted {
             report.warnings.extend(self.nothing_new(names));
         }

@@ -16,7 +16,9 @@ const HEIGHT: u32 = 260;
 #[must_use]
 pub fn page(report: &Report) -> String {
     let mut page = Page::new(&format!("Noise and drift of unit {}", report.unit));
-    page.headline(&report.verdict());
+    let sentences: Vec<_> =
+        report.sentences().into_iter().map(|sentence| (sentence, String::new())).collect();
+    page.headlines(&sentences);
     page.paragraph(&format!(
         "{} ticks of {} s, {:.2} h{}.",
         report.ticks,

@@ -61,16 +61,17 @@ impl Parameters {
         let (trend_sigma, trend_time_h) = match trend {
             Trend::Seen { slope, .. } if length_h < LEAST_TREND_H => {
                 notes.push(format!(
-                    "a trend of {slope:.2e} °/h² shows, but in {length_h:.1} h a slow drift looks the same too often: it is left out; \
-                     log for {LEAST_TREND_H} h"
+                    "a trend of {} °/h² shows, but in {length_h:.1} h a slow drift looks the same too often: it is left out; \
+                     log for {LEAST_TREND_H} h",
+                    short(slope)
                 ));
                 (0.0, TREND_CORRELATION_TIME_H)
             }
             Trend::Seen { slope, holds_h } => (slope.abs(), holds_h),
             Trend::NotSeen { error } => {
                 notes.push(format!(
-                    "no trend is seen; one of up to {:.2e} °/h² would not be",
-                    TREND_SIGMAS * error
+                    "no trend is seen; one of up to {} °/h² would not be",
+                    short(TREND_SIGMAS * error)
                 ));
                 (0.0, TREND_CORRELATION_TIME_H)
             }

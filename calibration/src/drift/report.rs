@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use super::analysis::{Analysis, Deviation};
 use super::columns::Kind;
-use super::figures::{short, stated_in, table, with_interval};
+use super::figures::{short, stated_in, table, with_interval, within};
 use super::parameters::{Parameters, Trend, markov, trend};
 use crate::allan::{Coefficient, NoiseFit, Term};
 
@@ -40,9 +40,15 @@ pub struct Report {
 }
 
 impl Report {
-    /// The first line: what was found, in words.
+    /// All sentences in one line: what was found, in words.
     #[must_use]
     pub fn verdict(&self) -> String {
+        format!("{}.", self.sentences().join("; "))
+    }
+
+    /// The first lines: what was found, one sentence for each sensor.
+    #[must_use]
+    pub fn sentences(&self) -> Vec<String> {
         let (measure, sensor) = (self.kind.measure(), self.kind.sensor());
         let of = |analysis: &Analysis| {
             let walk = analysis.noise.as_ref().map(|noise| noise.of_term(Term::AngleRandomWalk));
@@ -82,10 +88,8 @@ impl Report {
             }
             format!("{sensor} {}: {words}", analysis.name)
         };
-        let sensors: Vec<String> = self.sensors.iter().map(of).collect();
-        let refused =
-            if self.refused.is_empty() { String::new() } else { format!("; {} refused", self.refused.len()) };
-        format!("{}{refused}.", sensors.join("; "))
+        let refused = (!self.refused.is_empty()).then(|| format!("{} refused", self.refused.len()));
+        self.sensors.iter().map(of).chain(refused).collect()
     }
 
     /// Allan deviations, one row per averaging time.
@@ -120,13 +124,8 @@ impl Report {
             let (factor, unit) = stated_in(term, self.kind);
             let cells = self.sensors.iter().map(|sensor| {
                 match sensor.noise.as_ref().map(|noise| noise.of_term(term)) {
-                    Some(Coefficient::Observed { value, interval: [low, high] }) => {
-                        format!(
-                            "{} ({}…{})",
-                            short(value * factor),
-                            short(low * factor),
-                            short(high * factor)
-                        )
+                    Some(Coefficient::Observed { value, interval }) => {
+                        within(value * factor, interval.map(|end| end * factor))
                     }
                     Some(Coefficient::NotObservable { below }) if below.is_finite() => {
                         format!("not observable (< {})", short(below * factor))
@@ -264,7 +263,7 @@ impl Report {
     /// Everything as text.
     #[must_use]
     pub fn to_text(&self) -> String {
-        let mut text = format!("{}\n\n", self.verdict());
+        let mut text = format!("{}.\n\n", self.sentences().join(".\n"));
         let _ = writeln!(
             text,
             "unit {}, {} ticks of {} s: {:.2} h{}",

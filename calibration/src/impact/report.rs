@@ -14,6 +14,8 @@ use crate::drift::figures::{short, table};
 
 /// Height of a panel (CSS pixels).
 const HEIGHT: u32 = 220;
+/// Share of the estimator's error below which a drift that is known exactly is another matter than one that is estimated.
+const EXACT: f64 = 0.5;
 
 /// One row.
 #[derive(Debug, Clone, PartialEq)]
@@ -83,11 +85,26 @@ impl Report {
         } else {
             format!("the trend state costs {:.1}×: its trend_sigma is too large for this gyro", 1.0 / gain)
         };
+        let hours = short(self.voyage.hours);
+        // Seeded drifts are held at what they are, without noise: no procedure comes that far.
+        if self.seeds > 0
+            && held.radial_largest_m < EXACT * without.radial_largest_m.min(with.radial_largest_m)
+        {
+            return format!(
+                "{}: over {hours} h {middle}{} of position with the estimator without trend state, {} with it: {judgement}. Known \
+                 exactly at departure and held from then on, the drift would leave {} of position and {}′ of heading: the rest is what \
+                 the estimator does not see for noise.",
+                worst.case,
+                distance(without.radial_largest_m),
+                distance(with.radial_largest_m),
+                distance(held.radial_largest_m),
+                short(held.heading_largest_arcmin),
+            );
+        }
         format!(
-            "{}: over {} h {middle}{} of position and {}′ of heading where the drift is held at its last value; {} with the \
+            "{}: over {hours} h {middle}{} of position and {}′ of heading where the drift is held at its last value; {} with the \
              estimator without trend state, {} with it: {judgement}.",
             worst.case,
-            short(self.voyage.hours),
             distance(held.radial_largest_m),
             short(held.heading_largest_arcmin),
             distance(without.radial_largest_m),

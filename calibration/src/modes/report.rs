@@ -4,7 +4,7 @@ use isotherm_log::plot::page::Table;
 
 use super::fit::{GyroFit, Term};
 use super::make::{Made, ServoFit};
-use crate::drift::figures::short;
+use crate::drift::figures::{per_deg_c, short};
 use crate::report::{Coefficient, Curve, FitReport};
 
 /// Models of the cross-validation that the report lists for each gyro.
@@ -68,12 +68,8 @@ fn notes(made: &Made, report: &mut FitReport) {
 
 fn gyro(name: &str, fit: &GyroFit, report: &mut FitReport, validation: &mut Vec<Vec<String>>) {
     for one in &fit.coefficients {
-        let unit = match one.power {
-            0 => "°/h".to_owned(),
-            1 => "°/h/°C".to_owned(),
-            power => format!("°/h/°C^{power}"),
-        };
-        let name = format!("gyro {name} {}, power {}", one.term.key(), one.power);
+        let unit = per_deg_c("°/h", one.power);
+        let name = format!("gyro {name} {}, power {}", one.term.key().replace('_', " "), one.power);
         report.coefficients.push(Coefficient::new(name, unit, one.value, Some(one.sigma)));
     }
     let markov = fit.noise.markov.map_or_else(String::new, |[variance, time_s]| {
@@ -116,7 +112,7 @@ fn transient(name: &str, servo: &ServoFit, report: &mut FitReport) {
         Some(own.sigma_s),
     ));
     for (power, [value, sigma]) in servo.rest.coefficients.iter().enumerate() {
-        let unit = if power == 0 { "Hz".to_owned() } else { format!("Hz/°C^{power}") };
+        let unit = per_deg_c("Hz", power);
         let name = format!("gyro {name} dither rest frequency, power {power}");
         report.coefficients.push(Coefficient::new(name, unit, *value, Some(*sigma)));
     }

@@ -66,7 +66,7 @@ pub(super) fn left_chart(settings: &Settings, judged: &[Judgement]) -> Chart {
     };
     Chart {
         caption: "Specific force less what must be there, by position in the order of the table.".to_owned(),
-        x: Axis::of("number of the position", "1"),
+        x: Axis::of("number of the position", ""),
         panels: (0..3).map(panel).collect(),
         marks: Vec::new(),
     }

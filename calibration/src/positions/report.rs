@@ -8,8 +8,8 @@ use super::budget::ARCSEC_PER_RAD;
 use super::charts::{AXES, across, axes_chart, bend, left_chart, shown};
 use super::fit::Fit;
 use super::judged::{Judgement, curves, lengths};
-use crate::drift::figures::short;
-use crate::report::{Coefficient, Curve, Figure, FitReport, Verdict};
+use crate::drift::figures::{per_deg_c, short, six};
+use crate::report::{Coefficient, Curve, Figure, FitReport, Verdict, output_unit};
 
 /// A set of judged positions with the names of its runs.
 #[derive(Debug, Clone, Copy)]
@@ -39,7 +39,7 @@ pub fn report(
     report.verdicts.push(Verdict::of_values("|f|−g", "m/s²", length.unwrap_or_default(), outside));
     report.verdicts = as_a_whole(report.verdicts).into_iter().map(|v| v.stated_as(Figure::Rms)).collect();
     report.warnings.clone_from(&analysis.warnings);
-    report.notes = notes(analysis, settings);
+    report.notes = notes(document, analysis, settings);
     let names = names(document, analysis.fit.guess.len());
     report.coefficients = coefficients(document, analysis, settings, &names);
     report.charts.push(("What is left".to_owned(), left_chart(settings, inside.judged)));
@@ -76,7 +76,7 @@ fn names(document: &Document, count: usize) -> Vec<String> {
     (0..count).map(of).collect()
 }
 
-fn notes(analysis: &Analysis, settings: &Settings) -> Vec<String> {
+fn notes(document: &Document, analysis: &Analysis, settings: &Settings) -> Vec<String> {
     let fit = &analysis.fit.solution;
     let levels: Vec<String> = analysis.levels_deg_c.iter().map(|t| format!("{t:.1}")).collect();
     let arcsec = |rad: f64| rad * ARCSEC_PER_RAD;
@@ -86,14 +86,15 @@ fn notes(analysis: &Analysis, settings: &Settings) -> Vec<String> {
             "{} positions at {} °C; g = {} m/s²; C about {} °C.",
             analysis.poses.len(),
             levels.join(", "),
-            settings.gravity,
-            analysis.reference_deg_c
+            six(settings.gravity),
+            six(analysis.reference_deg_c)
         ),
         format!(
-            "Weighted with a stand of {:.1}″ (positioning and run-out) and white noise of {} output²·s; level known to {:.0}″ \
+            "Weighted with a stand of {:.1}″ (positioning and run-out) and white noise of {} ({})²·s; level known to {:.0}″ \
              beforehand. χ² {:.1} with {} degrees of freedom.",
             arcsec(analysis.weights.positioning_rad),
             noise.join(", "),
+            output_unit(document),
             arcsec(analysis.weights.levelling_rad),
             fit.chi_square,
             fit.degrees
@@ -117,12 +118,7 @@ fn coefficients(
     names: &[String],
 ) -> Vec<Coefficient> {
     let fit = &analysis.fit;
-    let output = document.accel.as_ref().map_or("", |accel| match accel.output {
-        isotherm_protocol::document::AccelOutput::Counts => "counts/s",
-        isotherm_protocol::document::AccelOutput::Volts => "V",
-        isotherm_protocol::document::AccelOutput::MetresPerSecondSquared => "m/s²",
-    });
-    let powers = ["", "/°C", "/°C²"];
+    let output = output_unit(document);
     let mut all = Vec::new();
     let of_sensor = fit.solution.parameters.len().saturating_sub(3) / names.len().max(1);
     let s = fit.degrees.sensor + 1;
@@ -139,13 +135,13 @@ fn coefficients(
         for (power, k) in sensor.scale.iter().enumerate() {
             let factor = analysis.half_deg_c.powi(-i32::try_from(power).unwrap_or(0));
             let value = k * factor / settings.gravity;
-            let unit = format!("{output}/(m/s²){}", powers[power]);
+            let unit = per_deg_c(&format!("{output}/(m/s²)"), power);
             let sigma = sigma(power, guess / settings.gravity * factor);
             all.push(Coefficient::new(format!("accelerometer {name} K{power}"), unit, value, sigma));
         }
         for (power, bias) in sensor.bias.iter().enumerate() {
             let factor = analysis.half_deg_c.powi(-i32::try_from(power).unwrap_or(0));
-            let unit = format!("{output}{}", powers[power]);
+            let unit = per_deg_c(output, power);
             let sigma = sigma(s + power, guess * factor);
             all.push(Coefficient::new(format!("accelerometer {name} S{power}"), unit, bias * factor, sigma));
         }
@@ -158,7 +154,7 @@ fn coefficients(
                 for i in across(sensor.axis[0]) {
                     all.push(Coefficient::new(
                         format!("accelerometer {name} C{power}{what} along {}", AXES[i]),
-                        format!("″{}", powers[power]),
+                        per_deg_c("″", power),
                         row[i] * factor,
                         Some(sigma[i] * factor * analysis.widened),
                     ));

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use isotherm_log::offline::Loaded;
-use isotherm_protocol::document::{Document, Sample};
+use isotherm_protocol::document::{AccelOutput, Document, Sample};
 
 use super::verdict::Verdict;
 use crate::error::Error;
@@ -161,6 +161,16 @@ fn common([before, after]: [&[f64]; 2], truth: Option<f64>) -> Option<[Vec<f64>;
     };
     let (before, after) = (mean(|pair| pair.0), mean(|pair| pair.1));
     Some([pairs.iter().map(|(a, _)| a - before).collect(), pairs.iter().map(|(_, b)| b - after).collect()])
+}
+
+/// Unit of measure of the accelerometers' output, which their biases have too; empty for a unit without accelerometers.
+#[must_use]
+pub fn output_unit(document: &Document) -> &'static str {
+    document.accel.as_ref().map_or("", |accel| match accel.output {
+        AccelOutput::Counts => "counts/s",
+        AccelOutput::Volts => "V",
+        AccelOutput::MetresPerSecondSquared => "m/s²",
+    })
 }
 
 /// The channel that the sensor follows which looks along a case axis more than the others do.

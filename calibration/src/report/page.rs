@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use isotherm_log::plot::page::{Axis, Chart, Content, Form, Ink, Mark, Page, Panel, Samples, Series, Table};
 use isotherm_protocol::document::Sample;
 
-use super::{Coefficient, Curve, FitReport, stated, verdict};
+use super::{Coefficient, Curve, FitReport, Verdict, stated, verdict};
 use crate::spectrum::Spectrum;
 
 /// Most points of a curve on the page; of more, the smallest and the largest of each group are there.
@@ -24,7 +24,8 @@ impl FitReport {
     #[must_use]
     pub fn to_html(&self) -> String {
         let mut page = Page::new(&format!("{}, unit {}", self.title, self.unit));
-        page.headline(&self.headline());
+        let verdict = |verdict: &Verdict| (verdict.sentence(), verdict.reason.clone());
+        page.headlines(&self.verdicts.iter().map(verdict).collect::<Vec<_>>());
         self.notes.iter().for_each(|note| page.paragraph(note));
         if !self.warnings.is_empty() {
             page.heading("Warnings");
@@ -228,7 +229,8 @@ fn coefficients(all: &[Coefficient]) -> Option<Chart> {
             series("95 %", Ink::Alert, Form::Line, bars.flatten().collect()),
             series("value", Ink::Corrected, Form::Dots, values.collect()),
         ];
-        let title = if unit.is_empty() { "without unit" } else { unit };
+        // The unit of measure says it all.
+        let title = if unit.is_empty() { "without unit" } else { "" };
         Panel { height: LOW, ..panel(title, unit, content) }
     };
     let mark = |(index, c): (usize, &Coefficient)| Mark {

@@ -61,7 +61,7 @@ fn a_report_says_the_same_in_every_form() {
     });
     let text = report.to_text();
     assert!(
-        text.starts_with("gyro x: 1.68 → 0.170 °/h peak to peak out of sample; accepted. gyro y:"),
+        text.starts_with("gyro x: 1.68 → 0.170 °/h peak to peak out of sample; accepted.\ngyro y:"),
         "{text}"
     );
     assert!(
@@ -75,10 +75,16 @@ fn a_report_says_the_same_in_every_form() {
     assert_eq!(json["coefficients"][1]["sigma"], serde_json::Value::Null);
     let html = report.to_html();
     for part in
-        ["class=\"headline\">gyro x", "plateau &lt; 3", "Over temperature", "Spectrum of what is left"]
+        ["class=\"headline\">\n<li>gyro x", "plateau &lt; 3", "Over temperature", "Spectrum of what is left"]
     {
         assert!(html.contains(part), "{part}");
     }
+    // A unit of measure by itself is said once.
+    assert!(
+        html.contains(r#""title":"","unit":"°/h""#) && !html.contains(r#""title":"°/h""#),
+        "units doubled"
+    );
+    assert!(html.contains("; refused <span>worse</span></li>"), "{html}");
     assert!(html.len() < 600_000, "{}", html.len());
     assert_eq!(report.refusals(), ["FOG-0001: gyro y: worse"]);
 }
@@ -106,6 +112,7 @@ fn judging_a_run_shows_what_the_terms_do() {
     }
     let document: &Document = &after.document;
     assert_eq!(curve::channel_of(document, true, 0), document.gyro.sensor[0].channel);
+    assert_eq!(output_unit(document), "m/s²", "what its accelerometers put out");
     let truth = judged(Rest { rate_deg_per_h: Some([0.0; 3]), force_m_per_s2: None });
     let [before, after] = truth.curves[0].sizes();
     assert!(before.mean.abs() > 2.0 * after.mean.abs(), "the bias is taken away: {before:?} {after:?}");

@@ -138,16 +138,21 @@ impl Verdict {
         (after.count > 0 && after.rms > 0.0).then(|| before.rms / after.rms)
     }
 
-    /// Its sentence, without a full stop.
+    /// Its sentence with the reason, without a full stop.
     #[must_use]
     pub fn words(&self) -> String {
+        match (self.accepted, self.reason.is_empty()) {
+            (_, true) => self.sentence(),
+            (true, false) => format!("{}, {}", self.sentence(), self.reason),
+            (false, false) => format!("{}: {}", self.sentence(), self.reason),
+        }
+    }
+
+    /// Its sentence without the reason and without a full stop: "gyro x: 1.68 → 0.170 °/h peak to peak out of sample; accepted".
+    #[must_use]
+    pub fn sentence(&self) -> String {
         let [before, after] = self.deciding();
-        let state = match (self.accepted, self.reason.is_empty()) {
-            (true, true) => "accepted".to_owned(),
-            (true, false) => format!("accepted, {}", self.reason),
-            (false, true) => "refused".to_owned(),
-            (false, false) => format!("refused: {}", self.reason),
-        };
+        let state = if self.accepted { "accepted" } else { "refused" };
         if before.count == 0 && after.count == 0 {
             return format!("{}: {state}", self.of);
         }
@@ -168,16 +173,16 @@ fn made_worse(before: f64, after: f64) -> bool {
     after > before * (1.0 + SAME_SHARE)
 }
 
-/// All verdicts in one line.
-pub(super) fn headline(verdicts: &[Verdict]) -> String {
+/// All verdicts, one sentence each.
+pub(super) fn sentences(verdicts: &[Verdict]) -> Vec<String> {
     if verdicts.is_empty() {
-        return "No verdict.".to_owned();
+        return vec!["No verdict.".to_owned()];
     }
     let sentence = |verdict: &Verdict| {
         let words = verdict.words();
         if words.ends_with(['.', '?']) { words } else { format!("{words}.") }
     };
-    verdicts.iter().map(sentence).collect::<Vec<_>>().join(" ")
+    verdicts.iter().map(sentence).collect()
 }
 
 /// All sizes as a table.
@@ -255,13 +260,14 @@ mod tests {
             assert!(!verdict.accepted && verdict.reason == words, "{}", verdict.words());
         }
         let in_sample = judged(1.0, 2.0).in_sample;
-        let better = Verdict::new("gyro x", "°/h", in_sample).out_of_sample(Some([in_sample[1], in_sample[0]]));
+        let better =
+            Verdict::new("gyro x", "°/h", in_sample).out_of_sample(Some([in_sample[1], in_sample[0]]));
         assert!(better.unless_worse().accepted, "out of sample decides");
     }
 
     #[test]
     fn a_question_ends_without_a_full_stop() {
         let verdict = judged(1.0, 1.0).refused("is it right?");
-        assert!(headline(&[verdict]).ends_with("is it right?"));
+        assert!(sentences(&[verdict])[0].ends_with("is it right?"));
     }
 }

@@ -5,7 +5,7 @@ use isotherm_log::plot::page::{Axis, Chart, Content, Form, Ink, Panel, Samples, 
 
 use super::about::ARCSEC;
 use super::terms::Term;
-use super::{RAMPS, places, ramp_words, steady};
+use super::{RAMPS, places, ramp_words, spoken, steady};
 use crate::means::Size;
 use crate::report::Sheet;
 use crate::written::Written;
@@ -44,7 +44,7 @@ pub(super) fn charts(sheet: &mut Sheet, written: &Written, terms: &[Term], range
                     let points = places(over, POINTS).into_iter().map(|x| (x, term.at(x).0));
                     line(term.sensor.clone(), ink, points)
                 });
-                panel(name, of_name.first().map_or("", |term| term.unit.as_str()), curves.collect())
+                panel(&spoken(name), of_name.first().map_or("", |term| term.unit.as_str()), curves.collect())
             });
             let heading = format!("{sensors} over {label}");
             add(sheet, &heading, "Each term over its fitted range.", argument, panels.collect());

@@ -8,6 +8,7 @@ use isotherm_correction::curve::{Curve, CurveParts};
 use isotherm_protocol::document::{Argument, Document, Unit};
 use toml::{Table, Value};
 
+use crate::drift::figures::{six, superscript};
 use crate::error::Error;
 
 /// Units that a key may end with.
@@ -126,7 +127,7 @@ fn term((kind, sensor): (&'static str, &str), name: &str, table: &Table) -> Opti
             let (suffix, value) = find("value_")?;
             let value = number(value)?;
             (unit, argument, range) = (symbol(suffix), Argument::DegC, None);
-            words = exact(value);
+            words = six(value);
             let everywhere = [-1e9, 1e9];
             parts = CurveParts::Polynomial { reference: 0.0, coefficients: vec![value], range: everywhere };
         }
@@ -173,16 +174,6 @@ pub(crate) fn number(value: &Value) -> Option<f64> {
     value.as_float().or_else(|| value.as_integer().map(|whole| whole as f64))
 }
 
-/// A number as people write it, up to six digits.
-fn exact(value: f64) -> String {
-    let rounded: f64 = format!("{value:.5e}").parse().unwrap_or(value);
-    if value != 0.0 && !(1e-4..1e7).contains(&value.abs()) {
-        format!("{rounded:e}")
-    } else {
-        format!("{rounded}")
-    }
-}
-
 fn polynomial(coefficients: &[f64], reference: f64, argument: Argument) -> String {
     let symbol = match argument {
         Argument::DegC => "T",
@@ -192,9 +183,9 @@ fn polynomial(coefficients: &[f64], reference: f64, argument: Argument) -> Strin
     let of = if reference == 0.0 {
         symbol.to_owned()
     } else if reference < 0.0 {
-        format!("({symbol} + {})", exact(-reference))
+        format!("({symbol} + {})", six(-reference))
     } else {
-        format!("({symbol} − {})", exact(reference))
+        format!("({symbol} − {})", six(reference))
     };
     let mut words = String::new();
     for (power, coefficient) in
@@ -206,13 +197,10 @@ fn polynomial(coefficients: &[f64], reference: f64, argument: Argument) -> Strin
             (false, false) => " + ",
             (false, true) => " − ",
         };
-        let _ = write!(words, "{sign}{}", exact(coefficient.abs()));
+        let _ = write!(words, "{sign}{}", six(coefficient.abs()));
         let power = match power {
             0 => String::new(),
-            1 => format!("·{of}"),
-            2 => format!("·{of}²"),
-            3 => format!("·{of}³"),
-            more => format!("·{of}^{more}"),
+            power => format!("·{of}{}", superscript(power)),
         };
         words.push_str(&power);
     }

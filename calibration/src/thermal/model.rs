@@ -6,6 +6,7 @@ use isotherm_protocol::document::{
 
 use super::columns::{Basis, Branch, Term, seconds};
 use super::scale::{Holds, put};
+use crate::drift::figures::per_deg_c;
 use crate::written::tidy;
 
 /// The dynamic part of a model.
@@ -67,11 +68,7 @@ impl Spec {
 /// Name and unit of a term's coefficient.
 #[must_use]
 pub fn described(term: Term, output: &str) -> (String, String) {
-    let power = |j: usize| match j {
-        0 => String::new(),
-        1 => "/°C".to_owned(),
-        _ => format!("/°C{}", superscript(j)),
-    };
+    let power = |j: usize| per_deg_c("", j);
     let branch = |branch: Branch| match branch {
         Branch::Both => "",
         Branch::RunUp => ", run-up",
@@ -91,10 +88,6 @@ pub fn described(term: Term, output: &str) -> (String, String) {
             (format!("lag of {} s, power {j}", seconds(tau)), format!("({output})/(°C/s){}", power(j)))
         }
     }
-}
-
-fn superscript(power: usize) -> char {
-    ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'].get(power).copied().unwrap_or('ⁿ')
 }
 
 /// A curve from the coefficients of its powers; `None` without any.

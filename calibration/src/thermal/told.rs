@@ -1,7 +1,7 @@
 //! What is said of a thermal fit: the origin in the document, and the report.
 
 use isotherm_log::plot::page::Table;
-use isotherm_protocol::document::Origin;
+use isotherm_protocol::document::{Document, Origin};
 
 use super::columns::Basis;
 use super::fit::Sensor;
@@ -10,7 +10,7 @@ use super::outcome::{Found, Outcome};
 use super::scale::Kept;
 use super::select::{Target, Tried};
 use crate::drift::figures::short;
-use crate::report::{Coefficient, Curve, FitReport, Verdict, residuals};
+use crate::report::{Coefficient, Curve, FitReport, Verdict, output_unit, residuals};
 
 impl Outcome {
     /// Says which sensors keep their scale factors, and why.
@@ -51,7 +51,7 @@ impl Outcome {
                 of_sensor.insert("refused".into(), why.clone().into());
             }
             let sigmas = found.terms.iter().map(|(term, value, sigma)| {
-                let (name, unit) = described(*term, output(sensor));
+                let (name, unit) = described(*term, output(&self.base, sensor));
                 let row = [
                     ("of", name.into()),
                     ("unit", unit.into()),
@@ -110,7 +110,7 @@ impl Outcome {
         }
         for (sensor, _, found) in &self.found {
             for (term, value, sigma) in &found.terms {
-                let (name, unit) = described(*term, output(sensor));
+                let (name, unit) = described(*term, output(&self.base, sensor));
                 report.coefficients.push(Coefficient::new(
                     format!("{} {name}", sensor.name),
                     unit,
@@ -126,8 +126,8 @@ impl Outcome {
 }
 
 /// Unit of a sensor's bias.
-fn output(sensor: &Sensor) -> &'static str {
-    if sensor.gyro { "°/h" } else { "output" }
+fn output(document: &Document, sensor: &Sensor) -> &'static str {
+    if sensor.gyro { "°/h" } else { output_unit(document) }
 }
 
 /// Models that the table of a sensor shows, beside the one without dynamics and the chosen one.

@@ -8,6 +8,7 @@ use std::sync::Arc;
 use super::accel::norm;
 use super::analysis::{Settings, Tumble, transitions};
 use super::gyro::angle_of;
+use crate::drift::figures::six;
 use crate::error::Error;
 use crate::means::Size;
 use crate::positions::budget::ARCSEC_PER_RAD;
@@ -75,7 +76,7 @@ pub fn report(
          y lies in the plane of the second and third. Out of sample: each pose by a fit of all others.",
         tumble.poses.len(),
         tumble.factor,
-        settings.gravity
+        six(settings.gravity)
     ));
     report.coefficients = coefficients(document, tumble);
     let time_s: Arc<[f64]> = tumble.poses.iter().map(Pose::middle_s).collect();

@@ -128,6 +128,26 @@ fn the_command_sails_stated_drifts_and_documents() {
     let many = json(&arguments);
     assert_eq!(many["rows"].as_array().unwrap().len(), 3);
     assert_eq!(calibrate(&arguments).stdout, calibrate(&arguments).stdout, "the same bytes");
+
+    // A constant drift: known exactly it would leave nothing, and that is said to be a bound, not what comes of it.
+    let text = std::fs::read_to_string(&document).unwrap();
+    let still = |line: &str| match line.split_once(" = ") {
+        Some((key @ ("sigma_deg_per_h" | "trend_sigma_deg_per_h2"), _)) => format!("{key} = 0.0\n"),
+        _ => format!("{line}\n"),
+    };
+    let constant = folder.path().join("constant.toml").display().to_string();
+    std::fs::write(&constant, text.lines().map(still).collect::<String>()).unwrap();
+    let bound = json(&["impact", "--document", &constant, "--seeds", "4", "--hours", "12", "--json"]);
+    let said = format!("{} {}", bound["verdict"], bound["notes"]);
+    assert_eq!(bound["rows"][0]["median"]["radial_largest_m"], 0.0, "{said}");
+    for words in [
+        "of position with the estimator",
+        "Known exactly at departure",
+        "the row is a bound",
+        "a constant part only",
+    ] {
+        assert!(said.contains(words), "{said}");
+    }
     for (arguments, code, words) in [
         (vec!["impact"], 2, "say which drift"),
         (vec!["impact", "--trend", "nan"], 2, "--trend is NaN"),

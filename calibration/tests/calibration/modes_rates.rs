@@ -117,7 +117,13 @@ fn modes_are_fitted_judged_written_and_reported() {
         |text: &str| text.lines().filter(|line| !line.starts_with("command")).collect::<Vec<_>>().join("\n");
     assert_eq!(without_command(&written), without_command(&std::fs::read_to_string(&again).unwrap()));
     assert_eq!(json["accepted"], true);
-    assert_eq!(json["verdict"], said.lines().next().unwrap());
+    // One sentence to a line in the text, all of them in JSON; powers and names as in all reports.
+    assert!(json["verdict"].as_str().unwrap().starts_with(said.lines().next().unwrap()), "{json}");
+    assert_eq!(said.lines().take_while(|line| line.starts_with("gyro ")).count(), 3, "{said}");
+    for text in [&said, &page] {
+        assert!(text.contains("static bias, power 2") && text.contains("°/h/°C²"), "{text}");
+        assert!(!text.contains("°C^") && !text.contains("static_bias,"), "{text}");
+    }
 
     several_modes(folder.path(), &run, &again);
 

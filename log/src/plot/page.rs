@@ -94,22 +94,38 @@ impl Page {
         self.line("p", " class=\"headline\"", text);
     }
 
+    /// Several results, one to a line as a headline: a short sentence, and in smaller letters what is to be known of it.
+    pub fn headlines(&mut self, sentences: &[(String, String)]) {
+        self.body.push_str("<ul class=\"headline\">\n");
+        for (sentence, more) in sentences {
+            self.write(format_args!("<li>{}", escape(sentence)));
+            if !more.is_empty() {
+                self.write(format_args!(" <span>{}</span>", escape(more)));
+            }
+            self.body.push_str("</li>\n");
+        }
+        self.body.push_str("</ul>\n");
+    }
+
     /// A paragraph.
     pub fn paragraph(&mut self, text: &str) {
         self.line("p", "", text);
     }
 
-    /// A table.
+    /// A table; on a phone each row of a wide one is a card.
     pub fn table(&mut self, table: &Table) {
         let kinds: Vec<&str> = (0..table.head.len()).map(|column| kind(table, column)).collect();
-        self.body.push_str("<div class=\"table\"><table>\n<thead><tr>");
-        self.cells("th", &table.head, &kinds);
+        let (wide, none) = (is_wide(table), Vec::new());
+        let heads = if wide { &table.head } else { &none };
+        self.body.push_str(if wide { "<div class=\"table wide\">" } else { "<div class=\"table\">" });
+        self.body.push_str("<table>\n<thead><tr>");
+        self.cells("th", &table.head, &kinds, &[]);
         self.body.push_str("</tr></thead>\n<tbody>\n");
         for row in &table.rows {
             let (name, values) = row.split_at(row.len().min(1));
             self.body.push_str("<tr>");
-            self.cells("th", name, &kinds);
-            self.cells("td", values, kinds.get(1..).unwrap_or_default());
+            self.cells("th", name, &kinds, heads);
+            self.cells("td", values, kinds.get(1..).unwrap_or_default(), heads.get(1..).unwrap_or_default());
             self.body.push_str("</tr>\n");
         }
         self.body.push_str("</tbody></table></div>\n");
@@ -148,10 +164,13 @@ impl Page {
         )
     }
 
-    fn cells(&mut self, tag: &str, cells: &[String], kinds: &[&str]) {
+    /// Cells, each with its column's kind and, where there is one, the head that it is told by without the row of heads.
+    fn cells(&mut self, tag: &str, cells: &[String], kinds: &[&str], heads: &[String]) {
         for (index, cell) in cells.iter().enumerate() {
             let kind = kinds.get(index).copied().unwrap_or_default();
-            self.write(format_args!("<{tag}{kind}>{}</{tag}>", escape(cell)));
+            let head = heads.get(index).filter(|head| !head.is_empty());
+            let head = head.map_or_else(String::new, |head| format!(" data-head=\"{}\"", escape(head)));
+            self.write(format_args!("<{tag}{kind}{head}>{}</{tag}>", escape(cell)));
         }
     }
 
@@ -167,17 +186,36 @@ impl Page {
 
 /// Longest word or figure that a column is as wide as (letters); longer ones are set in several lines.
 const WIDEST: usize = 40;
+/// Longest figure, with its sign and arrow (letters): longer ones are formulas and intervals, which are read like words.
+const FIGURE: usize = 24;
+/// Letters that stand side by side on a phone.
+const PHONE: usize = 44;
+
+/// Whether a table is wider than a phone.
+fn is_wide(table: &Table) -> bool {
+    let width = |column: usize| {
+        let cells = table.rows.iter().chain([&table.head]).filter_map(|row| row.get(column));
+        cells.map(|cell| cell.chars().count()).max().unwrap_or(0).min(WIDEST) + 2
+    };
+    (0..table.head.len()).map(width).sum::<usize>() > PHONE
+}
 
 /// The attribute of a column's cells: words stand to the left, figures to the right, and the first column as the style sheet has it.
 fn kind(table: &Table, column: usize) -> &'static str {
     let cells = || table.rows.iter().filter_map(|row| row.get(column));
+    let long = || cells().any(|cell| cell.chars().count() > WIDEST);
     let figure = |cell: &String| {
+        if cell.chars().count() > FIGURE {
+            return false;
+        }
         let bare = cell.trim_start_matches(['→', ' ', '(', '<', '±']);
         bare.is_empty() || bare == "–" || bare.starts_with(|c: char| c.is_ascii_digit() || "-−+".contains(c))
     };
-    if column == 0 || cells().all(figure) {
+    if column == 0 {
+        if long() { " class=\"long\"" } else { "" }
+    } else if cells().all(figure) {
         ""
-    } else if cells().any(|cell| cell.chars().count() > WIDEST) {
+    } else if long() {
         " class=\"words long\""
     } else {
         " class=\"words\""

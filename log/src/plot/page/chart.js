@@ -1,6 +1,6 @@
 // A chart: its panels, its tool bar, zooming and moving, the tooltip.
 
-const INKS = ["paper", "ink", "faint", "rule", "raw", "corrected", "other", "truth", "first", "second", "third", "fourth", "alert"];
+const INKS = ["paper", "ink", "faint", "rule", "raw", "corrected", "other", "truth", "first", "second", "third", "fourth", "fifth", "sixth", "alert"];
 const HELP = "Wheel or + and \u2212: zoom. Drag: zoom to a part. Shift and drag, or \u2190 and \u2192: move. Double click or Home: all of it.";
 
 class Chart {
@@ -10,11 +10,13 @@ class Chart {
     this.hidden = new Set();
     this.withoutOutliers = false;
     this.at = null;
+    this.keys = new Map();
+    this.legends = legends(this.shape.panels);
     this.toolbar();
     const stack = element("div", "stack");
     figure.insertBefore(stack, figure.querySelector("figcaption"));
     this.stack = stack;
-    this.panels = this.shape.panels.map(panel => new Panel(this, panel, stack));
+    this.panels = this.shape.panels.map((panel, index) => new Panel(this, panel, stack, this.legends.own[index]));
     this.tip = element("div", "tip", stack);
     this.tip.hidden = true;
     this.whole = this.wholeRange();
@@ -41,6 +43,7 @@ class Chart {
       const [l, h] = panel.extent();
       [low, high] = [Math.min(low, l), Math.max(high, h)];
     }
+    this.data = [low, high];
     if (!(low <= high)) return [0, 1];
     if (!(high > low)) return [low - 0.5, high + 0.5];
     // Dots at either end are not to be cut in two by the frame.
@@ -51,10 +54,8 @@ class Chart {
   toolbar() {
     const bar = element("div", "bar");
     this.figure.prepend(bar);
-    const names = new Map();
-    for (const panel of this.shape.panels) for (const one of panel.series ?? []) names.set(one.name, one.ink);
     const kinds = new Map(this.shape.marks.map(mark => [mark.kind, mark.ink]));
-    for (const [all, form] of [[names, "line"], [kinds, "dash"]]) {
+    for (const [all, form] of [[this.legends.shared, "line"], [kinds, "dash"]]) {
       for (const [name, ink] of all) this.toggle(bar, name, ink, form);
     }
     const buttons = element("span", "buttons", bar);
@@ -84,10 +85,11 @@ class Chart {
     made.setAttribute("aria-pressed", "true");
     element("i", form + " " + ink, made);
     made.append(name);
+    this.keys.set(name, [...(this.keys.get(name) ?? []), made]);
     made.addEventListener("click", () => {
       const gone = !this.hidden.delete(name);
       if (gone) this.hidden.add(name);
-      made.setAttribute("aria-pressed", String(!gone));
+      for (const key of this.keys.get(name)) key.setAttribute("aria-pressed", String(!gone));
       this.draw();
     });
   }
@@ -113,7 +115,8 @@ class Chart {
     const most = Math.max(2, Math.floor(width / (width < 500 ? 62 : 95)));
     if (unit !== "s" || logarithmic) {
       const { values, decimals } = logarithmic ? logTicks(low, high, most) : linearTicks(low, high, most);
-      return values.map(value => ({ value, label: tickLabel(value, decimals) }));
+      const marked = unit ? values : values.filter(value => Math.abs(value - Math.round(value)) < 1e-9);
+      return marked.map(value => ({ value, label: tickLabel(value, unit ? decimals : 0) }));
     }
     const { values } = timeTicks(low, high, most);
     const step = values.length > 1 ? values[1] - values[0] : high - low;
@@ -123,7 +126,7 @@ class Chart {
   place(x, step) {
     const { unit, logarithmic } = this.shape.x;
     if (unit === "s" && !logarithmic) return clock(x, step);
-    return plain(x, 6) + (unit ? " " + unit : "");
+    return unit ? placed(x, logarithmic ? Math.abs(x) / 200 : step) + " " + unit : placed(x, 1);
   }
 
   draw() {
@@ -135,9 +138,12 @@ class Chart {
   }
 
   drawNow() {
-    for (const panel of this.panels) panel.draw();
+    // All panels have the room at their left that the widest label needs.
+    const wanted = Math.max(...this.panels.map(panel => panel.measured()));
+    for (const panel of this.panels) panel.draw(wanted);
     const step = (this.range[1] - this.range[0]) / 1000;
-    this.readout.textContent = this.shape.x.label + " " + this.range.map(x => this.place(x, step)).join(" to ");
+    this.readout.textContent = this.shape.x.label + " " +
+      this.range.map(x => this.place(Math.min(Math.max(x, this.data[0]), this.data[1]), step)).join(" to ");
     this.drawOver();
   }
 

@@ -9,7 +9,8 @@ use serde::Serialize;
 pub struct Axis {
     /// What it shows.
     pub label: String,
-    /// Symbol of its unit of measure. Seconds (`s`) are told as minutes and hours where they are many.
+    /// Symbol of its unit of measure; empty for a count, which has marks at whole numbers only. Seconds (`s`) are told as
+    /// minutes and hours where they are many.
     pub unit: String,
     /// Whether it is logarithmic.
     pub logarithmic: bool,
@@ -43,6 +44,10 @@ pub enum Ink {
     Third,
     /// The fourth of several of a kind.
     Fourth,
+    /// The fifth of several of a kind.
+    Fifth,
+    /// The sixth of several of a kind.
+    Sixth,
     /// What is to be seen at once.
     Alert,
     /// What stays in the background.
@@ -52,7 +57,7 @@ pub enum Ink {
 impl Ink {
     /// Colours for several of a kind, over and over again.
     pub fn several() -> impl Iterator<Item = Self> {
-        [Self::First, Self::Second, Self::Third, Self::Fourth, Self::Raw, Self::Corrected].into_iter().cycle()
+        [Self::First, Self::Second, Self::Third, Self::Fourth, Self::Fifth, Self::Sixth].into_iter().cycle()
     }
 }
 
@@ -103,7 +108,8 @@ impl Samples {
 /// A curve.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
-    /// Its name in the legend; those of the same name are shown and hidden together.
+    /// Its name in the legend; those of the same name are shown and hidden together. What has one colour in several panels is
+    /// named above all of them, the rest beside its panel.
     pub name: String,
     /// Its colour.
     pub ink: Ink,
@@ -181,7 +187,7 @@ pub enum Content {
 /// A diagram.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Panel {
-    /// What it shows.
+    /// What it shows; may be empty where the unit of measure says it.
     pub title: String,
     /// Symbol of the unit of measure of its vertical axis; empty for lanes.
     pub unit: String,

@@ -160,18 +160,19 @@ function drawStretch(g, view, part, top, height, colours) {
   g.restore();
 }
 
-/** Lines where something happened. */
+/** Lines where something happened; where they would bury the curves, short ones at the upper edge. */
 function drawMarks(g, view, marks, colours) {
-  g.lineWidth = 1.2;
-  g.setLineDash([5, 3]);
-  let last = -9;
+  const inks = new Map();
   for (const mark of marks) {
     if (mark.x < view.range[0] || mark.x > view.range[1]) continue;
-    const p = Math.round(view.left + view.to(mark.x)) + 0.5;
-    if (p === last) continue;
-    last = p;
-    g.strokeStyle = colours[mark.ink];
-    line(g, p, view.top, p, view.top + view.height);
+    inks.set(Math.round(view.left + view.to(mark.x)) + 0.5, colours[mark.ink]);
+  }
+  const many = inks.size > Math.max(view.width / 60, 3);
+  g.lineWidth = 1.2;
+  g.setLineDash(many ? [] : [5, 3]);
+  for (const [p, ink] of inks) {
+    g.strokeStyle = ink;
+    line(g, p, view.top, p, view.top + (many ? 6 : view.height));
   }
   g.setLineDash([]);
 }

@@ -11,11 +11,13 @@ function element(tag, className, parent, text) {
 }
 
 class Panel {
-  constructor(chart, shape, parent) {
+  constructor(chart, shape, parent, own) {
     this.chart = chart;
     this.shape = shape;
     this.element = element("section", "panel", parent);
-    this.title = element("h3", "", this.element, shape.title + (shape.unit ? ", " + shape.unit : ""));
+    this.head = element("div", "head", this.element);
+    element("h3", "", this.head, [shape.title, shape.unit].filter(Boolean).join(", "));
+    for (const [name, ink] of own) chart.toggle(this.head, name, ink, "line");
     const box = element("div", "plot", this.element);
     this.canvas = element("canvas", "", box);
     this.over = element("canvas", "over", box);
@@ -52,12 +54,22 @@ class Panel {
     }
     this.width = width;
     // Room for the names of rows, where there is any.
-    this.left = width > 800 ? 168 : this.chart.paper ? 132 : 72;
-    this.title.style.marginLeft = this.left + "px";
+    this.least = width > 800 ? 168 : this.chart.paper ? 132 : 72;
   }
 
-  draw() {
+  /** Makes the vertical axis; the room that its labels need. */
+  measured() {
+    this.axis = this.shape.lanes ? null : this.verticalAxis(this.shown());
+    const g = this.canvas.getContext("2d");
+    g.font = FONT;
+    const widest = Math.max(0, ...(this.axis?.ticks ?? []).map(tick => g.measureText(tick.label).width));
+    return Math.max(this.least, Math.min(Math.ceil(widest) + 10, 0.5 * this.width));
+  }
+
+  draw(left) {
     const { chart, density } = this;
+    this.left = left;
+    this.head.style.marginLeft = left + "px";
     const g = this.canvas.getContext("2d");
     g.setTransform(density, 0, 0, density, 0, 0);
     g.clearRect(0, 0, this.width, this.height + TOP + BELOW);
@@ -65,7 +77,7 @@ class Panel {
     const logarithmic = chart.shape.x.logarithmic;
     Object.assign(view, mapping(chart.range, view.width, logarithmic));
     const shown = this.shown();
-    const y = this.shape.lanes ? null : this.verticalAxis(shown);
+    const y = this.axis;
     drawAxes(g, view, chart.xTicks(view.width), y, chart.colours);
     if (this.shape.lanes) {
       clipped(g, view, () => drawLanes(g, view, this.lanes, ROW, chart.colours, density));

@@ -11,6 +11,8 @@ function linearTicks(low, high, most) {
   const step = factor * 10 ** exponent;
   const values = [];
   for (let i = Math.ceil(low / step - 1e-9); i * step <= high + 1e-9 * step; i++) values.push(i * step);
+  // One mark by itself tells no scale.
+  if (values.length < 2 && most < 64) return linearTicks(low, high, 2 * Math.max(most, 2));
   return { values, decimals: Math.min(Math.max(-exponent, 0), 12) };
 }
 
@@ -18,7 +20,7 @@ function linearTicks(low, high, most) {
 function logTicks(low, high, most) {
   const values = [];
   const decades = Math.log10(high / low);
-  const factors = decades * 3 <= most ? [1, 2, 5] : [1];
+  const factors = decades * 3 <= most || decades < 2 ? [1, 2, 5] : [1];
   const skip = Math.max(1, Math.ceil(decades / most));
   for (let e = Math.floor(Math.log10(low)); e <= Math.ceil(Math.log10(high)); e++) {
     if (((e % skip) + skip) % skip) continue;
@@ -27,7 +29,8 @@ function logTicks(low, high, most) {
       if (value >= low * (1 - 1e-9) && value <= high * (1 + 1e-9)) values.push(value);
     }
   }
-  return { values, decimals: null };
+  // Within less than one of these steps the axis is as good as linear.
+  return values.length < 2 ? linearTicks(low, high, most) : { values, decimals: null };
 }
 
 /** Steps of a time axis, in seconds; below the first decimal ones. */
@@ -55,9 +58,11 @@ function grouped(text) {
 /** A number beside a tick mark. */
 function tickLabel(value, decimals) {
   const size = Math.abs(value);
-  if (decimals === null || size >= 1e9) return plain(value, 3);
+  if (decimals === null) return placed(value, size / 200);
+  if (size >= 1e9) return plain(value, 3);
+  if (size === 0 && decimals > 4) return "0";
   // As many digits as tell it from its neighbours.
-  if (size > 0 && decimals > 6 && size < 1e-3) return plain(value, Math.max(3, Math.floor(Math.log10(size) + 1e-9) + 1 + decimals));
+  if (size > 0 && decimals > 5 && size < 1e-3) return plain(value, Math.max(3, Math.floor(Math.log10(size) + 1e-9) + 1 + decimals));
   return grouped(value.toFixed(decimals));
 }
 
@@ -72,6 +77,15 @@ function plain(value, digits) {
       [...String(Number(exponent))].map(c => c === "-" ? "\u207b" : "\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079"[c]).join("");
   }
   return grouped(value.toFixed(Math.min(Math.max(digits - 1 - Math.floor(Math.log10(size)), 0), 12)));
+}
+
+/** A place on an axis, as fine as `step`. */
+function placed(x, step) {
+  if (!isFinite(x)) return "\u2014";
+  if (x !== 0 && (Math.abs(x) < 1e-4 || Math.abs(x) >= 1e9)) return plain(x, 3);
+  const decimals = Math.min(Math.max(Math.ceil(-Math.log10(step) - 1e-9), 0), 12);
+  const fixed = x.toFixed(decimals);
+  return grouped(decimals ? fixed.replace(/\.?0+$/, "") : fixed);
 }
 
 /** Seconds as 1:02:03.4, or 12.345 s below a minute; `step` says how fine. */
@@ -116,4 +130,29 @@ function mapping([low, high], pixels, logarithmic) {
   const [l, h] = [Math.log(low), Math.log(high)];
   const scale = pixels / (h - l);
   return { to: x => (Math.log(x) - l) * scale, from: p => Math.exp(l + p / scale) };
+}
+
+/**
+ * What stands for one colour in several panels, or is in the only one, is named above all of them; what is in one panel by
+ * itself, or has other colours elsewhere, beside each panel that it is in, where there is more than one curve to tell apart.
+ */
+function legends(panels) {
+  const found = new Map();
+  panels.forEach((panel, index) => {
+    for (const { name, ink } of panel.series ?? []) {
+      if (!found.has(name)) found.set(name, { inks: new Set(), panels: new Set() });
+      found.get(name).inks.add(ink);
+      found.get(name).panels.add(index);
+    }
+  });
+  const drawn = panels.filter(panel => panel.series?.length).length;
+  const shared = new Map();
+  for (const [name, { inks, panels: all }] of found) {
+    if (inks.size === 1 && (all.size > 1 || drawn === 1)) shared.set(name, [...inks][0]);
+  }
+  const own = panels.map(panel => {
+    const names = new Map((panel.series ?? []).map(one => [one.name, one.ink]));
+    return names.size < 2 ? new Map() : new Map([...names].filter(([name]) => !shared.has(name)));
+  });
+  return { shared, own };
 }

@@ -17,6 +17,13 @@ equal(tickLabel(-0.0001, 2), "0.00");
 equal(tickLabel(123456, 0), "123\u202f456");
 equal([0.0001845, 0.0001846].map(value => tickLabel(value, 7)), ["0.0001845", "0.0001846"]);
 equal(tickLabel(9.3e-5, 8), "9.3\u00d710\u207b\u2075");
+equal([0, -5e-6].map(value => tickLabel(value, 9)), ["0", "\u22125\u00d710\u207b\u2076"]);
+equal([100, 1, 0.05, 1e-5].map(value => tickLabel(value, null)), ["100", "1", "0.05", "1\u00d710\u207b\u2075"]);
+// One mark by itself tells no scale.
+assert(linearTicks(-3.6, 4.4, 2).values.length > 1 && linearTicks(-0.9, 0.9, 2).values.length > 1);
+for (const [low, high] of [[2.1, 4.9], [0.3, 7], [30, 400], [3, 3.4]]) assert(logTicks(low, high, 2).values.length > 1);
+equal([0.1666667, 48, -0.001].map(x => placed(x, 0.048)), ["0.17", "48", "0"]);
+equal([placed(0.1, 1e-3), placed(120, 1), placed(1e-6, 1e-9)], ["0.1", "120", "1\u00d710\u207b\u2076"]);
 equal(widened([0, 10], 0.1, false), [-1, 11]);
 assert(widened([1, 100], 0.5, true).every((value, i) => Math.abs(value / [0.1, 1000][i] - 1) < 1e-12));
 equal(plain(15.0410671, 6), "15.0411");
@@ -28,6 +35,16 @@ equal(clock(61, 1), "1:01");
 equal(clock(3723.25, 0.01), "1:02:03.25");
 equal(clock(-90, 1), "\u22121:30");
 equal(clock(59.9999, 0.1), "1:00.0");
+
+// Legends: a colour is said where it is right.
+const curves = (...all) => ({ series: all.map(([name, ink]) => ({ name, ink })) });
+const both = curves(["before", "raw"], ["after", "corrected"]);
+const said = legends([both, both, curves(["of x", "first"], ["of y", "second"]), { lanes: [] }]);
+equal([...said.shared], [["before", "raw"], ["after", "corrected"]]);
+equal(said.own.map(own => [...own]), [[], [], [["of x", "first"], ["of y", "second"]], []]);
+const mixed = legends([curves(["x", "first"], ["z", "third"]), curves(["z", "first"], ["x", "first"])]);
+equal([[...mixed.shared], mixed.own.map(own => [...own])], [[["x", "first"]], [[["z", "third"]], [["z", "first"]]]]);
+equal([...legends([both]).shared].length, 2);
 
 // Mapping, zooming, moving.
 for (const logarithmic of [false, true]) {

@@ -159,8 +159,49 @@ fn words_stand_to_the_left_and_figures_to_the_right() {
         rows: vec![row(["A", "gyro x", "→ 1.5", "accepted"]), row(["B", "gyro y", "–", long])],
     });
     let html = page.to_html();
-    let line =
-        "<th>A</th><td class=\"words\">gyro x</td><td>→ 1.5</td><td class=\"words long\">accepted</td>";
+    // It is wider than a phone: each cell has its head with it.
+    let line = "<th data-head=\"unit\">A</th><td class=\"words\" data-head=\"of\">gyro x</td><td data-head=\"rms\">→ 1.5</td>\
+                <td class=\"words long\" data-head=\"state\">accepted</td>";
     assert!(html.contains(line), "{html}");
     assert!(html.contains("<th>unit</th><th class=\"words\">of</th><th>rms</th>"), "{html}");
+    assert!(html.contains("<div class=\"table wide\">"), "{html}");
+}
+
+#[test]
+fn a_table_that_fits_stays_one_and_formulas_wrap() {
+    let mut page = Page::new("x");
+    let row = |cells: [&str; 2]| cells.map(str::to_owned).to_vec();
+    page.table(&Table {
+        head: row(["", "rms"]),
+        rows: vec![row(["gyro x", "1.5"]), row(["MEMS-0001", "2"])],
+    });
+    let formula = "90 + 4·(T − 25) + 0.03·(T − 25)² − 0.0004·(T − 25)³";
+    page.table(&Table { head: row(["term", "formula"]), rows: vec![row(["static bias", formula])] });
+    let html = page.to_html();
+    assert!(
+        html.contains("<div class=\"table\"><table>") && html.contains("<th>gyro x</th><td>1.5</td>"),
+        "{html}"
+    );
+    assert!(
+        html.contains(&format!("<td class=\"words long\" data-head=\"formula\">{formula}</td>")),
+        "{html}"
+    );
+}
+
+#[test]
+fn results_stand_one_to_a_line() {
+    let mut page = Page::new("x");
+    page.headlines(&[("a < b".into(), String::new()), ("c; refused".into(), "it is zero".into())]);
+    let lines =
+        "<ul class=\"headline\">\n<li>a &lt; b</li>\n<li>c; refused <span>it is zero</span></li>\n</ul>";
+    assert!(page.to_html().contains(lines));
+}
+
+#[test]
+fn colours_for_several_are_no_others() {
+    let several: Vec<Ink> = Ink::several().take(6).collect();
+    for ink in [Ink::Raw, Ink::Corrected, Ink::Other, Ink::Truth, Ink::Alert, Ink::Faint] {
+        assert!(!several.contains(&ink), "{ink:?} already stands for something in the same chart");
+    }
+    assert!((1..6).all(|at| !several[..at].contains(&several[at])), "{several:?}");
 }
