@@ -2,6 +2,7 @@
 
 use isotherm_log::plot::page::Table;
 use isotherm_protocol::document::{Measure, Residual, Sample};
+use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::drift::figures::short;
 use crate::means::Size;
@@ -74,7 +75,8 @@ impl Verdict {
         }
     }
 
-    /// Of the values before and after, in and out of sample; refused where they were made worse.
+    /// Of the values before and after, in and out of sample: refused where what is left in the deciding sample has grown by more
+    /// than noise. This is how all commands judge.
     #[must_use]
     pub fn of_values(
         of: impl Into<String>,
@@ -82,18 +84,24 @@ impl Verdict {
         inside: [Vec<f64>; 2],
         outside: Option<[Vec<f64>; 2]>,
     ) -> Self {
-        let sizes = |values: [Vec<f64>; 2]| values.map(|values| Size::of(&values));
-        Self::new(of, measure, sizes(inside)).out_of_sample(outside.map(sizes)).unless_worse()
+        let sizes = |values: &[Vec<f64>; 2]| values.each_ref().map(|values| Size::of(values));
+        let verdict = Self::new(of, measure, sizes(&inside)).out_of_sample(outside.as_ref().map(sizes));
+        let [before, after] = outside.unwrap_or(inside);
+        verdict.unless_worse(&before, &after)
     }
 
-    /// Refused where the rms of the sample that decides is made worse. This is how all commands judge.
-    fn unless_worse(self) -> Self {
-        let [before, after] = self.deciding().map(|size| size.rms);
-        if !made_worse(before, after) {
-            return self;
+    /// Refused where these values have grown by more than noise.
+    fn unless_worse(self, before: &[f64], after: &[f64]) -> Self {
+        let figure = |values: &[f64]| short(Size::of(values).rms);
+        match worse(before, after) {
+            Worse::No => self,
+            Worse::ByNoise => self.remark("its rms grows by no more than noise"),
+            Worse::Yes => {
+                let grown =
+                    format!("rms grows from {} to {} {}", figure(before), figure(after), self.measure);
+                self.refused(grown)
+            }
         }
-        let grown = format!("rms grows from {} to {} {}", short(before), short(after), self.measure);
-        self.refused(grown)
     }
 
     /// With sizes out of sample.
@@ -164,13 +172,41 @@ impl Verdict {
     }
 }
 
-/// Share by which a figure may change and still be the same: what noise does to it, and less than its digits tell.
+/// Share by which a figure may change and still be the same: less than its digits tell.
 pub const SAME_SHARE: f64 = 0.01;
+/// Probability below which it is no accident that what is left follows the change.
+const ACCIDENT: f64 = 1e-3;
+/// Times by which an rms grows at most by noise.
+const LARGEST_GROWTH: f64 = 2.0;
 
-/// Whether what is left has grown, by more than [`SAME_SHARE`]: no sentence says that 2.87 grows to 2.87. The one rule for "made
-/// worse", of every figure.
-fn made_worse(before: f64, after: f64) -> bool {
-    after > before * (1.0 + SAME_SHARE)
+/// Whether a change made something worse.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Worse {
+    No,
+    ByNoise,
+    Yes,
+}
+
+/// Whether a change made something worse: what is left grows by more than [`SAME_SHARE`], and follows the change itself. The one rule
+/// of all commands.
+///
+/// Were the change right, what is left after it would be noise, and its part along the change no larger than that of any other
+/// direction (Student's law). An rms alone grows or falls by chance where nothing has changed but its last digits.
+fn worse(before: &[f64], after: &[f64]) -> Worse {
+    let both = || before.iter().zip(after).filter(|(a, b)| a.is_finite() && b.is_finite());
+    let sum = |of: fn(f64, f64) -> f64| both().map(|(before, after)| of(*before, *after)).sum::<f64>();
+    let (squares, left) = (sum(|before, _| before * before), sum(|_, after| after * after));
+    if left <= squares * (1.0 + SAME_SHARE).powi(2) {
+        return Worse::No;
+    }
+    let change = sum(|before, after| (after - before).powi(2)).sqrt();
+    let along = sum(|before, after| after * (after - before)) / change;
+    #[expect(clippy::cast_precision_loss, reason = "values of a log are far below 2⁵³")]
+    let others = both().count().saturating_sub(1) as f64;
+    let noise = ((left - along * along).max(0.0) / others).sqrt();
+    let by_chance = StudentsT::new(0.0, 1.0, others).map_or(0.0, |law| law.sf(along / noise));
+    let doubled = left > LARGEST_GROWTH * LARGEST_GROWTH * squares;
+    if by_chance >= ACCIDENT && !doubled { Worse::ByNoise } else { Worse::Yes }
 }
 
 /// All verdicts, one sentence each.
@@ -244,30 +280,51 @@ pub fn residuals(verdicts: &[Verdict]) -> Vec<Residual> {
 mod tests {
     use super::*;
 
-    fn judged(before: f64, after: f64) -> Verdict {
-        let size = |rms: f64| Size::of(&[rms, -rms]);
-        Verdict::new("gyro x", "°/h", [size(before), size(after)]).unless_worse()
+    fn judged(before: &[f64], after: &[f64]) -> Verdict {
+        let sizes = [Size::of(before), Size::of(after)];
+        Verdict::new("gyro x", "°/h", sizes).unless_worse(before, after)
     }
 
     #[test]
-    fn what_differs_by_less_than_noise_makes_it_is_not_worse() {
-        for (before, after) in [(2.868, 2.871), (6.94, 6.99), (2.0, 1.0), (0.0, 0.0)] {
-            assert!(judged(before, after).accepted, "{before} {after}");
-        }
-        for (before, after) in [(2.80, 2.88), (0.0, 1.0)] {
-            let verdict = judged(before, after);
-            let words = format!("rms grows from {} to {} °/h", short(before), short(after));
-            assert!(!verdict.accepted && verdict.reason == words, "{}", verdict.words());
-        }
-        let in_sample = judged(1.0, 2.0).in_sample;
-        let better =
-            Verdict::new("gyro x", "°/h", in_sample).out_of_sample(Some([in_sample[1], in_sample[0]]));
-        assert!(better.unless_worse().accepted, "out of sample decides");
+    fn noise_is_told_from_what_a_change_made_worse() {
+        // Steps on a rate table: a part in a million of 72 °/s, beside noise of some °/h.
+        let before = [-6.46, -0.5, -0.33, 0.75, -3.77];
+        let after = [-6.46, -0.75, -0.33, 1.0, -3.77];
+        let verdict = judged(&before, &after);
+        assert!(verdict.accepted && verdict.reason.is_empty(), "{}", verdict.words());
+        // The same of 25 times as much, a tenth of the rms: still of steps that few.
+        let verdict = judged(&before, &[-6.46, -1.9, -0.33, 2.15, -3.77]);
+        assert!(verdict.accepted && verdict.reason.contains("no more than noise"), "{}", verdict.words());
+        // A scale factor that is as wrong as the old one was right.
+        let verdict = judged(&before, &[-6.46, -80.5, -0.33, 80.75, -3.77]);
+        assert!(
+            !verdict.accepted && verdict.reason.contains("rms grows from 3.37 to "),
+            "{}",
+            verdict.words()
+        );
+        // A constant error thirty times the noise.
+        let noise: Vec<f64> = (0..12).map(|k| libm::sin(f64::from(k * k))).collect();
+        let shifted: Vec<f64> = noise.iter().map(|x| x + 30.0).collect();
+        assert!(!judged(&noise, &shifted).accepted);
+        assert!(judged(&shifted, &noise).reason.is_empty());
+        // Few values leave much open, but no doubling.
+        assert!(judged(&[1.0, -1.0, 1.0], &[1.5, -1.1, 1.2]).accepted);
+        assert!(!judged(&[1.0, -1.0, 1.0], &[4.0, -1.0, 1.0]).accepted);
+        assert!(!judged(&[0.0; 3], &[1e-3; 3]).accepted, "there was nothing left before");
+        assert!(!judged(&[1.0], &[2.0]).accepted, "one value tells no noise");
+        // Windows of an hour: what differs by less than the digits tell, and by a twentieth.
+        let windows: Vec<f64> = (0..360).map(|k| libm::sin(f64::from(k * k))).collect();
+        let with = |share: f64| -> Vec<f64> {
+            let added = (0..360).map(|k| share * libm::cos(f64::from(k)));
+            windows.iter().zip(added).map(|(window, added)| window + added).collect()
+        };
+        assert!(judged(&windows, &with(0.05)).accepted);
+        assert!(!judged(&windows, &with(0.32)).accepted);
     }
 
     #[test]
     fn a_question_ends_without_a_full_stop() {
-        let verdict = judged(1.0, 1.0).refused("is it right?");
+        let verdict = judged(&[1.0], &[1.0]).refused("is it right?");
         assert!(sentences(&[verdict])[0].ends_with("is it right?"));
     }
 }

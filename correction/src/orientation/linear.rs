@@ -25,7 +25,7 @@ pub(super) fn is_conditioned(rows: &Rows, limit: f64) -> bool {
     let smallest = (0..3).map(|i| gram[(i, i)] - radius(i)).fold(f64::INFINITY, f64::min);
     let largest = (0..3).map(|i| gram[(i, i)] + radius(i)).fold(0.0, f64::max);
     let near = smallest > 0.0 && largest <= 0.5 * limit * limit * smallest;
-    near && largest.is_finite() || condition_number(rows) <= limit
+    near && gram.iter().all(|value| value.is_finite()) || condition_number(rows) <= limit
 }
 
 /// Ratio of the largest to the smallest singular value; infinite or NaN for a singular or broken matrix.

@@ -79,7 +79,7 @@ fn two_logs_are_compared_tick_by_tick() {
     assert!(html.contains("400 corrected ticks are in both logs, 200 of them differ"));
     // The mean of the differences: half of the common ticks differ by 0.5 µrad in 5 ms.
     let mean = 0.5 * 0.5e-6 / 0.005 * nominal::DEG_PER_H;
-    assert!(html.contains(&format!("<td>{mean:.5}</td>")), "{mean}");
+    assert!(html.contains(&format!(">{mean:.5}</td>")), "{mean}");
 }
 
 #[test]
