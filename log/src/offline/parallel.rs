@@ -19,7 +19,7 @@ use crate::source::LogReport;
 /// Most messages in one block.
 const BLOCK: usize = 1024;
 /// A block ends when its frames have so many bytes: what waits between two threads stays in the processor's caches.
-const BLOCK_BYTES: usize = 1 << 19;
+const BLOCK_BYTES: usize = 1 << 17;
 /// Blocks between two threads.
 const DEPTH: usize = 4;
 
