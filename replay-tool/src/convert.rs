@@ -69,6 +69,8 @@ pub struct Conversion {
     pub out: PathBuf,
     /// How files are created.
     pub place: Place,
+    /// Whether chunks of a recording are compressed.
+    pub compress: bool,
     /// Names of the log's files and of its mapping, for the provenance.
     pub sources: Vec<(String, String)>,
     /// For ROS 2 bags.

@@ -204,12 +204,12 @@ pub(super) fn rated(rows: &[Row]) -> String {
 
 /// Offline correction.
 pub(super) fn offline(offline: &Offline) -> String {
-    let own = vec![
-        "`isotherm-replay correct`, from MCAP".to_owned(),
-        thousands(offline.correct_per_s),
-        String::new(),
+    let own = [
+        ("`isotherm-replay correct`, from MCAP", offline.correct_per_s),
+        ("the same, chunks not compressed", offline.uncompressed_per_s),
     ];
-    let mut rows = vec![own];
+    let mut rows: Vec<_> =
+        own.map(|(name, per_s)| vec![name.to_owned(), thousands(per_s), String::new()]).to_vec();
     if let Some(numpy) = &offline.numpy {
         let ways = [
             ("numpy, vectorised, from MCAP", numpy.vectorised_per_s),

@@ -19,6 +19,8 @@ pub(crate) struct Offline {
     pub(crate) ticks: u64,
     /// `isotherm-replay correct`, from the start of the process to its end.
     pub(crate) correct_per_s: f64,
+    /// The same of a recording whose chunks are not compressed.
+    pub(crate) uncompressed_per_s: f64,
     /// numpy, where it could be run.
     pub(crate) numpy: Option<Numpy>,
 }
@@ -64,11 +66,12 @@ pub(super) fn measure(rounds: usize, quick: bool) -> Result<(Offline, Vec<String
     let log = Log::make(folder.path(), if quick { DURATION_S / 20 } else { DURATION_S })?;
     let interpreter = python::interpreter();
     let bar = Bar::over(rounds);
-    let mut times = Vec::new();
+    let (mut times, mut uncompressed) = (Vec::new(), Vec::new());
     let mut scripts = Vec::new();
     for _ in 0..rounds {
         bar.show("correct, numpy");
-        times.push(log.correct(None)?);
+        times.push(log.correct(&log.recording, None)?);
+        uncompressed.push(log.correct(&log.uncompressed, None)?);
         if interpreter.is_ok() {
             scripts.push(log.numpy()?);
         }
@@ -77,9 +80,11 @@ pub(super) fn measure(rounds: usize, quick: bool) -> Result<(Offline, Vec<String
     bar.finish();
     let numpy = if scripts.is_empty() { None } else { Some(compare(log.ticks, &times, &scripts)?) };
     #[expect(clippy::cast_precision_loss, reason = "some million ticks")]
-    let correct_per_s = median(times.iter().map(|time| log.ticks as f64 / time));
+    let [correct_per_s, uncompressed_per_s] =
+        [&times, &uncompressed].map(|times| median(times.iter().map(|time| log.ticks as f64 / time)));
     let skipped = interpreter.err().map(|error| error.to_string());
-    Ok((Offline { ticks: log.ticks, correct_per_s, numpy }, skipped.into_iter().collect()))
+    let offline = Offline { ticks: log.ticks, correct_per_s, uncompressed_per_s, numpy };
+    Ok((offline, skipped.into_iter().collect()))
 }
 
 /// Rates and ratios.
@@ -124,6 +129,7 @@ fn compare(ticks: u64, times: &[f64], scripts: &[Timed]) -> Result<Numpy, Error>
 /// A recording of one unit, and what is made of it.
 struct Log {
     recording: PathBuf,
+    uncompressed: PathBuf,
     document: PathBuf,
     corrected: PathBuf,
     ticks: u64,
@@ -132,33 +138,32 @@ struct Log {
 impl Log {
     /// Simulates it, and corrects it once for the comparison.
     fn make(folder: &Path, duration_s: u32) -> Result<Self, Error> {
-        let [text, mapping, recording, corrected] =
-            ["log.csv", "log.mapping.toml", "log.mcap", "corrected.csv"].map(|name| folder.join(name));
+        let [text, mapping, recording, uncompressed, corrected] =
+            ["log.csv", "log.mapping.toml", "log.mcap", "uncompressed.mcap", "corrected.csv"]
+                .map(|name| folder.join(name));
         let document =
             Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../config/calibration/{UNIT}.toml"));
         let mut simulate = Command::new(beside("isotherm-replay")?);
         simulate.args(["simulate", "--preset", "mems-chamber", "--seed", "1", "--json", "--duration"]);
         run(simulate.arg(duration_s.to_string()).arg("--out").arg(&text))?;
-        let mut convert = Command::new(beside("isotherm-replay")?);
-        convert.arg("convert").arg(&text).arg("--mapping").arg(mapping);
-        run(convert.args(["--unit", UNIT]).arg(&recording))?;
-        let mut log = Self { recording, document, corrected, ticks: 0 };
+        for (out, compression) in [(&recording, "zstd"), (&uncompressed, "none")] {
+            let mut convert = Command::new(beside("isotherm-replay")?);
+            convert.arg("convert").arg(&text).arg("--mapping").arg(&mapping);
+            run(convert.args(["--unit", UNIT, "--compression", compression]).arg(out))?;
+        }
+        let mut log = Self { recording, uncompressed, document, corrected, ticks: 0 };
         let corrected = log.corrected.clone();
-        log.correct(Some(&corrected))?;
+        log.correct(&log.recording, Some(&corrected))?;
         let written =
             std::fs::read_to_string(&corrected).map_err(|source| Error::file(&corrected, source))?;
         log.ticks = written.lines().skip(1).count() as u64;
         Ok(log)
     }
 
-    /// Corrects it on one thread; the processor time of that (s).
-    fn correct(&self, out: Option<&Path>) -> Result<f64, Error> {
+    /// Corrects a recording of it on one thread; the processor time of that (s).
+    fn correct(&self, recording: &Path, out: Option<&Path>) -> Result<f64, Error> {
         let mut correct = Command::new(beside("isotherm-replay")?);
-        correct
-            .arg("correct")
-            .arg(&self.recording)
-            .args(["--threads", "1", "--calibration"])
-            .arg(&self.document);
+        correct.arg("correct").arg(recording).args(["--threads", "1", "--calibration"]).arg(&self.document);
         if let Some(out) = out {
             correct.arg("--out").arg(out);
         }

@@ -98,11 +98,13 @@ fn rated(rows: &[Row]) -> comfy_table::Table {
 
 fn offline_table(offline: &super::Offline) -> comfy_table::Table {
     let mut table = plain(&["offline, one core", "ticks/s", "`correct` is faster by"]);
-    table.add_row([
-        "isotherm-replay correct, from MCAP".to_owned(),
-        format!("{:.0}", offline.correct_per_s),
-        String::new(),
-    ]);
+    let own = [
+        ("isotherm-replay correct, from MCAP", offline.correct_per_s),
+        ("the same, chunks not compressed", offline.uncompressed_per_s),
+    ];
+    for (name, per_s) in own {
+        table.add_row([name.to_owned(), format!("{per_s:.0}"), String::new()]);
+    }
     if let Some(numpy) = &offline.numpy {
         let rows = [
             ("numpy, vectorised, from MCAP", numpy.vectorised_per_s),

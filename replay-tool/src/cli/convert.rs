@@ -9,6 +9,7 @@ use isotherm_protocol::document::Document;
 use serde::Serialize;
 
 use super::log_args::LogArgs;
+use super::record::Compression;
 use super::{Outcome, print, show};
 use crate::convert::{self, Conversion, Place, Ros2Options, Target};
 use crate::error::Error;
@@ -42,6 +43,9 @@ pub(super) struct ConvertArgs {
     /// Gyro ticks in one message of a recording
     #[arg(long, value_name = "TICKS", default_value_t = 64, value_parser = clap::value_parser!(u16).range(1..=4096))]
     batch: u16,
+    /// How chunks of a recording are compressed
+    #[arg(long, value_enum, default_value_t)]
+    compression: Compression,
     /// Raw readings into a ROS 2 bag too, at nominal scale, where there are corrected ticks
     #[arg(long)]
     raw: bool,
@@ -112,6 +116,9 @@ impl ConvertArgs {
         ];
         match idle.iter().find(|(_, given)| *given && target != Target::Ros2) {
             Some((option, _)) => Err(Error::Usage(format!("{option} is for ROS 2 bags: leave it out"))),
+            None if !self.compression.compresses() && target != Target::Mcap => {
+                Err(Error::Usage("--compression is for recordings (.mcap): leave it out".to_owned()))
+            }
             None => Ok(()),
         }
     }
@@ -150,6 +157,7 @@ impl ConvertArgs {
             target,
             out,
             place,
+            compress: self.compression.compresses(),
             sources,
             ros2: Ros2Options { raw: self.raw, frame: self.frame.clone(), documents },
         })

@@ -57,8 +57,11 @@ fn there_and_back(mapping: &Path, log: &Path) {
     for (before, after) in before.iter().zip(&after) {
         assert_eq!(before, after);
     }
-    convert(folder.path(), &["b.csv", "-m", "b.mapping.toml", "-u", "U-1", "c.mcap"], 0);
+    let once_more = ["b.csv", "-m", "b.mapping.toml", "-u", "U-1", "c.mcap", "--compression", "none"];
+    convert(folder.path(), &once_more, 0);
     assert!(messages(&path("a.mcap")) == messages(&path("c.mcap")), "the same messages");
+    let length = |name: &str| fs::metadata(path(name)).unwrap().len();
+    assert!(length("a.mcap") < length("c.mcap"), "compressed, and not");
 }
 
 #[test]
@@ -289,6 +292,7 @@ fn nothing_is_written_over_and_nothing_half_is_left() {
     check(&run(&["x.mcap", "other"]), 2, "does not say what to convert to");
     check(&run(&["x.mcap", "x.parquet", "--to", "parquet"]), 2, "one file per unit and stream");
     check(&run(&["x.mcap", "z.csv", "--frame", "x"]), 2, "--frame is for ROS 2 bags");
+    check(&run(&["x.mcap", "z.csv", "--compression", "none"]), 2, "--compression is for recordings");
     check(&run(&["none.mcap", "z.csv"]), 1, "none.mcap");
     check(&run(&["x.csv", "-m", "y.mapping.toml", "-u", "A-1", "z.mcap"]), 78, "y.mapping.toml:1");
     assert_eq!(names(), before);
