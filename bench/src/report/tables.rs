@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use super::Kernel;
 use crate::chain::{Measure, Row, middle};
 use crate::machine::Machine;
-use crate::scale::{Growth, Offline, alone, beyond_first};
+use crate::scale::{BY_UNITS, Growth, Offline, alone, beyond_first};
 
 /// A table; the first column is text.
 fn markdown(head: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
@@ -129,20 +129,8 @@ pub(super) fn kernel(rows: &[Kernel]) -> String {
 /// By number of units, and how that grows.
 #[expect(clippy::cast_precision_loss, reason = "far below 2⁵³")]
 pub(super) fn units(rows: &[Row], zenoh: &[Row], growth: &[Growth]) -> String {
-    let head = [
-        "units",
-        "ticks/s",
-        "CPU µs/tick",
-        "lost",
-        "resident MiB",
-        "KiB per unit",
-        "start s",
-        "swap ms",
-        "Zenoh alone: CPU µs/tick",
-        "KiB per unit",
-    ];
     let table = markdown(
-        &head,
+        &BY_UNITS,
         rows.iter().map(|row| {
             let zenoh_alone = alone(row, zenoh);
             vec![

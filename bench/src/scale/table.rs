@@ -27,6 +27,20 @@ pub(crate) fn table(report: &Report) -> String {
     text
 }
 
+/// Columns of the figures by number of units.
+pub(crate) const BY_UNITS: [&str; 10] = [
+    "units",
+    "ticks/s",
+    "CPU µs/tick",
+    "lost",
+    "resident MiB",
+    "KiB per unit",
+    "start s",
+    "swap ms",
+    "Zenoh alone: CPU µs/tick",
+    "KiB per unit",
+];
+
 /// What Zenoh takes by itself where the service has so many units.
 pub(crate) fn alone<'a>(service: &Row, zenoh: &'a [Row]) -> Option<&'a Row> {
     zenoh.iter().find(|row| row.case.units == service.case.units)
@@ -47,18 +61,7 @@ fn kib_per_unit(row: &Row, first: &Row) -> f64 {
 
 #[expect(clippy::cast_precision_loss, reason = "far below 2⁵³")]
 fn units(rows: &[Row], zenoh: &[Row]) -> comfy_table::Table {
-    let mut table = plain(&[
-        "units",
-        "ticks/s",
-        "CPU µs/tick",
-        "lost",
-        "resident MiB",
-        "KiB per unit",
-        "start s",
-        "swap ms",
-        "Zenoh alone: CPU µs/tick",
-        "KiB per unit",
-    ]);
+    let mut table = plain(&BY_UNITS);
     for row in rows {
         let outcome = &row.median;
         table.add_row([
