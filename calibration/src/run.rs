@@ -76,27 +76,17 @@ impl Run {
     #[must_use]
     pub fn new(name: String, unit: UnitId, files: LogFiles, part: &Part) -> Self {
         let part = Part { units: [unit.clone()].into(), ..part.clone() };
-        Self {
-            name,
-            unit,
-            gyros: None,
-            source: Source::Files { files, part },
-            given: Vec::new(),
-            cut: Cut::default(),
-        }
+        Self::of(name, unit, Source::Files { files, part })
     }
 
     /// A run that is already in memory.
     #[must_use]
     pub fn of_events(name: String, unit: UnitId, events: Vec<LogEvent>) -> Self {
-        Self {
-            name,
-            unit,
-            gyros: None,
-            source: Source::Events(events.into()),
-            given: Vec::new(),
-            cut: Cut::default(),
-        }
+        Self::of(name, unit, Source::Events(events.into()))
+    }
+
+    fn of(name: String, unit: UnitId, source: Source) -> Self {
+        Self { name, unit, gyros: None, source, given: Vec::new(), cut: Cut::default() }
     }
 
     /// The same, where folders were given that have its files.

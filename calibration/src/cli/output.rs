@@ -97,29 +97,37 @@ impl OutputArgs {
         Ok(())
     }
 
-    /// Writes what a fit came to; its report is left. Where everything is refused there is no new document.
+    /// Writes what a fit came to; its report is left.
     pub(super) fn keep(&self, fitted: Fitted, work: &Work, names: &Names<'_>) -> Result<FitReport, Error> {
-        let Fitted { written, mut report, about } = fitted;
-        report.warnings.extend(work.told());
+        let Fitted { written, report, about } = fitted;
         let any_accepted =
             report.verdicts.is_empty() || report.verdicts.iter().any(|verdict| verdict.accepted);
-        if !any_accepted {
-            report.warnings.extend(self.nothing_new(names));
+        let document = |report: &FitReport| self.document(written.document, &about, report);
+        self.put(any_accepted, document, report, work, names)
+    }
+
+    /// Completes a report with what is to be said of the logs, and writes document and page; where everything is refused there is no
+    /// new document, and the report says so.
+    pub(super) fn put(
+        &self,
+        any_accepted: bool,
+        document: impl FnOnce(&FitReport) -> Result<Written, Error>,
+        mut report: FitReport,
+        work: &Work,
+        names: &Names<'_>,
+    ) -> Result<FitReport, Error> {
+        report.warnings.extend(work.told());
+        if let Some(out) = self.out.as_ref().filter(|_| !any_accepted) {
+            let out = names.of(out);
+            report.warnings.push(format!("every sensor is refused: nothing is written to {}", out.display()));
         }
-        let document = || self.document(written.document, &about, &report);
-        self.write(|| any_accepted.then(document).transpose(), || report.to_html(), names)?;
+        self.write(|| any_accepted.then(|| document(&report)).transpose(), || report.to_html(), names)?;
         Ok(report)
     }
 
     /// The page of a batch's table, and whether it may replace another.
     pub(super) fn page(&self) -> (Option<&Path>, bool) {
         (self.html.as_deref(), self.overwrite)
-    }
-
-    /// What is said where every sensor is refused; nothing where no document was wanted.
-    pub(super) fn nothing_new(&self, names: &Names<'_>) -> Option<String> {
-        let out = names.of(self.out.as_ref()?);
-        Some(format!("every sensor is refused: nothing is written to {}", out.display()))
     }
 
     /// Whether a document is to be written.

@@ -111,14 +111,9 @@ impl ThermalArgs {
         let origin = origin(&work.logs(), &command_line())?;
         let base = work.base.as_ref().map(|base| &base.document);
         let bar = names.at_work("fitting");
-        let Fitted { written, mut report, any_accepted } =
+        let Fitted { written, report, any_accepted } =
             fit(base, (&work.runs, &work.judges), &settings, origin, bar)?;
-        report.warnings.extend(work.told());
-        if !any_accepted {
-            report.warnings.extend(self.output.nothing_new(names));
-        }
-        self.output.write(|| Ok(any_accepted.then_some(written)), || report.to_html(), names)?;
-        Ok(report)
+        self.output.put(any_accepted, |_| Ok(written), report, work, names)
     }
 
     /// What the arguments must hold before anything is read.

@@ -199,9 +199,7 @@ impl Made {
             return Ok(());
         }
         for (sensor, row) in wanted.base.gyro.orientation.rows.iter().enumerate() {
-            let main =
-                (0..3).fold(0, |best, axis| if row[axis].abs() > row[best].abs() { axis } else { best });
-            let axis = format!("gyro {}", ["x", "y", "z"][main]);
+            let axis = format!("gyro {}", ["x", "y", "z"][document::main_axis(row)]);
             if worse.contains(&axis) {
                 self.gyros[sensor] =
                     Err(format!("its terms make {axis} worse than it was: it keeps the old ones"));

@@ -2,6 +2,7 @@
 
 use isotherm_log::plot::page::Table;
 
+use super::document::main_axis;
 use super::fit::{GyroFit, Term};
 use super::make::{Made, ServoFit};
 use crate::drift::figures::{per_deg_c, short};
@@ -129,8 +130,7 @@ fn transient(name: &str, servo: &ServoFit, report: &mut FitReport) {
 /// A gyro that keeps its old terms.
 fn refuse(made: &Made, sensor: usize, reason: &str, report: &mut FitReport) {
     let row = made.written.document.gyro.orientation.rows.get(sensor).copied().unwrap_or_default();
-    let main = (0..3).fold(0, |best, axis| if row[axis].abs() > row[best].abs() { axis } else { best });
-    let axis = format!("gyro {}", ["x", "y", "z"][main]);
+    let axis = format!("gyro {}", ["x", "y", "z"][main_axis(&row)]);
     for verdict in report.verdicts.iter_mut().filter(|verdict| verdict.of == axis) {
         *verdict = verdict.clone().refused(reason);
     }

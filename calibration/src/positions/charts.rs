@@ -6,6 +6,7 @@ use super::analysis::{Analysis, Settings};
 use super::budget::ARCSEC_PER_RAD;
 use super::fit::Fit;
 use super::judged::Judgement;
+use crate::modes::document::main_axis;
 
 pub(super) const AXES: [&str; 3] = ["x", "y", "z"];
 /// Points of a curve over temperature.
@@ -40,7 +41,7 @@ fn at(axis: &[[f64; 3]], x: f64) -> [f64; 3] {
 
 /// Elements of a row that say where the axis points: all but the largest.
 pub(super) fn across(row: [f64; 3]) -> impl Iterator<Item = usize> {
-    let largest = (0..3).fold(0, |best, i| if row[i].abs() > row[best].abs() { i } else { best });
+    let largest = main_axis(&row);
     (0..3).filter(move |i| *i != largest)
 }
 

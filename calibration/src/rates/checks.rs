@@ -6,7 +6,7 @@ use super::matching::Matched;
 use super::measure::in_case;
 use super::solve::GyroRates;
 use crate::drift::figures::short;
-use crate::modes::document::row;
+use crate::modes::document::{main_axis, row};
 use crate::modes::robust::median;
 
 /// Share of a run's fastest step from which on a step shows what the table turned about.
@@ -130,7 +130,7 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 /// An axis by its name where it is near a case axis, else as three numbers.
 fn words(axis: [f64; 3]) -> String {
     const NEAR: f64 = 0.985;
-    let main = largest(3, |index| axis[index].abs());
+    let main = main_axis(&axis);
     if axis[main].abs() > NEAR {
         return format!("{}{}", if axis[main] < 0.0 { "-" } else { "" }, ["x", "y", "z"][main]);
     }

@@ -12,7 +12,7 @@ use super::read::{Turned, read, whole_turns};
 use super::solve::{GyroRates, solve};
 use super::steps::Step;
 use crate::error::Error;
-use crate::modes::document::{row, widened};
+use crate::modes::document::{main_axis, row, widened};
 use crate::modes::robust::median;
 use crate::report::{FitReport, Verdict};
 use crate::run::{Run, Watch};
@@ -265,11 +265,6 @@ impl Made {
     pub fn report(&self) -> FitReport {
         super::report::report(self)
     }
-}
-
-/// The case axis that an input axis looks along more than along the others.
-fn main_axis(row: &[f64; 3]) -> usize {
-    (0..3).fold(0, |best, axis| if row[axis].abs() > row[best].abs() { axis } else { best })
 }
 
 fn axes_of(base: &Document, sensor: usize) -> [f64; 3] {
