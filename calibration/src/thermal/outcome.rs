@@ -301,7 +301,9 @@ impl Outcome {
             refused.filter(|(sensor, ..)| follows(sensor)).map(|(sensor, ..)| sensor.name.as_str()).collect();
         (!names.is_empty()).then(|| {
             format!(
-                "{}: refused, with terms from before that follow the change of temperature; they were made with a smoothing of {} s and a                  derivative step of {} s, and the document now has {} s and {} s for all sensors: what they take off is another thing.                  --smoothing {} keeps the old filter",
+                "{}: refused, with terms from before that follow the change of temperature; they were made with a smoothing of {} s and a \
+                 derivative step of {} s, and the document now has {} s and {} s for all sensors: what they take off is another thing. \
+                 --smoothing {} keeps the old filter",
                 names.join(", "),
                 old.smoothing_s,
                 old.derivative_step_s,
