@@ -29,6 +29,6 @@ step() {
 if [ -n "${QUICK:-}" ]; then step kernel kernel --rounds 5; else step kernel kernel; fi
 step chain chain --subject relay,keyed,service,python "${quick[@]}"
 step profiles chain --measure latency --units 20 --rate 1000 --subject relay,service "${quick[@]}" \
-    --profile default --profile pool-1 --profile pool-2 --profile rx-1 --profile batching-1ms
+    --profile default --profile pool-2 --profile rx-1 --profile batching-1ms
 step scale scale "${quick[@]}"
 "$bench" report --from "$figures" --page "$page" --plots "$plots"
