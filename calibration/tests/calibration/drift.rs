@@ -59,7 +59,7 @@ fn noise_coefficients_are_recovered_within_their_confidence() {
         let (inside, seen) = inside(found, term, truth);
         println!("{}: inside {inside} of {seen} seen, {SEEDS} seeds", term.symbol());
         assert!(seen * 10 >= SEEDS as usize * 9, "{}: seen in {seen}", term.symbol());
-        assert!(inside * 100 >= seen * 82, "{}: {inside} of {seen}", term.symbol());
+        assert!(inside * 100 >= seen * 90, "{}: {inside} of {seen}", term.symbol());
     }
 }
 

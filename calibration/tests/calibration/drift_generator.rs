@@ -43,18 +43,19 @@ impl Normal {
         (0..count).map(|_| next()).collect()
     }
 
-    /// Flicker of bias instability `b`: a sum of Markov processes, two per octave, whose densities add up to b²/(2πf).
+    /// Means over ticks of flicker of bias instability `b`: a sum of Markov processes, two per octave, whose densities add
+    /// up to b²/(2πf).
     pub(crate) fn flicker(&mut self, count: usize, b: f64) -> Vec<f64> {
         // A process of variance v has the two-sided density 2vτ/(1 + ω²τ²); one per factor r of τ add up to
-        // v/(2f·ln r), so v = b²·ln r/π.
+        // v/(2f·ln r), so v = b²·ln r/π. What is quicker than a tick is not nothing: in means over ticks it is white noise.
         let ratio = 2.0_f64.sqrt();
         let sigma = b * (ratio.ln() / std::f64::consts::PI).sqrt();
         let mut sum = vec![0.0; count];
-        let mut tau = 1.0;
+        let mut tau = 1.0 / 32.0;
         while tau < 10.0 * count as f64 {
             let mut markov = Markov::new(self, sigma, 1.0 / tau);
             for value in &mut sum {
-                *value += markov.next(self);
+                *value += markov.next_mean(self);
             }
             tau *= ratio;
         }
@@ -67,18 +68,35 @@ pub(crate) struct Markov {
     value: f64,
     decay: f64,
     drive: f64,
+    /// Share of the values at a step's ends in the mean over it, and what the mean has beside them.
+    ends: f64,
+    between: f64,
 }
 
 impl Markov {
     /// Of stationary sigma, `step` correlation times per step.
     pub(crate) fn new(normal: &mut Normal, sigma: f64, step: f64) -> Self {
         let decay = (-step).exp();
-        Self { value: sigma * normal.next(), decay, drive: sigma * (1.0 - decay * decay).sqrt() }
+        // Given both ends, the integral over a step is normal about τ·tanh(step/2) of their sum.
+        let half = (0.5 * step).tanh();
+        Self {
+            value: sigma * normal.next(),
+            decay,
+            drive: sigma * (1.0 - decay * decay).sqrt(),
+            ends: half / step,
+            between: sigma * (2.0 * (step - 2.0 * half)).max(0.0).sqrt() / step,
+        }
     }
 
     pub(crate) fn next(&mut self, normal: &mut Normal) -> f64 {
         self.value = self.decay * self.value + self.drive * normal.next();
         self.value
+    }
+
+    /// As [`next`](Self::next), but the mean over the step.
+    pub(crate) fn next_mean(&mut self, normal: &mut Normal) -> f64 {
+        let before = self.value;
+        self.ends * (before + self.next(normal)) + self.between * normal.next()
     }
 }
 
