@@ -3,9 +3,10 @@
 use isotherm_correction::earth::{Place, Tilt};
 
 use crate::drift::figures::short;
+use crate::means::Size;
 
 /// Orders of three axes: the swaps of two first, which need the fewest mistakes.
-const ORDERS: [[usize; 3]; 5] = [[1, 0, 2], [2, 1, 0], [0, 2, 1], [1, 2, 0], [2, 0, 1]];
+pub const ORDERS: [[usize; 3]; 5] = [[1, 0, 2], [2, 1, 0], [0, 2, 1], [1, 2, 0], [2, 0, 1]];
 /// How far from what is stated the means must be, as a share of it: 20° of gravity.
 const AWAY: f64 = 0.35;
 /// And in standard deviations of the means themselves, which a bias that moves has.
@@ -28,7 +29,14 @@ pub struct Shown<'a> {
     pub deviation: f64,
 }
 
-impl Shown<'_> {
+impl<'a> Shown<'a> {
+    /// Of sensors of a kind, with the symbol of their unit of measure.
+    #[must_use]
+    pub fn of([kind, measure]: [&'a str; 2], sizes: [Size; 3], stated: [f64; 3]) -> Self {
+        let deviation = sizes.iter().map(|size| size.deviation).fold(0.0, f64::hypot);
+        Self { kind, measure, mean: sizes.map(|size| size.mean), stated, deviation }
+    }
+
     /// Which axes look swapped, in words: another order fits by far better than that of the log; `None` where none does.
     #[must_use]
     pub fn swapped(&self) -> Option<String> {
@@ -50,23 +58,25 @@ impl Shown<'_> {
         let best = ORDERS.into_iter().filter(fits).reduce(|best, order| {
             if off(order) < 0.5 * off(best) && off(best) > 0.05 * size { order } else { best }
         })?;
-        let named: Vec<&str> = ["x", "y", "z"]
-            .into_iter()
-            .enumerate()
-            .filter(|(axis, _)| best[*axis] != *axis)
-            .map(|(_, n)| n)
-            .collect();
         let list = |v: [f64; 3]| v.map(short).join(", ");
         Some(format!(
             "{} {} look swapped: their means are {} {}, in the stated attitude they would be {}; check the columns in the mapping, and the \
              attitude",
             self.kind,
-            named.join(" and "),
+            moved(best),
             list(self.mean),
             self.measure,
             list(self.stated)
         ))
     }
+}
+
+/// The axes that are not in their places, in words.
+#[must_use]
+pub fn moved(order: [usize; 3]) -> String {
+    let names = ["x", "y", "z"].into_iter().zip(order).enumerate();
+    let moved: Vec<&str> = names.filter(|(axis, (_, of))| axis != of).map(|(_, (name, _))| name).collect();
+    moved.join(" and ")
 }
 
 /// Direction of the specific force at rest in case axes, a unit vector, where pitch and roll were stated.

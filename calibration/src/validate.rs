@@ -144,14 +144,12 @@ fn doubts(name: &str, curves: &[Curve], means: &Means) -> Vec<String> {
 
 /// Columns that look swapped, where the attitude is known.
 fn looks_swapped(name: &str, means: &Means, (rest, place): (&Rest, Option<&Place>)) -> Vec<String> {
-    let looks = |(kind, measure): (&str, &str), sizes: [Size; 3], stated: Option<[f64; 3]>| {
-        let deviation = sizes.iter().map(|size| size.deviation).fold(0.0, f64::hypot);
-        Shown { kind, measure, mean: sizes.map(|size| size.mean), stated: stated?, deviation }.swapped()
-    };
+    let looks =
+        |of: [&str; 2], sizes: [Size; 3], stated: Option<[f64; 3]>| Shown::of(of, sizes, stated?).swapped();
     let force = place.and_then(up).map(|up| up.map(|part| part * STANDARD_GRAVITY_M_PER_S2));
     let words = [
-        looks(("gyros", "°/h"), [0, 1, 2].map(|axis| Size::of(means.rate(axis))), rest.rate_deg_per_h),
-        looks(("accelerometers", "m/s²"), [0, 1, 2].map(|axis| Size::of(means.force(axis))), force),
+        looks(["gyros", "°/h"], [0, 1, 2].map(|axis| Size::of(means.rate(axis))), rest.rate_deg_per_h),
+        looks(["accelerometers", "m/s²"], [0, 1, 2].map(|axis| Size::of(means.force(axis))), force),
     ];
     words.into_iter().flatten().map(|words| format!("{name}: {words}")).collect()
 }

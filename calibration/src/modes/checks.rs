@@ -1,12 +1,15 @@
 //! What makes a log useless for the modes: every reason, with its value, limit and what to do.
 
 use isotherm_correction::sample::OutputKind;
+use isotherm_correction::units::STANDARD_GRAVITY_M_PER_S2;
 use isotherm_protocol::document::{Document, GyroOutput};
 
 use super::cells::{Gathered, Second};
 use super::fit::deg_per_h;
 use super::robust::median;
 use super::switches::{Switches, real};
+use crate::means::Size;
+use crate::swapped::Shown;
 
 /// Fewest switches.
 const SWITCHES: usize = 8;
@@ -27,6 +30,8 @@ const COUNTS: f64 = 4.0;
 const PUSH_M_PER_S2: f64 = 5e-3;
 /// Largest mean rate of a unit at rest, Earth rate apart (°/h): 0.05 °/s.
 const TURNING_DEG_PER_H: f64 = 180.0;
+/// Parts of the runs: what differs between their means is drift, not noise.
+const PARTS: usize = 20;
 
 /// Reasons that show before anything is corrected.
 #[must_use]
@@ -159,6 +164,27 @@ pub fn behind(
         }
     }
     reasons
+}
+
+/// Columns that look swapped, where what the gyros sense of the Earth (°/h) or the direction of gravity is known.
+#[must_use]
+pub fn swapped(seconds: &[Second], earth: Option<[f64; 3]>, up: Option<[f64; 3]>) -> Vec<String> {
+    let parts = || seconds.chunks(seconds.len().div_ceil(PARTS).max(1));
+    let looks = |of: [&str; 2], triad: fn(&Second) -> [f64; 3], stated: Option<[f64; 3]>| {
+        let sizes = [0, 1, 2].map(|axis| {
+            let mean = |part: &[Second]| {
+                Size::of(&part.iter().map(|second| triad(second)[axis]).collect::<Vec<f64>>()).mean
+            };
+            Size::of(&parts().map(mean).collect::<Vec<f64>>())
+        });
+        Shown::of(of, sizes, stated?).swapped()
+    };
+    let force = up.map(|up| up.map(|part| part * STANDARD_GRAVITY_M_PER_S2));
+    let words = [
+        looks(["gyros", "°/h"], |second| second.rate, earth),
+        looks(["accelerometers", "m/s²"], |second| second.force, force),
+    ];
+    words.into_iter().flatten().collect()
 }
 
 /// The first motion of each kind.

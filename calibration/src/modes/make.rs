@@ -113,9 +113,11 @@ pub fn make<W: Watch>(wanted: &Wanted<'_>, mut watch: impl FnMut() -> W) -> Resu
         let gathered = gather(wanted.runs, &bare, group, cut, &mut watch)?;
         let earth = earth_rate(wanted, &gathered)?;
         earth_case = earth;
-        check(&gathered, &bare, group, earth)?;
-        if warnings.is_empty() {
+        let doubts = check(&gathered, &bare, group, (earth, wanted.place.as_ref()))?;
+        // Gaps and gravity are the same for every group of gyros.
+        if group[0] == 0 {
             gaps(&gathered, &mut warnings);
+            warnings.extend(doubts);
         }
         for (place, sensor) in group.into_iter().enumerate() {
             let along: Vec<f64> =

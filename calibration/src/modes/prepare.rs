@@ -1,5 +1,6 @@
 //! What the procedure needs before it fits: windows, lost ticks, the Earth, a look at what was gathered.
 
+use isotherm_correction::earth::Place;
 use isotherm_protocol::document::{Curve, Document, Servo, ServoKind, Shape};
 
 use super::cells::{Cell, Gathered};
@@ -8,6 +9,7 @@ use super::servo::Transient;
 use super::switches::Switches;
 use super::{checks, document};
 use crate::error::Error;
+use crate::swapped::up;
 
 /// Length of a window of the residuals, in whole reversal periods (s).
 const WINDOW_S: f64 = 600.0;
@@ -72,18 +74,25 @@ pub(super) fn earth_of(document: &Document, sensor: usize, cell: &Cell, earth: O
     earth.map_or(0.0, |earth| checks::earth_along(document::row(document, sensor, cell.axes_deg_c), earth))
 }
 
+/// Looks at what was gathered of three gyros: warnings.
+///
+/// # Errors
+/// Every reason why nothing can be made of it.
 pub(super) fn check(
     gathered: &Gathered,
     bare: &Document,
     group: [usize; 3],
-    earth: Option<[f64; 3]>,
-) -> Result<(), Error> {
+    (earth, place): (Option<[f64; 3]>, Option<&Place>),
+) -> Result<Vec<String>, Error> {
     let names = group.map(|sensor| bare.gyro.sensor[sensor].name.as_str());
     let counts = group.map(|sensor| document::count_arcsec(bare, sensor));
     let along = earth
         .map(|earth| group.map(|sensor| checks::earth_along(document::row(bare, sensor, f64::NAN), earth)));
     let reasons = checks::behind(gathered, names, counts, along);
-    if reasons.is_empty() { Ok(()) } else { Err(Error::Refused(reasons)) }
+    if !reasons.is_empty() {
+        return Err(Error::Refused(reasons));
+    }
+    Ok(checks::swapped(&gathered.seconds, along, place.and_then(up)))
 }
 
 pub(super) fn gaps(gathered: &Gathered, warnings: &mut Vec<String>) {

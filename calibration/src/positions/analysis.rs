@@ -2,10 +2,10 @@
 
 use isotherm_protocol::document::Document;
 
-use super::doubts::{ACCIDENT, few, no_solution, quadratic_terms, sound, spread, survival, widening};
+use super::doubts::{ACCIDENT, few, no_solution, quadratic_terms, sound, spread, survival, turned, widening};
 use super::faults;
 use super::fit::{Fit, Weights, fit, guesses};
-use super::matching::matched;
+use super::matching::{Matched, matched};
 use super::model::{Degrees, Guess, Taken};
 use super::plan::Plan;
 use super::pose::{Pose, intensities};
@@ -145,6 +145,7 @@ pub fn analyse(tracks: &[Track], document: &Document, settings: &Settings) -> Re
         );
     }
     few(stand, &taken, levels_deg_c.len(), settings, &mut warnings);
+    turned(best, document, &mut warnings);
     if !known && !document.temperature.channel.is_empty() {
         warnings.push(
             "the temperature channels have gaps or none is followed by the accelerometers: all positions count as one temperature"
@@ -205,8 +206,9 @@ pub fn positions(tracks: &[Track], settings: &Settings) -> Result<Found, Vec<Str
             continue;
         }
         match matched(&settings.plan, track, &poses) {
-            Ok(matches) => {
-                let others = matches.iter().filter(|position| position.is_none()).count();
+            Ok(Matched { positions, doubt }) => {
+                warnings.extend(doubt.map(|words| format!("{}: {words}", track.run)));
+                let others = positions.iter().filter(|position| position.is_none()).count();
                 if others > 0 {
                     warnings.push(format!(
                         "{}: {others} of {} still poses are no position of the plan and were left out",
@@ -215,7 +217,7 @@ pub fn positions(tracks: &[Track], settings: &Settings) -> Result<Found, Vec<Str
                     ));
                 }
                 found.extend(
-                    poses.into_iter().zip(matches).filter_map(|(pose, position)| Some((pose, position?))),
+                    poses.into_iter().zip(positions).filter_map(|(pose, position)| Some((pose, position?))),
                 );
             }
             Err(words) => reasons.push(format!("{}: {words}", track.run)),

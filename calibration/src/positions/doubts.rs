@@ -1,5 +1,7 @@
 //! What is doubtful about a result, and what makes it none.
 
+use isotherm_protocol::document::Document;
+use nalgebra::Vector3;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::analysis::{Analysis, Settings};
@@ -15,6 +17,8 @@ pub const GOOD_POSITIONS: usize = 9;
 pub(super) const ACCIDENT: f64 = 1e-3;
 /// Largest standard error of a scale factor that is still a result (relative).
 const LARGEST_SIGMA: f64 = 1e-2;
+/// Largest angle between an axis and where the document at hand has it (°): half of a skewed unit's way to the next one.
+const LARGEST_TURN_DEG: f64 = 30.0;
 
 /// χ² of the quadratic terms of C, and their number.
 pub(super) fn quadratic_terms(fit: &Fit, plan: &Plan) -> (f64, usize) {
@@ -87,6 +91,25 @@ pub(super) fn few(
              errors of C hold what --levelling states ({:.0}″)",
             settings.levelling_rad * budget::ARCSEC_PER_RAD
         ));
+    }
+}
+
+/// Axes that lie far from where the document at hand has them: swapped columns, a sign, or another mounting.
+pub(super) fn turned(fit: &Fit, document: &Document, warnings: &mut Vec<String>) {
+    let rows = document.accel.iter().flat_map(|accel| &accel.orientation.rows);
+    for (index, (sensor, row)) in fit.sensors.iter().zip(rows).enumerate() {
+        let axis = Vector3::from(sensor.axis.first().copied().unwrap_or_default());
+        let angle_deg = axis.angle(&Vector3::from(*row)).to_degrees();
+        if angle_deg > LARGEST_TURN_DEG {
+            warnings.push(format!(
+                "accelerometer {}: its axis is found along ({:.2}, {:.2}, {:.2}), {angle_deg:.0}° from what the document at hand states: \
+                 are columns of the mapping swapped, is a sign the other one, or is the unit mounted otherwise than the plan says?",
+                faults::name(index),
+                axis.x,
+                axis.y,
+                axis.z
+            ));
+        }
     }
 }
 

@@ -9,6 +9,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::plan::{Attitude, Plan};
 use super::pose::Pose;
 use super::track::Track;
+use crate::swapped::{ORDERS, moved};
 
 /// Largest angle between the direction found and that of the plan (rad): 20°.
 const DIRECTION_RAD: f64 = 0.35;
@@ -16,12 +17,25 @@ const DIRECTION_RAD: f64 = 0.35;
 const ROTATION_RAD: f64 = 0.52;
 /// Share of the ways between poses on which the gyros must agree with the accelerometers.
 const AGREEMENT: f64 = 0.8;
+/// Fewest ways that tell an order of columns from chance.
+const TELLING_WAYS: usize = 3;
+/// The order of the log's columns.
+const AS_LOGGED: [usize; 3] = [0, 1, 2];
 
-/// Plan positions of a run's poses, `None` for a pose that is none of them.
+/// Plan positions of a run's poses.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Matched {
+    /// By pose; `None` for one that is no position of the plan.
+    pub positions: Vec<Option<usize>>,
+    /// What is to be said of it.
+    pub doubt: Option<String>,
+}
+
+/// Finds the plan positions of a run's poses.
 ///
 /// # Errors
 /// What is wrong and what to do.
-pub fn matched(plan: &Plan, track: &Track, poses: &[Pose]) -> Result<Vec<Option<usize>>, String> {
+pub fn matched(plan: &Plan, track: &Track, poses: &[Pose]) -> Result<Matched, String> {
     let directions = directions(poses)?;
     let fits = |pose: usize, position: usize| {
         let up = plan.up(&plan.positions[position].attitude, [0.0; 3]);
@@ -30,38 +44,92 @@ pub fn matched(plan: &Plan, track: &Track, poses: &[Pose]) -> Result<Vec<Option<
     let candidates: Vec<Vec<usize>> = (0..poses.len())
         .map(|pose| (0..plan.positions.len()).filter(|position| fits(pose, *position)).collect())
         .collect();
+    let ways = ways(track, poses, AS_LOGGED);
+    let share = agreement(&ways, &directions, AS_LOGGED);
+    let swapped = if share < AGREEMENT { swapped(track, poses, (&ways, &directions)) } else { None };
+    let unclear = |hint: &str| {
+        format!(
+            "{}; gyros and accelerometers agree on the turns between the poses on {:.0} % of the ways, at least {:.0} % is needed: {hint}",
+            nothing(plan, poses, &directions),
+            share * 100.0,
+            AGREEMENT * 100.0
+        )
+    };
+    let doubt = match swapped {
+        Some(Swapped { accelerometers: true, hint }) => return Err(unclear(&hint)),
+        swapped => swapped.map(|of| {
+            format!("gyros and accelerometers do not agree on the turns between the poses: {}", of.hint)
+        }),
+    };
     let unique = candidates.iter().all(|candidates| candidates.len() <= 1);
     if unique {
-        return Ok(candidates.iter().map(|candidates| candidates.first().copied()).collect());
+        let positions = candidates.iter().map(|candidates| candidates.first().copied()).collect();
+        return Ok(Matched { positions, doubt });
     }
-    let ways: Vec<Matrix3<f64>> = poses.windows(2).map(|pair| way(track, &pair[0], &pair[1])).collect();
-    let agree = ways
-        .iter()
-        .zip(directions.windows(2))
-        .filter(|(way, pair)| (**way * pair[0]).angle(&pair[1]) < DIRECTION_RAD);
-    #[expect(clippy::cast_precision_loss, reason = "poses")]
-    let share = agree.count() as f64 / ways.len().max(1) as f64;
     if share >= AGREEMENT {
         let starts = candidates.iter().position(|candidates| !candidates.is_empty());
         let anchors = starts.map(|start| candidates[start].clone()).unwrap_or_default();
         let followed = anchors.into_iter().map(|anchor| follow(plan, &candidates, &ways, anchor));
         let missing = |found: &Vec<Option<usize>>| found.iter().filter(|position| position.is_none()).count();
         // The first of equals: the plan's order.
-        return followed.min_by_key(missing).ok_or_else(|| nothing(plan, poses, &directions));
+        let positions = followed.min_by_key(missing).ok_or_else(|| nothing(plan, poses, &directions))?;
+        return Ok(Matched { positions, doubt });
     }
     let count = plan.positions.len();
     let in_order = (0..poses.len()).all(|pose| fits(pose, pose % count));
     if in_order && poses.len().is_multiple_of(count) {
-        return Ok((0..poses.len()).map(|pose| Some(pose % count)).collect());
+        let positions = (0..poses.len()).map(|pose| Some(pose % count)).collect();
+        return Ok(Matched { positions, doubt });
     }
-    Err(format!(
-        "{}; the gyros do not show the turns between the poses (they agree with the accelerometers on {:.0} % of the ways, at least \
-         {:.0} % is needed), and the poses are not the plan's {count} positions in their order: a position is missing or repeated. \
-         Say which pose is which with --times, or record the turns too",
-        nothing(plan, poses, &directions),
-        share * 100.0,
-        AGREEMENT * 100.0
-    ))
+    Err(unclear(&format!(
+        "and they are not the plan's {count} positions in their order, one is missing or repeated. Say which pose is which with \
+         --times, or record the turns too"
+    )))
+}
+
+/// Columns that look swapped.
+struct Swapped {
+    /// Of the accelerometers; otherwise of the gyros.
+    accelerometers: bool,
+    /// What to do.
+    hint: String,
+}
+
+/// The order of columns, of accelerometers or gyros, with which both agree on the turns; `None` where none is.
+fn swapped(
+    track: &Track,
+    poses: &[Pose],
+    (as_logged, directions): (&[Matrix3<f64>], &[Vector3<f64>]),
+) -> Option<Swapped> {
+    if as_logged.len() < TELLING_WAYS {
+        return None;
+    }
+    let found = |accelerometers: bool, order: [usize; 3]| Swapped {
+        accelerometers,
+        hint: format!(
+            "with {} {} swapped they would agree; check the columns in the mapping",
+            if accelerometers { "accelerometers" } else { "gyros" },
+            moved(order)
+        ),
+    };
+    ORDERS.into_iter().find_map(|order| {
+        if agreement(as_logged, directions, order) >= AGREEMENT {
+            return Some(found(true, order));
+        }
+        let reordered = ways(track, poses, order);
+        (agreement(&reordered, directions, AS_LOGGED) >= AGREEMENT).then(|| found(false, order))
+    })
+}
+
+/// Share of the ways on which gyros and accelerometers agree, with the accelerometers in another order.
+#[expect(clippy::cast_precision_loss, reason = "poses")]
+fn agreement(ways: &[Matrix3<f64>], directions: &[Vector3<f64>], order: [usize; 3]) -> f64 {
+    let up = |direction: &Vector3<f64>| Vector3::from_fn(|axis, _| direction[order[axis]]);
+    let agree = ways
+        .iter()
+        .zip(directions.windows(2))
+        .filter(|(way, pair)| (**way * up(&pair[0])).angle(&up(&pair[1])) < DIRECTION_RAD);
+    agree.count() as f64 / ways.len().max(1) as f64
 }
 
 /// The poses in words.
@@ -142,10 +210,19 @@ fn directions(poses: &[Pose]) -> Result<Vec<Vector3<f64>>, String> {
     Ok(poses.iter().map(|pose| scaled(pose).normalize()).collect())
 }
 
+/// Rotations of the case from pose to pose, with the gyros in another order.
+fn ways(track: &Track, poses: &[Pose], order: [usize; 3]) -> Vec<Matrix3<f64>> {
+    poses
+        .windows(2)
+        .map(|pair| way(order.map(|axis| track.rate_deg_per_s[axis].as_slice()), &track.duration_s, pair))
+        .collect()
+}
+
 /// Rotation of the case from one pose to the next: takes a fixed vector's components before to those after.
-fn way(track: &Track, before: &Pose, after: &Pose) -> Matrix3<f64> {
+fn way(rate_deg_per_s: [&[f64]; 3], duration_s: &[f64], pair: &[Pose]) -> Matrix3<f64> {
+    let [before, after] = [&pair[0], &pair[1]];
     let mean = |axis: usize| {
-        let column = &track.rate_deg_per_s[axis];
+        let column = rate_deg_per_s[axis];
         let at_rest = |pose: &Pose| {
             let ticks = &column[pose.interval.first..pose.interval.end];
             #[expect(clippy::cast_precision_loss, reason = "ticks of a pose")]
@@ -157,9 +234,9 @@ fn way(track: &Track, before: &Pose, after: &Pose) -> Matrix3<f64> {
     let rest = [0, 1, 2].map(mean);
     let mut turned = Matrix3::identity();
     for tick in before.interval.end..after.interval.first {
-        let rate = Vector3::from_fn(|axis, _| (track.rate_deg_per_s[axis][tick] - rest[axis]).to_radians());
+        let rate = Vector3::from_fn(|axis, _| (rate_deg_per_s[axis][tick] - rest[axis]).to_radians());
         if rate.iter().all(|rate| rate.is_finite()) {
-            turned = seen(rate * track.duration_s[tick]) * turned;
+            turned = seen(rate * duration_s[tick]) * turned;
         }
     }
     turned

@@ -239,11 +239,9 @@ pub fn swapped(samples: &Samples, document: &Document, (rest, stand): (&Rest, &S
         let along = |row: &[f64; 3]| row.iter().zip(vector).map(|(r, v)| r * v).sum();
         <[f64; 3]>::try_from(rows.iter().map(along).collect::<Vec<f64>>()).ok()
     };
-    let looks = |(kind, measure): (&str, &str), columns: &[Vec<f64>], stated: Option<[f64; 3]>| {
+    let looks = |of: [&str; 2], columns: &[Vec<f64>], stated: Option<[f64; 3]>| {
         let sizes: Vec<Size> = columns.iter().map(|values| Size::of(values)).collect();
-        let mean = <[f64; 3]>::try_from(sizes.iter().map(|size| size.mean).collect::<Vec<f64>>()).ok()?;
-        let deviation = sizes.iter().map(|size| size.deviation).fold(0.0, f64::hypot);
-        Shown { kind, measure, mean, stated: stated?, deviation }.swapped()
+        Shown::of(of, <[Size; 3]>::try_from(sizes).ok()?, stated?).swapped()
     };
     if stand.turning.is_some() {
         return Vec::new();
@@ -252,8 +250,8 @@ pub fn swapped(samples: &Samples, document: &Document, (rest, stand): (&Rest, &S
     let accel = document.accel.as_ref();
     let force = rest.force_m_per_s2.zip(accel).and_then(|(force, a)| along(&a.orientation.rows, force));
     let words = [
-        looks(("gyros", "°/h"), &samples.gyros, rate),
-        looks(("accelerometers", "m/s²"), &samples.forces, force),
+        looks(["gyros", "°/h"], &samples.gyros, rate),
+        looks(["accelerometers", "m/s²"], &samples.forces, force),
     ];
     words.into_iter().flatten().map(|words| format!("{}: {words}", samples.name)).collect()
 }

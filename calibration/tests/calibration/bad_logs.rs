@@ -2,11 +2,17 @@
 
 use std::path::Path;
 
+use isotherm_calibration::positions::plan::Plan;
+use isotherm_calibration::written::Written;
 use isotherm_log::text::LogEvent;
+use isotherm_simulator::chamber::Profile;
 use serde_json::Value;
 
 use crate::command::{calibrate, fails, shipped, succeeds, words};
+use crate::modes_rates::{base, events as events_of, zeeman};
+use crate::positions_command::driven;
 use crate::simulated_logs::{events, fibre_optic, record, record_events, record_units};
+use crate::stand;
 
 fn fog() -> String {
     shipped("FOG-0001.toml").display().to_string()
@@ -163,12 +169,94 @@ fn swapped_columns_are_pointed_out_where_the_attitude_is_stated() {
 }
 
 #[test]
+fn positions_with_swapped_columns_name_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let (log, base) = (path("log.mcap"), path("base.toml"));
+    std::fs::write(&base, Written::of(&stand::document()).unwrap().text).unwrap();
+    let times = path("times.csv").display().to_string();
+    let call = |plan: &str, more: &[&str], change: &dyn Fn(&mut LogEvent)| {
+        let positions = Plan::named(plan).unwrap();
+        let order: Vec<usize> = (0..positions.positions.len()).collect();
+        let (mut events, held) = stand::log(&stand::instrument(), 20.0, &positions, &order, &driven(21));
+        events.iter_mut().for_each(change);
+        let _ = std::fs::remove_file(&log);
+        record_events(&log, "MEMS-0001", &events);
+        let rows = held.iter().map(|([from, to], position)| {
+            format!("{},{},{}\n", from + 2.0, to - 1.0, positions.positions[*position].name)
+        });
+        std::fs::write(&times, format!("start_s,end_s,position\n{}", rows.collect::<String>())).unwrap();
+        let call = ["positions", log.to_str().unwrap(), "--document", base.to_str().unwrap(), "--plan", plan];
+        let (code, said, errors) = words(&calibrate(&[&call[..], &["--gravity", "9.8154"], more].concat()));
+        (code, format!("{said}{errors}"))
+    };
+    let accelerometers = |event: &mut LogEvent| {
+        if let LogEvent::Accel { tick, .. } = event {
+            tick.readings.swap(0, 1);
+        }
+    };
+    let gyros = |event: &mut LogEvent| {
+        if let LogEvent::Gyro { tick, .. } = event {
+            tick.readings.swap(0, 2);
+        }
+    };
+    for plan in ["twelve", "six"] {
+        let (code, sound) = call(plan, &[], &|_| ());
+        assert!(code == Some(0) && !sound.contains("swapped") && !sound.contains("from what"), "{sound}");
+        let (code, refused) = call(plan, &[], &accelerometers);
+        let hint = "with accelerometers x and y swapped they would agree; check the columns";
+        assert!(code == Some(1) && refused.contains(hint), "{refused}");
+        // The gyros do not matter for what is found, but for whoever corrects with that mapping.
+        let (code, told) = call(plan, &[], &gyros);
+        assert!(code == Some(0) && told.contains("with gyros x and z swapped they would agree"), "{told}");
+    }
+    // Where the times are stated nothing is matched: what is found is far from what the document states.
+    let (_, turned) = call("twelve", &["--times", &times], &accelerometers);
+    for axis in ["x", "y"] {
+        let words = format!("accelerometer {axis}: its axis is found along");
+        assert!(turned.contains(&words) && turned.contains("90° from what"), "{turned}");
+    }
+    assert!(!turned.contains("accelerometer z: its axis"), "{turned}");
+}
+
+#[test]
+fn modes_point_out_swapped_columns_where_the_attitude_is_stated() {
+    let folder = tempfile::tempdir().unwrap();
+    let base = base(folder.path());
+    let log = folder.path().join("run.mcap");
+    let chamber = || Profile::constant(50.0).ramp(-30.0, 4.0).ramp(50.0, 4.0);
+    let stated = ["--latitude", "55.75", "--heading", "30", "--pitch", "0", "--roll", "0", "--json"];
+    let warnings = |[gyros, accelerometers]: [bool; 2]| {
+        let mut all = events_of(&[zeeman(1, chamber())]);
+        for event in &mut all {
+            match event {
+                LogEvent::Gyro { tick, .. } if gyros => tick.readings.swap(0, 2),
+                LogEvent::Accel { tick, .. } if accelerometers => tick.readings.swap(0, 2),
+                _ => {}
+            }
+        }
+        let _ = std::fs::remove_file(&log);
+        record_events(&log, "ZLG-0001", &all);
+        let call = ["modes", log.to_str().unwrap(), "--document", base.to_str().unwrap()];
+        let (_, said, errors) = words(&calibrate(&[&call[..], &stated].concat()));
+        let report: Value = serde_json::from_str(&said).unwrap_or_default();
+        format!("{}{errors}", report["warnings"])
+    };
+    let sound = warnings([false, false]);
+    assert!(!sound.contains("swapped"), "{sound}");
+    let both = warnings([true, true]);
+    for sensors in ["gyros x and z look swapped", "accelerometers x and z look swapped"] {
+        assert!(both.contains(sensors), "{both}");
+    }
+}
+
+#[test]
 fn a_log_that_is_too_short_for_a_drift_says_so_in_its_first_line() {
     let folder = tempfile::tempdir().unwrap();
     let log = folder.path().join("ramp.mcap").display().to_string();
     // Heating for a quarter of an hour: what moves is temperature.
     let mut scenario = isotherm_simulator::presets::mems_chamber(5);
-    scenario.chamber = isotherm_simulator::chamber::Profile::constant(20.0).ramp(60.0, 3.0);
+    scenario.chamber = Profile::constant(20.0).ramp(60.0, 3.0);
     (scenario.tick_ns, scenario.duration_s) = (100_000_000, 800.0);
     record(Path::new(&log), &scenario);
     let said = succeeds(&["drift", &log]);
