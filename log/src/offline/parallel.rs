@@ -1,4 +1,4 @@
-//! Several units of a recording at once: one thread reads, others correct, the caller's writes.
+//! Several units of a recording at once: one thread reads, others correct, the caller's writes; or the caller's does all three.
 //!
 //! The recording is read in blocks of messages. Each unit belongs to one worker, which gets the unit's messages of every
 //! block in recorded order; what the workers make of a block is put together again by unit before the next. So neither
@@ -8,11 +8,13 @@ use std::collections::BTreeMap;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread;
 
+use isotherm_protocol::key::UnitId;
+
 use super::unit::{Form, Output, UnitPlan, UnitReport, UnitWork};
 use crate::diff::DiffOptions;
 use crate::error::Error;
 use crate::message::Message;
-use crate::part::{LogFiles, Part};
+use crate::part::{LogFiles, Messages, Part};
 use crate::progress::Progress;
 use crate::source::LogReport;
 
@@ -26,7 +28,8 @@ const DEPTH: usize = 4;
 /// How units are corrected.
 #[derive(Debug, Clone, Copy)]
 pub struct RunOptions {
-    /// Threads that correct (≥ 1); the results do not depend on it.
+    /// Threads that correct (≥ 1), and one more that reads; with one the caller's does everything. The results do not depend
+    /// on it.
     pub threads: usize,
     /// What is made of corrected ticks.
     pub form: Form,
@@ -42,6 +45,9 @@ pub type Made = Vec<(usize, Output)>;
 /// Messages of one block for one worker, by the unit's place in the plans.
 type Job = Vec<(usize, Message)>;
 
+/// Places of units in the plans.
+type Places = BTreeMap<UnitId, usize>;
+
 /// Corrects the units of a log; `each` takes what is made of them, block by block.
 ///
 /// # Errors
@@ -54,23 +60,25 @@ pub fn correct(
     each: &mut dyn FnMut(Made, &Progress) -> Result<(), Error>,
 ) -> Result<(Vec<UnitReport>, LogReport), Error> {
     let workers = options.threads.clamp(1, plans.len().max(1));
-    let places: BTreeMap<_, _> =
-        plans.iter().enumerate().map(|(place, plan)| (plan.id.clone(), place)).collect();
-    let mut of_worker: Vec<Vec<(usize, UnitWork)>> = (0..workers).map(|_| Vec::new()).collect();
+    let places: Places = plans.iter().enumerate().map(|(place, plan)| (plan.id.clone(), place)).collect();
+    let mut of_worker: Vec<Worker> = (0..workers).map(|_| Worker::default()).collect();
     for (place, plan) in plans.into_iter().enumerate() {
         let work = UnitWork::new(plan, options.form, options.from_ns, options.diff);
-        if let Some(works) = of_worker.get_mut(place % workers) {
-            works.push((place, work));
+        if let Some(worker) = of_worker.get_mut(place % workers) {
+            worker.units.push((place, work));
         }
+    }
+    if options.threads <= 1 {
+        return alone(files, part, &places, of_worker.pop().unwrap_or_default(), each);
     }
     thread::scope(|scope| {
         let (mut jobs, mut made, mut running) = (Vec::new(), Vec::new(), Vec::new());
-        for works in of_worker {
+        for worker in of_worker {
             let (job_sender, job_receiver) = sync_channel::<Job>(DEPTH);
             let (made_sender, made_receiver) = sync_channel::<Made>(DEPTH);
             jobs.push(job_sender);
             made.push(made_receiver);
-            running.push(scope.spawn(move || work(works, &job_receiver, &made_sender)));
+            running.push(scope.spawn(move || work(worker, &job_receiver, &made_sender)));
         }
         let (progress_sender, progress_receiver) = sync_channel(1);
         let places = &places;
@@ -98,36 +106,44 @@ fn joined<T>(ended: thread::Result<T>) -> T {
     ended.unwrap_or_else(|panic| std::panic::resume_unwind(panic))
 }
 
+/// Reads, corrects and gives out in one thread.
+fn alone(
+    files: &LogFiles,
+    part: &Part,
+    places: &Places,
+    mut worker: Worker,
+    each: &mut dyn FnMut(Made, &Progress) -> Result<(), Error>,
+) -> Result<(Vec<UnitReport>, LogReport), Error> {
+    let mut messages = files.open(part)?;
+    let progress = messages.progress();
+    // What was read before a log breaks off is given out, as it is with more threads.
+    let end = loop {
+        match block(&mut messages, places, 1) {
+            Ok(jobs) if jobs.is_empty() => break Ok(()),
+            Ok(jobs) => jobs.into_iter().try_for_each(|job| each(worker.take(job), &progress))?,
+            Err(error) => break Err(error),
+        }
+    };
+    each(worker.finish(), &progress)?;
+    end?;
+    Ok((worker.reports().map(|(_, report)| report).collect(), messages.report()))
+}
+
 /// Reads the log and hands each worker its messages.
 fn read(
     files: &LogFiles,
     part: &Part,
-    places: &BTreeMap<isotherm_protocol::key::UnitId, usize>,
+    places: &Places,
     jobs: &[SyncSender<Job>],
     progress: &SyncSender<Progress>,
 ) -> Result<LogReport, Error> {
     let mut messages = files.open(part)?;
     // The caller waits for it.
     let _ = progress.send(messages.progress());
-    let mut over = false;
-    while !over {
-        let mut block: Vec<Job> = jobs.iter().map(|_| Vec::new()).collect();
-        let mut bytes = 0;
-        for _ in 0..BLOCK {
-            let Some(message) = messages.next_message()? else {
-                over = true;
-                break;
-            };
-            bytes += message.frame.len();
-            let place = message.topic.unit().and_then(|unit| places.get(unit)).copied();
-            if let Some(place) = place
-                && let Some(job) = block.get_mut(place % jobs.len())
-            {
-                job.push((place, message));
-            }
-            if bytes >= BLOCK_BYTES {
-                break;
-            }
+    loop {
+        let block = block(&mut messages, places, jobs.len())?;
+        if block.is_empty() {
+            return Ok(messages.report());
         }
         for (job, worker) in block.into_iter().zip(jobs) {
             if worker.send(job).is_err() {
@@ -136,35 +152,75 @@ fn read(
             }
         }
     }
-    Ok(messages.report())
 }
 
-/// Corrects the units of one worker.
-fn work(
-    mut works: Vec<(usize, UnitWork)>,
-    jobs: &Receiver<Job>,
-    made: &SyncSender<Made>,
-) -> Vec<(usize, UnitReport)> {
-    let end_block = |works: &mut Vec<(usize, UnitWork)>| {
-        made.send(works.iter_mut().map(|(place, work)| (*place, work.output())).collect()).is_ok()
-    };
-    for job in jobs {
+/// The next messages of the log, by worker; none at its end.
+fn block(messages: &mut Messages, places: &Places, workers: usize) -> Result<Vec<Job>, Error> {
+    let mut block: Vec<Job> = Vec::new();
+    let mut bytes = 0;
+    for _ in 0..BLOCK {
+        let Some(message) = messages.next_message()? else { break };
+        block.resize_with(workers, Job::new);
+        bytes += message.frame.len();
+        let place = message.topic.unit().and_then(|unit| places.get(unit)).copied();
+        if let Some(place) = place
+            && let Some(job) = block.get_mut(place % workers)
+        {
+            job.push((place, message));
+        }
+        if bytes >= BLOCK_BYTES {
+            break;
+        }
+    }
+    Ok(block)
+}
+
+/// Units that one thread corrects, by their place in the plans, in that order.
+#[derive(Default)]
+struct Worker {
+    units: Vec<(usize, UnitWork)>,
+}
+
+impl Worker {
+    /// Corrects the messages of a block.
+    fn take(&mut self, job: Job) -> Made {
         for (place, message) in job {
-            if let Ok(index) = works.binary_search_by_key(&place, |(place, _)| *place)
-                && let Some((_, work)) = works.get_mut(index)
+            if let Ok(index) = self.units.binary_search_by_key(&place, |(place, _)| *place)
+                && let Some((_, work)) = self.units.get_mut(index)
             {
                 work.take(message);
             }
         }
-        if !end_block(&mut works) {
+        self.made()
+    }
+
+    /// What waits until nothing more comes.
+    fn finish(&mut self) -> Made {
+        for (_, work) in &mut self.units {
+            work.finish();
+        }
+        self.made()
+    }
+
+    fn made(&mut self) -> Made {
+        self.units.iter_mut().map(|(place, work)| (*place, work.output())).collect()
+    }
+
+    fn reports(self) -> impl Iterator<Item = (usize, UnitReport)> {
+        self.units.into_iter().map(|(place, work)| (place, work.report()))
+    }
+}
+
+/// Corrects what comes in for one worker.
+fn work(mut worker: Worker, jobs: &Receiver<Job>, made: &SyncSender<Made>) -> Vec<(usize, UnitReport)> {
+    for job in jobs {
+        if made.send(worker.take(job)).is_err() {
             break;
         }
     }
-    for (_, work) in &mut works {
-        work.finish();
-    }
-    end_block(&mut works);
-    works.into_iter().map(|(place, work)| (place, work.report())).collect()
+    // Nobody may want it any more.
+    let _ = made.send(worker.finish());
+    worker.reports().collect()
 }
 
 /// Takes what every worker has made of a block, block after block.

@@ -67,7 +67,7 @@ pub(super) struct CorrectArgs {
     /// Do not compare with the corrected ticks in a recording
     #[arg(long)]
     no_compare: bool,
-    /// Threads that correct the units of a recording; as many as there are cores without it
+    /// Threads that correct the units of a recording, beside the one that reads it; 1: one for both. As many as there are cores without it
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
     /// Print the summary as one JSON object
