@@ -60,6 +60,10 @@ enum Fed<'a> {
 }
 
 impl Fed<'_> {
+    fn is_accel(&self) -> bool {
+        matches!(self, Self::Event(LogEvent::Accel { .. }) | Self::Frame(RawStream::Accel, _))
+    }
+
     fn give(&self, unit: &mut Offline) {
         match self {
             Self::Event(event) => unit.handle(event),
@@ -170,9 +174,13 @@ impl Run {
                 each(tick, unit.unit());
             }
         };
+        let has_accelerometers = loaded.calibration.accel_count() > 0;
         self.feed(watch, |fed| {
-            fed.give(&mut unit);
-            give_out(&mut unit);
+            // A document of gyros alone is asked about gyros: their log may well have accelerometers.
+            if has_accelerometers || !fed.is_accel() {
+                fed.give(&mut unit);
+                give_out(&mut unit);
+            }
         })?;
         unit.finish();
         give_out(&mut unit);

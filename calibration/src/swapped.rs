@@ -40,35 +40,60 @@ impl<'a> Shown<'a> {
     /// Which axes look swapped, in words: another order fits by far better than that of the log; `None` where none does.
     #[must_use]
     pub fn swapped(&self) -> Option<String> {
-        let off = |order: [usize; 3]| {
-            let square = |axis: usize| {
-                let off = self.mean[order[axis]] - self.stated[axis];
-                off * off
-            };
-            (square(0) + square(1) + square(2)).sqrt()
-        };
-        let as_logged = off([0, 1, 2]);
-        let size = self.stated.iter().map(|part| part * part).sum::<f64>().sqrt();
-        // False for NaN too.
-        let is_away = as_logged > AWAY * size && as_logged > AWAY_DEVIATIONS * self.deviation;
-        if !is_away {
+        let off = |order: [usize; 3]| size([0, 1, 2].map(|axis| self.mean[order[axis]] - self.stated[axis]));
+        let (as_logged, size) = (self.off(), size(self.stated));
+        if !self.is_away() {
             return None;
         }
         let fits = |order: &[usize; 3]| off(*order) < LEFT * as_logged;
         let best = ORDERS.into_iter().filter(fits).reduce(|best, order| {
             if off(order) < 0.5 * off(best) && off(best) > 0.05 * size { order } else { best }
         })?;
-        let list = |v: [f64; 3]| v.map(short).join(", ");
         Some(format!(
-            "{} {} look swapped: their means are {} {}, in the stated attitude they would be {}; check the columns in the mapping, and the \
-             attitude",
+            "{} {} look swapped: {}; check the columns in the mapping, and the attitude",
             self.kind,
             moved(best),
+            self.means()
+        ))
+    }
+
+    /// That the means are far from what they must be though no order looks right, in words; `None` where they are near.
+    #[must_use]
+    pub fn far(&self) -> Option<String> {
+        (self.is_away() && self.swapped().is_none()).then(|| {
+            format!(
+                "the {} do not fit the attitude: {}; is the attitude that of another log, a sign the other one, or the unit of measure wrong?",
+                self.kind,
+                self.means()
+            )
+        })
+    }
+
+    /// How far the means are from what they must be.
+    fn off(&self) -> f64 {
+        size([0, 1, 2].map(|axis| self.mean[axis] - self.stated[axis]))
+    }
+
+    /// Whether that is too far; false for NaN too.
+    fn is_away(&self) -> bool {
+        let off = self.off();
+        off > AWAY * size(self.stated) && off > AWAY_DEVIATIONS * self.deviation
+    }
+
+    /// Both in words.
+    fn means(&self) -> String {
+        let list = |v: [f64; 3]| v.map(short).join(", ");
+        format!(
+            "their means are {} {}, in the stated attitude they would be {}",
             list(self.mean),
             self.measure,
             list(self.stated)
-        ))
+        )
     }
+}
+
+fn size(vector: [f64; 3]) -> f64 {
+    vector.iter().map(|part| part * part).sum::<f64>().sqrt()
 }
 
 /// The axes that are not in their places, in words.
@@ -111,6 +136,24 @@ mod tests {
             words("gyros", [-12.6, 7.1, -4.3], earth, 0.3).starts_with("gyros x and y and z look swapped")
         );
         assert!(words("gyros", [-4.0, 7.5, -12.0], earth, 0.3).starts_with("gyros x and y look swapped"));
+    }
+
+    #[test]
+    fn what_fits_in_no_order_is_told_as_far() {
+        let of = |mean: [f64; 3]| Shown {
+            kind: "accelerometers",
+            measure: "m/s²",
+            mean,
+            stated: [0.1, -0.2, -9.8],
+            deviation: 0.01,
+        };
+        let upside_down = of([0.1, -0.2, 9.8]).far().unwrap();
+        assert!(
+            upside_down.contains("9.80 m/s²") && upside_down.contains("attitude that of another log"),
+            "{upside_down}"
+        );
+        assert_eq!(of([-9.8, -0.2, 0.1]).far(), None, "swapped, which is told otherwise");
+        assert_eq!(of([0.3, 0.1, -9.7]).far(), None);
     }
 
     #[test]

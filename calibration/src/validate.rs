@@ -69,6 +69,13 @@ pub fn validate(
         }
         let faults = judging(&run.name, &run.series(&mut watch)?, &Stand::default());
         let after = Means::of(run, &written.loaded, wanted.window_s, &mut watch)?;
+        if (0..3).all(|axis| Size::of(after.rate(axis)).count == 0) {
+            let nothing = format!(
+                "{}: {name} makes no valid rate of any of its gyro ticks: is it the document of this unit, and the mapping right?",
+                run.name
+            );
+            return Err(Error::Refused([vec![nothing], after.troubles, faults].concat()));
+        }
         let nominal = Means::of(run, &bare.loaded, wanted.window_s, &mut watch)?;
         coverage.count(run, written, &mut watch)?;
         if let Some(reason) = at_rest(&run.name, &after) {

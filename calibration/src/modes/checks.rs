@@ -166,9 +166,9 @@ pub fn behind(
     reasons
 }
 
-/// Columns that look swapped, where what the gyros sense of the Earth (°/h) or the direction of gravity is known.
+/// Columns that look swapped, signs, scales and attitudes that look wrong, where what the gyros sense of the Earth (°/h) or the direction of gravity is known.
 #[must_use]
-pub fn swapped(seconds: &[Second], earth: Option<[f64; 3]>, up: Option<[f64; 3]>) -> Vec<String> {
+pub fn attitude(seconds: &[Second], earth: Option<[f64; 3]>, up: Option<[f64; 3]>) -> Vec<String> {
     let parts = || seconds.chunks(seconds.len().div_ceil(PARTS).max(1));
     let looks = |of: [&str; 2], triad: fn(&Second) -> [f64; 3], stated: Option<[f64; 3]>| {
         let sizes = [0, 1, 2].map(|axis| {
@@ -177,7 +177,8 @@ pub fn swapped(seconds: &[Second], earth: Option<[f64; 3]>, up: Option<[f64; 3]>
             };
             Size::of(&parts().map(mean).collect::<Vec<f64>>())
         });
-        Shown::of(of, sizes, stated?).swapped()
+        let shown = Shown::of(of, sizes, stated?);
+        shown.swapped().or_else(|| shown.far())
     };
     let force = up.map(|up| up.map(|part| part * STANDARD_GRAVITY_M_PER_S2));
     let words = [

@@ -92,7 +92,7 @@ pub(super) fn check(
     if !reasons.is_empty() {
         return Err(Error::Refused(reasons));
     }
-    Ok(checks::swapped(&gathered.seconds, along, place.and_then(up)))
+    Ok(checks::attitude(&gathered.seconds, along, place.and_then(up)))
 }
 
 pub(super) fn gaps(gathered: &Gathered, warnings: &mut Vec<String>) {

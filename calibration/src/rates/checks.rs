@@ -2,9 +2,12 @@
 
 use isotherm_protocol::document::Document;
 
+use super::bins::Bin;
 use super::matching::Matched;
 use super::measure::in_case;
+use super::plateaus::scatter;
 use super::solve::GyroRates;
+use super::steps::Step;
 use crate::drift::figures::short;
 use crate::modes::document::{main_axis, row};
 use crate::modes::robust::median;
@@ -17,6 +20,12 @@ const LARGEST_ANGLE_DEG: f64 = 30.0;
 const LARGEST_FACTOR: f64 = 2.0;
 /// Share of the largest rate that the straight line may leave of a step, where noise does not explain it.
 const LARGEST_LEFT: f64 = 0.01;
+/// Share of the step's rate, and standard deviations, by which a bin may differ from its middle; share of the bins that may differ more.
+const UNSTEADY: f64 = 0.05;
+const UNSTEADY_SIGMAS: f64 = 10.0;
+const UNSTEADY_BINS: f64 = 0.05;
+/// Share of the liveliest gyro's range below which another one shows nothing at all: what a document takes from a dead reading.
+const DEAD: f64 = 1e-9;
 
 /// The fast steps of a run must turn about the stated axis, and about as fast as stated where the scale is known.
 ///
@@ -78,6 +87,79 @@ pub(super) fn turned_as_stated(
         });
     }
     Ok(())
+}
+
+/// Each step must be one rate from end to end.
+///
+/// # Errors
+/// The first that is not, and what to do.
+pub(super) fn steady(matched: &[Matched], bins: &[Bin]) -> Result<(), String> {
+    let sigma = scatter(bins);
+    for one in matched {
+        let own = bins.get(one.plateau.bins[0]..one.plateau.bins[1]).unwrap_or_default();
+        let sensor = largest(sigma.len(), |sensor| one.plateau.rate[sensor].abs());
+        let rates: Vec<f64> = own.iter().filter(|bin| bin.good_s > 0.0).map(|bin| bin.rate[sensor]).collect();
+        if rates.is_empty() {
+            continue;
+        }
+        let usual = median(&rates);
+        let allowed =
+            (UNSTEADY * one.step.rate_deg_per_s.abs() * 3600.0).max(UNSTEADY_SIGMAS * sigma[sensor]);
+        let off = rates.iter().filter(|rate| (**rate - usual).abs() > allowed).count();
+        #[expect(clippy::cast_precision_loss, reason = "bins of a step")]
+        if off > 1 && off as f64 > UNSTEADY_BINS * rates.len() as f64 {
+            let [from, to] = one.plateau.window_s;
+            let (low, high) = rates.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), rate| {
+                (low.min(*rate), high.max(*rate))
+            });
+            return Err(format!(
+                "log {}: the rate is not steady in the step of {from:.1}…{to:.1} s ({} °/s): it lies between {} and {} °/s. Are the times \
+                 of the steps those of the log? Leave the table's acceleration out of them",
+                one.step.run + 1,
+                one.step.rate_deg_per_s,
+                short(low / 3600.0),
+                short(high / 3600.0)
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// The first gyro that does not move at all while another one does.
+pub(super) fn dead(bins: &[Bin]) -> Option<usize> {
+    let sensors = bins.first().map_or(0, |bin| bin.rate.len());
+    let range = |sensor: usize| {
+        let rates = bins.iter().filter(|bin| bin.good_s > 0.0).map(|bin| bin.rate[sensor]);
+        let (low, high) = rates.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
+        high - low
+    };
+    let liveliest = (0..sensors).map(range).fold(0.0, f64::max);
+    let still = scatter(bins);
+    (0..sensors).find(|sensor| {
+        liveliest > 0.0 && still[*sensor] <= DEAD * liveliest && range(*sensor) < 1e-3 * liveliest
+    })
+}
+
+/// Axes about which the runs turned one way only, in words: scale factor and bias, or an asymmetry, then cannot be told apart.
+pub(super) fn one_way(steps: &[Step]) -> Vec<String> {
+    let axes = ["x", "y", "z"].into_iter().enumerate();
+    let about = |axis: usize| {
+        steps
+            .iter()
+            .filter(move |step| main_axis(&step.axis) == axis)
+            .map(move |step| step.rate_deg_per_s * step.axis[axis])
+    };
+    let one_way = axes.filter(|(axis, _)| {
+        let [forth, back] = [about(*axis).any(|rate| rate > 0.0), about(*axis).any(|rate| rate < 0.0)];
+        forth != back
+    });
+    one_way
+        .map(|(_, name)| {
+            format!(
+                "all steps about {name} turn one way: an asymmetry of the scale factor is taken for scale and bias. Turn both ways, at equal rates"
+            )
+        })
+        .collect()
 }
 
 /// Why what was fitted is no gyro: `rates` are the true rates of the steps (°/h), `axis` its input axis.

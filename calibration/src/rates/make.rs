@@ -3,7 +3,7 @@
 use isotherm_correction::earth::Place;
 use isotherm_protocol::document::Document;
 
-use super::checks::no_result;
+use super::checks::{no_result, one_way};
 use super::document;
 use super::judge::{errors, verdicts};
 use super::matching::Matched;
@@ -79,7 +79,7 @@ pub struct Made {
 /// # Errors
 /// [`Error::Refused`] with every reason; [`Error::Log`], [`Error::Document`].
 pub fn make<W: Watch>(wanted: &Wanted<'_>, mut watch: impl FnMut() -> W) -> Result<Made, Error> {
-    let mut warnings = Vec::new();
+    let mut warnings = one_way(wanted.steps);
     let mut runs = read_all(wanted, &mut watch, &mut warnings)?;
     let judging = runs.split_off(wanted.runs.len());
     let sensors = wanted.base.gyro.sensor.len();

@@ -1,7 +1,7 @@
 //! A run on the table: its bins and its steps.
 
 use super::bins::{BIN_S, Binned, binned};
-use super::checks::turned_as_stated;
+use super::checks::{dead, steady, turned_as_stated};
 use super::make::Wanted;
 use super::matching::{Matched, matched};
 use super::plateaus;
@@ -44,11 +44,22 @@ pub(super) fn read<W: Watch>(
             run.name
         )));
     }
+    if let Some(sensor) = dead(&binned.bins) {
+        return Ok(Err(format!(
+            "log {} ({}): gyro {} reads the same all the time: it is dead, or its column is the wrong one; look at the mapping, or \
+             leave the log out",
+            number + 1,
+            run.name,
+            wanted.base.gyro.sensor.get(sensor).map_or("", |sensor| sensor.name.as_str())
+        )));
+    }
     let matched = match matched(&own, &binned.bins, &found) {
         Ok(matched) => matched,
         Err(reason) => return Ok(Err(reason)),
     };
-    if let Err(reason) = turned_as_stated(&matched, wanted.base, wanted.scale_known) {
+    let stated = turned_as_stated(&matched, wanted.base, wanted.scale_known)
+        .and_then(|()| steady(&matched, &binned.bins));
+    if let Err(reason) = stated {
         return Ok(Err(reason));
     }
     for one in &matched {

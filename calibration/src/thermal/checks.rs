@@ -232,28 +232,32 @@ pub fn turning(samples: &Samples, document: &Document, stand: &Stand) -> Option<
     ))
 }
 
-/// Columns that look swapped in a run at rest in a known attitude.
+/// Whether a run at rest stands as was stated: columns that look swapped, and gravity that is somewhere else.
 #[must_use]
-pub fn swapped(samples: &Samples, document: &Document, (rest, stand): (&Rest, &Stand)) -> Vec<String> {
+pub fn attitude(samples: &Samples, document: &Document, (rest, stand): (&Rest, &Stand)) -> Findings {
+    let mut found = Findings::default();
+    if stand.turning.is_some() {
+        return found;
+    }
     let along = |rows: &[[f64; 3]], vector: [f64; 3]| -> Option<[f64; 3]> {
         let along = |row: &[f64; 3]| row.iter().zip(vector).map(|(r, v)| r * v).sum();
         <[f64; 3]>::try_from(rows.iter().map(along).collect::<Vec<f64>>()).ok()
     };
-    let looks = |of: [&str; 2], columns: &[Vec<f64>], stated: Option<[f64; 3]>| {
-        let sizes: Vec<Size> = columns.iter().map(|values| Size::of(values)).collect();
-        Shown::of(of, <[Size; 3]>::try_from(sizes).ok()?, stated?).swapped()
+    let sizes = |columns: &[Vec<f64>]| -> Option<[Size; 3]> {
+        <[Size; 3]>::try_from(columns.iter().map(|values| Size::of(values)).collect::<Vec<Size>>()).ok()
     };
-    if stand.turning.is_some() {
-        return Vec::new();
-    }
     let rate = rest.rate_deg_per_h.and_then(|rate| along(&document.gyro.orientation.rows, rate));
     let accel = document.accel.as_ref();
     let force = rest.force_m_per_s2.zip(accel).and_then(|(force, a)| along(&a.orientation.rows, force));
-    let words = [
-        looks(["gyros", "°/h"], &samples.gyros, rate),
-        looks(["accelerometers", "m/s²"], &samples.forces, force),
-    ];
-    words.into_iter().flatten().map(|words| format!("{}: {words}", samples.name)).collect()
+    let gyros = sizes(&samples.gyros).zip(rate).map(|(sizes, rate)| Shown::of(["gyros", "°/h"], sizes, rate));
+    let forces = sizes(&samples.forces)
+        .zip(force)
+        .map(|(sizes, force)| Shown::of(["accelerometers", "m/s²"], sizes, force));
+    let named = |words: Option<String>| words.map(|words| format!("{}: {words}", samples.name));
+    found.warnings.extend([gyros, forces].into_iter().flatten().filter_map(|shown| named(shown.swapped())));
+    // The bias of a gyro may be many times the Earth's rate; that of an accelerometer is no third of gravity.
+    found.refusals.extend(named(forces.and_then(|shown| shown.far())));
+    found
 }
 
 /// Looks at a run that went through the corrector: the accelerometers must feel about one g.

@@ -58,7 +58,7 @@ pub fn millis(tau_s: f64) -> u64 {
 #[must_use]
 #[expect(clippy::cast_precision_loss, reason = "at most 1e10")]
 pub fn seconds(millis: u64) -> f64 {
-    millis as f64 * 1e-3
+    millis as f64 / 1e3
 }
 
 /// Channel, filter and the range of what follows them: what columns are made with.

@@ -101,7 +101,9 @@ pub fn fit(
         if found.refusals.is_empty() {
             let of_rest = rest(run, &base, stand, &mut watch)?;
             found.refusals.extend(checks::turning(&of_run, &plain, stand));
-            found.warnings.extend(checks::swapped(&of_run, &plain, (&of_rest, stand)));
+            let stands = checks::attitude(&of_run, &plain, (&of_rest, stand));
+            found.refusals.extend(stands.refusals);
+            found.warnings.extend(stands.warnings);
             rests.push(of_rest);
         }
         refusals.extend(found.refusals);
