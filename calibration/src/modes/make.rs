@@ -208,7 +208,7 @@ impl Made {
         let verdicts = Residual::verdicts(&self.residuals);
         if verdicts.is_empty() {
             return Err(Error::Refused(vec![format!(
-                "no window of {} s, of whole reversal periods, is without lost ticks: nothing of the fit can be judged. Record without \
+                "no window of {:.0} s, of whole reversal periods, is without lost ticks: nothing of the fit can be judged. Record without \
                  gaps; isotherm-replay info shows where they are",
                 self.window_s
             )]));

@@ -226,7 +226,12 @@ pub fn positions(tracks: &[Track], settings: &Settings) -> Result<Found, Vec<Str
     let poses: Vec<Pose> = found.iter().map(|(pose, _)| pose.clone()).collect();
     reasons.extend(faults::clipped(tracks, &poses));
     if reasons.is_empty() && found.is_empty() {
-        reasons.push("no position of the plan was found: is it the right --plan?".to_owned());
+        let runs: Vec<&str> = tracks.iter().map(|track| track.run.as_str()).collect();
+        reasons.push(if settings.times.is_some() {
+            format!("no row of --times is of {}: the column log has the file's name", runs.join(", "))
+        } else {
+            "no position of the plan was found: is it the right --plan?".to_owned()
+        });
     }
     if reasons.is_empty() { Ok((found, warnings)) } else { Err(reasons) }
 }
