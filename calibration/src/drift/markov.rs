@@ -17,6 +17,8 @@ use likelihood::{Problem, Solution, noise};
 
 /// Fewest bins.
 pub const FEWEST_BINS: usize = 24;
+/// Least likelihood ratio that a slope's error is made of: where nothing bears the slope out the error is ten times the slope.
+const LEAST_RATIO: f64 = 1e-2;
 /// Twice the gain in log-likelihood that makes a Markov part observable: 1 % for two parameters.
 const LEAST_GAIN: f64 = 9.21;
 /// χ² of two degrees of freedom beyond which a daily line is one: 0.1 %.
@@ -214,7 +216,7 @@ impl Fit {
         let (value, error) = self.power(1)?;
         let level = Beside { degree: 0, periods_h: self.beside.periods_h.clone() };
         let ratio = Self::of(slow, &level)?.minus_two_log_of_readings - self.minus_two_log_of_readings;
-        Some((value, error.max(value.abs() / ratio.max(f64::MIN_POSITIVE).sqrt())))
+        Some((value, error.max(value.abs() / ratio.max(LEAST_RATIO).sqrt())))
     }
 
     /// Every line of the fit.

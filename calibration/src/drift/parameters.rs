@@ -44,18 +44,30 @@ impl Parameters {
         let length_h = analysis.slow.length_h();
         let fit = analysis.markov.as_ref().map(|(fit, _)| fit);
         let part = fit.and_then(|fit| Some((fit.sigma?, fit.correlation_time_h?)));
-        let (sigma, time_h) = if let Some((sigma, time)) = part {
-            if time.value > length_h / 3.0 {
+        let (sigma, time_h) = match part {
+            // Of what is slower than the log only the random walk is seen, of size σ²/τ: that stays.
+            Some((sigma, time)) if time.value > length_h => {
                 notes.push(format!(
+                    "the correlation time is longer than the log of {length_h:.1} h can tell ({:.0} h fit best): the log's length is \
+                     written, and the sigma that gives the same random walk",
+                    time.value
+                ));
+                (sigma.value * (length_h / time.value).sqrt(), length_h)
+            }
+            Some((sigma, time)) => {
+                if time.value > length_h / 3.0 {
+                    notes.push(format!(
                         "the correlation time of {:.1} h rests on a log of {length_h:.1} h: three times as much is needed to \
                          tell it from a trend",
                         time.value
                     ));
+                }
+                (sigma.value, time.value)
             }
-            (sigma.value, time.value)
-        } else {
-            notes.push("no slow drift stands out of the white noise: sigma is 0".to_owned());
-            (0.0, length_h)
+            None => {
+                notes.push("no slow drift stands out of the white noise: sigma is 0".to_owned());
+                (0.0, length_h)
+            }
         };
         let trend = trend(analysis);
         let (trend_sigma, trend_time_h) = match trend {
