@@ -1,5 +1,7 @@
 //! From a run to the fits of its accelerometers and gyros, and every reason not to.
 
+pub(super) mod doubts;
+
 use crate::means::Size;
 use crate::positions::faults;
 use crate::positions::pose::Pose;
@@ -267,7 +269,7 @@ fn gyros(track: &Track, poses: &[Pose], accel: &AccelFit) -> Result<GyroFit, Str
             SHORTEST_TURN_RAD.to_degrees()
         ));
     }
-    gyro::fit(track, rest, &transitions).map_err(|why| match why {
+    let fit = gyro::fit(track, rest, &transitions).map_err(|why| match why {
         NoSolution::NotDetermined(index) => {
             format!(
                 "the turns do not determine gyro {}: turn the unit about each of its axes",
@@ -275,7 +277,8 @@ fn gyros(track: &Track, poses: &[Pose], accel: &AccelFit) -> Result<GyroFit, Str
             )
         }
         NoSolution::NoMinimum(words) => format!("no fit of the gyros was found ({words})"),
-    })
+    })?;
+    doubts::lost(&fit.angle, &fit.rows).map_or(Ok(fit), Err)
 }
 
 /// Turns between neighbouring poses, by the specific force that each has.

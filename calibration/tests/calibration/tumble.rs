@@ -217,3 +217,27 @@ fn what_cannot_be_fitted_is_refused_with_what_to_do() {
     let four = changed(&|track| track.outputs.push(track.outputs[0].clone()));
     assert!(four.contains("isotherm-calibrate positions"), "{four}");
 }
+
+#[test]
+fn gyros_that_do_not_follow_the_turns_are_refused_and_the_accelerometers_stand() {
+    let (_, good, _) = tumbled(24, &how(9));
+    let sound = analyse(&good, &settings()).unwrap();
+    let refused = |change: &dyn Fn(&mut Track)| {
+        let mut track = good.clone();
+        change(&mut track);
+        let found = analyse(&track, &settings()).unwrap();
+        assert_eq!(found.accel, sound.accel);
+        found.gyro.unwrap_err()
+    };
+    let left = |words: &str| -> f64 {
+        let (_, rest) = words.split_once("miss the direction of gravity by ").unwrap();
+        rest.split_once("° rms, at most 3° is a result").unwrap().0.parse().unwrap()
+    };
+    // At their limit in the turns: the fit is far better than before, and still none.
+    let clipped =
+        refused(&|track| track.gyros.iter_mut().flatten().for_each(|rate| *rate = rate.clamp(-0.5, 0.5)));
+    assert!(left(&clipped) > 3.0 && clipped.contains("at their limit"), "{clipped}");
+    // Rates of another moment.
+    let late = refused(&|track| track.gyros.iter_mut().for_each(|column| column.rotate_right(40)));
+    assert!(left(&late) > 3.0 && late.contains("time stamps"), "{late}");
+}
