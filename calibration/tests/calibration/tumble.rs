@@ -6,14 +6,15 @@ use isotherm_calibration::means::Size;
 use isotherm_calibration::positions::bare::bare;
 use isotherm_calibration::positions::still::StillLimits;
 use isotherm_calibration::positions::track::Track;
-use isotherm_calibration::tumble::analysis::{Settings, analyse};
+use isotherm_calibration::tumble::analysis::{Settings, Tumble, analyse};
+use isotherm_calibration::tumble::document::complete;
 use isotherm_calibration::written::Written;
 use isotherm_correction::unit::UnitSettings;
 use isotherm_log::mapping::Mapping;
 use isotherm_log::message::Topic;
 use isotherm_log::offline::{Offline, unit_id};
 use isotherm_log::part::{LogFiles, Part};
-use isotherm_protocol::document::{AccelOutput, Shape};
+use isotherm_protocol::document::{AccelOutput, Document, Shape};
 use isotherm_simulator::instrument::{Gyros, Instrument};
 use isotherm_simulator::presets::mems_chamber;
 use nalgebra::Matrix3;
@@ -240,4 +241,46 @@ fn gyros_that_do_not_follow_the_turns_are_refused_and_the_accelerometers_stand()
     // Rates of another moment.
     let late = refused(&|track| track.gyros.iter_mut().for_each(|column| column.rotate_right(40)));
     assert!(left(&late) > 3.0 && late.contains("time stamps"), "{late}");
+}
+
+#[test]
+fn signs_columns_and_units_of_measure_that_a_good_fit_hides_are_pointed_out() {
+    let (_, track, _) = tumbled(24, &how(13));
+    let series = stand::run("t", tumbled_log(12, 13)).series(()).unwrap();
+    let plain = bare(&series, AccelOutput::MetresPerSecondSquared).unwrap();
+    let good = analyse(&track, &settings()).unwrap();
+    assert!(complete(&plain, &good).1.is_empty(), "{:?}", complete(&plain, &good).1);
+    // A mirrored case: the signs of the first accelerometer and of two gyros. The fit follows them all the same.
+    let mut mirrored = track.clone();
+    mirrored.outputs[0].iter_mut().for_each(|reading| *reading = -*reading);
+    mirrored.gyros.iter_mut().flatten().for_each(|rate| *rate = -*rate);
+    let said = complete(&plain, &analyse(&mirrored, &settings()).unwrap()).1;
+    let [one] = &said[..] else { panic!("{said:?}") };
+    assert!(one.contains("gyro x: it is found with the other sign") && one.contains("(K = -1.00"), "{one}");
+    // What fits of other logs come to.
+    let of = |base: &Document, change: &dyn Fn(&mut Tumble)| {
+        let mut tumble = good.clone();
+        change(&mut tumble);
+        complete(base, &tumble).1
+    };
+    let swapped = of(&plain, &|tumble| tumble.gyro.as_mut().unwrap().rows.swap(0, 1));
+    let [x, y] = &swapped[..] else { panic!("{swapped:?}") };
+    assert!(x.contains("gyro x: a positive output is found along") && x.contains("90° from where"), "{x}");
+    assert!(y.contains("gyro y: a positive output") && y.contains("columns of the mapping swapped"), "{y}");
+    let degrees = |tumble: &mut Tumble| tumble.gyro.as_mut().unwrap().weight[1] *= 57.3;
+    let other = of(&plain, &degrees);
+    let [one] = &other[..] else { panic!("{other:?}") };
+    assert!(
+        one.starts_with("gyro y and gyro ") && one.contains("is the unit of measure of each column"),
+        "{one}"
+    );
+    // A document that states it is believed.
+    let mut stated = plain.clone();
+    stated.gyro.sensor[1].increment_weight_rad_per_rad = Some(57.1);
+    assert!(of(&stated, &degrees).is_empty(), "{:?}", of(&stated, &degrees));
+    stated.gyro.sensor[1].increment_weight_rad_per_rad = Some(-57.1);
+    assert!(of(&stated, &degrees)[0].contains("gyro y: it is found with the other sign"));
+    let accel = of(&plain, &|tumble| tumble.accel.scale[0] *= 9.8);
+    let [one] = &accel[..] else { panic!("{accel:?}") };
+    assert!(one.starts_with("accelerometer x and accelerometer "), "{one}");
 }

@@ -1,13 +1,21 @@
 //! What makes the result of a fit none, or doubtful.
 
-use nalgebra::Matrix3;
-
 use isotherm_correction::orientation::CONDITION_LIMIT;
+use isotherm_protocol::document::Document;
+use nalgebra::{Matrix3, Vector3};
 
+use super::Tumble;
 use crate::means::Size;
+use crate::positions::faults;
 
 /// Largest angle (°, rms) by which fitted gyros may miss the direction of gravity after a turn; half a degree is usual by hand.
 const LARGEST_LEFT_DEG: f64 = 3.0;
+/// Largest angle (°) between an axis and where the document at hand has it: what `positions` takes for swapped columns too.
+const LARGEST_TURN_DEG: f64 = 30.0;
+/// An angle (°) to the stated axis that is a sign, and no other axis.
+const OTHER_SIGN_DEG: f64 = 150.0;
+/// Times that one sensor's K may have changed more than another's; a unit of measure is more.
+const LARGEST_RATIO: f64 = 3.0;
 
 /// What to look at where the gyros do not follow the turns.
 pub(super) const WRONG_GYROS: &str = "look at the unit of measure of the gyros in the mapping (57.3 times too much is °/s read as rad/s), at the order and the signs \
@@ -27,4 +35,91 @@ pub(super) fn lost(angle: &[f64], rows: &[[f64; 3]; 3]) -> Option<String> {
     (condition.is_nan() || condition > CONDITION_LIMIT).then(|| {
         format!("their axes are found in one plane, or nearly so (condition number {condition:.0}, at most {CONDITION_LIMIT}): {WRONG_GYROS}")
     })
+}
+
+/// One sensor beside what the document at hand states of it.
+struct Beside {
+    name: String,
+    /// K, and K relative to the stated one.
+    scale: [f64; 2],
+    /// Where a positive output points, found and stated: a negative K along one axis is a positive one along its opposite.
+    senses: [Vector3<f64>; 2],
+}
+
+impl Beside {
+    fn new(kind: &str, index: usize, [found, stated]: [f64; 2], rows: [[f64; 3]; 2]) -> Self {
+        let [row, stated_row] = rows.map(Vector3::from);
+        Self {
+            name: format!("{kind} {}", faults::name(index)),
+            scale: [found, found / stated],
+            senses: [row * found.signum(), stated_row * stated.signum()],
+        }
+    }
+
+    /// Words where it points elsewhere.
+    fn turned(&self) -> Option<String> {
+        let [found, stated] = self.senses;
+        let angle = found.angle(&stated).to_degrees();
+        let Self { name, scale: [scale, _], .. } = self;
+        if angle > OTHER_SIGN_DEG {
+            return Some(format!(
+                "{name}: it is found with the other sign than the document at hand, or else its column, says (K = {scale:.4}): is a \
+                 sign missing in the mapping, of this column or of an accelerometer's?"
+            ));
+        }
+        (angle > LARGEST_TURN_DEG).then(|| {
+            format!(
+                "{name}: a positive output is found along ({:.2}, {:.2}, {:.2}), {angle:.0}° from where the document at hand, or else \
+                 its column, has it (K = {scale:.4}): are columns of the mapping swapped, of the accelerometers too, or is a sign the \
+                 other one?",
+                found.x, found.y, found.z
+            )
+        })
+    }
+}
+
+/// Sensors of one kind that have changed far more than the others of theirs.
+fn apart(sensors: &[Beside]) -> Option<String> {
+    let size = |sensor: &&Beside| sensor.scale[1].abs();
+    let most = sensors.iter().max_by(|a, b| size(a).total_cmp(&size(b)))?;
+    let least = sensors.iter().min_by(|a, b| size(a).total_cmp(&size(b)))?;
+    let ratio = size(&most) / size(&least);
+    (ratio > LARGEST_RATIO).then(|| {
+        format!(
+            "{} and {}: their K are {:.4} and {:.4} times what the document at hand, or else the log, states, {ratio:.1} times \
+             apart: is the unit of measure of each column in the mapping the right one?",
+            most.name, least.name, most.scale[1], least.scale[1]
+        )
+    })
+}
+
+/// What is physically odd about fits that are good: axes and scale factors far from what the document at hand states.
+pub(in crate::tumble) fn odd(
+    base: &Document,
+    tumble: &Tumble,
+    temperature: &dyn Fn(Option<&String>) -> f64,
+) -> Vec<String> {
+    let mut kinds: Vec<Vec<Beside>> = Vec::new();
+    if let Some(accel) = &base.accel {
+        let found = tumble.accel.scale.iter().zip(&tumble.accel.rows);
+        let stated = accel.sensor.iter().zip(&accel.orientation.rows);
+        let beside = found.zip(stated).enumerate().map(|(index, ((scale, row), (sensor, stated)))| {
+            let old = sensor.scale_factor.shape().at(temperature(sensor.channel.as_ref())).unwrap_or(1.0);
+            Beside::new("accelerometer", index, [*scale, old], [*row, *stated])
+        });
+        kinds.push(beside.collect());
+    }
+    if let Ok(gyro) = &tumble.gyro {
+        let found = gyro.weight.iter().zip(&gyro.rows);
+        let stated = base.gyro.sensor.iter().zip(&base.gyro.orientation.rows);
+        let beside = found.zip(stated).enumerate().map(|(index, ((weight, row), (sensor, stated)))| {
+            let old = sensor.increment_weight_rad_per_rad.unwrap_or(1.0);
+            Beside::new("gyro", index, [*weight, old], [*row, *stated])
+        });
+        kinds.push(beside.collect());
+    }
+    let of = |sensors: &Vec<Beside>| -> Vec<String> {
+        sensors.iter().filter_map(Beside::turned).chain(apart(sensors)).collect()
+    };
+    kinds.iter().flat_map(of).collect()
 }
