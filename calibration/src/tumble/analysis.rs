@@ -16,8 +16,6 @@ use super::gyro::{self, GyroFit, Transition};
 pub const FEWEST_POSES: usize = 12;
 /// Share of the mean square along the direction that the poses show least: below it they lie in one plane.
 const THINNEST: f64 = 0.05;
-/// Largest standard error of a scale factor that is still a result (relative).
-const LARGEST_SIGMA: f64 = 0.01;
 /// Multiples of the still start's variance that are tried as the limit of stillness.
 const FACTORS: [f64; 9] = [2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0];
 /// Shortest turn that says something of a gyro (rad).
@@ -94,7 +92,7 @@ pub fn analyse(track: &Track, settings: &Settings) -> Result<Tumble, Vec<String>
         }
     }
     let Some((factor, poses, accel)) = best else { return Err(reasons) };
-    sound(&poses, &accel)?;
+    doubts::sound(&poses, &accel)?;
     let held_out = held_out(&poses, settings.gravity);
     let mut warnings = Vec::new();
     let after = Size::of(&accel.residual).rms;
@@ -193,23 +191,6 @@ fn flat(poses: &[Pose]) -> Option<String> {
         least.max(0.0).sqrt(),
         THINNEST.sqrt()
     ))
-}
-
-/// Whether what was found is a result.
-fn sound(poses: &[Pose], fit: &AccelFit) -> Result<(), Vec<String>> {
-    let mut reasons = Vec::new();
-    for (axis, name) in AXES.iter().enumerate() {
-        if !(fit.sigma[axis] <= LARGEST_SIGMA && fit.scale[axis].is_finite()) {
-            reasons.push(format!(
-                "accelerometer {name}: its scale factor is known to {:.1} % only, at most {} % is a result: {} poses do not spread \
-                 enough, put it down with {name} up and down",
-                fit.sigma[axis] * 100.0,
-                LARGEST_SIGMA * 100.0,
-                poses.len()
-            ));
-        }
-    }
-    if reasons.is_empty() { Ok(()) } else { Err(reasons) }
 }
 
 /// A fit without a solution, in words.

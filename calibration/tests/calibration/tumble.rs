@@ -284,3 +284,41 @@ fn signs_columns_and_units_of_measure_that_a_good_fit_hides_are_pointed_out() {
     let [one] = &accel[..] else { panic!("{accel:?}") };
     assert!(one.starts_with("accelerometer x and accelerometer "), "{one}");
 }
+
+#[test]
+fn a_unit_on_its_six_faces_only_does_not_state_angles() {
+    let instrument = mems_chamber(0).instrument;
+    let axis = |k: usize| nalgebra::Vector3::ith_axis(k % 3);
+    let quarter = |k: usize, turns: f64| {
+        nalgebra::Rotation3::from_axis_angle(&axis(k), turns * 0.5 * std::f64::consts::PI)
+    };
+    let faces = [
+        quarter(0, 0.0),
+        quarter(0, 1.0),
+        quarter(1, 1.0),
+        quarter(0, 2.0),
+        quarter(0, -1.0),
+        quarter(1, -1.0),
+    ];
+    let mut dice = Dice::new(11);
+    // A table is level to a fraction of a degree: the angles are found from that, and known to as much as nothing.
+    let mut on_faces = |edges: f64| -> Track {
+        let put = |k: usize| {
+            let slant = nalgebra::Vector3::from(dice.vector(0.001)) + axis((k / 6) % 3).into_inner() * edges;
+            *(nalgebra::Rotation3::new(slant) * faces[k % 6]).matrix()
+        };
+        track(&instrument, &(0..18).map(put).collect::<Vec<_>>(), &how(11)).0
+    };
+    let refused = analyse(&on_faces(0.0), &settings()).unwrap_err().join("\n");
+    assert!(refused.contains("the angle between accelerometers x and y is known to "), "{refused}");
+    assert!(
+        refused.contains("at most 0.5° is a result") && refused.contains("edges and corners too"),
+        "{refused}"
+    );
+    let slanting = analyse(&on_faces(0.6), &settings()).unwrap();
+    assert!(
+        slanting.accel.sigma[6..].iter().all(|sigma| sigma.to_degrees() < 0.1),
+        "{:?}",
+        slanting.accel.sigma
+    );
+}

@@ -4,10 +4,15 @@ use isotherm_correction::orientation::CONDITION_LIMIT;
 use isotherm_protocol::document::Document;
 use nalgebra::{Matrix3, Vector3};
 
-use super::Tumble;
+use super::{AXES, AccelFit, Tumble};
 use crate::means::Size;
 use crate::positions::faults;
+use crate::positions::pose::Pose;
 
+/// Largest standard error of a scale factor that is still a result (relative).
+const LARGEST_SIGMA: f64 = 0.01;
+/// Largest standard error of an angle between two accelerometers that is still a result (°).
+const LARGEST_ANGLE_SIGMA_DEG: f64 = 0.5;
 /// Largest angle (°, rms) by which fitted gyros may miss the direction of gravity after a turn; half a degree is usual by hand.
 const LARGEST_LEFT_DEG: f64 = 3.0;
 /// Largest angle (°) between an axis and where the document at hand has it: what `positions` takes for swapped columns too.
@@ -20,6 +25,35 @@ const LARGEST_RATIO: f64 = 3.0;
 /// What to look at where the gyros do not follow the turns.
 pub(super) const WRONG_GYROS: &str = "look at the unit of measure of the gyros in the mapping (57.3 times too much is °/s read as rad/s), at the order and the signs \
      of the columns, of the accelerometers too, at gyros at their limit in the turns, and at the time stamps";
+
+/// Whether what was found of the accelerometers is a result.
+pub(super) fn sound(poses: &[Pose], fit: &AccelFit) -> Result<(), Vec<String>> {
+    let mut reasons = Vec::new();
+    for (axis, name) in AXES.iter().enumerate() {
+        if !(fit.sigma[axis] <= LARGEST_SIGMA && fit.scale[axis].is_finite()) {
+            reasons.push(format!(
+                "accelerometer {name}: its scale factor is known to {:.1} % only, at most {} % is a result: {} poses do not spread \
+                 enough, put it down with {name} up and down",
+                fit.sigma[axis] * 100.0,
+                LARGEST_SIGMA * 100.0,
+                poses.len()
+            ));
+        }
+    }
+    for (index, (one, other)) in [(0, 1), (0, 2), (1, 2)].into_iter().enumerate() {
+        let sigma = fit.sigma[6 + index].to_degrees();
+        if sigma.is_nan() || sigma > LARGEST_ANGLE_SIGMA_DEG {
+            reasons.push(format!(
+                "the angle between accelerometers {} and {} is known to {sigma:.1}° only, at most {LARGEST_ANGLE_SIGMA_DEG}° is a \
+                 result: {} poses do not tell it; put the unit on edges and corners too, not on its faces only",
+                AXES[one],
+                AXES[other],
+                poses.len()
+            ));
+        }
+    }
+    if reasons.is_empty() { Ok(()) } else { Err(reasons) }
+}
 
 /// Words where fitted gyros do not follow the turns: `angle` (rad) is left after each.
 pub(super) fn lost(angle: &[f64], rows: &[[f64; 3]; 3]) -> Option<String> {
