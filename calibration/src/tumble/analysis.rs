@@ -102,6 +102,7 @@ pub fn analyse(track: &Track, settings: &Settings) -> Result<Tumble, Vec<String>
             held_out.rms
         ));
     }
+    warnings.extend(doubts::ends_early(track, &poses));
     let gyro = gyros(track, &poses, &accel);
     Ok(Tumble { poses, factor, accel, gyro, held_out, warnings })
 }

@@ -322,3 +322,24 @@ fn a_unit_on_its_six_faces_only_does_not_state_angles() {
         slanting.accel.sigma
     );
 }
+
+#[test]
+fn poses_that_end_long_before_the_log_are_pointed_out() {
+    let (_, good, held) = tumbled(30, &how(12));
+    let early =
+        |found: &[String]| found.iter().any(|words| words.starts_with("no still pose is found after "));
+    assert!(!early(&analyse(&good, &settings()).unwrap().warnings));
+    // From the sixteenth pose on everything is ten times as large: noise too.
+    let mut changed = good.clone();
+    let first = (0..good.len()).find(|tick| good.start_s(*tick) > held[15][1]).unwrap();
+    changed.outputs.iter_mut().flat_map(|column| &mut column[first..]).for_each(|reading| *reading *= 10.0);
+    let found = analyse(&changed, &settings()).unwrap();
+    assert_eq!(found.poses.len(), 16);
+    assert!(early(&found.warnings), "{:?}", found.warnings);
+    let from = format!("after {:.0} s of {:.0} s", found.poses[15].span_s[1], good.start_s(good.len() - 1));
+    assert!(
+        found.warnings.iter().any(|words| words.contains(&from) && words.contains("--threshold")),
+        "{:?}",
+        found.warnings
+    );
+}

@@ -8,11 +8,14 @@ use super::{AXES, AccelFit, Tumble};
 use crate::means::Size;
 use crate::positions::faults;
 use crate::positions::pose::Pose;
+use crate::positions::track::Track;
 
 /// Largest standard error of a scale factor that is still a result (relative).
 const LARGEST_SIGMA: f64 = 0.01;
 /// Largest standard error of an angle between two accelerometers that is still a result (°).
 const LARGEST_ANGLE_SIGMA_DEG: f64 = 0.5;
+/// Share of a log at its end that has a pose.
+const LAST_SHARE: f64 = 1.0 / 3.0;
 /// Largest angle (°, rms) by which fitted gyros may miss the direction of gravity after a turn; half a degree is usual by hand.
 const LARGEST_LEFT_DEG: f64 = 3.0;
 /// Largest angle (°) between an axis and where the document at hand has it: what `positions` takes for swapped columns too.
@@ -53,6 +56,19 @@ pub(super) fn sound(poses: &[Pose], fit: &AccelFit) -> Result<(), Vec<String>> {
         }
     }
     if reasons.is_empty() { Ok(()) } else { Err(reasons) }
+}
+
+/// Words where the poses end long before the log does.
+pub(super) fn ends_early(track: &Track, poses: &[Pose]) -> Option<String> {
+    let length = track.start_s(track.len().checked_sub(1)?);
+    let [_, last] = poses.last()?.span_s;
+    (last < (1.0 - LAST_SHARE) * length).then(|| {
+        format!(
+            "no still pose is found after {last:.0} s of {length:.0} s: all that follows is left out. Was the unit moved without a rest, \
+             or is the noise larger there than in the still start (another unit of measure from some row on, a motor, a loose cable)? \
+             State a larger --threshold, or cut the log with --duration"
+        )
+    })
 }
 
 /// Words where fitted gyros do not follow the turns: `angle` (rad) is left after each.
