@@ -5,7 +5,6 @@ pub(super) mod doubts;
 use crate::means::Size;
 use crate::positions::faults;
 use crate::positions::pose::Pose;
-use crate::positions::solve::NoSolution;
 use crate::positions::still::{StillLimits, still};
 use crate::positions::track::Track;
 
@@ -80,7 +79,8 @@ pub fn analyse(track: &Track, settings: &Settings) -> Result<Tumble, Vec<String>
         let intervals = still(track, &limits, Some(settings.start_s));
         let poses = Pose::of(track, 0, &intervals);
         match found(track, &poses, settings).and_then(|()| {
-            accel::fit(&outputs(&poses), settings.gravity).map_err(|why| vec![no_solution(&why)])
+            accel::fit(&outputs(&poses), settings.gravity)
+                .map_err(|why| vec![doubts::no_accelerometers(&why)])
         }) {
             Ok(fit) => {
                 let rms = Size::of(&fit.residual).rms;
@@ -194,30 +194,6 @@ fn flat(poses: &[Pose]) -> Option<String> {
     ))
 }
 
-/// A fit without a solution, in words.
-fn no_solution(why: &NoSolution) -> String {
-    const NAMES: [&str; 9] = [
-        "scale factor of x",
-        "scale factor of y",
-        "scale factor of z",
-        "bias of x",
-        "bias of y",
-        "bias of z",
-        "angle between x and y",
-        "angle between x and z",
-        "angle between y and z",
-    ];
-    match why {
-        NoSolution::NotDetermined(index) => format!(
-            "the poses do not determine the {}: put the unit down in more different ways",
-            NAMES.get(*index).copied().unwrap_or("parameters")
-        ),
-        NoSolution::NoMinimum(words) => {
-            format!("no fit of the poses was found ({words}): is every column of the mapping the right one?")
-        }
-    }
-}
-
 /// |f| − g of every pose by the fit of all others.
 fn held_out(poses: &[Pose], gravity: f64) -> Size {
     let all = outputs(poses);
@@ -251,15 +227,7 @@ fn gyros(track: &Track, poses: &[Pose], accel: &AccelFit) -> Result<GyroFit, Str
             SHORTEST_TURN_RAD.to_degrees()
         ));
     }
-    let fit = gyro::fit(track, rest, &transitions).map_err(|why| match why {
-        NoSolution::NotDetermined(index) => {
-            format!(
-                "the turns do not determine gyro {}: turn the unit about each of its axes",
-                AXES[index % 3]
-            )
-        }
-        NoSolution::NoMinimum(words) => format!("no fit of the gyros was found ({words})"),
-    })?;
+    let fit = gyro::fit(track, rest, &transitions).map_err(|why| doubts::no_gyros(&why))?;
     doubts::lost(&fit.angle, &fit.rows).map_or(Ok(fit), Err)
 }
 

@@ -8,6 +8,7 @@ use super::{AXES, AccelFit, Tumble};
 use crate::means::Size;
 use crate::positions::faults;
 use crate::positions::pose::Pose;
+use crate::positions::solve::NoSolution;
 use crate::positions::track::Track;
 
 /// Largest standard error of a scale factor that is still a result (relative).
@@ -28,6 +29,55 @@ const LARGEST_RATIO: f64 = 3.0;
 /// What to look at where the gyros do not follow the turns.
 pub(super) const WRONG_GYROS: &str = "look at the unit of measure of the gyros in the mapping (57.3 times too much is °/s read as rad/s), at the order and the signs \
      of the columns, of the accelerometers too, at gyros at their limit in the turns, and at the time stamps";
+
+/// A fit of the accelerometers without a solution, in words.
+pub(super) fn no_accelerometers(why: &NoSolution) -> String {
+    const NAMES: [&str; 9] = [
+        "scale factor of x",
+        "scale factor of y",
+        "scale factor of z",
+        "bias of x",
+        "bias of y",
+        "bias of z",
+        "angle between x and y",
+        "angle between x and z",
+        "angle between y and z",
+    ];
+    match why {
+        NoSolution::NotDetermined(index) => format!(
+            "the poses do not determine the {}: put the unit down in more different ways",
+            NAMES.get(*index).copied().unwrap_or("parameters")
+        ),
+        // The library's words are about its search.
+        NoSolution::NoMinimum(_) => {
+            "no scale factors, biases and angles were found with which |f| is g in all poses: is every column of the mapping the right \
+             one, in one unit of measure throughout? A unit that was put on its faces only needs edges and corners too"
+                .to_owned()
+        }
+    }
+}
+
+/// A fit of the gyros without a solution, in words.
+pub(super) fn no_gyros(why: &NoSolution) -> String {
+    match why {
+        NoSolution::NotDetermined(index) => {
+            format!(
+                "the turns do not determine gyro {}: turn the unit about each of its axes",
+                AXES[gyro_of(*index)]
+            )
+        }
+        NoSolution::NoMinimum(_) => {
+            format!(
+                "no scale factors and axes were found with which the gyros follow the turns: {WRONG_GYROS}"
+            )
+        }
+    }
+}
+
+/// The gyro that a parameter is of: three weights, then two angles of each.
+fn gyro_of(parameter: usize) -> usize {
+    if parameter < 3 { parameter } else { (parameter - 3) / 2 % 3 }
+}
 
 /// Whether what was found of the accelerometers is a result.
 pub(super) fn sound(poses: &[Pose], fit: &AccelFit) -> Result<(), Vec<String>> {
@@ -55,6 +105,11 @@ pub(super) fn sound(poses: &[Pose], fit: &AccelFit) -> Result<(), Vec<String>> {
             ));
         }
     }
+    if flat(&fit.rows) {
+        reasons.push(
+            "the axes of the accelerometers are found in one plane, or nearly so: does the mapping have a column twice?".to_owned(),
+        );
+    }
     if reasons.is_empty() { Ok(()) } else { Err(reasons) }
 }
 
@@ -80,11 +135,14 @@ pub(super) fn lost(angle: &[f64], rows: &[[f64; 3]; 3]) -> Option<String> {
              {WRONG_GYROS}"
         ));
     }
+    flat(rows).then(|| format!("their axes are found in one plane, or nearly so: {WRONG_GYROS}"))
+}
+
+/// Whether three axes lie so near one plane that no document may state them.
+fn flat(rows: &[[f64; 3]; 3]) -> bool {
     let values = Matrix3::from_fn(|i, j| rows[i][j]).singular_values();
     let condition = values.max() / values.min();
-    (condition.is_nan() || condition > CONDITION_LIMIT).then(|| {
-        format!("their axes are found in one plane, or nearly so (condition number {condition:.0}, at most {CONDITION_LIMIT}): {WRONG_GYROS}")
-    })
+    condition.is_nan() || condition > CONDITION_LIMIT
 }
 
 /// One sensor beside what the document at hand states of it.
@@ -172,4 +230,27 @@ pub(in crate::tumble) fn odd(
         sensors.iter().filter_map(Beside::turned).chain(apart(sensors)).collect()
     };
     kinds.iter().flat_map(of).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_not_found_is_said_in_plain_words() {
+        let patience = NoSolution::NoMinimum("LostPatience".to_owned());
+        let words = no_accelerometers(&patience);
+        assert!(!words.contains("Lost") && words.contains("edges and corners"), "{words}");
+        let words = no_gyros(&patience);
+        assert!(
+            !words.contains("Lost") && words.contains("the order and the signs of the columns"),
+            "{words}"
+        );
+        assert!(no_gyros(&NoSolution::NotDetermined(8)).contains("gyro z"));
+        // What no document may state is refused before it is written, without the numbers of a matrix.
+        let straight = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        assert_eq!(lost(&[0.01; 8], &straight), None);
+        let words = lost(&[0.01; 8], &[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.8, 0.6, 1e-5]]).unwrap();
+        assert!(words.contains("in one plane") && !words.contains("condition number"), "{words}");
+    }
 }
