@@ -1,9 +1,10 @@
 //! From a run to the fits of its accelerometers and gyros, and every reason not to.
 
+pub(super) mod doubts;
+
 use crate::means::Size;
 use crate::positions::faults;
 use crate::positions::pose::Pose;
-use crate::positions::solve::NoSolution;
 use crate::positions::still::{StillLimits, still};
 use crate::positions::track::Track;
 
@@ -14,8 +15,6 @@ use super::gyro::{self, GyroFit, Transition};
 pub const FEWEST_POSES: usize = 12;
 /// Share of the mean square along the direction that the poses show least: below it they lie in one plane.
 const THINNEST: f64 = 0.05;
-/// Largest standard error of a scale factor that is still a result (relative).
-const LARGEST_SIGMA: f64 = 0.01;
 /// Multiples of the still start's variance that are tried as the limit of stillness.
 const FACTORS: [f64; 9] = [2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0];
 /// Shortest turn that says something of a gyro (rad).
@@ -80,7 +79,8 @@ pub fn analyse(track: &Track, settings: &Settings) -> Result<Tumble, Vec<String>
         let intervals = still(track, &limits, Some(settings.start_s));
         let poses = Pose::of(track, 0, &intervals);
         match found(track, &poses, settings).and_then(|()| {
-            accel::fit(&outputs(&poses), settings.gravity).map_err(|why| vec![no_solution(&why)])
+            accel::fit(&outputs(&poses), settings.gravity)
+                .map_err(|why| vec![doubts::no_accelerometers(&why)])
         }) {
             Ok(fit) => {
                 let rms = Size::of(&fit.residual).rms;
@@ -92,7 +92,7 @@ pub fn analyse(track: &Track, settings: &Settings) -> Result<Tumble, Vec<String>
         }
     }
     let Some((factor, poses, accel)) = best else { return Err(reasons) };
-    sound(&poses, &accel)?;
+    doubts::sound(&poses, &accel)?;
     let held_out = held_out(&poses, settings.gravity);
     let mut warnings = Vec::new();
     let after = Size::of(&accel.residual).rms;
@@ -102,6 +102,7 @@ pub fn analyse(track: &Track, settings: &Settings) -> Result<Tumble, Vec<String>
             held_out.rms
         ));
     }
+    warnings.extend(doubts::ends_early(track, &poses));
     let gyro = gyros(track, &poses, &accel);
     Ok(Tumble { poses, factor, accel, gyro, held_out, warnings })
 }
@@ -193,47 +194,6 @@ fn flat(poses: &[Pose]) -> Option<String> {
     ))
 }
 
-/// Whether what was found is a result.
-fn sound(poses: &[Pose], fit: &AccelFit) -> Result<(), Vec<String>> {
-    let mut reasons = Vec::new();
-    for (axis, name) in AXES.iter().enumerate() {
-        if !(fit.sigma[axis] <= LARGEST_SIGMA && fit.scale[axis].is_finite()) {
-            reasons.push(format!(
-                "accelerometer {name}: its scale factor is known to {:.1} % only, at most {} % is a result: {} poses do not spread \
-                 enough, put it down with {name} up and down",
-                fit.sigma[axis] * 100.0,
-                LARGEST_SIGMA * 100.0,
-                poses.len()
-            ));
-        }
-    }
-    if reasons.is_empty() { Ok(()) } else { Err(reasons) }
-}
-
-/// A fit without a solution, in words.
-fn no_solution(why: &NoSolution) -> String {
-    const NAMES: [&str; 9] = [
-        "scale factor of x",
-        "scale factor of y",
-        "scale factor of z",
-        "bias of x",
-        "bias of y",
-        "bias of z",
-        "angle between x and y",
-        "angle between x and z",
-        "angle between y and z",
-    ];
-    match why {
-        NoSolution::NotDetermined(index) => format!(
-            "the poses do not determine the {}: put the unit down in more different ways",
-            NAMES.get(*index).copied().unwrap_or("parameters")
-        ),
-        NoSolution::NoMinimum(words) => {
-            format!("no fit of the poses was found ({words}): is every column of the mapping the right one?")
-        }
-    }
-}
-
 /// |f| − g of every pose by the fit of all others.
 fn held_out(poses: &[Pose], gravity: f64) -> Size {
     let all = outputs(poses);
@@ -267,15 +227,8 @@ fn gyros(track: &Track, poses: &[Pose], accel: &AccelFit) -> Result<GyroFit, Str
             SHORTEST_TURN_RAD.to_degrees()
         ));
     }
-    gyro::fit(track, rest, &transitions).map_err(|why| match why {
-        NoSolution::NotDetermined(index) => {
-            format!(
-                "the turns do not determine gyro {}: turn the unit about each of its axes",
-                AXES[index % 3]
-            )
-        }
-        NoSolution::NoMinimum(words) => format!("no fit of the gyros was found ({words})"),
-    })
+    let fit = gyro::fit(track, rest, &transitions).map_err(|why| doubts::no_gyros(&why))?;
+    doubts::lost(&fit.angle, &fit.rows).map_or(Ok(fit), Err)
 }
 
 /// Turns between neighbouring poses, by the specific force that each has.

@@ -5,6 +5,7 @@ use isotherm_protocol::document::{Curve, Document, Shape};
 
 use super::accel::AccelFit;
 use super::analysis::Tumble;
+use super::analysis::doubts::odd;
 use super::gyro::GyroFit;
 use crate::positions::document::{level, units};
 use crate::written::tidy;
@@ -14,12 +15,13 @@ use crate::written::tidy;
 /// A tumble log has one temperature: curves over temperature keep their shape and go through what was found there.
 #[must_use]
 pub fn complete(document: &Document, tumble: &Tumble) -> (Document, Vec<String>) {
-    let mut document = document.clone();
-    let mut warnings = Vec::new();
+    let base = document;
+    let mut document = base.clone();
     let assumed = document.temperature.assumed_deg_c;
     let temperature = |channel: Option<&String>| {
         channel.and_then(|channel| tumble.mean_temperature(channel)).unwrap_or(assumed)
     };
+    let mut warnings = odd(base, tumble, &temperature);
     if let Some(accel) = &mut document.accel {
         let units = units(accel.output);
         for (index, sensor) in accel.sensor.iter_mut().enumerate() {

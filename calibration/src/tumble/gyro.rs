@@ -52,7 +52,10 @@ pub fn fit(track: &Track, rest: [f64; 3], transitions: &[Transition]) -> Result<
     let degrees = (2 * transitions.len()).saturating_sub(9).max(1) as f64;
     let size = (found.chi_square / degrees).sqrt();
     let p = &found.parameters;
-    let angle = found.residuals.chunks_exact(3).map(|r| norm([r[0], r[1], r[2]])).collect();
+    // Residuals are differences of unit vectors: chords.
+    let angle =
+        found.residuals.chunks_exact(3).map(|r| 2.0 * libm::asin((0.5 * norm([r[0], r[1], r[2]])).min(1.0)));
+    let angle = angle.collect();
     let mut sigma = [0.0; 9];
     sigma.iter_mut().enumerate().for_each(|(index, sigma)| *sigma = found.sigma(index) * size);
     Ok(GyroFit { weight: weights(p), rest, rows: rows(p), sigma, angle })

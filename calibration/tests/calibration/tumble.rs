@@ -6,14 +6,15 @@ use isotherm_calibration::means::Size;
 use isotherm_calibration::positions::bare::bare;
 use isotherm_calibration::positions::still::StillLimits;
 use isotherm_calibration::positions::track::Track;
-use isotherm_calibration::tumble::analysis::{Settings, analyse};
+use isotherm_calibration::tumble::analysis::{Settings, Tumble, analyse};
+use isotherm_calibration::tumble::document::complete;
 use isotherm_calibration::written::Written;
 use isotherm_correction::unit::UnitSettings;
 use isotherm_log::mapping::Mapping;
 use isotherm_log::message::Topic;
 use isotherm_log::offline::{Offline, unit_id};
 use isotherm_log::part::{LogFiles, Part};
-use isotherm_protocol::document::{AccelOutput, Shape};
+use isotherm_protocol::document::{AccelOutput, Document, Shape};
 use isotherm_simulator::instrument::{Gyros, Instrument};
 use isotherm_simulator::presets::mems_chamber;
 use nalgebra::Matrix3;
@@ -216,4 +217,129 @@ fn what_cannot_be_fitted_is_refused_with_what_to_do() {
     assert!(holes.contains("are no numbers"), "{holes}");
     let four = changed(&|track| track.outputs.push(track.outputs[0].clone()));
     assert!(four.contains("isotherm-calibrate positions"), "{four}");
+}
+
+#[test]
+fn gyros_that_do_not_follow_the_turns_are_refused_and_the_accelerometers_stand() {
+    let (_, good, _) = tumbled(24, &how(9));
+    let sound = analyse(&good, &settings()).unwrap();
+    let refused = |change: &dyn Fn(&mut Track)| {
+        let mut track = good.clone();
+        change(&mut track);
+        let found = analyse(&track, &settings()).unwrap();
+        assert_eq!(found.accel, sound.accel);
+        found.gyro.unwrap_err()
+    };
+    let left = |words: &str| -> f64 {
+        let (_, rest) = words.split_once("miss the direction of gravity by ").unwrap();
+        rest.split_once("° rms, at most 3° is a result").unwrap().0.parse().unwrap()
+    };
+    // At their limit in the turns: the fit is far better than before, and still none.
+    let clipped =
+        refused(&|track| track.gyros.iter_mut().flatten().for_each(|rate| *rate = rate.clamp(-0.5, 0.5)));
+    assert!(left(&clipped) > 3.0 && clipped.contains("at their limit"), "{clipped}");
+    // Rates of another moment.
+    let late = refused(&|track| track.gyros.iter_mut().for_each(|column| column.rotate_right(40)));
+    assert!(left(&late) > 3.0 && late.contains("time stamps"), "{late}");
+}
+
+#[test]
+fn signs_columns_and_units_of_measure_that_a_good_fit_hides_are_pointed_out() {
+    let (_, track, _) = tumbled(24, &how(13));
+    let series = stand::run("t", tumbled_log(12, 13)).series(()).unwrap();
+    let plain = bare(&series, AccelOutput::MetresPerSecondSquared).unwrap();
+    let good = analyse(&track, &settings()).unwrap();
+    assert!(complete(&plain, &good).1.is_empty(), "{:?}", complete(&plain, &good).1);
+    // A mirrored case: the signs of the first accelerometer and of two gyros. The fit follows them all the same.
+    let mut mirrored = track.clone();
+    mirrored.outputs[0].iter_mut().for_each(|reading| *reading = -*reading);
+    mirrored.gyros.iter_mut().flatten().for_each(|rate| *rate = -*rate);
+    let said = complete(&plain, &analyse(&mirrored, &settings()).unwrap()).1;
+    let [one] = &said[..] else { panic!("{said:?}") };
+    assert!(one.contains("gyro x: it is found with the other sign") && one.contains("(K = -1.00"), "{one}");
+    // What fits of other logs come to.
+    let of = |base: &Document, change: &dyn Fn(&mut Tumble)| {
+        let mut tumble = good.clone();
+        change(&mut tumble);
+        complete(base, &tumble).1
+    };
+    let swapped = of(&plain, &|tumble| tumble.gyro.as_mut().unwrap().rows.swap(0, 1));
+    let [x, y] = &swapped[..] else { panic!("{swapped:?}") };
+    assert!(x.contains("gyro x: a positive output is found along") && x.contains("90° from where"), "{x}");
+    assert!(y.contains("gyro y: a positive output") && y.contains("columns of the mapping swapped"), "{y}");
+    let degrees = |tumble: &mut Tumble| tumble.gyro.as_mut().unwrap().weight[1] *= 57.3;
+    let other = of(&plain, &degrees);
+    let [one] = &other[..] else { panic!("{other:?}") };
+    assert!(
+        one.starts_with("gyro y and gyro ") && one.contains("is the unit of measure of each column"),
+        "{one}"
+    );
+    // A document that states it is believed.
+    let mut stated = plain.clone();
+    stated.gyro.sensor[1].increment_weight_rad_per_rad = Some(57.1);
+    assert!(of(&stated, &degrees).is_empty(), "{:?}", of(&stated, &degrees));
+    stated.gyro.sensor[1].increment_weight_rad_per_rad = Some(-57.1);
+    assert!(of(&stated, &degrees)[0].contains("gyro y: it is found with the other sign"));
+    let accel = of(&plain, &|tumble| tumble.accel.scale[0] *= 9.8);
+    let [one] = &accel[..] else { panic!("{accel:?}") };
+    assert!(one.starts_with("accelerometer x and accelerometer "), "{one}");
+}
+
+#[test]
+fn a_unit_on_its_six_faces_only_does_not_state_angles() {
+    let instrument = mems_chamber(0).instrument;
+    let axis = |k: usize| nalgebra::Vector3::ith_axis(k % 3);
+    let quarter = |k: usize, turns: f64| {
+        nalgebra::Rotation3::from_axis_angle(&axis(k), turns * 0.5 * std::f64::consts::PI)
+    };
+    let faces = [
+        quarter(0, 0.0),
+        quarter(0, 1.0),
+        quarter(1, 1.0),
+        quarter(0, 2.0),
+        quarter(0, -1.0),
+        quarter(1, -1.0),
+    ];
+    let mut dice = Dice::new(11);
+    // A table is level to a fraction of a degree: the angles are found from that, and known to as much as nothing.
+    let mut on_faces = |edges: f64| -> Track {
+        let put = |k: usize| {
+            let slant = nalgebra::Vector3::from(dice.vector(0.001)) + axis((k / 6) % 3).into_inner() * edges;
+            *(nalgebra::Rotation3::new(slant) * faces[k % 6]).matrix()
+        };
+        track(&instrument, &(0..18).map(put).collect::<Vec<_>>(), &how(11)).0
+    };
+    let refused = analyse(&on_faces(0.0), &settings()).unwrap_err().join("\n");
+    assert!(refused.contains("the angle between accelerometers x and y is known to "), "{refused}");
+    assert!(
+        refused.contains("at most 0.5° is a result") && refused.contains("edges and corners too"),
+        "{refused}"
+    );
+    let slanting = analyse(&on_faces(0.6), &settings()).unwrap();
+    assert!(
+        slanting.accel.sigma[6..].iter().all(|sigma| sigma.to_degrees() < 0.1),
+        "{:?}",
+        slanting.accel.sigma
+    );
+}
+
+#[test]
+fn poses_that_end_long_before_the_log_are_pointed_out() {
+    let (_, good, held) = tumbled(30, &how(12));
+    let early =
+        |found: &[String]| found.iter().any(|words| words.starts_with("no still pose is found after "));
+    assert!(!early(&analyse(&good, &settings()).unwrap().warnings));
+    // From the sixteenth pose on everything is ten times as large: noise too.
+    let mut changed = good.clone();
+    let first = (0..good.len()).find(|tick| good.start_s(*tick) > held[15][1]).unwrap();
+    changed.outputs.iter_mut().flat_map(|column| &mut column[first..]).for_each(|reading| *reading *= 10.0);
+    let found = analyse(&changed, &settings()).unwrap();
+    assert_eq!(found.poses.len(), 16);
+    assert!(early(&found.warnings), "{:?}", found.warnings);
+    let from = format!("after {:.0} s of {:.0} s", found.poses[15].span_s[1], good.start_s(good.len() - 1));
+    assert!(
+        found.warnings.iter().any(|words| words.contains(&from) && words.contains("--threshold")),
+        "{:?}",
+        found.warnings
+    );
 }
