@@ -40,6 +40,8 @@ pub struct Columns {
     pub duration_s: Vec<f64>,
     /// Readings by sensor; what is no good reading is no number.
     pub values: Vec<Vec<f64>>,
+    /// Where raw readings stay exactly the same for long.
+    pub frozen: Vec<String>,
     /// What is to be said of the reading.
     pub notes: Vec<String>,
 }
@@ -105,7 +107,7 @@ impl Columns {
         let Ticks { end_ns, duration_s, readings, .. } = ticks;
         let names: Vec<String> = (0..readings.len()).map(|index| name(index, readings.len())).collect();
         let looked = names.iter().zip(&readings);
-        let notes = looked
+        let frozen = looked
             .filter_map(|(name, column)| {
                 checks::frozen(&format!("{} {name}", kind.sensor()), &end_ns, column)
             })
@@ -123,7 +125,7 @@ impl Columns {
             column
         });
         let values = values.collect();
-        Self { unit, kind, names, corrected: false, end_ns, duration_s, values, notes }
+        Self { unit, kind, names, corrected: false, end_ns, duration_s, values, frozen, notes: Vec::new() }
     }
 
     /// From the run of a unit, corrected with a document by the same stream as the service's.
@@ -147,7 +149,7 @@ impl Columns {
         };
         let mut columns = Self::empty(loaded.unit.clone(), kind);
         columns.notes = run.correct(loaded, second, |tick, _| columns.push(tick))?;
-        columns.notes.extend(frozen);
+        columns.frozen = frozen;
         if run.unit != loaded.unit {
             columns.notes.push(format!("The log is of unit {}, the document for {}.", run.unit, loaded.unit));
         }
@@ -201,6 +203,7 @@ impl Columns {
             end_ns: Vec::new(),
             duration_s: Vec::new(),
             values: vec![Vec::new(); AXES.len()],
+            frozen: Vec::new(),
             notes: Vec::new(),
         }
     }

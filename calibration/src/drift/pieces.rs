@@ -264,6 +264,7 @@ mod tests {
             names,
             corrected: false,
             duration_s: Vec::new(),
+            frozen: Vec::new(),
             end_ns,
             values,
             notes: Vec::new(),

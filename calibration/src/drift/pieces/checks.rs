@@ -105,7 +105,8 @@ pub fn frozen(called: &str, end_ns: &[i64], column: &[f64]) -> Option<String> {
 /// # Errors
 /// [`Error::Refused`] where the unit does not rest, or where ticks lie much farther apart than they last.
 pub fn at_rest(columns: &Columns, spacing: &Spacing) -> Result<Vec<String>, Error> {
-    let mut notes: Vec<String> = timing(columns, spacing)?.into_iter().collect();
+    let mut notes = columns.frozen.clone();
+    notes.extend(timing(columns, spacing)?);
     let mut moving = Vec::new();
     for (name, column) in columns.names.iter().zip(&columns.values) {
         let called = format!("{} {name}", columns.kind.sensor());
@@ -126,8 +127,13 @@ pub fn at_rest(columns: &Columns, spacing: &Spacing) -> Result<Vec<String>, Erro
                 ));
             }
         }
+        let noise = noise(column);
+        // Where the noise is not the same all through, the larger one counts.
+        let sigma = noise.iter().copied().fold(sigma, f64::max);
         notes.extend(far(&called, columns, column, (middle, sigma)));
-        notes.extend(unlike(&called, columns, column));
+        if columns.frozen.is_empty() {
+            notes.extend(unlike(&called, columns, &noise));
+        }
     }
     if moving.is_empty() { Ok(notes) } else { Err(Error::Refused(moving)) }
 }
@@ -202,28 +208,37 @@ fn far(called: &str, columns: &Columns, column: &[f64], (middle, sigma): (f64, f
     })
 }
 
-/// Noise that is not the same all through a log.
-fn unlike(called: &str, columns: &Columns, column: &[f64]) -> Option<String> {
-    let length = column.len().div_ceil(PARTS).max(2);
-    let noise = |part: &[f64]| {
+/// Length of the parts whose noise is compared (ticks).
+fn part(count: usize) -> usize {
+    count.div_ceil(PARTS).max(2)
+}
+
+/// Standard deviation of the noise in each part, by the middle step from reading to reading; 0 where nothing changes.
+fn noise(column: &[f64]) -> Vec<f64> {
+    let of = |part: &[f64]| {
         let mut steps: Vec<f64> = part.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
         steps.retain(|step| step.is_finite());
-        middle(&mut steps)
+        middle(&mut steps).map_or(0.0, |step| step * OF_MEDIAN / std::f64::consts::SQRT_2)
     };
-    let of: Vec<f64> = column.chunks(length).map(|part| noise(part).unwrap_or(0.0)).collect();
-    // A part without noise is frozen, or of coarse counts.
-    let least = of.iter().copied().filter(|noise| *noise > 0.0).fold(f64::INFINITY, f64::min);
-    let largest = of.iter().copied().fold(0.0, f64::max);
+    column.chunks(part(column.len())).map(of).collect()
+}
+
+/// Noise that is not the same all through a log.
+fn unlike(called: &str, columns: &Columns, noise: &[f64]) -> Option<String> {
+    // A part without noise is one of coarse counts.
+    let least = noise.iter().copied().filter(|noise| *noise > 0.0).fold(f64::INFINITY, f64::min);
+    let largest = noise.iter().copied().fold(0.0, f64::max);
     if largest <= UNLIKE_NOISE * least {
         return None;
     }
-    let loud = of.iter().position(|noise| *noise >= largest)?;
-    let ends = columns.since_s((loud * length + length).min(column.len()) - 1);
+    let loud = noise.iter().position(|noise| *noise >= largest)?;
+    let count = columns.end_ns.len();
+    let ends = columns.since_s(((loud + 1) * part(count)).min(count) - 1);
     Some(format!(
         "warning: {called}: the noise is {:.0} times as large between {:.0} s and {ends:.0} s as where it is least: are there two units \
          of measure in the log, or did the unit move?",
         largest / least,
-        columns.since_s(loud * length)
+        columns.since_s(loud * part(count))
     ))
 }
 
@@ -231,7 +246,9 @@ fn unlike(called: &str, columns: &Columns, column: &[f64]) -> Option<String> {
 fn robust(column: &[f64]) -> Option<(f64, f64)> {
     let mut good: Vec<f64> = column.iter().copied().filter(|reading| reading.is_finite()).collect();
     let about = middle(&mut good)?;
-    good.iter_mut().for_each(|reading| *reading = (*reading - about).abs());
+    for reading in &mut good {
+        *reading = (*reading - about).abs();
+    }
     Some((about, OF_MEDIAN * middle(&mut good)?))
 }
 
@@ -239,86 +256,4 @@ fn robust(column: &[f64]) -> Option<(f64, f64)> {
 fn middle(values: &mut [f64]) -> Option<f64> {
     let half = values.len().checked_sub(1)? / 2;
     Some(*values.select_nth_unstable_by(half, f64::total_cmp).1)
-}
-
-#[cfg(test)]
-#[expect(clippy::cast_precision_loss, clippy::cast_possible_wrap, reason = "numbers of ticks of tests")]
-mod tests {
-    use super::*;
-
-    const TICK_NS: i64 = 20_000_000;
-
-    fn wave(count: usize) -> Vec<f64> {
-        (0..count).map(|k| (k as f64 * 1.7).sin() + 0.3 * (k as f64 * 0.91).sin()).collect()
-    }
-
-    fn times(count: usize) -> Vec<i64> {
-        (0..count as i64).map(|k| k * TICK_NS).collect()
-    }
-
-    fn frozen_in(column: &[f64]) -> Option<String> {
-        frozen("gyro y", &times(column.len()), column)
-    }
-
-    #[test]
-    fn frozen_readings_are_told_and_coarse_or_slow_ones_are_not() {
-        let good = wave(20_000);
-        assert_eq!(frozen_in(&good), None);
-        let mut half = good.clone();
-        half[10_000..15_000].fill(0.5);
-        let words = frozen_in(&half).unwrap();
-        assert!(words.contains("gyro y reads exactly 0.5 from 200.00 s to 299.98 s"), "{words}");
-        let mut short = good.clone();
-        short[10_000..10_100].fill(0.5);
-        assert_eq!(frozen_in(&short), None, "half a hundredth of the log");
-        // Counts that are nearly always the same, and a sensor that is read more often than it measures.
-        let coarse: Vec<f64> = (0..20_000).map(|k| if k % 900 < 2 { 1.0 } else { 0.0 }).collect();
-        assert_eq!(frozen_in(&coarse), None);
-        let mut slow: Vec<f64> = good.iter().step_by(10).flat_map(|reading| [*reading; 10]).collect();
-        slow[3000..3300].fill(0.5);
-        assert_eq!(frozen_in(&slow), None);
-    }
-
-    #[test]
-    fn noise_of_two_measures_and_far_readings_are_told() {
-        let mut columns = Columns {
-            unit: isotherm_log::offline::unit_id("U").unwrap(),
-            kind: Kind::Rate,
-            names: vec!["x".to_owned()],
-            corrected: true,
-            end_ns: times(8000),
-            duration_s: vec![0.02; 8000],
-            values: vec![wave(8000)],
-            notes: Vec::new(),
-        };
-        let told = |columns: &Columns| {
-            let spacing = Spacing::of(&columns.end_ns)?;
-            at_rest(columns, &spacing)
-        };
-        assert!(told(&columns).unwrap().is_empty());
-        columns.values[0][4000..].iter_mut().for_each(|reading| *reading *= 57.3);
-        let words = told(&columns).unwrap().join("\n");
-        assert!(words.contains("the noise is 57 times as large between 80 s"), "{words}");
-        columns.values = vec![wave(8000)];
-        columns.values[0][1000] = 1e9;
-        let words = told(&columns).unwrap().join("\n");
-        assert!(words.contains("1 single readings") && words.contains("the first at 20.00 s"), "{words}");
-        columns.values = vec![wave(8000)];
-        columns.values[0][1000..1100].fill(1e5);
-        let words = told(&columns).unwrap().join("\n");
-        assert!(
-            words.contains("100 readings between 20.00 s and 21.98 s") && words.contains("did the unit turn")
-        );
-        columns.values = vec![wave(8000).iter().map(|reading| reading + 419.0).collect()];
-        assert!(told(&columns).unwrap()[0].contains("reads 419 °/h"));
-        columns.values = vec![wave(8000).iter().map(|reading| reading + 57.3 * 3600.0).collect()];
-        let words = told(&columns).unwrap_err().to_string();
-        assert!(words.contains("gyro x reads 57.3 °/s in the median, at most 20 °/s"), "{words}");
-        columns.values = vec![wave(8000)];
-        columns.duration_s = vec![0.01; 8000];
-        let words = told(&columns).unwrap().join("\n");
-        assert!(words.contains("ticks are 20.0 ms apart and last 10.0 ms"), "{words}");
-        columns.duration_s = vec![2e-5; 8000];
-        assert!(told(&columns).unwrap_err().to_string().contains("is the unit of the time column right"));
-    }
 }
