@@ -2,6 +2,10 @@
 
 use std::path::Path;
 
+use isotherm_calibration::drift::columns::{Columns, Kind};
+use isotherm_calibration::drift::pieces::Spacing;
+use isotherm_calibration::drift::pieces::checks::{at_rest, frozen};
+
 use crate::command::{fails, shipped, succeeds};
 use crate::drift_generator::{Normal, recording};
 
@@ -84,4 +88,81 @@ fn impact_tells_of_missing_ticks_and_of_what_a_short_log_lacks() {
     let holes = log(folder.path(), spoil, |_| true);
     let words = fails(&[&["impact", &holes, "--document", &document], &SHORT[..]].concat(), 1);
     assert!(words.contains("are no good numbers"), "{words}");
+}
+
+const TICK_NS: i64 = 20_000_000;
+
+fn wave(count: usize) -> Vec<f64> {
+    (0..count).map(|k| (k as f64 * 1.7).sin() + 0.3 * (k as f64 * 0.91).sin()).collect()
+}
+
+fn times(count: usize) -> Vec<i64> {
+    (0..count as i64).map(|k| k * TICK_NS).collect()
+}
+
+fn frozen_in(column: &[f64]) -> Option<String> {
+    frozen("gyro y", &times(column.len()), column)
+}
+
+#[test]
+fn frozen_readings_are_told_and_coarse_or_slow_ones_are_not() {
+    let good = wave(20_000);
+    assert_eq!(frozen_in(&good), None);
+    let mut half = good.clone();
+    half[10_000..15_000].fill(0.5);
+    let words = frozen_in(&half).unwrap();
+    assert!(words.contains("gyro y reads exactly 0.5 from 200.00 s to 299.98 s"), "{words}");
+    let mut short = good.clone();
+    short[10_000..10_100].fill(0.5);
+    assert_eq!(frozen_in(&short), None, "half a hundredth of the log");
+    // Counts that are nearly always the same, and a sensor that is read more often than it measures.
+    let coarse: Vec<f64> = (0..20_000).map(|k| if k % 900 < 2 { 1.0 } else { 0.0 }).collect();
+    assert_eq!(frozen_in(&coarse), None);
+    let mut slow: Vec<f64> = good.iter().step_by(10).flat_map(|reading| [*reading; 10]).collect();
+    slow[3000..3300].fill(0.5);
+    assert_eq!(frozen_in(&slow), None);
+}
+
+#[test]
+fn noise_of_two_measures_and_far_readings_are_told() {
+    let mut columns = Columns {
+        unit: isotherm_log::offline::unit_id("U").unwrap(),
+        kind: Kind::Rate,
+        names: vec!["x".to_owned()],
+        corrected: true,
+        end_ns: times(8000),
+        duration_s: vec![0.02; 8000],
+        values: vec![wave(8000)],
+        frozen: Vec::new(),
+        notes: Vec::new(),
+    };
+    let told = |columns: &Columns| {
+        let spacing = Spacing::of(&columns.end_ns)?;
+        at_rest(columns, &spacing)
+    };
+    assert!(told(&columns).unwrap().is_empty());
+    columns.values[0][4000..].iter_mut().for_each(|reading| *reading *= 57.3);
+    let words = told(&columns).unwrap().join("\n");
+    assert!(words.contains("times as large between 80 s and 100 s"), "{words}");
+    columns.values = vec![wave(8000)];
+    columns.values[0][1000] = 1e9;
+    let words = told(&columns).unwrap().join("\n");
+    assert!(words.contains("1 single readings") && words.contains("the first at 20.00 s"), "{words}");
+    columns.values = vec![wave(8000)];
+    columns.values[0][1000..1100].fill(1e5);
+    let words = told(&columns).unwrap().join("\n");
+    assert!(
+        words.contains("100 readings between 20.00 s and 21.98 s") && words.contains("did the unit turn")
+    );
+    columns.values = vec![wave(8000).iter().map(|reading| reading + 419.0).collect()];
+    assert!(told(&columns).unwrap()[0].contains("reads 419 °/h"));
+    columns.values = vec![wave(8000).iter().map(|reading| reading + 57.3 * 3600.0).collect()];
+    let words = told(&columns).unwrap_err().to_string();
+    assert!(words.contains("gyro x reads 57.3 °/s in the median, at most 20 °/s"), "{words}");
+    columns.values = vec![wave(8000)];
+    columns.duration_s = vec![0.01; 8000];
+    let words = told(&columns).unwrap().join("\n");
+    assert!(words.contains("ticks are 20.0 ms apart and last 10.0 ms"), "{words}");
+    columns.duration_s = vec![2e-5; 8000];
+    assert!(told(&columns).unwrap_err().to_string().contains("is the unit of the time column right"));
 }
