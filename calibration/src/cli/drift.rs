@@ -105,11 +105,11 @@ impl DriftArgs {
         let sensors = analyse(&grid, Wanted { factor, fit_h: self.fit_hours });
         working.finish();
         let mut parameters = Vec::new();
-        if kind == Kind::Rate {
-            let of = |sensor: &crate::drift::analysis::Analysis| {
-                (sensor.name.clone(), Parameters::of(sensor, self.initial_sigma))
-            };
-            parameters.extend(sensors.iter().map(of));
+        for sensor in sensors.iter().filter(|_| kind == Kind::Rate) {
+            match Parameters::of(sensor, self.initial_sigma) {
+                Ok(found) => parameters.push((sensor.name.clone(), found)),
+                Err(why) => grid.refused.push(why),
+            }
         }
         let report = Report {
             unit,
@@ -123,7 +123,10 @@ impl DriftArgs {
             sensors,
             parameters,
         };
-        self.output.write(|| self.document(work, &report).map(Some), || page(&report), names)?;
+        // Where every gyro is refused there is nothing new to say.
+        let stated = !report.parameters.is_empty();
+        let document = || stated.then(|| self.document(work, &report)).transpose();
+        self.output.write(document, || page(&report), names)?;
         Ok(report)
     }
 
@@ -159,7 +162,7 @@ impl DriftArgs {
         }
         let run = work.run()?;
         if let Some(document) = &work.base {
-            return Columns::corrected_by(run, &document.loaded, kind, bar());
+            return Columns::corrected_by(run, &document.loaded, kind, [bar(), bar()]);
         }
         let series = run.series(bar())?;
         if self.accelerometers {

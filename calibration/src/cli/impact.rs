@@ -290,7 +290,8 @@ impl ImpactArgs {
     fn sail_log(&self, voyage: &mut Voyage, parts: &[DriftParts; 3], cut: &Cut) -> Result<Report, Error> {
         let columns = self.columns(cut)?;
         let words: Vec<String> = cut.words().map(str::to_owned).into_iter().collect();
-        let (drift, mut notes) = logged::drift(&columns, voyage).map_err(|error| error.beside(&words))?;
+        let (drift, mut notes) =
+            logged::drift(&columns, voyage, &self.otherwise(parts)).map_err(|error| error.beside(&words))?;
         notes.extend(words);
         if *parts == [sizes(); 3] {
             notes.push(
@@ -315,6 +316,19 @@ impl ImpactArgs {
         Ok(Report { voyage: *voyage, source, seeds: 0, rows, notes })
     }
 
+    /// What can be done where the log is shorter than the calibration.
+    fn otherwise(&self, parts: &[DriftParts; 3]) -> String {
+        match &self.document {
+            None => "say how large the drift is with --document or --trend instead of the log".to_owned(),
+            Some(path) if *parts == [sizes(); 3] => format!(
+                "say how large the drift is with --trend instead of the log: {} has no [gyro.sensor.drift], which isotherm-calibrate \
+                 drift --document puts in",
+                path.display()
+            ),
+            Some(path) => format!("leave the log out: {} says how large the drift is", path.display()),
+        }
+    }
+
     fn columns(&self, cut: &Cut) -> Result<Columns, Error> {
         let args = LogArgs { log: self.log.clone(), reading: self.reading.clone() };
         let unit = self.reading.serial()?;
@@ -330,7 +344,7 @@ impl ImpactArgs {
         };
         let loaded = load_calibration(document)?;
         let run = args.run(Some(&loaded.unit))?;
-        let columns = Columns::corrected_by(&run, &loaded, Kind::Rate, Bar::reading());
+        let columns = Columns::corrected_by(&run, &loaded, Kind::Rate, [Bar::reading(), Bar::reading()]);
         run.hand_on(cut);
         columns
     }

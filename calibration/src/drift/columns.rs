@@ -8,6 +8,7 @@ use isotherm_log::offline::Loaded;
 use isotherm_protocol::key::UnitId;
 
 use super::DEG_PER_H_IN_RAD_PER_S;
+use super::pieces::checks;
 use crate::error::Error;
 use crate::run::cut::Cut;
 use crate::run::{Run, Watch};
@@ -35,8 +36,12 @@ pub struct Columns {
     pub corrected: bool,
     /// Ends of the ticks (ns on the producer's clock).
     pub end_ns: Vec<i64>,
+    /// How long the ticks last (s), as the mapping or the producer states it.
+    pub duration_s: Vec<f64>,
     /// Readings by sensor; what is no good reading is no number.
     pub values: Vec<Vec<f64>>,
+    /// Where raw readings stay exactly the same for long.
+    pub frozen: Vec<String>,
     /// What is to be said of the reading.
     pub notes: Vec<String>,
 }
@@ -100,7 +105,13 @@ impl Columns {
 
     fn build(unit: UnitId, kind: Kind, ticks: Ticks, scale: Scale) -> Self {
         let Ticks { end_ns, duration_s, readings, .. } = ticks;
-        let names = (0..readings.len()).map(|index| name(index, readings.len())).collect();
+        let names: Vec<String> = (0..readings.len()).map(|index| name(index, readings.len())).collect();
+        let looked = names.iter().zip(&readings);
+        let frozen = looked
+            .filter_map(|(name, column)| {
+                checks::frozen(&format!("{} {name}", kind.sensor()), &end_ns, column)
+            })
+            .collect();
         let values = readings.into_iter().map(|mut column| {
             match scale {
                 Scale::Mean(factor) => column.iter_mut().for_each(|reading| *reading *= factor),
@@ -114,16 +125,31 @@ impl Columns {
             column
         });
         let values = values.collect();
-        Self { unit, kind, names, corrected: false, end_ns, values, notes: Vec::new() }
+        Self { unit, kind, names, corrected: false, end_ns, duration_s, values, frozen, notes: Vec::new() }
     }
 
     /// From the run of a unit, corrected with a document by the same stream as the service's.
     ///
+    /// The raw readings are looked at first, `watches[0]` sees that: behind a correction a dead sensor still shows a little of the others.
+    ///
     /// # Errors
-    /// As [`Run::correct`].
-    pub fn corrected_by(run: &Run, loaded: &Loaded, kind: Kind, watch: impl Watch) -> Result<Self, Error> {
+    /// As [`Run::correct`] and [`checks::raw`].
+    pub fn corrected_by(
+        run: &Run,
+        loaded: &Loaded,
+        kind: Kind,
+        watches: [impl Watch; 2],
+    ) -> Result<Self, Error> {
+        let [first, second] = watches;
+        let frozen = match (run.series(first), kind) {
+            (Ok(series), Kind::Rate) => checks::raw(kind, &series.gyros)?,
+            (Ok(series), Kind::Force) => checks::raw(kind, &series.accels)?,
+            // The correction says what is wrong with the log.
+            (Err(_), _) => Vec::new(),
+        };
         let mut columns = Self::empty(loaded.unit.clone(), kind);
-        columns.notes = run.correct(loaded, watch, |tick, _| columns.push(tick))?;
+        columns.notes = run.correct(loaded, second, |tick, _| columns.push(tick))?;
+        columns.frozen = frozen;
         if run.unit != loaded.unit {
             columns.notes.push(format!("The log is of unit {}, the document for {}.", run.unit, loaded.unit));
         }
@@ -175,7 +201,9 @@ impl Columns {
             names: AXES.map(str::to_owned).to_vec(),
             corrected: true,
             end_ns: Vec::new(),
+            duration_s: Vec::new(),
             values: vec![Vec::new(); AXES.len()],
+            frozen: Vec::new(),
             notes: Vec::new(),
         }
     }
@@ -189,6 +217,7 @@ impl Columns {
         let good = !flags.is_empty() && flags.iter().all(|flags| flags.contains(SensorFlags::VALID));
         let duration_s = tick.duration.as_s();
         self.end_ns.push(tick.end_time.as_ns());
+        self.duration_s.push(duration_s);
         for (column, increment) in self.values.iter_mut().zip(increments) {
             column.push(if good { increment * factor / duration_s } else { f64::NAN });
         }
@@ -202,6 +231,14 @@ impl Columns {
             ));
         }
         Ok(self)
+    }
+
+    /// Time of a tick since the first (s).
+    #[must_use]
+    #[expect(clippy::cast_precision_loss, reason = "lengths of logs")]
+    pub fn since_s(&self, tick: usize) -> f64 {
+        let time = self.end_ns.get(tick).zip(self.end_ns.first());
+        time.map_or(0.0, |(end, first)| end.saturating_sub(*first) as f64 * 1e-9)
     }
 
     /// Symbol of the readings' unit of measure.

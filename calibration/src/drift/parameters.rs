@@ -24,6 +24,7 @@ const REFERENCE_S: f64 = 60.0;
 const TIME_RANGE_H: [f64; 2] = [0.02, 250_000.0];
 const INITIAL_RANGE: [f64; 2] = [1e-6, 20_000.0];
 const WALK_RANGE: [f64; 2] = [1e-8, 3000.0];
+const SIGMA_RANGE: [f64; 2] = [0.0, 20_000.0];
 /// An input axis within this cosine of a case axis has that axis' drift: 14°.
 const SMALLEST_COSINE: f64 = 0.97;
 
@@ -38,8 +39,10 @@ pub struct Parameters {
 
 impl Parameters {
     /// Of a gyro; `initial_sigma` (°/h) of the constant part where it is known.
-    #[must_use]
-    pub fn of(analysis: &Analysis, initial_sigma: Option<f64>) -> Self {
+    ///
+    /// # Errors
+    /// What is beyond the range that a document allows, in words: such a log is not one of a gyro at rest.
+    pub fn of(analysis: &Analysis, initial_sigma: Option<f64>) -> Result<Self, String> {
         let mut notes = Vec::new();
         let length_h = analysis.slow.length_h();
         let fit = analysis.markov.as_ref().map(|(fit, _)| fit);
@@ -96,6 +99,30 @@ impl Parameters {
             ));
             CONSTANT_SIGMAS * analysis.slow_deviation
         });
+        // A time below the range is only told: what is so quick is noise for an estimator that sees minutes.
+        if sigma > 0.0 && time_h < TIME_RANGE_H[0] {
+            notes.push(format!(
+                "the correlation time of {} h is below the {} h that a document allows, which stands in its place: log for longer",
+                short(time_h),
+                TIME_RANGE_H[0]
+            ));
+        }
+        let inside = [
+            ("sigma_deg_per_h", sigma, SIGMA_RANGE, "°/h"),
+            ("initial_sigma_deg_per_h", initial, INITIAL_RANGE, "°/h"),
+            ("angle_random_walk_deg_per_sqrt_h", walk, WALK_RANGE, "°/√h"),
+        ];
+        for (key, value, [low, high], measure) in inside {
+            // False for what is no number too.
+            if !(low..=high).contains(&value) {
+                return Err(format!(
+                    "gyro {}: {key} is {} {measure}, a document allows {low} to {high}: the log is not one of a gyro at rest (did the \
+                     unit turn, are there spikes, is the unit of measure right?); no drift is stated for it",
+                    analysis.name,
+                    short(value)
+                ));
+            }
+        }
         let within = |value: f64, [low, high]: [f64; 2]| digits(value.clamp(low, high));
         let drift = Drift {
             sigma_deg_per_h: digits(sigma),
@@ -105,7 +132,7 @@ impl Parameters {
             initial_sigma_deg_per_h: within(initial, INITIAL_RANGE),
             angle_random_walk_deg_per_sqrt_h: within(walk, WALK_RANGE),
         };
-        Self { drift, notes }
+        Ok(Self { drift, notes })
     }
 
     /// As it stands in a document.

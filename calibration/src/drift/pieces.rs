@@ -1,5 +1,7 @@
 //! Columns cut at their gaps, and what cannot be analysed at all.
 
+pub mod checks;
+
 use super::columns::Columns;
 use crate::error::Error;
 
@@ -47,6 +49,18 @@ pub struct Grid {
     pub notes: Vec<String>,
 }
 
+/// How the ticks of a log follow each other.
+#[derive(Debug, Clone)]
+pub struct Spacing {
+    /// The middle distance of two (ns).
+    middle_ns: i64,
+    /// Mean distance of two without a gap between them (s).
+    pub tick_s: f64,
+    /// Distances that are not like the middle one.
+    uneven: usize,
+    gaps: Vec<Gap>,
+}
+
 /// Ticks that are missing before one.
 #[derive(Debug, Clone, Copy)]
 struct Gap {
@@ -61,38 +75,14 @@ impl Grid {
     /// [`Error::Refused`]: too short, time that goes back, no sensor that can be analysed.
     #[expect(clippy::cast_precision_loss, reason = "counts of ticks and log lengths are far below 2⁵³")]
     pub fn of(columns: Columns) -> Result<Self, Error> {
+        let spacing = Spacing::of(&columns.end_ns)?;
+        let told = checks::at_rest(&columns, &spacing)?;
         let Columns { kind, names, end_ns, values, mut notes, .. } = columns;
+        notes.extend(told);
         let count = end_ns.len();
-        if count < FEWEST_TICKS {
-            return refused(format!(
-                "the log has {count} ticks, at least {FEWEST_TICKS} are needed, and for drift hours of them: log for longer"
-            ));
-        }
-        let intervals: Vec<i64> = end_ns.windows(2).map(|pair| pair[1].saturating_sub(pair[0])).collect();
-        if let Some(at) = intervals.iter().position(|interval| *interval <= 0) {
-            return refused(format!(
-                "time does not go on at tick {} of {count} ({} ns, then {} ns): are these logs of two runs, or given in the \
-                 wrong order? Give one run",
-                at + 2,
-                end_ns.get(at).copied().unwrap_or_default(),
-                end_ns.get(at + 1).copied().unwrap_or_default(),
-            ));
-        }
-        let mut sorted = intervals.clone();
-        let (_, middle, _) = sorted.select_nth_unstable(intervals.len() / 2);
-        let middle_ns = *middle;
-        let gaps = gaps(&intervals, middle_ns);
-        let missing: usize = gaps.iter().map(|gap| gap.missing).sum();
+        let missing = spacing.missing();
+        let Spacing { middle_ns, tick_s, uneven, gaps } = spacing;
         let places = count + missing;
-        let uneven = intervals.iter().filter(|interval| {
-            let off = (**interval - middle_ns).abs() as f64;
-            off > UNEVEN * middle_ns as f64 && **interval < middle_ns + middle_ns / 2
-        });
-        let uneven = uneven.count();
-        // The mean over everything that is no gap: the middle one may be off by the clock's resolution.
-        let within: i64 = intervals.iter().filter(|interval| **interval < middle_ns + middle_ns / 2).sum();
-        let whole = intervals.len() - gaps.len();
-        let tick_s = within as f64 * 1e-9 / whole.max(1) as f64;
         if uneven * 100 > count {
             notes.push(format!(
                 "{:.1} % of the ticks are more than 5 % longer or shorter than the middle one of {:.6} s; they are taken as \
@@ -129,6 +119,52 @@ impl Grid {
     #[expect(clippy::cast_precision_loss, reason = "counts of ticks are far below 2⁵³")]
     pub fn length_h(&self) -> f64 {
         self.ticks as f64 * self.tick_s / super::HOUR_S
+    }
+}
+
+impl Spacing {
+    /// Of the ends of ticks (ns).
+    ///
+    /// # Errors
+    /// [`Error::Refused`]: too few, or time that goes back.
+    #[expect(clippy::cast_precision_loss, reason = "log lengths are far below 2⁵³")]
+    pub fn of(end_ns: &[i64]) -> Result<Self, Error> {
+        let count = end_ns.len();
+        if count < FEWEST_TICKS {
+            return refused(format!(
+                "the log has {count} ticks, at least {FEWEST_TICKS} are needed, and for drift hours of them: log for longer"
+            ));
+        }
+        let intervals: Vec<i64> = end_ns.windows(2).map(|pair| pair[1].saturating_sub(pair[0])).collect();
+        if let Some(at) = intervals.iter().position(|interval| *interval <= 0) {
+            return refused(format!(
+                "time does not go on at tick {} of {count} ({} ns, then {} ns): are these logs of two runs, or given in the \
+                 wrong order? Give one run",
+                at + 2,
+                end_ns.get(at).copied().unwrap_or_default(),
+                end_ns.get(at + 1).copied().unwrap_or_default(),
+            ));
+        }
+        let mut sorted = intervals.clone();
+        let (_, middle, _) = sorted.select_nth_unstable(intervals.len() / 2);
+        let middle_ns = *middle;
+        let gaps = gaps(&intervals, middle_ns);
+        let uneven = intervals.iter().filter(|interval| {
+            let off = (**interval - middle_ns).abs() as f64;
+            off > UNEVEN * middle_ns as f64 && **interval < middle_ns + middle_ns / 2
+        });
+        let uneven = uneven.count();
+        // The mean over everything that is no gap: the middle one may be off by the clock's resolution.
+        let within: i64 = intervals.iter().filter(|interval| **interval < middle_ns + middle_ns / 2).sum();
+        let whole = intervals.len() - gaps.len();
+        let tick_s = within as f64 * 1e-9 / whole.max(1) as f64;
+        Ok(Self { middle_ns, tick_s, uneven, gaps })
+    }
+
+    /// Ticks that are missing.
+    #[must_use]
+    pub fn missing(&self) -> usize {
+        self.gaps.iter().map(|gap| gap.missing).sum()
     }
 }
 
@@ -172,16 +208,8 @@ fn words(gaps: &[Gap], bridge: bool, tick_s: f64) -> Vec<String> {
 
 /// How many readings of a column are no numbers, or why it cannot be analysed.
 #[expect(clippy::cast_precision_loss, reason = "counts of ticks are far below 2⁵³")]
-fn check(called: &str, column: &[f64]) -> Result<usize, String> {
-    let (mut low, mut high, mut bad) = (f64::INFINITY, f64::NEG_INFINITY, 0_usize);
-    for reading in column {
-        if reading.is_finite() {
-            low = low.min(*reading);
-            high = high.max(*reading);
-        } else {
-            bad += 1;
-        }
-    }
+pub(crate) fn check(called: &str, column: &[f64]) -> Result<usize, String> {
+    let bad = column.iter().filter(|reading| !reading.is_finite()).count();
     let share = bad as f64 / column.len().max(1) as f64;
     if share > LARGEST_BAD_SHARE {
         return Err(format!(
@@ -191,12 +219,7 @@ fn check(called: &str, column: &[f64]) -> Result<usize, String> {
             share * 100.0
         ));
     }
-    if low >= high {
-        return Err(format!(
-            "{called}: every reading is {low}: the sensor is dead, or the mapping names the wrong column"
-        ));
-    }
-    Ok(bad)
+    checks::dead(called, column).map_or(Ok(bad), Err)
 }
 
 /// Cuts a column; readings that are no numbers count as missing.
@@ -235,7 +258,17 @@ mod tests {
     fn columns(end_ns: Vec<i64>, values: Vec<Vec<f64>>) -> Columns {
         let names = (0..values.len()).map(|index| index.to_string()).collect();
         let unit = isotherm_log::offline::unit_id("U").unwrap();
-        Columns { unit, kind: Kind::Rate, names, corrected: false, end_ns, values, notes: Vec::new() }
+        Columns {
+            unit,
+            kind: Kind::Rate,
+            names,
+            corrected: false,
+            duration_s: Vec::new(),
+            frozen: Vec::new(),
+            end_ns,
+            values,
+            notes: Vec::new(),
+        }
     }
 
     fn wave(count: i64) -> Vec<f64> {

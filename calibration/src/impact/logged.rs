@@ -3,6 +3,7 @@
 use super::estimate::TICK_S;
 use super::scenario::{Drift, Voyage};
 use crate::drift::columns::Columns;
+use crate::drift::pieces::{Spacing, check, checks};
 use crate::drift::{DEG_PER_H_IN_RAD_PER_S, HOUR_S};
 use crate::error::Error;
 
@@ -13,19 +14,20 @@ const LONGEST_GAP: usize = 60;
 /// Shortest voyage (h).
 const SHORTEST_H: f64 = 1.0;
 
-/// The drift of a log, with what is to be said of it; `hours` of the voyage become what the log has where they are more.
+/// The drift of a log, with what is to be said of it; `hours` of the voyage become what the log has where they are more, and
+/// `otherwise` is what can be done where it is too short.
 ///
 /// The mean over the calibration is taken out: on a bench it holds the Earth's rate, and the calibration finds it.
 ///
 /// # Errors
-/// [`Error::Refused`] where the log is too short, has gaps, or not three gyros.
+/// [`Error::Refused`] where the log is too short, has gaps, or not three gyros, and as [`checks::at_rest`].
 #[expect(
     clippy::cast_precision_loss,
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
     reason = "ticks of 10 s of a log are far below 2⁵³"
 )]
-pub fn drift(columns: &Columns, voyage: &mut Voyage) -> Result<(Drift, Vec<String>), Error> {
+pub fn drift(columns: &Columns, voyage: &mut Voyage, otherwise: &str) -> Result<(Drift, Vec<String>), Error> {
     let refused = |why: String| Error::Refused(vec![why]);
     if columns.values.len() != 3 {
         return Err(refused(format!(
@@ -40,11 +42,20 @@ pub fn drift(columns: &Columns, voyage: &mut Voyage) -> Result<(Drift, Vec<Strin
     if length_h < voyage.calibration_h + SHORTEST_H {
         return Err(refused(format!(
             "the log is {length_h:.2} h, {:.1} h of calibration and at least {SHORTEST_H} h of voyage are needed: shorten the \
-             calibration with --calibration-hours, or say how large the drift is with --document or --trend",
+             calibration with --calibration-hours, or {otherwise}",
             voyage.calibration_h
         )));
     }
-    let mut notes = Vec::new();
+    let spacing = Spacing::of(&columns.end_ns)?;
+    let mut notes = columns.notes.clone();
+    notes.extend(checks::at_rest(columns, &spacing)?);
+    notes.extend(checks::missing(&spacing, columns.end_ns.len()));
+    let looked = columns.names.iter().zip(&columns.values);
+    let bad: Vec<String> =
+        looked.filter_map(|(name, column)| check(&format!("gyro {name}"), column).err()).collect();
+    if !bad.is_empty() {
+        return Err(Error::Refused(bad));
+    }
     if length_h < voyage.calibration_h + voyage.hours {
         let left = ((length_h - voyage.calibration_h) * 60.0).floor() / 60.0;
         notes.push(format!("The log ends after {left:.1} h of the voyage of {} h.", voyage.hours));

@@ -78,7 +78,9 @@ impl Report {
         let (held, without, with) = (of(Care::Held), of(Care::WithoutTrend), of(Care::WithTrend));
         let middle = if self.seeds > 0 { "in the middle of all seeds " } else { "" };
         let gain = without.radial_largest_m / with.radial_largest_m.max(f64::MIN_POSITIVE);
-        let judgement = if gain >= 1.05 {
+        let judgement = if without.radial_largest_m <= 0.0 && with.radial_largest_m <= 0.0 {
+            "the trend state neither gains nor costs".to_owned()
+        } else if gain >= 1.05 {
             format!("the trend state cuts the error {gain:.1}×")
         } else if gain > 1.0 / 1.05 {
             "the trend state neither gains nor costs".to_owned()

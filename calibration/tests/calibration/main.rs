@@ -7,6 +7,7 @@
 //! | `tumble` | a unit put down by hand, real and simulated |
 //! | `modes_rates` | `modes` and `rates` as their users run them |
 //! | `drift`, `impact`, `logged` | noise and drift, what they mean for navigation, and logs in every form |
+//! | `rest` | `drift` and `impact` on logs that are none of a unit at rest |
 //! | `agreement` | what reports state is what `isotherm-replay correct` gives with the written document, command by command |
 //! | `bad_logs` | files that may not be written, logs that are cut short, empty, swapped or not judged |
 //! | `two_units` | a recording of two units through every command that reads logs |
@@ -39,6 +40,7 @@ mod positions;
 mod positions_channels;
 mod positions_command;
 mod rates_refused;
+mod rest;
 mod simulated_logs;
 mod skewed_six;
 mod stand;
