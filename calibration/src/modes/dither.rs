@@ -6,6 +6,7 @@
 use super::cells::{Cell, MAX_POWER};
 use super::fit::largest_order;
 use super::noise::Data;
+use crate::drift::figures::short;
 
 /// Squared standard errors that the highest coefficient must be away from zero.
 const BETTER: f64 = 4.0;
@@ -15,6 +16,9 @@ const SEEN: f64 = 3.0;
 const MAX_ORDER: usize = 2;
 /// Smallest rate of temperature (°C/s) at which its delay can be told.
 const SLOWEST_DEG_C_PER_S: f64 = 2e-3;
+
+/// Largest rest frequency, as the half periods count it (Hz).
+const LARGEST_HZ: f64 = 1e6;
 
 /// f0 over temperature.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,9 +31,25 @@ pub struct Rest {
     pub delay_s: Option<f64>,
 }
 
+/// f0 of the gyro at a place among the three of the cells.
+///
+/// # Errors
+/// That there is none, or one that no dither has.
+pub fn found(cells: &[Cell], place: usize, reference_deg_c: f64) -> Result<Rest, String> {
+    let rest = fit(cells, place, reference_deg_c).ok_or("the dither's rest frequency cannot be fitted")?;
+    let rest_hz = rest.coefficients[0][0];
+    if (0.0..LARGEST_HZ).contains(&rest_hz) {
+        return Ok(rest);
+    }
+    Err(format!(
+        "the dither's rest frequency comes out as {} Hz, 0 to {LARGEST_HZ} Hz are possible: check the columns of the half periods",
+        short(rest_hz)
+    ))
+}
+
 /// Fits f0 of the gyro at a place among the three of the cells; `None` without half-period counts.
 #[must_use]
-pub fn fit(cells: &[Cell], place: usize, reference_deg_c: f64) -> Option<Rest> {
+fn fit(cells: &[Cell], place: usize, reference_deg_c: f64) -> Option<Rest> {
     let cells: Vec<&Cell> = cells.iter().filter(|cell| cell.dither_hz[place].is_finite()).collect();
     let temperature: Vec<f64> = cells.iter().map(|cell| cell.powers[0][place] + reference_deg_c).collect();
     let (low, high) = temperature

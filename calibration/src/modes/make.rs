@@ -12,7 +12,6 @@ use super::judge::judged;
 use super::prepare::{check, earth_of, earth_rate, gaps, groups, provisional, transition_ticks, window_s};
 use super::servo::{self, Transient};
 use super::switches::Switches;
-use crate::drift::figures::short;
 use crate::error::Error;
 use crate::report::{Curve as Residual, FitReport};
 use crate::run::{Run, Watch};
@@ -23,8 +22,6 @@ const CELLS: f64 = 400.0;
 const SHORTEST_S: f64 = 15.0;
 /// Time behind a switch that is left out where the servo is not known (s).
 const SETTLE_S: f64 = 0.5;
-/// Largest rest frequency of a dither, as the half periods count it (Hz).
-const LARGEST_REST_HZ: f64 = 1e6;
 
 /// What the fit starts from.
 #[derive(Debug, Clone)]
@@ -135,16 +132,7 @@ pub fn make<W: Watch>(wanted: &Wanted<'_>, mut watch: impl FnMut() -> W) -> Resu
             };
             gyros[sensor] = Some(fit(given, wanted.asked));
             servos[sensor] = Some(transients[sensor].clone().and_then(|transient| {
-                let rest = dither::fit(&gathered.cells, place, reference_deg_c)
-                    .ok_or("the dither's rest frequency cannot be fitted")?;
-                let rest_hz = rest.coefficients[0][0];
-                if !(0.0..LARGEST_REST_HZ).contains(&rest_hz) {
-                    return Err(format!(
-                        "the dither's rest frequency comes out as {} Hz, 0 to {LARGEST_REST_HZ} Hz are possible: check the columns of the \
-                         half periods",
-                        short(rest_hz)
-                    ));
-                }
+                let rest = dither::found(&gathered.cells, place, reference_deg_c)?;
                 Ok(ServoFit { transient, rest })
             }));
         }

@@ -18,7 +18,7 @@ pub(super) const ACCIDENT: f64 = 1e-3;
 /// Largest standard error of a scale factor that is still a result (relative).
 const LARGEST_SIGMA: f64 = 1e-2;
 /// Largest angle between an axis and where the document at hand has it (°): half of a skewed unit's way to the next one.
-const LARGEST_TURN_DEG: f64 = 30.0;
+pub const LARGEST_TURN_DEG: f64 = 30.0;
 
 /// χ² of the quadratic terms of C, and their number.
 pub(super) fn quadratic_terms(fit: &Fit, plan: &Plan) -> (f64, usize) {

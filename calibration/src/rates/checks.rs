@@ -225,6 +225,56 @@ mod tests {
     use nalgebra::DMatrix;
 
     use super::*;
+    use crate::rates::plateaus::within;
+
+    /// Bins of half a second of two gyros: the second has noise alone, as sampled from its number.
+    fn turning(rate_deg_per_s: impl Fn(f64) -> f64) -> Vec<Bin> {
+        let bin = |index: u32| {
+            let begin_s = 0.5 * f64::from(index);
+            let noise = f64::from(index * 7 % 5) - 2.0;
+            let rate = vec![3600.0 * rate_deg_per_s(begin_s) + noise, noise];
+            Bin { begin_s, length_s: 0.5, good_s: 0.5, rate, ..Bin::default() }
+        };
+        (0..200).map(bin).collect()
+    }
+
+    fn step(bins: &[Bin], window_s: [f64; 2], rate_deg_per_s: f64) -> Matched {
+        let step = Step { run: 0, axis: [1.0, 0.0, 0.0], rate_deg_per_s, window_s: Some(window_s) };
+        Matched { step, plateau: within(bins, window_s).unwrap() }
+    }
+
+    #[test]
+    fn a_step_is_one_rate_from_end_to_end() {
+        let bins = turning(|time_s| if (20.0..60.0).contains(&time_s) { 36.0 } else { 0.0 });
+        assert_eq!(steady(&[step(&bins, [22.0, 58.0], 36.0), step(&bins, [65.0, 95.0], 0.0)], &bins), Ok(()));
+        let late = steady(&[step(&bins, [32.0, 68.0], 36.0)], &bins).unwrap_err();
+        assert!(late.contains("not steady in the step of 32.0…68.0 s (36 °/s)"), "{late}");
+        let rest = steady(&[step(&bins, [40.0, 80.0], 0.0)], &bins).unwrap_err();
+        assert!(rest.contains("(0 °/s)"), "{rest}");
+    }
+
+    #[test]
+    fn a_gyro_that_does_not_move_at_all_is_dead() {
+        let mut bins = turning(|time_s| if time_s < 50.0 { 36.0 } else { -36.0 });
+        assert_eq!(dead(&bins), None, "noise is life");
+        for bin in &mut bins {
+            bin.rate[1] = 12.0;
+        }
+        assert_eq!(dead(&bins), Some(1));
+    }
+
+    #[test]
+    fn turning_one_way_is_pointed_out() {
+        let steps = |rates: &[f64]| -> Vec<Step> {
+            rates
+                .iter()
+                .map(|rate| Step { run: 0, axis: [0.0, 0.0, -1.0], rate_deg_per_s: *rate, window_s: None })
+                .collect()
+        };
+        assert!(one_way(&steps(&[36.0, 0.0, 108.0]))[0].starts_with("all steps about z turn one way"));
+        assert_eq!(one_way(&steps(&[36.0, -36.0])), Vec::<String>::new());
+        assert_eq!(one_way(&steps(&[0.0])), Vec::<String>::new());
+    }
 
     #[test]
     fn a_gyro_is_one_whose_scale_and_line_are_near_what_was_stated() {

@@ -8,14 +8,12 @@ use super::samples::Samples;
 use super::solve::median;
 use super::stand::Stand;
 use crate::drift::columns::name as sensor_name;
+use crate::drift::pieces::checks::moves;
 use crate::means::Size;
 use crate::report::Rest;
 use crate::series::{Series, Ticks};
 use crate::swapped::Shown;
 
-/// Mean rate of a gyro at rest beyond which it does not rest, or its unit is wrong (°/s): Earth's rate and the bias of a poor
-/// micromechanical gyro stay below.
-const FASTEST_DEG_PER_S: f64 = 20.0;
 /// How far a gyro on a rate table may be from what is stated: share of the rate, and beside it (°/s).
 const TABLE_SHARE: f64 = 0.05;
 const TABLE_DEG_PER_S: f64 = 0.5;
@@ -156,15 +154,8 @@ fn rates(found: &mut Findings, name: &str, ticks: &Ticks) {
         let mut sizes: Vec<f64> =
             readings.iter().filter(|r| r.is_finite()).map(|r| r.abs().to_degrees()).collect();
         let Some(usual) = median(&mut sizes) else { continue };
-        if usual > FASTEST_DEG_PER_S {
-            found.refusals.push(format!(
-                "{name}: gyro {} reads {usual:.1} °/s in the median, at most {FASTEST_DEG_PER_S} °/s is rest: does the unit move, \
-                 are columns swapped, or is the unit of measure in the mapping wrong ({:.3} as °/s, {:.3} as °/h)?",
-                sensor_name(index, ticks.readings.len()),
-                usual.to_radians(),
-                usual.to_radians() / 3600.0
-            ));
-        }
+        let called = format!("{name}: gyro {}", sensor_name(index, ticks.readings.len()));
+        found.refusals.extend(moves(&called, usual));
     }
 }
 

@@ -248,6 +248,26 @@ fn modes_point_out_swapped_columns_where_the_attitude_is_stated() {
     for sensors in ["gyros x and z look swapped", "accelerometers x and z look swapped"] {
         assert!(both.contains(sensors), "{both}");
     }
+    // The right columns, and the heading of another log.
+    let _ = std::fs::remove_file(&log);
+    record_events(&log, "ZLG-0001", events_of(&[zeeman(1, chamber())]));
+    let call = ["modes", log.to_str().unwrap(), "--document", base.to_str().unwrap(), "--latitude", "55.75"];
+    let (_, said, _) = words(&calibrate(&[&call[..], &["--heading", "210", "--json"]].concat()));
+    assert!(said.contains("the gyros do not fit the attitude"), "{said}");
+}
+
+#[test]
+fn thermal_refuses_a_log_in_another_attitude_than_the_stated_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let log = folder.path().join("run.mcap").display().to_string();
+    record(Path::new(&log), &fibre_optic(5, "FOG-0001", 3000.0));
+    let fog = fog();
+    let call =
+        ["thermal", &log, "--document", &fog, "--latitude", "55.75", "--heading", "30", "--pitch", "0"];
+    let (_, said, errors) = words(&calibrate(&[&call[..], &["--roll", "0"]].concat()));
+    assert!(!format!("{said}{errors}").contains("do not fit the attitude"), "{said}{errors}");
+    let refused = fails(&[&call[..], &["--roll", "180"]].concat(), 1);
+    assert!(refused.contains("run.mcap: the accelerometers do not fit the attitude"), "{refused}");
 }
 
 #[test]

@@ -6,7 +6,8 @@ use crate::drift::figures::short;
 use crate::error::Error;
 use crate::series::Ticks;
 
-/// Rate beyond which a unit does not rest, or its unit of measure is wrong (°/s); `thermal` has the same.
+/// Rate beyond which a unit does not rest, or its unit of measure is wrong (°/s): Earth's rate and the bias of a poor micromechanical
+/// gyro stay below.
 const FASTEST_DEG_PER_S: f64 = 20.0;
 /// Corrected rate at rest beyond which it is told (°/h): the bias is out, and the Earth turns by 15 °/h.
 const LARGEST_CORRECTED_DEG_PER_H: f64 = 100.0;
@@ -112,14 +113,8 @@ pub fn at_rest(columns: &Columns, spacing: &Spacing) -> Result<Vec<String>, Erro
         let called = format!("{} {name}", columns.kind.sensor());
         let Some((middle, sigma)) = robust(column) else { continue };
         if columns.kind == Kind::Rate {
-            let deg_per_s = middle / 3600.0;
-            if deg_per_s.abs() > FASTEST_DEG_PER_S {
-                moving.push(format!(
-                    "{called} reads {deg_per_s:.1} °/s in the median, at most {FASTEST_DEG_PER_S} °/s is rest: does the unit move, are \
-                     columns swapped, or is the unit of measure in the mapping wrong ({:.3} as °/s, {:.3} as °/h)?",
-                    deg_per_s.to_radians(),
-                    deg_per_s.to_radians() / 3600.0
-                ));
+            if let Some(words) = moves(&called, middle / 3600.0) {
+                moving.push(words);
             } else if columns.corrected && middle.abs() > LARGEST_CORRECTED_DEG_PER_H {
                 notes.push(format!(
                     "warning: {called} reads {middle:.0} °/h in the median after the correction, the Earth turns by 15 °/h: does the \
@@ -136,6 +131,19 @@ pub fn at_rest(columns: &Columns, spacing: &Spacing) -> Result<Vec<String>, Erro
         }
     }
     if moving.is_empty() { Ok(notes) } else { Err(Error::Refused(moving)) }
+}
+
+/// Words where the median rate of a gyro (°/s) is not that of a unit at rest.
+#[must_use]
+pub fn moves(called: &str, deg_per_s: f64) -> Option<String> {
+    (deg_per_s.abs() > FASTEST_DEG_PER_S).then(|| {
+        format!(
+            "{called} reads {deg_per_s:.1} °/s in the median, at most {FASTEST_DEG_PER_S} °/s is rest: does the unit move, are columns \
+             swapped, or is the unit of measure in the mapping wrong ({:.3} as °/s, {:.3} as °/h)?",
+            deg_per_s.to_radians(),
+            deg_per_s.to_radians() / 3600.0
+        )
+    })
 }
 
 /// How much of a log is missing, where that is more than a little.

@@ -6,6 +6,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::{AXES, AccelFit, Tumble};
 use crate::means::Size;
+use crate::positions::doubts::LARGEST_TURN_DEG;
 use crate::positions::faults;
 use crate::positions::pose::Pose;
 use crate::positions::solve::NoSolution;
@@ -19,8 +20,6 @@ const LARGEST_ANGLE_SIGMA_DEG: f64 = 0.5;
 const LAST_SHARE: f64 = 1.0 / 3.0;
 /// Largest angle (°, rms) by which fitted gyros may miss the direction of gravity after a turn; half a degree is usual by hand.
 const LARGEST_LEFT_DEG: f64 = 3.0;
-/// Largest angle (°) between an axis and where the document at hand has it: what `positions` takes for swapped columns too.
-const LARGEST_TURN_DEG: f64 = 30.0;
 /// An angle (°) to the stated axis that is a sign, and no other axis.
 const OTHER_SIGN_DEG: f64 = 150.0;
 /// Times that one sensor's K may have changed more than another's; a unit of measure is more.
