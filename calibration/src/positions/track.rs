@@ -122,6 +122,25 @@ impl Track {
         quantile(&self.duration_s, 0.5)
     }
 
+    /// Words where more than a hundredth of the ticks does not begin where the one before ends: gaps, or a tick length that is not the
+    /// log's.
+    #[must_use]
+    #[expect(clippy::cast_precision_loss, reason = "a run is far below 2⁵³ ns")]
+    pub fn gaps(&self) -> Option<String> {
+        let step_s = |pair: &[i64]| (pair[1] - pair[0]) as f64 * 1e-9;
+        let tick_s = self.tick_s();
+        let broken =
+            self.end_ns.windows(2).filter(|pair| (step_s(pair) - tick_s).abs() > 0.5 * tick_s).count();
+        let share = broken as f64 / self.len().max(1) as f64;
+        (share > 0.01).then(|| {
+            format!(
+                "{:.0} % of the accelerometer ticks do not begin where the one before ends: the log has gaps, or the tick length ({tick_s} s) \
+                 or the unit of the time column in the mapping is not that of the log",
+                100.0 * share
+            )
+        })
+    }
+
     /// Start of a tick since the run's beginning (s).
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "a run is far below 2⁵³ ns")]
@@ -161,4 +180,20 @@ pub fn quantile(values: &[f64], share: f64) -> f64 {
     let index = (share * (good.len() - 1) as f64).round() as usize;
     let (_, value, _) = good.select_nth_unstable_by(index, f64::total_cmp);
     *value
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gaps_are_told_where_they_are_many() {
+        let track = |step_ns: i64| Track {
+            end_ns: (1..=500).map(|tick| tick * 10_000_000 + tick / 10 * step_ns).collect(),
+            duration_s: vec![0.01; 500],
+            ..Track::default()
+        };
+        assert_eq!(track(0).gaps(), None);
+        assert!(track(40_000_000).gaps().unwrap().starts_with("10 % of the accelerometer ticks"));
+    }
 }

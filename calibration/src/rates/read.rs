@@ -1,6 +1,6 @@
 //! A run on the table: its bins and its steps.
 
-use super::bins::{BIN_S, Binned, binned};
+use super::bins::{BIN_S, Bin, Binned, binned};
 use super::checks::{dead, steady, turned_as_stated};
 use super::make::Wanted;
 use super::matching::{Matched, matched};
@@ -55,7 +55,10 @@ pub(super) fn read<W: Watch>(
     }
     let matched = match matched(&own, &binned.bins, &found) {
         Ok(matched) => matched,
-        Err(reason) => return Ok(Err(reason)),
+        Err(reason) => {
+            let gaps = gaps(&binned.bins).map_or_else(String::new, |words| format!("; {words}"));
+            return Ok(Err(reason + &gaps));
+        }
     };
     let stated = turned_as_stated(&matched, wanted.base, wanted.scale_known)
         .and_then(|()| steady(&matched, &binned.bins));
@@ -97,6 +100,20 @@ pub(super) fn read<W: Watch>(
     Ok(Ok(Turned { binned, matched, earth_start }))
 }
 
+/// Words where ticks are missing in more than a twentieth of the bins: no steady stretch is long enough then.
+#[expect(clippy::cast_precision_loss, reason = "bins of a run")]
+fn gaps(bins: &[Bin]) -> Option<String> {
+    let broken = bins.iter().filter(|bin| bin.broken || bin.good_s < (1.0 - LOST) * bin.length_s).count();
+    let share = broken as f64 / bins.len().max(1) as f64;
+    (share > LOST).then(|| {
+        format!(
+            "in {:.0} % of the half seconds ticks are missing or cannot be used: the log has gaps, or the tick length or the unit of the time \
+             column in the mapping is not that of the log",
+            100.0 * share
+        )
+    })
+}
+
 /// Cuts steps to whole turns, so that the Earth's horizontal part averages out.
 pub(super) fn whole_turns(run: &mut Turned, warnings: &mut Vec<String>) {
     for one in &mut run.matched {
@@ -126,5 +143,21 @@ pub(super) fn whole_turns(run: &mut Turned, warnings: &mut Vec<String>) {
             one.plateau.window_s[1] = last.begin_s + last.length_s;
         }
         one.plateau.rate = plateaus::mean(&bins[..count]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gaps_are_told_where_they_are_many() {
+        let bins = |every: u32| -> Vec<Bin> {
+            let bin =
+                |index: u32| Bin { length_s: 0.5, good_s: 0.5, broken: index % every == 0, ..Bin::default() };
+            (0..200).map(bin).collect()
+        };
+        assert_eq!(gaps(&bins(100)), None);
+        assert!(gaps(&bins(4)).unwrap().starts_with("in 25 % of the half seconds ticks are missing"));
     }
 }

@@ -145,6 +145,7 @@ fn found(track: &Track, poses: &[Pose], settings: &Settings) -> Result<(), Vec<S
              turn, or state less with --still-start",
             settings.start_s
         ));
+        reasons.extend(track.gaps());
     }
     reasons.extend(faults::clipped(std::slice::from_ref(track), poses));
     if poses.len() < FEWEST_POSES {
