@@ -153,8 +153,12 @@ mod tests {
     #[test]
     fn gaps_are_told_where_they_are_many() {
         let bins = |every: u32| -> Vec<Bin> {
-            let bin =
-                |index: u32| Bin { length_s: 0.5, good_s: 0.5, broken: index % every == 0, ..Bin::default() };
+            let bin = |index: u32| Bin {
+                length_s: 0.5,
+                good_s: 0.5,
+                broken: index.is_multiple_of(every),
+                ..Bin::default()
+            };
             (0..200).map(bin).collect()
         };
         assert_eq!(gaps(&bins(100)), None);
