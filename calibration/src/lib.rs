@@ -14,6 +14,7 @@
 //! | [`diff`] | what has changed between two documents |
 //! | [`merge`] | parts of a calibration in one document |
 //! | [`show`] | a document in words and curves |
+//! | [`robust`] | middle and scatter of numbers among which some may be wrong |
 //! | [`swapped`] | columns that look swapped |
 //! | [`validate`] | a document judged on other logs |
 //! | [`positions`], [`tumble`] | accelerometers on a stand; a unit tumbled by hand |
@@ -37,6 +38,7 @@ pub mod positions;
 pub mod provenance;
 pub mod rates;
 pub mod report;
+pub mod robust;
 pub mod run;
 pub mod series;
 pub mod show;

@@ -10,7 +10,6 @@
 //! | [`checks`] | what a log must have |
 //! | [`judge`] | drift in running mode, before and after |
 //! | [`make`], [`document`] | the whole procedure; the document |
-//! | [`robust`] | middle and scatter |
 
 pub mod cells;
 pub mod checks;
@@ -24,7 +23,6 @@ pub mod noise;
 pub mod orders;
 mod prepare;
 mod report;
-pub mod robust;
 pub mod servo;
 pub mod switches;
 #[cfg(test)]

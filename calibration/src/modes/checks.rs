@@ -6,9 +6,9 @@ use isotherm_protocol::document::{Document, GyroOutput};
 
 use super::cells::{Gathered, Second};
 use super::fit::deg_per_h;
-use super::robust::median;
 use super::switches::{Switches, real};
 use crate::means::Size;
+use crate::robust::{median, scatter_of_steps};
 use crate::swapped::Shown;
 
 /// Fewest switches.
@@ -216,10 +216,7 @@ fn motion(seconds: &[Second], names: [&str; 3], count_arcsec: [f64; 3]) -> Vec<S
 
 /// The first second that differs from its neighbours by more than noise explains, by how much, and the limit.
 fn jump(seconds: &[Second], values: &[f64], floor: f64, by_mode: bool) -> Option<(Second, f64, f64)> {
-    let steps: Vec<f64> = values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
-    // The median of |a − b| is 0.9539 standard deviations of either.
-    let sigma = median(&steps) / 0.953_9;
-    let limit = floor.max(SIGMAS * sigma);
+    let limit = floor.max(SIGMAS * scatter_of_steps(values));
     let span =
         values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(*x), high.max(*x)]);
     if span[1] - span[0] <= limit {

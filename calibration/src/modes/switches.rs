@@ -5,8 +5,8 @@ use std::collections::VecDeque;
 
 use isotherm_correction::sample::{GyroTick, LasingMode, OutputKind};
 
-use super::robust::{median, scatter};
 use crate::error::Error;
+use crate::robust::{median, scatter};
 use crate::run::{Run, Watch};
 
 /// Ticks before a switch that show what a reading is like.

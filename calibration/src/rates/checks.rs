@@ -9,8 +9,9 @@ use super::plateaus::scatter;
 use super::solve::GyroRates;
 use super::steps::Step;
 use crate::drift::figures::short;
+use crate::means::Size;
 use crate::modes::document::{main_axis, row};
-use crate::modes::robust::median;
+use crate::robust::median;
 
 /// Share of a run's fastest step from which on a step shows what the table turned about.
 const FAST: f64 = 0.5;
@@ -130,8 +131,7 @@ pub(super) fn dead(bins: &[Bin]) -> Option<usize> {
     let sensors = bins.first().map_or(0, |bin| bin.rate.len());
     let range = |sensor: usize| {
         let rates = bins.iter().filter(|bin| bin.good_s > 0.0).map(|bin| bin.rate[sensor]);
-        let (low, high) = rates.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
-        high - low
+        Size::of(&rates.collect::<Vec<f64>>()).peak_to_peak
     };
     let liveliest = (0..sensors).map(range).fold(0.0, f64::max);
     let still = scatter(bins);

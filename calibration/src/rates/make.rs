@@ -13,8 +13,8 @@ use super::solve::{GyroRates, solve};
 use super::steps::Step;
 use crate::error::Error;
 use crate::modes::document::{main_axis, row, widened};
-use crate::modes::robust::median;
 use crate::report::{FitReport, Verdict};
+use crate::robust::median;
 use crate::run::{Run, Watch};
 use crate::written::Written;
 

@@ -3,7 +3,7 @@
 use super::bins::Bin;
 use super::plateaus::{Plateau, within};
 use super::steps::Step;
-use crate::modes::robust::median;
+use crate::robust::median;
 
 /// Share of the smallest stated rate below which a plateau is a rest.
 const REST: f64 = 0.5;

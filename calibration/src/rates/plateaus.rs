@@ -1,7 +1,7 @@
 //! Where the table turned steadily: runs of bins between which no gyro changes by more than noise.
 
 use super::bins::Bin;
-use crate::modes::robust::median;
+use crate::robust::scatter_of_steps;
 
 /// Standard deviations, and share of the rate, by which two neighbouring bins may differ.
 const SIGMAS: f64 = 8.0;
@@ -29,12 +29,7 @@ pub struct Plateau {
 pub fn scatter(bins: &[Bin]) -> Vec<f64> {
     let sensors = bins.first().map_or(0, |bin| bin.rate.len());
     (0..sensors)
-        .map(|sensor| {
-            let steps: Vec<f64> =
-                bins.windows(2).map(|pair| (pair[1].rate[sensor] - pair[0].rate[sensor]).abs()).collect();
-            // The median of |a − b| is 0.9539 standard deviations of either.
-            median(&steps) / 0.953_9
-        })
+        .map(|sensor| scatter_of_steps(&bins.iter().map(|bin| bin.rate[sensor]).collect::<Vec<f64>>()))
         .collect()
 }
 

@@ -4,6 +4,7 @@ use super::Spacing;
 use crate::drift::columns::{Columns, Kind, name};
 use crate::drift::figures::short;
 use crate::error::Error;
+use crate::robust::{median, middle_and_scatter, scatter_of_steps};
 use crate::series::Ticks;
 
 /// Rate beyond which a unit does not rest, or its unit of measure is wrong (°/s): Earth's rate and the bias of a poor micromechanical
@@ -27,8 +28,6 @@ const SINGLE: usize = 3;
 /// Parts of the log whose noise is compared, and the ratio that is told.
 const PARTS: usize = 8;
 const UNLIKE_NOISE: f64 = 10.0;
-/// Standard deviation of normal noise over the median of its size.
-const OF_MEDIAN: f64 = 1.4826;
 /// Largest share of the ticks that may be missing without a word.
 const LARGEST_MISSING: f64 = 0.01;
 
@@ -111,7 +110,7 @@ pub fn at_rest(columns: &Columns, spacing: &Spacing) -> Result<Vec<String>, Erro
     let mut moving = Vec::new();
     for (name, column) in columns.names.iter().zip(&columns.values) {
         let called = format!("{} {name}", columns.kind.sensor());
-        let Some((middle, sigma)) = robust(column) else { continue };
+        let [middle, sigma] = middle_and_scatter(column);
         if columns.kind == Kind::Rate {
             if let Some(words) = moves(&called, middle / 3600.0) {
                 moving.push(words);
@@ -163,10 +162,9 @@ pub fn missing(spacing: &Spacing, count: usize) -> Option<String> {
 
 /// Whether ticks are as far apart as they last.
 fn timing(columns: &Columns, spacing: &Spacing) -> Result<Option<String>, Error> {
-    let mut lasts = columns.duration_s.clone();
-    let Some(lasts_s) = middle(&mut lasts).filter(|lasts_s| *lasts_s > 0.0) else { return Ok(None) };
+    let lasts_s = median(&columns.duration_s);
     let ratio = spacing.tick_s / lasts_s;
-    if (ratio - 1.0).abs() <= UNLIKE {
+    if lasts_s <= 0.0 || (ratio - 1.0).abs() <= UNLIKE {
         return Ok(None);
     }
     let words = format!(
@@ -223,12 +221,7 @@ fn part(count: usize) -> usize {
 
 /// Standard deviation of the noise in each part, by the middle step from reading to reading; 0 where nothing changes.
 fn noise(column: &[f64]) -> Vec<f64> {
-    let of = |part: &[f64]| {
-        let mut steps: Vec<f64> = part.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
-        steps.retain(|step| step.is_finite());
-        middle(&mut steps).map_or(0.0, |step| step * OF_MEDIAN / std::f64::consts::SQRT_2)
-    };
-    column.chunks(part(column.len())).map(of).collect()
+    column.chunks(part(column.len())).map(scatter_of_steps).collect()
 }
 
 /// Noise that is not the same all through a log.
@@ -248,20 +241,4 @@ fn unlike(called: &str, columns: &Columns, noise: &[f64]) -> Option<String> {
         largest / least,
         columns.since_s(loud * part(count))
     ))
-}
-
-/// Middle of the good readings, and their standard deviation by the middle distance from it.
-fn robust(column: &[f64]) -> Option<(f64, f64)> {
-    let mut good: Vec<f64> = column.iter().copied().filter(|reading| reading.is_finite()).collect();
-    let about = middle(&mut good)?;
-    for reading in &mut good {
-        *reading = (*reading - about).abs();
-    }
-    Some((about, OF_MEDIAN * middle(&mut good)?))
-}
-
-/// The middle one; the order is lost.
-fn middle(values: &mut [f64]) -> Option<f64> {
-    let half = values.len().checked_sub(1)? / 2;
-    Some(*values.select_nth_unstable_by(half, f64::total_cmp).1)
 }
