@@ -1,7 +1,7 @@
 //! Middle and scatter of numbers among which some may be wrong.
 
 /// Standard deviation of a normal distribution, in medians of absolute deviations.
-const SIGMA_PER_MAD: f64 = 1.482_602_218_505_602;
+pub const SIGMA_PER_MAD: f64 = 1.482_602_218_505_602;
 /// Median of |a − b| of two normal numbers, in standard deviations of either.
 const STEP_PER_SIGMA: f64 = 0.953_9;
 

@@ -288,10 +288,10 @@ impl ImpactArgs {
     }
 
     fn sail_log(&self, voyage: &mut Voyage, parts: &[DriftParts; 3], cut: &Cut) -> Result<Report, Error> {
-        let columns = self.columns(cut)?;
+        let mut columns = self.columns(cut)?;
         let words: Vec<String> = cut.words().map(str::to_owned).into_iter().collect();
-        let (drift, mut notes) =
-            logged::drift(&columns, voyage, &self.otherwise(parts)).map_err(|error| error.beside(&words))?;
+        let (drift, mut notes) = logged::drift(&mut columns, voyage, &self.otherwise(parts))
+            .map_err(|error| error.beside(&words))?;
         notes.extend(words);
         if *parts == [sizes(); 3] {
             notes.push(

@@ -258,6 +258,18 @@ impl Kind {
         }
     }
 
+    /// Symbol of the unit of measure of a slope (power 1) or a bend (power 2), over hours.
+    #[must_use]
+    pub const fn over_hours(self, power: usize) -> &'static str {
+        match (self, power) {
+            (_, 0) => self.measure(),
+            (Self::Rate, 1) => "°/h²",
+            (Self::Rate, _) => "°/h³",
+            (Self::Force, 1) => "m/s²/h",
+            (Self::Force, _) => "m/s²/h²",
+        }
+    }
+
     /// What a sensor of the kind is called.
     #[must_use]
     pub const fn sensor(self) -> &'static str {

@@ -78,6 +78,12 @@ pub fn alike(values: &[f64], digits: f64) -> Vec<String> {
     values.iter().map(word).collect()
 }
 
+/// A count and what is counted: "1 gap", "3 gaps".
+#[must_use]
+pub fn counted(count: usize, one: &str, several: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { several })
+}
+
 /// A power as a superscript; nothing for the first.
 #[must_use]
 pub fn superscript(power: usize) -> String {
@@ -146,6 +152,11 @@ mod tests {
         assert_eq!(alike(&[167.0, 24.9, 9.85, 390.2], 3.0), ["167", "24.9", "9.85", "390"]);
         assert_eq!(alike(&[1.002_24, 1.002_24], 3.0), ["1.00224"; 2]);
         assert_eq!(alike(&[0.0, 0.0, f64::NAN], 3.0), ["0", "0", "NaN"]);
+    }
+
+    #[test]
+    fn one_is_no_plural() {
+        assert_eq!([0, 1, 2].map(|count| counted(count, "gap", "gaps")), ["0 gaps", "1 gap", "2 gaps"]);
     }
 
     #[test]

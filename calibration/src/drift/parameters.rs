@@ -124,13 +124,20 @@ impl Parameters {
             }
         }
         let within = |value: f64, [low, high]: [f64; 2]| digits(value.clamp(low, high));
+        let [shortest, longest] = TIME_RANGE_H;
+        if trend_sigma > 0.0 && !(shortest..=longest).contains(&trend_time_h) {
+            notes.push(format!(
+                "the trend holds for {} h, a document allows {shortest} to {longest} h: the nearer end stands in its place",
+                short(trend_time_h)
+            ));
+        }
         let drift = Drift {
             sigma_deg_per_h: digits(sigma),
             correlation_time_h: within(time_h, TIME_RANGE_H),
             trend_sigma_deg_per_h2: digits(trend_sigma),
             trend_correlation_time_h: within(trend_time_h, TIME_RANGE_H),
-            initial_sigma_deg_per_h: within(initial, INITIAL_RANGE),
-            angle_random_walk_deg_per_sqrt_h: within(walk, WALK_RANGE),
+            initial_sigma_deg_per_h: digits(initial),
+            angle_random_walk_deg_per_sqrt_h: digits(walk),
         };
         Ok(Self { drift, notes })
     }

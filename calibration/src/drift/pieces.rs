@@ -1,8 +1,11 @@
 //! Columns cut at their gaps, and what cannot be analysed at all.
 
 pub mod checks;
+mod far;
+mod steps;
 
 use super::columns::Columns;
+use super::figures::{counted, short};
 use crate::error::Error;
 
 /// Fewest ticks of a log.
@@ -74,9 +77,9 @@ impl Grid {
     /// # Errors
     /// [`Error::Refused`]: too short, time that goes back, no sensor that can be analysed.
     #[expect(clippy::cast_precision_loss, reason = "counts of ticks and log lengths are far below 2⁵³")]
-    pub fn of(columns: Columns) -> Result<Self, Error> {
+    pub fn of(mut columns: Columns) -> Result<Self, Error> {
         let spacing = Spacing::of(&columns.end_ns)?;
-        let told = checks::at_rest(&columns, &spacing)?;
+        let told = checks::at_rest(&mut columns, &spacing)?;
         let Columns { kind, names, end_ns, values, mut notes, .. } = columns;
         notes.extend(told);
         let count = end_ns.len();
@@ -101,7 +104,8 @@ impl Grid {
                 Ok(bad) => {
                     if bad > 0 {
                         grid.notes.push(format!(
-                            "{called}: {bad} readings are no good numbers and count as missing."
+                            "{called}: {} no good numbers and count as missing.",
+                            counted(bad, "reading is", "readings are")
                         ));
                     }
                     grid.sensors.push(Sensor { name, pieces: cut(column, &gaps, bridge) });
@@ -109,7 +113,8 @@ impl Grid {
             }
         }
         if grid.sensors.is_empty() {
-            return Err(Error::Refused(grid.refused));
+            let told = grid.notes.into_iter().filter(|note| note.starts_with("warning"));
+            return Err(Error::Refused(grid.refused.into_iter().chain(told).collect()));
         }
         Ok(grid)
     }
@@ -187,19 +192,21 @@ fn gaps(intervals: &[i64], middle_ns: i64) -> Vec<Gap> {
 #[expect(clippy::cast_precision_loss, reason = "counts of ticks are far below 2⁵³")]
 fn words(gaps: &[Gap], bridge: bool, tick_s: f64) -> Vec<String> {
     let bridged = |gap: &&Gap| bridge && gap.missing <= LONGEST_BRIDGE;
-    let short = gaps.iter().filter(bridged).map(|gap| gap.missing).sum::<usize>();
+    let single = gaps.iter().filter(bridged).map(|gap| gap.missing).sum::<usize>();
     let long: Vec<&Gap> = gaps.iter().filter(|gap| !bridged(gap)).collect();
     let mut notes = Vec::new();
-    if short > 0 {
-        notes.push(format!("{short} single missing ticks are bridged with the mean of their neighbours."));
+    if single > 0 {
+        let ticks = counted(single, "single missing tick is", "single missing ticks are");
+        notes.push(format!("{ticks} bridged with the mean of their neighbours."));
     }
     if let Some(longest) = long.iter().map(|gap| gap.missing).max() {
         let missing: usize = long.iter().map(|gap| gap.missing).sum();
         notes.push(format!(
-            "{} gaps ({missing} ticks, the longest of {:.3} s) cut the log into {} pieces: no Allan difference and no spectrum \
-             reaches over a gap.",
-            long.len(),
-            longest as f64 * tick_s,
+            "{} ({}, the longest of {} s) {} the log into {} pieces: no Allan difference and no spectrum reaches over a gap.",
+            counted(long.len(), "gap", "gaps"),
+            counted(missing, "tick", "ticks"),
+            short(longest as f64 * tick_s),
+            if long.len() == 1 { "cuts" } else { "cut" },
             long.len() + 1
         ));
     }
@@ -297,7 +304,7 @@ mod tests {
         let grid = Grid::of(columns(far, vec![wave])).unwrap();
         let pieces = &grid.sensors[0].pieces;
         assert_eq!((pieces.len(), pieces[1].start, grid.ticks), (2, 3500, 6500));
-        assert!(grid.notes[0].contains("1 gaps (500 ticks, the longest of 0.500 s)"), "{:?}", grid.notes);
+        assert!(grid.notes[0].contains("1 gap (500 ticks, the longest of 0.500 s) cuts"), "{:?}", grid.notes);
     }
 
     #[test]

@@ -55,7 +55,7 @@ impl Report {
             let (factor, unit) = stated_in(Term::AngleRandomWalk, self.kind);
             let described = analysis.noise.as_ref().is_some_and(NoiseFit::describes);
             let mut words = match walk {
-                Some(_) if !described => "more than noise in it".to_owned(),
+                Some(_) if !described => "more in it than the five noise terms".to_owned(),
                 Some(Coefficient::Observed { value, .. }) => format!("N {} {unit}", short(value * factor)),
                 Some(Coefficient::NotObservable { below }) => {
                     format!("N below {} {unit}", short(below * factor))
@@ -82,7 +82,7 @@ impl Report {
             }
             match trend(analysis) {
                 Trend::Seen { slope, .. } => {
-                    let _ = write!(words, ", trend {} {measure} per h", short(slope));
+                    let _ = write!(words, ", trend {} {}", short(slope), self.kind.over_hours(1));
                 }
                 Trend::NotSeen { .. } => words.push_str(", no trend"),
             }
@@ -165,8 +165,8 @@ impl Report {
         row("the autocorrelation falls to 1/e at, h".to_owned(), &|a| {
             a.autocorrelation.as_ref().and_then(|auto| auto.correlation_time_h).map_or_else(none, short)
         });
-        row(format!("trend, {measure} per h"), &|a| power(a.slope));
-        row(format!("second order, {measure} per h²"), &|a| {
+        row(format!("trend, {}", self.kind.over_hours(1)), &|a| power(a.slope));
+        row(format!("second order, {}", self.kind.over_hours(2)), &|a| {
             power(a.second_order.as_ref().and_then(|fit| fit.power(2)))
         });
         (head, rows)

@@ -27,7 +27,11 @@ const SHORTEST_H: f64 = 1.0;
     clippy::cast_sign_loss,
     reason = "ticks of 10 s of a log are far below 2⁵³"
 )]
-pub fn drift(columns: &Columns, voyage: &mut Voyage, otherwise: &str) -> Result<(Drift, Vec<String>), Error> {
+pub fn drift(
+    columns: &mut Columns,
+    voyage: &mut Voyage,
+    otherwise: &str,
+) -> Result<(Drift, Vec<String>), Error> {
     let refused = |why: String| Error::Refused(vec![why]);
     if columns.values.len() != 3 {
         return Err(refused(format!(
@@ -35,10 +39,10 @@ pub fn drift(columns: &Columns, voyage: &mut Voyage, otherwise: &str) -> Result<
             columns.values.len()
         )));
     }
-    let (Some(first), Some(last)) = (columns.end_ns.first(), columns.end_ns.last()) else {
+    let (Some(first), Some(last)) = (columns.end_ns.first().copied(), columns.end_ns.last().copied()) else {
         return Err(refused("the log has no ticks".to_owned()));
     };
-    let length_h = last.saturating_sub(*first) as f64 * 1e-9 / HOUR_S;
+    let length_h = last.saturating_sub(first) as f64 * 1e-9 / HOUR_S;
     if length_h < voyage.calibration_h + SHORTEST_H {
         return Err(refused(format!(
             "the log is {length_h:.2} h, {:.1} h of calibration and at least {SHORTEST_H} h of voyage are needed: shorten the \
@@ -47,7 +51,7 @@ pub fn drift(columns: &Columns, voyage: &mut Voyage, otherwise: &str) -> Result<
         )));
     }
     let spacing = Spacing::of(&columns.end_ns)?;
-    let mut notes = columns.notes.clone();
+    let mut notes = std::mem::take(&mut columns.notes);
     notes.extend(checks::at_rest(columns, &spacing)?);
     notes.extend(checks::missing(&spacing, columns.end_ns.len()));
     let looked = columns.names.iter().zip(&columns.values);
@@ -66,7 +70,7 @@ pub fn drift(columns: &Columns, voyage: &mut Voyage, otherwise: &str) -> Result<
     for (axis, (values, name)) in columns.values.iter().zip(&columns.names).enumerate() {
         let mut sums = vec![(0.0, 0_u32); count];
         for (end, value) in columns.end_ns.iter().zip(values).filter(|(_, value)| value.is_finite()) {
-            let place = end.saturating_sub(*first) as f64 * 1e-9 / TICK_S;
+            let place = end.saturating_sub(first) as f64 * 1e-9 / TICK_S;
             if let Some(sum) = sums.get_mut(place as usize) {
                 sum.0 += value;
                 sum.1 += 1;

@@ -349,7 +349,7 @@ fn what_a_log_does_not_allow_is_refused_in_words() {
     assert!(code == Some(1) && words.contains("no accelerometer ticks"), "{words}");
     write("gaps.mcap", &[good.clone(), good.clone(), good], &|index| !(500..700).contains(&index));
     let gaps = json(&["drift", &path("gaps.mcap"), "--json"]);
-    assert!(gaps["notes"][0].as_str().unwrap().contains("1 gaps (200 ticks"), "{}", gaps["notes"]);
+    assert!(gaps["notes"][0].as_str().unwrap().contains("1 gap (200 ticks"), "{}", gaps["notes"]);
     assert!(gaps["sensors"][0]["allan"].as_array().unwrap().len() > 6);
     let (code, words) = refusal(&["drift", &path("gaps.mcap"), "--fit-hours", "0"]);
     assert!(code == Some(2) && words.contains("--fit-hours is 0"), "{words}");

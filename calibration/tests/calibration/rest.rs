@@ -62,17 +62,46 @@ fn drift_and_impact_tell_of_frozen_readings_and_of_a_wrong_measure() {
 #[test]
 fn drift_states_nothing_beyond_what_a_document_allows() {
     let folder = tempfile::tempdir().unwrap();
-    let spikes = log(
-        folder.path(),
-        |columns| columns[0].iter_mut().step_by(800).for_each(|rate| *rate = 1e11),
-        |_| true,
-    );
-    let output = crate::command::calibrate(&["drift", &spikes]);
+    let turned = log(folder.path(), |columns| columns[0][3000..3100].fill(1e11), |_| true);
+    let output = crate::command::calibrate(&["drift", &turned]);
     let (code, told, words) = crate::command::words(&output);
     assert_eq!(code, Some(1));
     assert!(words.contains("gyro x: ") && words.contains("a document allows"), "{words}");
-    assert!(told.contains("gyro x: 9 single readings are far beyond the noise"), "{told}");
+    assert!(told.contains("gyro x: 100 readings between"), "{told}");
     assert!(!told.contains("# gyro x") && told.contains("# gyro y"), "{told}");
+}
+
+#[test]
+fn drift_leaves_single_readings_far_beyond_the_noise_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let spoil =
+        |columns: &mut [Vec<f64>; 3]| columns[0].iter_mut().step_by(800).for_each(|rate| *rate = 1e11);
+    let spikes = log(folder.path(), spoil, |_| true);
+    let document = shipped("FOG-0001.toml").display().to_string();
+    let told = succeeds(&["drift", &spikes, "--document", &document]);
+    assert!(told.contains("they are left out on all axes, since"), "{told}");
+    let told = succeeds(&["drift", &spikes]);
+    assert!(told.contains("gyro x: 9 single readings are far beyond the noise"), "{told}");
+    assert!(told.contains("they are left out: look"), "{told}");
+    let walk = |told: &str| {
+        let line = told.lines().find(|line| line.starts_with("gyro x: N ")).unwrap().to_owned();
+        line.split_whitespace().nth(3).unwrap().parse::<f64>().unwrap()
+    };
+    let good = walk(&succeeds(&["drift", &log(folder.path(), |_| (), |_| true)]));
+    assert!((walk(&told) / good - 1.0).abs() < 0.02, "{told}");
+}
+
+#[test]
+fn drift_tells_of_a_step() {
+    let folder = tempfile::tempdir().unwrap();
+    let good = succeeds(&["drift", &log(folder.path(), |_| (), |_| true)]);
+    assert!(!good.contains("steps from"), "{good}");
+    let step = |columns: &mut [Vec<f64>; 3]| {
+        let middle = columns[1].len() / 2;
+        columns[1][middle..].iter_mut().for_each(|rate| *rate += 20.0);
+    };
+    let told = succeeds(&["drift", &log(folder.path(), step, |_| true)]);
+    assert!(told.contains("warning: gyro y steps from") && !told.contains("gyro x steps"), "{told}");
 }
 
 #[test]
@@ -123,22 +152,65 @@ fn frozen_readings_are_told_and_coarse_or_slow_ones_are_not() {
     assert_eq!(frozen_in(&slow), None);
 }
 
-#[test]
-fn noise_of_two_measures_and_far_readings_are_told() {
-    let mut columns = Columns {
+/// One corrected gyro.
+fn columns(readings: Vec<f64>) -> Columns {
+    Columns {
         unit: isotherm_log::offline::unit_id("U").unwrap(),
         kind: Kind::Rate,
         names: vec!["x".to_owned()],
         corrected: true,
-        end_ns: times(8000),
-        duration_s: vec![0.02; 8000],
-        values: vec![wave(8000)],
+        end_ns: times(readings.len()),
+        duration_s: vec![0.02; readings.len()],
+        values: vec![readings],
         frozen: Vec::new(),
         notes: Vec::new(),
+    }
+}
+
+#[test]
+fn steps_are_told_from_noise_and_slow_drift() {
+    const COUNT: usize = 20_000;
+    let told = |readings: Vec<f64>| {
+        let mut columns = columns(readings);
+        let spacing = Spacing::of(&columns.end_ns).unwrap();
+        at_rest(&mut columns, &spacing).map(|told| told.join("\n"))
     };
+    let sum = |a: Vec<f64>, b: Vec<f64>| a.iter().zip(b).map(|(a, b)| a + b).collect::<Vec<f64>>();
+    for seed in 0..40 {
+        let normal = &mut Normal::new(seed);
+        let white = normal.white(COUNT, 1.0);
+        let day = white.iter().enumerate().map(|(k, white)| white + 2.0 * (k as f64 * 6e-4).sin()).collect();
+        let ramp =
+            white.iter().enumerate().map(|(k, white)| white + 1e-3 * (k as f64 - 12e3).max(0.0)).collect();
+        let walk = sum(white.clone(), normal.random_walk(COUNT, 0.05));
+        let flicker = sum(white.clone(), normal.flicker(COUNT, 0.5));
+        for (kind, readings) in
+            [("white", white), ("day", day), ("ramp", ramp), ("walk", walk), ("flicker", flicker)]
+        {
+            let words = told(readings.clone()).unwrap();
+            assert!(!words.contains("steps from"), "seed {seed}, {kind}: {words}");
+            if kind == "white" {
+                // A part of the log has 157 readings, its mean a deviation of 0.08.
+                let stepped =
+                    readings.iter().enumerate().map(|(k, x)| if k < 11_000 { *x } else { x + 2.0 }).collect();
+                let words = told(stepped).unwrap();
+                let at: f64 =
+                    words.split("at about ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+                assert!(
+                    words.contains("gyro x steps from") && (at - 220.0).abs() < 7.0,
+                    "seed {seed}: {words}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn noise_of_two_measures_and_far_readings_are_told() {
+    let mut columns = columns(wave(8000));
     let told = |columns: &Columns| {
         let spacing = Spacing::of(&columns.end_ns)?;
-        at_rest(columns, &spacing)
+        at_rest(&mut columns.clone(), &spacing)
     };
     assert!(told(&columns).unwrap().is_empty());
     columns.values[0][4000..].iter_mut().for_each(|reading| *reading *= 57.3);
@@ -147,7 +219,7 @@ fn noise_of_two_measures_and_far_readings_are_told() {
     columns.values = vec![wave(8000)];
     columns.values[0][1000] = 1e9;
     let words = told(&columns).unwrap().join("\n");
-    assert!(words.contains("1 single readings") && words.contains("the first at 20.00 s"), "{words}");
+    assert!(words.contains("1 single reading is") && words.contains("the first at 20.00 s"), "{words}");
     columns.values = vec![wave(8000)];
     columns.values[0][1000..1100].fill(1e5);
     let words = told(&columns).unwrap().join("\n");

@@ -1,6 +1,7 @@
 //! What must hold of a log at rest before anything is made of it: for `drift` and for `impact`.
 
-use super::Spacing;
+use super::far::{self, Far};
+use super::{Spacing, steps};
 use crate::drift::columns::{Columns, Kind, name};
 use crate::drift::figures::short;
 use crate::error::Error;
@@ -21,10 +22,6 @@ const FROZEN_S: f64 = 60.0;
 const FROZEN_TICKS: usize = 32;
 /// Share of the other readings that may repeat the one before: coarse counts and slow sensors repeat more.
 const LARGEST_REPEATED: f64 = 0.55;
-/// Readings farther than this from the middle one are told (robust standard deviations).
-const FAR: f64 = 50.0;
-/// Far readings in a row that are no longer single ones.
-const SINGLE: usize = 3;
 /// Parts of the log whose noise is compared, and the ratio that is told.
 const PARTS: usize = 8;
 const UNLIKE_NOISE: f64 = 10.0;
@@ -100,15 +97,16 @@ pub fn frozen(called: &str, end_ns: &[i64], column: &[f64]) -> Option<String> {
     ))
 }
 
-/// What is to be said of columns that are to be analysed.
+/// What is to be said of columns that are to be analysed. Single readings far beyond the noise are left out of them.
 ///
 /// # Errors
 /// [`Error::Refused`] where the unit does not rest, or where ticks lie much farther apart than they last.
-pub fn at_rest(columns: &Columns, spacing: &Spacing) -> Result<Vec<String>, Error> {
+pub fn at_rest(columns: &mut Columns, spacing: &Spacing) -> Result<Vec<String>, Error> {
     let mut notes = columns.frozen.clone();
     notes.extend(timing(columns, spacing)?);
-    let mut moving = Vec::new();
-    for (name, column) in columns.names.iter().zip(&columns.values) {
+    let noise: Vec<Vec<f64>> = columns.values.iter().map(|column| noise(column)).collect();
+    let (mut moving, mut spikes) = (Vec::new(), Vec::new());
+    for ((name, column), noise) in columns.names.iter().zip(&columns.values).zip(&noise) {
         let called = format!("{} {name}", columns.kind.sensor());
         let [middle, sigma] = middle_and_scatter(column);
         if columns.kind == Kind::Rate {
@@ -121,15 +119,23 @@ pub fn at_rest(columns: &Columns, spacing: &Spacing) -> Result<Vec<String>, Erro
                 ));
             }
         }
-        let noise = noise(column);
         // Where the noise is not the same all through, the larger one counts.
         let sigma = noise.iter().copied().fold(sigma, f64::max);
-        notes.extend(far(&called, columns, column, (middle, sigma)));
-        if columns.frozen.is_empty() {
-            notes.extend(unlike(&called, columns, &noise));
-        }
+        let far = Far::of(column, (middle, sigma));
+        notes.extend(far.words(&called, columns, column));
+        spikes.push(far.single());
     }
-    if moving.is_empty() { Ok(notes) } else { Err(Error::Refused(moving)) }
+    if !moving.is_empty() {
+        return Err(Error::Refused(moving));
+    }
+    far::leave_out(columns, &spikes);
+    for ((name, column), noise) in columns.names.iter().zip(&columns.values).zip(&noise) {
+        let called = format!("{} {name}", columns.kind.sensor());
+        let unlike = if columns.frozen.is_empty() { unlike(&called, columns, noise) } else { None };
+        // Where the noise changes, a step is one more sign of what is told already.
+        notes.extend(unlike.or_else(|| steps::words(&called, columns, column)));
+    }
+    Ok(notes)
 }
 
 /// Words where the median rate of a gyro (°/s) is not that of a unit at rest.
@@ -183,35 +189,6 @@ fn timing(columns: &Columns, spacing: &Spacing) -> Result<Option<String>, Error>
 
 fn seconds(seconds: f64) -> String {
     if seconds < 1.0 { format!("{} ms", short(seconds * 1e3)) } else { format!("{} s", short(seconds)) }
-}
-
-/// Readings far beyond the noise: single ones, or a time in which the unit was moved.
-fn far(called: &str, columns: &Columns, column: &[f64], (middle, sigma): (f64, f64)) -> Option<String> {
-    let is_far = |reading: &f64| (reading - middle).abs() > FAR * sigma;
-    if sigma <= 0.0 {
-        return None;
-    }
-    let first = column.iter().position(is_far)?;
-    let last = column.iter().rposition(is_far)?;
-    let count = column.iter().filter(|reading| is_far(reading)).count();
-    let in_a_row =
-        column.chunk_by(|a, b| is_far(a) == is_far(b)).filter(|run| run.first().is_some_and(is_far));
-    let single = in_a_row.map(<[f64]>::len).max().unwrap_or(0) <= SINGLE;
-    let measure = columns.measure();
-    let value = short(column.get(first).copied().unwrap_or_default());
-    let (at, until) = (columns.since_s(first), columns.since_s(last));
-    Some(if single {
-        format!(
-            "warning: {called}: {count} single readings are far beyond the noise (more than {FAR} standard deviations), the first at \
-             {at:.2} s: {value} {measure}; noise and drift are spoilt by them, look for what makes them"
-        )
-    } else {
-        format!(
-            "warning: {called}: {count} readings between {at:.2} s and {until:.2} s are far beyond the noise (more than {FAR} standard \
-             deviations), the first is {value} {measure}: did the unit turn, or was it knocked? Cut the log to where it rests with \
-             --start and --duration"
-        )
-    })
 }
 
 /// Length of the parts whose noise is compared (ticks).
