@@ -7,6 +7,7 @@ use isotherm_protocol::document::Document;
 use super::samples::Samples;
 use super::stand::Stand;
 use crate::drift::columns::name as sensor_name;
+use crate::drift::figures::{counted, six};
 use crate::drift::pieces::checks::moves;
 use crate::means::Size;
 use crate::report::Rest;
@@ -115,7 +116,7 @@ fn sensor(found: &mut Findings, name: &str, (gyro, of, index): (bool, &str, usiz
     if let Some(first) = first
         && readings.iter().filter(|r| r.is_finite()).all(|reading| (reading - first).abs() <= 0.0)
     {
-        let what = if *first == 0.0 { "reads zero".to_owned() } else { format!("reads {first}") };
+        let what = if *first == 0.0 { "reads zero".to_owned() } else { format!("reads {}", six(*first)) };
         let why = format!("it {what} throughout: dead, not connected, or the wrong column");
         found.dead.push((gyro, index, why));
     }
@@ -142,8 +143,9 @@ fn gaps(found: &mut Findings, name: &str, kind: &str, ticks: &Ticks) {
     let whole = ticks.end_ns.last().copied().unwrap_or_default().saturating_sub(first) as f64 * 1e-9;
     if count > 0 && (missing > SMALL_SHARE * whole || longest > 60.0) {
         found.warnings.push(format!(
-            "{name}: {count} gaps in the {kind} ticks, {missing:.1} s in all, the longest {longest:.1} s at {at:.0} s: lags and \
-             derivatives are poor behind a gap; leave it out with --start and --duration where it matters"
+            "{name}: {} in the {kind} ticks, {missing:.1} s in all, the longest {longest:.1} s at {at:.0} s: lags and \
+             derivatives are poor behind a gap; leave it out with --start and --duration where it matters",
+            counted(count, "gap", "gaps")
         ));
     }
 }
