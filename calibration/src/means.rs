@@ -27,6 +27,15 @@ pub struct Means {
     pub troubles: Troubles,
 }
 
+/// Length of the windows that what is left is stated over (s), for runs as long as the longest of some: in long runs several of
+/// `shortest_s`, so that white noise does not hide what they are about. `thermal` and `validate` have it from here.
+#[must_use]
+pub fn usual_window_s(longest_run_s: f64, shortest_s: f64) -> f64 {
+    const WINDOWS_OF_A_RUN: f64 = 200.0;
+    const MOST: f64 = 10.0;
+    shortest_s * libm::floor(longest_run_s / (WINDOWS_OF_A_RUN * shortest_s)).clamp(1.0, MOST)
+}
+
 /// Size of a set of numbers; those that are no number are left out.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Size {

@@ -146,6 +146,14 @@ impl Ticks {
         self.end_ns.is_empty()
     }
 
+    /// From the first tick's end to the last one's (s).
+    #[must_use]
+    #[expect(clippy::cast_precision_loss, reason = "lengths of logs")]
+    pub fn length_s(&self) -> f64 {
+        let ends = self.end_ns.first().zip(self.end_ns.last());
+        ends.map_or(0.0, |(first, last)| last.saturating_sub(*first) as f64 * 1e-9)
+    }
+
     /// Adds a tick, with its end (ns) and duration (s).
     fn push(
         &mut self,

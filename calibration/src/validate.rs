@@ -14,7 +14,7 @@ use isotherm_protocol::document::{Document, Sample};
 
 use crate::drift::figures::short;
 use crate::error::Error;
-use crate::means::{Means, Size};
+use crate::means::{Means, Size, usual_window_s};
 use crate::report::{Curve, FitReport, Rest, SAME_SHARE, Verdict};
 use crate::run::Watch;
 use crate::swapped::{Shown, up};
@@ -27,12 +27,14 @@ pub use runs::JudgedLog;
 /// How a document is judged.
 #[derive(Debug, Clone, Copy)]
 pub struct Wanted {
-    /// Length of the windows (s).
-    pub window_s: f64,
+    /// Length of the windows (s); without it as [`usual_window_s`] has it for the longest log.
+    pub window_s: Option<f64>,
     /// Where the unit is and how it stands, where that is known.
     pub place: Option<Place>,
 }
 
+/// Length of the windows in short logs (s).
+const WINDOW_S: f64 = 10.0;
 /// By how much a figure may change where the document says nothing of it: rounding of sums.
 const SAME: f64 = 1e-9;
 /// Share of the deviation of the most lively axis below which a sensor is dead: what is left comes through the axes.
@@ -59,6 +61,7 @@ pub fn validate(
     let bare = Written::of(&document.nominal())?;
     let mut report = FitReport::new(format!("Judgement of {name}"), document.unit.clone());
     let mut coverage = Coverage::of(written);
+    let mut readings = Vec::new();
     for log in logs {
         let run = &log.run;
         if run.unit.to_string() != document.unit {
@@ -67,8 +70,14 @@ pub fn validate(
                 run.name, run.unit, document.unit
             )]));
         }
-        let faults = judging(&run.name, &run.series(&mut watch)?, &Stand::default());
-        let after = Means::of(run, &written.loaded, wanted.window_s, &mut watch)?;
+        let series = run.series(&mut watch)?;
+        readings.push((judging(&run.name, &series, &Stand::default()), series.gyros.length_s()));
+    }
+    let longest_s = readings.iter().map(|(_, length_s)| *length_s).fold(0.0, f64::max);
+    let window_s = wanted.window_s.unwrap_or_else(|| usual_window_s(longest_s, WINDOW_S));
+    for (log, (faults, _)) in logs.iter().zip(readings) {
+        let run = &log.run;
+        let after = Means::of(run, &written.loaded, window_s, &mut watch)?;
         if (0..3).all(|axis| Size::of(after.rate(axis)).count == 0) {
             let nothing = format!(
                 "{}: {name} makes no valid rate of any of its gyro ticks: is it the document of this unit, and the mapping right?",
@@ -76,7 +85,7 @@ pub fn validate(
             );
             return Err(Error::Refused([vec![nothing], after.troubles, faults].concat()));
         }
-        let nominal = Means::of(run, &bare.loaded, wanted.window_s, &mut watch)?;
+        let nominal = Means::of(run, &bare.loaded, window_s, &mut watch)?;
         coverage.count(run, written, &mut watch)?;
         if let Some(reason) = at_rest(&run.name, &after) {
             return Err(Error::Refused([vec![reason], faults].concat()));
@@ -114,7 +123,7 @@ pub fn validate(
         }
     }
     missing(document, &mut report)?;
-    report.notes = notes(&report.residuals, logs, wanted);
+    report.notes = notes(&report.residuals, logs, (window_s, wanted.place.is_some()));
     report.warnings.extend(coverage.warnings());
     report.tables.extend(coverage.tables());
     Ok(report)
@@ -236,7 +245,7 @@ fn missing(document: &Document, report: &mut FitReport) -> Result<(), Error> {
 }
 
 /// What was done, in sentences.
-fn notes(curves: &[Curve], logs: &[JudgedLog], wanted: Wanted) -> Vec<String> {
+fn notes(curves: &[Curve], logs: &[JudgedLog], (window_s, placed): (f64, bool)) -> Vec<String> {
     let names = |known: bool| -> Vec<String> {
         logs.iter().filter(|log| log.known == known).map(|log| log.run.name.clone()).collect()
     };
@@ -245,7 +254,7 @@ fn notes(curves: &[Curve], logs: &[JudgedLog], wanted: Wanted) -> Vec<String> {
     let hours = curves.iter().filter(|curve| curve.of == "gyro x").map(length).sum::<f64>() / 3600.0;
     let mut notes = vec![format!(
         "Before is nominal: the document without what knows of temperature, bias or mode. Means over {} s, {} h.",
-        short(wanted.window_s),
+        short(window_s),
         short(hours)
     )];
     if !outside.is_empty() {
@@ -254,11 +263,12 @@ fn notes(curves: &[Curve], logs: &[JudgedLog], wanted: Wanted) -> Vec<String> {
     if !inside.is_empty() {
         notes.push(format!("In sample, the document was made from them: {}.", inside.join(", ")));
     }
-    notes.push(match wanted.place {
-        Some(_) => "Earth rate is taken off the rates; of each specific force its mean over the run.".to_owned(),
-        None => "Of each axis its mean over the run is taken off, before and after each its own: a constant bias is not judged. \
+    notes.push(if placed {
+        "Earth rate is taken off the rates; of each specific force its mean over the run.".to_owned()
+    } else {
+        "Of each axis its mean over the run is taken off, before and after each its own: a constant bias is not judged. \
                  With --latitude and --heading it is, of the gyros."
-            .to_owned(),
+            .to_owned()
     });
     notes
 }

@@ -36,9 +36,9 @@ pub(super) struct ValidateArgs {
     log: Vec<PathBuf>,
     #[command(flatten)]
     reading: Reading,
-    /// Length of the windows that are averaged over
-    #[arg(long, value_name = "SECONDS", default_value_t = 10.0)]
-    window: f64,
+    /// Length of the windows that are averaged over; without it 10 s, in logs of an hour and more up to 100 s, as thermal has them
+    #[arg(long, value_name = "SECONDS")]
+    window: Option<f64>,
     #[command(flatten)]
     place: PlaceArgs,
     #[command(flatten)]
@@ -91,11 +91,8 @@ impl ValidateArgs {
     }
 
     fn wanted(&self) -> Result<Wanted, Error> {
-        if !(self.window.is_finite() && self.window > 0.0) {
-            return Err(Error::Usage(format!(
-                "--window is {}, must be a number of seconds above 0",
-                self.window
-            )));
+        if let Some(window) = self.window.filter(|window| !(window.is_finite() && *window > 0.0)) {
+            return Err(Error::Usage(format!("--window is {window}, must be a number of seconds above 0")));
         }
         Ok(Wanted { window_s: self.window, place: self.place.known()? })
     }

@@ -109,7 +109,8 @@ pub fn nominal_of(series: &Series) -> Result<Document, Error> {
                 .to_owned()
         } else {
             format!(
-                "which temperature channel each gyro follows cannot be told from their names ({list}): give a document that says so \
+                "which temperature channel each gyro follows cannot be told from their names ({list}): name them gyro0, gyro1, gyro2 (and accel0 …) in \
+                 the mapping, or give a document that says so \
                  (--document)"
             )
         }]));

@@ -7,7 +7,7 @@ use isotherm_protocol::document::Document;
 use super::samples::Samples;
 use super::stand::Stand;
 use crate::drift::columns::name as sensor_name;
-use crate::drift::figures::{counted, six};
+use crate::drift::figures::{counted, short, six};
 use crate::drift::pieces::checks::moves;
 use crate::means::Size;
 use crate::report::Rest;
@@ -20,6 +20,8 @@ const TABLE_SHARE: f64 = 0.05;
 const TABLE_DEG_PER_S: f64 = 0.5;
 /// How far the mean specific force may be from one g.
 const GRAVITY: [f64; 2] = [0.9, 1.1];
+/// What three gyros at rest hardly stay below together (°/h): one of three axes has more than half of the Earth's rate.
+const QUIETEST_DEG_PER_H: f64 = 1.0;
 /// Fewest readings of a tick series for which anything can be said.
 const FEWEST: usize = 100;
 /// Smallest range of temperature that is worth a fit (°C).
@@ -150,14 +152,24 @@ fn gaps(found: &mut Findings, name: &str, kind: &str, ticks: &Ticks) {
     }
 }
 
-/// Gyros with a rate output must be near rest.
+/// Gyros with a rate output must be near rest, and feel the Earth.
 fn rates(found: &mut Findings, name: &str, ticks: &Ticks) {
+    let mut largest = 0.0_f64;
     for (index, readings) in ticks.readings.iter().enumerate() {
         let sizes: Vec<f64> =
             readings.iter().filter(|r| r.is_finite()).map(|r| r.abs().to_degrees()).collect();
         let Some(usual) = median_if_any(&sizes) else { continue };
         let called = format!("{name}: gyro {}", sensor_name(index, ticks.readings.len()));
         found.refusals.extend(moves(&called, usual));
+        largest = largest.max(usual * 3600.0);
+    }
+    if ticks.readings.len() >= 3 && largest > 0.0 && largest < QUIETEST_DEG_PER_H {
+        found.warnings.push(format!(
+            "{name}: no gyro reads more than {} °/h in the median, and the Earth turns by 15 °/h: is the unit of measure in the mapping \
+             right ({} where °/s are taken as °/h)?",
+            short(largest),
+            short(largest * 3600.0)
+        ));
     }
 }
 

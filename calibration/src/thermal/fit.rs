@@ -15,6 +15,7 @@ use super::stand::Stand;
 use super::target::{rest, target};
 use super::{passes, search, sequential};
 use crate::error::Error;
+use crate::means::usual_window_s;
 use crate::report::{FitReport, Rest};
 use crate::run::{Run, Watch};
 use crate::written::Written;
@@ -121,7 +122,9 @@ pub fn fit(
         .map(|sensor| target(sensor, &plain, &samples, (&rests, &stands), &histories))
         .collect();
     let chosen = choose_filter(&filter, &plain, (&sensors, &targets), &samples, &histories, settings)?;
-    let settings = &Settings { window_s: Some(window_s(settings, &samples)), ..settings.clone() };
+    let usual_s = || usual_window_s(longest_run_s(&samples), settings.fit_window_s);
+    let settings =
+        &Settings { window_s: Some(settings.window_s.unwrap_or_else(usual_s)), ..settings.clone() };
     let mut outcome = Outcome::new(&base, plain, chosen.clone(), settings);
     outcome.warnings = warnings;
     outcome.scales(&sensors, &targets);
@@ -164,15 +167,6 @@ fn stands_as_stated(
     found.refusals.extend(stands.refusals);
     found.warnings.extend(stands.warnings);
     Ok((Some(rest), found))
-}
-
-/// Length of the windows that residuals are stated over (s): in long runs several of the fit's, so that white noise does not hide
-/// what they are about.
-fn window_s(settings: &Settings, samples: &[Samples]) -> f64 {
-    const WINDOWS_OF_A_RUN: f64 = 200.0;
-    const MOST: f64 = 10.0;
-    let several = libm::floor(longest_run_s(samples) / (WINDOWS_OF_A_RUN * settings.fit_window_s));
-    settings.window_s.unwrap_or(settings.fit_window_s * several.clamp(1.0, MOST))
 }
 
 /// Every sensor that follows a channel.
