@@ -2,7 +2,7 @@
 
 pub mod checks;
 mod far;
-mod steps;
+pub(crate) mod steps;
 
 use super::columns::Columns;
 use super::figures::{counted, short};

@@ -3,6 +3,7 @@
 use isotherm_correction::earth::Place;
 use isotherm_protocol::document::Document;
 
+use super::attitude;
 use super::checks::{no_result, one_way};
 use super::document;
 use super::judge::{errors, verdicts};
@@ -11,6 +12,7 @@ use super::measure::{earth_in_bins, first_gains, points, true_rates, white};
 use super::read::{Turned, read, whole_turns};
 use super::solve::{GyroRates, solve};
 use super::steps::Step;
+use crate::drift::figures::counted;
 use crate::error::Error;
 use crate::modes::document::{main_axis, row, widened};
 use crate::report::{FitReport, Verdict};
@@ -64,6 +66,8 @@ pub struct Made {
     pub steps: Vec<Measured>,
     /// The steps of the judging runs.
     pub judged: Vec<Measured>,
+    /// Whether the Earth's rate was taken off in a stated attitude.
+    pub earth_known: bool,
     /// White noise of each gyro (°/√h).
     pub walk: Vec<f64>,
     /// Verdicts, by case axis.
@@ -79,7 +83,7 @@ pub struct Made {
 /// # Errors
 /// [`Error::Refused`] with every reason; [`Error::Log`], [`Error::Document`].
 pub fn make<W: Watch>(wanted: &Wanted<'_>, mut watch: impl FnMut() -> W) -> Result<Made, Error> {
-    let mut warnings = one_way(wanted.steps);
+    let mut warnings: Vec<String> = one_way(wanted.steps).into_iter().collect();
     let mut runs = read_all(wanted, &mut watch, &mut warnings)?;
     let judging = runs.split_off(wanted.runs.len());
     let sensors = wanted.base.gyro.sensor.len();
@@ -131,12 +135,16 @@ pub fn make<W: Watch>(wanted: &Wanted<'_>, mut watch: impl FnMut() -> W) -> Resu
     let temperatures: Vec<f64> = runs.iter().filter_map(|run| run.binned.temperature_deg_c).collect();
     let axes_deg_c = runs.iter().find_map(|run| run.binned.axes_deg_c);
     let earth = earth_in_bins(&judging, &axes, &gains, &biases);
-    let judging_rates = true_rates(&judging, &earth);
+    let steps = measured(&runs, &rates);
+    let judged = measured(&judging, &true_rates(&judging, &earth));
+    runs.extend(judging);
+    warnings.extend(attitude::doubts(wanted, &runs, (&axes, &gains)));
     let mut made = Made {
         written: Written::of(wanted.base)?,
         gyros,
-        steps: measured(&runs, &rates),
-        judged: measured(&judging, &judging_rates),
+        steps,
+        judged,
+        earth_known: !wanted.place.is_empty(),
         walk,
         verdicts: Vec::new(),
         temperatures_deg_c: temperatures,
@@ -168,8 +176,19 @@ fn read_all<W: Watch>(
              --latitude, --heading, --pitch and --roll of the beginning of each log"
                 .to_owned(),
         );
-        for run in &mut runs {
-            whole_turns(run, warnings);
+        let short: Vec<f64> = runs.iter_mut().flat_map(whole_turns).collect();
+        if !short.is_empty() {
+            let mut rates: Vec<String> = Vec::new();
+            for rate in short.iter().map(ToString::to_string) {
+                if !rates.contains(&rate) {
+                    rates.push(rate);
+                }
+            }
+            warnings.push(format!(
+                "{} ({} °/s) less than a turn: up to the Earth's 15 °/h of its rate is left in it; let steps last for a whole turn",
+                counted(short.len(), "step is", "steps are"),
+                rates.join(", ")
+            ));
         }
     }
     Ok(runs)

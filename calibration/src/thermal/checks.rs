@@ -8,6 +8,7 @@ use super::samples::Samples;
 use super::solve::median;
 use super::stand::Stand;
 use crate::drift::columns::name as sensor_name;
+use crate::drift::figures::six;
 use crate::drift::pieces::checks::moves;
 use crate::means::Size;
 use crate::report::Rest;
@@ -115,7 +116,7 @@ fn sensor(found: &mut Findings, name: &str, (gyro, of, index): (bool, &str, usiz
     if let Some(first) = first
         && readings.iter().filter(|r| r.is_finite()).all(|reading| (reading - first).abs() <= 0.0)
     {
-        let what = if *first == 0.0 { "reads zero".to_owned() } else { format!("reads {first}") };
+        let what = if *first == 0.0 { "reads zero".to_owned() } else { format!("reads {}", six(*first)) };
         let why = format!("it {what} throughout: dead, not connected, or the wrong column");
         found.dead.push((gyro, index, why));
     }

@@ -3,7 +3,7 @@
 use super::far::{self, Far};
 use super::{Spacing, steps};
 use crate::drift::columns::{Columns, Kind, name};
-use crate::drift::figures::short;
+use crate::drift::figures::{short, six};
 use crate::error::Error;
 use crate::robust::{median, middle_and_scatter, scatter_of_steps};
 use crate::series::Ticks;
@@ -49,7 +49,8 @@ pub fn dead(called: &str, column: &[f64]) -> Option<String> {
     let first = good.next()?;
     good.all(|reading| (reading - first).abs() <= 0.0).then(|| {
         format!(
-            "{called}: every reading is {first}: the sensor is dead, or the mapping names the wrong column"
+            "{called}: every reading is {}: the sensor is dead, or the mapping names the wrong column",
+            six(*first)
         )
     })
 }
@@ -90,8 +91,9 @@ pub fn frozen(called: &str, end_ns: &[i64], column: &[f64]) -> Option<String> {
     };
     let value = column.get(from).copied().unwrap_or_default();
     Some(format!(
-        "warning: {called} reads exactly {value} from {:.2} s to {:.2} s{further}: it froze, or its output was lost; cut the log to \
+        "warning: {called} reads exactly {} from {:.2} s to {:.2} s{further}: it froze, or its output was lost; cut the log to \
          where it lives with --start and --duration",
+        six(value),
         since(from),
         since(to)
     ))
