@@ -107,7 +107,7 @@ pub fn before(switches: &Switches, document: &Document, transition_ticks: Option
                 "gyro {} gives the same reading, {}, from {from_s:.0} s to {to_s:.0} s, and changes all the time elsewhere: it failed, or its \
                  output was lost; cut the log to where it lives with --start and --duration",
                 name(&sensor),
-                six(reading)
+                six(reading + 0.0)
             ));
         }
     }

@@ -1,6 +1,6 @@
 //! Steps in a run at rest: two scales in one log, a gyro that dies, a unit that was turned or tilted.
 //!
-//! Compared are means over whole reversal periods, in which the modes cancel, by the rule of `drift`.
+//! Compared are means in which the modes cancel, by the rule of `drift`.
 
 use super::cells::Second;
 use super::words::fixed;
@@ -8,11 +8,13 @@ use crate::drift::pieces::steps::step;
 
 /// Most parts of a run that are compared.
 const PARTS: usize = 128;
+/// Seconds of a part: whole counts are coarse.
+const SHORTEST_SECONDS: usize = 10;
 /// Steps that are told: mean rate (°/h), specific force (m/s²).
 const RATE_DEG_PER_H: f64 = 1.0;
 const FORCE_M_PER_S2: f64 = 0.01;
 
-/// Means over reversal periods.
+/// Means over some seconds.
 #[derive(Debug, Clone, Copy, Default)]
 struct Pair {
     time_s: f64,
@@ -23,23 +25,24 @@ struct Pair {
 /// The steps of the rates, and of the specific force, in words.
 pub(super) fn found(seconds: &[Second], names: [&str; 3]) -> Vec<String> {
     let mut words = Vec::new();
-    for run in seconds.chunk_by(|a, b| a.time_s < b.time_s) {
-        let parts = parts(run);
-        let rates =
-            stepping(&parts, (names.map(|name| format!("gyro {name}")), "°/h", 2), RATE_DEG_PER_H, |pair| {
-                pair.rate
-            });
+    let runs: Vec<&[Second]> = seconds.chunk_by(|a, b| a.time_s < b.time_s).collect();
+    for (number, run) in runs.iter().enumerate() {
+        let log = if runs.len() > 1 { format!("in log {}, ", number + 1) } else { String::new() };
+        let names = names.map(|name| format!("gyro {name}"));
+        let rates = candidates(run)
+            .iter()
+            .find_map(|parts| stepping(parts, (&names, "°/h", 2), RATE_DEG_PER_H, |pair| pair.rate));
         words.extend(rates.map(|(at_s, steps)| {
             format!(
-                "about {at_s:.0} s after the beginning the mean rate steps and stays there: {steps}. Are two units of measure in one log, did a \
+                "{log}about {at_s:.0} s after the beginning the mean rate steps and stays there: {steps}. Are two units of measure in one log, did a \
                  gyro fail, or was the unit turned? Cut the log there with --start and --duration"
             )
         }));
         let axes = ["x", "y", "z"].map(|axis| format!("along {axis}"));
-        let forces = stepping(&parts, (axes, "m/s²", 3), FORCE_M_PER_S2, |pair| pair.force);
+        let forces = stepping(&parts(run), (&axes, "m/s²", 3), FORCE_M_PER_S2, |pair| pair.force);
         words.extend(forces.map(|(at_s, steps)| {
             format!(
-                "about {at_s:.0} s after the beginning the specific force steps and stays there: {steps}. Was the unit tilted, or is an \
+                "{log}about {at_s:.0} s after the beginning the specific force steps and stays there: {steps}. Was the unit tilted, or is an \
                  accelerometer out of order? Cut the log there with --start and --duration"
             )
         }));
@@ -50,7 +53,7 @@ pub(super) fn found(seconds: &[Second], names: [&str; 3]) -> Vec<String> {
 /// When the largest step is, and all steps in words; `None` without one.
 fn stepping(
     parts: &[Pair],
-    (names, measure, places): ([String; 3], &str, usize),
+    (names, measure, places): (&[String; 3], &str, u8),
     least: f64,
     of: fn(&Pair) -> [f64; 3],
 ) -> Option<(f64, String)> {
@@ -67,13 +70,22 @@ fn stepping(
     Some((*at_s, steps.iter().map(|(_, _, words)| words.as_str()).collect::<Vec<_>>().join(", ")))
 }
 
-/// Means over whole reversal periods, some of them together where there are many.
-fn parts(run: &[Second]) -> Vec<Pair> {
-    let stretches: Vec<Pair> =
-        run.chunk_by(|a, b| a.mode.total_cmp(&b.mode).is_eq()).map(of_stretch).collect();
-    let pairs = stretches.len() / 2;
-    let together = pairs.div_ceil(PARTS).max(1);
-    stretches.chunks_exact(2 * together).map(mean).collect()
+/// Parts of a run in which the modes cancel or stay: means over neighbouring stretches of both modes, and parts of each long stretch.
+fn candidates(run: &[Second]) -> Vec<Vec<Pair>> {
+    let in_modes = || run.chunk_by(|a, b| a.mode.total_cmp(&b.mode).is_eq());
+    let stretches: Vec<Pair> = in_modes().map(of_stretch).collect();
+    let together = stretches.len().div_ceil(2 * PARTS);
+    let pairs = if together > 1 {
+        stretches.chunks_exact(2 * together).map(mean).collect()
+    } else {
+        stretches.windows(2).map(mean).collect()
+    };
+    std::iter::once(pairs).chain(in_modes().map(parts)).collect()
+}
+
+/// Parts of some seconds.
+fn parts(seconds: &[Second]) -> Vec<Pair> {
+    seconds.chunks_exact(seconds.len().div_ceil(PARTS).max(SHORTEST_SECONDS)).map(of_stretch).collect()
 }
 
 fn of_stretch(seconds: &[Second]) -> Pair {
@@ -115,11 +127,28 @@ mod tests {
     fn two_scales_in_one_run_are_told() {
         assert_eq!(found(&run(|_| 1.0), ["x", "y", "z"]), Vec::<String>::new());
         let words = found(&run(|time_s| if time_s < 750.0 { 1.0 } else { 2.0 }), ["x", "y", "z"]);
-        assert!(
-            words.len() == 1
-                && words[0].contains("the mean rate steps")
-                && words[0].contains("gyro z from -11"),
-            "{words:?}"
-        );
+        assert!(words.len() == 1 && words[0].contains("the mean rate steps"), "{words:?}");
+        assert!(words[0].starts_with("about 7") && words[0].contains("gyro z from -1"), "{words:?}");
+        // Few reversals, of five minutes; the gyro dies.
+        let slow = |scale: fn(f64) -> f64| {
+            let mut run = run(scale);
+            for second in &mut run {
+                let mode = if second.time_s % 600.0 < 300.0 { 1.0 } else { -1.0 };
+                let change = 2.0 * (mode - second.mode) * scale(second.time_s);
+                second.rate = second.rate.map(|rate| rate + change);
+                second.mode = mode;
+            }
+            found(&run, ["x", "y", "z"])
+        };
+        assert_eq!(slow(|_| 1.0), Vec::<String>::new());
+        let dies = slow(|time_s| if time_s < 700.0 { 1.0 } else { 0.0 });
+        assert!(dies.len() == 1 && dies[0].starts_with("about 70"), "{dies:?}");
+        // The unit is tilted in the second of two logs.
+        let mut tilted = run(|_| 1.0);
+        tilted.extend(run(|_| 1.0));
+        tilted.iter_mut().skip(2300).for_each(|second| second.force[0] = 0.05);
+        let words = found(&tilted, ["x", "y", "z"]);
+        assert!(words.len() == 1 && words[0].starts_with("in log 2, about "), "{words:?}");
+        assert!(words[0].contains("along x from 0.000 to 0.050 m/s²"), "{words:?}");
     }
 }

@@ -98,11 +98,11 @@ impl Switches {
                 let now = tick.end_time.as_ns();
                 let since_s = seconds_of(now.saturating_sub(*begin.get_or_insert(now)));
                 found.seen.resize(found.sensors, Seen::default());
+                eye.take(tick, &mut found);
                 let kind = (eye.is_calm(), output == OutputKind::Counts);
                 for (sensor, seen) in found.seen.iter_mut().enumerate() {
                     seen.take(tick, sensor, since_s, kind);
                 }
-                eye.take(tick, &mut found);
             })?;
             eye.end(&mut found);
         }

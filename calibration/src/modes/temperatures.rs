@@ -26,39 +26,47 @@ pub(super) fn read<W: Watch>(
             raw.entry(name).or_default().extend(channel.raw);
         }
     }
-    let of = |channel: &isotherm_protocol::document::Channel| {
-        let name = &channel.name;
-        let [low, high] = channel.range_deg_c;
-        let Some(raw) = raw.get(name).filter(|raw| !raw.is_empty()) else {
-            return format!("{name} has no readings in the log");
-        };
-        let read =
-            raw.iter().map(|raw| channel.conversion_deg_c.iter().rev().fold(0.0, |sum, of| sum * raw + of));
-        let good: Vec<f64> = read.filter(|deg_c| deg_c.is_finite()).collect();
-        let ends = good
-            .iter()
-            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], t| [low.min(*t), high.max(*t)]);
-        let bad = raw.len() - good.len();
-        let numbers =
-            if bad > 0 { format!(", {bad} of {} readings are no numbers", raw.len()) } else { String::new() };
-        if good.is_empty() {
-            return format!("{name} reads no numbers");
-        }
-        let usual = median(&good.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect::<Vec<f64>>());
-        let limit = channel.spike_limit_deg_c;
-        let jumps = if usual > limit {
-            format!(", it jumps by {} °C from reading to reading, spike_limit_deg_c is {limit}", short(usual))
-        } else {
-            String::new()
-        };
-        format!(
-            "{name} reads {} to {} °C, {low} to {high} °C are allowed{jumps}{numbers}",
-            short(ends[0]),
-            short(ends[1])
-        )
+    let channels = document.temperature.channel.iter();
+    let all: Vec<(bool, String)> = channels.map(|channel| words(channel, raw.get(&channel.name))).collect();
+    let is_wrong = all.iter().any(|(wrong, _)| *wrong);
+    let told: Vec<&str> =
+        all.iter().filter(|(wrong, _)| *wrong == is_wrong).map(|(_, words)| words.as_str()).collect();
+    Ok(format!("temperatures by the document's conversion_deg_c: {}", told.join("; ")))
+}
+
+/// What a channel reads, and whether that cannot be right.
+fn words(channel: &isotherm_protocol::document::Channel, raw: Option<&Vec<f64>>) -> (bool, String) {
+    let (name, limit) = (&channel.name, channel.spike_limit_deg_c);
+    let [low, high] = channel.range_deg_c;
+    let Some(raw) = raw.filter(|raw| !raw.is_empty()) else {
+        return (true, format!("{name} has no readings in the log"));
     };
-    let channels: Vec<String> = document.temperature.channel.iter().map(of).collect();
-    Ok(format!("temperatures by the document's conversion_deg_c and range_deg_c: {}", channels.join("; ")))
+    let of = |raw: &f64| channel.conversion_deg_c.iter().rev().fold(0.0, |sum, of| sum * raw + of);
+    let good: Vec<f64> = raw.iter().map(of).filter(|deg_c| deg_c.is_finite()).collect();
+    let numbers = match raw.len() - good.len() {
+        0 => String::new(),
+        bad => format!(", {bad} of {} readings are no numbers", raw.len()),
+    };
+    let [from, to] =
+        good.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], t| [low.min(*t), high.max(*t)]);
+    if good.is_empty() {
+        return (true, format!("{name} reads no numbers"));
+    }
+    let reads = format!("{name} reads {}…{} °C", short(from), short(to));
+    if from < low || to > high {
+        return (true, format!("{reads}, its range_deg_c is {low}…{high} °C{numbers}"));
+    }
+    let usual = median(&good.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect::<Vec<f64>>());
+    if usual > limit {
+        let jumps = short(usual);
+        return (
+            true,
+            format!(
+                "{reads} and jumps by {jumps} °C from reading to reading, its spike_limit_deg_c is {limit}{numbers}"
+            ),
+        );
+    }
+    (!numbers.is_empty(), format!("{reads}, its range_deg_c is {low}…{high} °C{numbers}"))
 }
 
 /// Channels that freeze, by the rule of `drift`; those that freeze alike are named together.
@@ -76,7 +84,8 @@ pub(super) fn freezing<W: Watch>(
         for channel in &document.temperature.channel {
             let Some(Channel { time_ns, raw }) = series.temperatures.get(&channel.name) else { continue };
             let Some(words) = frozen("", time_ns, raw) else { continue };
-            let words = words.trim_start_matches("warning:").trim_start().to_owned();
+            let log = if runs.len() > 1 { format!("{}: ", run.name) } else { String::new() };
+            let words = format!("{log}{}", words.trim_start_matches("warning:").trim_start());
             match told.iter_mut().find(|(of, _)| *of == words) {
                 Some((_, names)) => names.push(channel.name.clone()),
                 None => told.push((words, vec![channel.name.clone()])),
@@ -84,11 +93,8 @@ pub(super) fn freezing<W: Watch>(
         }
     }
     let sentence = |(words, names): (String, Vec<String>)| {
-        format!(
-            "temperature {} {}: {words}",
-            if names.len() == 1 { "channel" } else { "channels" },
-            names.join(", ")
-        )
+        let [channel, each] = if names.len() == 1 { ["channel", ""] } else { ["channels", "each "] };
+        format!("temperature {channel} {}: {each}{words}", names.join(", "))
     };
     Ok(told.into_iter().map(sentence).collect())
 }

@@ -11,7 +11,7 @@ use crate::drift::figures::short;
 use crate::robust::median;
 
 /// The Earth's rate (°/h).
-const EARTH_DEG_PER_H: f64 = 15.041;
+const EARTH_DEG_PER_H: f64 = 15.04;
 /// Largest frequency of a dither, as the half periods count it (Hz).
 pub(super) const LARGEST_HZ: f64 = 1e6;
 /// Share by which the dither's frequency may differ from that of the document's servo.
@@ -46,14 +46,14 @@ pub(super) fn rates(switches: &Switches, document: &Document) -> Option<String> 
 
 /// What is wrong with the half-period counts, in words.
 pub(super) fn half_periods(switches: &Switches, document: &Document) -> Vec<String> {
-    const MEND: &str = "correction takes the dither out by them, so mend their columns in the mapping, or leave them out of it";
+    const MEND: &str = "The correction takes the dither out by them: mend their columns in the mapping, or leave them out of it";
     let name = |sensor: usize| document.gyro.sensor.get(sensor).map_or("?", |sensor| sensor.name.as_str());
     let mut reasons = Vec::new();
     let seen = || switches.seen.iter().enumerate();
     let dead: Vec<&str> =
         seen().filter(|(_, seen)| seen.has_dead_halves()).map(|(sensor, _)| name(sensor)).collect();
     if !dead.is_empty() {
-        reasons.push(format!("{}: all half-period counts are zero: {MEND}", gyros(&dead)));
+        reasons.push(format!("{}: all half-period counts are zero. {MEND}", gyros(&dead)));
     }
     let impossible: Vec<(&str, f64)> = seen()
         .filter(|(_, seen)| !seen.has_dead_halves())

@@ -1,8 +1,27 @@
-//! Words that the reports of modes and rates share: one sentence for all gyros that it holds of, and figures without a minus before zero.
+//! Words that the reports of modes and rates share: one sentence for all gyros, or logs, that it holds of, and figures without a minus before zero.
 
 /// Sentences of gyros, each with the names of all that it holds of, in the order of the first.
 #[must_use]
 pub(crate) fn together(told: &[(&str, String)]) -> Vec<String> {
+    grouped(told).into_iter().map(|(words, names)| format!("{}: {words}", gyros(&names))).collect()
+}
+
+/// Sentences of logs, each with the names of all that it holds of; of many only the first.
+#[must_use]
+pub(crate) fn of_logs(told: &[(&str, String)]) -> Vec<String> {
+    const MOST: usize = 4;
+    let logs = |names: &[&str]| match names.get(..MOST) {
+        Some(first) if names.len() > MOST + 1 => {
+            format!("{} and {} more logs, each", first.join(", "), names.len() - MOST)
+        }
+        _ if names.len() > 1 => format!("{}, each", names.join(", ")),
+        _ => names.join(", "),
+    };
+    grouped(told).into_iter().map(|(words, names)| format!("{}: {words}", logs(&names))).collect()
+}
+
+/// Sentences with the names of all that they hold of, in the order of the first.
+fn grouped<'a>(told: &'a [(&'a str, String)]) -> Vec<(&'a str, Vec<&'a str>)> {
     let mut groups: Vec<(&str, Vec<&str>)> = Vec::new();
     for (name, words) in told {
         match groups.iter_mut().find(|(of, _)| of == words) {
@@ -10,7 +29,7 @@ pub(crate) fn together(told: &[(&str, String)]) -> Vec<String> {
             None => groups.push((words, vec![name])),
         }
     }
-    groups.into_iter().map(|(words, names)| format!("{}: {words}", gyros(&names))).collect()
+    groups
 }
 
 /// "gyro x", "gyros x, y".
@@ -21,8 +40,8 @@ pub(crate) fn gyros(names: &[&str]) -> String {
 
 /// A number to so many places; zero has no sign.
 #[must_use]
-pub(crate) fn fixed(value: f64, places: usize) -> String {
-    let words = format!("{value:.places$}");
+pub(crate) fn fixed(value: f64, places: u8) -> String {
+    let words = format!("{value:.*}", usize::from(places));
     match words.strip_prefix('-') {
         Some(size) if size.bytes().all(|byte| matches!(byte, b'0' | b'.')) => size.to_owned(),
         _ => words,
@@ -38,6 +57,9 @@ mod tests {
         let told =
             [("x", "late"), ("y", "dead"), ("z", "late")].map(|(name, words)| (name, words.to_owned()));
         assert_eq!(together(&told), ["gyros x, z: late", "gyro y: dead"]);
+        assert_eq!(of_logs(&told), ["x, z, each: late", "y: dead"]);
+        let many = ["a", "b", "c", "d", "e", "f"].map(|name| (name, "late".to_owned()));
+        assert_eq!(of_logs(&many), ["a, b, c, d and 2 more logs, each: late"]);
     }
 
     #[test]

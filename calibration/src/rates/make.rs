@@ -15,6 +15,7 @@ use super::steps::Step;
 use crate::drift::figures::counted;
 use crate::error::Error;
 use crate::modes::document::{main_axis, row, widened};
+use crate::modes::words::of_logs;
 use crate::report::{FitReport, Verdict};
 use crate::robust::median;
 use crate::run::{Run, Watch};
@@ -138,7 +139,7 @@ pub fn make<W: Watch>(wanted: &Wanted<'_>, mut watch: impl FnMut() -> W) -> Resu
     let steps = measured(&runs, &rates);
     let judged = measured(&judging, &true_rates(&judging, &earth));
     runs.extend(judging);
-    warnings.extend(attitude::doubts(wanted, &runs, (&axes, &gains)));
+    warnings.extend(attitude::doubts(wanted.place, &runs, (&axes, &gains)));
     let mut made = Made {
         written: Written::of(wanted.base)?,
         gyros,
@@ -162,7 +163,7 @@ fn read_all<W: Watch>(
 ) -> Result<Vec<Turned>, Error> {
     let (mut runs, mut reasons) = (Vec::new(), Vec::new());
     for (number, run) in wanted.runs.iter().chain(wanted.judge).enumerate() {
-        match read(wanted, number, run, &mut *watch, warnings)? {
+        match read(wanted, number, run, &mut *watch)? {
             Ok(read) => runs.push(read),
             Err(reason) => reasons.push(reason),
         }
@@ -170,6 +171,12 @@ fn read_all<W: Watch>(
     if !reasons.is_empty() {
         return Err(Error::Refused(reasons));
     }
+    let names = wanted.runs.iter().chain(wanted.judge).map(|run| run.name.as_str());
+    let troubles: Vec<(&str, String)> = names
+        .zip(&runs)
+        .flat_map(|(name, run)| run.binned.troubles.iter().map(move |words| (name, words.clone())))
+        .collect();
+    warnings.extend(of_logs(&troubles));
     if wanted.place.is_empty() {
         warnings.push(
             "the Earth rate is not known: steps are cut to whole turns, and its share along the table's axis is in the bias. Give \

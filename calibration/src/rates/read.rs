@@ -32,10 +32,8 @@ pub(super) fn read<W: Watch>(
     number: usize,
     run: &Run,
     watch: &mut impl FnMut() -> W,
-    warnings: &mut Vec<String>,
 ) -> Result<Result<Turned, String>, Error> {
     let binned = binned(run, wanted.base, &mut *watch)?;
-    warnings.extend(binned.troubles.iter().map(|words| format!("{}: {words}", run.name)));
     let counts: Vec<f64> =
         (0..wanted.base.gyro.sensor.len()).map(|sensor| count_arcsec(wanted.base, sensor) / BIN_S).collect();
     let found = plateaus::find(&binned.bins, &counts);
@@ -105,9 +103,10 @@ pub(super) fn read<W: Watch>(
                     )
                 },
             );
+            let troubles: String = binned.troubles.iter().map(|words| format!("; {words}")).collect();
             return Ok(Err(format!(
                 "log {}: the unit cannot be levelled at its beginning: {force}. Give --pitch and --roll of that moment, or mend the columns \
-                 of the accelerometers in the mapping",
+                 of the accelerometers in the mapping{troubles}",
                 number + 1
             )));
         }
