@@ -5,20 +5,26 @@ pub const SIGMA_PER_MAD: f64 = 1.482_602_218_505_602;
 /// Median of |a − b| of two normal numbers, in standard deviations of either.
 const STEP_PER_SIGMA: f64 = 0.953_9;
 
-/// The middle one; zero without any. What is no number is left out.
+/// The middle one, or the mean of the two middle ones; zero without any. What is no number is left out.
 #[must_use]
 pub fn median(values: &[f64]) -> f64 {
+    median_if_any(values).unwrap_or(0.0)
+}
+
+/// The same, and `None` without any.
+#[must_use]
+pub fn median_if_any(values: &[f64]) -> Option<f64> {
     let mut good: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
     let count = good.len();
     if count == 0 {
-        return 0.0;
+        return None;
     }
     // Columns may have millions of readings: nothing is sorted that need not be.
     let (below, upper, _) = good.select_nth_unstable_by(count / 2, f64::total_cmp);
-    match below.iter().copied().max_by(f64::total_cmp) {
+    Some(match below.iter().copied().max_by(f64::total_cmp) {
         Some(lower) if count.is_multiple_of(2) => 0.5 * (lower + *upper),
         _ => *upper,
-    }
+    })
 }
 
 /// Standard deviation by the median of absolute deviations.

@@ -169,7 +169,12 @@ fn sums(sheet: &mut Sheet, written: &Written, range: [f64; 2]) {
         });
     }
     let head: Vec<&str> = head.iter().map(String::as_str).collect();
-    sheet.table("Bias in all, lags settled, lasing mode +", &head, rows);
+    sheet.table(&format!("Bias in all, lags settled{}", lasing_mode(written)), &head, rows);
+}
+
+/// The lasing mode that a sum is in, of a unit that reverses it.
+fn lasing_mode(written: &Written) -> &'static str {
+    if written.document.mode_reversal.is_some() { ", lasing mode +" } else { "" }
 }
 
 pub(crate) fn ramp_words(ramp: f64) -> String {

@@ -62,9 +62,9 @@ pub(super) struct ImpactArgs {
     /// Constant that appears at departure, as after a shock (°/h)
     #[arg(long, value_name = "DEG_PER_H", alias = "constant-deg-per-h", allow_hyphen_values = true, conflicts_with_all = ["log", "seeds"])]
     constant: Option<f64>,
-    /// Gyro that has the trend or the constant
-    #[arg(long, value_enum, default_value_t = Gyro::Each)]
-    gyro: Gyro,
+    /// Gyro that has the trend or the constant; without it each by itself, with --seeds all at once
+    #[arg(long, value_enum)]
+    gyro: Option<Gyro>,
     /// Sail many times with drifts from as many seeds, of the size that the document states; --trend comes on top
     #[arg(long, value_name = "NUMBER", conflicts_with = "log", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     seeds: Option<u32>,
@@ -161,6 +161,14 @@ impl ImpactArgs {
                 return Err(Error::Usage(format!("{name} is {value}, must be from {low} to {high}")));
             }
         }
+        if self.gyro.is_some() && self.trend.is_none() && self.constant.is_none() {
+            let words = "--gyro says which gyro has the trend or the constant: give --trend or --constant, or leave it out";
+            return Err(Error::Usage(words.to_owned()));
+        }
+        if self.gyro == Some(Gyro::Each) && self.seeds.is_some() {
+            let words = "--gyro each sails each gyro by itself, the drifts of --seeds are of all: give x, y, z or all";
+            return Err(Error::Usage(words.to_owned()));
+        }
         let inputs: Vec<&Path> = self.log.iter().chain(&self.document).map(PathBuf::as_path).collect();
         self.page.check(&inputs)?;
         Ok(Voyage {
@@ -203,7 +211,7 @@ impl ImpactArgs {
         let of = |name: &str, share| Case { name: name.to_owned(), share };
         let (x, y) = (of("level gyro x", [1.0, 0.0, 0.0]), of("level gyro y", [0.0, 1.0, 0.0]));
         let z = of("azimuth gyro z", [0.0, 0.0, 1.0]);
-        match self.gyro {
+        match self.gyro.unwrap_or(Gyro::Each) {
             Gyro::X => vec![x],
             Gyro::Y => vec![y],
             Gyro::Z => vec![z],
@@ -250,7 +258,7 @@ impl ImpactArgs {
         let count = self.seeds.unwrap_or(SEEDS);
         let seeds: Vec<u64> = (0..count).map(|index| self.seed.wrapping_add(u64::from(index))).collect();
         let slope = AngularRate::from_deg_per_h(self.trend.unwrap_or(0.0)).as_rad_per_s() / HOUR_S;
-        let on_top = match self.gyro {
+        let on_top = match self.gyro.unwrap_or(Gyro::All) {
             Gyro::X => [slope, 0.0, 0.0],
             Gyro::Y => [0.0, slope, 0.0],
             Gyro::Z => [0.0, 0.0, slope],

@@ -35,10 +35,11 @@ pub(crate) struct Reading {
     /// Column mapping of a text log (TOML); ready ones are in config/mappings
     #[arg(long, short, value_name = "FILE")]
     pub(crate) mapping: Option<PathBuf>,
-    /// The unit, where a recording has several, or the serial of a text log's
+    /// The unit, where a recording has several, or the serial of a text log's; without it a text log is taken for the document's
+    /// unit
     #[arg(long, short, value_name = "SERIAL")]
     pub(crate) unit: Option<String>,
-    /// Leave out this much of each log's beginning (s)
+    /// Leave out this much of each log's beginning (s); recordings are cut between messages
     #[arg(long, value_name = "SECONDS", default_value = "0", value_parser = seconds)]
     pub(crate) start: Span,
     /// Take this much of each log (s); without it, all

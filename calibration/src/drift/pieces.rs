@@ -196,8 +196,8 @@ fn words(gaps: &[Gap], bridge: bool, tick_s: f64) -> Vec<String> {
     let long: Vec<&Gap> = gaps.iter().filter(|gap| !bridged(gap)).collect();
     let mut notes = Vec::new();
     if single > 0 {
-        let ticks = counted(single, "single missing tick is", "single missing ticks are");
-        notes.push(format!("{ticks} bridged with the mean of their neighbours."));
+        let bridged = counted(single, "single missing tick is", "single missing ticks are");
+        notes.push(format!("{bridged} bridged with the mean of their neighbours."));
     }
     if let Some(longest) = long.iter().map(|gap| gap.missing).max() {
         let missing: usize = long.iter().map(|gap| gap.missing).sum();

@@ -5,7 +5,7 @@ use isotherm_log::plot::page::{Axis, Chart, Content, Form, Ink, Panel, Samples, 
 
 use super::about::ARCSEC;
 use super::terms::Term;
-use super::{RAMPS, places, ramp_words, spoken, steady};
+use super::{RAMPS, lasing_mode, places, ramp_words, spoken, steady};
 use crate::means::Size;
 use crate::report::Sheet;
 use crate::written::Written;
@@ -16,13 +16,9 @@ const POINTS: usize = 201;
 /// Adds them all.
 pub(super) fn charts(sheet: &mut Sheet, written: &Written, terms: &[Term], range: [f64; 2]) {
     let sums = sums(written, range);
-    add(
-        sheet,
-        "Bias in all",
-        "All terms together, lags settled, lasing mode +, all channels at one temperature.",
-        "°C",
-        sums,
-    );
+    let caption =
+        format!("All terms together, lags settled{}, all channels at one temperature.", lasing_mode(written));
+    add(sheet, "Bias in all", &caption, "°C", sums);
     for (argument, label) in
         [("°C", "temperature"), ("°C/s", "rate of temperature"), ("°C/s²", "its acceleration")]
     {

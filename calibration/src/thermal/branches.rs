@@ -1,6 +1,6 @@
 //! Plateaus, ramps between turning points, and the pieces that cross-validation leaves out.
 
-use super::solve::median;
+use crate::robust::median;
 
 /// Share of the range of temperature by which a turning point must stand out.
 const STANDS_OUT: f64 = 0.1;
@@ -157,7 +157,7 @@ impl History {
     #[must_use]
     pub fn passes(&self) -> usize {
         let [low, high] = self.range_deg_c;
-        let mut counts: Vec<f64> = (1..10)
+        let counts: Vec<f64> = (1..10)
             .map(|tenth| {
                 let at = low + (high - low) * f64::from(tenth) / 10.0;
                 let crossed = self.ramps.iter().filter(|ramp| {
@@ -170,7 +170,7 @@ impl History {
             })
             .collect();
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count")]
-        let passes = median(&mut counts).unwrap_or(0.0) as usize;
+        let passes = median(&counts) as usize;
         passes
     }
 }

@@ -5,13 +5,13 @@ use isotherm_correction::units::STANDARD_GRAVITY_M_PER_S2;
 use isotherm_protocol::document::Document;
 
 use super::samples::Samples;
-use super::solve::median;
 use super::stand::Stand;
 use crate::drift::columns::name as sensor_name;
-use crate::drift::figures::six;
+use crate::drift::figures::{counted, six};
 use crate::drift::pieces::checks::moves;
 use crate::means::Size;
 use crate::report::Rest;
+use crate::robust::{median, median_if_any};
 use crate::series::{Series, Ticks};
 use crate::swapped::Shown;
 
@@ -42,9 +42,9 @@ pub struct Findings {
 #[must_use]
 pub fn median_step_s(times_ns: &[i64]) -> f64 {
     #[expect(clippy::cast_precision_loss, reason = "steps of a log")]
-    let mut steps: Vec<f64> =
+    let steps: Vec<f64> =
         times_ns.windows(2).map(|pair| pair[1].saturating_sub(pair[0]) as f64 * 1e-9).collect();
-    median(&mut steps).unwrap_or(0.0)
+    median(&steps)
 }
 
 /// Looks at the raw readings of a run.
@@ -143,8 +143,9 @@ fn gaps(found: &mut Findings, name: &str, kind: &str, ticks: &Ticks) {
     let whole = ticks.end_ns.last().copied().unwrap_or_default().saturating_sub(first) as f64 * 1e-9;
     if count > 0 && (missing > SMALL_SHARE * whole || longest > 60.0) {
         found.warnings.push(format!(
-            "{name}: {count} gaps in the {kind} ticks, {missing:.1} s in all, the longest {longest:.1} s at {at:.0} s: lags and \
-             derivatives are poor behind a gap; leave it out with --start and --duration where it matters"
+            "{name}: {} in the {kind} ticks, {missing:.1} s in all, the longest {longest:.1} s at {at:.0} s: lags and \
+             derivatives are poor behind a gap; leave it out with --start and --duration where it matters",
+            counted(count, "gap", "gaps")
         ));
     }
 }
@@ -152,9 +153,9 @@ fn gaps(found: &mut Findings, name: &str, kind: &str, ticks: &Ticks) {
 /// Gyros with a rate output must be near rest.
 fn rates(found: &mut Findings, name: &str, ticks: &Ticks) {
     for (index, readings) in ticks.readings.iter().enumerate() {
-        let mut sizes: Vec<f64> =
+        let sizes: Vec<f64> =
             readings.iter().filter(|r| r.is_finite()).map(|r| r.abs().to_degrees()).collect();
-        let Some(usual) = median(&mut sizes) else { continue };
+        let Some(usual) = median_if_any(&sizes) else { continue };
         let called = format!("{name}: gyro {}", sensor_name(index, ticks.readings.len()));
         found.refusals.extend(moves(&called, usual));
     }
@@ -178,8 +179,8 @@ fn thermometer(found: &mut Findings, name: &str, channel: &str, readings: &crate
     // A temperature moves slowly: from reading to reading it changes by a small share of what it does over the run.
     let (low, high) =
         good.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), t| (l.min(*t), h.max(*t)));
-    let mut steps: Vec<f64> = good.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
-    let usual = median(&mut steps).unwrap_or(0.0);
+    let steps: Vec<f64> = good.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
+    let usual = median(&steps);
     if usual > 0.5 && usual > 0.05 * (high - low) {
         found.refusals.push(format!(
             "{name}: temperature channel {channel:?} jumps by {usual:.3} from reading to reading, over a range of {:.3}: that is no \
@@ -201,13 +202,12 @@ pub fn turning(samples: &Samples, document: &Document, stand: &Stand) -> Option<
         let away: Vec<usize> =
             (0..shown.len()).filter(|&window| (shown[window] - along).abs() > allowed).collect();
         if 2 * away.len() > shown.len() {
-            let mut good: Vec<f64> = shown.iter().copied().filter(|shown| shown.is_finite()).collect();
             return Some(format!(
                 "{}: gyro {} shows {:.3} °/s in the median, {:.3} °/s are stated along it: is --rate or --axis that of another log, \
                  or its sign the other one?",
                 samples.name,
                 sensor_name(index, samples.gyros.len()),
-                median(&mut good).unwrap_or(f64::NAN) / 3600.0,
+                median_if_any(shown).unwrap_or(f64::NAN) / 3600.0,
                 along / 3600.0
             ));
         }
@@ -257,14 +257,10 @@ pub fn attitude(samples: &Samples, document: &Document, (rest, stand): (&Rest, &
 pub fn corrected(samples: &Samples, stand: &Stand, dead: &[(bool, usize, String)]) -> Findings {
     let warnings = samples.troubles.iter().map(|words| format!("{}: {words}", samples.name)).collect();
     let mut found = Findings { warnings, ..Findings::default() };
-    let mean = |values: &Vec<f64>| {
-        let mut good: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
-        median(&mut good)
-    };
     // A dead accelerometer is refused for itself.
     let alive = dead.iter().all(|(gyro, ..)| *gyro);
     if samples.forces.len() == 3 && alive && stand.turning.is_none() {
-        let forces: Option<Vec<f64>> = samples.forces.iter().map(mean).collect();
+        let forces: Option<Vec<f64>> = samples.forces.iter().map(|values| median_if_any(values)).collect();
         if let Some(forces) = forces {
             let size = forces.iter().map(|f| f * f).sum::<f64>().sqrt();
             let share = size / STANDARD_GRAVITY_M_PER_S2;

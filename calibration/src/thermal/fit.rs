@@ -3,7 +3,7 @@
 use isotherm_protocol::document::{Document, Origin};
 
 use super::bare::{bare, filter, nominal_of};
-use super::checks;
+use super::checks::{self, Findings};
 use super::columns::Columns;
 use super::filter::{choose_filter, longest_run_s};
 use super::known::{Known, channel, histories};
@@ -15,7 +15,7 @@ use super::stand::Stand;
 use super::target::{rest, target};
 use super::{passes, search, sequential};
 use crate::error::Error;
-use crate::report::FitReport;
+use crate::report::{FitReport, Rest};
 use crate::run::{Run, Watch};
 use crate::written::Written;
 
@@ -67,9 +67,11 @@ pub fn fit(
         dead.extend(found.dead);
         series.push(of_run);
     }
+    let mut judging = Vec::new();
     for (index, run) in judges.iter().enumerate() {
-        let stand = settings.stand(runs.len() + index);
-        warnings.extend(checks::judging(&run.name, &run.series(&mut watch)?, &stand));
+        let (stand, series) = (settings.stand(runs.len() + index), run.series(&mut watch)?);
+        warnings.extend(checks::judging(&run.name, &series, &stand));
+        judging.push((series, stand));
     }
     let first = series.first().ok_or_else(|| Error::Refused(vec!["there is no run to fit to".to_owned()]))?;
     if !refusals.is_empty() {
@@ -95,20 +97,19 @@ pub fn fit(
     let mut samples = Vec::new();
     let mut rests = Vec::new();
     for ((run, series), stand) in runs.iter().zip(&series).zip(&stands) {
-        let window_s = stand.window_s(settings.fit_window_s);
-        let of_run = Samples::of(run, series, &plain, window_s, &mut watch)?;
-        let mut found = checks::corrected(&of_run, stand, &dead);
-        if found.refusals.is_empty() {
-            let of_rest = rest(run, &base, stand, &mut watch)?;
-            found.refusals.extend(checks::turning(&of_run, &plain, stand));
-            let stands = checks::attitude(&of_run, &plain, (&of_rest, stand));
-            found.refusals.extend(stands.refusals);
-            found.warnings.extend(stands.warnings);
-            rests.push(of_rest);
-        }
+        let of_run = Samples::of(run, series, &plain, stand.window_s(settings.fit_window_s), &mut watch)?;
+        let (of_rest, found) = stands_as_stated(run, &of_run, (&base, &plain), (stand, &dead), &mut watch)?;
+        rests.extend(of_rest);
         refusals.extend(found.refusals);
         warnings.extend(found.warnings);
         samples.push(of_run);
+    }
+    for (run, (series, stand)) in judges.iter().zip(&judging) {
+        let of_run = Samples::of(run, series, &plain, stand.window_s(settings.fit_window_s), &mut watch)?;
+        let (_, found) = stands_as_stated(run, &of_run, (&base, &plain), (stand, &dead), &mut watch)?;
+        // What can be judged is judged.
+        warnings.extend(found.refusals);
+        warnings.extend(found.warnings);
     }
     if !refusals.is_empty() {
         return Err(Error::Refused(refusals));
@@ -143,6 +144,26 @@ pub fn fit(
         outcome.history(name, &known.history);
     }
     outcome.finish((runs, judges), origin, |run, stand| rest(run, &base, stand, ()), watch)
+}
+
+/// Whether a run feels what it must in its stated attitude, and what it would put out without error where it does.
+fn stands_as_stated(
+    run: &Run,
+    of_run: &Samples,
+    (base, plain): (&Document, &Document),
+    (stand, dead): (&Stand, &[(bool, usize, String)]),
+    watch: impl Watch,
+) -> Result<(Option<Rest>, Findings), Error> {
+    let mut found = checks::corrected(of_run, stand, dead);
+    if !found.refusals.is_empty() {
+        return Ok((None, found));
+    }
+    let rest = rest(run, base, stand, watch)?;
+    found.refusals.extend(checks::turning(of_run, plain, stand));
+    let stands = checks::attitude(of_run, plain, (&rest, stand));
+    found.refusals.extend(stands.refusals);
+    found.warnings.extend(stands.warnings);
+    Ok((Some(rest), found))
 }
 
 /// Length of the windows that residuals are stated over (s): in long runs several of the fit's, so that white noise does not hide

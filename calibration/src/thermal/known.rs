@@ -9,7 +9,7 @@ use super::checks::SMALLEST_RANGE_DEG_C;
 use super::columns::{Basis, Columns};
 use super::fit::Sensor;
 use super::samples::Samples;
-use crate::drift::figures::short;
+use crate::drift::figures::{counted, short};
 use crate::error::Error;
 
 /// What chambers for instruments hardly reach (°C).
@@ -117,8 +117,9 @@ fn doubts(name: &str, history: &History) -> Vec<String> {
     let levels = history.levels();
     if levels < 2 {
         doubts.push(format!(
-            "channel {name:?}: {levels} plateaus of different temperature, 2 or more are needed to tell the static bias from what \
-             follows the change: hold the chamber at its ends until nothing drifts any more (an hour for a fibre coil)"
+            "channel {name:?}: {} of different temperature, 2 or more are needed to tell the static bias from what follows the change: \
+             hold the chamber at its ends until nothing drifts any more (an hour for a fibre coil)",
+            counted(levels, "plateau", "plateaus")
         ));
     }
     if !history.both_directions() {

@@ -7,6 +7,7 @@ use super::columns::{Columns, Term};
 use super::model::{Dynamics, Spec};
 use super::scale::{self, Kept};
 use super::solve::{Solution, once, solve};
+use crate::robust::median_if_any;
 
 /// Score of a larger model, as a share of that of a smaller one, above which the smaller one is kept.
 const NO_BETTER: f64 = 0.985;
@@ -296,8 +297,8 @@ pub fn equal_temperature(temperature: &[f64], at_rest: &[bool], [low, high]: [f6
     for (t, at_rest) in windows().filter(|(t, _)| t.is_finite()) {
         counts[usize::from(*at_rest)][bin(*t)] += 1.0;
     }
-    let mut filled: Vec<f64> = counts[0].iter().copied().filter(|count| *count > 0.0).collect();
-    let usual = CROWDED * super::solve::median(&mut filled).unwrap_or(1.0);
+    let filled: Vec<f64> = counts[0].iter().copied().filter(|count| *count > 0.0).collect();
+    let usual = CROWDED * median_if_any(&filled).unwrap_or(1.0);
     let weight = |(t, at_rest): (&f64, &bool)| {
         let among = if t.is_finite() { counts[usize::from(*at_rest)][bin(*t)] } else { return 0.0 };
         (usual / among.max(1.0)).clamp(0.1, 1.0)

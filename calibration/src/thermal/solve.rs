@@ -2,6 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::robust::median_if_any;
+
 /// Share of a column's own weight that the ridge adds: it only holds what the data leave open.
 const RIDGE: f64 = 1e-9;
 /// Root mean square of a column that is nothing but rounding: T̈ of a perfect ramp.
@@ -121,14 +123,14 @@ fn spikes(residual: &[f64], weights: &[f64]) -> Vec<f64> {
         let from = row.saturating_sub(NEIGHBOURS);
         let to = (row + NEIGHBOURS + 1).min(residual.len());
         let others = (from..to).filter(|&other| other != row && residual[other].is_finite());
-        let mut others: Vec<f64> = others.map(|other| residual[other]).collect();
-        median(&mut others)
+        let others: Vec<f64> = others.map(|other| residual[other]).collect();
+        median_if_any(&others)
     };
     let away: Vec<f64> =
         (0..residual.len()).map(|row| near(row).map_or(f64::NAN, |near| residual[row] - near)).collect();
     let known = away.iter().zip(weights).filter(|(away, weight)| away.is_finite() && **weight > 0.0);
-    let mut sizes: Vec<f64> = known.map(|(away, _)| away.abs()).collect();
-    let sigma = median(&mut sizes).map_or(0.0, |middle| 1.4826 * middle);
+    let sizes: Vec<f64> = known.map(|(away, _)| away.abs()).collect();
+    let sigma = median_if_any(&sizes).map_or(0.0, |middle| 1.4826 * middle);
     let weight = |away: &f64| {
         if !away.is_finite() || sigma <= 0.0 {
             return 1.0;
@@ -138,16 +140,6 @@ fn spikes(residual: &[f64], weights: &[f64]) -> Vec<f64> {
     };
     // Within four deviations nothing is a spike, and noise keeps its full weight.
     away.iter().map(|away| if away.abs() <= 4.0 * sigma { 1.0 } else { weight(away) }).collect()
-}
-
-/// The middle value; the mean of the two middle ones where their number is even.
-pub(super) fn median(values: &mut [f64]) -> Option<f64> {
-    if values.is_empty() {
-        return None;
-    }
-    values.sort_unstable_by(f64::total_cmp);
-    let middle = values.len() / 2;
-    Some(if values.len() % 2 == 1 { values[middle] } else { 0.5 * (values[middle - 1] + values[middle]) })
 }
 
 #[cfg(test)]

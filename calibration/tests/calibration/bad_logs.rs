@@ -268,6 +268,20 @@ fn thermal_refuses_a_log_in_another_attitude_than_the_stated_one() {
     assert!(!format!("{said}{errors}").contains("do not fit the attitude"), "{said}{errors}");
     let refused = fails(&[&call[..], &["--roll", "180"]].concat(), 1);
     assert!(refused.contains("run.mcap: the accelerometers do not fit the attitude"), "{refused}");
+    // A run that only judges is told of.
+    let judge = folder.path().join("judge.mcap");
+    let mut swapped = events_of(&[fibre_optic(6, "FOG-0001", 3000.0)]);
+    for event in &mut swapped {
+        if let LogEvent::Accel { tick, .. } = event {
+            tick.readings.swap(0, 2);
+        }
+    }
+    record_events(&judge, "FOG-0001", &swapped);
+    let with_judge = [&call[..], &["--roll", "0", "--judge", judge.to_str().unwrap()]].concat();
+    let (_, said, errors) = words(&calibrate(&with_judge));
+    let told = format!("{said}{errors}");
+    assert!(told.contains("judge.mcap: accelerometers x and z look swapped"), "{told}");
+    assert!(!told.contains("run.mcap: accelerometers"), "{told}");
 }
 
 #[test]

@@ -105,6 +105,14 @@ fn drift_tells_of_a_step() {
 }
 
 #[test]
+fn impact_takes_a_gyro_only_where_it_has_something() {
+    let words = fails(&["impact", "--seeds", "2", "--gyro", "x"], 2);
+    assert!(words.contains("give --trend or --constant, or leave it out"), "{words}");
+    let words = fails(&["impact", "--seeds", "2", "--trend", "0.0001", "--gyro", "each"], 2);
+    assert!(words.contains("give x, y, z or all"), "{words}");
+}
+
+#[test]
 fn impact_tells_of_missing_ticks_and_of_what_a_short_log_lacks() {
     let folder = tempfile::tempdir().unwrap();
     let document = shipped("FOG-0001.toml").display().to_string();

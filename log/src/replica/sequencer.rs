@@ -10,6 +10,7 @@
 //! there on, and a [`Notice`] says what is missing.
 
 mod anchor;
+mod copies;
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
@@ -19,6 +20,7 @@ use isotherm_protocol::key::Input;
 use isotherm_protocol::stream::Heard;
 
 use anchor::Search;
+use copies::Copies;
 
 use super::notice::Notice;
 use super::outline::{Mark, MarkKind, Outline, Place};
@@ -103,6 +105,8 @@ pub struct Sequencer {
     published: Option<u64>,
     /// For the memory that the next stream begins with.
     search: Search,
+    /// For the memory that the last stream began with.
+    copies: Copies,
     out: VecDeque<Deed>,
     now_ns: u64,
     over: bool,
@@ -139,6 +143,7 @@ impl Sequencer {
             given: Default::default(),
             published: None,
             search: Search::default(),
+            copies: Copies::default(),
             out: VecDeque::new(),
             now_ns: 0,
             over: false,
@@ -150,8 +155,10 @@ impl Sequencer {
     pub fn frame(&mut self, input: Input, received_ns: u64, bytes: Vec<u8>) {
         self.now_ns = self.now_ns.max(received_ns);
         self.order += 1;
-        if let Some(waiting) = self.waiting.get_mut(input.index()) {
-            waiting.push_back(Frame { order: self.order, received_ns, bytes });
+        let frame = Frame { order: self.order, received_ns, bytes };
+        let frame = self.copies.keep(input.index(), frame);
+        if let Some((waiting, frame)) = self.waiting.get_mut(input.index()).zip(frame) {
+            waiting.push_back(frame);
         }
     }
 
@@ -299,6 +306,7 @@ impl Sequencer {
         }
         let place = self.place(input);
         if let Some((frames, notice)) = place {
+            let notice = notice.filter(|notice| !self.gives_copies(notice));
             self.out.extend(notice.map(Deed::Notice));
             if let Some(to_go) = self.to_go.get_mut(index) {
                 *to_go = Some(frames);
@@ -379,6 +387,9 @@ impl Sequencer {
             (mark.kind != MarkKind::Ended).then_some(Standing { instance, number, heard: mark.heard });
         self.to_go = [None; Input::ALL.len()];
         self.published = None;
+        if !anchor {
+            self.copies = Copies::default();
+        }
         true
     }
 }

@@ -51,6 +51,45 @@ fn a_recording_from_the_middle_does_so_too() {
 }
 
 #[test]
+fn a_doubled_frame_between_whose_copies_a_memory_was_made_is_no_difference() {
+    let temperature = |message: &Message| matches!(message.topic, Topic::Raw(_, RawStream::Temperature));
+    for service_hears_both_before in [false, true] {
+        let mut session = Session::new();
+        session.ticks(800);
+        session.recorded.clear();
+        session.ticks(1);
+        let at = session.recorded.iter().position(temperature).unwrap();
+        let copy = session.recorded[at].clone();
+        if service_hears_both_before {
+            session.service.receive(RawStream::Temperature, &copy.frame).unwrap();
+            session.memory();
+            // The copy is longer on its way to the recorder.
+            session.recorded.push(Message { received_ns: session.now_ns + 1_000_000, ..copy });
+        } else {
+            session.memory();
+            session.service.receive(RawStream::Temperature, &copy.frame).unwrap();
+            session.recorded.insert(at + 1, copy);
+        }
+        lively(&mut session);
+        let (account, report) = replay(&session.recording(), Changes::default());
+        assert!(account.agrees() && account.ticks > 1000, "{service_hears_both_before}: {account:#?}");
+        // A copy that the service heard behind the memory is given once that is known: all that differs is how late it came.
+        let told = if service_hears_both_before { &[][..] } else { &["other memory"] };
+        assert_eq!(kinds(&report), told, "{service_hears_both_before}: {report:#?}");
+        for notice in &report.notices {
+            let Notice::OtherMemory { words, .. } = notice else { unreachable!() };
+            assert_eq!(words, "temperature_late 8 here, 0 there");
+        }
+        // A frame that the service did not hear and that is no copy is told.
+        let mut more = session.recording();
+        let at = more.iter().rposition(temperature).unwrap();
+        let frame = more[at].clone();
+        more.insert(at, Message { frame: [&frame.frame[..], &[0]].concat(), ..frame });
+        assert!(kinds(&replay(&more, Changes::default()).1).contains(&"not heard"));
+    }
+}
+
+#[test]
 fn a_memory_that_is_lost_the_first_file_of_a_row_is_enough_and_so_is_the_second() {
     let mut session = Session::new();
     session.ticks(400);

@@ -26,7 +26,7 @@ pub(crate) struct LogArgs {
     /// Unit to take from recordings, all without it; of a text log, the unit that it is of; may be given several times
     #[arg(long, short, value_name = "SERIAL")]
     pub(crate) unit: Vec<String>,
-    /// Begin this long after the log's beginning (s)
+    /// Begin this long after the log's beginning (s); recordings are cut between messages
     #[arg(long, value_name = "SECONDS", default_value = "0", value_parser = seconds)]
     pub(crate) start: Span,
     /// Take this much of the log (s); without it, all

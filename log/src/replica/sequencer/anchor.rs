@@ -7,6 +7,7 @@ use isotherm_protocol::codec;
 use isotherm_protocol::key::{Input, RawStream};
 use isotherm_protocol::raw::GyroBatch;
 
+use super::copies::Copies;
 use super::{Frame, NEAR_NS, Sequencer};
 use crate::replica::outline::{Mark, MarkKind};
 
@@ -39,8 +40,14 @@ impl Sequencer {
             self.marks.drain(..better);
             return true;
         }
-        let cuts =
-            if mark.kind == MarkKind::Memory { self.behind_memory(&mark) } else { self.before_first(&mark) };
+        let cuts = if mark.kind == MarkKind::Memory {
+            let cuts = self.behind_memory(&mark);
+            self.set_copies_aside(&mark, &cuts);
+            cuts
+        } else {
+            self.copies = Copies::default();
+            self.before_first(&mark)
+        };
         // A stream whose service has stopped is gone; one that was killed may have heard what comes before the cut.
         while let Some(index) = self.first_before(&cuts) {
             self.give(index);
