@@ -27,11 +27,23 @@ pub(super) fn read<W: Watch>(
         }
     }
     let channels = document.temperature.channel.iter();
-    let all: Vec<(bool, String)> = channels.map(|channel| words(channel, raw.get(&channel.name))).collect();
+    let all: Vec<(bool, String)> =
+        channels.clone().map(|channel| words(channel, raw.get(&channel.name))).collect();
     let is_wrong = all.iter().any(|(wrong, _)| *wrong);
     let told: Vec<&str> =
         all.iter().filter(|(wrong, _)| *wrong == is_wrong).map(|(_, words)| words.as_str()).collect();
-    Ok(format!("temperatures by the document's conversion_deg_c: {}", told.join("; ")))
+    let mut limits: Vec<String> = Vec::new();
+    for [low, high] in channels.map(|channel| channel.range_deg_c) {
+        let words = format!("{low}…{high} °C");
+        if !limits.contains(&words) {
+            limits.push(words);
+        }
+    }
+    Ok(format!(
+        "temperatures by the document's conversion_deg_c: {}. Its range_deg_c is {}",
+        told.join("; "),
+        limits.join(" and ")
+    ))
 }
 
 /// What a channel reads, and whether that cannot be right.
@@ -54,7 +66,7 @@ fn words(channel: &isotherm_protocol::document::Channel, raw: Option<&Vec<f64>>)
     }
     let reads = format!("{name} reads {}…{} °C", short(from), short(to));
     if from < low || to > high {
-        return (true, format!("{reads}, its range_deg_c is {low}…{high} °C{numbers}"));
+        return (true, format!("{reads}{numbers}"));
     }
     let usual = median(&good.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect::<Vec<f64>>());
     if usual > limit {
@@ -66,7 +78,7 @@ fn words(channel: &isotherm_protocol::document::Channel, raw: Option<&Vec<f64>>)
             ),
         );
     }
-    (!numbers.is_empty(), format!("{reads}, its range_deg_c is {low}…{high} °C{numbers}"))
+    (!numbers.is_empty(), format!("{reads}{numbers}"))
 }
 
 /// Channels that freeze, by the rule of `drift`; those that freeze alike are named together.

@@ -69,6 +69,8 @@ pub struct Made {
     pub judged: Vec<Measured>,
     /// Whether the Earth's rate was taken off in a stated attitude.
     pub earth_known: bool,
+    /// Whether the weights of the base are near those of the unit.
+    pub scale_known: bool,
     /// White noise of each gyro (°/√h).
     pub walk: Vec<f64>,
     /// Verdicts, by case axis.
@@ -146,6 +148,7 @@ pub fn make<W: Watch>(wanted: &Wanted<'_>, mut watch: impl FnMut() -> W) -> Resu
         steps,
         judged,
         earth_known: !wanted.place.is_empty(),
+        scale_known: wanted.scale_known,
         walk,
         verdicts: Vec::new(),
         temperatures_deg_c: temperatures,
@@ -192,9 +195,10 @@ fn read_all<W: Watch>(
                 }
             }
             warnings.push(format!(
-                "{} ({} °/s) less than a turn: up to the Earth's 15 °/h of its rate is left in it; let steps last for a whole turn",
-                counted(short.len(), "step is", "steps are"),
-                rates.join(", ")
+                "{} of {} °/s {} than a turn: up to the Earth's 15 °/h is left in that; let steps last for whole turns",
+                counted(short.len(), "step", "steps"),
+                rates.join(", "),
+                if short.len() == 1 { "is shorter" } else { "are shorter" }
             ));
         }
     }

@@ -45,6 +45,15 @@ pub fn matched(steps: &[Step], bins: &[Bin], plateaus: &[Plateau]) -> Result<Vec
             })?;
             Ok(Matched { step: *step, plateau })
         };
+        if let Some([a, b]) = overlapping(steps) {
+            let words = |[from, to]: [f64; 2]| format!("{from}…{to} s");
+            return Err(format!(
+                "log {}: two steps overlap, {} and {}: a stretch of the log may count once only. Mend begin_s and end_s in --steps",
+                first.run + 1,
+                words(a),
+                words(b)
+            ));
+        }
         return steps.iter().map(of).collect();
     }
     if steps.iter().any(|step| step.window_s.is_some()) {
@@ -99,6 +108,13 @@ pub fn matched(steps: &[Step], bins: &[Bin], plateaus: &[Plateau]) -> Result<Vec
     );
     all.sort_by_key(|one| one.plateau.bins[0]);
     Ok(all)
+}
+
+/// Windows of two steps that share a time.
+fn overlapping(steps: &[Step]) -> Option<[[f64; 2]; 2]> {
+    let mut windows: Vec<[f64; 2]> = steps.iter().filter_map(|step| step.window_s).collect();
+    windows.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    windows.windows(2).find(|pair| pair[1][0] < pair[0][1]).map(|pair| [pair[0], pair[1]])
 }
 
 /// The plateaus in which the table stands, by the slowest of the stated rates.

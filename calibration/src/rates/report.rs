@@ -13,6 +13,8 @@ use crate::report::{Coefficient, FitReport};
 const HEIGHT: u32 = 220;
 /// Largest size of what is left, in its standard deviations, before it is called a nonlinearity.
 const SEEN: f64 = 4.0;
+/// Share by which a weight changes at most without a word: what micromechanical gyros differ by from their data sheet.
+const OTHER_WEIGHT: f64 = 0.1;
 
 /// The report.
 pub(super) fn report(made: &Made) -> FitReport {
@@ -41,7 +43,7 @@ pub(super) fn report(made: &Made) -> FitReport {
         match made.gyros.get(index) {
             Some(Ok(found)) => {
                 if found.axis.is_none() {
-                    let stays = "the steps turn about fewer than three directions: its input axis stays that of the document";
+                    let stays = "the steps turn about fewer than three directions: the input axis stays that of the document";
                     told.push((&sensor.name, stays.to_owned()));
                 }
                 let weight = sensor
@@ -51,12 +53,13 @@ pub(super) fn report(made: &Made) -> FitReport {
                 coefficients(&sensor.name, found, weight, &mut report);
                 linearity(made, index, &sensor.name, found, &mut report);
             }
-            Some(Err(reason)) => told.push((&sensor.name, format!("{reason}; its weight and axis stay"))),
+            Some(Err(reason)) => told.push((&sensor.name, format!("{reason}; weight and axis stay"))),
             None => {}
         }
     }
     report.warnings.extend(together(&told));
     report.warnings.extend(widened(made));
+    report.warnings.extend(other_weights(made));
     if !made.judged.is_empty() {
         let steps = counted(made.judged.len(), "step", "steps");
         report.notes.push(format!("Out of sample: {steps} of the judging logs."));
@@ -115,6 +118,25 @@ fn coefficients(name: &str, found: &GyroRates, weight: Option<(f64, &str)>, repo
             }
         }
     }
+}
+
+/// Gyros whose weight is far from what it was, in one sentence: the rates, or the unit of measure, may be others than stated.
+fn other_weights(made: &Made) -> Option<String> {
+    let sensors = made.written.document.gyro.sensor.iter().zip(&made.gyros);
+    let other = sensors.filter(|_| made.scale_known).filter_map(|(sensor, found)| {
+        let change = 1.0 / found.as_ref().ok()?.gain[0].abs() - 1.0;
+        (change.abs() > OTHER_WEIGHT).then(|| (sensor.name.as_str(), format!("{} %", short(100.0 * change))))
+    });
+    let (names, changes): (Vec<&str>, Vec<String>) = other.unzip();
+    (!names.is_empty()).then(|| {
+        format!(
+            "{}: the weight changes by {}, more than {:.0} %: are the stated rates those of the table, are the readings in the unit of measure that \
+             the mapping has, and is the document that of this unit?",
+            gyros(&names),
+            changes.join(", "),
+            100.0 * OTHER_WEIGHT
+        )
+    })
 }
 
 /// Gyros whose steps scatter by more than noise, in one sentence.

@@ -71,7 +71,7 @@ pub fn solve(points: &[Point], old: [f64; 3]) -> Result<GyroRates, String> {
     let total = points.iter().map(|point| dot(point.rate, point.rate).sqrt()).fold(0.0, f64::max);
     if most < 0.1 * total {
         return Err(
-            "its input axis is across all axes of the table: turn about an axis nearer to it".to_owned()
+            "the input axis is across all axes of the table: turn about an axis nearer to it".to_owned()
         );
     }
     let both =

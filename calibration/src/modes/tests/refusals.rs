@@ -175,7 +175,7 @@ fn thermometers_are_told_with_what_they_read() {
     refused(
         with(|raw, _| 100.0 * raw - 150.0 + 273.15),
         &base,
-        &["gyro0 reads 3", "its range_deg_c is -70…130 °C"],
+        &["gyro0 reads 3", "Its range_deg_c is -70…130 °C"],
     );
     refused(with(|_, _| f64::NAN), &base, &["gyro0 reads no numbers"]);
     let made = made(with(|raw, time_s| if time_s < 205 { raw } else { 1.75 }), &base).unwrap();
