@@ -89,45 +89,41 @@ impl Coverage {
         Ok(())
     }
 
-    /// Share of a channel's fitted range that was seen; `None` where nothing was fitted over its temperature.
-    fn covered(channel: &ChannelRange) -> Option<f64> {
-        let [low, high] = channel.fitted.filter(|[low, high]| high > low)?;
-        let Some([from, to]) = channel.seen else { return Some(0.0) };
-        Some(((to.min(high) - from.max(low)) / (high - low)).clamp(0.0, 1.0))
-    }
-
-    /// What is to be looked at.
+    /// What is to be looked at: one sentence of each kind, however many channels or sensors it is about.
     pub(super) fn warnings(&self) -> Vec<String> {
+        let silent: Vec<&str> =
+            self.channels.iter().filter(|channel| channel.seen.is_none()).map(|c| c.name.as_str()).collect();
         let mut warnings = Vec::new();
-        for channel in &self.channels {
-            let name = &channel.name;
-            let Some([from, to]) = channel.seen else {
-                warnings.push(format!(
-                    "temperature channel {name}: no readings, what follows it stood at the assumed temperature throughout: is the \
-                     channel in the log, under this name?"
-                ));
-                continue;
-            };
-            let Some(share) = Self::covered(channel).filter(|share| *share < ENOUGH) else { continue };
-            let [low, high] = channel.fitted.unwrap_or_default();
+        if !silent.is_empty() {
             warnings.push(format!(
-                "temperature channel {name}: the logs cover {from:.1}…{to:.1} °C, {:.0} % of the fitted {low:.1}…{high:.1} °C: nothing \
-                 is said of the rest",
-                share * 100.0
+                "no readings of temperature channel {}: what follows it stood at the assumed temperature throughout; is it in the log, \
+                 under this name?",
+                silent.join(", ")
             ));
         }
-        for sensor in self.gyros.iter().chain(&self.accels) {
-            let name = &sensor.name;
-            let shares = [
-                (sensor.clamped, "outside the fitted range of temperature, where terms are held at its end"),
-                (sensor.stale, "without a fresh temperature"),
-                (sensor.invalid, "without a valid reading"),
-            ];
-            for (count, what) in shares {
-                if sensor.share(count) > CLAMPED {
-                    warnings
-                        .push(format!("{name}: {:.1} % of the ticks {what}", sensor.share(count) * 100.0));
-                }
+        let little: Vec<String> = self.channels.iter().filter_map(ChannelRange::covers_little).collect();
+        if !little.is_empty() {
+            warnings.push(format!(
+                "of the fitted range of temperature the logs cover {}: nothing is said of the rest",
+                little.join(", ")
+            ));
+        }
+        let shares: [(fn(&Sensor) -> u64, &str); 3] = [
+            (
+                |sensor| sensor.clamped,
+                "are outside the fitted range of temperature, where terms are held at its end",
+            ),
+            (|sensor| sensor.stale, "are without a fresh temperature"),
+            (|sensor| sensor.invalid, "are without a valid reading"),
+        ];
+        for (count, what) in shares {
+            let sensors = self.gyros.iter().chain(&self.accels);
+            let many: Vec<String> = sensors
+                .filter(|sensor| sensor.share(count(sensor)) > CLAMPED)
+                .map(|sensor| format!("{:.1} % of {}", sensor.share(count(sensor)) * 100.0, sensor.name))
+                .collect();
+            if !many.is_empty() {
+                warnings.push(format!("of the ticks, {} {what}", many.join(", ")));
             }
         }
         warnings
@@ -144,8 +140,7 @@ impl Coverage {
                 channel.name.clone(),
                 range(channel.seen, 1),
                 range(channel.fitted, 1),
-                Self::covered(channel)
-                    .map_or_else(|| "–".to_owned(), |share| format!("{:.0} %", share * 100.0)),
+                channel.covered().map_or_else(|| "–".to_owned(), |share| format!("{:.0} %", share * 100.0)),
                 range(rate, 2),
             ]
         };
@@ -169,6 +164,23 @@ impl Coverage {
             rows: self.gyros.iter().chain(&self.accels).map(sensor).collect(),
         };
         vec![("Temperature".to_owned(), channels), ("Flags".to_owned(), sensors)]
+    }
+}
+
+impl ChannelRange {
+    /// Share of the fitted range that was seen; `None` where nothing was fitted over its temperature.
+    fn covered(&self) -> Option<f64> {
+        let [low, high] = self.fitted.filter(|[low, high]| high > low)?;
+        let Some([from, to]) = self.seen else { return Some(0.0) };
+        Some(((to.min(high) - from.max(low)) / (high - low)).clamp(0.0, 1.0))
+    }
+
+    /// How little of it was seen, in words; `None` where it is enough.
+    fn covers_little(&self) -> Option<String> {
+        let share = self.covered().filter(|share| *share < ENOUGH)?;
+        let ([from, to], [low, high]) = (self.seen?, self.fitted?);
+        let name = &self.name;
+        Some(format!("{:.0} % of {name} ({from:.1}…{to:.1} of {low:.1}…{high:.1} °C)", share * 100.0))
     }
 }
 

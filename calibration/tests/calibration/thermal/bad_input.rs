@@ -250,7 +250,11 @@ fn gaps_are_told() {
     let seconds: Vec<u32> = (0..5400).filter(|second| !(2000..2200).contains(second)).collect();
     let holed = run_at(&seconds);
     let made = tried(holed, Method::Joint).unwrap();
-    assert!(made.report.warnings.iter().any(|words| words.contains("gaps")), "{:?}", made.report.warnings);
+    assert!(
+        made.report.warnings.iter().any(|words| words.contains("1 gap in the gyro ticks")),
+        "{:?}",
+        made.report.warnings
+    );
 }
 
 /// The seconds of a list only.
