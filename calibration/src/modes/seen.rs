@@ -139,7 +139,7 @@ mod tests {
         let dies = seen(|number| if number < 6000 { slow(number) } else { 0.0 }).frozen(30.0).unwrap();
         assert!((dies.from_s - 599.6).abs() < 0.5 && (dies.to_s - 999.9).abs() < 0.01, "{dies:?}");
         // Through a mode in which it shows next to nothing.
-        let in_one_mode = |number: u32| if number / 300 % 2 == 0 { slow(number) } else { 0.0 };
+        let in_one_mode = |number: u32| if (number / 300).is_multiple_of(2) { slow(number) } else { 0.0 };
         assert_eq!(seen(in_one_mode).frozen(30.0), None);
         let per_second = seen(slow).per_second().unwrap();
         assert!((per_second - 10.0 / 7.0).abs() < 0.5, "{per_second}");

@@ -114,7 +114,7 @@ mod tests {
     fn run(scale: impl Fn(f64) -> f64) -> Vec<Second> {
         let second = |number: u32| {
             let time_s = f64::from(number);
-            let mode = if number / 30 % 2 == 0 { 1.0 } else { -1.0 };
+            let mode = if (number / 30).is_multiple_of(2) { 1.0 } else { -1.0 };
             let noise = f64::from(number * 7 % 11) * 0.1;
             let rate =
                 [7.3, -4.2, -12.4].map(|earth| scale(time_s) * (earth + 2.0 * mode) + 1e-3 * time_s + noise);

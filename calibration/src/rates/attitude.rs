@@ -68,7 +68,7 @@ fn of_run(place: &Place, run: &Turned, (axes, gains): (&[[f64; 3]], &[f64])) -> 
     });
     run.rests.iter().find_map(|rest: &Plateau| {
         let [from, to] = rest.bins;
-        let words = shown(from..to, *gravity.get((from + to) / 2)?)?;
+        let words = shown(from..to, *gravity.get(usize::midpoint(from, to))?)?;
         let broken = bins.get(..to)?.iter().filter(|bin| bin.broken).count();
         let gaps = if broken == 0 {
             String::new()

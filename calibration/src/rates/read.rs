@@ -103,7 +103,8 @@ pub(super) fn read<W: Watch>(
                     )
                 },
             );
-            let troubles: String = binned.troubles.iter().map(|words| format!("; {words}")).collect();
+            let troubles =
+                binned.troubles.iter().fold(String::new(), |words, trouble| words + "; " + trouble);
             return Ok(Err(format!(
                 "log {}: the unit cannot be levelled at its beginning: {force}. Give --pitch and --roll of that moment, or mend the columns \
                  of the accelerometers in the mapping{troubles}",

@@ -219,7 +219,7 @@ fn weights_far_from_the_old_ones_and_steps_that_overlap_are_told() {
     let one = listed(&["x".to_owned()], [&RATES, &[]], [1, 0]).unwrap();
     let warnings = made(&runs, &one, &place()).unwrap().report().warnings;
     let told = warnings.iter().find(|words| words.contains("more than 10 %")).unwrap();
-    assert!(told.starts_with("gyro x: the weight changes by 66."), "{told}");
+    assert!(told.starts_with("gyro x: the weight changes by 67.0 %"), "{told}");
     let table = table(5);
     let right = made(&table, &steps(3), &place()).unwrap().report().warnings;
     assert!(!right.iter().any(|words| words.contains("more than 10 %")), "{right:?}");
