@@ -10,6 +10,7 @@
 //! | [`stand`] | how the unit stands or turns in a run, and what it would read without error |
 //! | [`bare`] | the unit without the terms that are fitted; a nominal document for a log without one |
 //! | [`samples`], [`checks`] | a run as windows, and what must hold of it |
+//! | [`thermometer`] | the noise of thermometers, taken out of what a fit is made with |
 //! | [`columns`] | what one unit of each term subtracts, from the corrector |
 //! | [`branches`] | plateaus, ramps, and the pieces that cross-validation leaves out |
 //! | [`solve`] | weighted, regularised, robust linear least squares |
@@ -38,6 +39,7 @@ pub mod settings;
 pub mod solve;
 pub mod stand;
 mod target;
+pub mod thermometer;
 mod told;
 
 pub use fit::{Fitted, fit};

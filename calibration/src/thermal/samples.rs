@@ -7,6 +7,7 @@ use isotherm_correction::units::Timestamp;
 use isotherm_protocol::document::{Curve, Document, Shape};
 
 use super::bare::along_axes;
+use super::thermometer::without_noise;
 use crate::error::Error;
 use crate::means::Means;
 use crate::run::{Run, Troubles, Watch};
@@ -30,7 +31,7 @@ pub struct Samples {
     pub forces: Vec<Vec<f64>>,
     /// Specific force (m/s²) that one unit of each accelerometer's output stands for.
     pub responses: Vec<Vec<f64>>,
-    /// Temperature readings by channel.
+    /// Temperature readings by channel, without the noise of the thermometers.
     pub temperatures: BTreeMap<String, Vec<TemperatureReading>>,
     /// Smoothed temperatures by channel at the end of each window (°C).
     pub deg_c: BTreeMap<String, Vec<f64>>,
@@ -119,16 +120,20 @@ pub fn start_ns(series: &Series) -> i64 {
     series.gyros.end_ns.first().map_or(0, |end| end.saturating_sub(first))
 }
 
-/// The temperature readings of a series by channel.
+/// The temperature readings of a series by channel, without the noise of the thermometers: see [`without_noise`].
 #[must_use]
 pub fn readings(series: &Series) -> BTreeMap<String, Vec<TemperatureReading>> {
     let channel = |(name, channel): (&String, &crate::series::Channel)| {
         let known = ChannelName::from(name).ok()?;
-        let pairs = channel.time_ns.iter().zip(&channel.raw);
+        let first = channel.time_ns.first().copied().unwrap_or_default();
+        #[expect(clippy::cast_precision_loss, reason = "lengths of logs")]
+        let since_s = |time: &i64| time.saturating_sub(first) as f64 * 1e-9;
+        let time_s: Vec<f64> = channel.time_ns.iter().map(since_s).collect();
+        let pairs = channel.time_ns.iter().zip(without_noise(&time_s, &channel.raw));
         let readings = pairs.map(|(time, raw)| TemperatureReading {
             channel: known,
             time: Timestamp::from_ns(*time),
-            raw: *raw,
+            raw,
         });
         Some((name.clone(), readings.collect()))
     };

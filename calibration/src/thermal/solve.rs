@@ -12,6 +12,10 @@ const NOTHING: f64 = 1e-11;
 const PASSES: usize = 4;
 /// Distance from the residual's neighbours at which a window counts for nothing (robust standard deviations).
 const BISQUARE: f64 = 7.0;
+/// One window of so many is a spike at most, and a spike stands out of what the model leaves over elsewhere: its standard deviation is
+/// taken to be at least this share of that. Where there is next to no noise, the ends of the ramps would count as spikes otherwise.
+const MOST_SPIKES: usize = 50;
+const BESIDE_THE_REST: f64 = 0.25;
 /// Neighbours on either side that a window is compared with.
 const NEIGHBOURS: usize = 3;
 
@@ -116,6 +120,17 @@ fn inflation(residual: &[f64], good: &[usize]) -> f64 {
     (1.0 + rho) / (1.0 - rho)
 }
 
+/// The residual that all but a few windows stay below.
+fn largest(residual: &[f64], weights: &[f64]) -> f64 {
+    let known = residual.iter().zip(weights).filter(|(left, weight)| left.is_finite() && **weight > 0.0);
+    let mut sizes: Vec<f64> = known.map(|(left, _)| left.abs()).collect();
+    if sizes.is_empty() {
+        return 0.0;
+    }
+    let place = sizes.len() - 1 - sizes.len() / MOST_SPIKES;
+    *sizes.select_nth_unstable_by(place, f64::total_cmp).1
+}
+
 /// Weights that take spikes out: a residual is held against the median of its neighbours, so that what a model leaves over
 /// minutes keeps its weight, however large it is.
 fn spikes(residual: &[f64], weights: &[f64]) -> Vec<f64> {
@@ -130,7 +145,9 @@ fn spikes(residual: &[f64], weights: &[f64]) -> Vec<f64> {
         (0..residual.len()).map(|row| near(row).map_or(f64::NAN, |near| residual[row] - near)).collect();
     let known = away.iter().zip(weights).filter(|(away, weight)| away.is_finite() && **weight > 0.0);
     let sizes: Vec<f64> = known.map(|(away, _)| away.abs()).collect();
-    let sigma = median_if_any(&sizes).map_or(0.0, |middle| 1.4826 * middle);
+    let sigma = median_if_any(&sizes)
+        .map_or(0.0, |middle| 1.4826 * middle)
+        .max(BESIDE_THE_REST * largest(residual, weights));
     let weight = |away: &f64| {
         if !away.is_finite() || sigma <= 0.0 {
             return 1.0;
