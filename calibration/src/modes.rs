@@ -7,6 +7,7 @@
 //! | [`cells`] | means between the switches beside the corrector's own columns |
 //! | [`noise`] | white noise, whole counts and Markov drift of the means; least squares under it |
 //! | [`orders`], [`fit`] | orders by cross-validation; one gyro's coefficients |
+//! | `seen`, `units`, `steps`, `temperatures` | what a log shows of dead gyros, other units of measure, motion, thermometers |
 //! | [`checks`] | what a log must have |
 //! | [`judge`] | drift in running mode, before and after |
 //! | [`make`], [`document`] | the whole procedure; the document |
@@ -23,7 +24,12 @@ pub mod noise;
 pub mod orders;
 mod prepare;
 mod report;
+mod seen;
 pub mod servo;
+mod steps;
 pub mod switches;
+mod temperatures;
 #[cfg(test)]
 mod tests;
+mod units;
+pub(crate) mod words;

@@ -5,11 +5,12 @@
 //! | [`steps`] | what the table was told to do |
 //! | [`bins`] | what the gyros gave, in short means along their own input axes |
 //! | [`plateaus`] | where the table turned steadily |
-//! | [`matching`], `checks` | which plateau is which step; whether the unit turned as stated |
+//! | [`matching`], `checks`, `attitude` | which plateau is which step; whether the unit turned and stood as stated |
 //! | [`earth`] | Earth rate in a case that turns |
 //! | [`solve`] | least squares over the steps, one gyro at a time |
 //! | [`make`], [`document`] | the whole procedure; the document |
 
+mod attitude;
 pub mod bins;
 mod checks;
 pub mod document;

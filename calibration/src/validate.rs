@@ -15,7 +15,7 @@ use isotherm_protocol::document::{Document, Sample};
 use crate::drift::figures::short;
 use crate::error::Error;
 use crate::means::{Means, Size, usual_window_s};
-use crate::report::{Curve, FitReport, Rest, SAME_SHARE, Verdict};
+use crate::report::{Curve, Figure, FitReport, Rest, SAME_SHARE, Verdict};
 use crate::run::Watch;
 use crate::swapped::{Shown, up};
 use crate::thermal::Stand;
@@ -105,7 +105,10 @@ pub fn validate(
             ));
         }
     }
-    report.verdicts = Curve::verdicts(&report.residuals);
+    report.verdicts = Curve::verdicts(&report.residuals)
+        .into_iter()
+        .map(|verdict| verdict.stated_as(Figure::Rms))
+        .collect();
     let liveliest = |of: &Verdict| {
         let alike = report.verdicts.iter().filter(|verdict| verdict.measure == of.measure);
         alike.map(|verdict| verdict.deciding()[0].deviation).fold(0.0, f64::max)

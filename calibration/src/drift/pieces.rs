@@ -2,7 +2,7 @@
 
 pub mod checks;
 mod far;
-mod steps;
+pub(crate) mod steps;
 
 use super::columns::Columns;
 use super::figures::{counted, short};
@@ -315,7 +315,7 @@ mod tests {
         let grid = Grid::of(columns(times.clone(), vec![wave(1000), vec![7.0; 1000], some_bad])).unwrap();
         assert_eq!((grid.sensors.len(), grid.sensors[1].pieces.len()), (2, 1), "one bad reading is bridged");
         assert!(grid.refused[0].contains("gyro 1: every reading is 7"), "{:?}", grid.refused);
-        assert!(grid.notes.iter().any(|note| note.contains("1 readings are no good numbers")));
+        assert!(grid.notes.iter().any(|note| note.contains("1 reading is no good numbers")));
         let mut back = times.clone();
         back[10] = 0;
         for (times, values, words) in [

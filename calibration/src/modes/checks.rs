@@ -6,7 +6,10 @@ use isotherm_protocol::document::{Document, GyroOutput};
 
 use super::cells::{Gathered, Second};
 use super::fit::deg_per_h;
+use super::seen::Stay;
 use super::switches::{Switches, real};
+use super::{steps, units};
+use crate::drift::figures::{counted, short, six};
 use crate::means::Size;
 use crate::robust::{median, scatter_of_steps};
 use crate::swapped::Shown;
@@ -29,7 +32,7 @@ const TURN_DEG_PER_H: f64 = 15.0;
 const COUNTS: f64 = 4.0;
 const PUSH_M_PER_S2: f64 = 5e-3;
 /// Largest mean rate of a unit at rest, Earth rate apart (°/h): 0.05 °/s.
-const TURNING_DEG_PER_H: f64 = 180.0;
+pub(super) const TURNING_DEG_PER_H: f64 = 180.0;
 /// Parts of the runs: what differs between their means is drift, not noise.
 const PARTS: usize = 20;
 
@@ -55,8 +58,8 @@ pub fn before(switches: &Switches, document: &Document, transition_ticks: Option
     } else {
         if switches.between_s.len() + 1 < SWITCHES {
             reasons.push(format!(
-                "the mode switches {} times, {SWITCHES} times are needed: record longer, or switch more often",
-                switches.between_s.len() + 1
+                "the mode switches {}, {SWITCHES} times are needed: record longer, or switch more often",
+                counted(switches.between_s.len() + 1, "time", "times")
             ));
         }
         if switches.unbalance() > UNBALANCE {
@@ -96,12 +99,33 @@ pub fn before(switches: &Switches, document: &Document, transition_ticks: Option
             switches.ticks
         ));
     }
+    for (sensor, seen) in
+        switches.seen.iter().enumerate().filter(|(sensor, _)| !switches.dead.contains(sensor))
+    {
+        if let Some(Stay { reading, from_s, to_s, .. }) = seen.frozen(switches.period_s()) {
+            reasons.push(format!(
+                "gyro {} gives the same reading, {}, from {from_s:.0} s to {to_s:.0} s, and changes all the time elsewhere: it failed, or its \
+                 output was lost; cut the log to where it lives with --start and --duration",
+                name(&sensor),
+                six(reading + 0.0)
+            ));
+        }
+    }
+    if counts == (output == OutputKind::Counts) && switches.sensors == stated {
+        reasons.extend(units::rates(switches, document));
+        reasons.extend(units::half_periods(switches, document));
+    }
+    // What else is wrong with the readings makes them look lost too.
     let lost = switches.transition_ticks();
-    if transition_ticks.is_none() && lost > TRANSITION_TICKS {
-        reasons.push(format!(
-            "readings are lost up to tick {lost} behind a switch, the correction bridges {TRANSITION_TICKS}: does the log mark the \
-             tick of the command? State --transition-ticks to leave it at that"
-        ));
+    if transition_ticks.is_none() && reasons.is_empty() {
+        if lost > TRANSITION_TICKS {
+            reasons.push(format!(
+                "readings are lost up to tick {lost} behind a switch, the correction bridges {TRANSITION_TICKS}: does the log mark the \
+                 tick of the command? State --transition-ticks to leave it at that"
+            ));
+        } else if lost == 0 {
+            reasons.extend(units::late(switches));
+        }
     }
     reasons
 }
@@ -150,7 +174,8 @@ pub fn behind(
     if gathered.cells.is_empty() && reasons.is_empty() {
         reasons.push("no settled stretch of ticks is left between the switches: is --settle shorter than the switches are apart?".to_owned());
     }
-    reasons.extend(motion(&gathered.seconds, names, count_arcsec));
+    let steps = steps::found(&gathered.seconds, names);
+    reasons.extend(if steps.is_empty() { motion(&gathered.seconds, names, count_arcsec) } else { steps });
     if let Some(earth) = earth {
         for (place, name) in names.into_iter().enumerate() {
             let rates: Vec<f64> = gathered.seconds.iter().map(|second| second.rate[place]).collect();
@@ -164,6 +189,12 @@ pub fn behind(
         }
     }
     reasons
+}
+
+/// Whether too many ticks lack a temperature.
+pub(super) fn lacks_temperatures(gathered: &Gathered) -> bool {
+    let [there, _] = gathered.ticks.map(real);
+    [gathered.stale, gathered.warming_up].into_iter().any(|count| real(count) > UNUSABLE * there)
 }
 
 /// Columns that look swapped, signs, scales and attitudes that look wrong, where what the gyros sense of the Earth (°/h) or the direction of gravity is known.
@@ -204,10 +235,12 @@ fn motion(seconds: &[Second], names: [&str; 3], count_arcsec: [f64; 3]) -> Vec<S
         let forces: Vec<f64> = seconds.iter().map(|second| second.force[axis]).collect();
         if let Some((second, value, limit)) = jump(seconds, &forces, PUSH_M_PER_S2, false) {
             reasons.push(format!(
-                "the unit was pushed {:.0} s after the beginning: {value:.4} m/s² along {} in a second, {limit:.4} m/s² are allowed at \
-                 rest; cut the log with --start and --duration",
+                "the unit was pushed {:.0} s after the beginning: {} m/s² along {} in a second, {} m/s² are allowed at rest; cut the log \
+                 with --start and --duration",
                 second.time_s,
-                ["x", "y", "z"][axis]
+                short(value),
+                ["x", "y", "z"][axis],
+                short(limit)
             ));
         }
     }

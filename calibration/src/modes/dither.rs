@@ -6,6 +6,7 @@
 use super::cells::{Cell, MAX_POWER};
 use super::fit::largest_order;
 use super::noise::Data;
+use super::units::LARGEST_HZ;
 use crate::drift::figures::short;
 
 /// Squared standard errors that the highest coefficient must be away from zero.
@@ -16,9 +17,6 @@ const SEEN: f64 = 3.0;
 const MAX_ORDER: usize = 2;
 /// Smallest rate of temperature (°C/s) at which its delay can be told.
 const SLOWEST_DEG_C_PER_S: f64 = 2e-3;
-
-/// Largest rest frequency, as the half periods count it (Hz).
-const LARGEST_HZ: f64 = 1e6;
 
 /// f0 over temperature.
 #[derive(Debug, Clone, PartialEq)]

@@ -8,6 +8,7 @@ use toml::{Table, Value};
 
 use super::fit::{GyroFit, MEANDER_REFERENCE_DEG_C, Term};
 use super::make::{Made, ServoFit};
+use super::words::gyros as gyros_in_words;
 use crate::report::Sigmas;
 use crate::written::tidy;
 
@@ -132,6 +133,33 @@ pub fn base_constant(base: &Document, sensor: usize, reference_deg_c: f64) -> f6
     curve.and_then(|curve| curve.shape().at(reference_deg_c)).unwrap_or(0.0)
 }
 
+/// That magnetic biases are those of the base with the other sign, in words.
+pub(super) fn inverted(
+    base: &Document,
+    gyros: &[Result<GyroFit, String>],
+    reference_deg_c: f64,
+) -> Option<String> {
+    /// Share of the old bias that may be left of the sum of both, and standard errors that it must be large.
+    const ALIKE: f64 = 0.2;
+    const SEEN: f64 = 10.0;
+    let is_inverted = |(old, found): &(&GyroSensor, &Result<GyroFit, String>)| {
+        let old = old.magnetic_bias.as_ref().and_then(|curve| curve.shape().at(reference_deg_c));
+        let now = found.as_ref().ok().and_then(|fit| fit.coefficient(Term::Magnetic, 0));
+        old.zip(now).is_some_and(|(old, [now, sigma])| {
+            (now + old).abs() < ALIKE * old.abs() && old.abs() > SEEN * sigma
+        })
+    };
+    let sensors = base.gyro.sensor.iter().zip(gyros).filter(is_inverted);
+    let names: Vec<&str> = sensors.map(|(sensor, _)| sensor.name.as_str()).collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "{}: the magnetic bias is that of the document with the other sign: is the log's mode column (+1 is plus), or the sign of the gyro's column, the other way round? The \
+             document holds only where the mode has the same sign as in this log",
+            gyros_in_words(&names)
+        )
+    })
+}
+
 /// What one count of a gyro stands for (″); zero where the output is no count.
 #[must_use]
 pub fn count_arcsec(document: &Document, sensor: usize) -> f64 {
@@ -169,7 +197,10 @@ pub fn sigmas(made: &Made) -> Sigmas {
     for (sensor, found) in made.written.document.gyro.sensor.iter().zip(&made.gyros) {
         for term in [Term::Static, Term::Magnetic, Term::Meander] {
             let own = found.iter().flat_map(|fit| &fit.coefficients).filter(|one| one.term == term);
-            let of_term: Vec<f64> = own.map(|one| tidy(one.sigma)).collect();
+            // Of a constant that was not fitted nothing is known.
+            let is_kept = |power: usize| made.keeps_constants && term == Term::Static && power == 0;
+            let of_term: Vec<f64> =
+                own.map(|one| if is_kept(one.power) { 0.0 } else { tidy(one.sigma) }).collect();
             if !of_term.is_empty() {
                 sigmas.put("gyro", &sensor.name, term.key(), of_term);
             }

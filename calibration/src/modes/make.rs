@@ -12,8 +12,10 @@ use super::judge::judged;
 use super::prepare::{check, earth_of, earth_rate, gaps, groups, provisional, transition_ticks, window_s};
 use super::servo::{self, Transient};
 use super::switches::Switches;
+use super::{temperatures, units};
 use crate::error::Error;
 use crate::report::{Curve as Residual, FitReport};
+use crate::robust::median;
 use crate::run::{Run, Watch};
 use crate::written::Written;
 
@@ -72,6 +74,8 @@ pub struct Made {
     pub reference_deg_c: f64,
     /// Window of the residuals: whole reversal periods (s).
     pub window_s: f64,
+    /// Whether the static biases keep the constants of the base, the attitude not being known.
+    pub keeps_constants: bool,
     /// Residuals of the runs.
     pub residuals: Vec<Residual>,
     /// What is to be said.
@@ -113,11 +117,15 @@ pub fn make<W: Watch>(wanted: &Wanted<'_>, mut watch: impl FnMut() -> W) -> Resu
         let gathered = gather(wanted.runs, &bare, group, cut, &mut watch)?;
         let earth = earth_rate(wanted, &gathered)?;
         earth_case = earth;
-        let doubts = check(&gathered, &bare, group, (earth, wanted.place.as_ref()))?;
-        // Gaps and gravity are the same for every group of gyros.
+        let doubts = check(wanted, &gathered, (&bare, group), earth, &mut watch)?;
+        // Gaps, gravity and temperatures are the same for every group of gyros.
         if group[0] == 0 {
             gaps(&gathered, &mut warnings);
             warnings.extend(doubts);
+            warnings.extend(temperatures::freezing(wanted.runs, &bare, &mut watch)?);
+            let deg_c: Vec<f64> =
+                gathered.cells.iter().map(|cell| cell.powers[0][0] + reference_deg_c).collect();
+            warnings.extend(units::other_dither(&switches, wanted.base, median(&deg_c)));
         }
         for (place, sensor) in group.into_iter().enumerate() {
             let along: Vec<f64> =
@@ -147,6 +155,7 @@ pub fn make<W: Watch>(wanted: &Wanted<'_>, mut watch: impl FnMut() -> W) -> Resu
             .filter_map(|(sensor, fit)| Some(format!("gyro {}: {}", name(sensor), fit.as_ref().err()?)));
         return Err(Error::Refused(reasons.collect()));
     }
+    warnings.extend(document::inverted(wanted.base, &gyros, reference_deg_c));
     if wanted.place.is_none() {
         warnings.push(
             "the Earth rate is not known: the static bias keeps its constant, only its shape is fitted. Give --latitude and \
@@ -174,6 +183,7 @@ pub fn make<W: Watch>(wanted: &Wanted<'_>, mut watch: impl FnMut() -> W) -> Resu
         transition_ticks,
         reference_deg_c,
         window_s,
+        keeps_constants: wanted.place.is_none(),
         residuals: Vec::new(),
         warnings,
     };

@@ -1,14 +1,14 @@
 //! What the procedure needs before it fits: windows, lost ticks, the Earth, a look at what was gathered.
 
-use isotherm_correction::earth::Place;
 use isotherm_protocol::document::{Curve, Document, Servo, ServoKind, Shape};
 
 use super::cells::{Cell, Gathered};
 use super::make::Wanted;
 use super::servo::Transient;
 use super::switches::Switches;
-use super::{checks, document};
+use super::{checks, document, temperatures};
 use crate::error::Error;
+use crate::run::Watch;
 use crate::swapped::up;
 
 /// Length of a window of the residuals, in whole reversal periods (s).
@@ -78,27 +78,32 @@ pub(super) fn earth_of(document: &Document, sensor: usize, cell: &Cell, earth: O
 ///
 /// # Errors
 /// Every reason why nothing can be made of it.
-pub(super) fn check(
+pub(super) fn check<W: Watch>(
+    wanted: &Wanted<'_>,
     gathered: &Gathered,
-    bare: &Document,
-    group: [usize; 3],
-    (earth, place): (Option<[f64; 3]>, Option<&Place>),
+    (bare, group): (&Document, [usize; 3]),
+    earth: Option<[f64; 3]>,
+    watch: &mut impl FnMut() -> W,
 ) -> Result<Vec<String>, Error> {
     let names = group.map(|sensor| bare.gyro.sensor[sensor].name.as_str());
     let counts = group.map(|sensor| document::count_arcsec(bare, sensor));
     let along = earth
         .map(|earth| group.map(|sensor| checks::earth_along(document::row(bare, sensor, f64::NAN), earth)));
-    let reasons = checks::behind(gathered, names, counts, along);
+    let mut reasons = checks::behind(gathered, names, counts, along);
     if !reasons.is_empty() {
+        if checks::lacks_temperatures(gathered) {
+            reasons.push(temperatures::read(wanted.runs, bare, watch)?);
+        }
         return Err(Error::Refused(reasons));
     }
-    Ok(checks::attitude(&gathered.seconds, along, place.and_then(up)))
+    Ok(checks::attitude(&gathered.seconds, along, wanted.place.as_ref().and_then(up)))
 }
 
 pub(super) fn gaps(gathered: &Gathered, warnings: &mut Vec<String>) {
     let [there, missing] = gathered.ticks;
     if missing > 0 {
-        warnings.push(format!("{missing} ticks are missing among {there}: means end there"));
+        let are = if missing == 1 { "tick is" } else { "ticks are" };
+        warnings.push(format!("{missing} {are} missing among {there}: means end there"));
     }
     warnings.extend(gathered.troubles.iter().cloned());
 }

@@ -5,8 +5,9 @@ use isotherm_log::plot::page::Table;
 use super::document::main_axis;
 use super::fit::{GyroFit, Term};
 use super::make::{Made, ServoFit};
-use crate::drift::figures::{per_deg_c, short};
-use crate::report::{Coefficient, Curve, FitReport};
+use super::words::{fixed, together};
+use crate::drift::figures::{counted, per_deg_c, short};
+use crate::report::{Coefficient, Curve, Figure, FitReport};
 
 /// Models of the cross-validation that the report lists for each gyro.
 const MODELS: usize = 5;
@@ -16,14 +17,23 @@ pub(super) fn report(made: &Made) -> FitReport {
     let unit = made.written.document.unit.clone();
     let mut report =
         FitReport::new("Mode-reversed laser gyro: drift polynomials and switch parameters", unit);
-    report.verdicts = Curve::verdicts(&made.residuals);
+    let verdicts = Curve::verdicts(&made.residuals).into_iter();
+    report.verdicts = verdicts.map(|verdict| verdict.stated_as(Figure::Rms)).collect();
     report.residuals.clone_from(&made.residuals);
     report.warnings.clone_from(&made.warnings);
     notes(made, &mut report);
     let mut validation = Vec::new();
+    let mut told: Vec<(&str, String)> = Vec::new();
     for (index, sensor) in made.before.document.gyro.sensor.iter().enumerate() {
         match made.gyros.get(index) {
-            Some(Ok(fit)) => gyro(&sensor.name, fit, &mut report, &mut validation),
+            Some(Ok(fit)) => {
+                gyro(&sensor.name, fit, (made.keeps_constants, &mut report), &mut validation);
+                if fit.left_out > 0 {
+                    let are = counted(fit.left_out, "mean is", "means are");
+                    told.push((&sensor.name, format!("{are} far off and left out")));
+                }
+                told.extend(fit.remarks.iter().map(|remark| (sensor.name.as_str(), remark.clone())));
+            }
             Some(Err(reason)) => refuse(made, index, reason, &mut report),
             None => {}
         }
@@ -32,11 +42,12 @@ pub(super) fn report(made: &Made) -> FitReport {
             Some(Err(reason)) => {
                 let old =
                     if sensor.servo.is_some() { "the document's servo stays" } else { "no servo is written" };
-                report.warnings.push(format!("gyro {}: {reason}; {old}", sensor.name));
+                told.push((&sensor.name, format!("{reason}; {old}")));
             }
             None => {}
         }
     }
+    report.warnings.extend(together(&told));
     if !validation.is_empty() {
         let head = ["gyro", "static order", "magnetic order", "slow-meander order", "χ² per mean", ""];
         report.validation = Some(Table { head: head.map(str::to_owned).to_vec(), rows: validation });
@@ -67,27 +78,30 @@ fn notes(made: &Made, report: &mut FitReport) {
     ));
 }
 
-fn gyro(name: &str, fit: &GyroFit, report: &mut FitReport, validation: &mut Vec<Vec<String>>) {
+fn gyro(
+    name: &str,
+    fit: &GyroFit,
+    (keeps_constants, report): (bool, &mut FitReport),
+    validation: &mut Vec<Vec<String>>,
+) {
     for one in &fit.coefficients {
         let unit = per_deg_c("°/h", one.power);
-        let name = format!("gyro {name} {}, power {}", one.term.key().replace('_', " "), one.power);
+        let kept = keeps_constants && one.term == Term::Static && one.power == 0;
+        let what = if kept { ", with the Earth's rate: not written" } else { "" };
+        let name = format!("gyro {name} {}, power {}{what}", one.term.key().replace('_', " "), one.power);
         report.coefficients.push(Coefficient::new(name, unit, one.value, Some(one.sigma)));
     }
     let markov = fit.noise.markov.map_or_else(String::new, |[variance, time_s]| {
         format!(", drift of {} °/h over {} s", short(variance.sqrt()), short(time_s))
     });
     report.notes.push(format!(
-        "gyro {name}: {} means over {:.1}…{:.1} °C, N {} °/√h{markov}, χ² {:.2} per degree of freedom.",
-        fit.cells,
-        fit.range_deg_c[0],
-        fit.range_deg_c[1],
+        "gyro {name}: {} over {}…{} °C, N {} °/√h{markov}, χ² {:.2} per degree of freedom.",
+        counted(fit.cells, "mean", "means"),
+        fixed(fit.range_deg_c[0], 1),
+        fixed(fit.range_deg_c[1], 1),
         short(fit.noise.white.sqrt() / 60.0),
         fit.chi_square
     ));
-    if fit.left_out > 0 {
-        report.warnings.push(format!("gyro {name}: {} means are far off and were left out", fit.left_out));
-    }
-    report.warnings.extend(fit.remarks.iter().map(|remark| format!("gyro {name}: {remark}")));
     let chosen = fit.scores.iter().find(|score| score.model == fit.model);
     let first = fit.scores.iter().take(MODELS).filter(|score| score.model != fit.model);
     for score in chosen.into_iter().chain(first) {

@@ -5,6 +5,7 @@ use std::collections::VecDeque;
 
 use isotherm_correction::sample::{GyroTick, LasingMode, OutputKind};
 
+use super::seen::Seen;
 use crate::error::Error;
 use crate::robust::{median, scatter};
 use crate::run::{Run, Watch};
@@ -59,6 +60,10 @@ pub struct Switches {
     pub behind: Vec<Behind>,
     /// Gyros whose reading never changed.
     pub dead: Vec<usize>,
+    /// What each gyro's readings are like.
+    pub seen: Vec<Seen>,
+    /// By how much each change of the mode comes behind the switch command that is nearest to it (s); empty without commands.
+    pub late_s: Vec<f64>,
 }
 
 impl Switches {
@@ -73,6 +78,8 @@ impl Switches {
         let mut changed: Vec<bool> = Vec::new();
         for run in runs {
             let mut eye = Eye::default();
+            found.seen.iter_mut().for_each(Seen::begin);
+            let mut begin = None;
             run.gyro_ticks(watch(), |output, tick| {
                 found.output.get_or_insert(output);
                 found.whole &= tick
@@ -88,9 +95,16 @@ impl Switches {
                 for (changed, (first, now)) in changed.iter_mut().zip(first.iter().zip(&tick.readings)) {
                     *changed |= now.is_finite() && first.total_cmp(now).is_ne();
                 }
+                let now = tick.end_time.as_ns();
+                let since_s = seconds_of(now.saturating_sub(*begin.get_or_insert(now)));
+                found.seen.resize(found.sensors, Seen::default());
                 eye.take(tick, &mut found);
+                let kind = (eye.is_calm(), output == OutputKind::Counts);
+                for (sensor, seen) in found.seen.iter_mut().enumerate() {
+                    seen.take(tick, sensor, since_s, kind);
+                }
             })?;
-            eye.close(&mut found);
+            eye.end(&mut found);
         }
         found.tick_s = if found.ticks == 0 { 0.0 } else { seconds / real(found.ticks) };
         found.dead =
@@ -133,6 +147,9 @@ impl Switches {
 #[derive(Debug, Default)]
 struct Eye {
     mode: Option<LasingMode>,
+    is_commanded: bool,
+    commands_ns: Vec<i64>,
+    changes_ns: Vec<i64>,
     switched_ns: Option<i64>,
     before: VecDeque<GyroTick>,
     behind: Option<Vec<GyroTick>>,
@@ -150,12 +167,16 @@ impl Eye {
             let [plus, minus] = &mut found.of_meander;
             *if phase == LasingMode::Plus { plus } else { minus } += 1;
         }
+        if tick.switch_command && !self.is_commanded {
+            self.commands_ns.push(tick.end_time.as_ns());
+        }
+        self.is_commanded = tick.switch_command;
         if tick.mode.is_some() && self.mode.is_some() && tick.mode != self.mode {
             self.close(found);
             let now = tick.end_time.as_ns();
+            self.changes_ns.push(now);
             if let Some(before) = self.switched_ns {
-                #[expect(clippy::cast_precision_loss, reason = "a run is far below 2⁵³ ns")]
-                found.between_s.push((now - before) as f64 * 1e-9);
+                found.between_s.push(seconds_of(now - before));
             }
             self.switched_ns = Some(now);
             self.behind = Some(Vec::new());
@@ -172,6 +193,22 @@ impl Eye {
             }
             self.before.push_back(tick.clone());
         }
+    }
+
+    /// Whether no switch is near.
+    fn is_calm(&self) -> bool {
+        self.behind.as_ref().is_none_or(|behind| behind.len() >= SEARCH)
+    }
+
+    /// Ends the run.
+    fn end(&mut self, found: &mut Switches) {
+        self.close(found);
+        let nearest = |change: &i64| {
+            let next = self.commands_ns.partition_point(|command| command < change);
+            let near = self.commands_ns.get(next.saturating_sub(1)..)?.iter().take(2);
+            near.map(|command| change - command).min_by_key(|late| late.abs())
+        };
+        found.late_s.extend(self.changes_ns.iter().filter_map(nearest).map(seconds_of));
     }
 
     /// Ends what is behind a switch.
@@ -249,6 +286,11 @@ pub(super) fn dither_hz(tick: &GyroTick, sensor: usize) -> Option<f64> {
 fn wanted(tick_s: f64) -> usize {
     let [least, most] = AFTER;
     (least..most).find(|count| real(*count as u64) * tick_s >= AFTER_S).unwrap_or(most)
+}
+
+#[expect(clippy::cast_precision_loss, reason = "a run is far below 2⁵³ ns")]
+fn seconds_of(ns: i64) -> f64 {
+    ns as f64 * 1e-9
 }
 
 #[expect(clippy::cast_precision_loss, reason = "ticks of a log are far below 2⁵³")]

@@ -30,6 +30,8 @@ pub struct Bin {
     pub good_s: f64,
     /// Mean rate of each gyro along its input axis (°/h), biases of the document subtracted.
     pub rate: Vec<f64>,
+    /// Mean specific force along the case axes (m/s²); `None` without accelerometers.
+    pub force: Option<[f64; 3]>,
     /// Whether ticks are missing before or in it.
     pub broken: bool,
     /// Whether a gyro was at its input limit.
@@ -88,6 +90,8 @@ struct Sums {
     length_s: f64,
     good_s: f64,
     angle: [f64; 3],
+    velocity: [f64; 3],
+    force_s: f64,
     broken: bool,
     overrange: bool,
 }
@@ -116,14 +120,20 @@ fn of_group(run: &Run, document: &Document, group: [usize; 3], watch: impl Watch
             sums.good_s += seconds;
             sums.angle.iter_mut().zip(tick.delta_angle).for_each(|(sum, angle)| *sum += angle);
         }
-        if force_s < 1.0 && !tick.accel_flags.is_empty() {
-            velocity.iter_mut().zip(tick.delta_velocity).for_each(|(sum, dv)| *sum += dv);
-            force_s += seconds;
+        if !tick.accel_flags.is_empty() && !tick.flags.contains(TickFlags::ACCELEROMETER_MISSING) {
+            sums.velocity.iter_mut().zip(tick.delta_velocity).for_each(|(sum, dv)| *sum += dv);
+            sums.force_s += seconds;
+            if force_s < 1.0 {
+                velocity.iter_mut().zip(tick.delta_velocity).for_each(|(sum, dv)| *sum += dv);
+                force_s += seconds;
+            }
         }
         if sums.length_s > BIN_S - 0.5 * seconds {
-            let Sums { begin_s, length_s, good_s, angle, broken, overrange } = std::mem::take(&mut sums);
+            let Sums { begin_s, length_s, good_s, angle, velocity, force_s, broken, overrange } =
+                std::mem::take(&mut sums);
             let rate = angle.map(|sum| AngularRate::from_rad_per_s(sum / good_s).as_deg_per_h()).to_vec();
-            binned.bins.push(Bin { begin_s, length_s, good_s, rate, broken, overrange });
+            let force = (force_s > 0.0).then(|| velocity.map(|sum| sum / force_s));
+            binned.bins.push(Bin { begin_s, length_s, good_s, rate, force, broken, overrange });
             if let Some(thermal) = &thermal {
                 of_axes.add(temperature(thermal, unit));
             }

@@ -11,6 +11,7 @@ use super::steps::Step;
 use crate::drift::figures::short;
 use crate::means::Size;
 use crate::modes::document::{main_axis, row};
+use crate::modes::words::fixed;
 use crate::robust::median;
 
 /// Share of a run's fastest step from which on a step shows what the table turned about.
@@ -141,7 +142,7 @@ pub(super) fn dead(bins: &[Bin]) -> Option<usize> {
 }
 
 /// Axes about which the runs turned one way only, in words: scale factor and bias, or an asymmetry, then cannot be told apart.
-pub(super) fn one_way(steps: &[Step]) -> Vec<String> {
+pub(super) fn one_way(steps: &[Step]) -> Option<String> {
     let axes = ["x", "y", "z"].into_iter().enumerate();
     let about = |axis: usize| {
         steps
@@ -153,13 +154,17 @@ pub(super) fn one_way(steps: &[Step]) -> Vec<String> {
         let [forth, back] = [about(*axis).any(|rate| rate > 0.0), about(*axis).any(|rate| rate < 0.0)];
         forth != back
     });
-    one_way
-        .map(|(_, name)| {
-            format!(
-                "all steps about {name} turn one way: an asymmetry of the scale factor is taken for scale and bias. Turn both ways, at equal rates"
-            )
-        })
-        .collect()
+    let names: Vec<&str> = one_way.map(|(_, name)| name).collect();
+    let (first, others) = names.split_first()?;
+    let others = if others.is_empty() {
+        String::new()
+    } else {
+        format!(", and so do those about {}", others.join(" and "))
+    };
+    Some(format!(
+        "all steps about {first} turn one way{others}: an asymmetry of the scale factor is taken for scale and bias. Turn both ways, at \
+         equal rates"
+    ))
 }
 
 /// Why what was fitted is no gyro: `rates` are the true rates of the steps (°/h), `axis` its input axis.
@@ -217,7 +222,7 @@ fn words(axis: [f64; 3]) -> String {
         return format!("{}{}", if axis[main] < 0.0 { "-" } else { "" }, ["x", "y", "z"][main]);
     }
     let [x, y, z] = axis;
-    format!("{x:.2},{y:.2},{z:.2}")
+    [x, y, z].map(|part| fixed(part, 2)).join(",")
 }
 
 #[cfg(test)]
@@ -271,9 +276,10 @@ mod tests {
                 .map(|rate| Step { run: 0, axis: [0.0, 0.0, -1.0], rate_deg_per_s: *rate, window_s: None })
                 .collect()
         };
-        assert!(one_way(&steps(&[36.0, 0.0, 108.0]))[0].starts_with("all steps about z turn one way"));
-        assert_eq!(one_way(&steps(&[36.0, -36.0])), Vec::<String>::new());
-        assert_eq!(one_way(&steps(&[0.0])), Vec::<String>::new());
+        let one = one_way(&steps(&[36.0, 0.0, 108.0])).unwrap();
+        assert!(one.starts_with("all steps about z turn one way"), "{one}");
+        assert_eq!(one_way(&steps(&[36.0, -36.0])), None);
+        assert_eq!(one_way(&steps(&[0.0])), None);
     }
 
     #[test]

@@ -13,7 +13,23 @@ const NONE_RAD: f64 = 1e-12;
 /// bin's rate in case axes (°/h), relative to the stars.
 #[must_use]
 pub fn carried(bins: &[Bin], start_deg_per_h: [f64; 3], turning: impl Fn(&Bin) -> [f64; 3]) -> Vec<[f64; 3]> {
-    let mut earth = start_deg_per_h;
+    // What the gyros show is relative to the stars: the Earth's own turning is in it.
+    let relative = |bin: &Bin, earth: [f64; 3]| {
+        let rate = turning(bin);
+        [0, 1, 2].map(|axis| rate[axis] - earth[axis])
+    };
+    means_of(bins, start_deg_per_h, relative)
+}
+
+/// Mean over each bin of any vector that is fixed to the Earth, in its own unit of measure. `turning` gives a bin's rate in case axes
+/// (°/h), relative to the Earth.
+#[must_use]
+pub fn carried_along(bins: &[Bin], start: [f64; 3], turning: impl Fn(&Bin) -> [f64; 3]) -> Vec<[f64; 3]> {
+    means_of(bins, start, |bin, _| turning(bin))
+}
+
+fn means_of(bins: &[Bin], start: [f64; 3], turning: impl Fn(&Bin, [f64; 3]) -> [f64; 3]) -> Vec<[f64; 3]> {
+    let mut fixed = start;
     let mut now_s = bins.first().map_or(0.0, |bin| bin.begin_s);
     let mut last = [0.0; 3];
     let mut means = Vec::with_capacity(bins.len());
@@ -21,15 +37,15 @@ pub fn carried(bins: &[Bin], start_deg_per_h: [f64; 3], turning: impl Fn(&Bin) -
         // Over a gap the table is taken to go on as it did.
         let gap_s = bin.begin_s - now_s;
         if gap_s > 1e-6 {
-            earth = turned(earth, last, gap_s).0;
+            fixed = turned(fixed, last, gap_s).0;
         }
-        let rate = turning(bin);
+        let rate = turning(bin, fixed);
         if rate.iter().all(|x| x.is_finite()) {
-            last = [0, 1, 2].map(|axis| rate[axis] - earth[axis]);
+            last = rate;
         }
-        let (behind, mean) = turned(earth, last, bin.length_s);
+        let (behind, mean) = turned(fixed, last, bin.length_s);
         means.push(mean);
-        earth = behind;
+        fixed = behind;
         now_s = bin.begin_s + bin.length_s;
     }
     means

@@ -4,7 +4,7 @@ use super::bins::means_within;
 use super::make::Measured;
 use crate::error::Error;
 use crate::means::Size;
-use crate::report::Verdict;
+use crate::report::{Figure, Verdict};
 use crate::run::{Run, Watch};
 use crate::written::Written;
 
@@ -44,6 +44,7 @@ pub(super) fn verdicts(steps: &[Measured], judged: &[Measured]) -> Vec<Verdict> 
             let both = |steps: &[Measured]| [of(steps, axis, 0), of(steps, axis, 1)];
             let outside = (!judged.is_empty()).then(|| both(judged));
             let verdict = Verdict::of_values(format!("gyro {name}"), "°/h", both(steps), outside);
+            let verdict = verdict.stated_as(Figure::Rms).counting("steps");
             if verdict.accepted {
                 return verdict;
             }

@@ -3,6 +3,7 @@
 use isotherm_correction::earth::Place;
 use isotherm_protocol::document::Document;
 
+use super::attitude;
 use super::checks::{no_result, one_way};
 use super::document;
 use super::judge::{errors, verdicts};
@@ -11,8 +12,10 @@ use super::measure::{earth_in_bins, first_gains, points, true_rates, white};
 use super::read::{Turned, read, whole_turns};
 use super::solve::{GyroRates, solve};
 use super::steps::Step;
+use crate::drift::figures::counted;
 use crate::error::Error;
 use crate::modes::document::{main_axis, row, widened};
+use crate::modes::words::of_logs;
 use crate::report::{FitReport, Verdict};
 use crate::robust::median;
 use crate::run::{Run, Watch};
@@ -64,6 +67,10 @@ pub struct Made {
     pub steps: Vec<Measured>,
     /// The steps of the judging runs.
     pub judged: Vec<Measured>,
+    /// Whether the Earth's rate was taken off in a stated attitude.
+    pub earth_known: bool,
+    /// Whether the weights of the base are near those of the unit.
+    pub scale_known: bool,
     /// White noise of each gyro (°/√h).
     pub walk: Vec<f64>,
     /// Verdicts, by case axis.
@@ -79,7 +86,7 @@ pub struct Made {
 /// # Errors
 /// [`Error::Refused`] with every reason; [`Error::Log`], [`Error::Document`].
 pub fn make<W: Watch>(wanted: &Wanted<'_>, mut watch: impl FnMut() -> W) -> Result<Made, Error> {
-    let mut warnings = one_way(wanted.steps);
+    let mut warnings: Vec<String> = one_way(wanted.steps).into_iter().collect();
     let mut runs = read_all(wanted, &mut watch, &mut warnings)?;
     let judging = runs.split_off(wanted.runs.len());
     let sensors = wanted.base.gyro.sensor.len();
@@ -131,12 +138,17 @@ pub fn make<W: Watch>(wanted: &Wanted<'_>, mut watch: impl FnMut() -> W) -> Resu
     let temperatures: Vec<f64> = runs.iter().filter_map(|run| run.binned.temperature_deg_c).collect();
     let axes_deg_c = runs.iter().find_map(|run| run.binned.axes_deg_c);
     let earth = earth_in_bins(&judging, &axes, &gains, &biases);
-    let judging_rates = true_rates(&judging, &earth);
+    let steps = measured(&runs, &rates);
+    let judged = measured(&judging, &true_rates(&judging, &earth));
+    runs.extend(judging);
+    warnings.extend(attitude::doubts(wanted.place, &runs, (&axes, &gains)));
     let mut made = Made {
         written: Written::of(wanted.base)?,
         gyros,
-        steps: measured(&runs, &rates),
-        judged: measured(&judging, &judging_rates),
+        steps,
+        judged,
+        earth_known: !wanted.place.is_empty(),
+        scale_known: wanted.scale_known,
         walk,
         verdicts: Vec::new(),
         temperatures_deg_c: temperatures,
@@ -154,7 +166,7 @@ fn read_all<W: Watch>(
 ) -> Result<Vec<Turned>, Error> {
     let (mut runs, mut reasons) = (Vec::new(), Vec::new());
     for (number, run) in wanted.runs.iter().chain(wanted.judge).enumerate() {
-        match read(wanted, number, run, &mut *watch, warnings)? {
+        match read(wanted, number, run, &mut *watch)? {
             Ok(read) => runs.push(read),
             Err(reason) => reasons.push(reason),
         }
@@ -162,14 +174,32 @@ fn read_all<W: Watch>(
     if !reasons.is_empty() {
         return Err(Error::Refused(reasons));
     }
+    let names = wanted.runs.iter().chain(wanted.judge).map(|run| run.name.as_str());
+    let troubles: Vec<(&str, String)> = names
+        .zip(&runs)
+        .flat_map(|(name, run)| run.binned.troubles.iter().map(move |words| (name, words.clone())))
+        .collect();
+    warnings.extend(of_logs(&troubles));
     if wanted.place.is_empty() {
         warnings.push(
             "the Earth rate is not known: steps are cut to whole turns, and its share along the table's axis is in the bias. Give \
              --latitude, --heading, --pitch and --roll of the beginning of each log"
                 .to_owned(),
         );
-        for run in &mut runs {
-            whole_turns(run, warnings);
+        let short: Vec<f64> = runs.iter_mut().flat_map(whole_turns).collect();
+        if !short.is_empty() {
+            let mut rates: Vec<String> = Vec::new();
+            for rate in short.iter().map(ToString::to_string) {
+                if !rates.contains(&rate) {
+                    rates.push(rate);
+                }
+            }
+            warnings.push(format!(
+                "{} of {} °/s {} than a turn: up to the Earth's 15 °/h is left in that; let steps last for whole turns",
+                counted(short.len(), "step", "steps"),
+                rates.join(", "),
+                if short.len() == 1 { "is shorter" } else { "are shorter" }
+            ));
         }
     }
     Ok(runs)

@@ -3,6 +3,8 @@
 use super::bins::Bin;
 use super::plateaus::{Plateau, within};
 use super::steps::Step;
+use crate::drift::figures::{counted, short};
+use crate::modes::words::fixed;
 use crate::robust::median;
 
 /// Share of the smallest stated rate below which a plateau is a rest.
@@ -43,6 +45,15 @@ pub fn matched(steps: &[Step], bins: &[Bin], plateaus: &[Plateau]) -> Result<Vec
             })?;
             Ok(Matched { step: *step, plateau })
         };
+        if let Some([a, b]) = overlapping(steps) {
+            let words = |[from, to]: [f64; 2]| format!("{from}…{to} s");
+            return Err(format!(
+                "log {}: two steps overlap, {} and {}: a stretch of the log may count once only. Mend begin_s and end_s in --steps",
+                first.run + 1,
+                words(a),
+                words(b)
+            ));
+        }
         return steps.iter().map(of).collect();
     }
     if steps.iter().any(|step| step.window_s.is_some()) {
@@ -58,11 +69,12 @@ pub fn matched(steps: &[Step], bins: &[Bin], plateaus: &[Plateau]) -> Result<Vec
     let moving: Vec<&Plateau> = plateaus.iter().filter(|plateau| size(plateau) > limit).collect();
     if turning.is_empty() || moving.len() != turning.len() {
         return Err(format!(
-            "log {}: {} steps of the table are stated, {} plateaus turn like the slowest of them or faster; found were {}. State all steps in their order, or their begin_s \
-             and end_s with --steps",
+            "log {}: {} of the table {} stated, {} like the slowest of them or faster; found were {}. State all steps in their order, or \
+             their begin_s and end_s with --steps",
             first.run + 1,
-            turning.len(),
-            moving.len(),
+            counted(turning.len(), "step", "steps"),
+            if turning.len() == 1 { "is" } else { "are" },
+            counted(moving.len(), "plateau turns", "plateaus turn"),
             listed(plateaus)
         ));
     }
@@ -78,14 +90,13 @@ pub fn matched(steps: &[Step], bins: &[Bin], plateaus: &[Plateau]) -> Result<Vec
     let of_slowest = |share: f64| (3600.0 * share * least).max(EARTH_DEG_PER_H) * scale;
     if let Some(turns) = no_rest(&rests, [of_slowest(AT_REST), of_slowest(RESTS_ALIKE)]) {
         return Err(format!(
-            "log {}: a plateau turns steadily that is none of the {} stated steps: {}. A rest shows {:.4} °/s at most and differs \
-             from the others by {:.4} °/s at most. Found were {}. State all steps in their order, or their begin_s and end_s with \
-             --steps",
+            "log {}: a plateau turns steadily that is none of the {}: {}. A rest shows {} °/s at most and differs from the others by \
+             {} °/s at most. Found were {}. State all steps in their order, or their begin_s and end_s with --steps",
             first.run + 1,
-            all.len(),
+            counted(all.len(), "stated step", "stated steps"),
             words(&[turns]),
-            of_slowest(AT_REST) / 3600.0,
-            of_slowest(RESTS_ALIKE) / 3600.0,
+            short(of_slowest(AT_REST) / 3600.0),
+            short(of_slowest(RESTS_ALIKE) / 3600.0),
             listed(plateaus)
         ));
     }
@@ -97,6 +108,20 @@ pub fn matched(steps: &[Step], bins: &[Bin], plateaus: &[Plateau]) -> Result<Vec
     );
     all.sort_by_key(|one| one.plateau.bins[0]);
     Ok(all)
+}
+
+/// Windows of two steps that share a time.
+fn overlapping(steps: &[Step]) -> Option<[[f64; 2]; 2]> {
+    let mut windows: Vec<[f64; 2]> = steps.iter().filter_map(|step| step.window_s).collect();
+    windows.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    windows.windows(2).find(|pair| pair[1][0] < pair[0][1]).map(|pair| [pair[0], pair[1]])
+}
+
+/// The plateaus in which the table stands, by the slowest of the stated rates.
+pub(super) fn slow(steps: &[Step], plateaus: Vec<Plateau>) -> Vec<Plateau> {
+    let rates = steps.iter().map(|step| step.rate_deg_per_s.abs()).filter(|rate| *rate > 0.0);
+    let most = (3600.0 * AT_REST * rates.fold(f64::INFINITY, f64::min)).max(EARTH_DEG_PER_H);
+    plateaus.into_iter().filter(|plateau| size(plateau) <= most).collect()
 }
 
 /// The plateau among the rests that is none: it turns, or not as the others do.
@@ -135,12 +160,14 @@ fn check(all: &[Matched]) -> Result<(), String> {
         let limit = MISMATCH * one.step.rate_deg_per_s.abs().max(0.1 * fastest.step.rate_deg_per_s.abs());
         if away > limit {
             return Err(format!(
-                "log {}: the plateau of {:.1}…{:.1} s turns at {along:.4} °/s by the scale of the fastest one, its step is stated as \
-                 {} °/s; {limit:.4} °/s of difference are allowed. Is the order of the rates right?",
+                "log {}: the plateau of {:.1}…{:.1} s turns at {} °/s by the scale of the fastest one, its step is stated as {} °/s; {} °/s \
+                 of difference are allowed. Is the order of the rates right?",
                 one.step.run + 1,
                 one.plateau.window_s[0],
                 one.plateau.window_s[1],
-                one.step.rate_deg_per_s
+                short(along),
+                one.step.rate_deg_per_s,
+                short(limit)
             ));
         }
     }
@@ -156,7 +183,7 @@ fn listed(plateaus: &[Plateau]) -> String {
 fn words(plateaus: &[&Plateau]) -> String {
     const MOST: usize = 12;
     let one = |plateau: &&Plateau| {
-        let rates: Vec<String> = plateau.rate.iter().map(|rate| format!("{:.3}", rate / 3600.0)).collect();
+        let rates: Vec<String> = plateau.rate.iter().map(|rate| fixed(rate / 3600.0, 3)).collect();
         format!("{:.1}…{:.1} s at ({}) °/s", plateau.window_s[0], plateau.window_s[1], rates.join(", "))
     };
     let mut list: Vec<String> = plateaus.iter().take(MOST).map(one).collect();

@@ -3,12 +3,13 @@
 use super::bins::{BIN_S, Bin, Binned, binned};
 use super::checks::{dead, steady, turned_as_stated};
 use super::make::Wanted;
-use super::matching::{Matched, matched};
-use super::plateaus;
+use super::matching::{Matched, matched, slow};
+use super::plateaus::{self, Plateau};
 use super::steps::Step;
 use crate::error::Error;
 use crate::modes::document::count_arcsec;
 use crate::modes::fit::deg_per_h;
+use crate::modes::words::fixed;
 use crate::run::{Run, Watch};
 
 /// Share of a step's ticks that may be lost.
@@ -20,6 +21,8 @@ const TURN_DEG: f64 = 360.0;
 pub(super) struct Turned {
     pub(super) binned: Binned,
     pub(super) matched: Vec<Matched>,
+    /// Where the table stood, whether that was stated or not.
+    pub(super) rests: Vec<Plateau>,
     pub(super) earth_start: Option<[f64; 3]>,
 }
 
@@ -29,10 +32,8 @@ pub(super) fn read<W: Watch>(
     number: usize,
     run: &Run,
     watch: &mut impl FnMut() -> W,
-    warnings: &mut Vec<String>,
 ) -> Result<Result<Turned, String>, Error> {
     let binned = binned(run, wanted.base, &mut *watch)?;
-    warnings.extend(binned.troubles.iter().map(|words| format!("{}: {words}", run.name)));
     let counts: Vec<f64> =
         (0..wanted.base.gyro.sensor.len()).map(|sensor| count_arcsec(wanted.base, sensor) / BIN_S).collect();
     let found = plateaus::find(&binned.bins, &counts);
@@ -91,13 +92,27 @@ pub(super) fn read<W: Watch>(
         None => None,
         Some(Some(rate)) => Some(rate.map(deg_per_h)),
         Some(None) => {
+            let force = binned.first_force.map_or_else(
+                || "the document or the log has no accelerometers".to_owned(),
+                |[x, y, z]| {
+                    format!(
+                        "the mean force of its first second is ({}, {}, {}) m/s²; it must be within 2 % of one g, x not vertical",
+                        fixed(x, 3),
+                        fixed(y, 3),
+                        fixed(z, 3)
+                    )
+                },
+            );
+            let troubles =
+                binned.troubles.iter().fold(String::new(), |words, trouble| words + "; " + trouble);
             return Ok(Err(format!(
-                "log {}: the unit cannot be levelled at its beginning: give --pitch and --roll of that moment",
+                "log {}: the unit cannot be levelled at its beginning: {force}. Give --pitch and --roll of that moment, or mend the columns \
+                 of the accelerometers in the mapping{troubles}",
                 number + 1
             )));
         }
     };
-    Ok(Ok(Turned { binned, matched, earth_start }))
+    Ok(Ok(Turned { binned, matched, rests: slow(&own, found), earth_start }))
 }
 
 /// Words where ticks are missing in more than a twentieth of the bins: no steady stretch is long enough then.
@@ -114,8 +129,9 @@ fn gaps(bins: &[Bin]) -> Option<String> {
     })
 }
 
-/// Cuts steps to whole turns, so that the Earth's horizontal part averages out.
-pub(super) fn whole_turns(run: &mut Turned, warnings: &mut Vec<String>) {
+/// Cuts steps to whole turns, so that the Earth's horizontal part averages out. Gives the rates (°/s) of those that are shorter.
+pub(super) fn whole_turns(run: &mut Turned) -> Vec<f64> {
+    let mut short = Vec::new();
     for one in &mut run.matched {
         let [begin, end] = one.plateau.bins;
         let bins = run.binned.bins.get(begin..end).unwrap_or_default();
@@ -125,10 +141,7 @@ pub(super) fn whole_turns(run: &mut Turned, warnings: &mut Vec<String>) {
             continue;
         }
         if turns < 1.0 {
-            warnings.push(format!(
-                "the step of {} °/s from {:.1} s on is less than a turn: up to the Earth's 15 °/h of its rate is left",
-                one.step.rate_deg_per_s, one.plateau.window_s[0]
-            ));
+            short.push(one.step.rate_deg_per_s);
             continue;
         }
         let wanted_s = turns * TURN_DEG / one.step.rate_deg_per_s.abs();
@@ -144,6 +157,7 @@ pub(super) fn whole_turns(run: &mut Turned, warnings: &mut Vec<String>) {
         }
         one.plateau.rate = plateaus::mean(&bins[..count]);
     }
+    short
 }
 
 #[cfg(test)]

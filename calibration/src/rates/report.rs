@@ -5,13 +5,16 @@ use isotherm_log::plot::page::{Axis, Chart, Content, Form, Ink, Panel, Samples, 
 
 use super::make::{Made, Measured};
 use super::solve::GyroRates;
-use crate::drift::figures::short;
+use crate::drift::figures::{counted, short};
+use crate::modes::words::{fixed, gyros, together};
 use crate::report::{Coefficient, FitReport};
 
 /// Height of a panel (CSS pixels).
 const HEIGHT: u32 = 220;
 /// Largest size of what is left, in its standard deviations, before it is called a nonlinearity.
 const SEEN: f64 = 4.0;
+/// Share by which a weight changes at most without a word: what micromechanical gyros differ by from their data sheet.
+const OTHER_WEIGHT: f64 = 0.1;
 
 /// The report.
 pub(super) fn report(made: &Made) -> FitReport {
@@ -24,18 +27,25 @@ pub(super) fn report(made: &Made) -> FitReport {
     let temperature = made
         .temperature_deg_c()
         .map_or_else(String::new, |deg_c| format!(", mean temperature {deg_c:.1} °C"));
-    report
-        .notes
-        .push(format!("{turning} steps of the table and {} rests{temperature}.", made.steps.len() - turning));
+    report.notes.push(format!(
+        "{} of the table and {}{temperature}.",
+        counted(turning, "step", "steps"),
+        counted(made.steps.len() - turning, "rest", "rests")
+    ));
     report.notes.push(
         "Before and after are the errors of the corrected rate over the steps, Earth rate and mean error (bias) taken off. The \
          increment weight is that of the mean of positive and negative input; asymmetry and nonlinearity have no place in a \
          document and stand in origin.details."
             .to_owned(),
     );
+    let mut told: Vec<(&str, String)> = Vec::new();
     for (index, sensor) in document.gyro.sensor.iter().enumerate() {
         match made.gyros.get(index) {
             Some(Ok(found)) => {
+                if found.axis.is_none() {
+                    let stays = "the steps turn about fewer than three directions: the input axis stays that of the document";
+                    told.push((&sensor.name, stays.to_owned()));
+                }
                 let weight = sensor
                     .increment_weight_arcsec_per_count
                     .map(|weight| (weight, "″/count"))
@@ -43,14 +53,16 @@ pub(super) fn report(made: &Made) -> FitReport {
                 coefficients(&sensor.name, found, weight, &mut report);
                 linearity(made, index, &sensor.name, found, &mut report);
             }
-            Some(Err(reason)) => {
-                report.warnings.push(format!("gyro {}: {reason}; its weight and axis stay", sensor.name));
-            }
+            Some(Err(reason)) => told.push((&sensor.name, format!("{reason}; weight and axis stay"))),
             None => {}
         }
     }
+    report.warnings.extend(together(&told));
+    report.warnings.extend(widened(made));
+    report.warnings.extend(other_weights(made));
     if !made.judged.is_empty() {
-        report.notes.push(format!("Out of sample: {} steps of the judging logs.", made.judged.len()));
+        let steps = counted(made.judged.len(), "step", "steps");
+        report.notes.push(format!("Out of sample: {steps} of the judging logs."));
         report.tables.push(("Errors of the judging steps".to_owned(), judged(made)));
     }
     report.charts.push(("Linearity".to_owned(), chart(made)));
@@ -105,18 +117,49 @@ fn coefficients(name: &str, found: &GyroRates, weight: Option<(f64, &str)>, repo
                 add(&format!("input axis along {element}"), "″", arcsec(*of), arcsec(sigma));
             }
         }
+    }
+}
+
+/// Gyros whose weight is far from what it was, in one sentence: the rates, or the unit of measure, may be others than stated.
+fn other_weights(made: &Made) -> Option<String> {
+    let sensors = made.written.document.gyro.sensor.iter().zip(&made.gyros);
+    let other = sensors.filter(|_| made.scale_known).filter_map(|(sensor, found)| {
+        let change = 1.0 / found.as_ref().ok()?.gain[0].abs() - 1.0;
+        (change.abs() > OTHER_WEIGHT).then(|| (sensor.name.as_str(), format!("{} %", short(100.0 * change))))
+    });
+    let (names, changes): (Vec<&str>, Vec<String>) = other.unzip();
+    (!names.is_empty()).then(|| {
+        format!(
+            "{}: the weight changes by {}, more than {:.0} %: are the stated rates those of the table, are the readings in the unit of measure that \
+             the mapping has, and is the document that of this unit?",
+            gyros(&names),
+            changes.join(", "),
+            100.0 * OTHER_WEIGHT
+        )
+    })
+}
+
+/// Gyros whose steps scatter by more than noise, in one sentence.
+fn widened(made: &Made) -> Option<String> {
+    let sensors = made.written.document.gyro.sensor.iter().zip(&made.gyros);
+    let wide = sensors.filter_map(|(sensor, found)| {
+        let found = found.as_ref().ok().filter(|found| found.widened)?;
+        Some((sensor.name.as_str(), format!("{:.1}", found.chi_square.sqrt())))
+    });
+    let (names, times): (Vec<&str>, Vec<String>) = wide.unzip();
+    let place = if made.earth_known {
+        ", or latitude and attitude that are not those of the beginning of each log"
     } else {
-        report.warnings.push(format!(
-            "gyro {name}: the steps turn about fewer than three directions: its input axis stays that of the document"
-        ));
-    }
-    if found.widened {
-        report.warnings.push(format!(
-            "gyro {name}: its steps scatter by {:.1} times what noise explains; standard errors are widened. Nonlinearity, or a \
-             table less steady than stated (--table-ppm)",
-            found.chi_square.sqrt()
-        ));
-    }
+        ", or the Earth's rate, which is not taken off"
+    };
+    (!names.is_empty()).then(|| {
+        format!(
+            "{}: steps scatter by {} times what noise explains; standard errors are widened. Nonlinearity, a table less steady than stated \
+             (--table-ppm){place}",
+            gyros(&names),
+            times.join(", ")
+        )
+    })
 }
 
 fn linearity(made: &Made, index: usize, name: &str, found: &GyroRates, report: &mut FitReport) {
@@ -134,7 +177,7 @@ fn linearity(made: &Made, index: usize, name: &str, found: &GyroRates, report: &
         let own = input(step);
         worst = worst.max(left.abs());
         let of_input =
-            if own.abs() > 0.01 * full { format!("{:.2}", 1e6 * left / own.abs()) } else { "–".to_owned() };
+            if own.abs() > 0.01 * full { fixed(1e6 * left / own.abs(), 2) } else { "–".to_owned() };
         rows.push(vec![
             (measured.matched.step.run + 1).to_string(),
             format!("{from:.1}…{to:.1}"),
@@ -142,7 +185,7 @@ fn linearity(made: &Made, index: usize, name: &str, found: &GyroRates, report: &
             short(own / 3600.0),
             short(*left),
             of_input,
-            format!("{:.3}", 1e6 * left / full),
+            fixed(1e6 * left / full, 3),
         ]);
     }
     let head =

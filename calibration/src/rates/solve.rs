@@ -10,6 +10,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::drift::figures::counted;
+
 /// Smallest share of the largest singular value that carries information.
 const SINGULAR: f64 = 1e-7;
 /// Standard deviations of its estimate by which χ² may be too large before the stated errors grow.
@@ -69,7 +71,7 @@ pub fn solve(points: &[Point], old: [f64; 3]) -> Result<GyroRates, String> {
     let total = points.iter().map(|point| dot(point.rate, point.rate).sqrt()).fold(0.0, f64::max);
     if most < 0.1 * total {
         return Err(
-            "its input axis is across all axes of the table: turn about an axis nearer to it".to_owned()
+            "the input axis is across all axes of the table: turn about an axis nearer to it".to_owned()
         );
     }
     let both =
@@ -93,7 +95,8 @@ pub fn solve(points: &[Point], old: [f64; 3]) -> Result<GyroRates, String> {
     let asymmetric = wide.is_some();
     let narrow = || Some(build(false)).filter(|x| x.nrows() >= x.ncols()).and_then(|x| least_squares(&x, &y));
     let (beta, mut covariance, left) = wide.or_else(narrow).ok_or_else(|| {
-        format!("{} steps are too few, or too much alike: use rates of both signs, at least two sizes, and a rest", points.len())
+        let steps = counted(points.len(), "step is", "steps are");
+        format!("{steps} too few, or too much alike: use rates of both signs, at least two sizes, and a rest")
     })?;
     let freedom = points.len() - beta.len();
     #[expect(clippy::cast_precision_loss, reason = "few steps")]

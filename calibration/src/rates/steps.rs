@@ -5,6 +5,7 @@ use std::path::Path;
 use isotherm_log::file::read_small_text;
 use serde::Deserialize;
 
+use crate::drift::figures::counted;
 use crate::error::Error;
 
 /// Fastest table (°/s).
@@ -92,8 +93,9 @@ pub fn listed(
     if names.len() != runs + judges {
         let and = if judges > 0 { format!(", {judges} to judge on") } else { String::new() };
         return Err(Error::Usage(format!(
-            "{runs} logs{and} and {} times --axis: state the table's axis of each log, in their order",
-            names.len()
+            "{}{and} and {} --axis: state the table's axis of each log, in their order",
+            counted(runs, "log", "logs"),
+            counted(names.len(), "time", "times")
         )));
     }
     let mut steps = Vec::new();
@@ -122,7 +124,7 @@ pub fn read(path: &Path, runs: usize) -> Result<Vec<Step>, Error> {
     };
     let rows = rows.map_err(wrong)?;
     if rows.is_empty() || rows.len() > MOST {
-        return Err(wrong(format!("{} steps, must be 1 to {MOST}", rows.len())));
+        return Err(wrong(format!("{}, must be 1 to {MOST}", counted(rows.len(), "step", "steps"))));
     }
     let step = |(index, row): (usize, Row)| {
         let axis = match &row.axis {
@@ -153,7 +155,7 @@ fn checked(step: Step, runs: usize) -> Result<Step, String> {
         ));
     }
     if step.run >= runs {
-        return Err(format!("log {} is named, {runs} were given", step.run + 1));
+        return Err(format!("log {} is named, {} given", step.run + 1, counted(runs, "was", "were")));
     }
     match step.window_s {
         Some([begin, end]) if !(begin >= 0.0 && end > begin && end.is_finite()) => {
@@ -179,9 +181,9 @@ fn of_csv(text: &str) -> Result<Vec<Row>, String> {
         let fields: Vec<&str> = line.split(',').map(str::trim).collect();
         if fields.len() != head.len() {
             return Err(format!(
-                "line {}: {} fields, the first line has {}",
+                "line {}: {}, the first line has {}",
                 index + 1,
-                fields.len(),
+                counted(fields.len(), "field", "fields"),
                 head.len()
             ));
         }

@@ -214,6 +214,27 @@ fn steps_that_are_not_those_of_the_log_are_refused() {
 }
 
 #[test]
+fn weights_far_from_the_old_ones_and_steps_that_overlap_are_told() {
+    let runs = [run(5, AXES[0], |reading| 0.6 * reading)];
+    let one = listed(&["x".to_owned()], [&RATES, &[]], [1, 0]).unwrap();
+    let warnings = made(&runs, &one, &place()).unwrap().report().warnings;
+    let told = warnings.iter().find(|words| words.contains("more than 10 %")).unwrap();
+    assert!(told.starts_with("gyro x: the weight changes by 67.0 %"), "{told}");
+    let table = table(5);
+    let right = made(&table, &steps(3), &place()).unwrap().report().warnings;
+    assert!(!right.iter().any(|words| words.contains("more than 10 %")), "{right:?}");
+    let window = |rate_deg_per_s: f64, from_s: f64| Step {
+        run: 0,
+        axis: AXES[0],
+        rate_deg_per_s,
+        window_s: Some([from_s, from_s + 8.0]),
+    };
+    let twice = [window(36.0, 11.0), window(-36.0, 31.0), window(36.0, 12.0)];
+    let refused = made(&runs, &twice, &place()).map(|made| made.warnings).unwrap_err().to_string();
+    assert!(refused.contains("two steps overlap, 11…19 s and 12…20 s"), "{refused}");
+}
+
+#[test]
 fn tables_of_steps_are_read_or_refused_with_their_line() {
     let folder = tempfile::tempdir().unwrap();
     let read = |name: &str, text: &str| {

@@ -50,6 +50,8 @@ pub struct Verdict {
     pub measure: String,
     /// Which figure the sentence states.
     pub figure: Figure,
+    /// What its sizes count, such as "windows".
+    pub counted: &'static str,
     /// Before and after over what the fit saw. Both are zero where the fit saw nothing of it.
     pub in_sample: [Size; 2],
     /// Before and after over what it did not see.
@@ -68,6 +70,7 @@ impl Verdict {
             of: of.into(),
             measure: measure.into(),
             figure: Figure::default(),
+            counted: "windows",
             in_sample,
             out_of_sample: None,
             accepted: true,
@@ -115,6 +118,13 @@ impl Verdict {
     #[must_use]
     pub fn stated_as(mut self, figure: Figure) -> Self {
         self.figure = figure;
+        self
+    }
+
+    /// With other things that its sizes count.
+    #[must_use]
+    pub fn counting(mut self, counted: &'static str) -> Self {
+        self.counted = counted;
         self
     }
 
@@ -223,7 +233,8 @@ pub(super) fn sentences(verdicts: &[Verdict]) -> Vec<String> {
 
 /// All sizes as a table.
 pub(super) fn rows(verdicts: &[Verdict]) -> Table {
-    let head = ["", "rms", "", "times smaller", "peak to peak", "", "windows", ""].map(str::to_owned);
+    let counted = verdicts.first().map_or("windows", |verdict| verdict.counted);
+    let head = ["", "rms", "", "times smaller", "peak to peak", "", counted, ""].map(str::to_owned);
     let mut rows = Vec::new();
     for verdict in verdicts {
         let samples = [("in sample", Some(verdict.in_sample)), ("out of sample", verdict.out_of_sample)];

@@ -22,6 +22,9 @@ struct ChannelRange {
     rate: Option<[f64; 2]>,
 }
 
+/// What is counted of a sensor.
+type Count = fn(&Sensor) -> u64;
+
 /// One sensor.
 #[derive(Debug)]
 struct Sensor {
@@ -108,7 +111,7 @@ impl Coverage {
                 little.join(", ")
             ));
         }
-        let shares: [(fn(&Sensor) -> u64, &str); 3] = [
+        let shares: [(Count, &str); 3] = [
             (
                 |sensor| sensor.clamped,
                 "are outside the fitted range of temperature, where terms are held at its end",

@@ -230,7 +230,8 @@ fn rates_are_fitted_written_and_reported() {
     .unwrap();
     let by_file = succeeds(&["rates", logs[2], "--steps", text(&steps), "--remove-mean"]);
     assert!(
-        by_file.contains("gyro z increment weight") && by_file.contains("gyro x: its input axis is across"),
+        by_file.contains("gyro z increment weight")
+            && by_file.contains("gyros x, y: the input axis is across"),
         "{by_file}"
     );
     let wrong = [&["rates", logs[0], "--axis", "x", "--rates", "36,-36,108"][..], &attitude].concat();
@@ -292,7 +293,7 @@ fn rates_are_judged_on_steps_that_the_fit_has_not_seen() {
     // One axis short.
     let short =
         ["rates", &seen, "--judge", &judged, "--axis", "z", "--rates", "36,-36,108,-108", "--remove-mean"];
-    assert!(fails(&short, 2).contains("1 logs, 1 to judge on and 1 times --axis"));
+    assert!(fails(&short, 2).contains("1 log, 1 to judge on and 1 time --axis"));
 }
 
 #[test]

@@ -81,7 +81,7 @@ fn a_log_that_the_document_was_made_from_is_in_sample() {
         document.origin.get_or_insert_default().log = of_log.log;
     });
     let report = json(&["validate", &path("unit.toml"), &path("known.mcap"), "--json"]);
-    assert!(report["verdict"].as_str().unwrap().contains("peak to peak in sample; accepted"));
+    assert!(report["verdict"].as_str().unwrap().contains("rms in sample; accepted"));
     assert_eq!(report["verdicts"][0]["out_of_sample"], Value::Null);
     let warnings = report["warnings"].to_string();
     assert!(warnings.contains("known.mcap is among the logs that the document was made from"), "{warnings}");

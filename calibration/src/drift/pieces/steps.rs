@@ -15,13 +15,22 @@ const TIMES_ITS_NEIGHBOURS: f64 = 4.0;
 /// Share of a step that must be left of it over the parts beside it.
 const STAYS: f64 = 0.5;
 
-/// Words where the readings step from one level to another and stay there.
+/// A step from one level to another.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Step {
+    /// The part that it lies in, or ends before.
+    pub(crate) part: usize,
+    /// Mean of the parts before it.
+    pub(crate) before: f64,
+    /// Mean of the parts behind it.
+    pub(crate) behind: f64,
+}
+
+/// Where the means of equal parts step from one level to another and stay there.
 ///
 /// Compared are the means of the parts before and behind each part, so that a step within a part counts whole. A slow drift, of whatever
 /// kind, changes as much in the parts near by.
-pub(super) fn words(called: &str, columns: &Columns, column: &[f64]) -> Option<String> {
-    let width = column.len().div_ceil(PARTS).max(FEWEST_TICKS);
-    let means: Vec<f64> = column.chunks_exact(width).map(mean).collect();
+pub(crate) fn step(means: &[f64]) -> Option<Step> {
     let changes: Vec<f64> = means.windows(3).map(|near| (near[2] - near[0]).abs()).collect();
     let usual = SIGMA_PER_MAD * median(&changes);
     let (at, largest) = changes
@@ -41,13 +50,20 @@ pub(super) fn words(called: &str, columns: &Columns, column: &[f64]) -> Option<S
     if *largest <= TIMES_ITS_NEIGHBOURS * most || (behind - before).abs() < STAYS * largest {
         return None;
     }
+    Some(Step { part: at + 1, before, behind })
+}
+
+/// Words where the readings step from one level to another and stay there.
+pub(super) fn words(called: &str, columns: &Columns, column: &[f64]) -> Option<String> {
+    let width = column.len().div_ceil(PARTS).max(FEWEST_TICKS);
+    let Step { part, before, behind } = step(&column.chunks_exact(width).map(mean).collect::<Vec<f64>>())?;
     let measure = columns.measure();
     Some(format!(
         "warning: {called} steps from {} to {} {measure} at about {:.0} s and stays there: was the unit moved, its power or its range \
          switched, or are these two logs? A step is taken for drift; cut the log there with --start and --duration",
         short(before),
         short(behind),
-        columns.since_s((at + 1) * width + width / 2)
+        columns.since_s(part * width + width / 2)
     ))
 }
 

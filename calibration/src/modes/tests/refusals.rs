@@ -89,7 +89,99 @@ fn logs_without_what_a_mode_reversed_gyro_needs_are_refused() {
         tick.readings.iter_mut().for_each(|reading| *reading += 500.0);
         true
     });
-    refused(turning, &base, &["180 °/h are allowed at rest"]);
+    refused(turning, &base, &["at most 180 °/h of bias"]);
+}
+
+#[test]
+fn readings_that_change_their_scale_or_die_are_refused() {
+    let (scenario, base) = (short(), base());
+    let late = |tick: &GyroTick| tick.end_time.as_ns() > 205_000_000_000;
+    let twice = changed(&scenario, |tick| {
+        let factor = if late(tick) { 2.0 } else { 1.0 };
+        tick.readings.iter_mut().for_each(|reading| *reading *= factor);
+        true
+    });
+    refused(
+        twice,
+        &base,
+        &["the mean rate steps and stays there", "gyro z from -1", "two units of measure", "Cut the log"],
+    );
+    let dies = changed(&scenario, |tick| {
+        tick.readings[1] *= if late(tick) { 0.0 } else { 1.0 };
+        true
+    });
+    refused(dies, &base, &["gyro y gives the same reading, 0, from 20", "cut the log"]);
+    let degrees = changed(&scenario, |tick| {
+        tick.readings.iter_mut().for_each(|reading| *reading = (*reading * 57.3).round());
+        true
+    });
+    refused(
+        degrees,
+        &base,
+        &["by the document's weights the gyros show", "180 °/h of bias", "1 rad is 57.3°"],
+    );
+    let halves = |change: fn(i32) -> i32| {
+        changed(&scenario, move |tick| {
+            for counts in tick.half_periods.iter_mut().take(1) {
+                (counts.positive, counts.negative) = (change(counts.positive), change(counts.negative));
+            }
+            true
+        })
+    };
+    refused(halves(|_| 0), &base, &["gyro x: all half-period counts are zero"]);
+    refused(
+        halves(|counts| 1000 * counts),
+        &base,
+        &["gyro x: the dither's frequency comes out as 6", "1000000 Hz"],
+    );
+    refused(halves(|counts| -counts), &base, &["gyro x: the dither's frequency comes out as -6", "swapped"]);
+}
+
+#[test]
+fn a_mode_that_comes_late_is_refused_and_one_the_other_way_round_told() {
+    let scenario = short();
+    let mut held = std::collections::VecDeque::new();
+    let late = changed(&scenario, |tick| {
+        held.push_back(tick.mode);
+        tick.mode = if held.len() > 10 { held.pop_front().flatten() } else { tick.mode };
+        true
+    });
+    refused(late, &base(), &["the mode changes 5.00 s (10 ticks) behind the switch command"]);
+    let made = fitted(&scenario, &base());
+    let turned = changed(&scenario, |tick| {
+        tick.mode =
+            tick.mode.map(|mode| if mode == LasingMode::Plus { LasingMode::Minus } else { LasingMode::Plus });
+        true
+    });
+    let again = make(&wanted(&[turned], &made.written.document), || ()).unwrap();
+    let told = again.warnings.iter().find(|words| words.contains("with the other sign")).unwrap();
+    assert!(told.starts_with("gyros x, y, z: "), "{told}");
+    assert!(!made.warnings.iter().any(|words| words.contains("with the other sign")));
+}
+
+#[test]
+fn thermometers_are_told_with_what_they_read() {
+    let (scenario, base) = (short(), base());
+    let with = |change: fn(f64, i64) -> f64| {
+        let events = events(&scenario).into_iter().map(|event| match event {
+            LogEvent::Temperature(mut reading) => {
+                reading.raw = change(reading.raw, reading.time.as_ns() / 1_000_000_000);
+                LogEvent::Temperature(reading)
+            }
+            other => other,
+        });
+        Run::of_events("changed".into(), unit_id("ZLG-0001").unwrap(), events.collect())
+    };
+    refused(
+        with(|raw, _| 100.0 * raw - 150.0 + 273.15),
+        &base,
+        &["gyro0 reads 3", "Its range_deg_c is -70…130 °C"],
+    );
+    refused(with(|_, _| f64::NAN), &base, &["gyro0 reads no numbers"]);
+    let made = made(with(|raw, time_s| if time_s < 205 { raw } else { 1.75 }), &base).unwrap();
+    let frozen =
+        made.warnings.iter().find(|words| words.starts_with("temperature channels gyro0, gyro1")).unwrap();
+    assert!(frozen.contains("each reads exactly 1.75 from 205"), "{frozen}");
 }
 
 #[test]
@@ -143,6 +235,13 @@ fn without_an_attitude_the_constant_stays_and_the_rest_is_fitted() {
         let [got, sigma] = fit.coefficient(Term::Magnetic, 0).unwrap();
         assert!(got.abs() > 100.0 * sigma);
     }
+    let report = made.report().to_text();
+    assert!(report.contains("gyro x static bias, power 0, with the Earth's rate: not written"), "{report}");
+    let sigmas = crate::modes::document::sigmas(&made);
+    assert!(
+        sigmas.get("gyro", "x", "static_bias").unwrap()[0] <= 0.0,
+        "of what was not fitted nothing is known"
+    );
     // Orders that the run cannot tell are not invented.
     let asked = crate::modes::fit::Asked { meander_order: Some(1), ..Default::default() };
     let made = make(&Wanted { asked, ..wanted(&runs, &base) }, || ()).unwrap();
