@@ -6,6 +6,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::faults::{counted, fixed};
 use super::plan::{Attitude, Plan};
 use super::pose::Pose;
 use super::track::Track;
@@ -82,8 +83,9 @@ pub fn matched(plan: &Plan, track: &Track, poses: &[Pose]) -> Result<Matched, St
         return Ok(Matched { positions, doubt });
     }
     Err(unclear(&format!(
-        "and they are not the plan's {count} positions in their order, one is missing or repeated. Say which pose is which with \
-         --times, or record the turns too"
+        "and they are not the plan's {count} positions in their order, one is missing or repeated{}. Say which pose is which with \
+         --times, or record the turns too",
+        unseen(plan).unwrap_or_default()
     )))
 }
 
@@ -132,13 +134,33 @@ fn agreement(ways: &[Matrix3<f64>], directions: &[Vector3<f64>], order: [usize; 
     agree.count() as f64 / ways.len().max(1) as f64
 }
 
+/// Words where a plan's neighbours differ by a turn about the vertical, which no accelerometer feels: without the turns in the log
+/// they are one pose, and the order tells nothing.
+fn unseen(plan: &Plan) -> Option<String> {
+    let up = |position: usize| Vector3::from(plan.up(&plan.positions[position].attitude, [0.0; 3]));
+    let pair =
+        (1..plan.positions.len()).find(|position| up(*position).angle(&up(position - 1)) < DIRECTION_RAD)?;
+    Some(format!(
+        " (from {:?} to {:?} the unit turns about the vertical only, which accelerometers do not feel: without turns in the log this \
+         plan always needs --times)",
+        plan.positions[pair - 1].name,
+        plan.positions[pair].name
+    ))
+}
+
 /// The poses in words.
 fn nothing(plan: &Plan, poses: &[Pose], directions: &[Vector3<f64>]) -> String {
     let words = poses.iter().zip(directions).map(|(pose, up)| {
-        format!("{:.0}–{:.0} s up ({:.2}, {:.2}, {:.2})", pose.span_s[0], pose.span_s[1], up.x, up.y, up.z)
+        let [x, y, z] = [up.x, up.y, up.z].map(|c| fixed(c, 2));
+        format!("{:.0}–{:.0} s up ({x}, {y}, {z})", pose.span_s[0], pose.span_s[1])
     });
     let words: Vec<String> = words.collect();
-    format!("{} still poses ({}) for a plan of {}", poses.len(), words.join("; "), plan.positions.len())
+    format!(
+        "{} ({}) for a plan of {}",
+        counted(poses.len(), "still pose"),
+        words.join("; "),
+        plan.positions.len()
+    )
 }
 
 /// Follows the gyros from an anchor.

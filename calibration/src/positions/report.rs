@@ -6,6 +6,7 @@ use isotherm_protocol::document::{Document, Sample};
 use super::analysis::{Analysis, Settings};
 use super::budget::ARCSEC_PER_RAD;
 use super::charts::{AXES, across, axes_chart, bend, left_chart, shown};
+use super::faults::{counted, fixed};
 use super::fit::Fit;
 use super::judged::{Judgement, curves, lengths};
 use crate::drift::figures::{per_deg_c, short, six};
@@ -29,7 +30,8 @@ pub fn report(
     inside: Set<'_>,
     outside: Option<Set<'_>>,
 ) -> FitReport {
-    let mut report = FitReport::new("Accelerometers from positions of a stand", &document.unit);
+    let mut report =
+        FitReport::new("Accelerometers from positions of a stand", &document.unit).counting("positions");
     report.residuals = curves(inside.judged, inside.runs, Sample::In);
     if let Some(set) = outside {
         report.residuals.extend(curves(set.judged, set.runs, Sample::Out));
@@ -78,26 +80,26 @@ fn names(document: &Document, count: usize) -> Vec<String> {
 
 fn notes(document: &Document, analysis: &Analysis, settings: &Settings) -> Vec<String> {
     let fit = &analysis.fit.solution;
-    let levels: Vec<String> = analysis.levels_deg_c.iter().map(|t| format!("{t:.1}")).collect();
+    let levels: Vec<String> = analysis.levels_deg_c.iter().map(|t| fixed(*t, 1)).collect();
     let arcsec = |rad: f64| rad * ARCSEC_PER_RAD;
     let noise: Vec<String> = analysis.weights.intensity.iter().map(|q| short(*q)).collect();
     let mut notes = vec![
         format!(
-            "{} positions at {} °C; g = {} m/s²; C about {} °C.",
-            analysis.poses.len(),
+            "{} at {} °C; g = {} m/s²; C about {} °C.",
+            counted(analysis.poses.len(), "position"),
             levels.join(", "),
             six(settings.gravity),
             six(analysis.reference_deg_c)
         ),
         format!(
             "Weighted with a stand of {:.1}″ (positioning and run-out) and white noise of {} ({})²·s; level known to {:.0}″ \
-             beforehand. χ² {:.1} with {} degrees of freedom.",
+             beforehand. χ² {:.1} with {} of freedom.",
             arcsec(analysis.weights.positioning_rad),
             noise.join(", "),
             output_unit(document),
             arcsec(analysis.weights.levelling_rad),
             fit.chi_square,
-            fit.degrees
+            counted(fit.degrees, "degree")
         ),
     ];
     if let Some((_, chi_square, terms, accident)) = &analysis.quadratic {
@@ -120,7 +122,7 @@ fn coefficients(
     let fit = &analysis.fit;
     let output = output_unit(document);
     let mut all = Vec::new();
-    let of_sensor = fit.solution.parameters.len().saturating_sub(3) / names.len().max(1);
+    let of_sensor = fit.degrees.of_sensor();
     let s = fit.degrees.sensor + 1;
     for (index, (name, sensor)) in names.iter().zip(&fit.sensors).enumerate() {
         let sigma = |offset: usize, scale: f64| {
@@ -178,12 +180,12 @@ fn position_rows(settings: &Settings, set: Set<'_>) -> Table {
         ["position", "log", "at, s", "°C", "x, mg", "y, mg", "z, mg", "|f| − g, mg"].map(str::to_owned);
     let row = |judgement: &Judgement| {
         let position = settings.plan.positions.get(judgement.position);
-        let milli_g = |error: f64| format!("{:.4}", error / settings.gravity * 1e3);
+        let milli_g = |error: f64| fixed(error / settings.gravity * 1e3, 4);
         let mut row = vec![
             position.map_or_else(String::new, |position| position.name.clone()),
             set.runs.get(judgement.run).cloned().unwrap_or_default(),
             format!("{:.1}", judgement.time_s),
-            if judgement.deg_c.is_finite() { format!("{:.2}", judgement.deg_c) } else { "–".to_owned() },
+            if judgement.deg_c.is_finite() { fixed(judgement.deg_c, 2) } else { "–".to_owned() },
         ];
         row.extend(judgement.error[1].map(milli_g));
         row.push(milli_g(judgement.length[1]));
@@ -202,9 +204,9 @@ fn level_rows(analysis: &Analysis, settings: &Settings, names: &[String]) -> Tab
             let Some(fit) = fit else { return "–".to_owned() };
             let value = fit.sensors[*index].axis[0][*i] * ARCSEC_PER_RAD;
             let sigma = fit.axis_sigma(&settings.plan, *index, 0)[*i] * ARCSEC_PER_RAD * analysis.widened;
-            format!("{value:.1} ± {sigma:.1}")
+            format!("{} ± {sigma:.1}", fixed(value, 1))
         };
-        std::iter::once(format!("{deg_c:.2}")).chain(shown.iter().map(cell)).collect()
+        std::iter::once(fixed(*deg_c, 2)).chain(shown.iter().map(cell)).collect()
     };
     Table { head, rows: analysis.levels_deg_c.iter().zip(&analysis.of_level).map(row).collect() }
 }

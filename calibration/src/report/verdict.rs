@@ -221,9 +221,9 @@ pub(super) fn sentences(verdicts: &[Verdict]) -> Vec<String> {
     verdicts.iter().map(sentence).collect()
 }
 
-/// All sizes as a table.
-pub(super) fn rows(verdicts: &[Verdict]) -> Table {
-    let head = ["", "rms", "", "times smaller", "peak to peak", "", "windows", ""].map(str::to_owned);
+/// All sizes as a table; `counted` is what they are over.
+pub(super) fn rows(verdicts: &[Verdict], counted: &str) -> Table {
+    let head = ["", "rms", "", "times smaller", "peak to peak", "", counted, ""].map(str::to_owned);
     let mut rows = Vec::new();
     for verdict in verdicts {
         let samples = [("in sample", Some(verdict.in_sample)), ("out of sample", verdict.out_of_sample)];
