@@ -10,6 +10,7 @@
 //! | [`temperature`], [`doubts`], [`measure`] | levels and channels; what is doubtful about a result, and about its unit of measure |
 //! | [`analysis`], [`document`], [`provenance`], [`judged`], [`report`], [`charts`] | from runs to a result; as a document, with where it comes from; what it leaves; in words and diagrams |
 //! | [`budget`] | what a planned calibration will come to |
+//! | `sense` | which way sensors point beside what is stated |
 //! | [`solve`] | nonlinear least squares with covariance |
 
 pub mod analysis;
@@ -29,6 +30,7 @@ pub mod plan;
 pub mod pose;
 pub mod provenance;
 pub mod report;
+pub(crate) mod sense;
 pub mod solve;
 pub mod still;
 pub mod temperature;

@@ -80,7 +80,7 @@ pub struct Analysis {
 /// # Errors
 /// Every reason why it cannot be, with what to do.
 pub fn analyse(tracks: &[Track], document: &Document, settings: &Settings) -> Result<Analysis, Vec<String>> {
-    let reasons: Vec<String> = tracks.iter().flat_map(faults::dead).collect();
+    let reasons = faults::dead(tracks);
     if !reasons.is_empty() {
         return Err(reasons);
     }
@@ -144,7 +144,7 @@ pub fn analyse(tracks: &[Track], document: &Document, settings: &Settings) -> Re
         );
     }
     few(stand, &taken, levels_deg_c.len(), settings, &mut warnings);
-    turned(best, document, &mut warnings);
+    turned(best, document, settings.gravity, &mut warnings);
     warnings.extend(measures(best, document, settings, &own));
     let of_level = (0..levels_deg_c.len()).map(|level| one_level(&all, level)).collect();
     let poses = poses.into_iter().zip(&level_of).map(|((pose, position), level)| (pose, position, *level));
@@ -179,7 +179,7 @@ pub type Found = (Vec<(Pose, usize)>, Vec<String>);
 pub fn positions(tracks: &[Track], settings: &Settings) -> Result<Found, Vec<String>> {
     let mut found = Vec::new();
     let mut warnings = Vec::new();
-    let mut reasons = Vec::new();
+    let (mut reasons, mut unclear) = (Vec::new(), Vec::new());
     for (run, track) in tracks.iter().enumerate() {
         if let Some(times) = &settings.times {
             match times.poses(track, run, &settings.plan) {
@@ -214,8 +214,15 @@ pub fn positions(tracks: &[Track], settings: &Settings) -> Result<Found, Vec<Str
                     poses.into_iter().zip(positions).filter_map(|(pose, position)| Some((pose, position?))),
                 );
             }
-            Err(words) => reasons.push(format!("{}: {words}", track.run)),
+            Err(words) => unclear.push((track.run.as_str(), words)),
         }
+    }
+    // What is wrong with one log of many mostly is with all of them.
+    if let Some(((first, words), others)) = unclear.split_first() {
+        let others: Vec<&str> = others.iter().map(|(run, _)| *run).collect();
+        let likewise =
+            if others.is_empty() { String::new() } else { format!(". Likewise {}", faults::logs(&others)) };
+        reasons.push(format!("{first}: {words}{likewise}"));
     }
     let poses: Vec<Pose> = found.iter().map(|(pose, _)| pose.clone()).collect();
     reasons.extend(faults::clipped(tracks, &poses));

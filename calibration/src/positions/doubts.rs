@@ -1,21 +1,24 @@
 //! What is doubtful about a result, and what makes it none.
 
 use isotherm_protocol::document::Document;
-use nalgebra::Vector3;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::analysis::{Analysis, Settings};
 use super::fit::Fit;
-use super::model::{Degrees, Taken};
+use super::model::{Degrees, Sensor, Taken};
 use super::plan::Plan;
+use super::sense::{self, Beside};
 use super::solve::NoSolution;
 use super::temperature::Temperatures;
 use super::{budget, faults, measure, model};
+use crate::drift::figures::short;
 
 /// Fewest positions that tell the stand's errors from the axes.
 pub const GOOD_POSITIONS: usize = 9;
 /// Probability below which something is no accident.
 pub(super) const ACCIDENT: f64 = 1e-3;
+/// Largest |f| − g (rms, a share of g) where the fit decides.
+pub(crate) const LARGEST_LEFT_SHARE: f64 = 0.02;
 /// Largest standard error of a scale factor that is still a result (relative).
 const LARGEST_SIGMA: f64 = 1e-2;
 /// Largest angle between an axis and where the document at hand has it (°): half of a skewed unit's way to the next one.
@@ -98,22 +101,41 @@ pub(super) fn few(
 }
 
 /// Axes that lie far from where the document at hand has them: swapped columns, a sign, or another mounting.
-pub(super) fn turned(fit: &Fit, document: &Document, warnings: &mut Vec<String>) {
+pub(super) fn turned(fit: &Fit, document: &Document, gravity: f64, warnings: &mut Vec<String>) {
     let rows = document.accel.iter().flat_map(|accel| &accel.orientation.rows);
-    for (index, (sensor, row)) in fit.sensors.iter().zip(rows).enumerate() {
-        let axis = Vector3::from(sensor.axis.first().copied().unwrap_or_default());
-        let angle_deg = axis.angle(&Vector3::from(*row)).to_degrees();
-        if angle_deg > LARGEST_TURN_DEG {
-            warnings.push(format!(
-                "accelerometer {}: its axis is found along ({}, {}, {}), {angle_deg:.0}° from what the document at hand states: \
-                 are columns of the mapping swapped, is a sign the other one, or is the unit mounted otherwise than the plan says?",
-                faults::name(index),
-                faults::fixed(axis.x, 2),
-                faults::fixed(axis.y, 2),
-                faults::fixed(axis.z, 2)
-            ));
-        }
+    let of = |(sensor, stated): (&Sensor, &[f64; 3])| {
+        Beside::new(
+            [sensor.scale[0] / gravity, 1.0],
+            [sensor.axis.first().copied().unwrap_or_default(), *stated],
+        )
+    };
+    let beside: Vec<Beside> = fit.sensors.iter().zip(rows).map(of).collect();
+    let turned = sense::turned(&beside);
+    if turned.is_empty() {
+        return;
     }
+    let who = faults::several("accelerometer", &turned);
+    let one = turned.len() == 1;
+    let moved = sense::places(&beside).map(|(order, same_way)| (sense::out_of_place(order), same_way));
+    let what = match moved {
+        Some((moved, _)) if moved.is_empty() => format!(
+            "{who} {} found with the other sign: {} missing in the mapping",
+            if one { "is" } else { "are" },
+            if one { "is its sign" } else { "are their signs" }
+        ),
+        Some((moved, [true, true, true])) if moved.len() == 2 => {
+            format!("{who} look swapped: are their columns of the mapping")
+        }
+        _ => format!(
+            "{who} {} far from where the document at hand has {}: are columns of the mapping swapped, is a sign the other one",
+            if one { "is" } else { "are" },
+            if one { "it" } else { "them" }
+        ),
+    };
+    warnings.push(format!(
+        "{what}, or is the unit mounted otherwise than the plan says? {}",
+        sense::found_along("accelerometer", &beside, &turned)
+    ));
 }
 
 /// Scale factors that are not those of the unit of measure that the document states; `own` are the temperatures that each
@@ -164,21 +186,32 @@ pub(super) fn spread(plan: &Plan, taken: &[Taken], bad: &[usize]) -> Vec<String>
 /// Whether what was found is a result.
 pub(super) fn sound(analysis: &Analysis) -> Result<(), Vec<String>> {
     let fit = &analysis.fit;
-    let per_sensor = fit.degrees.of_sensor();
-    let bad = |sensor: usize| {
-        let sigma = fit.solution.sigma(sensor * per_sensor) * model::SMALL * analysis.widened;
-        (sigma.is_nan() || sigma > LARGEST_SIGMA).then(|| {
-            format!(
-                "accelerometer {}: its scale factor is known to {:.2} % only, at most {} % is a result: look at its residuals, and at \
-                 its mapping",
-                faults::name(sensor),
-                sigma * 100.0,
-                LARGEST_SIGMA * 100.0
-            )
-        })
+    let sigma = |sensor: usize| {
+        fit.solution.sigma(sensor * fit.degrees.of_sensor()) * model::SMALL * analysis.widened
     };
-    let reasons: Vec<String> = (0..fit.guess.len()).filter_map(bad).collect();
-    if reasons.is_empty() { Ok(()) } else { Err(reasons) }
+    let bad: Vec<usize> = (0..fit.guess.len())
+        .filter(|sensor| sigma(*sensor).is_nan() || sigma(*sensor) > LARGEST_SIGMA)
+        .collect();
+    if bad.is_empty() {
+        return Ok(());
+    }
+    let known: Vec<String> = bad.iter().map(|sensor| short(sigma(*sensor) * 100.0)).collect();
+    let why = if analysis.widened > 1.0 {
+        format!(
+            "the positions scatter {} times as much as positioning, run-out and noise explain. Is a position mistaken for another \
+             (--times, --plan), is the unit of measure another one in some logs or from some row on, did zeros drift?",
+            short(analysis.widened)
+        )
+    } else {
+        "longer or more positions would help, and look at the noise of the sensors".to_owned()
+    };
+    Err(vec![format!(
+        "{}: {} known to {} % only, at most {} % is a result: {why}",
+        faults::several("accelerometer", &bad),
+        if bad.len() == 1 { "its scale factor is" } else { "their scale factors are" },
+        known.join(", "),
+        LARGEST_SIGMA * 100.0
+    )])
 }
 
 /// No solution, in words.

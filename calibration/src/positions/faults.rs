@@ -7,58 +7,106 @@ use crate::drift::figures::six;
 /// Share of readings that may be no number.
 const NOT_FINITE_SHARE: f64 = 0.01;
 
-/// Sensors that read the same in every tick, the same as another one, or too often nothing: what is wrong and what to do. Those with
-/// one fault are named together.
-#[must_use]
-#[expect(clippy::cast_precision_loss, reason = "ticks of a run")]
-pub fn dead(track: &Track) -> Vec<String> {
-    let mut faults: Vec<(&str, Vec<usize>, String)> = Vec::new();
-    let mut add = |kind: &'static str, sensor: usize, fault: String| match faults
-        .iter_mut()
-        .find(|(of, _, known)| *of == kind && *known == fault)
-    {
-        Some((_, sensors, _)) => sensors.push(sensor),
-        None => faults.push((kind, vec![sensor], fault)),
-    };
-    for (kind, columns) in [("accelerometer", &track.outputs), ("gyro", &track.gyros)] {
-        for (index, column) in columns.iter().enumerate() {
-            let missing = column.iter().filter(|value| !value.is_finite()).count();
-            if same(column) && missing == 0 {
-                add(
-                    kind,
-                    index,
-                    format!(
-                        "one value in every tick, {}: dead, or the wrong column; look at the mapping, or replace the sensor",
-                        six(column.first().copied().unwrap_or(f64::NAN))
-                    ),
-                );
-            } else if let Some(twin) =
-                columns[..index].iter().position(|other| missing == 0 && equal(other, column))
-            {
-                let fault = format!(
+/// What is wrong with a sensor, and what to do. Two are one fault whatever the numbers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Fault {
+    /// One value in every tick.
+    Dead(f64),
+    /// The same in every tick as another sensor, by number.
+    Twin(usize),
+    /// How many readings are no numbers, and of how many.
+    Missing([usize; 2]),
+}
+
+impl Fault {
+    fn of(columns: &[Vec<f64>], index: usize) -> Option<Self> {
+        let column = columns.get(index)?;
+        let missing = column.iter().filter(|value| !value.is_finite()).count();
+        #[expect(clippy::cast_precision_loss, reason = "ticks of a run")]
+        if missing as f64 > NOT_FINITE_SHARE * column.len() as f64 {
+            return Some(Self::Missing([missing, column.len()]));
+        }
+        if same(column) {
+            return column.first().copied().map(Self::Dead);
+        }
+        columns[..index].iter().position(|other| equal(other, column)).map(Self::Twin)
+    }
+
+    /// Takes another of the same kind in; false where it is another fault.
+    fn takes(&mut self, other: Self) -> bool {
+        match (self, other) {
+            (Self::Dead(one), Self::Dead(other)) => one.total_cmp(&other).is_eq(),
+            (Self::Twin(one), Self::Twin(other)) => *one == other,
+            (Self::Missing(one), Self::Missing(other)) => {
+                if other[0] > one[0] {
+                    *one = other;
+                }
+                true
+            }
+            _ => false,
+        }
+    }
+
+    fn words(self, kind: &str) -> String {
+        match self {
+            Self::Dead(value) => format!(
+                "one value in every tick, {}: dead, or the wrong column; look at the mapping, or replace the sensor",
+                six(value)
+            ),
+            Self::Twin(twin) => {
+                format!(
                     "the same in every tick as {kind} {}: does the mapping have a column twice?",
                     name(twin)
-                );
-                add(kind, index, fault);
+                )
             }
-            if missing as f64 > NOT_FINITE_SHARE * column.len() as f64 {
-                add(
-                    kind,
-                    index,
-                    format!(
-                        "{missing} of {} readings are no numbers, at most {} % may be: look at the recording, or cut it with --start \
-                         and --duration",
-                        column.len(),
-                        NOT_FINITE_SHARE * 100.0
-                    ),
-                );
+            Self::Missing([missing, all]) => format!(
+                "{missing} of {all} readings are no numbers, at most {} % may be: look at the recording, or cut it with --start and \
+                 --duration",
+                NOT_FINITE_SHARE * 100.0
+            ),
+        }
+    }
+}
+
+/// Sensors of runs that read the same in every tick, the same as another one, or too often nothing: what is wrong and what to do.
+/// Those with one fault are named together, and so are runs.
+#[must_use]
+pub fn dead(tracks: &[Track]) -> Vec<String> {
+    let mut faults: Vec<(&str, Vec<usize>, Vec<&str>, Fault)> = Vec::new();
+    for track in tracks {
+        for (kind, columns) in [("accelerometer", &track.outputs), ("gyro", &track.gyros)] {
+            for index in 0..columns.len() {
+                let Some(fault) = Fault::of(columns, index) else { continue };
+                let known = faults.iter_mut().find_map(|(of, sensors, runs, known)| {
+                    (*of == kind && known.takes(fault)).then_some((sensors, runs))
+                });
+                let Some((sensors, runs)) = known else {
+                    faults.push((kind, vec![index], vec![&track.run], fault));
+                    continue;
+                };
+                if !sensors.contains(&index) {
+                    sensors.push(index);
+                }
+                if !runs.contains(&track.run.as_str()) {
+                    runs.push(&track.run);
+                }
             }
         }
     }
-    let words = |(kind, sensors, fault): (&str, Vec<usize>, String)| {
-        format!("{}: {}: {fault}", track.run, several(kind, &sensors))
+    let words = |(kind, mut sensors, runs, fault): (&str, Vec<usize>, Vec<&str>, Fault)| {
+        sensors.sort_unstable();
+        format!("{}: {}: {}", logs(&runs), several(kind, &sensors), fault.words(kind))
     };
     faults.into_iter().map(words).collect()
+}
+
+/// Names of logs, of many only the first.
+#[must_use]
+pub fn logs(names: &[&str]) -> String {
+    match names {
+        [first, _, _, _, ..] => format!("{first} and {}", counted(names.len() - 1, "other log")),
+        few => few.join(", "),
+    }
 }
 
 /// Accelerometers that read exactly the same throughout some poses and not in others: they are at their limit there.
@@ -145,10 +193,15 @@ mod tests {
             gyros: vec![good.clone(), vec![f64::NAN; 200], good],
             ..Track::default()
         };
-        let [dead, none, twice] = &dead(&track)[..] else { panic!("{:?}", dead(&track)) };
-        assert!(dead.starts_with("log: accelerometers x, y and z: one value in every tick, 0: "), "{dead}");
-        assert!(none.starts_with("log: gyro y: 200 of 200 readings are no numbers"), "{none}");
-        assert!(twice.starts_with("log: gyro z: the same in every tick as gyro x"), "{twice}");
+        let all = [track.clone(), Track { run: "other".to_owned(), ..track }];
+        assert_eq!(logs(&["a", "b", "c", "d"]), "a and 3 other logs");
+        let [dead, none, twice] = &dead(&all)[..] else { panic!("{:?}", dead(&all)) };
+        assert!(
+            dead.starts_with("log, other: accelerometers x, y and z: one value in every tick, 0: "),
+            "{dead}"
+        );
+        assert!(none.starts_with("log, other: gyro y: 200 of 200 readings are no numbers"), "{none}");
+        assert!(twice.starts_with("log, other: gyro z: the same in every tick as gyro x"), "{twice}");
     }
 
     #[test]

@@ -49,12 +49,16 @@ pub fn matched(plan: &Plan, track: &Track, poses: &[Pose]) -> Result<Matched, St
     let share = agreement(&ways, &directions, AS_LOGGED);
     let swapped = if share < AGREEMENT { swapped(track, poses, (&ways, &directions)) } else { None };
     let unclear = |hint: &str| {
-        format!(
-            "{}; gyros and accelerometers agree on the turns between the poses on {:.0} % of the ways, at least {:.0} % is needed: {hint}",
-            nothing(plan, poses, &directions),
-            share * 100.0,
-            AGREEMENT * 100.0
-        )
+        let agree = if ways.is_empty() {
+            "the log has no turns".to_owned()
+        } else {
+            format!(
+                "gyros and accelerometers agree on the turns between the poses on {:.0} % of the ways, at least {:.0} % is needed",
+                share * 100.0,
+                AGREEMENT * 100.0
+            )
+        };
+        format!("{}; {agree}: {hint}", nothing(plan, poses, &directions))
     };
     let doubt = match swapped {
         Some(Swapped { accelerometers: true, hint }) => return Err(unclear(&hint)),
@@ -83,7 +87,7 @@ pub fn matched(plan: &Plan, track: &Track, poses: &[Pose]) -> Result<Matched, St
         return Ok(Matched { positions, doubt });
     }
     Err(unclear(&format!(
-        "and they are not the plan's {count} positions in their order, one is missing or repeated{}. Say which pose is which with \
+        "they are not the plan's {count} positions in their order, one is missing or repeated{}. Say which pose is which with \
          --times, or record the turns too",
         unseen(plan).unwrap_or_default()
     )))

@@ -6,6 +6,7 @@ use isotherm_protocol::document::{Document, Sample};
 use super::analysis::{Analysis, Settings};
 use super::budget::ARCSEC_PER_RAD;
 use super::charts::{AXES, across, axes_chart, bend, left_chart, shown};
+use super::doubts::LARGEST_LEFT_SHARE;
 use super::faults::{counted, fixed};
 use super::fit::Fit;
 use super::judged::{Judgement, curves, lengths};
@@ -38,7 +39,11 @@ pub fn report(
     }
     report.verdicts = Curve::verdicts(&report.residuals);
     let [length, outside] = [Some(inside), outside].map(|set| set.map(|set| lengths(set.judged)));
-    report.verdicts.push(Verdict::of_values("|f|−g", "m/s²", length.unwrap_or_default(), outside));
+    let length = Verdict::of_values("|f|−g", "m/s²", length.unwrap_or_default(), outside);
+    report.verdicts.push(match far(&length, settings.gravity) {
+        Some(words) => length.refused(words),
+        None => length,
+    });
     report.verdicts = as_a_whole(report.verdicts).into_iter().map(|v| v.stated_as(Figure::Rms)).collect();
     report.warnings.clone_from(&analysis.warnings);
     report.notes = notes(document, analysis, settings);
@@ -51,6 +56,20 @@ pub fn report(
         report.charts.push(("Axes over temperature".to_owned(), axes_chart(analysis, settings, &names)));
     }
     report
+}
+
+/// Words where far too much is left of |f| − g: no set of coefficients holds for these logs.
+fn far(length: &Verdict, gravity: f64) -> Option<String> {
+    let [_, after] = length.deciding();
+    let share = after.rms / gravity;
+    (share > LARGEST_LEFT_SHARE).then(|| {
+        format!(
+            "{} % of g are left{}, at most {} % is a result: is the unit of measure in it the same, and the unit?",
+            short(100.0 * share),
+            if length.out_of_sample.is_some() { " in the log that judges" } else { "" },
+            100.0 * LARGEST_LEFT_SHARE
+        )
+    })
 }
 
 /// K, S and C of all accelerometers are of one mounting of the unit and of the same temperatures: with one axis all are refused.

@@ -139,7 +139,7 @@ fn faults(track: &Track) -> Result<(), Vec<String>> {
             ));
         }
     }
-    reasons.extend(faults::dead(track));
+    reasons.extend(faults::dead(std::slice::from_ref(track)));
     if reasons.is_empty() { Ok(()) } else { Err(reasons) }
 }
 

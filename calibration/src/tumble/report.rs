@@ -12,6 +12,7 @@ use crate::drift::figures::{short, six};
 use crate::error::Error;
 use crate::means::Size;
 use crate::positions::budget::ARCSEC_PER_RAD;
+use crate::positions::doubts::LARGEST_LEFT_SHARE;
 use crate::positions::faults::{counted, fixed};
 use crate::positions::pose::Pose;
 use crate::positions::track::Track;
@@ -19,8 +20,6 @@ use crate::report::{Coefficient, Curve, Figure, FitReport, SAME_SHARE, Sigmas, V
 use crate::written::tidy;
 
 const AXES: [&str; 3] = ["x", "y", "z"];
-/// Largest |f| − g (rms, a share of g) of poses that the fit has not seen.
-const LARGEST_LEFT_SHARE: f64 = 0.02;
 /// Times by which the rms may grow in poses that the fit has not seen.
 const LARGEST_GROWTH: f64 = 2.0;
 

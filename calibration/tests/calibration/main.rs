@@ -3,7 +3,7 @@
 //! | file | holds |
 //! |---|---|
 //! | `thermal` | what the methods reach on simulated coils and the real chamber log, bad input, the fit against the service |
-//! | `positions`, `positions_command` | a simulated stand, from the log to the document |
+//! | `positions`, `positions_command`, `positions_damaged` | a simulated stand, from the log to the document; damaged logs |
 //! | `tumble`, `tumble_damaged` | a unit put down by hand, real and simulated, sound and damaged |
 //! | `modes_rates` | `modes` and `rates` as their users run them |
 //! | `drift`, `impact`, `logged` | noise and drift, what they mean for navigation, and logs in every form |
@@ -39,6 +39,7 @@ mod pages;
 mod positions;
 mod positions_channels;
 mod positions_command;
+mod positions_damaged;
 mod rates_refused;
 mod rest;
 mod simulated_logs;
