@@ -136,7 +136,7 @@ impl Budget {
         let count = counted(plan.positions.len(), "position");
         if let Some([known, later]) = self.known_by(plan, levelling_rad) {
             return format!(
-                "An axis will be known to {known:.1}″ (one sigma) by the plan's {count}, to {later:.1}″ until it is calibrated again."
+                "An axis will be known to {known:.1}″ (one sigma) by the plan's {count}, to {later:.1}″ with what housing and measured temperature add."
             );
         }
         let all: Vec<usize> = (0..plan.positions.len()).collect();
@@ -163,11 +163,11 @@ impl Budget {
             };
             format!(
                 "The weighted least-squares fit of the plan uses every position for every element{level}: it will state {mean:.1}″ on \
-                 average, {largest:.1}″ at most; housing and measured temperature come on top.\n"
+                 average, {largest:.1}″ at most.\n"
             )
         });
         format!(
-            "{}\n\nBy the formula of 004, four positions for an element, whatever the plan: {:.1}″.\n\n{}\n\nError by the measured \
+            "{}\n\nBy the formula of 004, which adds up four errors whatever the plan: {:.1}″.\n\n{}\n\nError by the measured \
              temperature: {}.\n{of_plan}",
             self.headline(plan, levelling_rad),
             self.total_arcsec(),

@@ -139,14 +139,14 @@ fn agreement(ways: &[Matrix3<f64>], directions: &[Vector3<f64>], order: [usize; 
 }
 
 /// Words where a plan's neighbours differ by a turn about the vertical, which no accelerometer feels: without the turns in the log
-/// they are one pose, and the order tells nothing.
+/// one is taken for the other, or both for one pose.
 fn unseen(plan: &Plan) -> Option<String> {
     let up = |position: usize| Vector3::from(plan.up(&plan.positions[position].attitude, [0.0; 3]));
     let pair =
         (1..plan.positions.len()).find(|position| up(*position).angle(&up(position - 1)) < DIRECTION_RAD)?;
     Some(format!(
-        " (from {:?} to {:?} the unit turns about the vertical only, which accelerometers do not feel: without turns in the log this \
-         plan always needs --times)",
+        " (from {:?} to {:?} the unit turns about the vertical only, which accelerometers do not feel: without turns only a complete set \
+         in the plan's order and in one log is known, anything else needs --times)",
         plan.positions[pair - 1].name,
         plan.positions[pair].name
     ))

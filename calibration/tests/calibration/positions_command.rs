@@ -180,7 +180,7 @@ fn a_judging_log_in_another_unit_of_measure_is_refused() {
         let (mut events, _) = stand::log(&stand::instrument(), 20.0, &Plan::twelve(), &order, &driven(33));
         for event in &mut events {
             if let isotherm_log::text::LogEvent::Accel { tick, .. } = event {
-                tick.readings.iter_mut().for_each(|reading| *reading *= factor);
+                tick.readings.iter_mut().for_each(|reading| *reading = (*reading * factor).round());
             }
         }
         record_events(&folder.path().join(format!("{name}.mcap")), "MEMS-0001", &events);

@@ -91,7 +91,7 @@ fn what_is_left_far_beyond_the_noise_is_told_with_what_it_follows() {
     assert!(times > 20.0 && after.contains("follows the time since the log's beginning"), "{drift}");
     let touched = said(24, &|track| {
         let quiet = track.len() / 7;
-        times_of(track, 3 * quiet..4 * quiet, 1.02);
+        times_of(track, 3 * quiet..4 * quiet, 1.008);
     });
     assert!(
         touched.contains(" times the noise of the poses") && touched.contains("was it moved or touched"),
