@@ -35,9 +35,9 @@ const OF_GYROS: [(f64, &str); 5] = [
 
 /// What scale factors of a kind of sensors are beside the stated ones.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Beside<'a> {
+pub struct Beside {
     /// Of what kind they are, as in "gyro".
-    pub kind: &'a str,
+    pub kind: &'static str,
     /// How many times too large the readings of each are by what is stated.
     pub times: Vec<f64>,
     /// Whether anything is stated that all of them can be held against, or only of one beside another.
@@ -48,7 +48,7 @@ pub struct Beside<'a> {
     hint: &'static str,
 }
 
-impl<'a> Beside<'a> {
+impl Beside {
     /// Accelerometers: output per specific force, found and stated.
     #[must_use]
     pub fn accelerometers(output: AccelOutput, found: &[f64], stated: &[f64]) -> Self {
@@ -162,7 +162,7 @@ mod tests {
         named(MetresPerSecondSquared, 0.102, 1.0, "in g that are taken for m/s²");
         named(MetresPerSecondSquared, 9.8, 1.0, "multiplied by g once more");
         named(MetresPerSecondSquared, 102.0, 1.0, "in mg (or cm/s²)");
-        named(MetresPerSecondSquared, 2.2, "as of no usual unit of measure");
+        named(MetresPerSecondSquared, 2.2, 1.0, "as of no usual unit of measure");
         named(MetresPerSecondSquared, 414.0, 1.0, "map them as \"raw\"");
         named(Volts, 4060.0, 414.0, "multiplied by g once more");
         let apart = Beside::accelerometers(Volts, &[414.0, 828.0, 412.0], &[1.0; 3]).words().unwrap();

@@ -41,10 +41,9 @@ fn said(analysis: &Analysis, words: &str) -> bool {
 /// Sets the readings of a channel, or takes it away.
 fn channel(tracks: &mut [Track], name: &str, reading: Option<f64>) {
     for track in tracks {
-        match (reading, track.temperature_deg_c.get_mut(name)) {
-            (Some(reading), Some(column)) => column.fill(reading),
-            (None, _) => drop(track.temperature_deg_c.remove(name)),
-            _ => panic!("no {name}"),
+        match reading {
+            Some(reading) => track.temperature_deg_c.get_mut(name).unwrap().fill(reading),
+            None => drop(track.temperature_deg_c.remove(name)),
         }
     }
 }

@@ -23,8 +23,8 @@ fn changed(seed: u64, change: &dyn Fn(&mut Track)) -> (Document, Tumble) {
 fn said(seed: u64, change: &dyn Fn(&mut Track)) -> String {
     let (plain, tumble) = changed(seed, change);
     let said = [tumble.warnings.clone(), complete(&plain, &tumble).unwrap().1].concat();
-    let [one] = &said[..] else { panic!("{said:?}") };
-    one.clone()
+    assert_eq!(said.len(), 1, "{said:?}");
+    said.concat()
 }
 
 fn times(columns: &mut [Vec<f64>], factor: f64) {
