@@ -80,7 +80,7 @@ mod tests {
                 .unwrap()
                 .1
                 .unwrap()
-                .contains("That would be 55.5769°, and gravity 0.361 % more")
+                .contains("That would be 55.5769°, and gravity 0.360 % more")
         );
         assert_eq!(stated(None, Some(55.75), 0.0).unwrap().1, None);
         assert!(stated(Some(981.0), None, 0.0).is_err() && stated(None, Some(91.0), 0.0).is_err());

@@ -55,7 +55,7 @@ fn gyros(sensors: &[Beside]) -> Result<Option<String>, String> {
     let what = places.map_or_else(
         || {
             format!(
-                "{} far from where the document at hand, or else {}, it: are columns of the mapping swapped, of the accelerometers \
+                "{} far from where the document at hand, or else {} it: are columns of the mapping swapped, of the accelerometers \
                  too, or is a sign the other one?",
                 if turned.len() == 1 { format!("{} is", several("gyro", &turned)) } else { format!("{} are", several("gyro", &turned)) },
                 if turned.len() == 1 { "its column, has" } else { "their columns, have" },
