@@ -7,9 +7,10 @@
 //! | [`gravity`] | what everything is relative to |
 //! | [`plan`], [`times`], [`matching`], [`faults`] | positions of a stand; when which was held; which pose is which; sensors that are no use |
 //! | [`model`], [`fit`] | the outputs as a function of what is to be found; finding it |
-//! | [`temperature`], [`doubts`] | levels and channels; what is doubtful about a result |
+//! | [`temperature`], [`doubts`], [`measure`] | levels and channels; what is doubtful about a result, and about its unit of measure |
 //! | [`analysis`], [`document`], [`provenance`], [`judged`], [`report`], [`charts`] | from runs to a result; as a document, with where it comes from; what it leaves; in words and diagrams |
 //! | [`budget`] | what a planned calibration will come to |
+//! | `sense` | which way sensors point beside what is stated |
 //! | [`solve`] | nonlinear least squares with covariance |
 
 pub mod analysis;
@@ -23,11 +24,13 @@ pub mod fit;
 pub mod gravity;
 pub mod judged;
 pub mod matching;
+pub mod measure;
 pub mod model;
 pub mod plan;
 pub mod pose;
 pub mod provenance;
 pub mod report;
+pub(crate) mod sense;
 pub mod solve;
 pub mod still;
 pub mod temperature;

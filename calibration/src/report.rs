@@ -70,6 +70,8 @@ pub struct FitReport {
     pub notes: Vec<String>,
     /// The coefficients.
     pub coefficients: Vec<Coefficient>,
+    /// What the sizes of the verdicts are over, such as "poses"; windows where nothing is said.
+    pub counted: Option<&'static str>,
     /// The cross-validation.
     pub validation: Option<Table>,
     /// Before and after, by sensor and run.
@@ -85,6 +87,18 @@ impl FitReport {
     #[must_use]
     pub fn new(title: impl Into<String>, unit: impl Into<String>) -> Self {
         Self { title: title.into(), unit: unit.into(), ..Self::default() }
+    }
+
+    /// With the name of what its sizes are over.
+    #[must_use]
+    pub fn counting(mut self, what: &'static str) -> Self {
+        self.counted = Some(what);
+        self
+    }
+
+    /// All sizes as a table.
+    fn size_rows(&self) -> Table {
+        verdict::rows(&self.verdicts, self.counted.unwrap_or("windows"))
     }
 
     /// Every verdict, one sentence each, in one line.
@@ -122,7 +136,7 @@ impl FitReport {
             let _ = writeln!(text, "\nwarning: {warning}");
         });
         let own = [
-            ("Before and after", Some(verdict::rows(&self.verdicts))),
+            ("Before and after", Some(self.size_rows())),
             ("Coefficients, with their standard errors", Some(self.coefficient_rows())),
             ("Cross-validation", self.validation.clone()),
         ];

@@ -48,10 +48,12 @@ pub(super) struct PositionsArgs {
     /// Print what a planned calibration will come to, and nothing else; the defaults are the example of 004
     #[arg(long, conflicts_with_all = ["log", "document", "out", "judge", "html", "times"])]
     budget: bool,
-    /// Positions in the order in which they are taken: "twelve" (those of 004), "six", or a file (TOML, CSV)
+    /// Positions in the order in which they are taken: "twelve" (those of 004; needs the turns in the log, or --times), "six", or
+    /// a file (TOML, CSV)
     #[arg(long, value_name = "PLAN", default_value = "twelve")]
     plan: String,
-    /// Table of times (CSV: `start_s,end_s,position[,log]`): no poses are searched for
+    /// Table of times (CSV: `start_s,end_s,position[,log]`): no poses are searched for. Needed with "twelve" where the logs
+    /// do not have the turns, unless one log has all positions in their order
     #[arg(long, value_name = "FILE")]
     times: Option<PathBuf>,
     /// Calibration document (TOML) that is completed, without it the accelerometers must stand along the case axes; for several

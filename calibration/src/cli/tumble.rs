@@ -112,7 +112,7 @@ impl TumbleArgs {
         fitting.finish();
         let mut tumble = found.map_err(Error::Refused)?;
         tumble.warnings.extend(about_gravity.clone());
-        let (document, warnings) = complete(&base.document, &tumble);
+        let (document, warnings) = complete(&base.document, &tumble).map_err(Error::Refused)?;
         tumble.warnings.extend(warnings);
         let left = |written: &Written| -> Result<Left, Error> {
             let track = Track::of(run, &written.loaded, bar())?;
@@ -130,6 +130,9 @@ impl TumbleArgs {
             range_deg_c: None,
             logs: work.logs(),
         };
+        // Gyros are relative to the axes of the accelerometers that were found with them.
+        let accepted = report.verdicts.first().is_some_and(|accel| accel.accepted);
+        let written = if accepted { written } else { Written::of(&base.document)? };
         Ok(Fitted { written, report, about })
     }
 

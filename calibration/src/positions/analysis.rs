@@ -2,16 +2,18 @@
 
 use isotherm_protocol::document::Document;
 
-use super::doubts::{ACCIDENT, few, no_solution, quadratic_terms, sound, spread, survival, turned, widening};
-use super::faults;
-use super::fit::{Fit, Weights, fit, guesses};
+use super::doubts::{
+    ACCIDENT, few, measures, no_solution, quadratic_terms, sound, spread, survival, turned, widening,
+};
+use super::faults::{self, counted};
+use super::fit::{Fit, Positions, Weights, guesses};
 use super::matching::{Matched, matched};
-use super::model::{Degrees, Guess, Taken};
+use super::model::{Degrees, Taken};
 use super::plan::Plan;
 use super::pose::{Pose, intensities};
 use super::still::{StillLimits, still};
 use super::temperature::{
-    Temperatures, blind, board_ratio, channels, levels, own_deg_c, reference, slopes_deg_c,
+    Followed, Temperatures, blind, board_ratio, followed, levels, own_deg_c, reference, slopes_deg_c, stuck,
 };
 use super::times::Times;
 use super::track::Track;
@@ -78,23 +80,21 @@ pub struct Analysis {
 /// # Errors
 /// Every reason why it cannot be, with what to do.
 pub fn analyse(tracks: &[Track], document: &Document, settings: &Settings) -> Result<Analysis, Vec<String>> {
-    let reasons: Vec<String> = tracks.iter().flat_map(faults::dead).collect();
+    let reasons = faults::dead(tracks);
     if !reasons.is_empty() {
         return Err(reasons);
     }
     let (poses, mut warnings) = positions(tracks, settings)?;
     let sensors = tracks.iter().map(|track| track.outputs.len()).max().unwrap_or(0);
-    let channels = channels(document, settings);
-    let temperature = |pose: &Pose, channels: &[String]| pose.mean_temperature(channels);
-    let axes: Vec<Option<f64>> = poses.iter().map(|(pose, _)| temperature(pose, &channels)).collect();
-    let known = !channels.is_empty() && axes.iter().all(Option::is_some);
-    let axes: Vec<f64> =
-        axes.iter().map(|t| t.filter(|_| known).unwrap_or(document.temperature.assumed_deg_c)).collect();
+    let Followed { channels, deg_c: axes } = followed(document, settings, &poses, &mut warnings)?;
     let (level_of, levels_deg_c) = levels(&axes);
     let own = own_deg_c(document, &poses, &axes, sensors);
     let blind = blind(document, &own, levels_deg_c.len());
     if !blind.is_empty() {
         return Err(blind);
+    }
+    if let Some(words) = stuck(&channels, &axes, &own).filter(|_| !channels.is_empty()) {
+        return Err(vec![words]);
     }
     let (low, high) =
         axes.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), t| (a.min(*t), b.max(*t)));
@@ -125,11 +125,10 @@ pub fn analyse(tracks: &[Track], document: &Document, settings: &Settings) -> Re
     let guess = guesses(stand, &taken, sensors).map_err(|bad| spread(stand, &taken, &bad))?;
     let most = levels_deg_c.len() - 1;
     let degrees = Degrees { sensor: most.min(2), axes: most.min(1) };
-    let found = fit(stand, &taken, &guess, &weights, degrees).map_err(|why| vec![no_solution(&why)])?;
-    let quadratic = (most >= 2)
-        .then(|| fit(stand, &taken, &guess, &weights, Degrees { axes: 2, ..degrees }).ok())
-        .flatten()
-        .map(|quadratic| {
+    let all = Positions { plan: stand, taken: &taken, guess: &guess, weights: &weights };
+    let found = all.fit(degrees).map_err(|why| vec![no_solution(&why, degrees, sensors)])?;
+    let quadratic =
+        (most >= 2).then(|| all.fit(Degrees { axes: 2, ..degrees }).ok()).flatten().map(|quadratic| {
             let (chi_square, terms) = quadratic_terms(&quadratic, stand);
             let accident = survival(chi_square, terms);
             (quadratic, chi_square, terms, accident)
@@ -145,15 +144,9 @@ pub fn analyse(tracks: &[Track], document: &Document, settings: &Settings) -> Re
         );
     }
     few(stand, &taken, levels_deg_c.len(), settings, &mut warnings);
-    turned(best, document, &mut warnings);
-    if !known && !document.temperature.channel.is_empty() {
-        warnings.push(
-            "the temperature channels have gaps or none is followed by the accelerometers: all positions count as one temperature"
-                .to_owned(),
-        );
-    }
-    let of_level =
-        (0..levels_deg_c.len()).map(|level| one_level(stand, &taken, &guess, &weights, level)).collect();
+    turned(best, document, settings.gravity, &mut warnings);
+    warnings.extend(measures(best, document, settings, &own));
+    let of_level = (0..levels_deg_c.len()).map(|level| one_level(&all, level)).collect();
     let poses = poses.into_iter().zip(&level_of).map(|((pose, position), level)| (pose, position, *level));
     let analysis = Analysis {
         poses: poses.collect(),
@@ -167,7 +160,7 @@ pub fn analyse(tracks: &[Track], document: &Document, settings: &Settings) -> Re
         range_deg_c: [low, high],
         sensors_deg_c: own.iter().map(|deg_c| Temperatures::of(deg_c)).collect(),
         slopes_deg_c: slopes_deg_c(document, &plain).unwrap_or(document.temperature.assumed_deg_c),
-        channels: if known { channels } else { Vec::new() },
+        channels,
         weights,
         widened,
         warnings,
@@ -186,7 +179,7 @@ pub type Found = (Vec<(Pose, usize)>, Vec<String>);
 pub fn positions(tracks: &[Track], settings: &Settings) -> Result<Found, Vec<String>> {
     let mut found = Vec::new();
     let mut warnings = Vec::new();
-    let mut reasons = Vec::new();
+    let (mut reasons, mut unclear) = (Vec::new(), Vec::new());
     for (run, track) in tracks.iter().enumerate() {
         if let Some(times) = &settings.times {
             match times.poses(track, run, &settings.plan) {
@@ -211,17 +204,25 @@ pub fn positions(tracks: &[Track], settings: &Settings) -> Result<Found, Vec<Str
                 let others = positions.iter().filter(|position| position.is_none()).count();
                 if others > 0 {
                     warnings.push(format!(
-                        "{}: {others} of {} still poses are no position of the plan and were left out",
+                        "{}: {others} of {} {} no position of the plan and left out",
                         track.run,
-                        poses.len()
+                        counted(poses.len(), "still pose"),
+                        if others == 1 { "is" } else { "are" }
                     ));
                 }
                 found.extend(
                     poses.into_iter().zip(positions).filter_map(|(pose, position)| Some((pose, position?))),
                 );
             }
-            Err(words) => reasons.push(format!("{}: {words}", track.run)),
+            Err(words) => unclear.push((track.run.as_str(), words)),
         }
+    }
+    // What is wrong with one log of many mostly is with all of them.
+    if let Some(((first, words), others)) = unclear.split_first() {
+        let others: Vec<&str> = others.iter().map(|(run, _)| *run).collect();
+        let likewise =
+            if others.is_empty() { String::new() } else { format!(". Likewise {}", faults::logs(&others)) };
+        reasons.push(format!("{first}: {words}{likewise}"));
     }
     let poses: Vec<Pose> = found.iter().map(|(pose, _)| pose.clone()).collect();
     reasons.extend(faults::clipped(tracks, &poses));
@@ -254,8 +255,9 @@ fn intensity(tracks: &[Track], poses: &[Pose]) -> Result<Vec<f64>, Vec<String>> 
 }
 
 /// A temperature by itself, where it has enough positions.
-fn one_level(plan: &Plan, taken: &[Taken], guess: &[Guess], weights: &Weights, level: usize) -> Option<Fit> {
-    let own: Vec<Taken> = taken.iter().filter(|taken| taken.level == level).cloned().collect();
-    let enough = guesses(plan, &own, guess.len()).is_ok();
-    enough.then(|| fit(plan, &own, guess, weights, Degrees { sensor: 0, axes: 0 }).ok()).flatten()
+fn one_level(all: &Positions<'_>, level: usize) -> Option<Fit> {
+    let own: Vec<Taken> = all.taken.iter().filter(|taken| taken.level == level).cloned().collect();
+    let enough = guesses(all.plan, &own, all.guess.len()).is_ok();
+    let alone = Positions { taken: &own, ..*all };
+    enough.then(|| alone.fit(Degrees { sensor: 0, axes: 0 }).ok()).flatten()
 }

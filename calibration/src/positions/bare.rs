@@ -38,16 +38,12 @@ pub fn bare(series: &Series, accel_output: AccelOutput) -> Result<Document, Erro
             ));
         }
     }
-    let mut channels = Vec::new();
+    let (mut channels, mut other) = (Vec::new(), Vec::new());
     for (name, channel) in &series.temperatures {
         let good: Vec<f64> = channel.raw.iter().copied().filter(|raw| raw.is_finite()).collect();
         let in_range = good.iter().filter(|raw| (RANGE_DEG_C[0]..=RANGE_DEG_C[1]).contains(*raw)).count();
         if in_range * 2 < good.len() || good.is_empty() {
-            reasons.push(format!(
-                "temperature channel {name:?} does not read °C (most readings are outside {} to {} °C): give its conversion \
-                 with --document",
-                RANGE_DEG_C[0], RANGE_DEG_C[1]
-            ));
+            other.push(format!("{name:?}"));
         }
         channels.push(Channel {
             name: name.clone(),
@@ -55,6 +51,15 @@ pub fn bare(series: &Series, accel_output: AccelOutput) -> Result<Document, Erro
             range_deg_c: RANGE_DEG_C,
             spike_limit_deg_c: 5.0,
         });
+    }
+    if !other.is_empty() {
+        reasons.push(format!(
+            "temperature {} {} not read °C (most readings are outside {} to {} °C, or no numbers): give the conversion with --document",
+            if other.len() == 1 { "channel" } else { "channels" },
+            if other.len() == 1 { format!("{} does", other[0]) } else { format!("{} do", other.join(", ")) },
+            RANGE_DEG_C[0],
+            RANGE_DEG_C[1]
+        ));
     }
     if !reasons.is_empty() {
         return Err(Error::Refused(reasons));

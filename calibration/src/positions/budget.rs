@@ -3,7 +3,9 @@
 use isotherm_log::plot::page::Table;
 use serde_json::{Value, json};
 
-use super::fit::{Weights, guesses, planned};
+use super::doubts::unseen;
+use super::faults::counted;
+use super::fit::{Positions, Weights, guesses};
 use super::model::{Degrees, Taken};
 use super::plan::Plan;
 use crate::drift::figures::{short, table};
@@ -112,11 +114,39 @@ impl Budget {
         let guess = guesses(plan, &taken, 3).ok()?;
         let positioning = self.positioning_arcsec.hypot(self.run_out_arcsec) / ARCSEC_PER_RAD;
         let weights = Weights { intensity: vec![self.noise; 3], positioning_rad: positioning, levelling_rad };
-        let found = planned(plan, &taken, &guess, &weights, Degrees { sensor: 0, axes: 0 }).ok()?;
+        let all = Positions { plan, taken: &taken, guess: &guess, weights: &weights };
+        let found = all.planned(Degrees { sensor: 0, axes: 0 }).ok()?;
         let covariance = found.axes_covariance(plan, 0);
         let sigma: Vec<f64> = covariance.diagonal().iter().map(|v| v.sqrt() * ARCSEC_PER_RAD).collect();
         let mean = (sigma.iter().map(|s| s * s).sum::<f64>() / sigma.len() as f64).sqrt();
         Some([mean, sigma.iter().copied().fold(0.0, f64::max)])
+    }
+
+    /// How well an axis is known by the plan's own fit, and with what the housing and the measured temperature add (″); `None` where
+    /// the plan does not determine it.
+    #[must_use]
+    pub fn known_by(&self, plan: &Plan, levelling_rad: f64) -> Option<[f64; 2]> {
+        let [mean, _] = self.of_plan(plan, levelling_rad)?;
+        let rest = [self.housing_arcsec(), self.temperature_arcsec(self.axis_arcsec_per_deg_c)];
+        Some([mean, rest.iter().fold(mean, |sum: f64, part| sum.hypot(*part))])
+    }
+
+    /// The first line: what this plan comes to.
+    fn headline(&self, plan: &Plan, levelling_rad: f64) -> String {
+        let count = counted(plan.positions.len(), "position");
+        if let Some([known, later]) = self.known_by(plan, levelling_rad) {
+            return format!(
+                "An axis will be known to {known:.1}″ (one sigma) by the plan's {count}, to {later:.1}″ with what housing and measured temperature add."
+            );
+        }
+        let all: Vec<usize> = (0..plan.positions.len()).collect();
+        let lacking = unseen(plan, &all);
+        let lacking = if lacking.is_empty() {
+            "they do not spread enough".to_owned()
+        } else {
+            format!("none has {}", lacking.join(", "))
+        };
+        format!("The plan's {count} will not determine C: {lacking}. Show each case axis up and down.")
     }
 
     /// As text.
@@ -125,16 +155,21 @@ impl Budget {
         let Table { head, rows } = self.rows();
         let typical = TYPICAL_ARCSEC_PER_DEG_C
             .map(|(name, rate)| format!("{:.1}″ for {name} ({rate} ″/°C)", self.temperature_arcsec(rate)));
-        let of_plan = match self.of_plan(plan, levelling_rad) {
-            Some([mean, largest]) => format!(
-                "The weighted least-squares fit of the plan's {} positions uses every position for every element: it will state \
-                 {mean:.1}″ on average, {largest:.1}″ at most.",
-                plan.positions.len()
-            ),
-            None => "The plan's positions do not determine C: each axis must be seen up and down.".to_owned(),
-        };
+        let of_plan = self.of_plan(plan, levelling_rad).map_or_else(String::new, |[mean, largest]| {
+            let level = if plan.tells_level() {
+                String::new()
+            } else {
+                format!(", with a level that is known to {:.0}″ (--levelling)", levelling_rad * ARCSEC_PER_RAD)
+            };
+            format!(
+                "The weighted least-squares fit of the plan uses every position for every element{level}: it will state {mean:.1}″ on \
+                 average, {largest:.1}″ at most.\n"
+            )
+        });
         format!(
-            "An axis will be known to {:.1}″ (one sigma).\n\n{}\n\nError by the measured temperature: {}.\n{of_plan}\n",
+            "{}\n\nBy the formula of 004, which adds up four errors whatever the plan: {:.1}″.\n\n{}\n\nError by the measured \
+             temperature: {}.\n{of_plan}",
+            self.headline(plan, levelling_rad),
             self.total_arcsec(),
             table(&head, &rows),
             typical.join(", ")
@@ -187,6 +222,8 @@ impl Budget {
             "temperature_typical_arcsec": typical,
             "total_arcsec": self.total_arcsec(),
             "positions": plan.positions.len(),
+            "determined": of_plan.is_some(),
+            "known_arcsec": self.known_by(plan, levelling_rad).map(|[_, later]| later),
             "fit_mean_arcsec": of_plan.map(|[mean, _]| mean),
             "fit_largest_arcsec": of_plan.map(|[_, largest]| largest),
         })
@@ -210,6 +247,36 @@ mod tests {
         for words in ["11.5", "10.6", "0.3″ for quartz", "1.2″ for silicon", "15.7″"] {
             assert!(text.contains(words), "{words} is not in\n{text}");
         }
+    }
+
+    #[test]
+    fn the_first_line_is_of_the_plan() {
+        let budget = Budget::default();
+        let first =
+            |plan: &Plan| budget.to_text(plan, 60.0 / ARCSEC_PER_RAD).lines().next().unwrap().to_owned();
+        let twelve = first(&Plan::twelve());
+        assert!(
+            twelve.starts_with(
+                "An axis will be known to 2.9″ (one sigma) by the plan's 12 positions, to 11.0″"
+            ),
+            "{twelve}"
+        );
+        let six = first(&Plan::six());
+        let [known, later] = budget.known_by(&Plan::six(), 60.0 / ARCSEC_PER_RAD).unwrap();
+        assert!(known > 20.0 && later > known && later < known + 4.0, "{known} {later}");
+        assert!(
+            six.starts_with(&format!(
+                "An axis will be known to {known:.1}″ (one sigma) by the plan's 6 positions"
+            )),
+            "{six}"
+        );
+        let mut flat = Plan::twelve();
+        flat.positions.retain(|position| !position.name.starts_with('Z'));
+        let flat = first(&flat);
+        assert!(
+            flat.starts_with("The plan's 8 positions will not determine C: none has z up, z down."),
+            "{flat}"
+        );
     }
 
     #[test]

@@ -97,66 +97,68 @@ pub fn guesses(plan: &Plan, taken: &[Taken], sensors: usize) -> Result<Vec<Guess
     if bad.is_empty() { Ok(found.into_iter().flatten().collect()) } else { Err(bad) }
 }
 
-/// Finds everything from the positions taken.
-///
-/// # Errors
-/// Where they do not determine it.
-pub fn fit(
-    plan: &Plan,
-    taken: &[Taken],
-    guess: &[Guess],
-    weights: &Weights,
-    degrees: Degrees,
-) -> Result<Fit, NoSolution> {
-    found(plan, taken, guess, weights, degrees, |start, residuals| solve(start, residuals))
+/// Positions to be fitted, and what is known of them beforehand.
+#[derive(Debug, Clone, Copy)]
+pub struct Positions<'a> {
+    /// The plan that they are of.
+    pub plan: &'a Plan,
+    /// The positions as they were taken.
+    pub taken: &'a [Taken],
+    /// First guesses of all accelerometers.
+    pub guess: &'a [Guess],
+    /// What is known of the errors.
+    pub weights: &'a Weights,
 }
 
-/// What [`fit`] will find of positions that are only planned, so that the first guess is the truth: nothing is searched for.
-///
-/// # Errors
-/// Where they do not determine it.
-pub fn planned(
-    plan: &Plan,
-    taken: &[Taken],
-    guess: &[Guess],
-    weights: &Weights,
-    degrees: Degrees,
-) -> Result<Fit, NoSolution> {
-    found(plan, taken, guess, weights, degrees, |start, residuals| known(start, residuals))
-}
+impl Positions<'_> {
+    /// Finds everything from them.
+    ///
+    /// # Errors
+    /// Where they do not determine it.
+    pub fn fit(&self, degrees: Degrees) -> Result<Fit, NoSolution> {
+        self.found(degrees, |start, residuals| solve(start, residuals))
+    }
 
-fn found(
-    plan: &Plan,
-    taken: &[Taken],
-    guess: &[Guess],
-    weights: &Weights,
-    degrees: Degrees,
-    solve: impl Fn(&[f64], &dyn Fn(&[f64]) -> Vec<f64>) -> Result<Solution, NoSolution>,
-) -> Result<Fit, NoSolution> {
-    let model = Model { plan, guess: guess.to_vec(), degrees };
-    let start = vec![0.0; model.count()];
-    let whitening: Vec<DMatrix<f64>> =
-        taken.iter().map(|taken| whitening(&model, &start, taken, weights)).collect();
-    let prior = weights.levelling_rad / SMALL;
-    let residuals = |p: &[f64]| -> Vec<f64> {
-        let mut all = Vec::with_capacity(taken.len() * guess.len() + 3);
-        for (taken, whitening) in taken.iter().zip(&whitening) {
-            let predicted = model.outputs(p, taken);
-            let away = DVector::from_iterator(
-                guess.len(),
-                taken.outputs.iter().zip(&predicted).map(|(measured, predicted)| measured - predicted),
-            );
-            all.extend((whitening * away).iter());
-        }
-        all.extend(p[p.len() - 3..].iter().map(|error| error / prior));
-        all
-    };
-    let solution = solve(&start, &residuals)?;
-    let errors = model.errors(&solution.parameters);
-    let from = model.count() - 3;
-    let stand = [0, 1, 2].map(|i| (errors[i], solution.sigma(from + i) * SMALL));
-    let sensors = model.state(&solution.parameters);
-    Ok(Fit { degrees, sensors, stand, solution, guess: guess.to_vec() })
+    /// What [`Positions::fit`] will find of positions that are only planned, so that the first guess is the truth: nothing is
+    /// searched for.
+    ///
+    /// # Errors
+    /// Where they do not determine it.
+    pub fn planned(&self, degrees: Degrees) -> Result<Fit, NoSolution> {
+        self.found(degrees, |start, residuals| known(start, residuals))
+    }
+
+    fn found(
+        &self,
+        degrees: Degrees,
+        solve: impl Fn(&[f64], &dyn Fn(&[f64]) -> Vec<f64>) -> Result<Solution, NoSolution>,
+    ) -> Result<Fit, NoSolution> {
+        let Self { plan, taken, guess, weights } = *self;
+        let model = Model { plan, guess: guess.to_vec(), degrees };
+        let start = vec![0.0; model.count()];
+        let whitening: Vec<DMatrix<f64>> =
+            taken.iter().map(|taken| whitening(&model, &start, taken, weights)).collect();
+        let prior = weights.levelling_rad / SMALL;
+        let residuals = |p: &[f64]| -> Vec<f64> {
+            let mut all = Vec::with_capacity(taken.len() * guess.len() + 3);
+            for (taken, whitening) in taken.iter().zip(&whitening) {
+                let predicted = model.outputs(p, taken);
+                let away = DVector::from_iterator(
+                    guess.len(),
+                    taken.outputs.iter().zip(&predicted).map(|(measured, predicted)| measured - predicted),
+                );
+                all.extend((whitening * away).iter());
+            }
+            all.extend(p[p.len() - 3..].iter().map(|error| error / prior));
+            all
+        };
+        let solution = solve(&start, &residuals)?;
+        let errors = model.errors(&solution.parameters);
+        let from = model.count() - 3;
+        let stand = [0, 1, 2].map(|i| (errors[i], solution.sigma(from + i) * SMALL));
+        let sensors = model.state(&solution.parameters);
+        Ok(Fit { degrees, sensors, stand, solution, guess: guess.to_vec() })
+    }
 }
 
 /// L⁻¹ of V = L·Lᵀ for one position.

@@ -1,5 +1,6 @@
 //! Gravity at the place of a calibration: every scale factor of an accelerometer is relative to it.
 
+use crate::drift::figures::{short, six};
 use crate::error::Error;
 
 /// Standard gravity (m/s²).
@@ -39,7 +40,7 @@ pub fn stated(
             usage("--gravity", gravity, "from 9.7 to 9.9 m/s², as on Earth")
         }
         (Some(gravity), _) => Ok((gravity, None)),
-        (None, Some(latitude)) => Ok((normal(latitude, height_m), None)),
+        (None, Some(latitude)) => Ok((normal(latitude, height_m), radians(latitude))),
         (None, None) => Ok((
             STANDARD_M_PER_S2,
             Some(format!(
@@ -48,6 +49,18 @@ pub fn stated(
             )),
         )),
     }
+}
+
+/// Words where a latitude may be in radians.
+fn radians(latitude: f64) -> Option<String> {
+    let may_be = latitude != 0.0 && latitude.abs() <= std::f64::consts::FRAC_PI_2;
+    may_be.then(|| {
+        format!(
+            "--latitude is {latitude}°, near the equator: is it not in radians? That would be {}°, and gravity {} % more",
+            six(latitude.to_degrees()),
+            short(100.0 * (normal(latitude.to_degrees(), 0.0) / normal(latitude, 0.0) - 1.0))
+        )
+    })
 }
 
 #[cfg(test)]
@@ -62,6 +75,14 @@ mod tests {
         assert!((normal(45.0, 1000.0) - normal(45.0, 0.0) + 3.086e-3).abs() < 1e-9);
         assert_eq!(stated(Some(9.81), None, 0.0).unwrap(), (9.81, None));
         assert!(stated(None, None, 0.0).unwrap().1.is_some());
+        assert!(
+            stated(None, Some(0.97), 0.0)
+                .unwrap()
+                .1
+                .unwrap()
+                .contains("That would be 55.5769°, and gravity 0.360 % more")
+        );
+        assert_eq!(stated(None, Some(55.75), 0.0).unwrap().1, None);
         assert!(stated(Some(981.0), None, 0.0).is_err() && stated(None, Some(91.0), 0.0).is_err());
     }
 }

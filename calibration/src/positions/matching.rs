@@ -6,6 +6,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::faults::{counted, fixed};
 use super::plan::{Attitude, Plan};
 use super::pose::Pose;
 use super::track::Track;
@@ -48,12 +49,16 @@ pub fn matched(plan: &Plan, track: &Track, poses: &[Pose]) -> Result<Matched, St
     let share = agreement(&ways, &directions, AS_LOGGED);
     let swapped = if share < AGREEMENT { swapped(track, poses, (&ways, &directions)) } else { None };
     let unclear = |hint: &str| {
-        format!(
-            "{}; gyros and accelerometers agree on the turns between the poses on {:.0} % of the ways, at least {:.0} % is needed: {hint}",
-            nothing(plan, poses, &directions),
-            share * 100.0,
-            AGREEMENT * 100.0
-        )
+        let agree = if ways.is_empty() {
+            "the log has no turns".to_owned()
+        } else {
+            format!(
+                "gyros and accelerometers agree on the turns between the poses on {:.0} % of the ways, at least {:.0} % is needed",
+                share * 100.0,
+                AGREEMENT * 100.0
+            )
+        };
+        format!("{}; {agree}: {hint}", nothing(plan, poses, &directions))
     };
     let doubt = match swapped {
         Some(Swapped { accelerometers: true, hint }) => return Err(unclear(&hint)),
@@ -82,8 +87,9 @@ pub fn matched(plan: &Plan, track: &Track, poses: &[Pose]) -> Result<Matched, St
         return Ok(Matched { positions, doubt });
     }
     Err(unclear(&format!(
-        "and they are not the plan's {count} positions in their order, one is missing or repeated. Say which pose is which with \
-         --times, or record the turns too"
+        "they are not the plan's {count} positions in their order, one is missing or repeated{}. Say which pose is which with \
+         --times, or record the turns too",
+        unseen(plan).unwrap_or_default()
     )))
 }
 
@@ -132,13 +138,33 @@ fn agreement(ways: &[Matrix3<f64>], directions: &[Vector3<f64>], order: [usize; 
     agree.count() as f64 / ways.len().max(1) as f64
 }
 
+/// Words where a plan's neighbours differ by a turn about the vertical, which no accelerometer feels: without the turns in the log
+/// one is taken for the other, or both for one pose.
+fn unseen(plan: &Plan) -> Option<String> {
+    let up = |position: usize| Vector3::from(plan.up(&plan.positions[position].attitude, [0.0; 3]));
+    let pair =
+        (1..plan.positions.len()).find(|position| up(*position).angle(&up(position - 1)) < DIRECTION_RAD)?;
+    Some(format!(
+        " (from {:?} to {:?} the unit turns about the vertical only, which accelerometers do not feel: without turns only a complete set \
+         in the plan's order and in one log is known, anything else needs --times)",
+        plan.positions[pair - 1].name,
+        plan.positions[pair].name
+    ))
+}
+
 /// The poses in words.
 fn nothing(plan: &Plan, poses: &[Pose], directions: &[Vector3<f64>]) -> String {
     let words = poses.iter().zip(directions).map(|(pose, up)| {
-        format!("{:.0}–{:.0} s up ({:.2}, {:.2}, {:.2})", pose.span_s[0], pose.span_s[1], up.x, up.y, up.z)
+        let [x, y, z] = [up.x, up.y, up.z].map(|c| fixed(c, 2));
+        format!("{:.0}–{:.0} s up ({x}, {y}, {z})", pose.span_s[0], pose.span_s[1])
     });
     let words: Vec<String> = words.collect();
-    format!("{} still poses ({}) for a plan of {}", poses.len(), words.join("; "), plan.positions.len())
+    format!(
+        "{} ({}) for a plan of {}",
+        counted(poses.len(), "still pose"),
+        words.join("; "),
+        plan.positions.len()
+    )
 }
 
 /// Follows the gyros from an anchor.

@@ -38,6 +38,14 @@ pub struct Degrees {
     pub axes: usize,
 }
 
+impl Degrees {
+    /// Parameters of one accelerometer: K, S, and two angles of its axis.
+    #[must_use]
+    pub fn of_sensor(self) -> usize {
+        2 * (self.sensor + 1) + 2 * (self.axes + 1)
+    }
+}
+
 /// First guess of one accelerometer.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Guess {
@@ -121,7 +129,7 @@ impl Model<'_> {
     /// Parameters of one accelerometer.
     #[must_use]
     pub fn of_sensor(&self) -> usize {
-        2 * (self.degrees.sensor + 1) + 2 * (self.degrees.axes + 1)
+        self.degrees.of_sensor()
     }
 
     /// All parameters: accelerometer by accelerometer K, S, a, b, each by powers; then δ1, δ2, δ3 (in thousandths).

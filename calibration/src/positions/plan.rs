@@ -23,6 +23,7 @@ use std::path::Path;
 
 use isotherm_log::file::read_small_text;
 
+use super::doubts::GOOD_POSITIONS;
 use crate::error::Error;
 
 /// Errors of a stand: δ1, δ2, δ3 (rad).
@@ -140,6 +141,12 @@ impl Plan {
     #[must_use]
     pub fn has_stand(&self) -> bool {
         self.positions.iter().any(|position| matches!(position.attitude, Attitude::Stand(_)))
+    }
+
+    /// Whether its positions tell the stand's level from the axes.
+    #[must_use]
+    pub fn tells_level(&self) -> bool {
+        self.has_stand() && self.positions.len() >= GOOD_POSITIONS
     }
 
     /// The position of a name.

@@ -88,7 +88,7 @@ pub fn sigmas(document: &Document, analysis: &Analysis, settings: &Settings) -> 
     let mut sigmas = Sigmas::default();
     let Some(accel) = &document.accel else { return sigmas };
     let fit = &analysis.fit;
-    let of_sensor = fit.solution.parameters.len().saturating_sub(3) / fit.guess.len().max(1);
+    let of_sensor = fit.degrees.of_sensor();
     let own = fit.degrees.sensor + 1;
     for (index, (sensor, guess)) in accel.sensor.iter().zip(&fit.guess).enumerate() {
         let of = |from: usize, scale: f64| -> Vec<f64> {
@@ -113,6 +113,6 @@ pub fn sigmas(document: &Document, analysis: &Analysis, settings: &Settings) -> 
 fn scale_sigmas(analysis: &Analysis) -> Vec<f64> {
     let solution = &analysis.fit.solution;
     let sensors = analysis.fit.guess.len();
-    let of_sensor = solution.parameters.len().saturating_sub(3) / sensors.max(1);
+    let of_sensor = analysis.fit.degrees.of_sensor();
     (0..sensors).map(|sensor| solution.sigma(sensor * of_sensor) * SMALL * analysis.widened).collect()
 }

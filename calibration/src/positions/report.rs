@@ -6,6 +6,8 @@ use isotherm_protocol::document::{Document, Sample};
 use super::analysis::{Analysis, Settings};
 use super::budget::ARCSEC_PER_RAD;
 use super::charts::{AXES, across, axes_chart, bend, left_chart, shown};
+use super::doubts::LARGEST_LEFT_SHARE;
+use super::faults::{counted, fixed};
 use super::fit::Fit;
 use super::judged::{Judgement, curves, lengths};
 use crate::drift::figures::{per_deg_c, short, six};
@@ -29,14 +31,19 @@ pub fn report(
     inside: Set<'_>,
     outside: Option<Set<'_>>,
 ) -> FitReport {
-    let mut report = FitReport::new("Accelerometers from positions of a stand", &document.unit);
+    let mut report =
+        FitReport::new("Accelerometers from positions of a stand", &document.unit).counting("positions");
     report.residuals = curves(inside.judged, inside.runs, Sample::In);
     if let Some(set) = outside {
         report.residuals.extend(curves(set.judged, set.runs, Sample::Out));
     }
     report.verdicts = Curve::verdicts(&report.residuals);
     let [length, outside] = [Some(inside), outside].map(|set| set.map(|set| lengths(set.judged)));
-    report.verdicts.push(Verdict::of_values("|f|−g", "m/s²", length.unwrap_or_default(), outside));
+    let length = Verdict::of_values("|f|−g", "m/s²", length.unwrap_or_default(), outside);
+    report.verdicts.push(match far(&length, settings.gravity) {
+        Some(words) => length.refused(words),
+        None => length,
+    });
     report.verdicts = as_a_whole(report.verdicts).into_iter().map(|v| v.stated_as(Figure::Rms)).collect();
     report.warnings.clone_from(&analysis.warnings);
     report.notes = notes(document, analysis, settings);
@@ -49,6 +56,20 @@ pub fn report(
         report.charts.push(("Axes over temperature".to_owned(), axes_chart(analysis, settings, &names)));
     }
     report
+}
+
+/// Words where far too much is left of |f| − g: no set of coefficients holds for these logs.
+fn far(length: &Verdict, gravity: f64) -> Option<String> {
+    let [_, after] = length.deciding();
+    let share = after.rms / gravity;
+    (share > LARGEST_LEFT_SHARE).then(|| {
+        format!(
+            "{} % of g are left{}, at most {} % is a result: is the unit of measure in it the same, and the unit?",
+            short(100.0 * share),
+            if length.out_of_sample.is_some() { " in the log that judges" } else { "" },
+            100.0 * LARGEST_LEFT_SHARE
+        )
+    })
 }
 
 /// K, S and C of all accelerometers are of one mounting of the unit and of the same temperatures: with one axis all are refused.
@@ -78,26 +99,26 @@ fn names(document: &Document, count: usize) -> Vec<String> {
 
 fn notes(document: &Document, analysis: &Analysis, settings: &Settings) -> Vec<String> {
     let fit = &analysis.fit.solution;
-    let levels: Vec<String> = analysis.levels_deg_c.iter().map(|t| format!("{t:.1}")).collect();
+    let levels: Vec<String> = analysis.levels_deg_c.iter().map(|t| fixed(*t, 1)).collect();
     let arcsec = |rad: f64| rad * ARCSEC_PER_RAD;
     let noise: Vec<String> = analysis.weights.intensity.iter().map(|q| short(*q)).collect();
     let mut notes = vec![
         format!(
-            "{} positions at {} °C; g = {} m/s²; C about {} °C.",
-            analysis.poses.len(),
+            "{} at {} °C; g = {} m/s²; C about {} °C.",
+            counted(analysis.poses.len(), "position"),
             levels.join(", "),
             six(settings.gravity),
             six(analysis.reference_deg_c)
         ),
         format!(
             "Weighted with a stand of {:.1}″ (positioning and run-out) and white noise of {} ({})²·s; level known to {:.0}″ \
-             beforehand. χ² {:.1} with {} degrees of freedom.",
+             beforehand. χ² {:.1} with {} of freedom.",
             arcsec(analysis.weights.positioning_rad),
             noise.join(", "),
             output_unit(document),
             arcsec(analysis.weights.levelling_rad),
             fit.chi_square,
-            fit.degrees
+            counted(fit.degrees, "degree")
         ),
     ];
     if let Some((_, chi_square, terms, accident)) = &analysis.quadratic {
@@ -120,7 +141,7 @@ fn coefficients(
     let fit = &analysis.fit;
     let output = output_unit(document);
     let mut all = Vec::new();
-    let of_sensor = fit.solution.parameters.len().saturating_sub(3) / names.len().max(1);
+    let of_sensor = fit.degrees.of_sensor();
     let s = fit.degrees.sensor + 1;
     for (index, (name, sensor)) in names.iter().zip(&fit.sensors).enumerate() {
         let sigma = |offset: usize, scale: f64| {
@@ -178,12 +199,12 @@ fn position_rows(settings: &Settings, set: Set<'_>) -> Table {
         ["position", "log", "at, s", "°C", "x, mg", "y, mg", "z, mg", "|f| − g, mg"].map(str::to_owned);
     let row = |judgement: &Judgement| {
         let position = settings.plan.positions.get(judgement.position);
-        let milli_g = |error: f64| format!("{:.4}", error / settings.gravity * 1e3);
+        let milli_g = |error: f64| fixed(error / settings.gravity * 1e3, 4);
         let mut row = vec![
             position.map_or_else(String::new, |position| position.name.clone()),
             set.runs.get(judgement.run).cloned().unwrap_or_default(),
             format!("{:.1}", judgement.time_s),
-            if judgement.deg_c.is_finite() { format!("{:.2}", judgement.deg_c) } else { "–".to_owned() },
+            if judgement.deg_c.is_finite() { fixed(judgement.deg_c, 2) } else { "–".to_owned() },
         ];
         row.extend(judgement.error[1].map(milli_g));
         row.push(milli_g(judgement.length[1]));
@@ -202,9 +223,9 @@ fn level_rows(analysis: &Analysis, settings: &Settings, names: &[String]) -> Tab
             let Some(fit) = fit else { return "–".to_owned() };
             let value = fit.sensors[*index].axis[0][*i] * ARCSEC_PER_RAD;
             let sigma = fit.axis_sigma(&settings.plan, *index, 0)[*i] * ARCSEC_PER_RAD * analysis.widened;
-            format!("{value:.1} ± {sigma:.1}")
+            format!("{} ± {sigma:.1}", fixed(value, 1))
         };
-        std::iter::once(format!("{deg_c:.2}")).chain(shown.iter().map(cell)).collect()
+        std::iter::once(fixed(*deg_c, 2)).chain(shown.iter().map(cell)).collect()
     };
     Table { head, rows: analysis.levels_deg_c.iter().zip(&analysis.of_level).map(row).collect() }
 }

@@ -38,6 +38,19 @@ pub enum NoSolution {
     NoMinimum(String),
 }
 
+impl NoSolution {
+    /// In plain words: what `of` ("the poses") do not determine by the name of the parameter, and what more is needed; or what to
+    /// look at where nothing was found.
+    #[must_use]
+    pub fn words(&self, of: &str, name: impl Fn(usize) -> String, more: &str, look: &str) -> String {
+        match self {
+            Self::NotDetermined(index) => format!("{of} do not determine {}: {more}", name(*index)),
+            // The library's words are about its search.
+            Self::NoMinimum(_) => look.to_owned(),
+        }
+    }
+}
+
 impl Solution {
     /// Standard error of a parameter.
     #[must_use]

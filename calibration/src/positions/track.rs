@@ -6,8 +6,13 @@ use isotherm_correction::sample::OutputKind;
 use isotherm_correction::units::AngularRate;
 use isotherm_log::offline::Loaded;
 
+use super::faults::counted;
+use crate::drift::figures::six;
 use crate::error::Error;
 use crate::run::{Run, Watch};
+
+/// Share of the ticks, or of the time, that gaps may take.
+const MANY: f64 = 0.01;
 
 /// Ticks of a run, as columns of equal length.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -122,21 +127,31 @@ impl Track {
         quantile(&self.duration_s, 0.5)
     }
 
-    /// Words where more than a hundredth of the ticks does not begin where the one before ends: gaps, or a tick length that is not the
-    /// log's.
+    /// Words where more than a hundredth of the ticks does not begin where the one before ends, or more than a hundredth of the time
+    /// has none: gaps, or a tick length that is not the log's.
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "a run is far below 2⁵³ ns")]
     pub fn gaps(&self) -> Option<String> {
-        let step_s = |pair: &[i64]| (pair[1] - pair[0]) as f64 * 1e-9;
         let tick_s = self.tick_s();
-        let broken =
-            self.end_ns.windows(2).filter(|pair| (step_s(pair) - tick_s).abs() > 0.5 * tick_s).count();
+        let away_s: Vec<f64> =
+            self.end_ns.windows(2).map(|pair| (pair[1] - pair[0]) as f64 * 1e-9 - tick_s).collect();
+        let broken = away_s.iter().filter(|away_s| away_s.abs() > 0.5 * tick_s).count();
         let share = broken as f64 / self.len().max(1) as f64;
-        (share > 0.01).then(|| {
-            format!(
-                "{:.0} % of the accelerometer ticks do not begin where the one before ends: the log has gaps, or the tick length ({tick_s} s) \
+        if share > MANY {
+            return Some(format!(
+                "{:.0} % of the accelerometer ticks do not begin where the one before ends: the log has gaps, or the tick length ({} s) \
                  or the unit of the time column in the mapping is not that of the log",
-                100.0 * share
+                100.0 * share,
+                six(tick_s)
+            ));
+        }
+        let missing: Vec<f64> = away_s.into_iter().filter(|away_s| *away_s > 0.5 * tick_s).collect();
+        let (missing_s, length_s) = (missing.iter().sum::<f64>(), self.start_s(self.len().saturating_sub(1)));
+        (missing_s > MANY * length_s).then(|| {
+            format!(
+                "{missing_s:.0} s of {length_s:.0} s are missing, in {}: a pose that has one is none; record without gaps, or cut the log \
+                 to where it has none with --start and --duration",
+                counted(missing.len(), "gap")
             )
         })
     }
@@ -195,5 +210,9 @@ mod tests {
         };
         assert_eq!(track(0).gaps(), None);
         assert!(track(40_000_000).gaps().unwrap().starts_with("10 % of the accelerometer ticks"));
+        // One that is long.
+        let mut long = track(0);
+        long.end_ns[250..].iter_mut().for_each(|end| *end += 2_000_000_000);
+        assert!(long.gaps().unwrap().starts_with("2 s of 7 s are missing, in 1 gap: "), "{:?}", long.gaps());
     }
 }

@@ -44,7 +44,7 @@ pub(super) fn verdicts(steps: &[Measured], judged: &[Measured]) -> Vec<Verdict> 
             let both = |steps: &[Measured]| [of(steps, axis, 0), of(steps, axis, 1)];
             let outside = (!judged.is_empty()).then(|| both(judged));
             let verdict = Verdict::of_values(format!("gyro {name}"), "°/h", both(steps), outside);
-            let verdict = verdict.stated_as(Figure::Rms).counting("steps");
+            let verdict = verdict.stated_as(Figure::Rms);
             if verdict.accepted {
                 return verdict;
             }

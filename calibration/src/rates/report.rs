@@ -20,7 +20,8 @@ const OTHER_WEIGHT: f64 = 0.1;
 pub(super) fn report(made: &Made) -> FitReport {
     let document = &made.written.document;
     let mut report =
-        FitReport::new("Rate table: scale factor, asymmetry, linearity, input axes", document.unit.clone());
+        FitReport::new("Rate table: scale factor, asymmetry, linearity, input axes", document.unit.clone())
+            .counting("steps");
     report.verdicts.clone_from(&made.verdicts);
     report.warnings.clone_from(&made.warnings);
     let turning = made.steps.iter().filter(|step| step.matched.step.rate_deg_per_s != 0.0).count();

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use isotherm_log::plot::page::{Axis, Chart, Content, Form, Ink, Mark, Page, Panel, Samples, Series, Table};
 use isotherm_protocol::document::Sample;
 
-use super::{Coefficient, Curve, FitReport, Verdict, stated, verdict};
+use super::{Coefficient, Curve, FitReport, Verdict, stated};
 use crate::spectrum::Spectrum;
 
 /// Most points of a curve on the page; of more, the smallest and the largest of each group are there.
@@ -31,7 +31,7 @@ impl FitReport {
             page.heading("Warnings");
             self.warnings.iter().for_each(|warning| page.paragraph(warning));
         }
-        section(&mut page, "Before and after", &verdict::rows(&self.verdicts));
+        section(&mut page, "Before and after", &self.size_rows());
         self.over_time(&mut page);
         self.over_temperature(&mut page);
         for (heading, chart) in &self.charts {

@@ -50,8 +50,6 @@ pub struct Verdict {
     pub measure: String,
     /// Which figure the sentence states.
     pub figure: Figure,
-    /// What its sizes count, such as "windows".
-    pub counted: &'static str,
     /// Before and after over what the fit saw. Both are zero where the fit saw nothing of it.
     pub in_sample: [Size; 2],
     /// Before and after over what it did not see.
@@ -70,7 +68,6 @@ impl Verdict {
             of: of.into(),
             measure: measure.into(),
             figure: Figure::default(),
-            counted: "windows",
             in_sample,
             out_of_sample: None,
             accepted: true,
@@ -118,13 +115,6 @@ impl Verdict {
     #[must_use]
     pub fn stated_as(mut self, figure: Figure) -> Self {
         self.figure = figure;
-        self
-    }
-
-    /// With other things that its sizes count.
-    #[must_use]
-    pub fn counting(mut self, counted: &'static str) -> Self {
-        self.counted = counted;
         self
     }
 
@@ -231,9 +221,8 @@ pub(super) fn sentences(verdicts: &[Verdict]) -> Vec<String> {
     verdicts.iter().map(sentence).collect()
 }
 
-/// All sizes as a table.
-pub(super) fn rows(verdicts: &[Verdict]) -> Table {
-    let counted = verdicts.first().map_or("windows", |verdict| verdict.counted);
+/// All sizes as a table; `counted` is what they are over.
+pub(super) fn rows(verdicts: &[Verdict], counted: &str) -> Table {
     let head = ["", "rms", "", "times smaller", "peak to peak", "", counted, ""].map(str::to_owned);
     let mut rows = Vec::new();
     for verdict in verdicts {

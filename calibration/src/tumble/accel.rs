@@ -18,6 +18,8 @@ pub const SENSORS: usize = 3;
 /// What was found of the accelerometers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AccelFit {
+    /// Gravity that it is relative to (m/s²).
+    pub gravity: f64,
     /// K: output per specific force (output units per m/s²).
     pub scale: [f64; 3],
     /// S: output at no specific force (output units).
@@ -69,6 +71,7 @@ fn rows_of(angles: [f64; 3]) -> [[f64; 3]; 3] {
 pub fn fit(poses: &[Vec<f64>], gravity: f64) -> Result<AccelFit, NoSolution> {
     let start = ellipsoid(poses, gravity)?;
     let of = |p: &[f64]| AccelFit {
+        gravity,
         scale: [0, 1, 2].map(|i| start.0[i] * (1.0 + p[i])),
         bias: [0, 1, 2].map(|i| start.1[i] + p[3 + i] * start.0[i] * gravity),
         rows: rows_of([p[6], p[7], p[8]]),

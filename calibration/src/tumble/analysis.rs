@@ -1,9 +1,11 @@
 //! From a run to the fits of its accelerometers and gyros, and every reason not to.
 
 pub(super) mod doubts;
+pub(super) mod odd;
 
+use crate::drift::figures::short;
 use crate::means::Size;
-use crate::positions::faults;
+use crate::positions::faults::{self, counted};
 use crate::positions::pose::Pose;
 use crate::positions::still::{StillLimits, still};
 use crate::positions::track::Track;
@@ -47,8 +49,10 @@ pub struct Tumble {
     pub accel: AccelFit,
     /// The gyros, or why not.
     pub gyro: Result<GyroFit, String>,
-    /// |f| − g (m/s²) of each pose, by the fit of all others.
-    pub held_out: Size,
+    /// |f| − g (m/s²) of each pose, by the fit of all others; no number where these have none.
+    pub held_out: Vec<f64>,
+    /// Largest distance of each gyro's output from that at rest (rad/s of the log).
+    pub largest_rate: [f64; 3],
     /// What is to be said.
     pub warnings: Vec<String>,
 }
@@ -95,16 +99,27 @@ pub fn analyse(track: &Track, settings: &Settings) -> Result<Tumble, Vec<String>
     doubts::sound(&poses, &accel)?;
     let held_out = held_out(&poses, settings.gravity);
     let mut warnings = Vec::new();
-    let after = Size::of(&accel.residual).rms;
-    if held_out.rms > 2.0 * after {
+    let (after, outside) = (Size::of(&accel.residual).rms, Size::of(&held_out).rms);
+    if outside > 2.0 * after {
         warnings.push(format!(
-            "|f| − g is {:.2e} m/s² rms in poses that the fit has not seen, {after:.2e} in those that it has: more poses would help",
-            held_out.rms
+            "|f| − g is {} m/s² rms in poses that the fit has not seen, {} in those that it has: more poses would help",
+            short(outside),
+            short(after)
         ));
     }
+    warnings.extend(doubts::beyond_noise(track, &poses, &accel));
     warnings.extend(doubts::ends_early(track, &poses));
-    let gyro = gyros(track, &poses, &accel);
-    Ok(Tumble { poses, factor, accel, gyro, held_out, warnings })
+    let rest = at_rest(&poses);
+    let gyro = gyros(track, &poses, &accel, rest);
+    let largest_rate = [0, 1, 2].map(|gyro| {
+        let column = track.gyros.get(gyro).map_or(&[][..], Vec::as_slice);
+        column
+            .iter()
+            .map(|rate| (rate - rest[gyro]).abs())
+            .filter(|away| away.is_finite())
+            .fold(0.0, f64::max)
+    });
+    Ok(Tumble { poses, factor, accel, gyro, held_out, largest_rate, warnings })
 }
 
 /// Mean outputs of poses.
@@ -124,7 +139,7 @@ fn faults(track: &Track) -> Result<(), Vec<String>> {
             ));
         }
     }
-    reasons.extend(faults::dead(track));
+    reasons.extend(faults::dead(std::slice::from_ref(track)));
     if reasons.is_empty() { Ok(()) } else { Err(reasons) }
 }
 
@@ -150,8 +165,9 @@ fn found(track: &Track, poses: &[Pose], settings: &Settings) -> Result<(), Vec<S
     reasons.extend(faults::clipped(std::slice::from_ref(track), poses));
     if poses.len() < FEWEST_POSES {
         reasons.push(format!(
-            "{} still poses were found, {FEWEST_POSES} are needed and 30 are good: put the unit down in more ways, for {} s each",
-            poses.len(),
+            "{} {} found, {FEWEST_POSES} are needed and 30 are good: put the unit down in more ways, for {} s each",
+            counted(poses.len(), "still pose"),
+            if poses.len() == 1 { "was" } else { "were" },
             settings.limits.least_s + settings.limits.window_s
         ));
     } else if let Some(words) = flat(poses) {
@@ -186,7 +202,7 @@ fn flat(poses: &[Pose]) -> Option<String> {
         return None;
     }
     let direction = eigen.eigenvectors.column(index);
-    let axis = AXES.get(direction.iamax()).copied().unwrap_or("?");
+    let axis = faults::name(direction.iamax());
     Some(format!(
         "the poses lie in one plane: along {axis} the specific force is {:.2} g rms, at least {:.2} g is needed; put the unit down \
          with its {axis} axis up, down and slanting",
@@ -196,40 +212,47 @@ fn flat(poses: &[Pose]) -> Option<String> {
 }
 
 /// |f| − g of every pose by the fit of all others.
-fn held_out(poses: &[Pose], gravity: f64) -> Size {
+fn held_out(poses: &[Pose], gravity: f64) -> Vec<f64> {
     let all = outputs(poses);
     let one = |index: usize| {
         let mut others = all.clone();
         let held = others.remove(index);
-        accel::fit(&others, gravity).ok().map(|fit| norm(fit.force(&held)) - gravity)
+        accel::fit(&others, gravity).map_or(f64::NAN, |fit| norm(fit.force(&held)) - gravity)
     };
-    Size::of(&(0..all.len()).filter_map(one).collect::<Vec<_>>())
+    (0..all.len()).map(one).collect()
+}
+
+/// Mean output of each gyro over all poses.
+fn at_rest(poses: &[Pose]) -> [f64; 3] {
+    let total: f64 = poses.iter().map(|pose| pose.duration_s).sum();
+    [0, 1, 2].map(|gyro| {
+        let of = |pose: &Pose| pose.gyros.get(gyro).copied().unwrap_or(f64::NAN) * pose.duration_s;
+        poses.iter().map(of).sum::<f64>() / total
+    })
 }
 
 /// Fits the gyros to what lies between the poses.
-fn gyros(track: &Track, poses: &[Pose], accel: &AccelFit) -> Result<GyroFit, String> {
+fn gyros(track: &Track, poses: &[Pose], accel: &AccelFit, rest: [f64; 3]) -> Result<GyroFit, String> {
     if track.gyro_counts {
         return Err(
             "the gyros put out counts: the angle of one is wanted as a start, convert them in the mapping"
                 .into(),
         );
     }
-    let total: f64 = poses.iter().map(|pose| pose.duration_s).sum();
-    let rest = [0, 1, 2].map(|gyro| {
-        let of = |pose: &Pose| pose.gyros.get(gyro).copied().unwrap_or(f64::NAN) * pose.duration_s;
-        poses.iter().map(of).sum::<f64>() / total
-    });
     let transitions = transitions(poses, |pose| accel.force(&pose.outputs));
     if transitions.len() < 6 {
         return Err(format!(
-            "only {} turns of at least {:.0}° within {LONGEST_TRANSITION_S} s lie between the poses, six are needed: turn the unit \
-             about each of its axes",
-            transitions.len(),
+            "{} of at least {:.0}° within {LONGEST_TRANSITION_S} s between the poses, six are needed: turn the unit about each of its \
+             axes, each time within {LONGEST_TRANSITION_S} s from pose to pose",
+            counted(transitions.len(), "turn"),
             SHORTEST_TURN_RAD.to_degrees()
         ));
     }
     let fit = gyro::fit(track, rest, &transitions).map_err(|why| doubts::no_gyros(&why))?;
-    doubts::lost(&fit.angle, &fit.rows).map_or(Ok(fit), Err)
+    match doubts::lost(&fit) {
+        Some(words) => Err(words),
+        None => Ok(fit),
+    }
 }
 
 /// Turns between neighbouring poses, by the specific force that each has.

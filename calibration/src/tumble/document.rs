@@ -5,7 +5,7 @@ use isotherm_protocol::document::{Curve, Document, Shape};
 
 use super::accel::AccelFit;
 use super::analysis::Tumble;
-use super::analysis::doubts::odd;
+use super::analysis::odd::odd;
 use super::gyro::GyroFit;
 use crate::positions::document::{level, units};
 use crate::written::tidy;
@@ -13,15 +13,17 @@ use crate::written::tidy;
 /// Puts what was found into a document; gives what is to be said of it.
 ///
 /// A tumble log has one temperature: curves over temperature keep their shape and go through what was found there.
-#[must_use]
-pub fn complete(document: &Document, tumble: &Tumble) -> (Document, Vec<String>) {
+///
+/// # Errors
+/// Where the accelerometers show a mirror image of the case: no document may hold that.
+pub fn complete(document: &Document, tumble: &Tumble) -> Result<(Document, Vec<String>), Vec<String>> {
     let base = document;
     let mut document = base.clone();
     let assumed = document.temperature.assumed_deg_c;
     let temperature = |channel: Option<&String>| {
         channel.and_then(|channel| tumble.mean_temperature(channel)).unwrap_or(assumed)
     };
-    let mut warnings = odd(base, tumble, &temperature);
+    let mut warnings = odd(base, tumble, &temperature)?;
     if let Some(accel) = &mut document.accel {
         let units = units(accel.output);
         for (index, sensor) in accel.sensor.iter_mut().enumerate() {
@@ -40,7 +42,7 @@ pub fn complete(document: &Document, tumble: &Tumble) -> (Document, Vec<String>)
     if let Ok(gyro) = &tumble.gyro {
         gyros(&mut document, gyro, &temperature);
     }
-    (document, warnings)
+    Ok((document, warnings))
 }
 
 /// Puts the gyros into the document.

@@ -1,12 +1,19 @@
 //! Gyros against accelerometers: between two poses the rotated direction of gravity must be the one that the accelerometers
 //! find there (Tedaldi, Pretto and Menegatti 2014).
 
+mod search;
+
 use nalgebra::{Matrix3, Vector3};
 
+use crate::means::Size;
 use crate::positions::solve::{NoSolution, solve};
 use crate::positions::track::Track;
 
 use super::accel::norm;
+use search::Start;
+
+/// Largest angle (°, rms) by which fitted gyros may miss the direction of gravity after a turn; half a degree is usual by hand.
+pub const LARGEST_LEFT_DEG: f64 = 3.0;
 
 /// What was found of the gyros.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,10 +24,41 @@ pub struct GyroFit {
     pub rest: [f64; 3],
     /// Input axes, unit vectors in case axes.
     pub rows: [[f64; 3]; 3],
-    /// Standard errors of the weights (relative) and of the two angles of each axis (rad).
+    /// Standard errors of the weights (as they are) and of the two angles of each axis (rad), along the case axes of
+    /// [`GyroFit::across`].
     pub sigma: [f64; 9],
     /// Angle between the direction that the gyros predict and the one that the accelerometers find, by transition (rad).
     pub angle: Vec<f64>,
+}
+
+impl GyroFit {
+    /// The two case axes that a gyro's input axis lies across, whichever way round it is: those that its angles are along.
+    #[must_use]
+    pub fn across(&self, gyro: usize) -> [usize; 2] {
+        let along = Vector3::from(self.rows.get(gyro).copied().unwrap_or_default()).iamax();
+        others(along)
+    }
+
+    /// Angle that is left after a turn (°, rms).
+    #[must_use]
+    pub fn left_deg(&self) -> f64 {
+        Size::of(&self.angle).rms.to_degrees()
+    }
+
+    /// Whether the gyros follow the turns, and each lies along the case axis that its angles were counted from.
+    fn follows(&self, start: &Start) -> bool {
+        let placed = (0..3).all(|gyro| self.across(gyro) == others(start.along[gyro]));
+        placed && self.left_deg() <= LARGEST_LEFT_DEG
+    }
+}
+
+/// The two axes that are not this one.
+fn others(axis: usize) -> [usize; 2] {
+    match axis {
+        0 => [1, 2],
+        1 => [0, 2],
+        _ => [0, 1],
+    }
 }
 
 /// A transition: ticks between two poses, and the directions of specific force before and after.
@@ -32,13 +70,33 @@ pub struct Transition {
     pub directions: [[f64; 3]; 2],
 }
 
-/// Fits scale factors and axes of three gyros to transitions.
+/// Fits scale factors and axes of three gyros to transitions: first as if each lay along its own case axis and the log's unit of
+/// measure were the right one. Where that does not follow the turns, other orders, signs and units of measure are tried.
 ///
 /// # Errors
 /// Where the transitions do not determine them.
 pub fn fit(track: &Track, rest: [f64; 3], transitions: &[Transition]) -> Result<GyroFit, NoSolution> {
+    let own = Start::default();
+    let plain = from(track, rest, transitions, &own);
+    if plain.as_ref().is_ok_and(|fit| fit.follows(&own)) {
+        return plain;
+    }
+    let other = search::likely(track, rest, transitions).into_iter().find_map(|start| {
+        let found = from(track, rest, transitions, &start).ok()?;
+        found.follows(&start).then_some(found)
+    });
+    other.map_or(plain, Ok)
+}
+
+/// The fit from one start.
+fn from(
+    track: &Track,
+    rest: [f64; 3],
+    transitions: &[Transition],
+    start: &Start,
+) -> Result<GyroFit, NoSolution> {
     let residuals = |p: &[f64]| -> Vec<f64> {
-        let inverse = inverse_of(p);
+        let inverse = start.inverse_of(p);
         let of = |transition: &Transition| {
             let found = turned(track, rest, &inverse, transition);
             let [_, wanted] = transition.directions;
@@ -57,27 +115,11 @@ pub fn fit(track: &Track, rest: [f64; 3], transitions: &[Transition]) -> Result<
         found.residuals.chunks_exact(3).map(|r| 2.0 * libm::asin((0.5 * norm([r[0], r[1], r[2]])).min(1.0)));
     let angle = angle.collect();
     let mut sigma = [0.0; 9];
-    sigma.iter_mut().enumerate().for_each(|(index, sigma)| *sigma = found.sigma(index) * size);
-    Ok(GyroFit { weight: weights(p), rest, rows: rows(p), sigma, angle })
-}
-
-/// K of each gyro.
-fn weights(p: &[f64]) -> [f64; 3] {
-    [0, 1, 2].map(|i| 1.0 + p.get(i).copied().unwrap_or(0.0))
-}
-
-/// Input axes: each turned by two small angles from its case axis.
-fn rows(p: &[f64]) -> [[f64; 3]; 3] {
-    let angle = |i: usize| p.get(3 + i).copied().unwrap_or(0.0);
-    let raw = [[1.0, angle(0), angle(1)], [angle(2), 1.0, angle(3)], [angle(4), angle(5), 1.0]];
-    raw.map(|row| row.map(|c| c / norm(row)))
-}
-
-/// Rate about the case axes per output of each gyro.
-fn inverse_of(p: &[f64]) -> Matrix3<f64> {
-    let axes = Matrix3::from_fn(|i, j| rows(p)[i][j]);
-    let scale = Matrix3::from_diagonal(&weights(p).into());
-    axes.try_inverse().unwrap_or_else(Matrix3::identity) * scale
+    for (index, sigma) in sigma.iter_mut().enumerate() {
+        let of_one = start.weight.get(index).map_or(1.0, |weight| weight.abs());
+        *sigma = found.sigma(index) * size * of_one;
+    }
+    Ok(GyroFit { weight: start.weights(p), rest, rows: start.rows(p), sigma, angle })
 }
 
 /// The direction before the transition, as the case sees it after the gyros' rotation.

@@ -8,16 +8,20 @@ use std::sync::Arc;
 use super::accel::norm;
 use super::analysis::{Settings, Tumble, transitions};
 use super::gyro::angle_of;
-use crate::drift::figures::six;
+use crate::drift::figures::{short, six};
 use crate::error::Error;
 use crate::means::Size;
 use crate::positions::budget::ARCSEC_PER_RAD;
+use crate::positions::doubts::LARGEST_LEFT_SHARE;
+use crate::positions::faults::{counted, fixed};
 use crate::positions::pose::Pose;
 use crate::positions::track::Track;
-use crate::report::{Coefficient, Curve, Figure, FitReport, Sigmas, Verdict};
+use crate::report::{Coefficient, Curve, Figure, FitReport, SAME_SHARE, Sigmas, Verdict};
 use crate::written::tidy;
 
 const AXES: [&str; 3] = ["x", "y", "z"];
+/// Times by which the rms may grow in poses that the fit has not seen.
+const LARGEST_GROWTH: f64 = 2.0;
 
 /// What a calibration leaves of the poses, by the service's own output.
 #[derive(Debug, Clone, PartialEq)]
@@ -60,21 +64,23 @@ pub fn report(
     run: &str,
     [before, after]: [&Left; 2],
 ) -> FitReport {
-    let mut report = FitReport::new("Accelerometers and gyros from a tumbled unit", &document.unit);
-    let sizes = |of: fn(&Left) -> &[f64]| [Size::of(of(before)), Size::of(of(after))];
-    let length = sizes(|left| &left.length);
-    let accel = Verdict::new("|f|−g", "m/s²", length).stated_as(Figure::Rms);
-    report.verdicts.push(accel.out_of_sample(Some([length[0], tumble.held_out])));
-    let gyro = Verdict::new("gyros", "°", sizes(|left| &left.angle_deg)).stated_as(Figure::Rms);
-    report.verdicts.push(match &tumble.gyro {
-        Ok(_) => gyro.remark(format!("{} turns between poses", after.angle_deg.len())),
-        Err(words) => Verdict::new("gyros", "°", [Size::default(); 2]).refused(words.clone()),
-    });
+    let mut report = FitReport::new("Accelerometers and gyros from a tumbled unit", &document.unit)
+        .counting("poses, turns");
+    let accel = accelerometers(tumble, [&before.length, &after.length], settings.gravity);
+    let gyro = Verdict::new("gyros", "°", [Size::of(&before.angle_deg), Size::of(&after.angle_deg)]);
+    let gyro = gyro.stated_as(Figure::Rms);
+    let refused = |words: &str| Verdict::new("gyros", "°", [Size::default(); 2]).refused(words);
+    let gyro = match &tumble.gyro {
+        Err(words) => refused(words),
+        Ok(_) if !accel.accepted => refused("they are relative to the accelerometers, which are refused"),
+        Ok(_) => gyro.remark(format!("{} between poses", counted(after.angle_deg.len(), "turn"))),
+    };
+    report.verdicts.extend([accel, gyro]);
     report.warnings.clone_from(&tumble.warnings);
     report.notes.push(format!(
-        "{} poses, found with {} times the variance of the still start; g = {} m/s². z is the input axis of the third accelerometer, \
+        "{}, found with {} times the variance of the still start; g = {} m/s². z is the input axis of the third accelerometer, \
          y lies in the plane of the second and third. Out of sample: each pose by a fit of all others.",
-        tumble.poses.len(),
+        counted(tumble.poses.len(), "pose"),
         tumble.factor,
         six(settings.gravity)
     ));
@@ -94,6 +100,35 @@ pub fn report(
     report.charts.push(("What is left".to_owned(), left_chart(tumble, after)));
     report.tables.push(("Poses".to_owned(), rows(tumble, after)));
     report
+}
+
+/// What came of the accelerometers: held-out poses decide.
+fn accelerometers(tumble: &Tumble, [before, after]: [&Vec<f64>; 2], gravity: f64) -> Verdict {
+    let sizes = [before, after].map(|values| Size::of(values));
+    let outside = Size::of(&tumble.held_out);
+    let verdict = Verdict::new("|f|−g", "m/s²", sizes).out_of_sample(Some([sizes[0], outside]));
+    let verdict = verdict.stated_as(Figure::Rms);
+    let left = outside.rms;
+    if left.is_nan() || outside.count == 0 || left > LARGEST_LEFT_SHARE * gravity {
+        return verdict.refused(format!(
+            "{} % of g are left in poses that the fit has not seen, at most {} % is a result: is one unit of measure, and one \
+             temperature, held throughout, and was the unit left alone in each pose?",
+            short(100.0 * left / gravity),
+            100.0 * LARGEST_LEFT_SHARE
+        ));
+    }
+    let change: Vec<f64> = before.iter().zip(after).map(|(before, after)| after - before).collect();
+    if Size::of(&change).rms <= SAME_SHARE * sizes[0].rms {
+        return verdict.remark("it changes nothing");
+    }
+    // Nine coefficients cost something in poses that they were not found from; these may be what the document at hand was found from.
+    match left / sizes[0].rms {
+        grown if grown > LARGEST_GROWTH => verdict.refused(
+            "the document at hand fits these poses better than what is found of them: more poses are needed",
+        ),
+        grown if grown > 1.0 + SAME_SHARE => verdict.remark("no better than the document at hand"),
+        _ => verdict,
+    }
 }
 
 /// What is left by itself: beside what was there before, it is a line at zero.
@@ -127,8 +162,8 @@ fn rows(tumble: &Tumble, after: &Left) -> Table {
     let row = |(index, ((pose, direction), length)): (usize, ((&Pose, &[f64; 3]), &f64))| {
         let mut row = vec![(index + 1).to_string()];
         row.extend(pose.span_s.map(|time| format!("{time:.2}")));
-        row.extend(direction.map(|c| format!("{c:.3}")));
-        row.push(format!("{:.3}", length * 1e3));
+        row.extend(direction.map(|c| fixed(c, 3)));
+        row.push(fixed(length * 1e3, 3));
         row
     };
     Table { head, rows: poses.map(row).collect() }
@@ -173,7 +208,7 @@ fn coefficients(document: &Document, tumble: &Tumble) -> Vec<Coefficient> {
             (gyro.weight[axis] * gyro.rest[axis]).to_degrees(),
             None,
         ));
-        for (which, column) in (0..3).filter(|column| *column != axis).enumerate() {
+        for (which, column) in gyro.across(axis).into_iter().enumerate() {
             all.push(Coefficient::new(
                 format!("gyro {name} along {}", AXES[column]),
                 "″",
@@ -204,7 +239,7 @@ pub fn details(tumble: &Tumble, settings: &Settings, report: &FitReport) -> Resu
         "poses": tumble.poses.len(),
         "stillness_factor": tumble.factor,
         "window_s": settings.limits.window_s,
-        "held_out_rms_m_per_s2": tumble.held_out.rms,
+        "held_out_rms_m_per_s2": Size::of(&tumble.held_out).rms,
         "verdict": report.headline(),
         "warnings": report.warnings,
         "coefficients": coefficients,
@@ -240,7 +275,7 @@ pub fn sigmas(document: &Document, tumble: &Tumble) -> Sigmas {
         let ppm = tidy(1e6 * gyro.sigma[axis] / gyro.weight[axis].abs());
         sigmas.put("gyro", &sensor.name, "increment_weight_ppm", vec![ppm]);
         let mut row = [0.0; 3];
-        for (which, column) in (0..3).filter(|column| *column != axis).enumerate() {
+        for (which, column) in gyro.across(axis).into_iter().enumerate() {
             row[column] = arcsec(gyro.sigma[3 + 2 * axis + which]);
         }
         sigmas.put("gyro", &sensor.name, "axis_arcsec", row.to_vec());

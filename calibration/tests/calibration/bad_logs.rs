@@ -202,7 +202,7 @@ fn positions_with_swapped_columns_name_them() {
     };
     for plan in ["twelve", "six"] {
         let (code, sound) = call(plan, &[], &|_| ());
-        assert!(code == Some(0) && !sound.contains("swapped") && !sound.contains("from what"), "{sound}");
+        assert!(code == Some(0) && !sound.contains("swapped") && !sound.contains("is found"), "{sound}");
         let (code, refused) = call(plan, &[], &accelerometers);
         let hint = "with accelerometers x and y swapped they would agree; check the columns";
         assert!(code == Some(1) && refused.contains(hint), "{refused}");
@@ -212,11 +212,8 @@ fn positions_with_swapped_columns_name_them() {
     }
     // Where the times are stated nothing is matched: what is found is far from what the document states.
     let (_, turned) = call("twelve", &["--times", &times], &accelerometers);
-    for axis in ["x", "y"] {
-        let words = format!("accelerometer {axis}: its axis is found along");
-        assert!(turned.contains(&words) && turned.contains("90° from what"), "{turned}");
-    }
-    assert!(!turned.contains("accelerometer z: its axis"), "{turned}");
+    assert!(turned.contains("accelerometers x and y look swapped: "), "{turned}");
+    assert!(!turned.contains("of accelerometer z along"), "{turned}");
 }
 
 #[test]

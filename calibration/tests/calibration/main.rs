@@ -3,8 +3,8 @@
 //! | file | holds |
 //! |---|---|
 //! | `thermal` | what the methods reach on simulated coils and the real chamber log, bad input, the fit against the service |
-//! | `positions`, `positions_command` | a simulated stand, from the log to the document |
-//! | `tumble` | a unit put down by hand, real and simulated |
+//! | `positions`, `positions_command`, `positions_damaged` | a simulated stand, from the log to the document; damaged logs |
+//! | `tumble`, `tumble_damaged` | a unit put down by hand, real and simulated, sound and damaged |
 //! | `modes_rates` | `modes` and `rates` as their users run them |
 //! | `drift`, `impact`, `logged` | noise and drift, what they mean for navigation, and logs in every form |
 //! | `rest` | `drift` and `impact` on logs that are none of a unit at rest |
@@ -39,6 +39,7 @@ mod pages;
 mod positions;
 mod positions_channels;
 mod positions_command;
+mod positions_damaged;
 mod rates_refused;
 mod rest;
 mod simulated_logs;
@@ -46,5 +47,6 @@ mod skewed_six;
 mod stand;
 mod thermal;
 mod tumble;
+mod tumble_damaged;
 mod two_units;
 mod validate;

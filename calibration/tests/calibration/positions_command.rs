@@ -150,4 +150,46 @@ fn the_budget_prints_the_examples_of_the_paper() {
     let stand = value["stand_arcsec"].as_f64().unwrap();
     assert!((stand - 2.0 * 1.0_f64.hypot(2.0626)).abs() < 1e-3, "{value}");
     assert!((value["temperature_arcsec"].as_f64().unwrap() - 1.2).abs() < 1e-12);
+    // Of another plan the first line is another one; of one that tells nothing it says so.
+    let first = |plan: &str| {
+        let done = within(folder.path(), &["positions", "--budget", "--plan", plan]);
+        assert!(done.status.success());
+        text(&done.stdout).lines().next().unwrap().to_owned()
+    };
+    assert!(first("twelve").contains(" 2.9″ (one sigma) by the plan's 12 positions"), "{}", first("twelve"));
+    assert!(
+        first("six").contains(" by the plan's 6 positions") && !first("six").contains(" 2.9″"),
+        "{}",
+        first("six")
+    );
+    std::fs::write(folder.path().join("flat.csv"), "name,axis_1_deg,axis_2_deg\na,0,0\nb,90,0\nc,0,180\n")
+        .unwrap();
+    let flat = first("flat.csv");
+    assert!(
+        flat.starts_with("The plan's 3 positions will not determine C: none has x up, x down, z up, z down."),
+        "{flat}"
+    );
+}
+
+#[test]
+fn a_judging_log_in_another_unit_of_measure_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let order: Vec<usize> = (0..12).collect();
+    let document = stand::document();
+    for (name, factor) in [("own", 1.0), ("other", 9.81)] {
+        let (mut events, _) = stand::log(&stand::instrument(), 20.0, &Plan::twelve(), &order, &driven(33));
+        for event in &mut events {
+            if let isotherm_log::text::LogEvent::Accel { tick, .. } = event {
+                tick.readings.iter_mut().for_each(|reading| *reading = (*reading * factor).round());
+            }
+        }
+        record_events(&folder.path().join(format!("{name}.mcap")), "MEMS-0001", &events);
+    }
+    std::fs::write(folder.path().join("base.toml"), Written::of(&document).unwrap().text).unwrap();
+    let call =
+        ["positions", "own.mcap", "--judge", "other.mcap", "--document", "base.toml", "--gravity", "9.8154"];
+    let done = within(folder.path(), &call);
+    assert_eq!(done.status.code(), Some(1));
+    let errors = text(&done.stderr);
+    assert!(errors.contains("% of g are left in the log that judges, at most 2 % is a result"), "{errors}");
 }

@@ -1,16 +1,15 @@
 //! What makes the result of a fit none, or doubtful.
 
 use isotherm_correction::orientation::CONDITION_LIMIT;
-use isotherm_protocol::document::Document;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3};
 
-use super::{AXES, AccelFit, Tumble};
+use super::{AXES, AccelFit, GyroFit};
+use crate::drift::figures::short;
 use crate::means::Size;
-use crate::positions::doubts::LARGEST_TURN_DEG;
-use crate::positions::faults;
-use crate::positions::pose::Pose;
+use crate::positions::pose::{Pose, intensities};
 use crate::positions::solve::NoSolution;
 use crate::positions::track::Track;
+use crate::tumble::gyro::LARGEST_LEFT_DEG;
 
 /// Largest standard error of a scale factor that is still a result (relative).
 const LARGEST_SIGMA: f64 = 0.01;
@@ -18,12 +17,14 @@ const LARGEST_SIGMA: f64 = 0.01;
 const LARGEST_ANGLE_SIGMA_DEG: f64 = 0.5;
 /// Share of a log at its end that has a pose.
 const LAST_SHARE: f64 = 1.0 / 3.0;
-/// Largest angle (°, rms) by which fitted gyros may miss the direction of gravity after a turn; half a degree is usual by hand.
-const LARGEST_LEFT_DEG: f64 = 3.0;
-/// An angle (°) to the stated axis that is a sign, and no other axis.
-const OTHER_SIGN_DEG: f64 = 150.0;
-/// Times that one sensor's K may have changed more than another's; a unit of measure is more.
-const LARGEST_RATIO: f64 = 3.0;
+
+/// Times that what is left of |f| − g may be larger than the noise of the means. A unit put down by hand is not quite still, and
+/// its accelerometers are not quite straight.
+const LARGEST_BEYOND_NOISE: f64 = 20.0;
+/// What is little, whatever the noise (a share of g).
+const LITTLE: f64 = 5e-4;
+/// Share of the variance of what is left that follows the time where something drifts.
+const FOLLOWS_TIME: f64 = 0.6;
 
 /// What to look at where the gyros do not follow the turns.
 pub(super) const WRONG_GYROS: &str = "look at the unit of measure of the gyros in the mapping (57.3 times too much is °/s read as rad/s), at the order and the signs \
@@ -32,45 +33,33 @@ pub(super) const WRONG_GYROS: &str = "look at the unit of measure of the gyros i
 /// A fit of the accelerometers without a solution, in words.
 pub(super) fn no_accelerometers(why: &NoSolution) -> String {
     const NAMES: [&str; 9] = [
-        "scale factor of x",
-        "scale factor of y",
-        "scale factor of z",
-        "bias of x",
-        "bias of y",
-        "bias of z",
-        "angle between x and y",
-        "angle between x and z",
-        "angle between y and z",
+        "the scale factor of x",
+        "the scale factor of y",
+        "the scale factor of z",
+        "the bias of x",
+        "the bias of y",
+        "the bias of z",
+        "the angle between x and y",
+        "the angle between x and z",
+        "the angle between y and z",
     ];
-    match why {
-        NoSolution::NotDetermined(index) => format!(
-            "the poses do not determine the {}: put the unit down in more different ways",
-            NAMES.get(*index).copied().unwrap_or("parameters")
-        ),
-        // The library's words are about its search.
-        NoSolution::NoMinimum(_) => {
-            "no scale factors, biases and angles were found with which |f| is g in all poses: is every column of the mapping the right \
-             one, in one unit of measure throughout? A unit that was put on its faces only needs edges and corners too"
-                .to_owned()
-        }
-    }
+    why.words(
+        "the poses",
+        |index| NAMES.get(index).copied().unwrap_or("all parameters").to_owned(),
+        "put the unit down in more different ways",
+        "no scale factors, biases and angles were found with which |f| is g in all poses: is every column of the mapping the right \
+         one, in one unit of measure throughout? A unit that was put on its faces only needs edges and corners too",
+    )
 }
 
 /// A fit of the gyros without a solution, in words.
 pub(super) fn no_gyros(why: &NoSolution) -> String {
-    match why {
-        NoSolution::NotDetermined(index) => {
-            format!(
-                "the turns do not determine gyro {}: turn the unit about each of its axes",
-                AXES[gyro_of(*index)]
-            )
-        }
-        NoSolution::NoMinimum(_) => {
-            format!(
-                "no scale factors and axes were found with which the gyros follow the turns: {WRONG_GYROS}"
-            )
-        }
-    }
+    why.words(
+        "the turns",
+        |index| format!("gyro {}", AXES[gyro_of(index)]),
+        "turn the unit about each of its axes",
+        &format!("no scale factors and axes were found with which the gyros follow the turns: {WRONG_GYROS}"),
+    )
 }
 
 /// The gyro that a parameter is of: three weights, then two angles of each.
@@ -112,6 +101,68 @@ pub(super) fn sound(poses: &[Pose], fit: &AccelFit) -> Result<(), Vec<String>> {
     if reasons.is_empty() { Ok(()) } else { Err(reasons) }
 }
 
+/// Words where far more is left of |f| − g than the noise explains.
+pub(super) fn beyond_noise(track: &Track, poses: &[Pose], fit: &AccelFit) -> Option<String> {
+    let intensity = intensities(std::slice::from_ref(track), poses);
+    let gravity = fit.gravity;
+    let along = |pose: &Pose| [0, 1, 2].map(|i| (pose.outputs[i] - fit.bias[i]) / (fit.scale[i] * gravity));
+    let variance = |pose: &Pose| -> f64 {
+        let of = |(i, along): (usize, f64)| (along / fit.scale[i]).powi(2) * intensity[i];
+        along(pose).into_iter().enumerate().map(of).sum::<f64>() / pose.duration_s
+    };
+    #[expect(clippy::cast_precision_loss, reason = "poses")]
+    let noise = (poses.iter().map(variance).sum::<f64>() / poses.len() as f64).sqrt();
+    let left = Size::of(&fit.residual).rms;
+    if noise.is_nan() || left <= (LARGEST_BEYOND_NOISE * noise).max(LITTLE * gravity) {
+        return None;
+    }
+    let share = follows_time(poses, fit, along);
+    let why = if share > FOLLOWS_TIME {
+        format!(
+            "{:.0} % of its variance follows the time since the log's beginning: zeros or scale factors moved. Let the unit warm up \
+             before the still start, keep its temperature, and look for another unit of measure from some row on",
+            100.0 * share
+        )
+    } else {
+        "was it moved or touched in poses, do scale factors change with the direction, or is the unit of measure another one from some \
+         row on? The table has |f| − g pose by pose"
+            .to_owned()
+    };
+    Some(format!(
+        "the fit leaves {} m/s² rms of |f| − g, {} times the noise of the poses ({} m/s²): {why}",
+        short(left),
+        short(left / noise),
+        short(noise)
+    ))
+}
+
+/// Share of the variance of what is left that zeros and a common scale factor explain that go straight with the time; zero where the
+/// poses are too few to tell.
+///
+/// Beside them stand the directions that the fit itself has taken what it could along: zeros, scale factors, angles.
+fn follows_time(poses: &[Pose], fit: &AccelFit, along: impl Fn(&Pose) -> [f64; 3]) -> f64 {
+    const OWN: usize = 9;
+    const WITH_TIME: usize = 4;
+    if poses.len() < 2 * OWN {
+        return 0.0;
+    }
+    let times: Vec<f64> = poses.iter().map(Pose::middle_s).collect();
+    let [middle, half] = [Size::of(&times).mean, 0.5 * Size::of(&times).peak_to_peak];
+    let row = |pose: usize| -> [f64; OWN + WITH_TIME] {
+        let ([x, y, z], time) = (along(&poses[pose]), (times[pose] - middle) / half);
+        [x, y, z, x * x, y * y, z * z, x * y, x * z, y * z, x * time, y * time, z * time, time]
+    };
+    let design = DMatrix::from_fn(poses.len(), OWN + WITH_TIME, |pose, column| row(pose)[column]);
+    let left = DVector::from_column_slice(&fit.residual);
+    #[expect(clippy::cast_precision_loss, reason = "poses")]
+    let per_degree = |squares: f64, taken: usize| squares / (poses.len() - taken) as f64;
+    let solved = design.clone().svd(true, true).solve(&left, 1e-9);
+    solved.map_or(0.0, |terms| {
+        let more = per_degree((&left - design * terms).norm_squared(), OWN + WITH_TIME);
+        1.0 - more / per_degree(left.norm_squared(), OWN)
+    })
+}
+
 /// Words where the poses end long before the log does.
 pub(super) fn ends_early(track: &Track, poses: &[Pose]) -> Option<String> {
     let length = track.start_s(track.len().checked_sub(1)?);
@@ -125,16 +176,16 @@ pub(super) fn ends_early(track: &Track, poses: &[Pose]) -> Option<String> {
     })
 }
 
-/// Words where fitted gyros do not follow the turns: `angle` (rad) is left after each.
-pub(super) fn lost(angle: &[f64], rows: &[[f64; 3]; 3]) -> Option<String> {
-    let left = Size::of(angle).rms.to_degrees();
+/// Words where fitted gyros do not follow the turns.
+pub(super) fn lost(fit: &GyroFit) -> Option<String> {
+    let left = fit.left_deg();
     if left.is_nan() || left > LARGEST_LEFT_DEG {
         return Some(format!(
             "after a turn they still miss the direction of gravity by {left:.1}° rms, at most {LARGEST_LEFT_DEG}° is a result: \
              {WRONG_GYROS}"
         ));
     }
-    flat(rows).then(|| format!("their axes are found in one plane, or nearly so: {WRONG_GYROS}"))
+    flat(&fit.rows).then(|| format!("their axes are found in one plane, or nearly so: {WRONG_GYROS}"))
 }
 
 /// Whether three axes lie so near one plane that no document may state them.
@@ -142,93 +193,6 @@ fn flat(rows: &[[f64; 3]; 3]) -> bool {
     let values = Matrix3::from_fn(|i, j| rows[i][j]).singular_values();
     let condition = values.max() / values.min();
     condition.is_nan() || condition > CONDITION_LIMIT
-}
-
-/// One sensor beside what the document at hand states of it.
-struct Beside {
-    name: String,
-    /// K, and K relative to the stated one.
-    scale: [f64; 2],
-    /// Where a positive output points, found and stated: a negative K along one axis is a positive one along its opposite.
-    senses: [Vector3<f64>; 2],
-}
-
-impl Beside {
-    fn new(kind: &str, index: usize, [found, stated]: [f64; 2], rows: [[f64; 3]; 2]) -> Self {
-        let [row, stated_row] = rows.map(Vector3::from);
-        Self {
-            name: format!("{kind} {}", faults::name(index)),
-            scale: [found, found / stated],
-            senses: [row * found.signum(), stated_row * stated.signum()],
-        }
-    }
-
-    /// Words where it points elsewhere.
-    fn turned(&self) -> Option<String> {
-        let [found, stated] = self.senses;
-        let angle = found.angle(&stated).to_degrees();
-        let Self { name, scale: [scale, _], .. } = self;
-        if angle > OTHER_SIGN_DEG {
-            return Some(format!(
-                "{name}: it is found with the other sign than the document at hand, or else its column, says (K = {scale:.4}): is a \
-                 sign missing in the mapping, of this column or of an accelerometer's?"
-            ));
-        }
-        (angle > LARGEST_TURN_DEG).then(|| {
-            format!(
-                "{name}: a positive output is found along ({:.2}, {:.2}, {:.2}), {angle:.0}° from where the document at hand, or else \
-                 its column, has it (K = {scale:.4}): are columns of the mapping swapped, of the accelerometers too, or is a sign the \
-                 other one?",
-                found.x, found.y, found.z
-            )
-        })
-    }
-}
-
-/// Sensors of one kind that have changed far more than the others of theirs.
-fn apart(sensors: &[Beside]) -> Option<String> {
-    let size = |sensor: &&Beside| sensor.scale[1].abs();
-    let most = sensors.iter().max_by(|a, b| size(a).total_cmp(&size(b)))?;
-    let least = sensors.iter().min_by(|a, b| size(a).total_cmp(&size(b)))?;
-    let ratio = size(&most) / size(&least);
-    (ratio > LARGEST_RATIO).then(|| {
-        format!(
-            "{} and {}: their K are {:.4} and {:.4} times what the document at hand, or else the log, states, {ratio:.1} times \
-             apart: is the unit of measure of each column in the mapping the right one?",
-            most.name, least.name, most.scale[1], least.scale[1]
-        )
-    })
-}
-
-/// What is physically odd about fits that are good: axes and scale factors far from what the document at hand states.
-pub(in crate::tumble) fn odd(
-    base: &Document,
-    tumble: &Tumble,
-    temperature: &dyn Fn(Option<&String>) -> f64,
-) -> Vec<String> {
-    let mut kinds: Vec<Vec<Beside>> = Vec::new();
-    if let Some(accel) = &base.accel {
-        let found = tumble.accel.scale.iter().zip(&tumble.accel.rows);
-        let stated = accel.sensor.iter().zip(&accel.orientation.rows);
-        let beside = found.zip(stated).enumerate().map(|(index, ((scale, row), (sensor, stated)))| {
-            let old = sensor.scale_factor.shape().at(temperature(sensor.channel.as_ref())).unwrap_or(1.0);
-            Beside::new("accelerometer", index, [*scale, old], [*row, *stated])
-        });
-        kinds.push(beside.collect());
-    }
-    if let Ok(gyro) = &tumble.gyro {
-        let found = gyro.weight.iter().zip(&gyro.rows);
-        let stated = base.gyro.sensor.iter().zip(&base.gyro.orientation.rows);
-        let beside = found.zip(stated).enumerate().map(|(index, ((weight, row), (sensor, stated)))| {
-            let old = sensor.increment_weight_rad_per_rad.unwrap_or(1.0);
-            Beside::new("gyro", index, [*weight, old], [*row, *stated])
-        });
-        kinds.push(beside.collect());
-    }
-    let of = |sensors: &Vec<Beside>| -> Vec<String> {
-        sensors.iter().filter_map(Beside::turned).chain(apart(sensors)).collect()
-    };
-    kinds.iter().flat_map(of).collect()
 }
 
 #[cfg(test)]
@@ -248,8 +212,10 @@ mod tests {
         assert!(no_gyros(&NoSolution::NotDetermined(8)).contains("gyro z"));
         // What no document may state is refused before it is written, without the numbers of a matrix.
         let straight = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-        assert_eq!(lost(&[0.01; 8], &straight), None);
-        let words = lost(&[0.01; 8], &[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.8, 0.6, 1e-5]]).unwrap();
+        let of =
+            |rows| GyroFit { weight: [1.0; 3], rest: [0.0; 3], rows, sigma: [0.0; 9], angle: vec![0.01; 8] };
+        assert_eq!(lost(&of(straight)), None);
+        let words = lost(&of([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.8, 0.6, 1e-5]])).unwrap();
         assert!(words.contains("in one plane") && !words.contains("condition number"), "{words}");
     }
 }

@@ -1,0 +1,137 @@
+//! `positions` on logs that are damaged: what is told, and what is refused.
+
+use isotherm_calibration::positions::analysis::{Analysis, Settings, analyse};
+use isotherm_calibration::positions::plan::Plan;
+use isotherm_calibration::positions::track::Track;
+use isotherm_calibration::run::Run;
+use isotherm_calibration::written::Written;
+use isotherm_protocol::document::Document;
+
+use crate::stand::judging::{quick, settings, times, tracks};
+use crate::stand::{self, Stand};
+
+/// What the twelve positions at some temperatures come to, with the turns told by times; `change` has the tracks of all runs.
+fn found(
+    deg_c: &[f64],
+    document: &Document,
+    channels: &[&str],
+    change: &dyn Fn(&mut [Track]),
+) -> Result<Analysis, Vec<String>> {
+    let (plan, order) = (Plan::twelve(), (0..12).collect::<Vec<_>>());
+    let written = Written::of(document).unwrap();
+    let (mut runs, mut rows): (Vec<Run>, _) = (Vec::new(), times(&plan, "", &[]));
+    for (index, deg_c) in deg_c.iter().enumerate() {
+        let name = format!("log {index}");
+        // One stand, and other noise in each log.
+        let how = Stand { errors: quick(40).errors, ..quick(40 + index as u64) };
+        let (events, held) = stand::log(&stand::instrument(), *deg_c, &plan, &order, &how);
+        rows.rows.extend(times(&plan, &name, &held).rows);
+        runs.push(stand::run(&name, events));
+    }
+    let mut tracks = tracks(&runs, &written);
+    change(&mut tracks);
+    let channels = channels.iter().map(|channel| (*channel).to_owned()).collect();
+    analyse(&tracks, document, &Settings { channels, ..settings(plan, Some(rows)) })
+}
+
+fn said(analysis: &Analysis, words: &str) -> bool {
+    analysis.warnings.iter().any(|warning| warning.contains(words))
+}
+
+/// Sets the readings of a channel, or takes it away.
+fn channel(tracks: &mut [Track], name: &str, reading: Option<f64>) {
+    for track in tracks {
+        match reading {
+            Some(reading) => track.temperature_deg_c.get_mut(name).unwrap().fill(reading),
+            None => drop(track.temperature_deg_c.remove(name)),
+        }
+    }
+}
+
+#[test]
+fn channels_that_say_nothing_are_told_and_others_stand_in_for_them() {
+    let mut document = stand::document();
+    let thermal = isotherm_protocol::document::OrientationThermal {
+        channels: vec!["housing".to_owned()],
+        reference_deg_c: 20.0,
+        range_deg_c: [-40.0, 80.0],
+        slopes_arcsec_per_deg_c: vec![[0.0; 3]; 3],
+    };
+    document.accel.as_mut().unwrap().orientation.thermal = Some(thermal);
+    let deg_c = [-20.0, 50.0];
+    let good = found(&deg_c, &document, &[], &|_| {}).unwrap();
+    assert_eq!((good.levels_deg_c.len(), good.channels.as_slice()), (2, &["housing".to_owned()][..]));
+    assert_eq!(good.warnings, Vec::<String>::new());
+    // The accelerometers' own channels tell both temperatures.
+    let gone = found(&deg_c, &document, &[], &|tracks| channel(tracks, "housing", None)).unwrap();
+    assert_eq!((gone.levels_deg_c.len(), gone.channels.len()), (2, 3));
+    assert!(said(&gone, "channel \"housing\" has no reading in some position"), "{:?}", gone.warnings);
+    let stuck = found(&deg_c, &document, &[], &|tracks| channel(tracks, "housing", Some(25.0))).unwrap_err();
+    assert!(
+        stuck[0].contains("goes from 25.0 to 25.0 °C only") && stuck[0].contains("accelerometers x, y and z"),
+        "{stuck:?}"
+    );
+    let asked = found(&deg_c, &document, &["nothing"], &|_| {}).unwrap_err();
+    assert!(asked[0].starts_with("--channel: channel \"nothing\" is not in every position"), "{asked:?}");
+    // One channel for all: they are named in one sentence.
+    let blind = found(&deg_c, &document, &[], &|tracks| {
+        (0..3).for_each(|index| channel(tracks, &format!("accel{index}"), Some(25.0)));
+    });
+    let blind = blind.unwrap_err();
+    assert!(
+        blind.len() == 3 && blind[0].contains("accelerometer x: what K and S follow is channel \"accel0\""),
+        "{blind:?}"
+    );
+    for sensor in &mut document.accel.as_mut().unwrap().sensor {
+        sensor.channel = Some("board".to_owned());
+    }
+    let blind = found(&deg_c, &document, &[], &|tracks| channel(tracks, "board", Some(25.0))).unwrap_err();
+    let [one] = &blind[..] else { panic!("{blind:?}") };
+    assert!(one.starts_with("accelerometers x, y and z: what K and S follow is channel \"board\""), "{one}");
+}
+
+#[test]
+fn units_of_measure_and_columns_are_named_once() {
+    let document = stand::document();
+    let of = |change: &dyn Fn(&mut [Track])| found(&[20.0], &document, &[], change);
+    let good = of(&|_| {}).unwrap();
+    assert_eq!(good.warnings, Vec::<String>::new());
+    let grams =
+        of(&|tracks| tracks[0].outputs.iter_mut().flatten().for_each(|output| *output *= 9.81)).unwrap();
+    let [one] = &grams.warnings[..] else { panic!("{:?}", grams.warnings) };
+    assert!(
+        one.starts_with("accelerometers: their readings are 9.8") && one.contains("by g once more"),
+        "{one}"
+    );
+    let swapped = of(&|tracks| tracks[0].outputs.swap(0, 2)).unwrap();
+    let [one] = &swapped.warnings[..] else { panic!("{:?}", swapped.warnings) };
+    assert!(one.starts_with("accelerometers x and z look swapped: "), "{one}");
+    let sign = of(&|tracks| tracks[0].outputs[1].iter_mut().for_each(|output| *output = -*output)).unwrap();
+    let [one] = &sign.warnings[..] else { panic!("{:?}", sign.warnings) };
+    assert!(one.starts_with("accelerometer y is found with the other sign: is its sign missing"), "{one}");
+    let half = of(&|tracks| {
+        let middle = tracks[0].len() / 2;
+        tracks[0].outputs.iter_mut().for_each(|column| column[middle..].iter_mut().for_each(|x| *x /= 9.81));
+    });
+    let half = half.unwrap_err();
+    let [one] = &half[..] else { panic!("{half:?}") };
+    assert!(one.starts_with("accelerometers x, y and z: their scale factors are known to "), "{one}");
+    assert!(one.contains("is the unit of measure another one in some logs or from some row on"), "{one}");
+}
+
+#[test]
+fn a_position_without_its_twin_asks_for_times() {
+    let plan = Plan::twelve();
+    let how = Stand { turn_deg_per_s: None, hold_s: 14.0, tick_ns: 100_000_000, ..quick(8) };
+    // A log of one position.
+    let (events, _) = stand::log(&stand::instrument(), 20.0, &plan, &[1], &how);
+    let document = stand::document();
+    let tracks = tracks(&[stand::run("room", events)], &Written::of(&document).unwrap());
+    let refused = analyse(&tracks, &document, &settings(plan, None)).unwrap_err().join("\n");
+    assert!(
+        refused.contains("from \"Y up a\" to \"Y up b\" the unit turns about the vertical only")
+            && refused.contains("anything else needs --times")
+            && refused.contains("the log has no turns"),
+        "{refused}"
+    );
+}

@@ -1,0 +1,143 @@
+//! `tumble` on logs that are damaged and can be fitted all the same: what is told, and what is refused.
+
+use isotherm_calibration::positions::bare::bare;
+use isotherm_calibration::positions::track::Track;
+use isotherm_calibration::report::Verdict;
+use isotherm_calibration::tumble::analysis::{Tumble, analyse};
+use isotherm_calibration::tumble::document::complete;
+use isotherm_calibration::tumble::report::{Left, report};
+use isotherm_protocol::document::{AccelOutput, Document};
+
+use crate::stand;
+use crate::tumble::{how, settings, tumbled, tumbled_log};
+
+/// A log that was changed, and the document without anything known.
+fn changed(seed: u64, change: &dyn Fn(&mut Track)) -> (Document, Tumble) {
+    let (_, mut track, _) = tumbled(24, &how(seed));
+    change(&mut track);
+    let series = stand::run("t", tumbled_log(12, seed)).series(()).unwrap();
+    (bare(&series, AccelOutput::MetresPerSecondSquared).unwrap(), analyse(&track, &settings()).unwrap())
+}
+
+/// The only thing that is said.
+fn said(seed: u64, change: &dyn Fn(&mut Track)) -> String {
+    let (plain, tumble) = changed(seed, change);
+    let said = [tumble.warnings.clone(), complete(&plain, &tumble).unwrap().1].concat();
+    assert_eq!(said.len(), 1, "{said:?}");
+    said.concat()
+}
+
+fn times(columns: &mut [Vec<f64>], factor: f64) {
+    columns.iter_mut().flatten().for_each(|reading| *reading *= factor);
+}
+
+#[test]
+fn gyros_in_another_order_and_unit_are_found_and_named() {
+    let (plain, good) = changed(21, &|_| {});
+    assert_eq!((good.warnings.len(), complete(&plain, &good).unwrap().1.len()), (0, 0));
+    let good = good.gyro.unwrap();
+    // Order, unit of measure and sign at once.
+    let (plain, tumble) = changed(21, &|track| {
+        track.gyros.swap(0, 2);
+        times(&mut track.gyros, 57.3);
+        times(&mut track.gyros[1..2], -1.0);
+    });
+    let gyro = tumble.gyro.as_ref().unwrap();
+    for (one, other) in [(0, 2), (1, 1), (2, 0)] {
+        let ratio = gyro.weight[one].abs() * 57.3 / good.weight[other];
+        assert!((ratio - 1.0).abs() < 1e-3, "{one}: {ratio}");
+        assert!(gyro.sigma[one] < 1e-3 / 57.3 && gyro.sigma[3 + 2 * one] < 1e-3, "{:?}", gyro.sigma);
+    }
+    assert_eq!([0, 1, 2].map(|axis| gyro.across(axis)), [[0, 1], [0, 2], [1, 2]]);
+    let said = complete(&plain, &tumble).unwrap().1;
+    let [order, unit] = &said[..] else { panic!("{said:?}") };
+    assert!(order.starts_with("gyros x and z look swapped, or accelerometers, and a sign"), "{order}");
+    assert!(unit.contains("as of °/s that are taken for rad/s"), "{unit}");
+    let swapped = self::said(22, &|track| track.gyros.swap(0, 1));
+    assert!(
+        swapped.starts_with("gyros x and y look swapped: check the columns in the mapping."),
+        "{swapped}"
+    );
+    let shifted = self::said(22, &|track| track.gyros[2].iter_mut().for_each(|rate| *rate += 5.2));
+    assert!(shifted.starts_with("gyro z: at rest it reads 29") && shifted.contains("mid_scale"), "{shifted}");
+}
+
+#[test]
+fn accelerometers_in_another_order_or_unit_are_named() {
+    let (plain, swapped) = changed(23, &|track| track.outputs.swap(0, 1));
+    let refused = complete(&plain, &swapped).unwrap_err().join("\n");
+    assert!(refused.starts_with("accelerometers x and y look swapped: check the columns"), "{refused}");
+    let (plain, flipped) = changed(23, &|track| times(&mut track.outputs[2..], -1.0));
+    let refused = complete(&plain, &flipped).unwrap_err().join("\n");
+    assert!(refused.contains("is the sign of accelerometer z missing in the mapping"), "{refused}");
+    let grams = said(23, &|track| times(&mut track.outputs, 1.0 / 9.81));
+    assert!(
+        grams.contains("as of readings in g that are taken for m/s²: correct the unit of measure"),
+        "{grams}"
+    );
+}
+
+#[test]
+fn what_is_left_far_beyond_the_noise_is_told_with_what_it_follows() {
+    let drift = said(24, &|track| {
+        let ends = track.end_ns.clone();
+        let later = |end: i64| 1e-3 * end as f64 * 1e-9;
+        for column in &mut track.outputs {
+            column.iter_mut().zip(&ends).for_each(|(reading, end)| *reading += later(*end));
+        }
+    });
+    let [before, after] = drift.split_once(" times the noise of the poses").map(|(a, b)| [a, b]).unwrap();
+    let times: f64 = before.rsplit(' ').next().unwrap().parse().unwrap();
+    assert!(times > 20.0 && after.contains("follows the time since the log's beginning"), "{drift}");
+    let touched = said(24, &|track| {
+        let quiet = track.len() / 7;
+        times_of(track, 3 * quiet..4 * quiet, 1.008);
+    });
+    assert!(
+        touched.contains(" times the noise of the poses") && touched.contains("was it moved or touched"),
+        "{touched}"
+    );
+}
+
+fn times_of(track: &mut Track, ticks: std::ops::Range<usize>, factor: f64) {
+    for column in &mut track.outputs {
+        column[ticks.clone()].iter_mut().for_each(|reading| *reading *= factor);
+    }
+}
+
+#[test]
+fn poses_that_the_fit_has_not_seen_decide() {
+    let (document, tumble) = changed(25, &|_| {});
+    let count = tumble.poses.len();
+    let of = |before: f64, after: f64, outside: f64| -> [Verdict; 2] {
+        // Size counts, not the sign.
+        let wave =
+            |size: f64| (0..count).map(|k| if k % 2 == 0 { size } else { -size }).collect::<Vec<f64>>();
+        let left = |size: f64| Left {
+            length: wave(size),
+            direction: vec![[0.0, 0.0, 1.0]; count],
+            angle_deg: vec![0.5; count - 1],
+            turn_s: vec![1.0; count - 1],
+        };
+        let tumble = Tumble { held_out: wave(outside), ..tumble.clone() };
+        let report = report(&document, &tumble, &settings(), "t", [&left(before), &left(after)]);
+        report.verdicts.try_into().unwrap()
+    };
+    let words = |[accel, gyro]: &[Verdict; 2]| format!("{}\n{}", accel.words(), gyro.words());
+    let good = of(0.9, 1e-3, 1.4e-3);
+    assert!(good.iter().all(|verdict| verdict.accepted) && good[0].reason.is_empty(), "{}", words(&good));
+    let same = of(1e-3, 1e-3, 1.4e-3);
+    assert!(same[0].accepted && same[0].reason == "it changes nothing", "{}", words(&same));
+    let as_good = of(1e-3, 8e-4, 1.4e-3);
+    assert!(as_good[0].accepted && as_good[0].reason.contains("no better than"), "{}", words(&as_good));
+    let worse = of(1e-3, 3e-4, 5e-3);
+    assert!(!worse[0].accepted && worse[0].reason.contains("fits these poses better"), "{}", words(&worse));
+    assert!(
+        !worse[1].accepted && worse[1].reason.contains("relative to the accelerometers"),
+        "{}",
+        words(&worse)
+    );
+    let far = of(0.9, 0.1, 0.3);
+    assert!(!far[0].accepted && far[0].reason.starts_with("3.06 % of g are left"), "{}", words(&far));
+    assert!(!of(0.9, 0.1, f64::NAN)[0].accepted, "no held-out fit at all");
+}
