@@ -44,7 +44,9 @@ fn significant(value: f64, digits: f64) -> String {
     } else if !(1e-3..1e5).contains(&size) {
         format!("{value:.*e}", whole(digits - 1.0))
     } else {
-        format!("{value:.*}", whole(digits - 1.0 - libm::floor(libm::log10(size))))
+        // 9.996 has its first digit before the point, 10.0 that is said of it has two there.
+        let said: f64 = format!("{size:.*e}", whole(digits - 1.0)).parse().unwrap_or(size);
+        format!("{value:.*}", whole(digits - 1.0 - libm::floor(libm::log10(said))))
     }
 }
 
@@ -137,8 +139,8 @@ mod tests {
     #[test]
     fn figures_have_as_many_digits_as_they_are_read_for() {
         assert_eq!(
-            [1.678, 0.17, 12345.6, 1.2e-5, 0.0, -0.0].map(short),
-            ["1.68", "0.170", "12346", "1.20e-5", "0", "0"]
+            [1.678, 0.17, 12345.6, 1.2e-5, 0.0, -0.0, 9.996, -0.99961].map(short),
+            ["1.68", "0.170", "12346", "1.20e-5", "0", "0", "10.0", "-1.00"]
         );
         assert_eq!(
             [9.815_708_729_443_966, 9.8154, 20.0, -2.5e-7].map(six),

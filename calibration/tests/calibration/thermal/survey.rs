@@ -172,7 +172,7 @@ fn programmes(rate: f64, hold: f64) -> [Profile; 2] {
 }
 
 #[test]
-#[ignore = "a survey by hand: cargo test --release -p isotherm-calibration --test thermal -- --ignored survey --nocapture"]
+#[ignore = "a survey by hand: cargo test --release --workspace --locked --test calibration -- --ignored survey --nocapture"]
 fn survey_of_coils() {
     let coil = |change: fn(&mut Coil)| {
         let mut coil = USUAL;
