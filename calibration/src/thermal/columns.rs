@@ -1,7 +1,7 @@
 //! What one unit of each term subtracts, taken from the corrector itself.
 //!
-//! A term is put with the coefficient one into a document that has nothing else, and the run's own temperature readings
-//! are driven through the service's stream with it, together with ticks that read zero. What comes out is the term's
+//! A term is put with the coefficient one into a document that has nothing else, and the run's own temperature readings, without
+//! their noise, are driven through the service's stream with it, together with ticks that read zero. What comes out is the term's
 //! column, with filter, grid, derivative step and the ramps between readings as the service has them. Three terms go in
 //! at a time, one per axis.
 
