@@ -79,16 +79,34 @@ fn drift_leaves_single_readings_far_beyond_the_noise_out() {
     let spikes = log(folder.path(), spoil, |_| true);
     let document = shipped("FOG-0001.toml").display().to_string();
     let told = succeeds(&["drift", &spikes, "--document", &document]);
-    assert!(told.contains("they are left out on all axes, since"), "{told}");
+    assert!(told.contains("; left out on all axes, since"), "{told}");
     let told = succeeds(&["drift", &spikes]);
     assert!(told.contains("gyro x: 9 single readings are far beyond the noise"), "{told}");
-    assert!(told.contains("they are left out: look"), "{told}");
+    assert!(told.contains("; left out: look"), "{told}");
     let walk = |told: &str| {
         let line = told.lines().find(|line| line.starts_with("gyro x: N ")).unwrap().to_owned();
         line.split_whitespace().nth(3).unwrap().parse::<f64>().unwrap()
     };
     let good = walk(&succeeds(&["drift", &log(folder.path(), |_| (), |_| true)]));
     assert!((walk(&told) / good - 1.0).abs() < 0.02, "{told}");
+}
+
+#[test]
+fn corrected_accelerometers_that_do_not_feel_gravity_are_told() {
+    let of = |level: [f64; 3]| Columns {
+        kind: Kind::Force,
+        names: ["x", "y", "z"].map(str::to_owned).to_vec(),
+        values: level.map(|level| wave(8000).iter().map(|reading| reading * 1e-3 + level).collect()).to_vec(),
+        ..columns(wave(8000))
+    };
+    let told = |columns: Columns| {
+        let spacing = Spacing::of(&columns.end_ns).unwrap();
+        at_rest(&mut columns.clone(), &spacing).unwrap().join("\n")
+    };
+    assert_eq!(told(of([0.3, -0.2, -9.79])), "");
+    let words = told(of([0.03, -0.02, -1.0]));
+    assert!(words.contains("read 1.00 m/s² together, gravity is 9.76 to 9.84"), "{words}");
+    assert_eq!(told(Columns { corrected: false, ..of([0.03, -0.02, -1.0]) }), "", "they may be volts");
 }
 
 #[test]

@@ -1,5 +1,8 @@
 //! What must hold of a log at rest before anything is made of it: for `drift` and for `impact`.
 
+use isotherm_correction::earth::LEVELLING_TOLERANCE;
+use isotherm_correction::units::STANDARD_GRAVITY_M_PER_S2;
+
 use super::far::{self, Far};
 use super::{Spacing, steps};
 use crate::drift::columns::{Columns, Kind, name};
@@ -130,6 +133,7 @@ pub fn at_rest(columns: &mut Columns, spacing: &Spacing) -> Result<Vec<String>, 
     if !moving.is_empty() {
         return Err(Error::Refused(moving));
     }
+    notes.extend(gravity(columns));
     far::leave_out(columns, &spikes);
     for ((name, column), noise) in columns.names.iter().zip(&columns.values).zip(&noise) {
         let called = format!("{} {name}", columns.kind.sensor());
@@ -138,6 +142,20 @@ pub fn at_rest(columns: &mut Columns, spacing: &Spacing) -> Result<Vec<String>, 
         notes.extend(unlike.or_else(|| steps::words(&called, columns, column)));
     }
     Ok(notes)
+}
+
+/// Words where corrected accelerometers do not feel gravity; raw ones may be in V.
+fn gravity(columns: &Columns) -> Option<String> {
+    let feels = columns.kind == Kind::Force && columns.corrected;
+    let size = columns.values.iter().map(|column| median(column).powi(2)).sum::<f64>().sqrt();
+    let is_g = (size / STANDARD_GRAVITY_M_PER_S2 - 1.0).abs() <= LEVELLING_TOLERANCE;
+    (feels && !is_g).then(|| {
+        format!(
+            "warning: the accelerometers read {} m/s² together, gravity is 9.76 to 9.84: are the unit of measure in the mapping, the columns \
+             and the document right?",
+            short(size)
+        )
+    })
 }
 
 /// Words where the median rate of a gyro (°/s) is not that of a unit at rest.

@@ -43,7 +43,7 @@ impl Far {
         Some(if self.are_single {
             format!(
                 "warning: {called}: {} far beyond the noise (more than {FAR} standard deviations), the first \
-                 at {at:.2} s: {value} {measure}; they are left out{wide}: look for what makes them",
+                 at {at:.2} s: {value} {measure}; left out{wide}: look for what makes them",
                 counted(count, "single reading is", "single readings are")
             )
         } else {
