@@ -1,10 +1,24 @@
-//! Simulated runs for tests.
+//! Simulated runs, and noise, for tests.
 
 use isotherm_log::offline::unit_id;
 use isotherm_log::text::LogEvent;
 use isotherm_simulator::{Scenario, Simulation, Step};
 
 use crate::run::Run;
+
+/// White noise of standard deviation 1, nearly normal, the same every time.
+#[expect(clippy::cast_precision_loss, reason = "53 bits")]
+pub(crate) fn noise() -> impl FnMut() -> f64 {
+    let mut seed = 1_u64;
+    move || {
+        let mut sum = 0.0;
+        for _ in 0..12 {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            sum += (seed >> 11) as f64 / 9_007_199_254_740_992.0;
+        }
+        sum - 6.0
+    }
+}
 
 /// A scenario as a run in memory; `each` sees every step with its truth.
 pub(crate) fn simulated(scenario: &Scenario, mut each: impl FnMut(&Step)) -> Run {

@@ -2,9 +2,10 @@
 
 use std::collections::BTreeMap;
 
+use isotherm_correction::earth::LEVELLING_TOLERANCE;
 use isotherm_correction::sample::{CorrectedTick, SensorFlags};
 use isotherm_correction::unit::Unit;
-use isotherm_correction::units::{AngularRate, Timestamp};
+use isotherm_correction::units::{AngularRate, STANDARD_GRAVITY_M_PER_S2, Timestamp};
 use isotherm_log::offline::Loaded;
 
 use crate::error::Error;
@@ -25,6 +26,12 @@ pub struct Means {
     pub temperature_deg_c: BTreeMap<String, Vec<f64>>,
     /// What the correction passed over.
     pub troubles: Troubles,
+}
+
+/// Whether the mean specific force of a unit at rest has the size of gravity (m/s²), within [`LEVELLING_TOLERANCE`].
+#[must_use]
+pub fn is_one_g(size: f64) -> bool {
+    (size / STANDARD_GRAVITY_M_PER_S2 - 1.0).abs() <= LEVELLING_TOLERANCE
 }
 
 /// Length of the windows that what is left is stated over (s), for runs as long as the longest of some: in long runs several of

@@ -32,4 +32,3 @@ mod temperatures;
 #[cfg(test)]
 mod tests;
 mod units;
-pub(crate) mod words;

@@ -10,6 +10,7 @@
 //! | [`batch`] | several units at once, and the table that closes them |
 //! | [`sheet`] | a line, tables and charts where nothing was fitted |
 //! | [`sigma`] | standard errors as documents keep them |
+//! | `words` | one sentence for all gyros, or logs, that it holds of |
 //! | `page`, `json` | the report as a page and as JSON |
 
 pub mod batch;
@@ -21,6 +22,7 @@ pub mod sigma;
 #[cfg(test)]
 mod tests;
 pub mod verdict;
+pub(crate) mod words;
 
 use std::fmt::Write;
 

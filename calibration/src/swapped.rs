@@ -2,8 +2,8 @@
 
 use isotherm_correction::earth::{Place, Tilt};
 
+use crate::drift::figures::fixed;
 use crate::means::Size;
-use crate::modes::words::fixed;
 
 /// Orders of three axes: the swaps of two first, which need the fewest mistakes.
 pub const ORDERS: [[usize; 3]; 5] = [[1, 0, 2], [2, 1, 0], [0, 2, 1], [1, 2, 0], [2, 0, 1]];
@@ -86,7 +86,7 @@ impl<'a> Shown<'a> {
         let largest = self.mean.iter().chain(&self.stated).map(|part| part.abs()).fold(0.0, f64::max);
         let places =
             (0..6_u8).find(|places| largest * libm::pow(10.0, f64::from(*places)) >= 100.0).unwrap_or(6);
-        let list = |v: [f64; 3]| v.map(|part| fixed(part, places)).join(", ");
+        let list = |v: [f64; 3]| v.map(|part| fixed(part, usize::from(places))).join(", ");
         format!(
             "their means are {} {}, in the stated attitude they would be {}",
             list(self.mean),

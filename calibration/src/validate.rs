@@ -8,13 +8,13 @@
 mod coverage;
 mod runs;
 
-use isotherm_correction::earth::{LEVELLING_TOLERANCE, Place};
+use isotherm_correction::earth::Place;
 use isotherm_correction::units::{AngularRate, STANDARD_GRAVITY_M_PER_S2};
 use isotherm_protocol::document::{Document, Sample};
 
 use crate::drift::figures::short;
 use crate::error::Error;
-use crate::means::{Means, Size, usual_window_s};
+use crate::means::{Means, Size, is_one_g, usual_window_s};
 use crate::report::{Curve, Figure, FitReport, Rest, SAME_SHARE, Verdict};
 use crate::run::Watch;
 use crate::swapped::{Shown, up};
@@ -138,7 +138,7 @@ fn doubts(name: &str, curves: &[Curve], means: &Means) -> Vec<String> {
     let force = [0, 1, 2].map(|axis| Size::of(means.force(axis)));
     if force.iter().all(|size| size.count > 0) {
         let length = force.iter().map(|size| size.mean * size.mean).sum::<f64>().sqrt();
-        if (length / STANDARD_GRAVITY_M_PER_S2 - 1.0).abs() > LEVELLING_TOLERANCE {
+        if !is_one_g(length) {
             doubts.push(format!(
                 "{name}: the mean specific force is {} m/s², gravity is 9.76 to 9.84: are the unit of the columns, their order, and \
                  the document right?",

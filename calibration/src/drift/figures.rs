@@ -50,6 +50,16 @@ fn significant(value: f64, digits: f64) -> String {
     }
 }
 
+/// So many places behind the point; zero has no sign.
+#[must_use]
+pub fn fixed(value: f64, places: usize) -> String {
+    let words = format!("{value:.places$}");
+    match words.strip_prefix('-') {
+        Some(size) if size.bytes().all(|byte| matches!(byte, b'0' | b'.')) => size.to_owned(),
+        _ => words,
+    }
+}
+
 /// Six significant digits, without the zeros at the end: what people state, such as g or a coefficient.
 #[must_use]
 pub fn six(value: f64) -> String {
@@ -154,6 +164,23 @@ mod tests {
         assert_eq!(alike(&[167.0, 24.9, 9.85, 390.2], 3.0), ["167", "24.9", "9.85", "390"]);
         assert_eq!(alike(&[1.002_24, 1.002_24], 3.0), ["1.00224"; 2]);
         assert_eq!(alike(&[0.0, 0.0, f64::NAN], 3.0), ["0", "0", "NaN"]);
+    }
+
+    #[test]
+    fn zero_has_no_sign() {
+        assert_eq!(
+            [-0.0004, -0.0006, 0.0, -12.3456].map(|x| fixed(x, 3)),
+            ["0.000", "-0.001", "0.000", "-12.346"]
+        );
+    }
+
+    #[test]
+    fn numbers_are_written_as_people_do() {
+        assert_eq!([fixed(-0.001, 2), fixed(-0.016, 2), fixed(1.0, 1)], ["0.00", "-0.02", "1.0"]);
+        assert_eq!(
+            [counted(1, "pose", "poses"), counted(0, "pose", "poses"), counted(12, "pose", "poses")],
+            ["1 pose", "0 poses", "12 poses"]
+        );
     }
 
     #[test]

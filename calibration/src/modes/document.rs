@@ -8,8 +8,8 @@ use toml::{Table, Value};
 
 use super::fit::{GyroFit, MEANDER_REFERENCE_DEG_C, Term};
 use super::make::{Made, ServoFit};
-use super::words::gyros as gyros_in_words;
 use crate::report::Sigmas;
+use crate::report::words::gyros as gyros_in_words;
 use crate::written::tidy;
 
 /// Multiples of τ after which the servo's transient counts as settled: e⁻¹⁶ of it is left.

@@ -5,8 +5,8 @@ use isotherm_log::plot::page::Table;
 use super::document::main_axis;
 use super::fit::{GyroFit, Term};
 use super::make::{Made, ServoFit};
-use super::words::{fixed, together};
-use crate::drift::figures::{counted, per_deg_c, short};
+use crate::drift::figures::{counted, fixed, per_deg_c, short};
+use crate::report::words::together;
 use crate::report::{Coefficient, Curve, Figure, FitReport};
 
 /// Models of the cross-validation that the report lists for each gyro.

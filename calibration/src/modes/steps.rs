@@ -3,7 +3,7 @@
 //! Compared are means in which the modes cancel, by the rule of `drift`.
 
 use super::cells::Second;
-use super::words::fixed;
+use crate::drift::figures::fixed;
 use crate::drift::pieces::steps::step;
 
 /// Most parts of a run that are compared.
@@ -53,7 +53,7 @@ pub(super) fn found(seconds: &[Second], names: [&str; 3]) -> Vec<String> {
 /// When the largest step is, and all steps in words; `None` without one.
 fn stepping(
     parts: &[Pair],
-    (names, measure, places): (&[String; 3], &str, u8),
+    (names, measure, places): (&[String; 3], &str, usize),
     least: f64,
     of: fn(&Pair) -> [f64; 3],
 ) -> Option<(f64, String)> {

@@ -7,6 +7,7 @@ use isotherm_protocol::document::Document;
 use crate::drift::figures::short;
 use crate::drift::pieces::checks::frozen;
 use crate::error::Error;
+use crate::report::words::grouped;
 use crate::robust::median;
 use crate::run::{Run, Watch};
 use crate::series::Channel;
@@ -90,7 +91,7 @@ pub(super) fn freezing<W: Watch>(
     document: &Document,
     watch: &mut impl FnMut() -> W,
 ) -> Result<Vec<String>, Error> {
-    let mut told: Vec<(String, Vec<String>)> = Vec::new();
+    let mut told: Vec<(&str, String)> = Vec::new();
     for run in runs {
         let series = run.series(watch())?;
         for channel in &document.temperature.channel {
@@ -98,15 +99,12 @@ pub(super) fn freezing<W: Watch>(
             let Some(words) = frozen("", time_ns, raw) else { continue };
             let log = if runs.len() > 1 { format!("{}: ", run.name) } else { String::new() };
             let words = format!("{log}{}", words.trim_start_matches("warning:").trim_start());
-            match told.iter_mut().find(|(of, _)| *of == words) {
-                Some((_, names)) => names.push(channel.name.clone()),
-                None => told.push((words, vec![channel.name.clone()])),
-            }
+            told.push((&channel.name, words));
         }
     }
-    let sentence = |(words, names): (String, Vec<String>)| {
+    let sentence = |(words, names): (&str, Vec<&str>)| {
         let [channel, each] = if names.len() == 1 { ["channel", ""] } else { ["channels", "each "] };
         format!("temperature {channel} {}: {each}{words}", names.join(", "))
     };
-    Ok(told.into_iter().map(sentence).collect())
+    Ok(grouped(&told).into_iter().map(sentence).collect())
 }

@@ -6,8 +6,8 @@ use isotherm_protocol::document::{Document, GyroOutput};
 use super::checks::TURNING_DEG_PER_H;
 use super::document::count_arcsec;
 use super::switches::{Switches, real};
-use super::words::gyros;
 use crate::drift::figures::short;
+use crate::report::words::gyros;
 use crate::robust::median;
 
 /// The Earth's rate (°/h).

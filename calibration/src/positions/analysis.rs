@@ -5,7 +5,7 @@ use isotherm_protocol::document::Document;
 use super::doubts::{
     ACCIDENT, few, measures, no_solution, quadratic_terms, sound, spread, survival, turned, widening,
 };
-use super::faults::{self, counted};
+use super::faults;
 use super::fit::{Fit, Positions, Weights, guesses};
 use super::matching::{Matched, matched};
 use super::model::{Degrees, Taken};
@@ -17,6 +17,7 @@ use super::temperature::{
 };
 use super::times::Times;
 use super::track::Track;
+use crate::drift::figures::counted;
 
 /// How the positions are looked at.
 #[derive(Debug, Clone, PartialEq)]
@@ -206,7 +207,7 @@ pub fn positions(tracks: &[Track], settings: &Settings) -> Result<Found, Vec<Str
                     warnings.push(format!(
                         "{}: {others} of {} {} no position of the plan and left out",
                         track.run,
-                        counted(poses.len(), "still pose"),
+                        counted(poses.len(), "still pose", "still poses"),
                         if others == 1 { "is" } else { "are" }
                     ));
                 }

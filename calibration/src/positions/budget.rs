@@ -4,11 +4,10 @@ use isotherm_log::plot::page::Table;
 use serde_json::{Value, json};
 
 use super::doubts::unseen;
-use super::faults::counted;
 use super::fit::{Positions, Weights, guesses};
 use super::model::{Degrees, Taken};
 use super::plan::Plan;
-use crate::drift::figures::{short, table};
+use crate::drift::figures::{counted, short, table};
 
 /// ″ in one radian.
 pub const ARCSEC_PER_RAD: f64 = 206_264.806_247_096_36;
@@ -133,7 +132,7 @@ impl Budget {
 
     /// The first line: what this plan comes to.
     fn headline(&self, plan: &Plan, levelling_rad: f64) -> String {
-        let count = counted(plan.positions.len(), "position");
+        let count = counted(plan.positions.len(), "position", "positions");
         if let Some([known, later]) = self.known_by(plan, levelling_rad) {
             return format!(
                 "An axis will be known to {known:.1}″ (one sigma) by the plan's {count}, to {later:.1}″ with what housing and measured temperature add."

@@ -11,7 +11,7 @@ use super::sense::{self, Beside};
 use super::solve::NoSolution;
 use super::temperature::Temperatures;
 use super::{budget, faults, measure, model};
-use crate::drift::figures::short;
+use crate::drift::figures::{counted, short};
 
 /// Fewest positions that tell the stand's errors from the axes.
 pub const GOOD_POSITIONS: usize = 9;
@@ -55,7 +55,7 @@ pub(super) fn widening(fit: &Fit, warnings: &mut Vec<String>) -> f64 {
         "the positions scatter {factor:.1} times as much as positioning, run-out and noise explain (χ² {chi_square:.0} with {} of \
          freedom); all standard errors are widened by that. Look at the largest residuals: a position that is mistaken for \
          another, a unit that was not settled, a stand that is worse than --positioning and --run-out say",
-        faults::counted(degrees, "degree")
+        counted(degrees, "degree", "degrees")
     ));
     factor
 }

@@ -2,7 +2,7 @@
 
 use super::pose::Pose;
 use super::track::Track;
-use crate::drift::figures::six;
+use crate::drift::figures::{counted, six};
 
 /// Share of readings that may be no number.
 const NOT_FINITE_SHARE: f64 = 0.01;
@@ -104,7 +104,9 @@ pub fn dead(tracks: &[Track]) -> Vec<String> {
 #[must_use]
 pub fn logs(names: &[&str]) -> String {
     match names {
-        [first, _, _, _, ..] => format!("{first} and {}", counted(names.len() - 1, "other log")),
+        [first, _, _, _, ..] => {
+            format!("{first} and {}", counted(names.len() - 1, "other log", "other logs"))
+        }
         few => few.join(", "),
     }
 }
@@ -165,20 +167,6 @@ pub fn name(index: usize) -> String {
     ["x", "y", "z"].get(index).map_or_else(|| index.to_string(), |name| (*name).to_owned())
 }
 
-/// A number with so many decimals, without the sign of a zero.
-#[must_use]
-pub fn fixed(value: f64, decimals: usize) -> String {
-    let text = format!("{value:.decimals$}");
-    let digits = text.strip_prefix('-').filter(|digits| digits.chars().all(|c| c == '0' || c == '.'));
-    digits.map_or_else(|| text.clone(), str::to_owned)
-}
-
-/// So many of something: "1 pose", "2 poses".
-#[must_use]
-pub fn counted(count: usize, one: &str) -> String {
-    if count == 1 { format!("1 {one}") } else { format!("{count} {one}s") }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -202,14 +190,5 @@ mod tests {
         );
         assert!(none.starts_with("log, other: gyro y: 200 of 200 readings are no numbers"), "{none}");
         assert!(twice.starts_with("log, other: gyro z: the same in every tick as gyro x"), "{twice}");
-    }
-
-    #[test]
-    fn numbers_are_written_as_people_do() {
-        assert_eq!([fixed(-0.001, 2), fixed(-0.016, 2), fixed(1.0, 1)], ["0.00", "-0.02", "1.0"]);
-        assert_eq!(
-            [counted(1, "pose"), counted(0, "pose"), counted(12, "pose")],
-            ["1 pose", "0 poses", "12 poses"]
-        );
     }
 }

@@ -6,10 +6,10 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::faults::{counted, fixed};
 use super::plan::{Attitude, Plan};
 use super::pose::Pose;
 use super::track::Track;
+use crate::drift::figures::{counted, fixed};
 use crate::swapped::{ORDERS, moved};
 
 /// Largest angle between the direction found and that of the plan (rad): 20°.
@@ -161,7 +161,7 @@ fn nothing(plan: &Plan, poses: &[Pose], directions: &[Vector3<f64>]) -> String {
     let words: Vec<String> = words.collect();
     format!(
         "{} ({}) for a plan of {}",
-        counted(poses.len(), "still pose"),
+        counted(poses.len(), "still pose", "still poses"),
         words.join("; "),
         plan.positions.len()
     )

@@ -7,10 +7,9 @@ use super::analysis::{Analysis, Settings};
 use super::budget::ARCSEC_PER_RAD;
 use super::charts::{AXES, across, axes_chart, bend, left_chart, shown};
 use super::doubts::LARGEST_LEFT_SHARE;
-use super::faults::{counted, fixed};
 use super::fit::Fit;
 use super::judged::{Judgement, curves, lengths};
-use crate::drift::figures::{per_deg_c, short, six};
+use crate::drift::figures::{counted, fixed, per_deg_c, short, six};
 use crate::report::{Coefficient, Curve, Figure, FitReport, Verdict, output_unit};
 
 /// A set of judged positions with the names of its runs.
@@ -105,7 +104,7 @@ fn notes(document: &Document, analysis: &Analysis, settings: &Settings) -> Vec<S
     let mut notes = vec![
         format!(
             "{} at {} °C; g = {} m/s²; C about {} °C.",
-            counted(analysis.poses.len(), "position"),
+            counted(analysis.poses.len(), "position", "positions"),
             levels.join(", "),
             six(settings.gravity),
             six(analysis.reference_deg_c)
@@ -118,7 +117,7 @@ fn notes(document: &Document, analysis: &Analysis, settings: &Settings) -> Vec<S
             output_unit(document),
             arcsec(analysis.weights.levelling_rad),
             fit.chi_square,
-            counted(fit.degrees, "degree")
+            counted(fit.degrees, "degree", "degrees")
         ),
     ];
     if let Some((_, chi_square, terms, accident)) = &analysis.quadratic {

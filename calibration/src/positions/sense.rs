@@ -3,8 +3,8 @@
 use nalgebra::Vector3;
 
 use super::doubts::LARGEST_TURN_DEG;
-use super::faults::{fixed, name};
-use crate::drift::figures::short;
+use super::faults::name;
+use crate::drift::figures::{fixed, short};
 
 /// One sensor beside what the document at hand states of it.
 pub(crate) struct Beside {

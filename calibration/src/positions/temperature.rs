@@ -7,6 +7,7 @@ use isotherm_protocol::document::Document;
 use super::analysis::Settings;
 use super::faults;
 use super::pose::Pose;
+use crate::drift::figures::fixed;
 
 /// Distance of temperatures that are two (°C).
 pub const LEVEL_GAP_DEG_C: f64 = 5.0;
@@ -102,8 +103,8 @@ pub(super) fn blind(document: &Document, own: &[Vec<f64>], levels: usize) -> Vec
             "{}: what K and S follow is {channel}, which goes from {} to {} °C over {levels} temperatures of the axes, more than \
              {LEVEL_GAP_DEG_C} °C are needed: name the channel that measures it in the document, or give the logs of one temperature",
             faults::several("accelerometer", &sensors),
-            faults::fixed(low, 1),
-            faults::fixed(high, 1)
+            fixed(low, 1),
+            fixed(high, 1)
         )
     };
     blind.into_iter().map(words).collect()
@@ -124,11 +125,11 @@ pub(super) fn stuck(channels: &[String], axes: &[f64], own: &[Vec<f64>]) -> Opti
             "C follows {}, which goes from {} to {} °C only, but the channel of {} goes from {} to {} °C: is it stuck, or not of this \
              unit? Name another one with --channel",
             names(channels),
-            faults::fixed(low, 1),
-            faults::fixed(high, 1),
+            fixed(low, 1),
+            fixed(high, 1),
             faults::several("accelerometer", &sensors),
-            faults::fixed(*from, 1),
-            faults::fixed(*to, 1)
+            fixed(*from, 1),
+            fixed(*to, 1)
         )
     })
 }

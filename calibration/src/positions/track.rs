@@ -6,8 +6,7 @@ use isotherm_correction::sample::OutputKind;
 use isotherm_correction::units::AngularRate;
 use isotherm_log::offline::Loaded;
 
-use super::faults::counted;
-use crate::drift::figures::six;
+use crate::drift::figures::{counted, six};
 use crate::error::Error;
 use crate::run::{Run, Watch};
 
@@ -151,7 +150,7 @@ impl Track {
             format!(
                 "{missing_s:.0} s of {length_s:.0} s are missing, in {}: a pose that has one is none; record without gaps, or cut the log \
                  to where it has none with --start and --duration",
-                counted(missing.len(), "gap")
+                counted(missing.len(), "gap", "gaps")
             )
         })
     }

@@ -8,10 +8,9 @@ use super::measure::in_case;
 use super::plateaus::scatter;
 use super::solve::GyroRates;
 use super::steps::Step;
-use crate::drift::figures::short;
+use crate::drift::figures::{fixed, short};
 use crate::means::Size;
 use crate::modes::document::{main_axis, row};
-use crate::modes::words::fixed;
 use crate::robust::median;
 
 /// Share of a run's fastest step from which on a step shows what the table turned about.

@@ -15,7 +15,7 @@ use super::steps::Step;
 use crate::drift::figures::counted;
 use crate::error::Error;
 use crate::modes::document::{main_axis, row, widened};
-use crate::modes::words::of_logs;
+use crate::report::words::of_logs;
 use crate::report::{FitReport, Verdict};
 use crate::robust::median;
 use crate::run::{Run, Watch};

@@ -3,8 +3,7 @@
 use super::bins::Bin;
 use super::plateaus::{Plateau, within};
 use super::steps::Step;
-use crate::drift::figures::{counted, short};
-use crate::modes::words::fixed;
+use crate::drift::figures::{counted, fixed, short};
 use crate::robust::median;
 
 /// Share of the smallest stated rate below which a plateau is a rest.

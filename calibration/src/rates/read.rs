@@ -6,10 +6,10 @@ use super::make::Wanted;
 use super::matching::{Matched, matched, slow};
 use super::plateaus::{self, Plateau};
 use super::steps::Step;
+use crate::drift::figures::fixed;
 use crate::error::Error;
 use crate::modes::document::count_arcsec;
 use crate::modes::fit::deg_per_h;
-use crate::modes::words::fixed;
 use crate::run::{Run, Watch};
 
 /// Share of a step's ticks that may be lost.

@@ -5,8 +5,8 @@ use isotherm_log::plot::page::{Axis, Chart, Content, Form, Ink, Panel, Samples, 
 
 use super::make::{Made, Measured};
 use super::solve::GyroRates;
-use crate::drift::figures::{counted, short};
-use crate::modes::words::{fixed, gyros, together};
+use crate::drift::figures::{counted, fixed, short};
+use crate::report::words::{gyros, together};
 use crate::report::{Coefficient, FitReport};
 
 /// Height of a panel (CSS pixels).

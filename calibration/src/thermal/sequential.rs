@@ -7,6 +7,7 @@ use super::branches::History;
 use super::columns::{Branch, Columns, Term};
 use super::select::Target;
 use super::solve::solve;
+use crate::drift::figures::counted;
 
 /// Rounds of rate and acceleration.
 const ROUNDS: usize = 60;
@@ -45,9 +46,9 @@ pub fn find(columns: &Columns<'_>, target: &Target, history: &History, steps: &[
     let levels = history.levels();
     if levels < 2 {
         return Err(format!(
-            "the log has {levels} plateau{} of different temperature, the sequential method needs 2 at which the unit has come to \
+            "the log has {} of different temperature, the sequential method needs 2 at which the unit has come to \
              rest: hold the chamber until nothing drifts any more, or use --method joint",
-            if levels == 1 { "" } else { "s" }
+            counted(levels, "plateau", "plateaus")
         ));
     }
     let first = usize::from(!target.level);

@@ -160,24 +160,16 @@ fn spikes(residual: &[f64], weights: &[f64]) -> Vec<f64> {
 }
 
 #[cfg(test)]
-#[expect(clippy::cast_precision_loss, reason = "small numbers")]
 mod tests {
     use super::*;
+    use crate::fixture::noise;
 
     #[test]
     fn spikes_cost_nothing_and_the_sigmas_are_honest() {
         let rows = 400;
         let x: Vec<f64> = (0..rows).map(|i| f64::from(i) / 400.0).collect();
         let ones = vec![1.0; 400];
-        let mut seed = 1_u64;
-        let mut noise = || {
-            let mut sum = 0.0;
-            for _ in 0..12 {
-                seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-                sum += (seed >> 11) as f64 / 9_007_199_254_740_992.0;
-            }
-            sum - 6.0
-        };
+        let mut noise = noise();
         let mut target: Vec<f64> = x.iter().map(|x| 3.0 - 2.0 * x + 0.1 * noise()).collect();
         for spike in [7, 100, 101, 320] {
             target[spike] += 50.0;

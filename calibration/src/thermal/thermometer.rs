@@ -199,15 +199,7 @@ mod tests {
     fn chamber(noise: f64, resolution: f64) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
         let time: Vec<f64> = (0..6000).map(f64::from).collect();
         let truth: Vec<f64> = time.iter().map(|t| 20.0 + ((t - 1200.0) / 60.0).clamp(0.0, 40.0)).collect();
-        let mut seed = 1_u64;
-        let mut normal = || {
-            let mut sum = 0.0;
-            for _ in 0..12 {
-                seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-                sum += (seed >> 11) as f64 / 9_007_199_254_740_992.0;
-            }
-            sum - 6.0
-        };
+        let mut normal = crate::fixture::noise();
         let shown = truth.iter().map(|truth| {
             let shown = truth + noise * normal();
             if resolution > 0.0 { (shown / resolution).round() * resolution } else { shown }

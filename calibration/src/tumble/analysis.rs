@@ -3,9 +3,9 @@
 pub(super) mod doubts;
 pub(super) mod odd;
 
-use crate::drift::figures::short;
+use crate::drift::figures::{counted, short};
 use crate::means::Size;
-use crate::positions::faults::{self, counted};
+use crate::positions::faults;
 use crate::positions::pose::Pose;
 use crate::positions::still::{StillLimits, still};
 use crate::positions::track::Track;
@@ -166,7 +166,7 @@ fn found(track: &Track, poses: &[Pose], settings: &Settings) -> Result<(), Vec<S
     if poses.len() < FEWEST_POSES {
         reasons.push(format!(
             "{} {} found, {FEWEST_POSES} are needed and 30 are good: put the unit down in more ways, for {} s each",
-            counted(poses.len(), "still pose"),
+            counted(poses.len(), "still pose", "still poses"),
             if poses.len() == 1 { "was" } else { "were" },
             settings.limits.least_s + settings.limits.window_s
         ));
@@ -244,7 +244,7 @@ fn gyros(track: &Track, poses: &[Pose], accel: &AccelFit, rest: [f64; 3]) -> Res
         return Err(format!(
             "{} of at least {:.0}° within {LONGEST_TRANSITION_S} s between the poses, six are needed: turn the unit about each of its \
              axes, each time within {LONGEST_TRANSITION_S} s from pose to pose",
-            counted(transitions.len(), "turn"),
+            counted(transitions.len(), "turn", "turns"),
             SHORTEST_TURN_RAD.to_degrees()
         ));
     }

@@ -8,12 +8,11 @@ use std::sync::Arc;
 use super::accel::norm;
 use super::analysis::{Settings, Tumble, transitions};
 use super::gyro::angle_of;
-use crate::drift::figures::{short, six};
+use crate::drift::figures::{counted, fixed, short, six};
 use crate::error::Error;
 use crate::means::Size;
 use crate::positions::budget::ARCSEC_PER_RAD;
 use crate::positions::doubts::LARGEST_LEFT_SHARE;
-use crate::positions::faults::{counted, fixed};
 use crate::positions::pose::Pose;
 use crate::positions::track::Track;
 use crate::report::{Coefficient, Curve, Figure, FitReport, SAME_SHARE, Sigmas, Verdict};
@@ -73,14 +72,14 @@ pub fn report(
     let gyro = match &tumble.gyro {
         Err(words) => refused(words),
         Ok(_) if !accel.accepted => refused("they are relative to the accelerometers, which are refused"),
-        Ok(_) => gyro.remark(format!("{} between poses", counted(after.angle_deg.len(), "turn"))),
+        Ok(_) => gyro.remark(format!("{} between poses", counted(after.angle_deg.len(), "turn", "turns"))),
     };
     report.verdicts.extend([accel, gyro]);
     report.warnings.clone_from(&tumble.warnings);
     report.notes.push(format!(
         "{}, found with {} times the variance of the still start; g = {} m/s². z is the input axis of the third accelerometer, \
          y lies in the plane of the second and third. Out of sample: each pose by a fit of all others.",
-        counted(tumble.poses.len(), "pose"),
+        counted(tumble.poses.len(), "pose", "poses"),
         tumble.factor,
         six(settings.gravity)
     ));

@@ -1,13 +1,11 @@
 //! What must hold of a log at rest before anything is made of it: for `drift` and for `impact`.
 
-use isotherm_correction::earth::LEVELLING_TOLERANCE;
-use isotherm_correction::units::STANDARD_GRAVITY_M_PER_S2;
-
 use super::far::{self, Far};
 use super::{Spacing, steps};
 use crate::drift::columns::{Columns, Kind, name};
 use crate::drift::figures::{short, six};
 use crate::error::Error;
+use crate::means::is_one_g;
 use crate::robust::{median, middle_and_scatter, scatter_of_steps};
 use crate::series::Ticks;
 
@@ -148,8 +146,7 @@ pub fn at_rest(columns: &mut Columns, spacing: &Spacing) -> Result<Vec<String>, 
 fn gravity(columns: &Columns) -> Option<String> {
     let feels = columns.kind == Kind::Force && columns.corrected;
     let size = columns.values.iter().map(|column| median(column).powi(2)).sum::<f64>().sqrt();
-    let is_g = (size / STANDARD_GRAVITY_M_PER_S2 - 1.0).abs() <= LEVELLING_TOLERANCE;
-    (feels && !is_g).then(|| {
+    (feels && !is_one_g(size)).then(|| {
         format!(
             "warning: the accelerometers read {} m/s² together, gravity is 9.76 to 9.84: are the unit of measure in the mapping, the columns \
              and the document right?",

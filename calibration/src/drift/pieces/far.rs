@@ -42,8 +42,8 @@ impl Far {
         let wide = if columns.corrected { " on all axes, since a correction carries them over" } else { "" };
         Some(if self.are_single {
             format!(
-                "warning: {called}: {} far beyond the noise (more than {FAR} standard deviations), the first \
-                 at {at:.2} s: {value} {measure}; left out{wide}: look for what makes them",
+                "warning: {called}: {} far beyond the noise (more than {FAR} standard deviations), the first at {at:.2} s: {value} \
+                 {measure}; left out{wide}: look for what makes them",
                 counted(count, "single reading is", "single readings are")
             )
         } else {

@@ -1,4 +1,4 @@
-//! Words that the reports of modes and rates share: one sentence for all gyros, or logs, that it holds of, and figures without a minus before zero.
+//! One sentence for all gyros, or logs, that it holds of.
 
 /// Sentences of gyros, each with the names of all that it holds of, in the order of the first.
 #[must_use]
@@ -21,7 +21,8 @@ pub(crate) fn of_logs(told: &[(&str, String)]) -> Vec<String> {
 }
 
 /// Sentences with the names of all that they hold of, in the order of the first.
-fn grouped<'a>(told: &'a [(&'a str, String)]) -> Vec<(&'a str, Vec<&'a str>)> {
+#[must_use]
+pub(crate) fn grouped<'a>(told: &'a [(&'a str, String)]) -> Vec<(&'a str, Vec<&'a str>)> {
     let mut groups: Vec<(&str, Vec<&str>)> = Vec::new();
     for (name, words) in told {
         match groups.iter_mut().find(|(of, _)| of == words) {
@@ -38,16 +39,6 @@ pub(crate) fn gyros(names: &[&str]) -> String {
     format!("{} {}", if names.len() == 1 { "gyro" } else { "gyros" }, names.join(", "))
 }
 
-/// A number to so many places; zero has no sign.
-#[must_use]
-pub(crate) fn fixed(value: f64, places: u8) -> String {
-    let words = format!("{value:.*}", usize::from(places));
-    match words.strip_prefix('-') {
-        Some(size) if size.bytes().all(|byte| matches!(byte, b'0' | b'.')) => size.to_owned(),
-        _ => words,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -60,13 +51,5 @@ mod tests {
         assert_eq!(of_logs(&told), ["x, z, each: late", "y: dead"]);
         let many = ["a", "b", "c", "d", "e", "f"].map(|name| (name, "late".to_owned()));
         assert_eq!(of_logs(&many), ["a, b, c, d and 2 more logs, each: late"]);
-    }
-
-    #[test]
-    fn zero_has_no_sign() {
-        assert_eq!(
-            [-0.0004, -0.0006, 0.0, -12.3456].map(|x| fixed(x, 3)),
-            ["0.000", "-0.001", "0.000", "-12.346"]
-        );
     }
 }
