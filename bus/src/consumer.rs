@@ -10,6 +10,7 @@ use zenoh::Session;
 use zenoh::bytes::ZBytes;
 use zenoh::pubsub::Subscriber;
 
+use crate::receipt::Receipt;
 use crate::{BusError, Continuity, DeclaredKeys};
 
 /// Receives the corrected batches of one unit or of all, and keeps the account of each unit.
@@ -24,6 +25,8 @@ pub struct Consumer {
     session: Session,
     // One for each unit heard of.
     keys: DeclaredKeys,
+    // A service that stops hears from it that everything has come.
+    _receipt: Receipt,
     // Dropping it ends the subscription.
     _subscriber: Subscriber<()>,
 }
@@ -48,12 +51,14 @@ impl Consumer {
             })
             .await
             .map_err(|source| BusError::Declare { key, source })?;
+        let receipt = Receipt::declare(session).await?;
         Ok(Self {
             frames,
             accounts: BTreeMap::new(),
             rejected: 0,
             session: session.clone(),
             keys: DeclaredKeys::default(),
+            _receipt: receipt,
             _subscriber: subscriber,
         })
     }

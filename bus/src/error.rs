@@ -119,6 +119,16 @@ pub enum BusError {
         /// Ticks sent and not come back.
         in_flight: u64,
     },
+    /// A subscriber has not taken what was published for it.
+    #[error(
+        "a subscriber has not taken within {waited:?} what was published for it ({key}): it is slow, or hangs, or the link to it is slow"
+    )]
+    NotTaken {
+        /// Key expression of the receipts.
+        key: &'static str,
+        /// How long was waited.
+        waited: Duration,
+    },
     /// The session did not close in time; it is left to itself.
     #[error("the Zenoh session did not close within {0:?}")]
     CloseTimeout(Duration),

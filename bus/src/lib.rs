@@ -15,6 +15,7 @@
 //! | [`consumer`] | corrected batches in |
 //! | [`continuity`] | the rule by which a consumer notices a lost tick |
 //! | [`presence`] | waiting until the service is there |
+//! | [`receipt`] | proof that subscribers have taken what was sent |
 //! | [`routes`] | keys whose routes Zenoh is to remember |
 
 pub mod consumer;
@@ -23,6 +24,7 @@ mod error;
 pub mod outlet;
 pub mod presence;
 pub mod producer;
+pub mod receipt;
 pub mod routes;
 pub mod session;
 

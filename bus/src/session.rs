@@ -98,8 +98,8 @@ pub fn locators(session: &Session) -> Vec<String> {
 
 /// Closes a session, waiting no longer than `limit`.
 ///
-/// What was published before is written out first. Zenoh itself may take 10 s where a peer no longer answers; such a
-/// session is left to close by itself.
+/// What was published before is written out first, as far as the peers take it at once: see [`crate::receipt`]. Zenoh itself may take
+/// 10 s where a peer no longer answers; such a session is left to close by itself.
 ///
 /// # Errors
 /// [`BusError::CloseTimeout`] and [`BusError::Close`].

@@ -36,6 +36,8 @@ pub const ALL_SERVICE_STATUS: &str = "isotherm/*/status";
 pub const ALL_CONFIGURATIONS: &str = "isotherm/*/configuration";
 /// Liveliness tokens of all service instances.
 pub const ALL_SERVICES_ALIVE: &str = "isotherm/*/alive";
+/// Receipts of all subscribers that give one: a service that stops asks them.
+pub const ALL_RECEIPTS: &str = "isotherm/*/receipt";
 
 /// First chunk of every key of a unit.
 const ROOT: &str = "imu";
@@ -243,6 +245,12 @@ pub fn configuration(instance: &str) -> String {
 #[must_use]
 pub fn service_alive(instance: &str) -> String {
     format!("{SERVICE_ROOT}/{instance}/alive")
+}
+
+/// Key of the receipt of a session that subscribes: `isotherm/{session}/receipt`; the session is its Zenoh id as text.
+#[must_use]
+pub fn receipt(session: &str) -> String {
+    format!("{SERVICE_ROOT}/{session}/receipt")
 }
 
 /// Reads the instance of a service's status key back; `None` where it is none.

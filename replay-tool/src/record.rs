@@ -20,6 +20,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
+use isotherm_bus::receipt::Receipt;
 use isotherm_bus::{BusError, SessionOptions};
 use isotherm_log::recording::RecordingOptions;
 use isotherm_protocol::key::UnitId;
@@ -159,6 +160,7 @@ async fn on_session(
     let queue = Arc::new(Queue::new(options.queue_bytes));
     let (tell, mut lives) = unbounded_channel();
     let subscribers = subscribe(session, options, &queue).await?;
+    let _receipt = Receipt::declare(session).await?;
     let life = follow_services(session, tell).await?;
     await_service(session, options.service, stop).await?;
 

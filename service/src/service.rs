@@ -6,6 +6,7 @@ use std::net::SocketAddr;
 use std::path::Path;
 use std::sync::Arc;
 
+use isotherm_bus::receipt;
 use isotherm_protocol::key::UnitId;
 use isotherm_protocol::status::Status;
 use zenoh::Session;
@@ -23,6 +24,9 @@ use crate::totals::Totals;
 use crate::unit::UnitActor;
 use crate::watch::{WatchSettings, Watcher};
 use declare::Declared;
+
+/// The part of the time for a stop that is kept for closing the session, one in so many.
+const CLOSE_SHARE: u32 = 10;
 
 /// A service at work. Dropping it without [`RunningService::stop`] ends it without flushing.
 #[derive(Debug)]
@@ -164,7 +168,8 @@ fn watch_settings(settings: &Settings) -> WatchSettings {
 }
 
 impl RunningService {
-    /// Stops receiving, corrects and publishes what was received, closes the session; at most the configured time.
+    /// Stops receiving, corrects and publishes what was received, waits for the subscribers that give receipts, closes the session; at
+    /// most the configured time.
     ///
     /// The session given to [`start`] is closed for whoever else holds it.
     pub async fn stop(self) -> Totals {
@@ -172,15 +177,22 @@ impl RunningService {
         metrics.iter().for_each(Endpoint::stopping);
         let deadline = tokio::time::Instant::now() + settings.stop_timeout;
         // Each of these may wait: a callback for a slow subscriber, the keeper for a callback, the registrar for a disk.
-        let units = Arc::clone(&intake);
+        let (units, published_on) = (Arc::clone(&intake), session.clone());
         let flush = tokio::task::spawn_blocking(move || {
-            let received = declared.undeclare();
+            let (received, alive) = declared.undeclare();
             let kept = keeper.stop();
             let watched = watcher.is_none_or(Watcher::stop);
             // Last of all: the first ticks of a calibration may have come with the flush.
             let registered = registrar.stop();
             units.each_unit(UnitActor::end);
-            received && kept && watched && registered
+            let left = deadline.saturating_duration_since(tokio::time::Instant::now());
+            let taken =
+                receipt::all_taken(&published_on, left.saturating_sub(settings.stop_timeout / CLOSE_SHARE));
+            if let Err(error) = &taken {
+                tracing::error!("{error}");
+            }
+            drop(alive);
+            received && kept && watched && registered && taken.is_ok()
         });
         let flushed = matches!(tokio::time::timeout_at(deadline, flush).await, Ok(Ok(true)));
         if !flushed {

@@ -132,6 +132,8 @@ def listen(arguments):
         subscriber = session.declare_subscriber(
             arguments.key, lambda sample: messages.put((str(sample.key_expr), sample.payload.to_bytes()))
         )
+        # A service that stops asks whether everything has come; ending its query without a reply says so.
+        receipt = session.declare_queryable(f"isotherm/{session.zid()}/receipt", lambda query: query.drop())
         wait_for_service(session, arguments.idle)
         say({"ready": True})
         while arguments.ticks is None or accounted < arguments.ticks:
@@ -152,6 +154,7 @@ def listen(arguments):
             if not arguments.summary:
                 for tick in batch["ticks"]:
                     say({"unit": batch["unit"], "revision": batch["revision"]["counter"], **tick})
+        receipt.undeclare()
         subscriber.undeclare()
     say({"units": {unit: account.summary() for unit, account in accounts.items()}, "rejected": rejected})
     if any(account.lost or account.duplicated for account in accounts.values()):

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use isotherm_bus::presence::ServiceWatch;
 use isotherm_bus::{Consumer, SessionOptions, close, locators, open, presence};
 use isotherm_correction::calibration::Calibration;
 use isotherm_protocol::corrected::CorrectedTick;
@@ -22,6 +23,8 @@ pub struct Bench {
     consumer_session: Session,
     /// Receives every corrected batch.
     pub consumer: Consumer,
+    /// Tells when the service has gone.
+    watch: ServiceWatch,
     /// Options with which a further session reaches the service.
     pub options: SessionOptions,
 }
@@ -32,10 +35,18 @@ impl Bench {
     /// # Panics
     /// Where a session cannot be opened.
     pub async fn start(calibrations: &[(&str, Arc<Calibration>)]) -> Self {
+        Self::start_with(Settings::default(), calibrations).await
+    }
+
+    /// The same, with these settings.
+    ///
+    /// # Panics
+    /// Where a session cannot be opened.
+    pub async fn start_with(settings: Settings, calibrations: &[(&str, Arc<Calibration>)]) -> Self {
         let session = open(&SessionOptions::default()).await.expect("a session on loopback");
         let options = SessionOptions { connect: locators(&session), ..SessionOptions::default() };
         // Nothing may be dropped on the way to this consumer: the tests judge the service, not the loopback.
-        let settings = Settings { congestion: CongestionControl::Block, ..Settings::default() };
+        let settings = Settings { congestion: CongestionControl::Block, ..settings };
         let mut set = Calibrations::default();
         for (unit, calibration) in calibrations {
             set.insert(UnitId::new(unit).expect("a serial"), Arc::clone(calibration), [7; 8]);
@@ -44,7 +55,8 @@ impl Bench {
         let consumer_session = open(&options).await.expect("a session on loopback");
         let consumer = Consumer::declare(&consumer_session, None).await.expect("a subscription");
         presence::wait_for_service(&consumer_session, LIMIT).await.expect("the service is there");
-        Self { service, consumer_session, consumer, options }
+        let watch = ServiceWatch::declare(&consumer_session).await.expect("a watch");
+        Self { service, consumer_session, consumer, watch, options }
     }
 
     /// Receives until `unit` has given out `count` raw ticks.
@@ -68,12 +80,14 @@ impl Bench {
         ticks
     }
 
-    /// Stops the service; its totals, and what the consumer received since.
+    /// Stops the service; its totals, and what the consumer received since: all of it, for the service's token goes behind
+    /// everything that it has sent.
     ///
     /// # Panics
-    /// Where a session does not close.
+    /// Where the service does not go, or a session does not close.
     pub async fn stop(mut self) -> (Totals, Vec<(String, CorrectedTick)>) {
         let totals = self.service.stop().await;
+        tokio::time::timeout(LIMIT, self.watch.gone()).await.expect("the service goes");
         let mut rest = Vec::new();
         while let Some(batch) = self.consumer.try_next() {
             rest.extend(batch.ticks.into_iter().map(|tick| (batch.unit.clone(), tick)));

@@ -169,6 +169,8 @@ fn the_page_states_keys_and_limits() {
         format!("`{}`", key::ALL_CONFIGURATIONS),
         format!("`{}`", key::ALL_UNITS_ALIVE),
         format!("`{}`", key::ALL_SERVICES_ALIVE),
+        format!("`{}`", key::ALL_RECEIPTS),
+        format!("`{}`", key::receipt("{session}")),
         format!("1…{} characters", key::MAX_UNIT_ID),
         format!("at most {} bytes", codec::MAX_FRAME),
         format!("1…{} ticks", codec::MAX_TICKS),

@@ -23,7 +23,7 @@ use crate::unit::{Journal, Outlet};
 pub(super) struct Declared {
     subscribers: Vec<Subscriber<()>>,
     queryables: Vec<Queryable<()>>,
-    _alive: LivelinessToken,
+    alive: LivelinessToken,
 }
 
 impl Declared {
@@ -59,16 +59,18 @@ impl Declared {
             answer(session, key::ALL_SERVICE_STATUS, ask(Asked::Status)).await?,
             answer(session, key::ALL_STATUS, ask(Asked::Status)).await?,
         ];
-        Ok(Self { subscribers, queryables, _alive: token })
+        Ok(Self { subscribers, queryables, alive: token })
     }
 
-    /// Ends it, and waits for what is being received; whether that went well.
-    pub(super) fn undeclare(self) -> bool {
-        let Self { subscribers, queryables, .. } = self;
+    /// Ends it, and waits for what is being received; whether that went well. The token stays until it is dropped: where it goes,
+    /// nothing more comes from this service.
+    pub(super) fn undeclare(self) -> (bool, LivelinessToken) {
+        let Self { subscribers, queryables, alive } = self;
         // Every one of them, whatever became of the others.
         let received = subscribers.into_iter().map(|it| it.undeclare().wait_callbacks().wait().is_ok());
         let received = received.fold(true, |all, one| all & one);
-        queryables.into_iter().map(|it| it.undeclare().wait().is_ok()).fold(received, |all, one| all & one)
+        let ended = queryables.into_iter().map(|it| it.undeclare().wait().is_ok());
+        (ended.fold(received, |all, one| all & one), alive)
     }
 }
 
