@@ -110,9 +110,9 @@ impl Plan {
         let path = Path::new(name);
         let text = read_small_text(path, "read the plan")?;
         let is_csv = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv"));
-        file::read(&text, is_csv).map_err(|words| {
+        file::read(&text, name, is_csv).map_err(|what| {
             Error::Usage(format!(
-                "{name}: {words}; a plan is \"twelve\", \"six\", or a file as docs/calibration/positions.md shows"
+                "{what}; a plan is \"twelve\", \"six\", or a file as docs/calibration/positions.md shows"
             ))
         })
     }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use isotherm_log::file::read_small_text;
+use isotherm_log::file::{parse_toml, read_small_text};
 use serde::Deserialize;
 
 use crate::drift::figures::counted;
@@ -118,11 +118,11 @@ pub fn read(path: &Path, runs: usize) -> Result<Vec<Step>, Error> {
     let wrong = |what: String| Error::Usage(format!("{}: {what}", path.display()));
     let is_csv = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv"));
     let rows = if is_csv {
-        of_csv(&text)
+        of_csv(&text).map_err(wrong)?
     } else {
-        toml::from_str::<File>(&text).map(|file| file.step).map_err(|e| e.to_string())
+        let file = parse_toml::<File>(&text, &path.display().to_string());
+        file.map(|file| file.step).map_err(Error::Usage)?
     };
-    let rows = rows.map_err(wrong)?;
     if rows.is_empty() || rows.len() > MOST {
         return Err(wrong(format!("{}, must be 1 to {MOST}", counted(rows.len(), "step", "steps"))));
     }

@@ -1,14 +1,15 @@
 //! Plans as their files have them.
 
+use isotherm_log::file::parse_toml;
 use serde::Deserialize;
 
 use super::{Attitude, Plan, Position, mounting};
 
-/// Reads a plan's text: CSV or TOML.
-pub(super) fn read(text: &str, is_csv: bool) -> Result<Plan, String> {
-    let written =
-        if is_csv { of_csv(text)? } else { toml::from_str(text).map_err(|error| error.to_string())? };
-    Written::plan(written)
+/// Reads the text of a file with a plan: CSV or TOML. What is wrong is told with the name.
+pub(super) fn read(text: &str, name: &str, is_csv: bool) -> Result<Plan, String> {
+    let named = |what| format!("{name}: {what}");
+    let written = if is_csv { of_csv(text).map_err(named)? } else { parse_toml(text, name)? };
+    Written::plan(written).map_err(named)
 }
 
 /// A plan as its file has it.

@@ -1,5 +1,8 @@
 //! A state folder that is taken away, and an audit file that lost what it held.
 
+use std::io::ErrorKind;
+use std::path::Path;
+
 use isotherm_protocol::control::SwapOptions;
 use isotherm_protocol::service_status::ServiceStatus;
 
@@ -15,6 +18,13 @@ fn told<'s>(status: &'s ServiceStatus, kind: &str) -> Option<&'s str> {
     status.faults.iter().find(|fault| fault.kind == kind).map(|fault| fault.first.as_str())
 }
 
+/// Removes a folder into which the service may be writing.
+fn remove(folder: &Path) {
+    while let Err(error) = std::fs::remove_dir_all(folder) {
+        assert_eq!(error.kind(), ErrorKind::DirectoryNotEmpty, "{error}");
+    }
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn a_state_folder_that_is_removed_is_told_refuses_swaps_and_a_new_one_gets_all_that_holds() {
     let folders = Folders::new();
@@ -23,7 +33,7 @@ async fn a_state_folder_that_is_removed_is_told_refuses_swaps_and_a_new_one_gets
     assert_accepted(&stand.swap(UNIT, &document(UNIT, 2.0), &plain()).await, 2);
     assert_eq!(stand.revisions(UNIT, 20).await, [2]);
 
-    std::fs::remove_dir_all(&folders.state).unwrap();
+    remove(&folders.state);
     let status = until_service(&stand, |status| told(status, "state_folder").is_some()).await;
     let words = told(&status, "state_folder").unwrap();
     assert!(words.contains("was removed") && words.contains("make an empty folder"), "{words}");
@@ -46,8 +56,10 @@ async fn a_state_folder_that_is_removed_is_told_refuses_swaps_and_a_new_one_gets
     // A copy in its place: a swap into the old one would never be seen again.
     let aside = folders.state.with_file_name("aside");
     std::fs::rename(&folders.state, &aside).unwrap();
-    std::fs::create_dir(&folders.state).unwrap();
-    std::fs::copy(audit_file(&aside), audit_file(&folders.state)).unwrap();
+    let copied = folders.state.with_file_name("copied");
+    std::fs::create_dir(&copied).unwrap();
+    std::fs::copy(audit_file(&aside), audit_file(&copied)).unwrap();
+    std::fs::rename(&copied, &folders.state).unwrap();
     assert_accepted(&stand.swap(UNIT, &document(UNIT, 5.0), &plain()).await, 5);
     let history = stand.history(UNIT).await;
     assert!(history.len() > 4, "the audit file of the copy is put aside and read: {history:#?}");
@@ -56,7 +68,7 @@ async fn a_state_folder_that_is_removed_is_told_refuses_swaps_and_a_new_one_gets
     assert_eq!(stand.revisions(UNIT, 20).await, [5]);
 
     // Away and back: nothing has happened.
-    std::fs::remove_dir_all(&aside).unwrap();
+    remove(&aside);
     std::fs::rename(&folders.state, &aside).unwrap();
     until_service(&stand, |status| told(status, "state_folder").is_some()).await;
     std::fs::rename(&aside, &folders.state).unwrap();
