@@ -152,7 +152,10 @@ mod tests {
         }
         for (text, expected) in [
             ("rate = \"x\"\ncount = 1", "a.toml:1:8: invalid type: string \"x\", expected a number"),
-            ("rate = 1\ncount = 0.5", "a.toml:2:9: invalid type: floating point `0.5`, expected a whole number"),
+            (
+                "rate = 1\ncount = 0.5",
+                "a.toml:2:9: invalid type: floating point `0.5`, expected a whole number",
+            ),
             ("rate = 1\ncount = -1", "a.toml:2:9: invalid value: integer `-1`, expected a whole number"),
             ("rate = 1", "a.toml:1:1: missing field `count`"),
         ] {

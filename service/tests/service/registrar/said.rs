@@ -28,7 +28,9 @@ async fn a_renamed_file_says_nothing_new_and_a_restart_makes_no_difference() {
     let [a, b, c] = ["a.toml", "b.toml", "c.toml"].map(|name| folders.documents.join(name));
     std::fs::rename(&a, &b).unwrap();
     // Until the old name is told as removed the two are rivals, for a moment only: what is written down of it stays.
-    stand.until(UNIT, |event| matches!(event, AuditEvent::Refused(refused) if refused.rival).then_some(())).await;
+    stand
+        .until(UNIT, |event| matches!(event, AuditEvent::Refused(refused) if refused.rival).then_some(()))
+        .await;
     until_service(&stand, |status| status.bad_documents.is_empty()).await;
     behind(&stand, &folders, "ZLG-8").await;
     assert_eq!(stand.revisions(UNIT, 20).await, [2], "what came in over the bus stays in force");
