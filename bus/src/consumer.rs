@@ -43,6 +43,8 @@ impl Consumer {
     pub async fn declare(session: &Session, unit: Option<&UnitId>) -> Result<Self, BusError> {
         let key = unit.map_or_else(|| key::ALL_CORRECTED.to_owned(), key::corrected);
         let (sender, frames) = unbounded_channel();
+        // First: who knows of the subscription knows of the receipt.
+        let receipt = Receipt::declare(session).await?;
         let subscriber = session
             .declare_subscriber(&key)
             .callback(move |sample| {
@@ -51,7 +53,6 @@ impl Consumer {
             })
             .await
             .map_err(|source| BusError::Declare { key, source })?;
-        let receipt = Receipt::declare(session).await?;
         Ok(Self {
             frames,
             accounts: BTreeMap::new(),

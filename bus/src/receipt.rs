@@ -4,7 +4,7 @@
 //! is being written is given up, with everything behind it, and the close says that all is well. A query travels behind what was published
 //! before it at the same priority; once a subscriber's session has let the query go, it has taken everything.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use isotherm_protocol::key;
 use zenoh::qos::{CongestionControl, Priority};
@@ -14,14 +14,14 @@ use zenoh::{Session, Wait};
 
 use crate::BusError;
 
-/// What a session answers with that it has taken what was sent to it; for as long as this is kept.
+/// Has a session answer that it has taken what was sent to it, for as long as this is kept.
 #[derive(Debug)]
 pub struct Receipt {
     _queryable: Queryable<()>,
 }
 
 impl Receipt {
-    /// Has a session that subscribes give receipts.
+    /// Begins to give receipts. Declared before the subscriptions: who knows of those is to know of it.
     ///
     /// # Errors
     /// [`BusError::Declare`].
@@ -36,12 +36,20 @@ impl Receipt {
 
 /// Waits until every subscriber that gives receipts has taken what this session has published at [`Priority::RealTime`].
 ///
-/// Blocks the thread: the queue of a subscriber that is slow may be full.
-///
 /// # Errors
 /// [`BusError::NotTaken`] after `limit`; [`BusError::Declare`] where the session is closed.
-pub fn all_taken(session: &Session, limit: Duration) -> Result<(), BusError> {
-    let end = Instant::now() + limit;
+pub async fn all_taken(session: &Session, limit: Duration) -> Result<(), BusError> {
+    let session = session.clone();
+    // On a thread of its own: where the queue of a slow subscriber is full, the query itself waits for a place in it.
+    let asking = tokio::task::spawn_blocking(move || ask(&session, limit));
+    match tokio::time::timeout(limit, asking).await {
+        Ok(Ok(taken)) => taken,
+        Ok(Err(_)) | Err(_) => Err(not_taken(limit)),
+    }
+}
+
+/// Asks for the receipts and waits for the end of the query.
+fn ask(session: &Session, limit: Duration) -> Result<(), BusError> {
     let replies = session
         .get(key::ALL_RECEIPTS)
         .target(QueryTarget::All)
@@ -52,13 +60,10 @@ pub fn all_taken(session: &Session, limit: Duration) -> Result<(), BusError> {
         .timeout(limit)
         .wait()
         .map_err(|source| BusError::Declare { key: key::ALL_RECEIPTS.to_owned(), source })?;
-    loop {
-        match replies.recv_deadline(end) {
-            // Every one of them has let the query go, or is not there any more.
-            Err(_) => return Ok(()),
-            Ok(Some(reply)) if reply.result().is_ok() => {}
-            // Zenoh itself says that somebody has not answered in time.
-            Ok(_) => return Err(BusError::NotTaken { key: key::ALL_RECEIPTS, waited: limit }),
-        }
-    }
+    // It ends once everybody has let it go, or is not there any more. Zenoh itself replies for those who have not in time.
+    if replies.into_iter().any(|reply| reply.result().is_err()) { Err(not_taken(limit)) } else { Ok(()) }
+}
+
+fn not_taken(waited: Duration) -> BusError {
+    BusError::NotTaken { key: key::ALL_RECEIPTS, waited }
 }

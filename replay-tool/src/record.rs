@@ -159,8 +159,8 @@ async fn on_session(
 ) -> Result<RecordReport, Error> {
     let queue = Arc::new(Queue::new(options.queue_bytes));
     let (tell, mut lives) = unbounded_channel();
-    let subscribers = subscribe(session, options, &queue).await?;
     let _receipt = Receipt::declare(session).await?;
+    let subscribers = subscribe(session, options, &queue).await?;
     let life = follow_services(session, tell).await?;
     await_service(session, options.service, stop).await?;
 

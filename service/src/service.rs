@@ -9,6 +9,7 @@ use std::sync::Arc;
 use isotherm_bus::receipt;
 use isotherm_protocol::key::UnitId;
 use isotherm_protocol::status::Status;
+use tokio::time::Instant;
 use zenoh::Session;
 
 use crate::ServiceError;
@@ -175,9 +176,10 @@ impl RunningService {
     pub async fn stop(self) -> Totals {
         let Self { session, settings, intake, watcher, declared, keeper, registrar, metrics } = self;
         metrics.iter().for_each(Endpoint::stopping);
-        let deadline = tokio::time::Instant::now() + settings.stop_timeout;
+        let deadline = Instant::now() + settings.stop_timeout;
+        let left = |deadline: Instant| deadline.saturating_duration_since(Instant::now());
         // Each of these may wait: a callback for a slow subscriber, the keeper for a callback, the registrar for a disk.
-        let (units, published_on) = (Arc::clone(&intake), session.clone());
+        let units = Arc::clone(&intake);
         let flush = tokio::task::spawn_blocking(move || {
             let (received, alive) = declared.undeclare();
             let kept = keeper.stop();
@@ -185,28 +187,27 @@ impl RunningService {
             // Last of all: the first ticks of a calibration may have come with the flush.
             let registered = registrar.stop();
             units.each_unit(UnitActor::end);
-            let left = deadline.saturating_duration_since(tokio::time::Instant::now());
-            let taken =
-                receipt::all_taken(&published_on, left.saturating_sub(settings.stop_timeout / CLOSE_SHARE));
-            if let Err(error) = &taken {
-                tracing::error!("{error}");
-            }
-            drop(alive);
-            received && kept && watched && registered && taken.is_ok()
+            (received && kept && watched && registered, alive)
         });
-        let flushed = matches!(tokio::time::timeout_at(deadline, flush).await, Ok(Ok(true)));
+        // The token is there until the session is closed: where it goes, nothing more comes.
+        let (flushed, _alive) = match tokio::time::timeout_at(deadline, flush).await {
+            Ok(Ok((in_order, alive))) => (in_order, Some(alive)),
+            Ok(Err(_)) | Err(_) => (false, None),
+        };
+        let taken =
+            receipt::all_taken(&session, left(deadline).saturating_sub(settings.stop_timeout / CLOSE_SHARE))
+                .await;
         if !flushed {
             tracing::error!("not everything could be flushed within {:?}", settings.stop_timeout);
         }
-        let rest = deadline.saturating_duration_since(tokio::time::Instant::now());
-        let closed = isotherm_bus::close(session, rest).await;
-        if let Err(error) = &closed {
+        let closed = isotherm_bus::close(session, left(deadline)).await;
+        for error in [&taken, &closed].into_iter().filter_map(|done| done.as_ref().err()) {
             tracing::error!("{error}");
         }
         if let Some(metrics) = metrics {
             metrics.end().await;
         }
-        Totals { stopped_in_time: flushed && closed.is_ok(), ..intake.totals() }
+        Totals { stopped_in_time: flushed && taken.is_ok() && closed.is_ok(), ..intake.totals() }
     }
 
     /// The session that it runs on.

@@ -128,12 +128,12 @@ def listen(arguments):
     accounts, rejected = {}, 0
     accounted = 0
     with open_session(arguments.connect) as session:
+        # A service that stops asks whether everything has come; ending its query without a reply says so.
+        receipt = session.declare_queryable(f"isotherm/{session.zid()}/receipt", lambda query: query.drop())
         # Zenoh's thread only hands the bytes over: a slow callback would hold up the session.
         subscriber = session.declare_subscriber(
             arguments.key, lambda sample: messages.put((str(sample.key_expr), sample.payload.to_bytes()))
         )
-        # A service that stops asks whether everything has come; ending its query without a reply says so.
-        receipt = session.declare_queryable(f"isotherm/{session.zid()}/receipt", lambda query: query.drop())
         wait_for_service(session, arguments.idle)
         say({"ready": True})
         while arguments.ticks is None or accounted < arguments.ticks:

@@ -9,7 +9,7 @@ use std::collections::BinaryHeap;
 use std::sync::{Arc, PoisonError};
 use std::time::Duration;
 
-use isotherm_bus::{BusError, Outlet, OutletOptions, presence};
+use isotherm_bus::{BusError, Outlet, OutletOptions, presence, receipt};
 use isotherm_log::faults::Departure;
 use isotherm_log::part::LogFiles;
 use tokio::sync::mpsc::UnboundedReceiver;
@@ -262,8 +262,11 @@ impl<'a, W: Watch> Player<'a, W> {
         Ok(())
     }
 
-    /// Waits until everything has come back that will.
+    /// Waits until everything has come back that will, or until others have taken it where nothing is to come back.
     async fn drain(&mut self) -> Result<(), Error> {
+        if self.options.acknowledge == Acknowledge::No {
+            receipt::all_taken(self.session, self.options.wait).await?;
+        }
         for unit in self.units.iter() {
             let Some(outlet) = &unit.outlet else { continue };
             match outlet.drain().await {

@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use isotherm_bus::DeclaredKeys;
+use isotherm_bus::receipt::Receipt;
 use isotherm_protocol::key::{self, RawStream, UnitId};
 use zenoh::liveliness::LivelinessToken;
 use zenoh::pubsub::Subscriber;
@@ -23,6 +24,7 @@ use crate::unit::{Journal, Outlet};
 pub(super) struct Declared {
     subscribers: Vec<Subscriber<()>>,
     queryables: Vec<Queryable<()>>,
+    receipt: Receipt,
     alive: LivelinessToken,
 }
 
@@ -37,6 +39,7 @@ impl Declared {
         let raw = take(intake, bell, Intake::receive);
         let reference = take(intake, bell, Intake::reference);
         let put = desk.clone();
+        let receipt = Receipt::declare(session).await?;
         let subscribers = vec![
             subscribe(session, key::ALL_RAW, raw).await?,
             subscribe(session, key::ALL_REFERENCE, reference).await?,
@@ -59,16 +62,17 @@ impl Declared {
             answer(session, key::ALL_SERVICE_STATUS, ask(Asked::Status)).await?,
             answer(session, key::ALL_STATUS, ask(Asked::Status)).await?,
         ];
-        Ok(Self { subscribers, queryables, alive: token })
+        Ok(Self { subscribers, queryables, receipt, alive: token })
     }
 
     /// Ends it, and waits for what is being received; whether that went well. The token stays until it is dropped: where it goes,
     /// nothing more comes from this service.
     pub(super) fn undeclare(self) -> (bool, LivelinessToken) {
-        let Self { subscribers, queryables, alive } = self;
+        let Self { subscribers, queryables, receipt, alive } = self;
         // Every one of them, whatever became of the others.
         let received = subscribers.into_iter().map(|it| it.undeclare().wait_callbacks().wait().is_ok());
         let received = received.fold(true, |all, one| all & one);
+        drop(receipt);
         let ended = queryables.into_iter().map(|it| it.undeclare().wait().is_ok());
         (ended.fold(received, |all, one| all & one), alive)
     }
