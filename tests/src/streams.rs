@@ -1,7 +1,10 @@
 //! Raw streams for tests.
 
-use isotherm_correction::sample::{AccelTick, ChannelName, GyroTick, TemperatureReading};
+use isotherm_bus::{Producer, ProducerOptions};
+use isotherm_correction::sample::{AccelTick, ChannelName, GyroTick, OutputKind, TemperatureReading};
 use isotherm_correction::units::{Span, Timestamp};
+use isotherm_protocol::key::UnitId;
+use zenoh::Session;
 
 /// Duration of a tick in these streams (5 ms).
 pub const TICK: Span = Span::from_ns(5_000_000);
@@ -24,6 +27,19 @@ pub fn gyro(k: u64, rates: &[f64]) -> GyroTick {
         readings: rates.iter().copied().collect(),
         ..GyroTick::default()
     }
+}
+
+/// Sends the first gyro ticks of a unit, ten in a batch, and nothing else: they all wait for accelerometer ticks.
+///
+/// # Panics
+/// Where they cannot be sent.
+pub async fn send_waiting_ticks(session: &Session, unit: &UnitId, count: u64) {
+    let options = ProducerOptions { batch_ticks: 10, max_in_flight: None, ..ProducerOptions::default() };
+    let mut producer = Producer::declare(session, unit, options).await.expect("a producer");
+    for k in 0..count {
+        producer.gyro(OutputKind::Mean, gyro(k, &[0.1, 0.2, 0.3])).await.expect("a tick is sent");
+    }
+    producer.flush().await.expect("the rest is sent");
 }
 
 /// Accelerometer tick `k` with mean outputs.

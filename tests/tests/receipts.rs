@@ -9,8 +9,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use isotherm_bus::receipt::{Receipt, all_taken};
-use isotherm_bus::{Producer, ProducerOptions, SessionOptions, close, locators, open, presence};
-use isotherm_correction::sample::OutputKind;
+use isotherm_bus::{SessionOptions, close, locators, open, presence};
 use isotherm_protocol::codec;
 use isotherm_protocol::corrected::CorrectedBatch;
 use isotherm_protocol::key::{self, UnitId};
@@ -18,7 +17,7 @@ use isotherm_service::Settings;
 use isotherm_tests::bench::{Bench, LIMIT};
 use isotherm_tests::calibrations::{compile, identity};
 use isotherm_tests::process::run_well;
-use isotherm_tests::streams::gyro;
+use isotherm_tests::streams::send_waiting_ticks;
 use serde_json::Value;
 use zenoh::Session;
 use zenoh::pubsub::Subscriber;
@@ -58,11 +57,6 @@ impl Listener {
     }
 }
 
-/// Opens a session to another one.
-async fn connected(locators: Vec<String>) -> Session {
-    open(&SessionOptions { connect: locators, ..SessionOptions::default() }).await.unwrap()
-}
-
 /// A service with one unit, and a listener to it.
 async fn service(stop_timeout: Duration, dawdle: impl Fn() + Send + Sync + 'static) -> (Bench, Listener) {
     let settings = Settings { stop_timeout, ..Settings::default() };
@@ -76,12 +70,7 @@ async fn service(stop_timeout: Duration, dawdle: impl Fn() + Send + Sync + 'stat
 /// Sends ticks to it and waits until they have come out.
 async fn corrected(bench: &mut Bench, ticks: u64) {
     let session = open(&bench.options).await.unwrap();
-    let options = ProducerOptions { batch_ticks: 10, ..ProducerOptions::default() };
-    let mut producer = Producer::declare(&session, &UnitId::new("UNIT").unwrap(), options).await.unwrap();
-    for k in 0..ticks {
-        producer.gyro(OutputKind::Mean, gyro(k, &[0.1, 0.2, 0.3])).await.unwrap();
-    }
-    producer.flush().await.unwrap();
+    send_waiting_ticks(&session, &UnitId::new("UNIT").unwrap(), ticks).await;
     bench.receive("UNIT", ticks).await;
     close(session, LIMIT).await.unwrap();
 }
@@ -117,7 +106,8 @@ async fn a_session_that_is_closed_behind_the_receipts_loses_nothing() {
     let source = open(&SessionOptions::default()).await.unwrap();
     // Where it is answered, a declaration has arrived.
     let status = source.declare_queryable(key::ALL_STATUS).callback(drop).await.unwrap();
-    let session = connected(locators(&source)).await;
+    let options = SessionOptions { connect: locators(&source), ..SessionOptions::default() };
+    let session = open(&options).await.unwrap();
     // As slow as a slow link: what is on its way fills the buffers of both ends.
     let slow = Listener::new(session, "slow", || std::thread::sleep(Duration::from_micros(200))).await;
     presence::wait_for_service(&slow.session, LIMIT).await.unwrap();

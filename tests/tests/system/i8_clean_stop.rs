@@ -1,23 +1,13 @@
 //! I8: on SIGINT or SIGTERM what was received is corrected, published and flushed, then the sessions close within a
 //! bounded time. What a slow subscriber has to do with it stands in `receipts.rs`.
 
-use isotherm_bus::{Consumer, Producer, ProducerOptions, SessionOptions, close, open, presence};
-use isotherm_correction::sample::{OutputKind, TickFlags};
+use isotherm_bus::{Consumer, SessionOptions, close, open, presence};
+use isotherm_correction::sample::TickFlags;
 use isotherm_protocol::key::UnitId;
 use isotherm_tests::bench::{Bench, LIMIT};
 use isotherm_tests::calibrations::{compile, identity};
 use isotherm_tests::process::Service;
-use isotherm_tests::streams::gyro;
-
-/// Sends gyro ticks that all wait for accelerometer ticks which never come.
-async fn send_waiting_ticks(session: &zenoh::Session, unit: &UnitId, count: u64) {
-    let options = ProducerOptions { batch_ticks: 10, max_in_flight: None, ..ProducerOptions::default() };
-    let mut producer = Producer::declare(session, unit, options).await.unwrap();
-    for k in 0..count {
-        producer.gyro(OutputKind::Mean, gyro(k, &[0.1, 0.2, 0.3])).await.unwrap();
-    }
-    producer.flush().await.unwrap();
-}
+use isotherm_tests::streams::send_waiting_ticks;
 
 #[tokio::test(flavor = "multi_thread")]
 async fn i8_what_waits_inside_is_published_on_stop() {

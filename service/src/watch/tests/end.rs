@@ -39,7 +39,7 @@ fn a_thread_that_is_held_is_left_behind_within_its_limit() {
     called.recv_timeout(Duration::from_secs(10)).unwrap();
     let start = Instant::now();
     assert!(!watcher.stop());
-    assert!(start.elapsed() < STOP_LIMIT * 8, "{:?}", start.elapsed());
+    assert!(start.elapsed() < STOP_LIMIT * 2, "{:?}", start.elapsed());
     drop(taker);
     assert_eq!(called.recv(), Err(std::sync::mpsc::RecvError), "let go, it ends");
 }
