@@ -16,6 +16,7 @@ mod steady;
 #[expect(clippy::float_cmp, reason = "what is not there is zero to the bit")]
 mod tests;
 
+use alloc::boxed::Box;
 use alloc::vec::Vec;
 
 use serde::{Deserialize, Serialize};
@@ -29,11 +30,12 @@ pub use steady::{Jump, Steady};
 
 use crate::channel::{Channel, ThermalFilter};
 use crate::drift::DriftModel;
+use crate::lanes::Lanes;
 use crate::operation::SelfTestParts;
 use crate::orientation::Orientation;
 use crate::reversal::Reversal;
 use crate::sample::OutputKind;
-use crate::thermal::{AccelModel, GyroModel};
+use crate::thermal::{AccelModel, GyroModel, Trends};
 
 /// A validated coefficient set; immutable, shared by pointer.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -53,6 +55,13 @@ pub struct Calibration {
     pub(crate) accel_orientation_channels: Vec<usize>,
     pub(crate) reversal: Option<Reversal>,
     self_test: SelfTestParts,
+    /// Input limits, a lane for each sensor; infinite where there is none, so that what is not read is never beyond.
+    pub(crate) gyro_limits: Lanes,
+    pub(crate) accel_limits: Lanes,
+    /// `None` where no gyro has a trend.
+    pub(crate) trends: Option<Box<Trends>>,
+    /// Whether any gyro has a perimeter servo.
+    pub(crate) has_servo: bool,
 }
 
 impl Calibration {

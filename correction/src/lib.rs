@@ -16,6 +16,7 @@
 //! | [`sample`] | what goes in (raw ticks, temperature readings) and what comes out (corrected ticks, flags) |
 //! | [`calibration`] | the immutable, validated coefficient set |
 //! | [`curve`] | polynomial, piecewise-linear table and cubic spline, clamped to their fitted range |
+//! | [`lanes`] | sensor beside sensor: one number of each |
 //! | [`channel`] | temperature channel: gating, smoothing, three-point derivatives |
 //! | [`thermal`] | the gyro's and accelerometer's thermal terms and their continuous update |
 //! | [`orientation`] | input axes to case axes, parity residuals, exclusion of a failed sensor |
@@ -40,6 +41,7 @@ pub mod channel;
 pub mod curve;
 pub mod drift;
 pub mod earth;
+pub mod lanes;
 mod later;
 pub mod navigation;
 pub mod observation;

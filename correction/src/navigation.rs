@@ -108,11 +108,11 @@ impl StepSum {
     /// where the calibration revision changes or the unit becomes calibrated or ceases to be. Raw readings of
     /// an uncalibrated unit are summed plainly: cross products of counts mean nothing.
     #[inline]
-    pub fn push(
+    pub fn push<E: FnMut(&CorrectedTick) + ?Sized>(
         &mut self,
         step: &NavigationStep,
         tick: &CorrectedTick,
-        emit: &mut dyn FnMut(&CorrectedTick),
+        emit: &mut E,
     ) {
         if step.ticks <= 1 && !step.coning_sculling && self.open.is_none() {
             emit(tick);
@@ -122,7 +122,12 @@ impl StepSum {
     }
 
     /// Takes one tick of a step.
-    fn sum(&mut self, step: NavigationStep, tick: &CorrectedTick, emit: &mut dyn FnMut(&CorrectedTick)) {
+    fn sum<E: FnMut(&CorrectedTick) + ?Sized>(
+        &mut self,
+        step: NavigationStep,
+        tick: &CorrectedTick,
+        emit: &mut E,
+    ) {
         let breaks = tick.missed > 0 || tick.flags.intersects(TickFlags::GAP | TickFlags::RESTART);
         let differs = self.open.as_ref().is_some_and(|open| {
             let changed = open.flags.symmetric_difference(tick.flags);
@@ -164,7 +169,7 @@ impl StepSum {
     }
 
     /// Closes the open step, if there is one, and emits it.
-    pub fn flush(&mut self, step: &NavigationStep, emit: &mut dyn FnMut(&CorrectedTick)) {
+    pub fn flush<E: FnMut(&CorrectedTick) + ?Sized>(&mut self, step: &NavigationStep, emit: &mut E) {
         let coning = core::mem::take(&mut self.coning);
         let sculling = core::mem::take(&mut self.sculling);
         let Some(mut sum) = self.open.take() else {

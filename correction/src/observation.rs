@@ -1,12 +1,14 @@
-//! One tick as the corrector saw it: what self-test, pre-launch calibration and drift estimator rest on.
+//! One tick as the corrector saw it, in the lanes that it was corrected in: what self-test, pre-launch calibration and drift
+//! estimator rest on.
 
 use serde::{Deserialize, Serialize};
 
-use crate::sample::{LasingMode, SensorFlags, Sensors, TickFlags};
+use crate::lanes::Lanes;
+use crate::sample::{LasingMode, MAX_SENSORS, SensorFlags, TickFlags};
 use crate::units::{Span, Timestamp};
 
 /// One gyro in one tick.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct GyroSeen {
     /// Raw reading, as it came (counts, or rad/s).
     pub reading: f64,
@@ -23,18 +25,82 @@ pub struct GyroSeen {
     pub flags: SensorFlags,
 }
 
-/// One accelerometer in one tick.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub struct AccelSeen {
-    /// Raw reading, as it came.
-    pub reading: f64,
-    /// Its flags.
-    pub flags: SensorFlags,
+/// All gyros in one tick: the fields of [`GyroSeen`], a lane for each gyro.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct GyroLanes {
+    /// Number of gyros.
+    pub count: usize,
+    /// Raw readings.
+    pub reading: Lanes,
+    /// K(T)·P/Δt (rad/s).
+    pub rate: Lanes,
+    /// Bias (rad/s).
+    pub bias: Lanes,
+    /// Drift (rad/s).
+    pub drift: Lanes,
+    /// Temperature (°C).
+    pub temperature_deg_c: Lanes,
+    /// Flags.
+    pub flags: [SensorFlags; MAX_SENSORS],
+}
+
+impl GyroLanes {
+    /// Gyro by gyro.
+    pub fn iter(&self) -> impl Iterator<Item = GyroSeen> + '_ {
+        (0..self.count).map_while(|lane| self.get(lane))
+    }
+
+    /// One gyro.
+    #[must_use]
+    pub fn get(&self, lane: usize) -> Option<GyroSeen> {
+        (lane < self.count.min(MAX_SENSORS)).then(|| GyroSeen {
+            reading: self.reading[lane],
+            rate: self.rate[lane],
+            bias: self.bias[lane],
+            drift: self.drift[lane],
+            temperature_deg_c: self.temperature_deg_c[lane],
+            flags: self.flags[lane],
+        })
+    }
+}
+
+impl FromIterator<GyroSeen> for GyroLanes {
+    fn from_iter<I: IntoIterator<Item = GyroSeen>>(gyros: I) -> Self {
+        let mut lanes = Self::default();
+        for (lane, gyro) in gyros.into_iter().take(MAX_SENSORS).enumerate() {
+            lanes.count = lane + 1;
+            lanes.reading[lane] = gyro.reading;
+            lanes.rate[lane] = gyro.rate;
+            lanes.bias[lane] = gyro.bias;
+            lanes.drift[lane] = gyro.drift;
+            lanes.temperature_deg_c[lane] = gyro.temperature_deg_c;
+            lanes.flags[lane] = gyro.flags;
+        }
+        lanes
+    }
+}
+
+/// All accelerometers in one tick.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct AccelLanes {
+    /// Number of accelerometers; 0 without an accelerometer tick.
+    pub count: usize,
+    /// Raw readings, as they came.
+    pub reading: Lanes,
+    /// Flags.
+    pub flags: [SensorFlags; MAX_SENSORS],
+}
+
+impl AccelLanes {
+    /// Reading and flags, accelerometer by accelerometer.
+    pub fn iter(&self) -> impl Iterator<Item = (f64, SensorFlags)> + '_ {
+        self.reading.iter().copied().zip(self.flags).take(self.count)
+    }
 }
 
 /// One tick after its correction, taken apart again.
 ///
-/// The corrector fills one and the same `Observation` tick after tick; nothing is allocated.
+/// The corrector works in one and the same `Observation` tick after tick; nothing is allocated.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Observation {
     /// Sequence number of the tick.
@@ -50,10 +116,10 @@ pub struct Observation {
     /// Whether the readings are those of a settled instrument: not lost in a mode switch, not carrying restored angle,
     /// no perimeter-servo transient, no swap on its way.
     pub settled: bool,
-    /// Each gyro.
-    pub gyros: Sensors<GyroSeen>,
-    /// Each accelerometer; empty without an accelerometer tick.
-    pub accels: Sensors<AccelSeen>,
+    /// Each gyro; none before the first tick.
+    pub gyros: GyroLanes,
+    /// Each accelerometer; none without an accelerometer tick.
+    pub accels: AccelLanes,
     /// Corrected mean angular rate of the tick in case axes (rad/s).
     pub angular_rate: [f64; 3],
     /// Corrected mean specific force of the tick in case axes (m/s²); `None` without a usable accelerometer tick.

@@ -13,6 +13,7 @@ mod parity;
 mod parts;
 
 use alloc::vec::Vec;
+use core::array;
 
 use serde::{Deserialize, Serialize};
 
@@ -23,6 +24,7 @@ pub use parts::{
     CONDITION_LIMIT, OrientationError, OrientationParts, ROW_NORM_TOLERANCE, WEIGHT_RATIO_LIMIT,
 };
 
+use crate::lanes;
 use crate::sample::{MAX_SENSORS, MIN_SENSORS, Sensors};
 
 /// Which sensors of a kind take part: bit i for sensor i.
@@ -55,6 +57,12 @@ impl SensorMask {
     #[must_use]
     pub const fn with(self, index: usize) -> Self {
         if index < MAX_SENSORS { Self(self.0 | (1 << index)) } else { self }
+    }
+
+    /// The same sensors, `index` among them or not.
+    #[must_use]
+    pub const fn set(self, index: usize, takes_part: bool) -> Self {
+        if takes_part { self.with(index) } else { self.without(index) }
     }
 
     /// The sensors that both masks hold.
@@ -179,8 +187,8 @@ impl Orientation {
         }
         // √W·C = Q·R, hence (CᵀWC)⁻¹CᵀW = R⁻¹·Qᵀ·√W; the condition number is not squared this way.
         let (q, r) = orthonormal_columns(&self.weighted(rows))?;
-        let mut columns = [[0.0; 3]; MAX_SENSORS];
-        for (([x, y, z], q), root_weight) in columns.iter_mut().zip(&q).zip(&self.root_weights) {
+        let mut columns = [[0.0; 4]; MAX_SENSORS];
+        for (([x, y, z, _], q), root_weight) in columns.iter_mut().zip(&q).zip(&self.root_weights) {
             let b = q.map(|q| q * root_weight);
             *z = b[2] / r[2][2];
             *y = (b[1] - r[1][2] * *z) / r[1][1];
@@ -250,8 +258,9 @@ fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
 /// A compiled C(T)⁺.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Inverse {
-    /// What one unit of each sensor's reading gives along the case axes.
-    columns: [[f64; 3]; MAX_SENSORS],
+    /// What one unit of each sensor's reading gives along the case axes; the fourth axis is none, and a sensor that takes no
+    /// part gives nothing.
+    columns: [[f64; 4]; MAX_SENSORS],
     mask: SensorMask,
 }
 
@@ -262,43 +271,33 @@ impl Inverse {
         self.mask
     }
 
-    /// What one unit of each sensor's reading gives along the case axes.
-    pub(crate) const fn columns(&self) -> &[[f64; 3]; MAX_SENSORS] {
-        &self.columns
-    }
-
     /// v = C⁺·s (unit of `readings`).
     ///
     /// A sensor outside the mask is not looked at, so its reading may be anything, NaN too. Readings that are
     /// missing count as zero.
     #[must_use]
     pub fn apply(&self, readings: &[f64]) -> [f64; 3] {
-        let mut sum = [0.0; 3];
-        for (index, (column, s)) in self.columns.iter().zip(readings).enumerate() {
-            if self.mask.contains(index) {
-                sum.iter_mut().zip(column).for_each(|(sum, c)| *sum += c * s);
-            }
-        }
-        sum
+        let used = |(index, s): (usize, &f64)| if self.mask.contains(index) { *s } else { 0.0 };
+        let readings: Sensors<f64> = readings.iter().take(MAX_SENSORS).enumerate().map(used).collect();
+        self.lerp_apply::<MAX_SENSORS>(self, 1.0, &lanes::of_readings(&readings))
     }
 
-    /// What [`lerp`](Self::lerp) to `other` and then [`apply`](Self::apply) give, without the matrix in between.
-    #[must_use]
-    pub fn lerp_apply(&self, other: &Self, u: f64, readings: &[f64]) -> [f64; 3] {
-        if !self.leads_to(other, u) {
-            return other.apply(readings);
+    /// What [`lerp`](Self::lerp) to `other` and then [`apply`](Self::apply) give, without the matrix in between; the readings of
+    /// sensors outside the mask must be zero.
+    #[inline]
+    pub(crate) fn lerp_apply<const N: usize>(&self, other: &Self, u: f64, readings: &[f64; N]) -> [f64; 3] {
+        let mut sum = [0.0; 4];
+        let mut add = |column: [f64; 4], reading| sum = array::from_fn(|axis| sum[axis] + column[axis] * reading);
+        let columns = self.columns.iter().zip(&other.columns).zip(readings);
+        if self.leads_to(other, u) {
+            columns.for_each(|((from, to), reading)| {
+                add(array::from_fn(|axis| from[axis] + (to[axis] - from[axis]) * u), *reading);
+            });
+        } else {
+            columns.for_each(|((_, to), reading)| add(*to, *reading));
         }
-        let u = u.max(0.0);
-        let mut sum = [0.0; 3];
-        for (index, ((column, target), s)) in
-            self.columns.iter().zip(&other.columns).zip(readings).enumerate()
-        {
-            if self.mask.contains(index) {
-                let [x, y, z] = [0, 1, 2].map(|axis| column[axis] + (target[axis] - column[axis]) * u);
-                sum = [sum[0] + x * s, sum[1] + y * s, sum[2] + z * s];
-            }
-        }
-        sum
+        let [x, y, z, _] = sum;
+        [x, y, z]
     }
 
     /// The matrix a fraction `u` of the way from this one to `other`, u clamped to 0…1.

@@ -195,7 +195,7 @@ impl PreLaunch {
             if observation.missed > 0 {
                 run.cut();
             }
-            let Some(&GyroSeen { rate, bias, temperature_deg_c, flags, .. }) = observation.gyros.get(index)
+            let Some(GyroSeen { rate, bias, temperature_deg_c, flags, .. }) = observation.gyros.get(index)
             else {
                 run.bad();
                 continue;

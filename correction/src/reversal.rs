@@ -108,18 +108,6 @@ impl Substitution {
         self.left == 0 && self.lost.is_empty() && self.pending.is_none()
     }
 
-    /// Whether the coming tick is a good one that nothing is to be done with but to remember it:
-    /// [`note_good`](Self::note_good) then does what [`tick`](Self::tick) would.
-    pub(crate) fn is_plain(&self, reversal: Reversal, input: &TickInput) -> bool {
-        self.is_settled() && !input.restart && self.left_from(reversal, input) == 0
-    }
-
-    /// Remembers a good tick by its mean rates per sensor (rad/s), NaN where there is no sensor. Its duration is above zero.
-    pub(crate) fn note_good(&mut self, input: &TickInput, rates: [f64; MAX_SENSORS]) {
-        self.note_mode(input, false);
-        self.history.push(Reading::of_rates(input.end_time, input.duration, rates));
-    }
-
     /// Takes one tick: replaces the increments of a lost tick, restores angle in a good one.
     ///
     /// `increments` are the angle increments per sensor (rad), scaled and with every bias removed; those of a

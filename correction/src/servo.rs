@@ -26,7 +26,6 @@ use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 
 use crate::curve::{Curve, CurveError, CurveParts};
-use crate::orientation::SensorMask;
 use crate::sample::{HalfPeriodCounts, MAX_SENSORS};
 use crate::units::{Span, Timestamp};
 
@@ -229,32 +228,6 @@ impl ServoMemory {
             return Transient::Settled;
         }
         self.running_rate(sensor, servo, tick, (middle, mean_hz))
-    }
-
-    /// Whether no transition is running, and no servo that settles within `settles_s` (s) after one has a transient in this
-    /// tick: [`apparent_rate`](Self::apparent_rate) would give [`Transient::Settled`] for each. `None`: there is no servo.
-    pub(crate) fn is_settled(&self, settles_s: Option<f64>, end_time: Timestamp, duration: Span) -> bool {
-        let runs = |(start, settles_s): (Timestamp, f64)| {
-            (0.0..=settles_s).contains(&middle(end_time, duration).seconds_from(start))
-        };
-        !self.switching && !self.settles_from.zip(settles_s).is_some_and(runs)
-    }
-
-    /// What [`apparent_rate`](Self::apparent_rate) remembers of these gyros in a tick without a transient.
-    pub(crate) fn note_settled(
-        &mut self,
-        sensors: SensorMask,
-        (end_time, duration): (Timestamp, Span),
-        half_periods: &[HalfPeriodCounts],
-    ) {
-        let middle = middle(end_time, duration);
-        for (sensor, last) in self.last.iter_mut().enumerate() {
-            if !sensors.contains(sensor) {
-                continue;
-            }
-            let counts = half_periods.get(sensor);
-            *last = counts.and_then(|counts| mean_hz(*counts, duration)).map(|mean| (middle, mean));
-        }
     }
 
     /// The apparent rate while the transient runs; remembers the mean rate without it.

@@ -4,12 +4,14 @@
 //! on a straight line to the new one over the next sample interval: the corrected rate has no staircase.
 
 mod accel;
+mod bank;
 mod gyro;
 mod lag;
 mod ramp;
 
-pub use accel::{AccelModel, AccelTerms, AccelThermal};
-pub(crate) use gyro::TermError;
-pub use gyro::{GyroModel, GyroTerms, GyroThermal, MAX_LAGS, TrendModel};
-pub(crate) use ramp::share;
-pub use ramp::{Follower, Ramp};
+pub use accel::AccelModel;
+pub(crate) use bank::Bank;
+pub(crate) use gyro::{TermError, Trends};
+pub use gyro::{GyroModel, GyroTerms, TrendModel};
+pub use lag::MAX_LAGS;
+pub(crate) use ramp::Ramp;

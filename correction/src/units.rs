@@ -169,21 +169,6 @@ impl Timestamp {
     }
 }
 
-impl Timestamp {
-    /// Whether it is less than 2⁶² ns (146 years) from the clock's epoch, so that no difference of two such times saturates.
-    pub(crate) const fn is_near(self) -> bool {
-        const FAR: i64 = 1 << 62;
-        -FAR < self.0 && self.0 < FAR
-    }
-
-    /// As [`seconds_from`](Self::seconds_from), for two times that [are near](Self::is_near): it need not look whether the
-    /// difference saturates.
-    #[expect(clippy::cast_precision_loss, reason = "as in `seconds_from`")]
-    pub(crate) const fn seconds_from_near(self, other: Self) -> f64 {
-        self.0.wrapping_sub(other.0) as f64 * 1e-9
-    }
-}
-
 /// The saturated difference of two times that are too far apart, the first of which is `from`.
 #[cold]
 const fn ends_apart(from: i64) -> i64 {

@@ -79,13 +79,6 @@ impl UnitStream {
         }
     }
 
-    /// The same stream, whose unit corrects every tick by the general path: see [`Unit::by_general_path`].
-    #[must_use]
-    pub fn by_general_path(mut self) -> Self {
-        self.unit = self.unit.by_general_path();
-        self
-    }
-
     /// Lets the revision counter go on behind `highest`, the highest that the unit was ever given; at the start only.
     #[must_use]
     pub fn with_revision(mut self, highest: u64) -> Self {
@@ -214,7 +207,7 @@ impl UnitStream {
     }
 
     fn handle_in(&mut self, queues: &mut Queues, event: Event<'_>) {
-        queues.lend(&mut self.unit, &mut self.ready);
+        queues.lend(&mut self.ready);
         if let Event::Gyro { ticks, .. } = event {
             self.incoming_series = ticks.last().map_or(self.incoming_series, |tick| tick.series);
         }
@@ -240,7 +233,7 @@ impl UnitStream {
             before.0.into_iter().chain(after.0).for_each(|counter| self.revisions.made_ticks(counter));
         }
         self.note_pre_launch(state);
-        queues.take_back(&mut self.unit, &mut self.ready);
+        queues.take_back(&mut self.ready);
     }
 
     /// Does something with the unit that may end a pre-launch calibration.

@@ -4,14 +4,17 @@ mod checker;
 mod self_test;
 mod sensors;
 
+use alloc::boxed::Box;
 use alloc::vec::Vec;
 
 use super::Calibration;
 use super::defect::{Defect, DefectKind, Section};
 use super::parts::CalibrationParts;
 use crate::channel::{Channel, ChannelParts, MAX_GRID_POINTS, ThermalFilter, ThermalFilterParts};
+use crate::lanes::Lanes;
 use crate::reversal::Reversal;
 use crate::sample::{MAX_SENSORS, MIN_SENSORS};
+use crate::thermal::Trends;
 
 use checker::{Checker, HUGE};
 pub use self_test::MAX_SELF_TEST_READINGS;
@@ -82,6 +85,10 @@ pub(super) fn compile(parts: &CalibrationParts) -> Result<Calibration, Vec<Defec
             filter,
             channels: parts.channels.iter().cloned().map(Channel).collect(),
             gyro_output: parts.gyro_output,
+            gyro_limits: limits(gyros.iter().map(|gyro| gyro.input_limit)),
+            accel_limits: limits(accels.iter().map(|accel| accel.input_limit)),
+            trends: Trends::of(&gyros).map(Box::new),
+            has_servo: gyros.iter().any(|gyro| gyro.servo.is_some()),
             gyros,
             drifts,
             gyro_orientation,
@@ -95,6 +102,13 @@ pub(super) fn compile(parts: &CalibrationParts) -> Result<Calibration, Vec<Defec
         }),
         _ => Err(checker.defects),
     }
+}
+
+/// A lane for each sensor; infinite where there is none.
+fn limits(stated: impl Iterator<Item = f64>) -> Lanes {
+    let mut lanes = [f64::INFINITY; MAX_SENSORS];
+    lanes.iter_mut().zip(stated).for_each(|(lane, limit)| *lane = limit);
+    lanes
 }
 
 fn check_filter(checker: &mut Checker, filter: &ThermalFilterParts) {

@@ -259,7 +259,7 @@ impl DriftEstimator {
         let end = observation.end_time;
         let start = end - observation.duration;
         let covered = Covered::new(start, end);
-        for (gyro, seen) in self.gyros.iter_mut().zip(&observation.gyros) {
+        for (gyro, seen) in self.gyros.iter_mut().zip(observation.gyros.iter()) {
             let Some(gyro) = gyro else { continue };
             gyro.filter.start(start);
             gyro.ring.reach(&covered);

@@ -55,7 +55,7 @@ pub(super) struct GyroDrift {
     pub(super) ring: Ring,
     line: Line,
     /// What is subtracted beyond the line: the rest of what updates have changed.
-    offset: Ramp<1>,
+    offset: Ramp,
 }
 
 impl GyroDrift {
@@ -64,7 +64,7 @@ impl GyroDrift {
             filter: Filter::new(model),
             ring: Ring::new(),
             line: Line::default(),
-            offset: Ramp::hold([0.0]),
+            offset: Ramp::hold(0.0),
         }
     }
 
@@ -79,15 +79,14 @@ impl GyroDrift {
     }
 
     pub(super) fn subtrahend(&self, grid: i64, time: Timestamp) -> f64 {
-        let [offset] = self.offset.at(time);
-        self.predicted(grid, time) + offset
+        self.predicted(grid, time) + self.offset.at(time)
     }
 
     /// Goes on from what was subtracted `before` to what the filter says now.
     pub(super) fn hand_over(&mut self, before: f64, grid: i64, time: Timestamp) {
         self.draw(grid);
-        self.offset = Ramp::hold([before - self.predicted(grid, time)]);
-        self.offset.turn(time, SUBTRACTION_RAMP, [0.0]);
+        self.offset = Ramp::hold(before - self.predicted(grid, time));
+        self.offset.turn(time, SUBTRACTION_RAMP, 0.0);
     }
 
     /// The drift at `time`, that of the last tick.

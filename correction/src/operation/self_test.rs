@@ -184,7 +184,7 @@ impl SelfTest {
     pub fn observe(&mut self, seen: &Observation) -> bool {
         let start = *self.start.get_or_insert(seen.end_time - seen.duration);
         self.end = seen.end_time;
-        for (liveness, gyro) in self.gyros.iter_mut().zip(&seen.gyros) {
+        for (liveness, gyro) in self.gyros.iter_mut().zip(seen.gyros.iter()) {
             // Over a mode switch a gyro may well give nothing.
             if seen.settled || self.ticks == 0 {
                 liveness.observe(gyro.reading, gyro.flags, self.ticks == 0, seen.end_time);
@@ -193,9 +193,9 @@ impl SelfTest {
             }
         }
         self.ticks += 1;
-        if !seen.accels.is_empty() {
-            for (liveness, accel) in self.accels.iter_mut().zip(&seen.accels) {
-                liveness.observe(accel.reading, accel.flags, self.accel_ticks == 0, seen.end_time);
+        if seen.accels.count > 0 {
+            for (liveness, (reading, flags)) in self.accels.iter_mut().zip(seen.accels.iter()) {
+                liveness.observe(reading, flags, self.accel_ticks == 0, seen.end_time);
             }
             self.accel_ticks += 1;
         }

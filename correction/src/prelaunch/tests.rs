@@ -31,8 +31,8 @@ fn run(
     while still.now_s() < seconds {
         let mut seen = still.tick();
         let earth = [crate::earth::EARTH_RATE.as_rad_per_s(), 0.0, 0.0];
-        for ((gyro, at_rest), earth) in seen.gyros.iter_mut().zip(RATE_RAD_PER_S).zip(earth) {
-            gyro.rate += earth - at_rest;
+        for ((rate, at_rest), earth) in seen.gyros.rate.iter_mut().zip(RATE_RAD_PER_S).zip(earth) {
+            *rate += earth - at_rest;
         }
         change(still.now_s(), &mut seen);
         pre_launch.observe(&seen);
@@ -106,7 +106,7 @@ fn the_standard_error_is_that_of_the_walk_whatever_the_modes_and_drifts_do() {
     let mut sum = 0.0;
     for seed in 0..20 {
         let still = Still { change: [0.0, deg_per_h(10.0)], ..with_modes(seed) };
-        let drift = |now_s: f64, seen: &mut Observation| seen.gyros[0].rate += deg_per_h(1.0) * now_s / 200.0;
+        let drift = |now_s: f64, seen: &mut Observation| seen.gyros.rate[0] += deg_per_h(1.0) * now_s / 200.0;
         let pre_launch = run(&settings, still, 201.0, drift);
         sum += accepted(&pre_launch)[0].static_bias_sigma_rad_per_s;
     }
@@ -129,7 +129,7 @@ fn counts_that_are_cut_in_two_are_in_the_standard_error() {
         angle += (7.292e-5 * 0.02) / count;
         let rate = f64::floor(angle) * count / 0.02;
         angle -= f64::floor(angle);
-        seen.gyros.iter_mut().for_each(|gyro| gyro.rate = gyro.bias + rate);
+        seen.gyros.rate = seen.gyros.bias.map(|bias| bias + rate);
         pre_launch.observe(&seen);
     }
     let constants = accepted(&pre_launch)[0];
@@ -170,7 +170,7 @@ fn motion_and_temperature_are_refused_at_once_and_the_rest_is_not_looked_at() {
 
     let clamped = |now_s: f64, seen: &mut Observation| {
         if now_s > 70.0 {
-            seen.gyros[1].flags |= SensorFlags::CLAMPED_TEMPERATURE;
+            seen.gyros.flags[1] |= SensorFlags::CLAMPED_TEMPERATURE;
         }
     };
     let pre_launch = run(&settings(), with_modes(7), 71.0, clamped);
@@ -234,7 +234,7 @@ fn unbalanced_modes_and_a_mode_that_hardly_was_are_refused() {
 fn bad_and_missing_ticks_are_counted_and_too_many_are_refused() {
     let stale = |now_s: f64, seen: &mut Observation| {
         if now_s % 10.0 < 2.0 {
-            seen.gyros[2].flags |= SensorFlags::STALE_TEMPERATURE;
+            seen.gyros.flags[2] |= SensorFlags::STALE_TEMPERATURE;
         }
     };
     let pre_launch = run(&settings(), with_modes(13), 201.0, stale);
@@ -260,7 +260,7 @@ fn bad_and_missing_ticks_are_counted_and_too_many_are_refused() {
 #[test]
 fn a_change_beyond_its_limit_names_gyro_and_constant() {
     let far = Still { change: [deg_per_h(0.1), deg_per_h(1.5)], ..with_modes(15) };
-    let pre_launch = run(&settings(), far, 201.0, |_, seen| seen.gyros[1].rate += deg_per_h(-2.0));
+    let pre_launch = run(&settings(), far, 201.0, |_, seen| seen.gyros.rate[1] += deg_per_h(-2.0));
     let words: Vec<_> = refused(&pre_launch).iter().map(ToString::to_string).collect();
     assert_eq!(words.len(), 4, "{words:?}");
     assert!(words[0].starts_with("B0 (magnetic bias) of gyro 0 would change by +1.5"), "{}", words[0]);

@@ -29,11 +29,6 @@ impl Reading {
     const NONE: Self =
         Self { end_time: Timestamp::from_ns(0), duration: Span::ZERO, rates: [f64::NAN; MAX_SENSORS] };
 
-    /// A tick of which the mean rates are known already.
-    pub(super) const fn of_rates(end_time: Timestamp, duration: Span, rates: [f64; MAX_SENSORS]) -> Self {
-        Self { end_time, duration, rates }
-    }
-
     /// The rates of a tick; `None` where it has no duration, so that no rate can be formed.
     pub(super) fn new(end_time: Timestamp, duration: Span, increments: &[f64]) -> Option<Self> {
         if duration == Span::ZERO {

@@ -1,20 +1,20 @@
 //! A gyro's terms (models §2): θ = K(T)·P − Ω·Δt with Ω a sum of named terms.
 
+use alloc::boxed::Box;
+use alloc::vec::Vec;
+use core::array;
+
 use arrayvec::ArrayVec;
 use serde::{Deserialize, Serialize};
 
-use alloc::boxed::Box;
-use alloc::vec::Vec;
-
-use super::lag::{Lag, advance, settled};
-use super::ramp::{Follower, Ramp};
+use super::bank::Follows;
+use super::lag::{Lag, MAX_LAGS, settled};
 use crate::calibration::{BranchArgument, GyroParts};
 use crate::channel::{ThermalFilter, ThermalState};
 use crate::curve::{Curve, CurveError};
+use crate::lanes::Lanes;
+use crate::sample::MAX_SENSORS;
 use crate::servo::{Servo, ServoError};
-use crate::units::{Span, Timestamp};
-
-pub use super::lag::MAX_LAGS;
 
 /// A gyro, compiled.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -115,8 +115,7 @@ impl GyroModel {
     /// The terms on a ramp that has lasted for long, so that every lag has settled on it.
     pub(crate) fn steady(&self, thermal: &ThermalState, filter: &ThermalFilter) -> GyroTerms {
         let lagged = settled(&self.lags, thermal, filter);
-        let ([increment_weight, bias, magnetic, meander], _) =
-            evaluate(self, thermal, &lagged, filter.branch_dead_band);
+        let ([increment_weight, bias, magnetic, meander], _) = self.terms(thermal, &lagged, filter);
         GyroTerms { increment_weight, bias, magnetic, meander }
     }
 
@@ -178,11 +177,6 @@ impl TrendModel {
         self.coefficients.iter().rev().fold(0.0, |sum, c| sum * t + c)
     }
 
-    /// Coefficients by power, the highest last, and the interval (s).
-    pub(crate) fn parts(&self) -> (&[f64], [f64; 2]) {
-        (&self.coefficients, self.interval_s)
-    }
-
     /// Rate (rad/s) from the end of the interval on.
     #[must_use]
     pub fn last(&self) -> f64 {
@@ -190,8 +184,44 @@ impl TrendModel {
     }
 }
 
-/// Values of a gyro's thermal terms, in the order of the ramp.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+/// The trends of all gyros, lane by lane.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Trends {
+    /// By power.
+    coefficients: [Lanes; 3],
+    from_s: Lanes,
+    to_s: Lanes,
+}
+
+impl Trends {
+    /// Those of the gyros; `None` where none has one.
+    pub(crate) fn of(models: &[GyroModel]) -> Option<Self> {
+        let mut trends = Self {
+            coefficients: [[0.0; MAX_SENSORS]; 3],
+            from_s: [0.0; MAX_SENSORS],
+            to_s: [0.0; MAX_SENSORS],
+        };
+        for (lane, model) in models.iter().enumerate() {
+            let Some(trend) = &model.trend else { continue };
+            for (power, coefficient) in trends.coefficients.iter_mut().zip(&trend.coefficients) {
+                power[lane] = *coefficient;
+            }
+            [trends.from_s[lane], trends.to_s[lane]] = trend.interval_s;
+        }
+        models.iter().any(|model| model.trend.is_some()).then_some(trends)
+    }
+
+    /// As [`TrendModel::at`] of each gyro; zero for one without a trend.
+    pub(crate) fn at<const N: usize>(&self, since_turn_on_s: f64) -> [f64; N] {
+        array::from_fn(|i| {
+            let t = since_turn_on_s.max(self.from_s[i]).min(self.to_s[i]);
+            self.coefficients.iter().rev().fold(0.0, |sum, c| sum * t + c[i])
+        })
+    }
+}
+
+/// Values of a gyro's thermal terms.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GyroTerms {
     /// K(T): angle per count (rad), or rad per rad.
     pub increment_weight: f64,
@@ -203,109 +233,44 @@ pub struct GyroTerms {
     pub meander: f64,
 }
 
-/// Memory of one gyro's thermal terms.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct GyroThermal {
-    /// Increment weight, bias, magnetic and slow-meander term, in the order of [`GyroTerms`].
-    terms: Follower<4>,
-    /// `L_τ[T]` of each lag (°C).
-    lagged: [f64; MAX_LAGS],
-}
-
-impl GyroThermal {
-    /// Starts with the terms as they are at the assumed temperature.
-    #[must_use]
-    pub fn new(model: &GyroModel, filter: &ThermalFilter) -> Self {
-        let assumed = ThermalState { temperature: filter.assumed_deg_c, ..ThermalState::default() };
-        let lagged = [filter.assumed_deg_c; MAX_LAGS];
-        let (terms, clamped) = evaluate(model, &assumed, &lagged, filter.branch_dead_band);
-        Self { terms: Follower::assumed(terms, clamped), lagged }
+impl Follows<4> for GyroModel {
+    fn channel(&self) -> Option<usize> {
+        self.channel
     }
 
-    /// Goes on with the lags of an earlier calibration, where their time constants are the same.
-    pub fn carry_lags(&mut self, model: &GyroModel, before: (&GyroModel, &Self)) {
-        let (old_model, old) = before;
-        let same = old_model.lags.iter().map(|lag| lag.decay).eq(model.lags.iter().map(|lag| lag.decay));
-        if same {
-            self.lagged = old.lagged;
-        }
+    fn lags(&self) -> &[Lag] {
+        &self.lags
     }
 
-    /// Starts the lags anew from a temperature that is taken to have stood for ever.
-    pub fn restart(&mut self, temperature: f64) {
-        self.lagged = [temperature; MAX_LAGS];
-    }
-
-    /// Arrives at once where the terms are heading, after a step of the producer's clock.
-    pub fn settle(&mut self) {
-        self.terms.settle();
-    }
-
-    /// Moves the lags on by one grid point.
-    pub fn grid_point(&mut self, model: &GyroModel, thermal: &ThermalState) {
-        advance(&model.lags, &mut self.lagged, thermal.temperature);
-    }
-
-    /// Evaluates every term and turns towards the result, `over` a sample interval from `start` on.
-    pub fn update(
-        &mut self,
-        model: &GyroModel,
+    /// In the order of [`GyroTerms`].
+    fn terms(
+        &self,
         thermal: &ThermalState,
-        dead_band: f64,
-        start: Timestamp,
-        over: Span,
-    ) {
-        let (terms, clamped) = evaluate(model, thermal, &self.lagged, dead_band);
-        self.terms.follow(terms, clamped, start, over);
-    }
-
-    /// The terms in use at `time`.
-    #[must_use]
-    pub fn at(&self, time: Timestamp) -> GyroTerms {
-        let [increment_weight, bias, magnetic, meander] = self.terms.at(time);
-        GyroTerms { increment_weight, bias, magnetic, meander }
-    }
-
-    /// The way that the terms are on, in the order of [`GyroTerms`].
-    pub(crate) const fn ramp(&self) -> &Ramp<4> {
-        self.terms.ramp()
-    }
-
-    /// Whether an argument was outside its fitted range at the last evaluation.
-    #[must_use]
-    pub fn clamped(&self) -> bool {
-        self.terms.clamped()
-    }
-}
-
-/// Every term at a thermal state, and whether an argument was clamped.
-fn evaluate(
-    model: &GyroModel,
-    thermal: &ThermalState,
-    lagged: &[f64; MAX_LAGS],
-    dead_band: f64,
-) -> ([f64; 4], bool) {
-    let mut clamped = false;
-    let mut eval = |curve: &Curve| {
-        let evaluated = curve.at(thermal.temperature);
-        clamped |= evaluated.clamped;
-        evaluated.value
-    };
-    let weight = model.increment_weight * (1.0 + eval(&model.increment_weight_error));
-    let mut bias = eval(&model.static_bias);
-    let magnetic = model.magnetic_bias.as_deref().map_or(0.0, &mut eval);
-    let meander = model.slow_meander.as_deref().map_or(0.0, &mut eval);
-    for (lag, lagged) in model.lags.iter().zip(lagged) {
-        bias += eval(&lag.gain) * (thermal.temperature - lagged) * lag.per_second;
-    }
-    for (term, derivative) in
-        [(&model.thermal_rate, thermal.rate), (&model.thermal_acceleration, thermal.acceleration)]
-    {
-        if let Some(branched) = term {
-            let (coefficient, outside) = branched.at(thermal, derivative, dead_band);
-            bias += coefficient * derivative;
-            clamped |= outside;
+        lagged: &[f64; MAX_LAGS],
+        filter: &ThermalFilter,
+    ) -> ([f64; 4], bool) {
+        let mut clamped = false;
+        let mut eval = |curve: &Curve| {
+            let evaluated = curve.at(thermal.temperature);
+            clamped |= evaluated.clamped;
+            evaluated.value
+        };
+        let weight = self.increment_weight * (1.0 + eval(&self.increment_weight_error));
+        let mut bias = eval(&self.static_bias);
+        let magnetic = self.magnetic_bias.as_deref().map_or(0.0, &mut eval);
+        let meander = self.slow_meander.as_deref().map_or(0.0, &mut eval);
+        for (lag, lagged) in self.lags.iter().zip(lagged) {
+            bias += eval(&lag.gain) * (thermal.temperature - lagged) * lag.per_second;
         }
+        for (term, derivative) in
+            [(&self.thermal_rate, thermal.rate), (&self.thermal_acceleration, thermal.acceleration)]
+        {
+            if let Some(branched) = term {
+                let (coefficient, outside) = branched.at(thermal, derivative, filter.branch_dead_band);
+                bias += coefficient * derivative;
+                clamped |= outside;
+            }
+        }
+        ([weight, bias, magnetic, meander], clamped)
     }
-    ([weight, bias, magnetic, meander], clamped)
 }

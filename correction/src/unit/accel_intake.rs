@@ -5,7 +5,7 @@ use alloc::collections::VecDeque;
 use serde::{Deserialize, Serialize};
 
 use super::counters::Counters;
-use super::gyro_intake::MAX_DURATION;
+use super::gyro_intake::{LONGEST_KEPT, MAX_DURATION};
 use crate::sample::{AccelTick, GyroTick, OutputKind};
 use crate::units::{Span, Timestamp};
 
@@ -14,7 +14,7 @@ const MAX_PENDING: usize = 8192;
 
 /// A tick that waits for its gyro tick, or has met it.
 #[derive(Debug, Serialize, Deserialize)]
-pub(super) struct Pending {
+pub(super) struct PendingAccel {
     pub(super) tick: AccelTick,
     /// What its readings stand for.
     pub(super) output: OutputKind,
@@ -25,10 +25,10 @@ pub(super) struct Pending {
 /// Memory of the accelerometer stream.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub(super) struct AccelIntake {
-    pending: VecDeque<Pending>,
+    pending: VecDeque<PendingAccel>,
     /// Ticks that came after their time, since the last gyro tick: where the next one starts a new series, they are
     /// the first of it.
-    behind: VecDeque<Pending>,
+    behind: VecDeque<PendingAccel>,
     /// Messages of gyro ticks that started no new series.
     gyro_messages: u64,
     /// End of the last gyro tick that was released in this series.
@@ -42,7 +42,7 @@ impl AccelIntake {
             counters.bad_duration += 1;
             return;
         }
-        let pending = Pending { tick: tick.clone(), output, after: self.gyro_messages };
+        let pending = PendingAccel { tick: tick.clone(), output, after: self.gyro_messages };
         if self.released.is_some_and(|released| tick.end_time <= released) {
             counters.accel_late += 1;
             if self.behind.len() < MAX_PENDING {
@@ -55,7 +55,7 @@ impl AccelIntake {
 
     /// Puts a tick in its place in time.
     #[inline]
-    fn insert(&mut self, pending: Pending, counters: &mut Counters) {
+    fn insert(&mut self, pending: PendingAccel, counters: &mut Counters) {
         let time = pending.tick.end_time;
         if self.pending.len() < MAX_PENDING
             && self.pending.back().is_none_or(|last| last.tick.end_time < time)
@@ -67,7 +67,7 @@ impl AccelIntake {
     }
 
     /// Likewise a tick that is not the newest, or one too many.
-    fn insert_between(&mut self, pending: Pending, counters: &mut Counters) {
+    fn insert_between(&mut self, pending: PendingAccel, counters: &mut Counters) {
         let time = pending.tick.end_time;
         let place = self.pending.iter().rposition(|p| p.tick.end_time < time).map_or(0, |i| i + 1);
         if self.pending.get(place).is_some_and(|p| p.tick.end_time == time) {
@@ -82,14 +82,9 @@ impl AccelIntake {
         }
     }
 
-    /// Where ticks wait, to be lent and given back.
-    pub(super) fn queue(&mut self) -> &mut VecDeque<Pending> {
-        &mut self.pending
-    }
-
     /// Looks for the tick that ends with `gyro`, nearer than half the gyro tick's duration; one that is not there may still
     /// come.
-    pub(super) fn meets(&mut self, gyro: &GyroTick, counters: &mut Counters) -> Option<&Pending> {
+    pub(super) fn meets(&mut self, gyro: &GyroTick, counters: &mut Counters) -> Option<&PendingAccel> {
         let half = Span::from_ns(gyro.duration.as_ns() / 2);
         while self.pending.front().is_some_and(|front| front.tick.end_time + half <= gyro.end_time) {
             self.pending.pop_front();
@@ -98,14 +93,12 @@ impl AccelIntake {
         self.pending.front().filter(|front| front.tick.end_time < gyro.end_time + half)
     }
 
-    /// Takes the tick that [meets](Self::meets) `gyro`.
-    pub(super) fn take(&mut self, gyro: &GyroTick, counters: &mut Counters) -> Option<Pending> {
-        self.meets(gyro, counters)?;
-        self.pending.pop_front()
+    /// The oldest tick that waits: what [`meets`](Self::meets) has found, until its gyro tick has gone.
+    pub(super) fn front(&self) -> Option<&PendingAccel> {
+        self.pending.front()
     }
 
-    /// Remembers that the gyro tick which ends at `end_time` has gone, and drops the tick that it has `met`, where that still
-    /// stands here.
+    /// Remembers that the gyro tick which ends at `end_time` has gone, with the tick here that it has `met`.
     pub(super) fn gyro_released(&mut self, end_time: Timestamp, met: bool) {
         self.released = Some(end_time);
         if met {
@@ -117,6 +110,9 @@ impl AccelIntake {
     pub(super) fn goes_on(&mut self) {
         self.behind.clear();
         self.gyro_messages += 1;
+        if self.pending.is_empty() && self.pending.capacity() > LONGEST_KEPT {
+            self.pending = VecDeque::new();
+        }
     }
 
     /// Notes that gyro ticks came which start a new series: what came since the last message of the old one is set
@@ -135,7 +131,7 @@ impl AccelIntake {
         if self.released.take().is_none() {
             return;
         }
-        let near = |Pending { tick, .. }: &Pending| {
+        let near = |PendingAccel { tick, .. }: &PendingAccel| {
             tick.end_time + MAX_DURATION > end_time && tick.end_time < end_time + MAX_DURATION
         };
         let before = self.pending.len();

@@ -1,8 +1,12 @@
 //! Input axes to case axes, following temperature on a straight line.
 
+use core::array;
+
+use arrayvec::ArrayVec;
 use serde::{Deserialize, Serialize};
 
-use crate::orientation::{Inverse, Orientation, ParityCheck, ParityVerdict, SensorMask};
+use crate::orientation::{Inverse, Orientation, ParityCheck, SensorMask};
+use crate::sample::{MAX_PARITY, TickFlags};
 use crate::thermal::Ramp;
 use crate::units::{Span, Timestamp};
 
@@ -10,7 +14,7 @@ use crate::units::{Span, Timestamp};
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Axes {
     /// Temperature that the orientation follows (°C); `share` of its way is the share between the inverses.
-    temperature: Ramp<1>,
+    temperature: Ramp,
     target: f64,
     clamped: bool,
     /// Whether a temperature was read: the first one is not approached from the assumed one, but met.
@@ -29,7 +33,7 @@ impl Axes {
         let mask = SensorMask::all(orientation.sensors());
         let inverse = orientation.inverse(target, mask);
         Self {
-            temperature: Ramp::hold([target]),
+            temperature: Ramp::hold(target),
             target,
             clamped: outside(orientation, target),
             started: false,
@@ -56,7 +60,7 @@ impl Axes {
         self.from = now.or(self.to);
         self.target = temperature;
         self.clamped = outside(orientation, temperature);
-        self.temperature.turn(start, over, [temperature]);
+        self.temperature.turn(start, over, temperature);
         if over == Span::ZERO {
             self.settle();
         }
@@ -78,37 +82,55 @@ impl Axes {
         self.included
     }
 
-    /// Resolves case axes from the sensors of `mask`; `None` where they do not span the space.
-    pub(super) fn resolve(
+    /// Case axes from the sensors of `usable`, and whether they can be trusted: where the usable ones do not span the space, from
+    /// all that are not excluded, and not to be trusted.
+    #[inline]
+    pub(super) fn resolve<const N: usize>(
+        &mut self,
+        orientation: &Orientation,
+        usable: SensorMask,
+        readings: &[f64; N],
+        time: Timestamp,
+    ) -> ([f64; 3], bool) {
+        if let Some(vector) = self.resolve_with(orientation, usable, readings, time) {
+            return (vector, true);
+        }
+        (self.resolve_with(orientation, self.included, readings, time).unwrap_or_default(), false)
+    }
+
+    /// Case axes from the sensors of `mask`; `None` where they do not span the space.
+    #[inline]
+    fn resolve_with<const N: usize>(
         &mut self,
         orientation: &Orientation,
         mask: SensorMask,
-        readings: &[f64],
+        readings: &[f64; N],
         time: Timestamp,
     ) -> Option<[f64; 3]> {
         if mask != self.mask {
-            let [now] = self.temperature.at(time);
-            self.mask = mask;
-            // Both ends anew, from where the temperature is now, so that the change of sensors is all that steps.
-            self.from = orientation.inverse(now, mask);
-            self.to = orientation.inverse(self.target, mask);
+            self.choose(orientation, mask, time);
         }
         let (from, to) = (self.from.as_ref()?, self.to.as_ref()?);
-        Some(from.lerp_apply(to, self.temperature.share(time), readings))
+        let share = self.temperature.share(time);
+        if mask == SensorMask::all(orientation.sensors()) {
+            return Some(from.lerp_apply(to, share, readings));
+        }
+        let readings = array::from_fn(|lane| if mask.contains(lane) { readings[lane] } else { 0.0 });
+        Some(from.lerp_apply::<N>(to, share, &readings))
     }
 
-    /// The way that the inverse is on, and its ends; `None` while not every sensor takes part.
-    pub(super) fn of_all(&self, orientation: &Orientation) -> Option<(&Ramp<1>, &Inverse, &Inverse)> {
-        let (all, [from, to]) = (SensorMask::all(orientation.sensors()), [&self.from, &self.to]);
-        let (from, to) = (from.as_ref()?, to.as_ref()?);
-        let masks = [self.included, self.mask, from.mask(), to.mask()];
-        masks.iter().all(|mask| *mask == all).then_some((&self.temperature, from, to))
+    /// Goes on with other sensors: both ends anew, from where the temperature is now, so that the change of sensors is all that
+    /// steps.
+    #[cold]
+    fn choose(&mut self, orientation: &Orientation, mask: SensorMask, time: Timestamp) {
+        self.mask = mask;
+        self.from = orientation.inverse(self.temperature.at(time), mask);
+        self.to = orientation.inverse(self.target, mask);
     }
 
     /// Temperature that the orientation follows (°C).
     pub(super) fn temperature_deg_c(&self, time: Timestamp) -> f64 {
-        let [now] = self.temperature.at(time);
-        now
+        self.temperature.at(time)
     }
 
     /// The inverse in use at `time` and the sensors that it takes.
@@ -116,18 +138,24 @@ impl Axes {
         self.at(time).map(|inverse| (self.mask, inverse))
     }
 
-    /// Watches the parity residuals; excludes a sensor where they call for it.
+    /// Watches the parity of readings, where there are more sensors than axes, and excludes a sensor where that calls for it;
+    /// what is left over goes to the corrected tick. Whether a sensor was excluded.
     pub(super) fn watch(
         &mut self,
         orientation: &Orientation,
-        mask: SensorMask,
-        rates: &[f64],
-    ) -> ParityVerdict {
-        let verdict = self.parity.check(orientation, self.target, mask, rates);
+        usable: SensorMask,
+        readings: &[f64],
+        (parity, flags): (&mut ArrayVec<f64, MAX_PARITY>, &mut TickFlags),
+    ) -> bool {
+        let verdict = self.parity.check(orientation, self.target, usable, readings);
+        *parity = verdict.residuals;
+        if verdict.exceeded {
+            *flags |= TickFlags::PARITY_EXCEEDED;
+        }
         if let Some(sensor) = verdict.exclude {
             self.included = self.included.without(sensor);
         }
-        verdict
+        verdict.exclude.is_some()
     }
 
     fn at(&self, time: Timestamp) -> Option<Inverse> {

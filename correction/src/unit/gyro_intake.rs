@@ -14,6 +14,8 @@ use crate::units::{Span, Timestamp};
 
 /// Most gyro ticks that wait for an accelerometer tick or a missing neighbour.
 const MAX_PENDING: usize = 8192;
+/// Longest queue whose room is kept once it is empty, in ticks: what a burst has needed beyond it goes.
+pub(super) const LONGEST_KEPT: usize = 256;
 /// Longest tick (10 s).
 pub(super) const MAX_DURATION: Span = Span::from_ns(10_000_000_000);
 /// A step of time larger than this, and than twice the ticks it claims to span, is not believed at once (1 h).
@@ -103,8 +105,9 @@ impl Admission {
 }
 
 impl GyroIntake {
-    /// Whether a tick goes on where the last one left off, with nothing waiting: it need not wait either.
-    pub(super) fn goes_straight(&self, tick: &GyroTick) -> bool {
+    /// Whether a tick goes on where the last one left off, with nothing waiting: then it need not wait either.
+    #[inline]
+    pub(super) fn is_next(&self, tick: &GyroTick) -> bool {
         let (Some(newest), Some(last), Some(series)) = (self.newest, self.last, self.series) else {
             return false;
         };
@@ -119,12 +122,20 @@ impl GyroIntake {
             && self.pending.is_empty()
     }
 
-    /// Remembers a tick that [goes straight](Self::goes_straight) through.
-    pub(super) fn went_straight(&mut self, tick: &GyroTick) {
+    /// Remembers a tick that [is the next](Self::is_next) and did not wait.
+    #[inline]
+    pub(super) fn passed(&mut self, tick: &GyroTick) {
         self.jump = None;
         self.newest = Some(Newest { sequence: tick.sequence, end_time: tick.end_time });
-        self.released = self.released << 1 | 1;
-        self.last = Some(tick.sequence);
+        self.leave(tick.sequence, 0, false);
+    }
+
+    /// Remembers that a tick has left, with so many missing before it.
+    #[inline]
+    fn leave(&mut self, sequence: u64, missed: u64, restart: bool) {
+        let moved = u32::try_from(missed.saturating_add(1)).ok().filter(|_| !restart);
+        self.released = moved.and_then(|moved| self.released.checked_shl(moved)).unwrap_or(0) | 1;
+        self.last = Some(sequence);
     }
 
     /// Takes one tick of a batch; whether it starts a new series.
@@ -153,6 +164,9 @@ impl GyroIntake {
     /// time would keep the others waiting for ever.
     pub(super) fn end_batch(&mut self) {
         let mut end = None;
+        if self.pending.is_empty() && self.pending.capacity() > LONGEST_KEPT {
+            self.pending = VecDeque::new();
+        }
         for pending in self.pending.iter_mut().rev() {
             if self.batch == 0 {
                 break;
@@ -309,20 +323,8 @@ impl GyroIntake {
             Some(distance) if !restart => distance.saturating_sub(1),
             _ => refused_before,
         };
-        let moved = missed.saturating_add(1);
-        let kept = if restart {
-            0
-        } else {
-            u32::try_from(moved).ok().and_then(|n| self.released.checked_shl(n)).unwrap_or(0)
-        };
-        self.released = kept | 1;
-        self.last = Some(tick.sequence);
+        self.leave(tick.sequence, missed, restart);
         Some(Left { tick, output, missed, restart })
-    }
-
-    /// Where ticks wait, to be lent and given back.
-    pub(super) fn queue(&mut self) -> &mut VecDeque<Pending> {
-        &mut self.pending
     }
 
     /// How many ticks wait.

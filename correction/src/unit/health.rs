@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::sample::SensorFlags;
+use crate::sample::{MAX_SENSORS, SensorFlags, Sensors};
 
 /// Account of one sensor since its unit got a calibration with as many sensors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -25,25 +25,46 @@ pub struct SensorHealth {
     pub excluded: u64,
 }
 
-impl SensorHealth {
-    /// Enters a tick in which nothing but `VALID` was flagged.
-    pub(super) fn note_valid(&mut self) {
-        self.flags = SensorFlags::VALID;
+/// Accounts of all sensors of a kind.
+#[derive(Debug, Default, Serialize, Deserialize)]
+pub(super) struct Health {
+    /// All but the flags and the ticks, which stand below: in most ticks nothing else is to be written down.
+    accounts: Sensors<SensorHealth>,
+    flags: [SensorFlags; MAX_SENSORS],
+    ticks: u64,
+}
+
+impl Health {
+    /// Of so many sensors that have not been seen.
+    pub(super) fn new(sensors: usize) -> Self {
+        let accounts = core::iter::repeat_n(SensorHealth::default(), sensors).collect();
+        Self { accounts, ..Self::default() }
+    }
+
+    /// Enters a tick in which every sensor was valid and nothing else.
+    #[inline]
+    pub(super) fn note_sound(&mut self) {
+        self.flags = [SensorFlags::VALID; MAX_SENSORS];
         self.ticks += 1;
     }
 
     /// Enters the flags of one tick.
-    pub(super) fn note(&mut self, flags: SensorFlags) {
-        self.flags = flags;
+    pub(super) fn note(&mut self, flags: &[SensorFlags; MAX_SENSORS]) {
+        self.flags = *flags;
         self.ticks += 1;
-        if flags == SensorFlags::VALID {
-            return;
+        for (account, flags) in self.accounts.iter_mut().zip(flags) {
+            account.invalid += u64::from(!flags.contains(SensorFlags::VALID));
+            account.overrange += u64::from(flags.contains(SensorFlags::OVERRANGE));
+            account.not_finite += u64::from(flags.contains(SensorFlags::NOT_FINITE));
+            account.clamped += u64::from(flags.contains(SensorFlags::CLAMPED_TEMPERATURE));
+            account.stale += u64::from(flags.contains(SensorFlags::STALE_TEMPERATURE));
+            account.excluded += u64::from(flags.contains(SensorFlags::EXCLUDED));
         }
-        self.invalid += u64::from(!flags.contains(SensorFlags::VALID));
-        self.overrange += u64::from(flags.contains(SensorFlags::OVERRANGE));
-        self.not_finite += u64::from(flags.contains(SensorFlags::NOT_FINITE));
-        self.clamped += u64::from(flags.contains(SensorFlags::CLAMPED_TEMPERATURE));
-        self.stale += u64::from(flags.contains(SensorFlags::STALE_TEMPERATURE));
-        self.excluded += u64::from(flags.contains(SensorFlags::EXCLUDED));
+    }
+
+    /// Sensor by sensor.
+    pub(super) fn accounts(&self) -> Sensors<SensorHealth> {
+        let accounts = self.accounts.iter().zip(self.flags);
+        accounts.map(|(account, flags)| SensorHealth { flags, ticks: self.ticks, ..*account }).collect()
     }
 }

@@ -2,9 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::lanes::{Lanes, narrow};
 use crate::orientation::{Inverse, SensorMask};
-use crate::sample::Sensors;
-use crate::thermal::{AccelTerms, GyroTerms};
 use crate::units::{Span, Timestamp};
 
 /// What was in use when the swap took effect.
@@ -14,14 +13,23 @@ pub(super) struct Slew {
     pub(super) start: Timestamp,
     /// Time over which the change is made.
     pub(super) over: Span,
-    /// Terms of each gyro, its trend in the bias.
-    pub(super) gyros: Sensors<GyroTerms>,
-    /// Terms of each accelerometer.
-    pub(super) accels: Sensors<AccelTerms>,
+    /// Terms of the gyros, the trend in the bias.
+    pub(super) gyros: [Lanes; 4],
+    /// Terms of the accelerometers, and of their boards.
+    pub(super) accels: [Lanes; 2],
+    pub(super) boards: [Lanes; 1],
     /// Sensors and inverse that gave case axes from the gyros.
     pub(super) gyro_axes: Option<(SensorMask, Inverse)>,
     /// Likewise from the accelerometers.
     pub(super) accel_axes: Option<(SensorMask, Inverse)>,
+}
+
+/// A swap on its way, at one tick.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Slewing<'a> {
+    pub(super) from: &'a Slew,
+    /// Share of what was before the swap, above 0.
+    pub(super) share: f64,
 }
 
 impl Slew {
@@ -32,46 +40,30 @@ impl Slew {
         }
         1.0 - (time.seconds_from(self.start) / self.over.as_s()).clamp(0.0, 1.0)
     }
-
-    /// The terms of a gyro, on their way to `new`.
-    pub(super) fn gyro(&self, index: usize, new: GyroTerms, share: f64) -> GyroTerms {
-        let Some(old) = self.gyros.get(index) else { return new };
-        GyroTerms {
-            increment_weight: between(new.increment_weight, old.increment_weight, share),
-            bias: between(new.bias, old.bias, share),
-            magnetic: between(new.magnetic, old.magnetic, share),
-            meander: between(new.meander, old.meander, share),
-        }
-    }
-
-    /// The terms of an accelerometer, on their way to `new`.
-    pub(super) fn accel(&self, index: usize, new: AccelTerms, share: f64) -> AccelTerms {
-        let Some(old) = self.accels.get(index) else { return new };
-        AccelTerms {
-            bias: between(new.bias, old.bias, share),
-            per_scale_factor: between(new.per_scale_factor, old.per_scale_factor, share),
-            ratio: between(new.ratio, old.ratio, share),
-        }
-    }
 }
 
-/// Case axes on their way from what the old inverse of the same sensors gives; where the sensors differ, there is no way.
-pub(super) fn axes(
-    new: [f64; 3],
-    old: Option<&(SensorMask, Inverse)>,
-    mask: SensorMask,
-    readings: &[f64],
-    share: f64,
-) -> [f64; 3] {
-    match old {
-        Some((old_mask, inverse)) if share > 0.0 && *old_mask == mask => {
-            let mut axes = new;
-            axes.iter_mut()
-                .zip(inverse.apply(readings))
-                .for_each(|(axis, old)| *axis = between(*axis, old, share));
-            axes
+impl Slewing<'_> {
+    /// Terms on their way from the old ones.
+    pub(super) fn terms<const N: usize, const T: usize>(&self, new: &mut [[f64; N]; T], old: &[Lanes; T]) {
+        for (new, old) in new.iter_mut().zip(old) {
+            new.iter_mut().zip(narrow::<N>(old)).for_each(|(new, old)| *new = between(*new, *old, self.share));
         }
-        _ => new,
+    }
+
+    /// Case axes on their way from what the old inverse of the same sensors gives; where the sensors differ, there is no way.
+    pub(super) fn axes(
+        &self,
+        new: [f64; 3],
+        old: Option<&(SensorMask, Inverse)>,
+        mask: SensorMask,
+        readings: &[f64],
+    ) -> [f64; 3] {
+        let mut axes = new;
+        if let Some((_, inverse)) = old.filter(|(old_mask, _)| *old_mask == mask) {
+            let old = inverse.apply(readings);
+            axes.iter_mut().zip(old).for_each(|(axis, old)| *axis = between(*axis, old, self.share));
+        }
+        axes
     }
 }
 

@@ -7,11 +7,11 @@ use serde::{Deserialize, Serialize};
 
 use super::axes::Axes;
 use super::counters::Counters;
-use super::footing::Footings;
 use crate::calibration::Calibration;
 use crate::channel::{ChannelMemory, ThermalState, Verdict};
-use crate::sample::{ChannelName, TemperatureReading};
-use crate::thermal::{AccelThermal, GyroThermal};
+use crate::lanes::Lanes;
+use crate::sample::{ChannelName, MAX_SENSORS, SensorFlags, TemperatureReading};
+use crate::thermal::{AccelModel, Bank};
 use crate::units::{Span, Timestamp};
 
 /// Most readings that wait to take effect: two messages of 4096 times with 16 channels each, since a producer sends a
@@ -66,17 +66,68 @@ impl Waiting {
     }
 }
 
+/// What the temperatures say of the sensors of a kind until the next reading.
+#[derive(Debug, Default, Serialize, Deserialize)]
+pub(super) struct Footing {
+    /// Smoothed temperature of each sensor's channel (°C); the assumed one without a channel or before its first reading.
+    pub(super) temperature_deg_c: Lanes,
+    /// Flags of each sensor in a tick with readings that are sound and temperatures that are fresh.
+    flags: [SensorFlags; MAX_SENSORS],
+    /// A tick that ends later rests on a temperature that is missing, rejected or too old.
+    fresh_until: [Timestamp; MAX_SENSORS],
+    /// Up to this time every sensor is valid and nothing else; `None` where one is not.
+    sound_until: Option<Timestamp>,
+}
+
+impl Footing {
+    /// Whether there is nothing to say of any sensor in a tick that ends at `time`.
+    #[inline]
+    pub(super) fn is_sound(&self, time: Timestamp) -> bool {
+        self.sound_until.is_some_and(|until| time <= until)
+    }
+
+    /// Enters one sensor, by the temperature that it follows (°C) and up to when that is fresh.
+    fn note(
+        &mut self,
+        lane: usize,
+        (temperature_deg_c, fresh_until): (f64, Timestamp),
+        clamped: bool,
+        axes: &Axes,
+    ) {
+        let mut flags = SensorFlags::VALID;
+        flags.set(SensorFlags::CLAMPED_TEMPERATURE, clamped);
+        flags.set(SensorFlags::EXCLUDED, !axes.included().contains(lane));
+        let before = if lane == 0 { Some(fresh_until) } else { self.sound_until };
+        self.sound_until = before.filter(|_| flags == SensorFlags::VALID).map(|until| until.min(fresh_until));
+        self.temperature_deg_c[lane] = temperature_deg_c;
+        self.flags[lane] = flags;
+        self.fresh_until[lane] = fresh_until;
+    }
+
+    /// What is to be said of a sensor in a tick that ends at `time`.
+    pub(super) fn flags(&self, lane: usize, time: Timestamp) -> SensorFlags {
+        let stale = time > self.fresh_until[lane];
+        if stale { self.flags[lane] | SensorFlags::STALE_TEMPERATURE } else { self.flags[lane] }
+    }
+}
+
 /// Memory of everything that follows temperature; made for one calibration.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct ThermalMemory {
-    pub(super) channels: Vec<ChannelMemory>,
+    channels: Vec<ChannelMemory>,
     updated: Vec<Option<Timestamp>>,
-    pub(super) gyros: Vec<GyroThermal>,
-    pub(super) accels: Vec<AccelThermal>,
+    /// Increment weight, bias, magnetic and slow-meander term.
+    pub(super) gyros: Bank<4>,
+    /// S and 1/K.
+    pub(super) accels: Bank<2>,
+    /// r, which follows the board's channel.
+    pub(super) boards: Bank<1>,
     pub(super) gyro_axes: Axes,
     pub(super) accel_axes: Option<Axes>,
-    /// What changes with a reading only, so that a tick need not gather it anew.
-    pub(super) footings: Footings,
+    pub(super) gyro_footing: Footing,
+    pub(super) accel_footing: Footing,
+    /// Whether any channel is still warming up.
+    pub(super) warming_up: bool,
 }
 
 impl ThermalMemory {
@@ -86,33 +137,26 @@ impl ThermalMemory {
         before: Option<(&Calibration, &Self)>,
         now: Timestamp,
     ) -> Self {
+        let filter = &calibration.filter;
         let channels = calibration.channels.iter().map(|channel| {
-            let kept =
-                before.filter(|(old, _)| old.filter == calibration.filter).and_then(|(old, memory)| {
-                    let index = old.channels.iter().position(|c| c == channel)?;
-                    memory.channels.get(index).cloned()
-                });
-            kept.unwrap_or_else(|| ChannelMemory::new(&calibration.filter))
+            let kept = before.filter(|(old, _)| old.filter == *filter).and_then(|(old, memory)| {
+                let index = old.channels.iter().position(|c| c == channel)?;
+                memory.channels.get(index).cloned()
+            });
+            kept.unwrap_or_else(|| ChannelMemory::new(filter))
         });
+        let axes = |orientation| Axes::new(orientation, filter.assumed_deg_c);
         let mut memory = Self {
             channels: channels.collect(),
             updated: alloc::vec![None; calibration.channels.len()],
-            gyros: calibration
-                .gyros
-                .iter()
-                .map(|model| GyroThermal::new(model, &calibration.filter))
-                .collect(),
-            accels: calibration
-                .accels
-                .iter()
-                .map(|model| AccelThermal::new(model, &calibration.filter))
-                .collect(),
-            gyro_axes: Axes::new(&calibration.gyro_orientation, calibration.filter.assumed_deg_c),
-            accel_axes: calibration
-                .accel_orientation
-                .as_ref()
-                .map(|o| Axes::new(o, calibration.filter.assumed_deg_c)),
-            footings: Footings::default(),
+            gyros: Bank::new(&calibration.gyros, filter),
+            accels: Bank::new(&calibration.accels, filter),
+            boards: Bank::new(&calibration.accels, filter),
+            gyro_axes: axes(&calibration.gyro_orientation),
+            accel_axes: calibration.accel_orientation.as_ref().map(axes),
+            gyro_footing: Footing::default(),
+            accel_footing: Footing::default(),
+            warming_up: false,
         };
         for index in 0..memory.channels.len() {
             if let Some(state) = memory.channels.get(index).and_then(ChannelMemory::state) {
@@ -126,44 +170,36 @@ impl ThermalMemory {
         if let Some((old, old_memory)) = before.filter(|(old, _)| old.same_thermal_basis(calibration)) {
             memory.carry_unchanged(calibration, (old, old_memory));
         }
-        memory.footings = Footings::of(calibration, &memory);
+        memory.note_footing(calibration);
         memory
     }
 
     /// Goes on with lags that were filtered in the same way.
     fn carry_lags(&mut self, calibration: &Calibration, (old, old_memory): (&Calibration, &Self)) {
-        let models = calibration.gyros.iter().zip(&old.gyros);
-        for ((model, old_model), (thermal, kept)) in models.zip(self.gyros.iter_mut().zip(&old_memory.gyros))
-        {
-            let followed = model.channel.and_then(|index| calibration.channels.get(index));
-            if followed == old_model.channel.and_then(|index| old.channels.get(index)) {
-                thermal.carry_lags(model, (old_model, kept));
-            }
-        }
-        let models = calibration.accels.iter().zip(&old.accels);
-        for ((model, old_model), (thermal, kept)) in
-            models.zip(self.accels.iter_mut().zip(&old_memory.accels))
-        {
-            let followed = model.channel.and_then(|index| calibration.channels.get(index));
-            if followed == old_model.channel.and_then(|index| old.channels.get(index)) {
-                thermal.carry_lags(model, (old_model, kept));
-            }
-        }
+        let followed = |calibration: &Calibration, channel: Option<usize>| {
+            channel.and_then(|index| calibration.channels.get(index)).cloned()
+        };
+        let same = |new, before| followed(calibration, new) == followed(old, before);
+        self.gyros.carry_lags(&calibration.gyros, (&old.gyros, &old_memory.gyros), |lane| {
+            same(calibration.gyros[lane].channel, old.gyros[lane].channel)
+        });
+        self.accels.carry_lags(&calibration.accels, (&old.accels, &old_memory.accels), |lane| {
+            same(calibration.accels[lane].channel, old.accels[lane].channel)
+        });
     }
 
     /// Goes on with what a swap did not change, on its way as it is: a swap to the same coefficients is no event.
     fn carry_unchanged(&mut self, calibration: &Calibration, (old, old_memory): (&Calibration, &Self)) {
         self.updated.clone_from(&old_memory.updated);
-        let models = calibration.gyros.iter().zip(&old.gyros);
-        for ((new, old), (thermal, kept)) in models.zip(self.gyros.iter_mut().zip(&old_memory.gyros)) {
+        for (lane, (new, old)) in calibration.gyros.iter().zip(&old.gyros).enumerate() {
             if new == old {
-                thermal.clone_from(kept);
+                self.gyros.carry(&old_memory.gyros, lane);
             }
         }
-        let models = calibration.accels.iter().zip(&old.accels);
-        for ((new, old), (thermal, kept)) in models.zip(self.accels.iter_mut().zip(&old_memory.accels)) {
+        for (lane, (new, old)) in calibration.accels.iter().zip(&old.accels).enumerate() {
             if new == old {
-                thermal.clone_from(kept);
+                self.accels.carry(&old_memory.accels, lane);
+                self.boards.carry(&old_memory.boards, lane);
             }
         }
         if calibration.gyro_orientation == old.gyro_orientation
@@ -179,6 +215,7 @@ impl ThermalMemory {
     }
 
     /// Applies every waiting reading that takes effect before a tick ending at `end_time`.
+    #[inline]
     pub(super) fn advance(
         &mut self,
         calibration: &Calibration,
@@ -187,14 +224,24 @@ impl ThermalMemory {
         end_time: Timestamp,
         counters: &mut Counters,
     ) {
-        let mut any = false;
+        if waiting.is_due(end_time, delay) {
+            self.take_due(calibration, waiting, delay, end_time, counters);
+        }
+    }
+
+    #[cold]
+    fn take_due(
+        &mut self,
+        calibration: &Calibration,
+        waiting: &mut Waiting,
+        delay: Span,
+        end_time: Timestamp,
+        counters: &mut Counters,
+    ) {
         while let Some(reading) = waiting.pop_before(end_time, delay) {
             self.read(calibration, &reading, delay, counters);
-            any = true;
         }
-        if any {
-            self.footings = Footings::of(calibration, self);
-        }
+        self.note_footing(calibration);
     }
 
     fn read(
@@ -211,18 +258,9 @@ impl ThermalMemory {
             counters.temperature_unknown_channel += 1;
             return;
         };
-        let (gyros, accels) = (&mut self.gyros, &mut self.accels);
         let verdict = memory.read(channel, &calibration.filter, reading.time, reading.raw, |state| {
-            for (model, thermal) in calibration.gyros.iter().zip(&mut *gyros) {
-                if model.channel == Some(index) {
-                    thermal.grid_point(model, state);
-                }
-            }
-            for (model, thermal) in calibration.accels.iter().zip(&mut *accels) {
-                if model.channel == Some(index) {
-                    thermal.grid_point(model, state);
-                }
-            }
+            self.gyros.grid_point(&calibration.gyros, index, state);
+            self.accels.grid_point(&calibration.accels, index, state);
         });
         let start = reading.time + delay;
         match verdict {
@@ -244,16 +282,8 @@ impl ThermalMemory {
     }
 
     fn restart_lags(&mut self, calibration: &Calibration, channel: usize, temperature: f64) {
-        for (model, thermal) in calibration.gyros.iter().zip(&mut self.gyros) {
-            if model.channel == Some(channel) {
-                thermal.restart(temperature);
-            }
-        }
-        for (model, thermal) in calibration.accels.iter().zip(&mut self.accels) {
-            if model.channel == Some(channel) {
-                thermal.restart(temperature);
-            }
-        }
+        self.gyros.restart_lags(&calibration.gyros, channel, temperature);
+        self.accels.restart_lags::<AccelModel>(&calibration.accels, channel, temperature);
     }
 
     /// Turns everything that follows a channel towards its present state.
@@ -262,19 +292,10 @@ impl ThermalMemory {
         if let Some(updated) = self.updated.get_mut(channel) {
             *updated = Some(start);
         }
-        for (model, thermal) in calibration.gyros.iter().zip(&mut self.gyros) {
-            if model.channel == Some(channel) {
-                thermal.update(model, &state, calibration.filter.branch_dead_band, start, over);
-            }
-        }
-        for (model, thermal) in calibration.accels.iter().zip(&mut self.accels) {
-            if model.channel == Some(channel) {
-                thermal.update_sensor(model, state.temperature, start, over);
-            }
-            if model.board_channel == Some(channel) {
-                thermal.update_board(model, state.temperature, start, over);
-            }
-        }
+        let (to, way, filter) = ((channel, &state), (start, over), &calibration.filter);
+        self.gyros.update(&calibration.gyros, to, filter, way);
+        self.accels.update(&calibration.accels, to, filter, way);
+        self.boards.update(&calibration.accels, to, filter, way);
         let channels = &self.channels;
         let follow = |axes: &mut Axes, orientation, following: &[usize]| {
             if following.contains(&channel)
@@ -293,11 +314,40 @@ impl ThermalMemory {
     pub(super) fn restart(&mut self, calibration: &Calibration) {
         self.channels.iter_mut().for_each(ChannelMemory::restart);
         self.updated.iter_mut().for_each(|updated| *updated = None);
-        self.gyros.iter_mut().for_each(GyroThermal::settle);
-        self.accels.iter_mut().for_each(AccelThermal::settle);
+        self.gyros.settle();
+        self.accels.settle();
+        self.boards.settle();
         self.gyro_axes.settle();
         self.accel_axes.iter_mut().for_each(Axes::settle);
-        self.footings = Footings::of(calibration, self);
+        self.note_footing(calibration);
+    }
+
+    /// Notes what stays as it is until the next reading, so that a tick need not gather it. To be called when a sensor was
+    /// excluded, too.
+    pub(super) fn note_footing(&mut self, calibration: &Calibration) {
+        let filter = &calibration.filter;
+        let channel = |index: Option<usize>| index.and_then(|index| self.channels.get(index));
+        let fresh_until =
+            |index| channel(index).map_or(Timestamp::from_ns(i64::MAX), |c| c.fresh_until(filter));
+        let temperature = |index| {
+            let state = channel(index).and_then(ChannelMemory::state);
+            state.map_or(filter.assumed_deg_c, |state| state.temperature)
+        };
+        let mut gyros = Footing::default();
+        let axes = &self.gyro_axes;
+        for (lane, model) in calibration.gyros.iter().enumerate() {
+            let clamped = self.gyros.clamped(lane) || axes.clamped();
+            gyros.note(lane, (temperature(model.channel), fresh_until(model.channel)), clamped, axes);
+        }
+        let mut accels = Footing::default();
+        for (lane, model) in calibration.accels.iter().enumerate() {
+            let Some(axes) = &self.accel_axes else { break };
+            let clamped = self.accels.clamped(lane) || self.boards.clamped(lane) || axes.clamped();
+            let fresh_until = fresh_until(model.channel).min(fresh_until(model.board_channel));
+            accels.note(lane, (temperature(model.channel), fresh_until), clamped, axes);
+        }
+        self.warming_up = self.channels.iter().any(|channel| channel.warming_up(filter));
+        (self.gyro_footing, self.accel_footing) = (gyros, accels);
     }
 
     /// Smoothed temperature of the channel of a name (°C), where it is neither missing nor stale.

@@ -13,38 +13,32 @@ impl Unit {
     /// What has been counted.
     #[must_use]
     pub fn counters(&self) -> &Counters {
-        &self.counters
+        &self.pipeline.counters
     }
 
     /// The calibration in force and its revision.
     #[must_use]
     pub fn calibration(&self) -> Option<(&Arc<Calibration>, u64)> {
-        self.active.as_ref().map(|active| (&active.calibration, active.revision))
+        self.pipeline.active.as_ref().map(|active| (&active.calibration, active.revision))
     }
 
     /// The change that waits for its tick: its revision, and when it takes effect.
     #[must_use]
     pub fn pending(&self) -> Option<(u64, At)> {
-        self.pending.as_ref().map(|change| (change.revision, change.at))
+        self.pipeline.pending.as_ref().map(|change| (change.revision, change.at))
     }
 
     /// The temperature channels as they stand at the last tick; none without a calibration.
     pub fn channels(&self) -> impl Iterator<Item = ChannelReport> + '_ {
-        self.active
+        self.pipeline.active
             .iter()
-            .flat_map(|active| active.corrector.thermal().report(&active.calibration, self.last_end))
-    }
-
-    /// Whether the next tick goes by the plan of plain ticks, if it is one: for who compares the two paths.
-    #[must_use]
-    pub fn has_plan(&self) -> bool {
-        self.active.as_ref().is_some_and(|active| active.corrector.has_plan())
+            .flat_map(|active| active.corrector.thermal().report(&active.calibration, self.pipeline.last_end))
     }
 
     /// Whether ticks wait for their accelerometer tick, a missing neighbour, or the end of a navigation step.
     #[must_use]
     pub fn is_waiting(&self) -> bool {
-        !self.gyros.is_empty() || !self.steps.is_empty()
+        !self.gyros.is_empty() || !self.pipeline.steps.is_empty()
     }
 
     /// Gyro ticks that wait for their accelerometer tick or a missing neighbour.
@@ -56,83 +50,83 @@ impl Unit {
     /// The settings it was made with.
     #[must_use]
     pub fn settings(&self) -> &UnitSettings {
-        &self.settings
+        &self.pipeline.settings
     }
 
     /// What the unit is doing.
     #[must_use]
     pub fn state(&self) -> State {
-        self.operating.state()
+        self.pipeline.operating.state()
     }
 
     /// The last tick that was corrected, taken apart; `None` before the first one under a calibration.
     #[must_use]
     pub fn observation(&self) -> Option<&Observation> {
-        let seen = self.active.as_ref().map(|active| &active.corrector.seen);
-        seen.filter(|seen| !seen.gyros.is_empty())
+        let seen = self.pipeline.active.as_ref().map(|active| &active.corrector.seen);
+        seen.filter(|seen| seen.gyros.count > 0)
     }
 
     /// Account of each gyro, in the order of the calibration; empty without one.
     #[must_use]
-    pub fn gyro_health(&self) -> &[SensorHealth] {
-        self.active.as_ref().map_or(&[], |active| &active.corrector.gyro_health)
+    pub fn gyro_health(&self) -> Sensors<SensorHealth> {
+        self.pipeline.active.iter().flat_map(|active| active.corrector.gyro_health.accounts()).collect()
     }
 
     /// Account of each accelerometer, likewise.
     #[must_use]
-    pub fn accel_health(&self) -> &[SensorHealth] {
-        self.active.as_ref().map_or(&[], |active| &active.corrector.accel_health)
+    pub fn accel_health(&self) -> Sensors<SensorHealth> {
+        self.pipeline.active.iter().flat_map(|active| active.corrector.accel_health.accounts()).collect()
     }
 
     /// What is presently subtracted from the readings, in case axes; `None` before the first corrected tick.
     #[must_use]
     pub fn applied(&self) -> Option<Applied> {
         self.observation()?;
-        self.active.as_ref().map(|active| active.corrector.applied(&active.calibration))
+        self.pipeline.active.as_ref().map(|active| active.corrector.applied(&active.calibration))
     }
 
     /// Result of the last self-test that ended.
     #[must_use]
     pub fn self_test(&self) -> Option<&SelfTestReport> {
-        self.operating.report()
+        self.pipeline.operating.report()
     }
 
     /// The pre-launch calibration that is at work, or the last one.
     #[must_use]
     pub fn pre_launch(&self) -> Option<PreLaunchView<'_>> {
-        self.operating.pre_launch()
+        self.pipeline.operating.pre_launch()
     }
 
     /// The rest that the operator has declared.
     #[must_use]
     pub fn at_rest(&self) -> Option<&AtRest> {
-        self.operating.rest()
+        self.pipeline.operating.rest()
     }
 
     /// Estimated drift of each gyro at the last tick; `None` for one whose calibration has no parameters for it.
     #[must_use]
     pub fn drift(&self) -> Sensors<Option<DriftEstimate>> {
-        let active = self.active.iter();
+        let active = self.pipeline.active.iter();
         active.flat_map(|active| active.corrector.drift.estimates()).collect()
     }
 
     /// What became of the references.
     #[must_use]
     pub fn reference_counters(&self) -> ReferenceCounters {
-        self.active.as_ref().map(|active| *active.corrector.drift.counters()).unwrap_or_default()
+        self.pipeline.active.as_ref().map(|active| *active.corrector.drift.counters()).unwrap_or_default()
     }
 
     /// Ends a self-test that gets no ticks with what it has seen: for the owner's clock.
     pub fn expire_self_test(&mut self) {
-        if let Some(active) = &self.active {
+        if let Some(active) = &self.pipeline.active {
             let temperature =
-                |name: &_| active.corrector.thermal().alive(&active.calibration, name, self.last_end);
-            self.operating.end_self_test((&active.calibration, active.revision), &temperature);
+                |name: &_| active.corrector.thermal().alive(&active.calibration, name, self.pipeline.last_end);
+            self.pipeline.operating.end_self_test((&active.calibration, active.revision), &temperature);
         }
     }
 
     /// Ends a pre-launch calibration whose stream has ended: it is refused as too short.
     pub fn end_pre_launch(&mut self) {
-        self.operating.end_pre_launch();
+        self.pipeline.operating.end_pre_launch();
     }
 }

@@ -16,7 +16,7 @@ use super::UnitStream;
 ///
 /// The number behind the program's version goes up with every change of a type that is part of the memory; a test of
 /// this module notices.
-pub const MEMORY_VERSION: &str = concat!("isotherm ", env!("CARGO_PKG_VERSION"), ", memory 3");
+pub const MEMORY_VERSION: &str = concat!("isotherm ", env!("CARGO_PKG_VERSION"), ", memory 4");
 
 /// CRC-32 behind.
 const CHECKSUM: usize = 4;

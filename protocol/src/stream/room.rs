@@ -6,7 +6,6 @@ use std::collections::VecDeque;
 
 use isotherm_correction::operation::HealthReading;
 use isotherm_correction::sample::{AccelTick, CorrectedTick, GyroTick, TemperatureReading};
-use isotherm_correction::unit::{self, Unit};
 
 /// Most ready ticks for which room is kept.
 const MOST_READY: usize = 256;
@@ -24,7 +23,6 @@ pub(super) struct Room {
 /// Queues that no unit needs at present.
 #[derive(Debug, Default)]
 pub(super) struct Queues {
-    unit: unit::Room,
     ready: VecDeque<CorrectedTick>,
 }
 
@@ -42,16 +40,14 @@ pub(super) fn with<T>(work: impl FnOnce(&mut Room) -> T) -> T {
 
 impl Queues {
     /// Lends a unit what it may need for an event.
-    pub(super) fn lend(&mut self, unit: &mut Unit, ready: &mut VecDeque<CorrectedTick>) {
-        unit.borrow_room(&mut self.unit);
+    pub(super) fn lend(&mut self, ready: &mut VecDeque<CorrectedTick>) {
         if ready.capacity() == 0 {
             std::mem::swap(ready, &mut self.ready);
         }
     }
 
     /// Takes back what it does not need any more.
-    pub(super) fn take_back(&mut self, unit: &mut Unit, ready: &mut VecDeque<CorrectedTick>) {
-        unit.return_room(&mut self.unit);
+    pub(super) fn take_back(&mut self, ready: &mut VecDeque<CorrectedTick>) {
         self.take_ready(ready);
     }
 

@@ -107,10 +107,10 @@ impl UnitStream {
     }
 
     fn sensors(&self, label: &Label) -> Vec<SensorStatus> {
-        let gyros = self.unit.gyro_health().iter().enumerate();
-        let accels = self.unit.accel_health().iter().enumerate();
-        let gyros = gyros.map(|(index, health)| sensor(label.gyro(index), SensorKind::Gyro, health));
-        let accels = accels.map(|(index, health)| sensor(label.accel(index), SensorKind::Accel, health));
+        let gyros = self.unit.gyro_health().into_iter().enumerate();
+        let accels = self.unit.accel_health().into_iter().enumerate();
+        let gyros = gyros.map(|(index, health)| sensor(label.gyro(index), SensorKind::Gyro, &health));
+        let accels = accels.map(|(index, health)| sensor(label.accel(index), SensorKind::Accel, &health));
         gyros.chain(accels).collect()
     }
 

@@ -1,7 +1,6 @@
 //! I2 over a memory: a stream that is written down at any moment, read back and gone on with gives the same bits as one
 //! that was not.
 
-mod plain_ticks;
 mod scenarios;
 mod script;
 

@@ -74,7 +74,7 @@ impl Bench {
         self.end = observation.end_time;
         self.estimator.advance(self.end, restart, &plain);
         let subtracted = [0, 1, 2].map(|i| self.estimator.subtrahend(i, self.end));
-        observation.gyros.iter_mut().zip(subtracted).for_each(|(gyro, drift)| gyro.drift = drift);
+        observation.gyros.drift[..3].copy_from_slice(&subtracted);
         self.estimator.observe(&observation);
         self.subtracted.push(subtracted);
     }
@@ -208,16 +208,16 @@ fn readings_that_say_nothing_take_no_part() {
             // A mode switch now and then, one reading beyond its limit, one that is no number, a gyro that is excluded.
             if k % 300 == 0 {
                 observation.settled = false;
-                observation.gyros.iter_mut().for_each(|gyro| gyro.rate = 5.0);
+                observation.gyros.rate = [5.0; 8];
             }
             if k == 700 {
-                observation.gyros[0].flags = SensorFlags::OVERRANGE;
-                observation.gyros[0].rate = 1e3;
+                observation.gyros.flags[0] = SensorFlags::OVERRANGE;
+                observation.gyros.rate[0] = 1e3;
             }
             if k == 701 {
-                observation.gyros[0].rate = f64::NAN;
+                observation.gyros.rate[0] = f64::NAN;
             }
-            observation.gyros[2].flags = SensorFlags::EXCLUDED;
+            observation.gyros.flags[2] = SensorFlags::EXCLUDED;
         });
     }
     let estimate = bench.estimator.estimate(0).unwrap();

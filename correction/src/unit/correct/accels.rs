@@ -1,120 +1,105 @@
 //! The accelerometers' part of a tick: bias, scale factor, board ratio, case axes.
 
-use super::gyros::UNSOUND;
-use super::{Corrector, of_length, resolve, watch_parity};
+use core::array;
+
+use super::patch::{Patch, SOUND, within};
+use super::{Corrector, OnItsWay, of_sensors};
 use crate::calibration::Calibration;
-use crate::observation::AccelSeen;
-use crate::sample::{AccelTick, CorrectedTick, MAX_SENSORS, OutputKind, SensorFlags, TickFlags};
-use crate::thermal::AccelTerms;
+use crate::lanes::{narrow, of_readings, put};
+use crate::sample::{CorrectedTick, MAX_SENSORS, MIN_SENSORS, OutputKind, SensorFlags, TickFlags};
 use crate::unit::counters::Counters;
 use crate::units::Timestamp;
 
 impl Corrector {
-    /// The terms of an accelerometer in use.
-    pub(super) fn accel_terms(&self, index: usize, time: Timestamp) -> Option<AccelTerms> {
-        let terms = self.thermal.accels.get(index)?.at(time);
-        let slew = self.slew.as_ref().filter(|_| self.slew_share > 0.0);
-        Some(slew.map_or(terms, |slew| slew.accel(index, terms, self.slew_share)))
+    /// The terms of the accelerometers in use: S and 1/K, and r of their boards.
+    pub(super) fn accel_terms<const N: usize>(&self, time: Timestamp) -> ([[f64; N]; 2], [[f64; N]; 1]) {
+        let (mut terms, mut board) = (self.thermal.accels.at::<N>(time), self.thermal.boards.at::<N>(time));
+        if let Some(slewing) = self.slewing() {
+            slewing.terms(&mut terms, &slewing.from.accels);
+            slewing.terms(&mut board, &slewing.from.boards);
+        }
+        (terms, board)
     }
 
     /// Corrects the accelerometers' readings of a tick.
-    pub(super) fn accels(
+    #[inline]
+    pub(super) fn accels<const N: usize>(
         &mut self,
         calibration: &Calibration,
-        time: Timestamp,
-        accel: Option<&AccelTick>,
-        out: &mut CorrectedTick,
+        tick: &OnItsWay<'_>,
         counters: &mut Counters,
+        out: &mut CorrectedTick,
     ) {
+        let count = calibration.accels.len();
         self.seen.specific_force = None;
-        let Some(orientation) = &calibration.accel_orientation else {
-            self.seen.accels.clear();
-            out.accel_flags.clear();
+        self.seen.accels.count = 0;
+        out.accel_flags = of_sensors([SensorFlags::empty(); MAX_SENSORS], count);
+        let (Some(orientation), Some(axes)) = (&calibration.accel_orientation, &self.thermal.accel_axes) else {
             return;
         };
-        let Some(tick) = accel else {
-            self.seen.accels.clear();
+        let Some(raw) = tick.accel else {
             out.flags |= TickFlags::ACCELEROMETER_MISSING | TickFlags::VELOCITY_INVALID;
-            of_length(&mut out.accel_flags, calibration.accels.len());
-            out.accel_flags.fill(SensorFlags::empty());
             counters.accel_missing += 1;
             return;
         };
-        let duration_s = tick.duration.as_s();
-        let Some(axes) = &self.thermal.accel_axes else { return };
-        let included = axes.included();
-        let mut mask = included;
-        let mut forces = [0.0; MAX_SENSORS];
-        let count = calibration.accels.len();
-        of_length(&mut self.seen.accels, count);
-        of_length(&mut out.accel_flags, count);
-        let slew = self.slew.as_ref().filter(|_| self.slew_share > 0.0);
-        let (
-            Some(thermals),
-            Some(footings),
-            Some(last_forces),
-            Some(healths),
-            Some(seen),
-            Some(all_flags),
-            Some(readings),
-            Some(forces),
-        ) = (
-            self.thermal.accels.get(..count),
-            self.thermal.footings.accels.get(..count),
-            self.last_forces.get_mut(..count),
-            self.accel_health.get_mut(..count),
-            self.seen.accels.get_mut(..count),
-            out.accel_flags.get_mut(..count),
-            tick.readings.get(..count),
-            forces.get_mut(..count),
-        )
-        else {
-            return;
-        };
-        for (i, model) in calibration.accels.iter().enumerate() {
-            let terms = thermals[i].at(time);
-            let terms = slew.map_or(terms, |slew| slew.accel(i, terms, self.slew_share));
-            let mut flags = footings[i].flags(time);
-            if !included.contains(i) {
-                flags |= SensorFlags::EXCLUDED;
-            }
-            let (reading, limit) = (readings[i], model.input_limit);
-            let force = if reading.is_finite() {
-                if reading.abs() >= limit {
-                    flags |= SensorFlags::OVERRANGE;
-                    counters.overrange_readings += 1;
-                }
-                let reading = reading.clamp(-limit, limit);
-                terms.specific_force(match calibration.accel_output {
-                    OutputKind::Counts => reading / duration_s,
-                    OutputKind::Mean => reading,
-                })
-            } else {
-                flags |= SensorFlags::NOT_FINITE;
-                counters.not_finite_readings += 1;
-                last_forces[i]
+        // The corrected tick has the gyro tick's time.
+        let (time, duration_s) = (out.end_time, raw.duration.as_s());
+        let ([bias, per_scale_factor], [ratio]) = self.accel_terms::<N>(time);
+        let readings: [f64; N] = of_readings(&raw.readings);
+        let corrected = |lane: usize, reading: f64| {
+            let output = match calibration.accel_output {
+                OutputKind::Counts => reading / duration_s,
+                OutputKind::Mean => reading,
             };
-            if flags.intersects(SensorFlags::OVERRANGE | SensorFlags::NOT_FINITE) {
-                mask = mask.without(i);
-            } else {
-                last_forces[i] = force;
+            (output - bias[lane]) * ratio[lane] * per_scale_factor[lane]
+        };
+        let mut forces: [f64; N] = array::from_fn(|i| corrected(i, readings[i]));
+
+        let mut usable = axes.included();
+        let footing = &self.thermal.accel_footing;
+        let flags = if footing.is_sound(time) & within(&readings, narrow(&calibration.accel_limits)) {
+            put(&mut self.last_forces, forces);
+            self.accel_health.note_sound();
+            SOUND
+        } else {
+            let limits = &calibration.accel_limits;
+            let patch = Patch { count, readings: &raw.readings, limits, footing, time };
+            let last = &self.last_forces;
+            let flags = patch.apply(&mut usable, counters, |lane, reading| {
+                forces[lane] = reading.map_or(last[lane], |reading| corrected(lane, reading));
+            });
+            let taken = SensorFlags::OVERRANGE | SensorFlags::NOT_FINITE;
+            for lane in (0..count).filter(|lane| !flags[*lane].intersects(taken)) {
+                self.last_forces[lane] = forces[lane];
             }
-            if flags.intersects(UNSOUND) {
-                flags -= SensorFlags::VALID;
-            }
-            forces[i] = force;
-            all_flags[i] = flags;
-            healths[i].note(flags);
-            seen[i] = AccelSeen { reading, flags };
-        }
+            self.accel_health.note(&flags);
+            flags
+        };
+        let seen = &mut self.seen.accels;
+        seen.count = count;
+        put(&mut seen.reading, readings);
+        seen.flags = flags;
+        out.accel_flags = of_sensors(flags, count);
+
         let Some(axes) = &mut self.thermal.accel_axes else { return };
-        let told = (&mut out.accel_parity, &mut out.flags);
-        watch_parity(axes, orientation, (mask, forces), told, counters);
-        let (force, trusted) = resolve(axes, orientation, mask, forces, time);
-        let slewed_from = self.slew.as_ref().and_then(|slew| slew.accel_axes.as_ref());
-        let force = crate::unit::slew::axes(force, slewed_from, mask, forces, self.slew_share);
+        let excluded = orientation.sensors() > MIN_SENSORS
+            && axes.watch(
+                orientation,
+                usable,
+                &forces[..orientation.sensors()],
+                (&mut out.accel_parity, &mut out.flags),
+            );
+        let (force, trusted) = axes.resolve(orientation, usable, &forces, time);
+        let force = self.slewing().map_or(force, |slewing| {
+            let old = slewing.from.accel_axes.as_ref();
+            slewing.axes(force, old, usable, &forces[..orientation.sensors()])
+        });
         out.delta_velocity = force.map(|f| f * duration_s);
         out.flags.set(TickFlags::VELOCITY_INVALID, !trusted);
         self.seen.specific_force = trusted.then_some(force);
+        if excluded {
+            counters.sensors_excluded += 1;
+            self.thermal.note_footing(calibration);
+        }
     }
 }

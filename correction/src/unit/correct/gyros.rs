@@ -1,22 +1,26 @@
 //! The gyros' part of a tick: scale, bias, servo transient, substitution, case axes.
 
-use super::{Corrector, of_length, resolve, watch_parity};
+use core::array;
+
+use super::patch::{Patch, SOUND, within};
+use super::{Corrector, OnItsWay, of_sensors};
 use crate::calibration::Calibration;
-use crate::observation::GyroSeen;
+use crate::lanes::{narrow, of_readings, put};
 use crate::orientation::SensorMask;
 use crate::reversal::{Substitution, TickInput};
-use crate::sample::{CorrectedTick, GyroTick, LasingMode, MAX_SENSORS, OutputKind, SensorFlags, TickFlags};
+use crate::sample::{
+    CorrectedTick, GyroTick, LasingMode, MIN_SENSORS, OutputKind, SensorFlags, TickFlags,
+};
 use crate::servo::{ServoTick, Transient};
-use crate::thermal::{GyroModel, GyroTerms};
 use crate::unit::counters::Counters;
-use crate::unit::footing::Footing;
-use crate::unit::release::Released;
+use crate::unit::pipeline::Released;
 use crate::units::Timestamp;
 
-/// A reading that does not count as it stands.
-pub(super) const UNSOUND: SensorFlags =
-    SensorFlags::OVERRANGE.union(SensorFlags::NOT_FINITE).union(SensorFlags::EXCLUDED);
-
+/// What the substitution did, and the servo could not: counted.
+const SWITCHING: TickFlags = TickFlags::INTERPOLATED
+    .union(TickFlags::ANGLE_RESTORED)
+    .union(TickFlags::SWITCH_UNRESOLVED)
+    .union(TickFlags::SERVO_UNMEASURED);
 /// The increments of a tick that are not those of a settled instrument.
 const UNSETTLED: TickFlags = TickFlags::INTERPOLATED
     .union(TickFlags::ANGLE_RESTORED)
@@ -24,151 +28,141 @@ const UNSETTLED: TickFlags = TickFlags::INTERPOLATED
     .union(TickFlags::SERVO_UNMEASURED);
 
 impl Corrector {
-    /// The terms of a gyro in use, its trend in the bias.
-    pub(super) fn gyro_terms(
+    /// The terms of the gyros in use, the trend in the bias: increment weight, bias, magnetic and slow-meander term.
+    pub(super) fn gyro_terms<const N: usize>(
         &self,
-        index: usize,
-        model: &GyroModel,
+        calibration: &Calibration,
         time: Timestamp,
         since_turn_on_s: f64,
-    ) -> Option<GyroTerms> {
-        let terms = terms(self.thermal.gyros.get(index)?.at(time), model, since_turn_on_s);
-        let slew = self.slew.as_ref().filter(|_| self.slew_share > 0.0);
-        Some(slew.map_or(terms, |slew| slew.gyro(index, terms, self.slew_share)))
+    ) -> [[f64; N]; 4] {
+        let mut terms = self.thermal.gyros.at::<N>(time);
+        let trend = calibration.trends.as_ref().map_or([0.0; N], |trends| trends.at(since_turn_on_s));
+        terms[1] = array::from_fn(|i| terms[1][i] + trend[i]);
+        if let Some(slewing) = self.slewing() {
+            slewing.terms(&mut terms, &slewing.from.gyros);
+        }
+        terms
     }
 
     /// Corrects the gyros' readings of a tick.
-    pub(super) fn gyros(
+    #[inline]
+    pub(super) fn gyros<const N: usize>(
         &mut self,
         calibration: &Calibration,
-        released: &Released<'_>,
-        since_turn_on_s: f64,
-        out: &mut CorrectedTick,
+        tick: &OnItsWay<'_>,
         counters: &mut Counters,
+        out: &mut CorrectedTick,
     ) {
-        let tick = released.tick;
-        let duration_s = tick.duration.as_s();
-        let input = input(released);
-        let lost = calibration.reversal.as_ref().is_some_and(|r| self.substitution.is_lost(r, &input));
-        self.servo.advance(lost, tick.end_time, tick.duration);
-
-        let included = self.thermal.gyro_axes.included();
-        let mut mask = included;
-        let (mut increments, mut rates) = ([0.0; MAX_SENSORS], [0.0; MAX_SENSORS]);
+        let raw = tick.released.tick;
+        let (time, duration_s) = (raw.end_time, raw.duration.as_s());
         let count = calibration.gyros.len();
-        of_length(&mut self.seen.gyros, count);
-        of_length(&mut out.gyro_flags, count);
-        let slew = self.slew.as_ref().filter(|_| self.slew_share > 0.0);
-        let signs = Signs::of(tick);
-        // Lists of one length, so that it is checked here and not at every access.
-        let (
-            Some(thermals),
-            Some(footings),
-            Some(last_rates),
-            Some(healths),
-            Some(seen),
-            Some(all_flags),
-            Some(readings),
-            Some(increments),
-            Some(rates),
-        ) = (
-            self.thermal.gyros.get(..count),
-            self.thermal.footings.gyros.get(..count),
-            self.last_rates.get_mut(..count),
-            self.gyro_health.get_mut(..count),
-            self.seen.gyros.get_mut(..count),
-            out.gyro_flags.get_mut(..count),
-            tick.readings.get(..count),
-            increments.get_mut(..count),
-            rates.get_mut(..count),
-        )
-        else {
-            return;
-        };
-        for (i, model) in calibration.gyros.iter().enumerate() {
-            let terms = terms(thermals[i].at(tick.end_time), model, since_turn_on_s);
-            let terms = slew.map_or(terms, |slew| slew.gyro(i, terms, self.slew_share));
-            let Footing { temperature_deg_c, .. } = footings[i];
-            let mut bias = signs.bias(&terms);
-            if let (Some(servo), false) = (&model.servo, lost) {
-                let servo_tick = ServoTick {
-                    end_time: tick.end_time,
-                    duration: tick.duration,
-                    temperature_deg_c,
-                    scale_rad_per_count: terms.increment_weight,
-                    half_periods: tick.half_periods.get(i).copied(),
-                };
-                let transient = self.servo.apparent_rate(i, servo, &servo_tick);
-                bias += transient.rate_rad_per_s();
-                out.flags |= flags_of(transient);
-            }
-            let drift = self.drift.subtrahend(i, tick.end_time);
-            let mut flags = footings[i].flags(tick.end_time);
-            if !included.contains(i) {
-                flags |= SensorFlags::EXCLUDED;
-            }
+        let input = input(tick.released);
+        let lost = calibration.reversal.as_ref().is_some_and(|r| self.substitution.is_lost(r, &input));
 
-            let (reading, limit) = (readings[i], model.input_limit);
-            increments[i] = if lost {
-                0.0
-            } else if reading.is_finite() {
-                if reading.abs() >= limit {
-                    flags |= SensorFlags::OVERRANGE;
-                    counters.overrange_readings += 1;
-                    mask = mask.without(i);
-                }
-                // Beyond its limit a reading says no more than the limit, and stays finite whatever it is.
-                let reading = reading.clamp(-limit, limit);
-                scaled(calibration.gyro_output, reading, terms.increment_weight, duration_s)
-                    - (bias + drift) * duration_s
+        let [weight, bias, magnetic, meander] = self.gyro_terms::<N>(calibration, time, tick.since_turn_on_s);
+        let (mode_sign, meander_sign) = (sign(raw.mode), sign(raw.meander));
+        let mut bias: [f64; N] =
+            array::from_fn(|i| bias[i] + mode_sign * magnetic[i] + meander_sign * meander[i]);
+        self.servo.advance(lost, time, raw.duration);
+        if calibration.has_servo && !lost {
+            out.flags |= self.servo_transients(calibration, raw, &weight, &mut bias);
+        }
+        let drift: [f64; N] = if self.drift.subtracts() {
+            array::from_fn(|i| self.drift.subtrahend(i, time))
+        } else {
+            [0.0; N]
+        };
+        let subtrahend: [f64; N] = array::from_fn(|i| bias[i] + drift[i]);
+        let readings: [f64; N] = of_readings(&raw.readings);
+        let scaled = |lane: usize, reading: f64| match calibration.gyro_output {
+            OutputKind::Counts => weight[lane] * reading,
+            OutputKind::Mean => weight[lane] * (reading * duration_s),
+        };
+        let corrected = |lane: usize, reading| scaled(lane, reading) - subtrahend[lane] * duration_s;
+        let mut increments: [f64; N] = array::from_fn(|i| corrected(i, readings[i]));
+
+        let mut usable = self.thermal.gyro_axes.included();
+        let footing = &self.thermal.gyro_footing;
+        let sound = !lost & footing.is_sound(time) & within(&readings, narrow(&calibration.gyro_limits));
+        let flags = if sound {
+            SOUND
+        } else {
+            let limits = &calibration.gyro_limits;
+            let patch = Patch { count, readings: &raw.readings, limits, footing, time };
+            if lost {
+                increments = [0.0; N];
+                patch.lost()
             } else {
-                flags |= SensorFlags::NOT_FINITE;
-                counters.not_finite_readings += 1;
-                mask = mask.without(i);
-                last_rates[i] * duration_s
-            };
-            // Before the substitution: the angle that it restores is a lump, not a rate.
-            rates[i] = increments[i] / duration_s;
-            if lost || flags.intersects(UNSOUND) {
-                flags -= SensorFlags::VALID;
-            } else {
-                last_rates[i] = rates[i];
+                let last = &self.last_rates;
+                patch.apply(&mut usable, counters, |lane, reading| {
+                    increments[lane] = match reading {
+                        Some(reading) => corrected(lane, reading),
+                        None => last[lane] * duration_s,
+                    };
+                })
             }
-            all_flags[i] = flags;
-            healths[i].note(flags);
-            let rate = rates[i] + (bias + drift);
-            seen[i] = GyroSeen { reading, rate, bias, drift, temperature_deg_c, flags };
+        };
+        // Before the substitution: the angle that it restores is a lump, not a rate.
+        let rates: [f64; N] = increments.map(|increment| increment / duration_s);
+        if sound {
+            put(&mut self.last_rates, rates);
+            self.gyro_health.note_sound();
+        } else {
+            for lane in (0..count).filter(|lane| flags[*lane].contains(SensorFlags::VALID)) {
+                self.last_rates[lane] = rates[lane];
+            }
+            self.gyro_health.note(&flags);
         }
 
-        out.flags |= self.substitute(calibration, input, increments);
-        count_switch_flags(out.flags, counters);
+        let seen = &mut self.seen.gyros;
+        seen.count = count;
+        put(&mut seen.reading, readings);
+        put::<N>(&mut seen.rate, array::from_fn(|i| rates[i] + subtrahend[i]));
+        put(&mut seen.bias, bias);
+        put(&mut seen.drift, drift);
+        seen.temperature_deg_c = self.thermal.gyro_footing.temperature_deg_c;
+        seen.flags = flags;
+        out.gyro_flags = of_sensors(flags, count);
+
+        out.flags |= self.substitute(calibration, input, &mut increments[..count]);
+        if out.flags.intersects(SWITCHING) {
+            count_switch_flags(out.flags, counters);
+        }
         self.seen.settled = !lost && self.slew.is_none() && !out.flags.intersects(UNSETTLED);
-        self.resolve_angle(calibration, mask, (increments, rates), out, counters);
+        self.resolve_angle(calibration, usable, (&increments, &rates), counters, out);
     }
 
-    /// Resolves the increments (rad) in case axes, and watches the parity of the rates before the substitution (rad/s).
-    fn resolve_angle(
+    /// Adds what the gyros' servos show in a good tick to their biases (rad/s); `weight` in rad per count.
+    fn servo_transients<const N: usize>(
         &mut self,
         calibration: &Calibration,
-        mask: SensorMask,
-        (increments, rates): (&[f64], &[f64]),
-        out: &mut CorrectedTick,
-        counters: &mut Counters,
-    ) {
-        let orientation = &calibration.gyro_orientation;
-        let axes = &mut self.thermal.gyro_axes;
-        if !out.flags.contains(TickFlags::INTERPOLATED) {
-            let told = (&mut out.gyro_parity, &mut out.flags);
-            watch_parity(axes, orientation, (mask, rates), told, counters);
+        tick: &GyroTick,
+        weight: &[f64; N],
+        bias: &mut [f64; N],
+    ) -> TickFlags {
+        let mut flags = TickFlags::empty();
+        let temperatures = &self.thermal.gyro_footing.temperature_deg_c;
+        let lanes = calibration.gyros.iter().zip(weight).zip(temperatures).zip(bias).enumerate();
+        for (lane, (((model, weight), temperature_deg_c), bias)) in lanes {
+            let Some(servo) = &model.servo else { continue };
+            let servo_tick = ServoTick {
+                end_time: tick.end_time,
+                duration: tick.duration,
+                temperature_deg_c: *temperature_deg_c,
+                scale_rad_per_count: *weight,
+                half_periods: tick.half_periods.get(lane).copied(),
+            };
+            let transient = self.servo.apparent_rate(lane, servo, &servo_tick);
+            *bias += transient.rate_rad_per_s();
+            flags |= match transient {
+                Transient::Settled => TickFlags::empty(),
+                Transient::Apparent { .. } => TickFlags::SERVO_TRANSIENT,
+                Transient::Unmeasured => TickFlags::SERVO_UNMEASURED,
+            };
         }
-        let (angle, trusted) = resolve(axes, orientation, mask, increments, out.end_time);
-        let slewed_from = self.slew.as_ref().and_then(|slew| slew.gyro_axes.as_ref());
-        out.delta_angle = crate::unit::slew::axes(angle, slewed_from, mask, increments, self.slew_share);
-        out.flags.set(TickFlags::ANGLE_INVALID, !trusted);
+        flags
     }
-}
 
-impl Corrector {
     /// Bridges a mode switch (models §5).
     fn substitute(
         &mut self,
@@ -186,10 +180,37 @@ impl Corrector {
             None => TickFlags::empty(),
         }
     }
+
+    /// Resolves the increments (rad) in case axes, and watches the parity of the rates before the substitution (rad/s).
+    fn resolve_angle<const N: usize>(
+        &mut self,
+        calibration: &Calibration,
+        usable: SensorMask,
+        (increments, rates): (&[f64; N], &[f64; N]),
+        counters: &mut Counters,
+        out: &mut CorrectedTick,
+    ) {
+        let orientation = &calibration.gyro_orientation;
+        let axes = &mut self.thermal.gyro_axes;
+        let mut excluded = false;
+        if orientation.sensors() > MIN_SENSORS && !out.flags.contains(TickFlags::INTERPOLATED) {
+            let rates = &rates[..orientation.sensors()];
+            excluded = axes.watch(orientation, usable, rates, (&mut out.gyro_parity, &mut out.flags));
+        }
+        let (angle, trusted) = axes.resolve(orientation, usable, increments, out.end_time);
+        out.delta_angle = self.slewing().map_or(angle, |slewing| {
+            slewing.axes(angle, slewing.from.gyro_axes.as_ref(), usable, &increments[..orientation.sensors()])
+        });
+        out.flags.set(TickFlags::ANGLE_INVALID, !trusted);
+        if excluded {
+            counters.sensors_excluded += 1;
+            self.thermal.note_footing(calibration);
+        }
+    }
 }
 
 /// What the substitution must know of a tick.
-pub(super) fn input(released: &Released<'_>) -> TickInput {
+fn input(released: &Released<'_>) -> TickInput {
     let tick = released.tick;
     TickInput {
         end_time: tick.end_time,
@@ -201,49 +222,13 @@ pub(super) fn input(released: &Released<'_>) -> TickInput {
     }
 }
 
-/// What is told of a tick with this transient of the servo.
-const fn flags_of(transient: Transient) -> TickFlags {
-    match transient {
-        Transient::Settled => TickFlags::empty(),
-        Transient::Apparent { .. } => TickFlags::SERVO_TRANSIENT,
-        Transient::Unmeasured => TickFlags::SERVO_UNMEASURED,
-    }
-}
-
-/// The terms with the trend in the bias.
-fn terms(mut thermal: GyroTerms, model: &GyroModel, since_turn_on_s: f64) -> GyroTerms {
-    thermal.bias += model.trend.as_ref().map_or(0.0, |trend| trend.at(since_turn_on_s));
-    thermal
-}
-
-/// Signs of a tick's mode and meander; +1 where the instrument has none.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Signs {
-    mode: f64,
-    meander: f64,
-}
-
-impl Signs {
-    pub(super) fn of(tick: &GyroTick) -> Self {
-        let sign = |phase: Option<LasingMode>| phase.map_or(1.0, LasingMode::sign);
-        Self { mode: sign(tick.mode), meander: sign(tick.meander) }
-    }
-
-    /// The terms of Ω that follow temperature (rad/s).
-    pub(super) fn bias(&self, terms: &GyroTerms) -> f64 {
-        terms.bias + self.mode * terms.magnetic + self.meander * terms.meander
-    }
-}
-
-/// K(T)·P (rad).
-fn scaled(output: OutputKind, reading: f64, increment_weight: f64, duration_s: f64) -> f64 {
-    match output {
-        OutputKind::Counts => increment_weight * reading,
-        OutputKind::Mean => increment_weight * (reading * duration_s),
-    }
+/// Sign of a lasing mode or of the meander's phase; +1 where the instrument has none.
+fn sign(phase: Option<LasingMode>) -> f64 {
+    phase.map_or(1.0, LasingMode::sign)
 }
 
 /// Counts what the substitution did.
+#[cold]
 fn count_switch_flags(flags: TickFlags, counters: &mut Counters) {
     counters.ticks_interpolated += u64::from(flags.contains(TickFlags::INTERPOLATED));
     counters.switches_restored += u64::from(flags.contains(TickFlags::ANGLE_RESTORED));

@@ -1,0 +1,255 @@
+//! Ticks in their order go through the corrector and out: what fits the calibration, when a change takes effect, and what is
+//! announced with a tick.
+
+use alloc::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+
+use super::accel_intake::PendingAccel;
+use super::change::{At, Change};
+use super::correct::{Corrector, OnItsWay, Takeover, pass_through};
+use super::counters::Counters;
+use super::operating::Operating;
+use super::settings::{Uncalibrated, UnitSettings};
+use super::thermal_memory::Waiting;
+use crate::calibration::Calibration;
+use crate::drift::DriftSettings;
+use crate::navigation::StepSum;
+use crate::sample::{AccelTick, CorrectedTick, GyroTick, OutputKind, TemperatureReading, TickFlags};
+use crate::units::{Span, Timestamp};
+
+/// A calibration in force, with the memory that belongs to it.
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct Active {
+    #[serde(with = "crate::written::shared")]
+    pub(super) calibration: Arc<Calibration>,
+    pub(super) corrector: Corrector,
+    pub(super) revision: u64,
+}
+
+/// A gyro tick that has left its intake: the next of its series, or the first of a new one.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Released<'a> {
+    pub(super) tick: &'a GyroTick,
+    /// What its readings stand for.
+    pub(super) output: OutputKind,
+    /// Ticks that are missing before it.
+    pub(super) missed: u64,
+    pub(super) restart: bool,
+}
+
+/// Everything that a tick passes between the intake and the owner of the unit.
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct Pipeline {
+    pub(super) settings: UnitSettings,
+    pub(super) active: Option<Active>,
+    pub(super) pending: Option<Change>,
+    pub(super) operating: Operating,
+    pub(super) waiting: Waiting,
+    pub(super) steps: StepSum,
+    pub(super) counters: Counters,
+    /// Ticks that left the intake and were neither given out nor announced.
+    unannounced: u64,
+    /// Ticks that left the intake without being corrected, and whether the producer restarted at one of them.
+    unseen: (u64, bool),
+    /// The next output must announce a restart that fell on a tick which was held back.
+    restart_due: bool,
+    /// End of the first tick since the unit appeared or its producer restarted.
+    turn_on: Option<Timestamp>,
+    pub(super) last_end: Timestamp,
+    /// Where a tick is corrected: no memory, only a place.
+    #[serde(skip)]
+    corrected: CorrectedTick,
+}
+
+impl Pipeline {
+    pub(super) fn new(settings: UnitSettings) -> Self {
+        Self {
+            settings,
+            active: None,
+            pending: None,
+            operating: Operating::new(settings.in_standby),
+            waiting: Waiting::default(),
+            steps: StepSum::new(),
+            counters: Counters::default(),
+            unannounced: 0,
+            unseen: (0, false),
+            restart_due: false,
+            turn_on: None,
+            last_end: Timestamp::default(),
+            corrected: CorrectedTick::default(),
+        }
+    }
+
+    /// Puts a change in force, before the next tick.
+    pub(super) fn take_effect(&mut self, change: Change) {
+        let Change { calibration, revision, slew, .. } = change;
+        let since_turn_on_s = self.turn_on.map_or(0.0, |turn_on| self.last_end.seconds_from(turn_on));
+        // A unit that has given nothing out has nothing to move away from.
+        let slew = if self.turn_on.is_some() { slew } else { Span::ZERO };
+        let kept = self.active.take().map(|active| (active.calibration, active.corrector));
+        let UnitSettings { reference_delay: delay, subtract_drift: subtract, .. } = self.settings;
+        let drift = DriftSettings { delay, subtract };
+        let takeover = Takeover { now: self.last_end, since_turn_on_s, slew, drift };
+        let corrector = Corrector::new(&calibration, kept, takeover);
+        self.operating.calibration_changed(&calibration);
+        self.active = Some(Active { calibration, corrector, revision });
+    }
+
+    /// Takes temperature readings, which wait for the first tick that is to feel them.
+    pub(super) fn take_temperatures(&mut self, readings: &[TemperatureReading]) {
+        for reading in readings {
+            self.counters.temperature_readings_in += 1;
+            if reading.time + self.settings.temperature_delay < self.last_end {
+                self.counters.temperature_late += 1;
+            }
+            self.waiting.push(reading, &mut self.counters);
+        }
+    }
+
+    /// Whether a gyro tick fits the calibration that will correct it.
+    #[inline]
+    pub(super) fn takes_gyro(&mut self, tick: &GyroTick, output: OutputKind) -> bool {
+        let due = self.pending.as_ref().is_some_and(|change| change.at.is_due(tick));
+        self.fits(due, output, tick.readings.len(), |c| (c.gyro_output(), c.gyro_count()))
+    }
+
+    /// Whether an accelerometer tick fits the calibration that will correct it.
+    #[inline]
+    pub(super) fn takes_accel(&mut self, tick: &AccelTick, output: OutputKind) -> bool {
+        let sensors = tick.readings.len();
+        // Which gyro tick it will go with is not known yet.
+        let due = self.pending.as_ref().is_some_and(|change| match change.at {
+            At::Time(time) => tick.end_time >= time,
+            At::Sequence(_) => {
+                let waiting = &change.calibration;
+                (waiting.accel_output(), waiting.accel_count()) == (output, sensors)
+            }
+            At::NextTick => false,
+        });
+        self.fits(due, output, sensors, |c| (c.accel_output(), c.accel_count()))
+    }
+
+    /// Checks kind and number of readings against the calibration, if there is one: the one in force, or the one that waits.
+    #[inline]
+    fn fits(
+        &mut self,
+        waiting: bool,
+        output: OutputKind,
+        sensors: usize,
+        expect: fn(&Calibration) -> (OutputKind, usize),
+    ) -> bool {
+        let in_force = self.active.as_ref().map(|active| &active.calibration);
+        let calibration =
+            self.pending.as_ref().filter(|_| waiting).map(|change| &change.calibration).or(in_force);
+        let Some((need_output, need_sensors)) = calibration.map(|calibration| expect(calibration)) else {
+            return true;
+        };
+        if sensors != need_sensors {
+            self.counters.wrong_sensor_count += 1;
+            return false;
+        }
+        if output != need_output {
+            self.counters.wrong_output_kind += 1;
+            return false;
+        }
+        true
+    }
+
+    /// Whether a gyro tick cannot go without its accelerometers. Whether a unit without calibration has any is not known: it
+    /// waits as if it had.
+    pub(super) fn expects_accels(&self) -> bool {
+        self.active.as_ref().is_none_or(|active| active.calibration.accel_count() > 0)
+    }
+
+    /// Corrects one tick and gives it out.
+    #[inline]
+    pub(super) fn pass<E: FnMut(&CorrectedTick) + ?Sized>(
+        &mut self,
+        mut released: Released<'_>,
+        accel: Option<&PendingAccel>,
+        emit: &mut E,
+    ) {
+        let Released { tick, output, .. } = released;
+        // The run that a sequence number or a time was meant for is over with a restart.
+        if self.pending.is_some()
+            && let Some(change) =
+                self.pending.take_if(|change| released.restart || change.at.is_due(tick))
+        {
+            self.take_effect(change);
+        }
+        // A swap since they came may have changed what fits.
+        let accel = accel.filter(|PendingAccel { tick, output, .. }| {
+            self.fits(false, *output, tick.readings.len(), |c| (c.accel_output(), c.accel_count()))
+        });
+        let fits = self.fits(false, output, tick.readings.len(), |c| (c.gyro_output(), c.gyro_count()));
+        self.last_end = tick.end_time;
+        if released.restart {
+            self.waiting.restart(self.last_end);
+            self.turn_on = None;
+        }
+        // What the consumer has not been told, and what the corrector has not seen: a tick that is held back in standby
+        // is unknown to the one and not to the other.
+        let restart = released.restart | core::mem::take(&mut self.restart_due);
+        let missed = released.missed.saturating_add(core::mem::take(&mut self.unannounced));
+        let (unseen, restart_unseen) = core::mem::take(&mut self.unseen);
+        released.missed = released.missed.saturating_add(unseen);
+        released.restart |= restart_unseen;
+        let turn_on = *self.turn_on.get_or_insert(tick.end_time);
+        let mut held = false;
+        match &mut self.active {
+            Some(active) if fits => {
+                let tick = OnItsWay {
+                    released: &released,
+                    accel: accel.map(|accel| &accel.tick),
+                    since_turn_on_s: tick.end_time.seconds_from(turn_on),
+                };
+                let waiting = (&mut self.waiting, self.settings.temperature_delay);
+                let (counters, out) = (&mut self.counters, &mut self.corrected);
+                active.corrector.correct(&active.calibration, &tick, waiting, counters, out);
+                self.corrected.revision = active.revision;
+                if self.operating.watches() {
+                    watch(&mut self.operating, active, self.last_end);
+                }
+            }
+            Some(_) => {}
+            None => {
+                held = self.settings.uncalibrated == Uncalibrated::Hold;
+                self.corrected = pass_through(tick, accel.map(|accel| &accel.tick));
+            }
+        }
+        held |= !self.operating.state().is_running();
+        if held || (self.active.is_some() && !fits) {
+            self.unannounced = missed.saturating_add(1);
+            self.restart_due = restart;
+            if self.active.is_none() || !fits {
+                self.unseen = (released.missed.saturating_add(1), released.restart);
+            }
+            self.counters.ticks_held += u64::from(held);
+            return;
+        }
+        self.corrected.missed = missed;
+        if missed > 0 {
+            self.corrected.flags |= TickFlags::GAP;
+            self.counters.gaps += 1;
+            self.counters.ticks_missed = self.counters.ticks_missed.saturating_add(missed);
+        }
+        if restart {
+            self.corrected.flags |= TickFlags::RESTART;
+        }
+        self.counters.ticks_out += 1;
+        self.steps.push(&self.settings.navigation, &self.corrected, emit);
+    }
+}
+
+/// Shows a corrected tick to those who watch the unit.
+#[cold]
+fn watch(operating: &mut Operating, active: &mut Active, time: Timestamp) {
+    let temperature = |name: &_| active.corrector.thermal().alive(&active.calibration, name, time);
+    let in_force = (&*active.calibration, active.revision);
+    let reference = operating.observe(&active.corrector.seen, in_force, &temperature);
+    if let Some(reference) = reference {
+        // What is refused is counted.
+        let _ = active.corrector.drift.submit_at_rest(&reference);
+    }
+}
