@@ -1,10 +1,11 @@
 //! I2 over the two paths of a tick: by the plan, sensor beside sensor, or by the general path, sensor after sensor. Frames,
 //! first outputs and memory are the same bytes.
 
+use isotherm_tests::lives;
+use isotherm_tests::script::Scenario;
 use proptest::prelude::*;
 
-use super::script::Scenario;
-use super::{run, run_stream, scenarios};
+use super::{run, run_stream};
 
 /// Compares the two; in how many of its steps the plan held.
 fn same(scenario: &Scenario) -> usize {
@@ -22,7 +23,7 @@ fn same(scenario: &Scenario) -> usize {
 
 #[test]
 fn i2_plain_ticks_give_the_bits_of_the_general_path() {
-    for scenario in scenarios::all() {
+    for scenario in lives::all() {
         let planned = same(&scenario);
         assert!(
             planned > 100,
@@ -38,6 +39,6 @@ proptest! {
 
     #[test]
     fn i2_whatever_happens_plain_ticks_give_the_bits_of_the_general_path(seed in any::<u64>()) {
-        same(&scenarios::anything(seed, 300));
+        same(&lives::anything(seed, 300));
     }
 }
