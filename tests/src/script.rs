@@ -124,6 +124,8 @@ pub struct Script {
     pub warming: f64,
     /// Temperatures come.
     pub thermometers: bool,
+    /// What each accelerometer reads at rest (thousandths of m/s²); none: the third points up, the others lie.
+    pub forces: Vec<f64>,
     /// When accelerometer ticks come.
     pub accels: Accels,
     late_accels: Vec<Step>,
@@ -161,6 +163,7 @@ impl Script {
             swing: 0.0,
             warming: 2e-4,
             thermometers: true,
+            forces: Vec::new(),
             accels: Accels::Before,
             late_accels: Vec::new(),
             mode: LasingMode::Plus,

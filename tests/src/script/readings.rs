@@ -94,7 +94,9 @@ impl Script {
         let calibration = Arc::clone(&self.calibration);
         let output = calibration.accel_output();
         let readings = (0..calibration.accel_count()).map(|sensor| {
-            let mean = if sensor == 2 { -9800.0 } else { 40.0 } + self.swing_of(sequence + 7, sensor);
+            let still = if sensor == 2 { -9800.0 } else { 40.0 };
+            let still = self.forces.get(sensor).copied().unwrap_or(still);
+            let mean = still + self.swing_of(sequence + 7, sensor);
             let mean = if output == OutputKind::Counts { mean * 5e-3 } else { mean };
             self.reading(output, mean)
         });

@@ -111,13 +111,11 @@ pub(crate) fn without_accels(mut parts: CalibrationParts) -> CalibrationParts {
     parts
 }
 
-/// So many gyros and accelerometers about the case axes, watched by parity, each with a bias of its own.
-pub(crate) fn redundant(sensors: u8, confirm_ticks: u32) -> Arc<Calibration> {
-    let mut parts = identity();
-    // Roots are the same on every machine, sines need not be.
+/// Input axes of eight sensors. Roots are the same on every machine, sines need not be.
+fn rows() -> [[f64; 3]; 8] {
     let third = (1.0_f64 / 3.0).sqrt();
     let half = 0.5_f64.sqrt();
-    let rows = [
+    [
         [1.0, 0.0, 0.0],
         [0.0, 1.0, 0.0],
         [0.0, 0.0, 1.0],
@@ -126,7 +124,13 @@ pub(crate) fn redundant(sensors: u8, confirm_ticks: u32) -> Arc<Calibration> {
         [half, 0.0, -half],
         [0.0, 0.6, 0.8],
         [-0.8, 0.0, 0.6],
-    ];
+    ]
+}
+
+/// So many gyros and accelerometers about the case axes, watched by parity, each with a bias of its own.
+pub(crate) fn redundant(sensors: u8, confirm_ticks: u32) -> Arc<Calibration> {
+    let mut parts = identity();
+    let rows = rows();
     let rows = &rows[..usize::from(sensors)];
     let watched = |limit| OrientationParts {
         slopes_per_deg_c: vec![[2e-6, -1e-6, 1e-6]; rows.len()],
@@ -145,6 +149,14 @@ pub(crate) fn redundant(sensors: u8, confirm_ticks: u32) -> Arc<Calibration> {
     }
     (parts.gyro_orientation, parts.accel_orientation) = (watched(0.05), Some(watched(0.5)));
     compile(&parts)
+}
+
+/// The life of a unit with [`redundant`] sensors, whose accelerometers agree with each other.
+pub(crate) fn redundant_script(seed: u64, sensors: u8, confirm_ticks: u32) -> Script {
+    let mut script = Script::new(seed, &redundant(sensors, confirm_ticks), &[("t", 23.0)]);
+    script.forces = rows().map(|[_, _, down]| -9800.0 * down).to_vec();
+    (script.swing, script.batch) = (0.0, 3);
+    script
 }
 
 /// Frames of a hundred plain ticks, ten in each.

@@ -5,7 +5,7 @@ use isotherm_tests::calibrations::compile;
 use isotherm_tests::lives::{FULL_CHANNELS, full};
 use isotherm_tests::script::{Kind, Odd, Scenario, Script};
 
-use crate::plain::{RICH_CHANNELS, redundant, rich_parts, rich_script, told, with_outputs};
+use crate::plain::{RICH_CHANNELS, redundant_script, rich_parts, rich_script, told, with_outputs};
 
 fn odd(kind: Kind, sensor: Option<usize>, from: u64, ticks: u64, value: f64) -> Odd {
     Odd { kind, sensor, ticks: from..from + ticks, value }
@@ -13,8 +13,8 @@ fn odd(kind: Kind, sensor: Option<usize>, from: u64, ticks: u64, value: f64) -> 
 
 /// Six sensors of each kind; one gyro is off for too short to be excluded, another for good, and so an accelerometer.
 pub(crate) fn parity_of_six() -> Scenario {
-    let mut script = Script::new(51, &redundant(6, 25), &[("t", 22.0)]);
-    (script.swing, script.batch) = (20.0, 5);
+    let mut script = redundant_script(51, 6, 25);
+    (script.swing, script.batch) = (5.0, 5);
     script.odd = vec![
         odd(Kind::Gyro, Some(1), 1100, 20, 0.4),
         odd(Kind::Gyro, Some(4), 1200, 900, 0.3),
@@ -29,8 +29,8 @@ pub(crate) fn parity_of_six() -> Scenario {
 
 /// Eight of each, which fail one behind the other until two are left.
 pub(crate) fn parity_of_eight_until_two_are_left() -> Scenario {
-    let mut script = Script::new(52, &redundant(8, 5), &[("t", 22.0)]);
-    (script.swing, script.batch) = (20.0, 3);
+    let mut script = redundant_script(52, 8, 5);
+    (script.swing, script.batch) = (5.0, 3);
     for (failed, value) in (0..6_u8).zip([0.4, -0.9, 1.3, -2.1, 3.4, -5.5]) {
         let (sensor, from) = (usize::from(failed), 1050 + 60 * u64::from(failed));
         script.odd.push(odd(Kind::Gyro, Some(sensor), from, 10_000, value));
@@ -44,8 +44,8 @@ pub(crate) fn parity_of_eight_until_two_are_left() -> Scenario {
 
 /// The same with sensors that read no number any more.
 pub(crate) fn eight_sensors_of_which_six_read_no_number() -> Scenario {
-    let mut script = Script::new(53, &redundant(8, 5), &[("t", 22.0)]);
-    (script.swing, script.batch) = (20.0, 3);
+    let mut script = redundant_script(53, 8, 5);
+    (script.swing, script.batch) = (5.0, 3);
     for failed in 0..6_u8 {
         let (sensor, from) = (usize::from(failed), 1050 + 40 * u64::from(failed));
         script.odd.push(odd(Kind::Gyro, Some(sensor), from, 400, f64::NAN));

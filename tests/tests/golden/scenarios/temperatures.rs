@@ -74,7 +74,7 @@ pub(crate) fn temperatures_too_many() -> Scenario {
     script.ticks(40);
     let names: Vec<String> = (0..14).map(|index| format!("c{index}")).collect();
     let names = ["t", "board"].into_iter().chain(names.iter().map(String::as_str));
-    let channels: isotherm_protocol::raw::TemperatureBatch = TemperatureBatch {
+    let channels = TemperatureBatch {
         channels: names.map(|name| name.try_into().unwrap()).collect(),
         ticks: Vec::new(),
     };
