@@ -1,14 +1,13 @@
 //! I2 over a memory: a stream that is written down at any moment, read back and gone on with gives the same bits as one
 //! that was not.
 
-mod scenarios;
-mod script;
 
 use isotherm_correction::operation::State;
 use isotherm_protocol::stream::{InForce, Label, MemoryError, UnitStream};
 use isotherm_tests::dice::Dice;
+use isotherm_tests::lives;
+use isotherm_tests::script::{Scenario, Step};
 use proptest::prelude::*;
-use script::{Scenario, Step};
 
 /// Everything that a stream gives: frames as they go out, first outputs of revisions, the memory at the end.
 #[derive(PartialEq)]
@@ -84,7 +83,7 @@ fn holds(scenario: &Scenario, cuts: usize, seed: u64) {
 
 #[test]
 fn i2_a_stream_that_was_written_down_goes_on_to_the_same_bits() {
-    for scenario in scenarios::all() {
+    for scenario in lives::all() {
         for seed in 0..3 {
             holds(&scenario, 250, seed);
         }
@@ -93,7 +92,7 @@ fn i2_a_stream_that_was_written_down_goes_on_to_the_same_bits() {
 
 #[test]
 fn i2_a_stream_that_is_written_down_before_every_step_gives_the_same_bits() {
-    let scenario = scenarios::anything(1, 400);
+    let scenario = lives::anything(1, 400);
     let plain = run(&scenario, |_, _| false);
     assert!(run(&scenario, |_, _| true) == plain);
 }
@@ -103,13 +102,13 @@ proptest! {
 
     #[test]
     fn i2_whatever_happens_a_memory_changes_no_bit(seed in any::<u64>()) {
-        holds(&scenarios::anything(seed, 300), 60, seed);
+        holds(&lives::anything(seed, 300), 60, seed);
     }
 }
 
 #[test]
 fn a_memory_of_another_version_and_a_damaged_one_are_refused_with_words() {
-    let scenario = scenarios::anything(1, 100);
+    let scenario = lives::anything(1, 100);
     let memory = run(&scenario, |_, _| false).memory;
     let read = UnitStream::from_memory(&memory).unwrap();
     assert_ne!(read.unit().state(), State::PreLaunchCalibration);

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use crate::calibrations::{compile, constant, identity, lively_drift, orientation, polynomial};
 use isotherm_correction::calibration::{BranchArgument, BranchedParts, Calibration, LagParts};
 use isotherm_correction::earth::Place;
 use isotherm_correction::navigation::NavigationStep;
@@ -14,30 +15,34 @@ use isotherm_correction::units::Span;
 use isotherm_protocol::document::Document;
 use isotherm_protocol::journal::JournalEvent;
 use isotherm_protocol::stream::UnitStream;
-use isotherm_tests::calibrations::{compile, constant, identity, lively_drift, orientation, polynomial};
 
-use super::script::{Meets, Scenario, Script};
+use crate::script::{Meets, Scenario, Script};
 
 /// Four gyros of which one is skewed, mode reversal, servo, lags, drift, parity, self-test.
-fn full() -> Arc<Calibration> {
-    let text = include_str!("../../../../config/calibration/example-full.toml");
-    Arc::new(Document::parse(text, None).unwrap().calibration)
+///
+/// # Panics
+/// Never: the document is sound.
+#[must_use]
+pub fn full() -> Arc<Calibration> {
+    let text = include_str!("../../config/calibration/example-full.toml");
+    Arc::new(Document::parse(text, None).expect("the fixture is sound").calibration)
 }
 
-const FULL_CHANNELS: [(&str, f64); 4] = [("block", 1.8), ("coil", 25.0), ("accel", 4770.0), ("board", 72.5)];
+/// Its channels, with a raw value each.
+pub const FULL_CHANNELS: [(&str, f64); 4] =
+    [("block", 1.8), ("coil", 25.0), ("accel", 4770.0), ("board", 72.5)];
 
 /// Six gyros on a cone, every thermal term on, a drift so lively that it is followed; `tweak` is what differs.
-fn skewed(tweak: f64) -> Arc<Calibration> {
+#[must_use]
+pub fn skewed(tweak: f64) -> Arc<Calibration> {
     let mut parts = identity();
     parts.filter.grid_step_s = 0.1;
     parts.filter.smoothing_s = 0.3;
     parts.filter.derivative_step_s = 0.2;
-    let rows: Vec<[f64; 3]> = (0..6)
-        .map(|i| {
-            let angle = std::f64::consts::FRAC_PI_3 * f64::from(i);
-            [0.8 * angle.cos(), 0.8 * angle.sin(), 0.6]
-        })
-        .collect();
+    // 60° apart. Roots are the same on every machine, sines need not be.
+    let far = 0.75_f64.sqrt();
+    let rows = [[1.0, 0.0], [0.5, far], [-0.5, far], [-1.0, 0.0], [-0.5, -far], [0.5, -far]]
+        .map(|[x, y]| [0.8 * x, 0.8 * y, 0.6]);
     parts.gyro_orientation = OrientationParts {
         slopes_per_deg_c: vec![[1e-6, -2e-6, 3e-6]; 6],
         parity_limit: Some(5e-3),
@@ -61,11 +66,18 @@ fn skewed(tweak: f64) -> Arc<Calibration> {
     compile(&parts)
 }
 
-fn place() -> Place {
-    Place::new(55.0, 30.0, Some([0.1, -0.2])).unwrap()
+/// Where it stands.
+///
+/// # Panics
+/// Never: there is such a place.
+#[must_use]
+pub fn place() -> Place {
+    Place::new(55.0, 30.0, Some([0.1, -0.2])).expect("the fixture is sound")
 }
 
-fn pre_launch(duration: Span) -> Command {
+/// A pre-launch calibration that is content with half a minute of each mode.
+#[must_use]
+pub fn pre_launch(duration: Span) -> Command {
     let mut settings = PreLaunchSettings { duration, place: Some(place()), ..PreLaunchSettings::default() };
     settings.limits.time_per_mode = Span::from_ms(30_000);
     Command::PreLaunch(settings)
@@ -95,11 +107,20 @@ const EXCLUDED: Meets =
     ("with a gyro excluded", |stream| stream.unit().gyro_health().iter().any(|health| health.excluded > 0));
 
 /// Every one, by what it is about.
-pub(super) fn all() -> Vec<Scenario> {
+///
+/// # Panics
+/// Never: they are sound.
+#[must_use]
+pub fn all() -> Vec<Scenario> {
     vec![mode_reversal(), excluded(), navigation(), states(), drift(), swaps(), uncalibrated()]
 }
 
-fn mode_reversal() -> Scenario {
+/// Switches of the lasing mode, with mishaps.
+///
+/// # Panics
+/// Never: it is sound.
+#[must_use]
+pub fn mode_reversal() -> Scenario {
     let mut script = Script::new(11, &full(), &FULL_CHANNELS);
     (script.mishaps, script.switches, script.batch) = (3, 64, 3);
     script.ticks(3000);
@@ -109,22 +130,37 @@ fn mode_reversal() -> Scenario {
     script.scenario("mode reversal with mishaps", UnitSettings::default(), vec![WAITING, SWITCHING, READY])
 }
 
-fn excluded() -> Scenario {
+/// Six skewed gyros of which one fails.
+///
+/// # Panics
+/// Never: it is sound.
+#[must_use]
+pub fn excluded() -> Scenario {
     let mut script = Script::new(12, &skewed(0.0), &[("t", 24.0)]);
     (script.fails, script.mishaps) = (Some((4, 2200)), 1);
     script.ticks(3000);
     script.scenario("six skewed gyros of which one fails", UnitSettings::default(), vec![WAITING, EXCLUDED])
 }
 
-fn navigation() -> Scenario {
+/// Navigation steps over mode switches.
+///
+/// # Panics
+/// Never: it is sound.
+#[must_use]
+pub fn navigation() -> Scenario {
     let mut script = Script::new(13, &full(), &FULL_CHANNELS);
     (script.switches, script.batch, script.mishaps) = (97, 1, 1);
     script.ticks(2000);
-    let navigation = NavigationStep::new(7, true).unwrap();
+    let navigation = NavigationStep::new(7, true).expect("the fixture is sound");
     script.scenario("navigation steps", UnitSettings { navigation, ..UnitSettings::default() }, vec![WAITING])
 }
 
-fn states() -> Scenario {
+/// Self-test and pre-launch calibration, in all their endings.
+///
+/// # Panics
+/// Never: it is sound.
+#[must_use]
+pub fn states() -> Scenario {
     let mut script = Script::new(14, &full(), &FULL_CHANNELS);
     (script.tick, script.batch, script.switches) = (Span::from_ms(20), 5, 250);
     script.ticks(300);
@@ -150,7 +186,12 @@ fn states() -> Scenario {
     script.scenario("self-test and pre-launch calibration", UnitSettings::default(), meets)
 }
 
-fn drift() -> Scenario {
+/// Drift from references, then at rest.
+///
+/// # Panics
+/// Never: it is sound.
+#[must_use]
+pub fn drift() -> Scenario {
     let mut script = Script::new(15, &skewed(0.0), &[("t", 24.0)]);
     (script.tick, script.batch, script.scatter) = (Span::from_ms(20), 5, 0.5);
     for _ in 0..20 {
@@ -168,7 +209,12 @@ fn drift() -> Scenario {
     script.scenario("drift from references and at rest", settings, vec![DRIFTING, AT_REST])
 }
 
-fn swaps() -> Scenario {
+/// Slews and changes that wait.
+///
+/// # Panics
+/// Never: it is sound.
+#[must_use]
+pub fn swaps() -> Scenario {
     let sets = [skewed(0.0), skewed(0.5), skewed(-0.25)];
     let mut script = Script::new(16, &sets[0], &[("t", 24.0)]);
     script.mishaps = 2;
@@ -182,7 +228,12 @@ fn swaps() -> Scenario {
     script.scenario("slews and changes that wait", UnitSettings::default(), vec![PENDING, WAITING])
 }
 
-fn uncalibrated() -> Scenario {
+/// Held until a calibration comes.
+///
+/// # Panics
+/// Never: it is sound.
+#[must_use]
+pub fn uncalibrated() -> Scenario {
     let mut script = Script::new(17, &full(), &FULL_CHANNELS);
     // Its calibration comes late.
     script.steps.clear();
@@ -195,7 +246,11 @@ fn uncalibrated() -> Scenario {
 }
 
 /// Whatever chance brings, over so many rounds of a few ticks.
-pub(super) fn anything(seed: u64, rounds: u64) -> Scenario {
+///
+/// # Panics
+/// Never: it is sound.
+#[must_use]
+pub fn anything(seed: u64, rounds: u64) -> Scenario {
     let sets = [full(), full()];
     let mut script = Script::new(seed, &sets[0], &FULL_CHANNELS);
     (script.mishaps, script.switches) = (script.dice.below(6), 40 + script.dice.below(100));
@@ -213,10 +268,4 @@ pub(super) fn anything(seed: u64, rounds: u64) -> Scenario {
         }
     }
     script.scenario("anything", UnitSettings::default(), Vec::new())
-}
-
-impl Script {
-    fn scenario(self, name: &'static str, settings: UnitSettings, meets: Vec<Meets>) -> Scenario {
-        Scenario { name, settings, steps: self.steps, meets }
-    }
 }
