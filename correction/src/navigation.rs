@@ -87,6 +87,8 @@ impl NavigationStep {
 pub struct StepSum {
     /// Plain sums and flags so far; `None` between steps.
     open: Option<CorrectedTick>,
+    /// Counter of the revision that makes the open step, which a tick's form leaves out.
+    revision: u64,
     /// β of the open step (rad).
     coning: [f64; 3],
     /// σ of the open step (m/s).
@@ -108,11 +110,11 @@ impl StepSum {
     /// where the calibration revision changes or the unit becomes calibrated or ceases to be. Raw readings of
     /// an uncalibrated unit are summed plainly: cross products of counts mean nothing.
     #[inline]
-    pub fn push(
+    pub fn push<E: FnMut(&CorrectedTick) + ?Sized>(
         &mut self,
         step: &NavigationStep,
         tick: &CorrectedTick,
-        emit: &mut dyn FnMut(&CorrectedTick),
+        emit: &mut E,
     ) {
         if step.ticks <= 1 && !step.coning_sculling && self.open.is_none() {
             emit(tick);
@@ -122,11 +124,16 @@ impl StepSum {
     }
 
     /// Takes one tick of a step.
-    fn sum(&mut self, step: NavigationStep, tick: &CorrectedTick, emit: &mut dyn FnMut(&CorrectedTick)) {
+    fn sum<E: FnMut(&CorrectedTick) + ?Sized>(
+        &mut self,
+        step: NavigationStep,
+        tick: &CorrectedTick,
+        emit: &mut E,
+    ) {
         let breaks = tick.missed > 0 || tick.flags.intersects(TickFlags::GAP | TickFlags::RESTART);
         let differs = self.open.as_ref().is_some_and(|open| {
             let changed = open.flags.symmetric_difference(tick.flags);
-            open.revision != tick.revision || changed.contains(TickFlags::UNCALIBRATED)
+            self.revision != tick.revision || changed.contains(TickFlags::UNCALIBRATED)
         });
         if breaks || differs {
             self.flush(&step, emit);
@@ -150,6 +157,7 @@ impl StepSum {
             open.ticks >= step.ticks
         } else {
             self.open = Some(tick.clone());
+            self.revision = tick.revision;
             tick.ticks.max(1) >= step.ticks
         };
         if full {
@@ -164,12 +172,13 @@ impl StepSum {
     }
 
     /// Closes the open step, if there is one, and emits it.
-    pub fn flush(&mut self, step: &NavigationStep, emit: &mut dyn FnMut(&CorrectedTick)) {
+    pub fn flush<E: FnMut(&CorrectedTick) + ?Sized>(&mut self, step: &NavigationStep, emit: &mut E) {
         let coning = core::mem::take(&mut self.coning);
         let sculling = core::mem::take(&mut self.sculling);
         let Some(mut sum) = self.open.take() else {
             return;
         };
+        sum.revision = self.revision;
         if step.coning_sculling && !sum.flags.contains(TickFlags::UNCALIBRATED) {
             let rotated = rotation(sum.delta_angle, sum.delta_velocity);
             sum.delta_velocity = plus(sum.delta_velocity, plus(rotated, sculling));

@@ -13,7 +13,7 @@ use isotherm_protocol::codec::encode;
 use isotherm_protocol::journal::JournalEvent;
 use isotherm_protocol::key::{Input, RawStream, UnitId};
 use isotherm_protocol::raw::{
-    AccelBatch, GyroBatch, HealthBatch, HealthReading, HealthTick, TemperatureBatch, TemperatureTick,
+    AccelBatch, GyroBatch, HealthBatch, HealthReading, HealthTick, TemperatureBatch,
 };
 use isotherm_protocol::reference::Reference;
 use isotherm_protocol::stream::UnitStream;
@@ -198,10 +198,10 @@ impl Script {
             gyros.push(gyro);
         }
         if self.calibration.accel_count() > 0 {
-            let batch = AccelBatch::from_core(self.calibration.accel_output(), &accels).unwrap();
+            let batch = AccelBatch { output: self.calibration.accel_output(), ticks: accels };
             sent.push(frame(RawStream::Accel, encode(&batch).unwrap()));
         }
-        let batch = GyroBatch::from_core(self.calibration.gyro_output(), &gyros).unwrap();
+        let batch = GyroBatch { output: self.calibration.gyro_output(), ticks: gyros };
         sent.push(frame(RawStream::Gyro, encode(&batch).unwrap()));
         sent
     }
@@ -260,10 +260,13 @@ impl Script {
     fn temperatures(&mut self) -> Vec<u8> {
         let warming = 2e-4 * f64::from(u32::try_from(self.next % 50_000).unwrap());
         let noise = 0.01 * self.dice.between_minus_one_and_one();
-        let raw = self.channels.iter().map(|(_, raw)| raw * (1.0 + 1e-3 * (warming + noise))).collect();
-        let ticks = vec![TemperatureTick { time_ns: self.now_ns - self.tick.as_ns(), raw }];
-        let channels = self.channels.iter().map(|(name, _)| *name).collect();
-        encode(&TemperatureBatch { channels, ticks }).unwrap()
+        let time = Timestamp::from_ns(self.now_ns - self.tick.as_ns());
+        let reading = |&(channel, raw): &(ChannelName, f64)| TemperatureReading {
+            channel,
+            time,
+            raw: raw * (1.0 + 1e-3 * (warming + noise)),
+        };
+        encode(&TemperatureBatch { readings: self.channels.iter().map(reading).collect() }).unwrap()
     }
 
     fn health(&mut self) -> Vec<u8> {
