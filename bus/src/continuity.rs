@@ -34,9 +34,8 @@ impl Continuity {
 
     /// Enters one tick.
     pub fn feed(&mut self, tick: &CorrectedTick) {
-        let flags = TickFlags::from_bits_retain(tick.flags);
-        self.enter(tick.sequence, tick.ticks, tick.missed, flags.contains(TickFlags::RESTART));
-        if flags.contains(TickFlags::UNCALIBRATED) {
+        self.enter(tick.sequence, tick.ticks, tick.missed, tick.flags.contains(TickFlags::RESTART));
+        if tick.flags.contains(TickFlags::UNCALIBRATED) {
             self.uncalibrated += u64::from(tick.ticks.max(1));
         }
     }

@@ -63,20 +63,12 @@ async fn echo(session: &Session) -> (Subscriber<()>, Queryable<()>) {
 }
 
 fn corrected(serial: &str, raw: &GyroBatch) -> CorrectedBatch {
-    let ticks = raw.ticks.iter().zip(raw.first_sequence..).map(|(tick, sequence)| CorrectedTick {
-        sequence,
-        end_time_ns: tick.end_time_ns,
-        duration_ns: tick.duration_ns,
+    let ticks = raw.ticks.iter().map(|tick| CorrectedTick {
+        sequence: tick.sequence,
+        end_time: tick.end_time,
+        duration: tick.duration,
         ticks: 1,
-        missed: 0,
-        delta_angle_rad: [0.0; 3],
-        delta_velocity_m_per_s: [0.0; 3],
-        mode: None,
-        flags: 0,
-        gyro_flags: ArrayVec::new(),
-        accel_flags: ArrayVec::new(),
-        gyro_parity_rad_per_s: ArrayVec::new(),
-        accel_parity_m_per_s2: ArrayVec::new(),
+        ..CorrectedTick::default()
     });
     CorrectedBatch {
         unit: serial.to_owned(),
@@ -146,9 +138,9 @@ async fn what_is_published_before_close_arrives() {
         while !publisher.matching_status().await.unwrap().matching() {
             listener.recv_async().await.unwrap();
         }
-        let raw = GyroBatch::from_core(OutputKind::Counts, &[gyro(0)]).unwrap();
         for sequence in 0..2000 {
-            let batch = corrected("LAST", &GyroBatch { first_sequence: sequence, ..raw.clone() });
+            let ticks = vec![GyroTick { sequence, ..gyro(0) }];
+            let batch = corrected("LAST", &GyroBatch { output: OutputKind::Counts, ticks });
             publisher.put(encode(&batch).unwrap()).await.unwrap();
         }
         close(source, LIMIT).await.unwrap();

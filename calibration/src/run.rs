@@ -257,14 +257,12 @@ impl Run {
 fn events(input: RawStream, frame: &[u8]) -> Option<Vec<LogEvent>> {
     match input {
         RawStream::Gyro => {
-            let batch: GyroBatch = codec::decode(frame).ok()?;
-            let output = batch.output();
-            Some(batch.to_core().map(|tick| LogEvent::Gyro { output, tick }).collect())
+            let GyroBatch { output, ticks } = codec::decode(frame).ok()?;
+            Some(ticks.into_iter().map(|tick| LogEvent::Gyro { output, tick }).collect())
         }
         RawStream::Accel => {
-            let batch: AccelBatch = codec::decode(frame).ok()?;
-            let output = batch.output();
-            Some(batch.to_core().map(|tick| LogEvent::Accel { output, tick }).collect())
+            let AccelBatch { output, ticks } = codec::decode(frame).ok()?;
+            Some(ticks.into_iter().map(|tick| LogEvent::Accel { output, tick }).collect())
         }
         _ => None,
     }

@@ -95,15 +95,15 @@ impl Series {
         match stream {
             RawStream::Gyro => {
                 let Ok(batch) = codec::decode::<GyroBatch>(frame) else { return Ok(false) };
-                batch.to_core().try_for_each(|tick| self.gyro(batch.output(), &tick))?;
+                batch.ticks.iter().try_for_each(|tick| self.gyro(batch.output, tick))?;
             }
             RawStream::Accel => {
                 let Ok(batch) = codec::decode::<AccelBatch>(frame) else { return Ok(false) };
-                batch.to_core().try_for_each(|tick| self.accel(batch.output(), &tick))?;
+                batch.ticks.iter().try_for_each(|tick| self.accel(batch.output, tick))?;
             }
             RawStream::Temperature => {
                 let Ok(batch) = codec::decode::<TemperatureBatch>(frame) else { return Ok(false) };
-                batch.to_core().for_each(|reading| self.temperature(&reading));
+                batch.readings.iter().for_each(|reading| self.temperature(reading));
             }
             RawStream::Health => {}
         }

@@ -87,6 +87,8 @@ impl NavigationStep {
 pub struct StepSum {
     /// Plain sums and flags so far; `None` between steps.
     open: Option<CorrectedTick>,
+    /// Counter of the revision that makes the open step, which a tick's form leaves out.
+    revision: u64,
     /// β of the open step (rad).
     coning: [f64; 3],
     /// σ of the open step (m/s).
@@ -131,7 +133,7 @@ impl StepSum {
         let breaks = tick.missed > 0 || tick.flags.intersects(TickFlags::GAP | TickFlags::RESTART);
         let differs = self.open.as_ref().is_some_and(|open| {
             let changed = open.flags.symmetric_difference(tick.flags);
-            open.revision != tick.revision || changed.contains(TickFlags::UNCALIBRATED)
+            self.revision != tick.revision || changed.contains(TickFlags::UNCALIBRATED)
         });
         if breaks || differs {
             self.flush(&step, emit);
@@ -155,6 +157,7 @@ impl StepSum {
             open.ticks >= step.ticks
         } else {
             self.open = Some(tick.clone());
+            self.revision = tick.revision;
             tick.ticks.max(1) >= step.ticks
         };
         if full {
@@ -175,6 +178,7 @@ impl StepSum {
         let Some(mut sum) = self.open.take() else {
             return;
         };
+        sum.revision = self.revision;
         if step.coning_sculling && !sum.flags.contains(TickFlags::UNCALIBRATED) {
             let rotated = rotation(sum.delta_angle, sum.delta_velocity);
             sum.delta_velocity = plus(sum.delta_velocity, plus(rotated, sculling));

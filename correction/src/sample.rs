@@ -169,34 +169,106 @@ bitflags! {
 }
 
 /// One corrected tick (or navigation step) in case axes.
+///
+/// Its form in serde is that of the wire (`docs/wire.md`), whose names say the unit of measure.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct CorrectedTick {
     /// Sequence number of the raw gyro tick; of the last one where several are summed.
     pub sequence: u64,
     /// End of the tick on the producer's clock.
+    #[serde(rename = "end_time_ns")]
     pub end_time: Timestamp,
     /// Measured duration; the sum where several ticks are summed.
+    #[serde(rename = "duration_ns", with = "written::duration")]
     pub duration: Span,
     /// Raw ticks in this output: 1, or the length of a navigation step.
     pub ticks: u16,
     /// Raw gyro ticks that are missing before this one and were not announced before.
     pub missed: u64,
     /// Angle increments about the case axes (rad).
+    #[serde(rename = "delta_angle_rad")]
     pub delta_angle: [f64; 3],
     /// Velocity increments along the case axes (m/s).
+    #[serde(rename = "delta_velocity_m_per_s")]
     pub delta_velocity: [f64; 3],
     /// Lasing mode of the tick.
     pub mode: Option<LasingMode>,
     /// Flags of the tick.
+    #[serde(with = "written::flags")]
     pub flags: TickFlags,
     /// Flags of each gyro.
+    #[serde(with = "written::sensor_flags")]
     pub gyro_flags: Sensors<SensorFlags>,
     /// Flags of each accelerometer.
+    #[serde(with = "written::sensor_flags")]
     pub accel_flags: Sensors<SensorFlags>,
     /// Parity residuals of the gyros (rad/s), N − 3 of them.
+    #[serde(rename = "gyro_parity_rad_per_s")]
     pub gyro_parity: ArrayVec<f64, MAX_PARITY>,
     /// Parity residuals of the accelerometers (m/s²), N − 3 of them.
+    #[serde(rename = "accel_parity_m_per_s2")]
     pub accel_parity: ArrayVec<f64, MAX_PARITY>,
-    /// Counter of the calibration revision that made this tick; 0 while uncalibrated.
+    /// Counter of the calibration revision that made this tick; 0 while uncalibrated. A batch says it once for all its ticks.
+    #[serde(skip)]
     pub revision: u64,
+}
+
+/// Fields of a corrected tick as the plain numbers that they are on the wire.
+mod written {
+    /// A duration as a number that has no sign; what is beyond the longest span becomes that.
+    pub(super) mod duration {
+        use serde::{Deserialize, Deserializer, Serializer};
+
+        use crate::units::Span;
+
+        pub(in super::super) fn serialize<S: Serializer>(span: &Span, to: S) -> Result<S::Ok, S::Error> {
+            to.serialize_u64(span.as_ns().unsigned_abs())
+        }
+
+        pub(in super::super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Span, D::Error> {
+            let ns = u64::deserialize(from)?;
+            Ok(Span::from_ns(i64::try_from(ns).unwrap_or(i64::MAX)))
+        }
+    }
+
+    /// Bits, known or not: the flags' own form in JSON is text.
+    pub(super) mod flags {
+        use serde::{Deserialize, Deserializer, Serializer};
+
+        use crate::sample::TickFlags;
+
+        pub(in super::super) fn serialize<S: Serializer>(
+            flags: &TickFlags,
+            to: S,
+        ) -> Result<S::Ok, S::Error> {
+            to.serialize_u16(flags.bits())
+        }
+
+        pub(in super::super) fn deserialize<'de, D: Deserializer<'de>>(
+            from: D,
+        ) -> Result<TickFlags, D::Error> {
+            u16::deserialize(from).map(TickFlags::from_bits_retain)
+        }
+    }
+
+    /// Bits, one byte per sensor.
+    pub(super) mod sensor_flags {
+        use serde::{Deserialize, Deserializer, Serializer};
+
+        use crate::sample::{SensorFlags, Sensors};
+
+        pub(in super::super) fn serialize<S: Serializer>(
+            flags: &Sensors<SensorFlags>,
+            to: S,
+        ) -> Result<S::Ok, S::Error> {
+            to.collect_seq(flags.iter().map(SensorFlags::bits))
+        }
+
+        pub(in super::super) fn deserialize<'de, D: Deserializer<'de>>(
+            from: D,
+        ) -> Result<Sensors<SensorFlags>, D::Error> {
+            let bits = Sensors::<u8>::deserialize(from)?;
+            Ok(bits.into_iter().map(SensorFlags::from_bits_retain).collect())
+        }
+    }
 }

@@ -25,6 +25,7 @@ mod topic;
 
 use std::collections::BTreeMap;
 
+use isotherm_correction::units::Span;
 use isotherm_protocol::codec::{self, CodecError};
 use isotherm_protocol::corrected::CorrectedBatch;
 use isotherm_protocol::key::{RawStream, UnitId};
@@ -256,20 +257,23 @@ impl UnitSurvey {
         match topic {
             Topic::Raw(_, RawStream::Gyro) => {
                 let batch: GyroBatch = codec::decode(frame)?;
-                let times = batch.ticks.iter().map(|tick| (tick.end_time_ns, tick.duration_ns));
-                match survey.ticks(batch.series, batch.first_sequence, received_ns, &times) {
+                let Some(first) = batch.ticks.first() else { return Ok(()) };
+                let times = batch.ticks.iter().map(|tick| (tick.end_time.as_ns(), length_ns(tick.duration)));
+                match survey.ticks(first.series, first.sequence, received_ns, &times) {
                     Place::Old => {}
                     place => self.modes.take(&batch, place == Place::Start),
                 }
             }
             Topic::Raw(_, RawStream::Accel) => {
                 let batch: AccelBatch = codec::decode(frame)?;
-                let times = batch.ticks.iter().map(|tick| (tick.end_time_ns, tick.duration_ns));
-                survey.ticks(0, batch.first_sequence, received_ns, &times);
+                let Some(first) = batch.ticks.first() else { return Ok(()) };
+                let times = batch.ticks.iter().map(|tick| (tick.end_time.as_ns(), length_ns(tick.duration)));
+                survey.ticks(0, first.sequence, received_ns, &times);
             }
             Topic::Raw(_, RawStream::Temperature) => {
                 let batch: TemperatureBatch = codec::decode(frame)?;
-                survey.readings(received_ns, batch.ticks.iter().map(|tick| tick.time_ns));
+                let times = batch.ticks().filter_map(|tick| tick.first()).map(|reading| reading.time.as_ns());
+                survey.readings(received_ns, times);
                 self.temperatures.temperatures(&batch);
             }
             Topic::Raw(_, RawStream::Health) => {
@@ -286,10 +290,15 @@ impl UnitSurvey {
                 // A batch may have gaps between its ticks, and an output may stand for several raw ticks.
                 for tick in &batch.ticks {
                     let first = tick.sequence.saturating_sub(u64::from(tick.ticks.saturating_sub(1)));
-                    survey.outputs(first, u64::from(tick.ticks.max(1)), tick.end_time_ns, tick.duration_ns);
+                    survey.outputs(
+                        first,
+                        u64::from(tick.ticks.max(1)),
+                        tick.end_time.as_ns(),
+                        length_ns(tick.duration),
+                    );
                 }
                 if let Some(last) = batch.ticks.last() {
-                    survey.received(received_ns, last.end_time_ns);
+                    survey.received(received_ns, last.end_time.as_ns());
                 }
                 self.corrected.take(&batch);
             }
@@ -299,6 +308,11 @@ impl UnitSurvey {
         }
         Ok(())
     }
+}
+
+/// Length of a span (ns).
+fn length_ns(span: Span) -> u64 {
+    span.as_ns().unsigned_abs()
 }
 
 /// Notes a value that is not in the list yet.

@@ -99,18 +99,19 @@ impl Message {
 
 /// When the last thing in a frame happened on the producer's clock.
 fn time(topic: &Topic, frame: &[u8]) -> Option<Timestamp> {
-    let ns = match topic {
-        Topic::Raw(_, RawStream::Gyro) => codec::decode::<GyroBatch>(frame).ok()?.ticks.last()?.end_time_ns,
-        Topic::Raw(_, RawStream::Accel) => codec::decode::<AccelBatch>(frame).ok()?.ticks.last()?.end_time_ns,
+    Some(match topic {
+        Topic::Raw(_, RawStream::Gyro) => codec::decode::<GyroBatch>(frame).ok()?.ticks.last()?.end_time,
+        Topic::Raw(_, RawStream::Accel) => codec::decode::<AccelBatch>(frame).ok()?.ticks.last()?.end_time,
         Topic::Raw(_, RawStream::Temperature) => {
-            codec::decode::<TemperatureBatch>(frame).ok()?.ticks.last()?.time_ns
+            codec::decode::<TemperatureBatch>(frame).ok()?.readings.last()?.time
         }
-        Topic::Raw(_, RawStream::Health) => codec::decode::<HealthBatch>(frame).ok()?.ticks.last()?.time_ns,
-        Topic::Reference(_) => codec::decode::<Reference>(frame).ok()?.end_ns,
-        Topic::Corrected(_) => codec::decode::<CorrectedBatch>(frame).ok()?.ticks.last()?.end_time_ns,
+        Topic::Raw(_, RawStream::Health) => {
+            Timestamp::from_ns(codec::decode::<HealthBatch>(frame).ok()?.ticks.last()?.time_ns)
+        }
+        Topic::Reference(_) => Timestamp::from_ns(codec::decode::<Reference>(frame).ok()?.end_ns),
+        Topic::Corrected(_) => codec::decode::<CorrectedBatch>(frame).ok()?.ticks.last()?.end_time,
         Topic::Status(_) | Topic::Journal(_) | Topic::Service(_) | Topic::Other(_) => return None,
-    };
-    Some(Timestamp::from_ns(ns))
+    })
 }
 
 #[cfg(test)]

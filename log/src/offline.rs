@@ -80,7 +80,7 @@ impl Offline {
     /// A unit with a calibration, as the service has it after its start.
     #[must_use]
     pub fn new(loaded: &Loaded, settings: UnitSettings) -> Self {
-        let mut stream = UnitStream::new(loaded.unit.clone(), settings);
+        let mut stream = UnitStream::new(loaded.unit.clone(), settings).keeping_ticks();
         stream.install(Arc::clone(&loaded.calibration), loaded.digest);
         Self { stream }
     }
@@ -120,7 +120,7 @@ impl Offline {
 
     /// Corrected ticks that are ready, without taking them.
     pub fn peek(&self) -> impl Iterator<Item = &CorrectedTick> {
-        self.stream.ready().iter()
+        self.stream.ready().ticks().iter()
     }
 
     /// Takes the corrected ticks that are ready.

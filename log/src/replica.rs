@@ -147,7 +147,7 @@ impl Replica {
     /// Of a unit without a journal: with these settings, and a calibration that is in force from the first tick on.
     #[must_use]
     pub fn without_journal(id: UnitId, settings: UnitSettings, calibration: Option<&Loaded>) -> Self {
-        let mut stream = UnitStream::new(id.clone(), settings);
+        let mut stream = UnitStream::new(id.clone(), settings).keeping_ticks();
         if let Some(loaded) = calibration {
             stream.install(Arc::clone(&loaded.calibration), loaded.digest);
         }
@@ -254,7 +254,7 @@ impl Replica {
             }
             _ => {}
         }
-        let fresh = || UnitStream::new(self.id.clone(), UnitSettings::default());
+        let fresh = || UnitStream::new(self.id.clone(), UnitSettings::default()).keeping_ticks();
         if anchor {
             self.stream = Some(fresh());
         }

@@ -9,6 +9,9 @@
 //!
 //! Decoding never panics and never allocates more than a fixed multiple of the frame's length, which is bounded too.
 
+mod reader;
+mod writer;
+
 use std::fmt;
 use std::marker::PhantomData;
 
@@ -16,6 +19,9 @@ use postcard::ser_flavors::Flavor;
 use serde::de::{DeserializeOwned, Error as _, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 use thiserror::Error;
+
+pub(crate) use reader::{Body, Stretch};
+pub(crate) use writer::{Writer, append, append_str};
 
 use crate::version::Versions;
 
@@ -27,6 +33,10 @@ pub const MAX_TICKS: usize = 4096;
 const HEADER: usize = 2;
 /// CRC-32 behind.
 const CHECKSUM: usize = 4;
+/// What is read or written at once (bytes): 255 and the longest step from there.
+pub(crate) const WINDOW: usize = 272;
+/// Highest bit of each byte: set where a number goes on behind it.
+const GOES_ON: u64 = 0x8080_8080_8080_8080;
 
 /// Kind of a message: the first byte of its frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -53,29 +63,77 @@ pub enum Kind {
 }
 
 /// A message that has a frame of its own.
-pub trait Message: Serialize + DeserializeOwned {
+pub trait Message: Sized {
     /// Its kind.
     const KIND: Kind;
     /// Versions of its body.
     const VERSIONS: Versions;
 
-    /// Reads a body of a version that [`Message::VERSIONS`] holds; also gives what is left over behind it.
-    ///
-    /// A message whose older versions have other bodies reads each by its own type and converts.
-    ///
-    /// # Errors
-    /// Where the bytes are no such body.
-    fn read_body(version: u8, body: &[u8]) -> postcard::Result<(Self, &[u8])> {
-        let _ = version;
-        postcard::take_from_bytes(body)
-    }
-
-    /// Checks what the types cannot say; called on encoding and after decoding.
+    /// Checks what the types cannot say; called before a message is written.
     ///
     /// # Errors
     /// [`CodecError`] where the parts of the message contradict each other.
     fn check(&self) -> Result<(), CodecError> {
         Ok(())
+    }
+
+    /// Appends the body, in the current version.
+    ///
+    /// # Errors
+    /// [`CodecError`] where a value has no form on the wire.
+    fn write_body(&self, frame: &mut Vec<u8>) -> Result<(), CodecError>;
+
+    /// Reads a body of a version that [`Message::VERSIONS`] holds, to its end, and checks it.
+    ///
+    /// # Errors
+    /// [`CodecError::Malformed`], then [`CodecError::Trailing`], then what [`Message::check`] finds.
+    fn read_body(version: u8, body: &[u8]) -> Result<Self, CodecError>;
+}
+
+/// A message whose body is what serde makes of it.
+pub(crate) trait PlainMessage: Serialize + DeserializeOwned {
+    /// [`Message::KIND`].
+    const KIND: Kind;
+    /// [`Message::VERSIONS`].
+    const VERSIONS: Versions;
+
+    /// [`Message::check`].
+    fn check(&self) -> Result<(), CodecError> {
+        Ok(())
+    }
+
+    /// Reads a body of any of the versions; what is written in another one than the current converts.
+    fn read(version: u8, body: &[u8]) -> Result<Self, CodecError> {
+        let _ = version;
+        whole(body)
+    }
+}
+
+impl<M: PlainMessage> Message for M {
+    const KIND: Kind = <M as PlainMessage>::KIND;
+    const VERSIONS: Versions = <M as PlainMessage>::VERSIONS;
+
+    fn check(&self) -> Result<(), CodecError> {
+        PlainMessage::check(self)
+    }
+
+    fn write_body(&self, frame: &mut Vec<u8>) -> Result<(), CodecError> {
+        postcard::serialize_with_flavor(self, Room(frame)).map_err(|_| CodecError::Malformed)
+    }
+
+    fn read_body(version: u8, body: &[u8]) -> Result<Self, CodecError> {
+        let message = M::read(version, body)?;
+        PlainMessage::check(&message)?;
+        Ok(message)
+    }
+}
+
+/// What a body holds that serde reads, to its end.
+pub(crate) fn whole<T: DeserializeOwned>(body: &[u8]) -> Result<T, CodecError> {
+    match postcard::take_from_bytes(body) {
+        Ok((value, [])) => Ok(value),
+        Ok((_, rest)) => Err(CodecError::Trailing { count: rest.len() }),
+        Err(_) => Err(CodecError::Malformed),
     }
 }
 
@@ -144,6 +202,12 @@ pub enum CodecError {
         /// How many gyros there are.
         need: usize,
     },
+    /// Readings that are said to be counts and are none.
+    #[error("tick {index} of the batch has readings that are no counts of 32 bits")]
+    NotCounts {
+        /// Index of the first such tick.
+        index: usize,
+    },
     /// A field with a value that its message cannot carry.
     #[error("{field} must be {must_be}")]
     Value {
@@ -160,20 +224,25 @@ pub enum CodecError {
 /// What [`Message::check`] finds; [`CodecError::Length`] beyond [`MAX_FRAME`].
 pub fn encode_into<M: Message>(message: &M, frame: &mut Vec<u8>) -> Result<(), CodecError> {
     message.check()?;
-    encode_as::<M>(message, frame)
-}
-
-/// Encodes something that has the body of a message `M`, without its checks.
-pub(crate) fn encode_as<M: Message>(body: &impl Serialize, frame: &mut Vec<u8>) -> Result<(), CodecError> {
     frame.clear();
-    frame.extend([M::KIND as u8, M::VERSIONS.current]);
-    postcard::serialize_with_flavor(body, Room(frame)).map_err(|_| CodecError::Malformed)?;
-    let checksum = crc32fast::hash(frame);
-    frame.extend(checksum.to_le_bytes());
+    begin::<M>(frame);
+    message.write_body(frame)?;
+    seal(frame);
     if frame.len() > MAX_FRAME {
         return Err(CodecError::Length { length: frame.len() });
     }
     Ok(())
+}
+
+/// Appends kind and version.
+pub(crate) fn begin<M: Message>(frame: &mut Vec<u8>) {
+    frame.extend([M::KIND as u8, M::VERSIONS.current]);
+}
+
+/// Appends the checksum of everything before.
+pub(crate) fn seal(frame: &mut Vec<u8>) {
+    let checksum = crc32fast::hash(frame);
+    frame.extend(checksum.to_le_bytes());
 }
 
 /// A frame that is being written: whole slices at once, where postcard's own flavour takes byte after byte.
@@ -213,12 +282,7 @@ pub fn encode<M: Message>(message: &M) -> Result<Vec<u8>, CodecError> {
 /// [`CodecError`], whatever the bytes are.
 pub fn decode<M: Message>(frame: &[u8]) -> Result<M, CodecError> {
     let (version, body) = open::<M>(frame)?;
-    let (message, rest) = M::read_body(version, body).map_err(|_| CodecError::Malformed)?;
-    if !rest.is_empty() {
-        return Err(CodecError::Trailing { count: rest.len() });
-    }
-    message.check()?;
-    Ok(message)
+    M::read_body(version, body)
 }
 
 /// Version and body of a sound frame.

@@ -1,16 +1,13 @@
 //! Corrected batches: what a navigation computer subscribes to.
 
-use std::collections::VecDeque;
-
 use arrayvec::ArrayVec;
-use isotherm_correction::sample::{
-    self as core, ChannelName, MAX_PARITY, MAX_SENSORS, SensorFlags, TickFlags,
-};
-use isotherm_correction::units::{Span, Timestamp};
-use serde::{Deserialize, Serialize, Serializer};
+use isotherm_correction::sample::ChannelName;
+use serde::{Deserialize, Serialize};
 
-use crate::codec::{CodecError, Kind, MAX_TICKS, Message, bounded, encode_as};
-use crate::raw::{MAX_CHANNELS, Mode};
+pub use isotherm_correction::sample::CorrectedTick;
+
+use crate::codec::{CodecError, Kind, MAX_TICKS, Message, append, append_str, bounded, whole};
+use crate::raw::MAX_CHANNELS;
 use crate::version::{self, Versions};
 
 /// Which calibration made an output.
@@ -34,43 +31,12 @@ pub struct AppliedTemperature {
     pub rate_deg_c_per_s: f64,
 }
 
-/// One corrected tick in case axes; see [`core::CorrectedTick`] for the meaning of each field.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct CorrectedTick {
-    /// Sequence number of the raw gyro tick.
-    pub sequence: u64,
-    /// End of the tick (ns on the producer's clock).
-    pub end_time_ns: i64,
-    /// Measured duration (ns).
-    pub duration_ns: u64,
-    /// Raw ticks in this output.
-    pub ticks: u16,
-    /// Raw ticks missing before this one.
-    pub missed: u64,
-    /// Angle increments about the case axes (rad).
-    pub delta_angle_rad: [f64; 3],
-    /// Velocity increments along the case axes (m/s).
-    pub delta_velocity_m_per_s: [f64; 3],
-    /// Lasing mode.
-    pub mode: Option<Mode>,
-    /// Bits of [`TickFlags`].
-    pub flags: u16,
-    /// Bits of [`SensorFlags`], one byte per gyro.
-    pub gyro_flags: ArrayVec<u8, MAX_SENSORS>,
-    /// Bits of [`SensorFlags`], one byte per accelerometer.
-    pub accel_flags: ArrayVec<u8, MAX_SENSORS>,
-    /// Parity residuals of the gyros (rad/s).
-    pub gyro_parity_rad_per_s: ArrayVec<f64, MAX_PARITY>,
-    /// Parity residuals of the accelerometers (m/s²).
-    pub accel_parity_m_per_s2: ArrayVec<f64, MAX_PARITY>,
-}
-
 /// Corrected ticks of one unit, all made by one calibration.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CorrectedBatch {
     /// Serial of the unit.
     pub unit: String,
-    /// The calibration that made the ticks.
+    /// The calibration that made the ticks; each of them has its counter once they have been decoded.
     pub revision: Revision,
     /// Temperatures in use at the last tick of the batch.
     pub temperatures: ArrayVec<AppliedTemperature, MAX_CHANNELS>,
@@ -84,93 +50,115 @@ impl Message for CorrectedBatch {
     const VERSIONS: Versions = version::CORRECTED;
 
     fn check(&self) -> Result<(), CodecError> {
-        check_count(self.ticks.len())
+        let count = self.ticks.len();
+        if (1..=MAX_TICKS).contains(&count) { Ok(()) } else { Err(CodecError::Ticks { count }) }
+    }
+
+    fn write_body(&self, frame: &mut Vec<u8>) -> Result<(), CodecError> {
+        append_head(frame, &self.unit, self.revision, &self.temperatures, self.ticks.len());
+        self.ticks.iter().for_each(|tick| append_tick(frame, tick));
+        Ok(())
+    }
+
+    fn read_body(_: u8, body: &[u8]) -> Result<Self, CodecError> {
+        let mut batch: Self = whole(body)?;
+        batch.ticks.iter_mut().for_each(|tick| tick.revision = batch.revision.counter);
+        batch.check()?;
+        Ok(batch)
     }
 }
 
-/// A [`CorrectedBatch`] whose ticks stay where they are: the same bytes, nothing copied.
-#[derive(Debug, Serialize)]
-pub struct CorrectedBody<'a> {
-    /// Serial of the unit.
-    pub unit: &'a str,
-    /// The calibration that made the ticks.
-    pub revision: Revision,
-    /// Temperatures in use at the last tick of the batch.
-    pub temperatures: ArrayVec<AppliedTemperature, MAX_CHANNELS>,
-    /// The ticks.
-    pub ticks: Ticks<'a>,
-}
-
-/// The first ticks of those that are ready.
-#[derive(Debug)]
-pub struct Ticks<'a> {
-    /// All that are ready.
-    pub ready: &'a VecDeque<core::CorrectedTick>,
-    /// How many of them.
-    pub count: usize,
-}
-
-impl CorrectedBody<'_> {
-    /// Encodes it into `frame`, as [`codec::encode_into`](crate::codec::encode_into) does the batch.
-    ///
-    /// # Errors
-    /// [`CodecError::Ticks`] outside 1…4096 ticks; [`CodecError::Length`] beyond the longest frame.
-    pub fn encode_into(&self, frame: &mut Vec<u8>) -> Result<(), CodecError> {
-        check_count(self.ticks.count.min(self.ticks.ready.len()))?;
-        encode_as::<CorrectedBatch>(self, frame)
+/// Appends what stands before the ticks of a batch.
+pub(crate) fn append_head(
+    frame: &mut Vec<u8>,
+    unit: &str,
+    revision: Revision,
+    temperatures: &[AppliedTemperature],
+    ticks: usize,
+) {
+    append_str(frame, unit);
+    append(frame, |to| {
+        to.u64(revision.counter);
+        to.bytes(revision.digest);
+        to.length(temperatures.len());
+    });
+    for applied in temperatures {
+        append_str(frame, &applied.channel);
+        append(frame, |to| to.f64s(&[applied.temperature_deg_c, applied.rate_deg_c_per_s]));
     }
+    append(frame, |to| to.length(ticks));
 }
 
-/// Checks the number of ticks of a batch.
-fn check_count(count: usize) -> Result<(), CodecError> {
-    if (1..=MAX_TICKS).contains(&count) { Ok(()) } else { Err(CodecError::Ticks { count }) }
+/// Longest form of a tick, in bytes.
+pub(crate) const MAX_TICK: usize = 196;
+
+/// Appends one tick: the one place where corrected ticks become bytes.
+pub(crate) fn append_tick(frame: &mut Vec<u8>, tick: &CorrectedTick) {
+    append(frame, |to| {
+        to.u64(tick.sequence);
+        to.i64(tick.end_time.as_ns());
+        to.u64(tick.duration.as_ns().unsigned_abs());
+        to.u64(tick.ticks.into());
+        to.u64(tick.missed);
+        to.f64s(&tick.delta_angle);
+        to.f64s(&tick.delta_velocity);
+        to.mode(tick.mode);
+        to.u64(tick.flags.bits().into());
+        for flags in [&tick.gyro_flags, &tick.accel_flags] {
+            to.length(flags.len());
+            flags.iter().for_each(|flags| to.byte(flags.bits()));
+        }
+        for parity in [&tick.gyro_parity, &tick.accel_parity] {
+            to.length(parity.len());
+            to.f64s(parity);
+        }
+    });
 }
 
-impl Serialize for Ticks<'_> {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_seq(self.ready.iter().take(self.count).map(CorrectedTick::from))
-    }
-}
+#[cfg(test)]
+mod tests {
+    use isotherm_correction::sample::{LasingMode, SensorFlags, TickFlags};
+    use isotherm_correction::units::{Span, Timestamp};
+    use proptest::prelude::*;
 
-impl From<&core::CorrectedTick> for CorrectedTick {
-    fn from(tick: &core::CorrectedTick) -> Self {
-        Self {
-            sequence: tick.sequence,
-            end_time_ns: tick.end_time.as_ns(),
-            duration_ns: tick.duration.as_ns().unsigned_abs(),
-            ticks: tick.ticks,
-            missed: tick.missed,
-            delta_angle_rad: tick.delta_angle,
-            delta_velocity_m_per_s: tick.delta_velocity,
-            mode: tick.mode.map(Into::into),
-            flags: tick.flags.bits(),
-            gyro_flags: tick.gyro_flags.iter().map(SensorFlags::bits).collect(),
-            accel_flags: tick.accel_flags.iter().map(SensorFlags::bits).collect(),
-            gyro_parity_rad_per_s: tick.gyro_parity.clone(),
-            accel_parity_m_per_s2: tick.accel_parity.clone(),
+    use super::*;
+
+    prop_compose! {
+        fn tick()(
+            (sequence, end_ns, duration_ns) in any::<(u64, i64, i64)>(),
+            (ticks, missed, flags) in any::<(u16, u64, u16)>(),
+            mode in prop_oneof![Just(None), Just(Some(LasingMode::Plus)), Just(Some(LasingMode::Minus))],
+            numbers in any::<[u64; 16]>(),
+            (gyros, accels, gyro_parity, accel_parity) in (0..=8_usize, 0..=8_usize, 0..=5_usize, 0..=5_usize),
+        ) -> CorrectedTick {
+            let numbers = numbers.map(f64::from_bits);
+            let sensors = |count| (0..count).map(|index| SensorFlags::from_bits_retain(255 - index)).collect();
+            CorrectedTick {
+                sequence,
+                end_time: Timestamp::from_ns(end_ns),
+                duration: Span::from_ns(duration_ns),
+                ticks,
+                missed,
+                delta_angle: [numbers[0], numbers[1], numbers[2]],
+                delta_velocity: [numbers[3], numbers[4], numbers[5]],
+                mode,
+                flags: TickFlags::from_bits_retain(flags),
+                gyro_flags: sensors(u8::try_from(gyros).unwrap()),
+                accel_flags: sensors(u8::try_from(accels).unwrap()),
+                gyro_parity: numbers[6..].iter().copied().take(gyro_parity).collect(),
+                accel_parity: numbers[11..].iter().copied().take(accel_parity).collect(),
+                revision: 0,
+            }
         }
     }
-}
 
-impl CorrectedTick {
-    /// The tick as the core made it, under the batch's revision counter.
-    #[must_use]
-    pub fn to_core(&self, revision: u64) -> core::CorrectedTick {
-        core::CorrectedTick {
-            sequence: self.sequence,
-            end_time: Timestamp::from_ns(self.end_time_ns),
-            duration: Span::from_ns(i64::try_from(self.duration_ns).unwrap_or(i64::MAX)),
-            ticks: self.ticks,
-            missed: self.missed,
-            delta_angle: self.delta_angle_rad,
-            delta_velocity: self.delta_velocity_m_per_s,
-            mode: self.mode.map(Into::into),
-            flags: TickFlags::from_bits_retain(self.flags),
-            gyro_flags: self.gyro_flags.iter().map(|&bits| SensorFlags::from_bits_retain(bits)).collect(),
-            accel_flags: self.accel_flags.iter().map(|&bits| SensorFlags::from_bits_retain(bits)).collect(),
-            gyro_parity: self.gyro_parity_rad_per_s.clone(),
-            accel_parity: self.accel_parity_m_per_s2.clone(),
-            revision,
+    proptest! {
+        #[test]
+        fn a_tick_is_written_as_postcard_writes_it(tick in tick()) {
+            let mut frame = Vec::new();
+            append_tick(&mut frame, &tick);
+            prop_assert!(frame.len() <= MAX_TICK);
+            prop_assert_eq!(frame, postcard::to_allocvec(&tick).unwrap());
         }
     }
 }

@@ -1,80 +1,87 @@
 //! Raw batches: what a producer publishes for one unit.
+//!
+//! They hold the core's own ticks. `docs/wire.md` describes their form; one place writes it and one reads it, the latter into
+//! room that is used again: that is what becomes of every message in the service.
 
 mod batcher;
-mod direct;
 mod health;
+mod temperature;
+mod tick;
 
-use arrayvec::ArrayVec;
-use isotherm_correction::sample as core;
-use isotherm_correction::sample::{ChannelName, MAX_SENSORS, OutputKind};
+use isotherm_correction::sample::{AccelTick, GyroTick, MAX_SENSORS, OutputKind, Sensors};
 use isotherm_correction::units::{Span, Timestamp};
-use serde::{Deserialize, Serialize};
 
 pub use batcher::{BatchError, Batcher, RawFrame};
-pub use direct::{read_accel, read_gyro, read_temperatures};
 pub use health::{HealthBatch, HealthReading, HealthTick, MAX_HEALTH};
+pub use temperature::{MAX_CHANNELS, TemperatureBatch, read_temperatures};
+pub use tick::RawTick;
 
-use crate::codec::{CodecError, Kind, MAX_TICKS, Message, bounded};
-use crate::version::{self, Versions};
+use crate::codec::{self, Body, CodecError, Kind, MAX_TICKS, Message, Stretch, append};
+use crate::version::Versions;
 
-/// Most temperature channels in one batch.
-pub const MAX_CHANNELS: usize = 16;
-
-/// Readings of one tick, one per sensor.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub enum Readings {
-    /// Counts accumulated over the tick.
-    Counts(ArrayVec<i32, MAX_SENSORS>),
-    /// Means over the tick: rad/s for gyros; V or m/s² for accelerometers.
-    Means(ArrayVec<f64, MAX_SENSORS>),
+/// Consecutive ticks of one unit; gyro ticks are of one series.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RawBatch<T> {
+    /// What the readings stand for.
+    pub output: OutputKind,
+    /// 1…4096 ticks with as many readings each. What is written of their sequence numbers and their series is the first's.
+    pub ticks: Vec<T>,
 }
 
-impl Readings {
-    /// Number of sensors.
-    #[must_use]
-    pub fn len(&self) -> usize {
-        match self {
-            Self::Counts(counts) => counts.len(),
-            Self::Means(means) => means.len(),
-        }
+/// Raw gyro ticks.
+pub type GyroBatch = RawBatch<GyroTick>;
+/// Raw accelerometer ticks.
+pub type AccelBatch = RawBatch<AccelTick>;
+
+/// Fewest bytes of a tick: its times, kind and number of readings.
+const FEWEST_BYTES: usize = 4;
+
+impl<T: RawTick> Message for RawBatch<T> {
+    const KIND: Kind = T::KIND;
+    const VERSIONS: Versions = T::VERSIONS;
+
+    fn check(&self) -> Result<(), CodecError> {
+        let mut alike = Alike::default();
+        self.ticks.iter().enumerate().for_each(|(index, tick)| alike.note(index, self.output, tick));
+        alike.judge(self.ticks.len()).map(drop)
     }
 
-    /// Whether there is no reading at all.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
-    /// What the readings stand for.
-    #[must_use]
-    pub fn kind(&self) -> OutputKind {
-        match self {
-            Self::Counts(_) => OutputKind::Counts,
-            Self::Means(_) => OutputKind::Mean,
-        }
-    }
-
-    /// The readings as numbers; counts are exact.
-    #[must_use]
-    pub fn values(&self) -> core::Sensors<f64> {
-        match self {
-            Self::Counts(counts) => counts.iter().copied().map(f64::from).collect(),
-            Self::Means(means) => means.clone(),
-        }
-    }
-
-    /// From numbers; counts must be whole and fit 32 bits, or `None`.
-    #[must_use]
-    pub fn from_values(kind: OutputKind, values: &[f64]) -> Option<Self> {
-        if values.len() > MAX_SENSORS {
-            return None;
-        }
-        match kind {
-            OutputKind::Mean => Some(Self::Means(values.iter().copied().collect())),
-            OutputKind::Counts => {
-                values.iter().map(|&value| whole(value)).collect::<Option<_>>().map(Self::Counts)
+    fn write_body(&self, frame: &mut Vec<u8>) -> Result<(), CodecError> {
+        let first = self.ticks.first();
+        append(frame, |to| {
+            to.u64(first.map_or(0, RawTick::sequence));
+            if let Some(series) = first.and_then(RawTick::series) {
+                to.u64(series);
+            }
+            to.length(self.ticks.len());
+        });
+        for (index, tick) in self.ticks.iter().enumerate() {
+            let mut fits = true;
+            append(frame, |to| {
+                let (end_time, duration) = tick.times();
+                to.i64(end_time.as_ns());
+                to.u64(duration.as_ns().unsigned_abs());
+                to.byte(u8::from(self.output == OutputKind::Mean));
+                to.length(tick.readings().len());
+                match self.output {
+                    OutputKind::Mean => to.f64s(tick.readings()),
+                    OutputKind::Counts => tick.readings().iter().for_each(|&reading| match whole(reading) {
+                        Some(count) => to.i32(count),
+                        None => fits = false,
+                    }),
+                }
+                tick.write_rest(to);
+            });
+            if !fits {
+                return Err(CodecError::NotCounts { index });
             }
         }
+        Ok(())
+    }
+
+    fn read_body(_: u8, body: &[u8]) -> Result<Self, CodecError> {
+        let mut ticks = Vec::new();
+        Ok(Self { output: read_body(body, &mut ticks)?, ticks })
     }
 }
 
@@ -87,274 +94,104 @@ fn whole(value: f64) -> Option<i32> {
     exact.then_some(count)
 }
 
-/// Sign of the lasing mode or of the slow meander's phase.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Mode {
-    /// +1.
-    Plus,
-    /// −1.
-    Minus,
+/// Reads a frame of gyro or accelerometer ticks; what their readings stand for.
+///
+/// `ticks` holds the ticks afterwards, and anything after an error.
+///
+/// # Errors
+/// As [`codec::decode`] of a [`RawBatch`].
+pub fn read_ticks<T: RawTick>(frame: &[u8], ticks: &mut Vec<T>) -> Result<OutputKind, CodecError> {
+    read_body(codec::body::<RawBatch<T>>(frame)?, ticks)
 }
 
-impl From<core::LasingMode> for Mode {
-    fn from(mode: core::LasingMode) -> Self {
-        match mode {
-            core::LasingMode::Plus => Self::Plus,
-            core::LasingMode::Minus => Self::Minus,
-        }
+fn read_body<T: RawTick>(bytes: &[u8], ticks: &mut Vec<T>) -> Result<OutputKind, CodecError> {
+    let mut body = Body(bytes);
+    let mut alike = Alike::default();
+    read_all(&mut body, ticks, &mut alike).ok_or(CodecError::Malformed)?;
+    body.end()?;
+    alike.judge(ticks.len())
+}
+
+/// Reads all ticks of a body.
+fn read_all<T: RawTick>(body: &mut Body<'_>, ticks: &mut Vec<T>, alike: &mut Alike) -> Option<()> {
+    // Never more than the body can hold, whatever it says.
+    let most = MAX_TICKS.min(body.left() / FEWEST_BYTES);
+    let (first, series) =
+        body.part(|part| Some((part.u64()?, if T::HAS_SERIES { part.u64()? } else { 0 })))?;
+    ticks.resize_with(body.length(most)?, T::default);
+    for (index, tick) in ticks.iter_mut().enumerate() {
+        body.part(|part| {
+            let end_time = Timestamp::from_ns(part.i64()?);
+            // What is longer than the longest span becomes that, which the core then refuses.
+            let duration = Span::from_ns(i64::try_from(part.u64()?).unwrap_or(i64::MAX));
+            tick.begin(first.saturating_add(index as u64), series, (end_time, duration));
+            let output = read_readings(part, tick.readings_mut())?;
+            tick.read_rest(part)?;
+            alike.note(index, output, tick);
+            Some(())
+        })?;
     }
+    Some(())
 }
 
-impl From<Mode> for core::LasingMode {
-    fn from(mode: Mode) -> Self {
-        match mode {
-            Mode::Plus => Self::Plus,
-            Mode::Minus => Self::Minus,
-        }
-    }
-}
-
-/// Half-period counts of one gyro in one tick.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct HalfPeriod {
-    /// Counts in the positive half period of the dither.
-    pub positive: i32,
-    /// Counts in the negative half period of the dither.
-    pub negative: i32,
-}
-
-/// One raw gyro tick; its sequence number is the batch's first plus its index.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct GyroTick {
-    /// End of the tick (ns on the producer's clock).
-    pub end_time_ns: i64,
-    /// Measured duration (ns).
-    pub duration_ns: u64,
-    /// One reading per gyro.
-    pub readings: Readings,
-    /// Lasing mode commanded at the end of the tick, where the instrument has modes.
-    pub mode: Option<Mode>,
-    /// A mode switch was commanded at the start of this tick.
-    pub switch_command: bool,
-    /// Phase of the slow meander, where the producer reports it.
-    pub meander: Option<Mode>,
-    /// Half-period counts, one per gyro, or none.
-    pub half_periods: ArrayVec<HalfPeriod, MAX_SENSORS>,
-}
-
-/// Consecutive gyro ticks of one unit.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct GyroBatch {
-    /// Sequence number of the first tick.
-    pub first_sequence: u64,
-    /// Number of the producer's run, e.g. the time of its start: where it changes, neither sequence nor time
-    /// continue what came before. A producer without such a number sends 0 for ever.
-    pub series: u64,
-    /// 1…4096 ticks, all with readings of one kind and number.
-    #[serde(deserialize_with = "bounded::<_, _, MAX_TICKS>")]
-    pub ticks: Vec<GyroTick>,
-}
-
-/// One raw accelerometer tick; its sequence number is the batch's first plus its index.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct AccelTick {
-    /// End of the tick (ns on the producer's clock).
-    pub end_time_ns: i64,
-    /// Measured duration (ns).
-    pub duration_ns: u64,
-    /// One reading per accelerometer.
-    pub readings: Readings,
-}
-
-/// Consecutive accelerometer ticks of one unit.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct AccelBatch {
-    /// Sequence number of the first tick.
-    pub first_sequence: u64,
-    /// 1…4096 ticks, all with readings of one kind and number.
-    #[serde(deserialize_with = "bounded::<_, _, MAX_TICKS>")]
-    pub ticks: Vec<AccelTick>,
-}
-
-/// Readings of all channels of a batch at one time.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct TemperatureTick {
-    /// Time of the readings (ns on the producer's clock).
-    pub time_ns: i64,
-    /// One raw reading per channel of the batch; NaN where a channel gave none.
-    pub raw: ArrayVec<f64, MAX_CHANNELS>,
-}
-
-/// Temperature readings of one unit.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct TemperatureBatch {
-    /// Names of the channels.
-    pub channels: ArrayVec<ChannelName, MAX_CHANNELS>,
-    /// 1…4096 ticks.
-    #[serde(deserialize_with = "bounded::<_, _, MAX_TICKS>")]
-    pub ticks: Vec<TemperatureTick>,
-}
-
-/// Checks the number of ticks and that all have readings like the first.
-fn check_ticks<'a>(readings: impl ExactSizeIterator<Item = &'a Readings>) -> Result<(), CodecError> {
-    let count = readings.len();
-    if !(1..=MAX_TICKS).contains(&count) {
-        return Err(CodecError::Ticks { count });
-    }
-    let mut first = None;
-    for (index, readings) in readings.enumerate() {
-        let like = (readings.kind(), readings.len());
-        if *first.get_or_insert(like) != like {
-            return Err(CodecError::MixedReadings { index });
-        }
-    }
-    Ok(())
-}
-
-impl Message for GyroBatch {
-    const KIND: Kind = Kind::RawGyro;
-    const VERSIONS: Versions = version::RAW_GYRO;
-
-    fn check(&self) -> Result<(), CodecError> {
-        check_ticks(self.ticks.iter().map(|tick| &tick.readings))?;
-        for (index, tick) in self.ticks.iter().enumerate() {
-            let (got, need) = (tick.half_periods.len(), tick.readings.len());
-            if got != 0 && got != need {
-                return Err(CodecError::HalfPeriods { index, got, need });
+/// Reads the readings of a tick; what they stand for.
+#[inline]
+fn read_readings(part: &mut Stretch<'_>, readings: &mut Sensors<f64>) -> Option<OutputKind> {
+    let kind = part.u32()?;
+    resize(readings, part.length(MAX_SENSORS)?);
+    match kind {
+        0 => {
+            for reading in readings {
+                *reading = f64::from(part.i32()?);
             }
+            Some(OutputKind::Counts)
         }
-        Ok(())
-    }
-}
-
-impl Message for AccelBatch {
-    const KIND: Kind = Kind::RawAccel;
-    const VERSIONS: Versions = version::RAW_ACCEL;
-
-    fn check(&self) -> Result<(), CodecError> {
-        check_ticks(self.ticks.iter().map(|tick| &tick.readings))
-    }
-}
-
-impl Message for TemperatureBatch {
-    const KIND: Kind = Kind::RawTemperature;
-    const VERSIONS: Versions = version::RAW_TEMPERATURE;
-
-    fn check(&self) -> Result<(), CodecError> {
-        let count = self.ticks.len();
-        if !(1..=MAX_TICKS).contains(&count) {
-            return Err(CodecError::Ticks { count });
+        1 => {
+            for reading in readings {
+                *reading = part.f64()?;
+            }
+            Some(OutputKind::Mean)
         }
-        match self.ticks.iter().position(|tick| tick.raw.len() != self.channels.len()) {
-            Some(index) => Err(CodecError::MixedReadings { index }),
-            None => Ok(()),
+        _ => None,
+    }
+}
+
+/// Makes room for a number of values, which are written next: mostly as many as there were.
+#[inline]
+fn resize<V: Default>(values: &mut Sensors<V>, count: usize) {
+    if values.len() != count {
+        *values = (0..count).map(|_| V::default()).collect();
+    }
+}
+
+/// Whether all ticks of a batch have readings of one kind and number, and half-period counts of all gyros or of none.
+#[derive(Debug, Default)]
+struct Alike {
+    first: Option<(OutputKind, usize)>,
+    /// The first tick with other readings.
+    mixed: Option<CodecError>,
+    /// The first tick with half-period counts of some gyros.
+    some_halves: Option<CodecError>,
+}
+
+impl Alike {
+    #[inline]
+    fn note(&mut self, index: usize, output: OutputKind, tick: &impl RawTick) {
+        let (need, got) = (tick.readings().len(), tick.half_periods());
+        if *self.first.get_or_insert((output, need)) != (output, need) {
+            self.mixed.get_or_insert(CodecError::MixedReadings { index });
+        }
+        if got != 0 && got != need {
+            self.some_halves.get_or_insert(CodecError::HalfPeriods { index, got, need });
         }
     }
-}
 
-/// A span from a wire duration; what does not fit becomes the longest span, which the core then refuses.
-fn span(duration_ns: u64) -> Span {
-    Span::from_ns(i64::try_from(duration_ns).unwrap_or(i64::MAX))
-}
-
-/// Wire duration of a span.
-fn duration_ns(span: Span) -> u64 {
-    span.as_ns().unsigned_abs()
-}
-
-impl GyroBatch {
-    /// What the readings stand for; counts for an empty batch, which no decoder lets through.
-    #[must_use]
-    pub fn output(&self) -> OutputKind {
-        self.ticks.first().map_or(OutputKind::Counts, |tick| tick.readings.kind())
-    }
-
-    /// The ticks as the core takes them.
-    pub fn to_core(&self) -> impl Iterator<Item = core::GyroTick> {
-        self.ticks.iter().zip(0..).map(|(tick, index)| core::GyroTick {
-            sequence: self.first_sequence.saturating_add(index),
-            end_time: Timestamp::from_ns(tick.end_time_ns),
-            duration: span(tick.duration_ns),
-            readings: tick.readings.values(),
-            mode: tick.mode.map(Into::into),
-            switch_command: tick.switch_command,
-            meander: tick.meander.map(Into::into),
-            half_periods: tick
-                .half_periods
-                .iter()
-                .map(|half| core::HalfPeriodCounts { positive: half.positive, negative: half.negative })
-                .collect(),
-            series: self.series,
-        })
-    }
-
-    /// A batch of consecutive ticks of one series; `None` where a reading is not a count though counts are asked for.
-    #[must_use]
-    pub fn from_core(kind: OutputKind, ticks: &[core::GyroTick]) -> Option<Self> {
-        let wire = ticks.iter().map(|tick| {
-            Some(GyroTick {
-                end_time_ns: tick.end_time.as_ns(),
-                duration_ns: duration_ns(tick.duration),
-                readings: Readings::from_values(kind, &tick.readings)?,
-                mode: tick.mode.map(Into::into),
-                switch_command: tick.switch_command,
-                meander: tick.meander.map(Into::into),
-                half_periods: tick
-                    .half_periods
-                    .iter()
-                    .map(|half| HalfPeriod { positive: half.positive, negative: half.negative })
-                    .collect(),
-            })
-        });
-        let first = ticks.first()?;
-        Some(Self {
-            first_sequence: first.sequence,
-            series: first.series,
-            ticks: wire.collect::<Option<_>>()?,
-        })
+    /// What is wrong with a batch of `count` ticks; otherwise what its readings stand for.
+    fn judge(self, count: usize) -> Result<OutputKind, CodecError> {
+        let (output, _) = self.first.filter(|_| count <= MAX_TICKS).ok_or(CodecError::Ticks { count })?;
+        self.mixed.or(self.some_halves).map_or(Ok(output), Err)
     }
 }
 
-impl AccelBatch {
-    /// What the readings stand for; counts for an empty batch, which no decoder lets through.
-    #[must_use]
-    pub fn output(&self) -> OutputKind {
-        self.ticks.first().map_or(OutputKind::Counts, |tick| tick.readings.kind())
-    }
-
-    /// The ticks as the core takes them.
-    pub fn to_core(&self) -> impl Iterator<Item = core::AccelTick> {
-        self.ticks.iter().zip(0..).map(|(tick, index)| core::AccelTick {
-            sequence: self.first_sequence.saturating_add(index),
-            end_time: Timestamp::from_ns(tick.end_time_ns),
-            duration: span(tick.duration_ns),
-            readings: tick.readings.values(),
-        })
-    }
-
-    /// A batch of consecutive ticks; `None` where a reading is not a count though counts are asked for.
-    #[must_use]
-    pub fn from_core(kind: OutputKind, ticks: &[core::AccelTick]) -> Option<Self> {
-        let wire = ticks.iter().map(|tick| {
-            Some(AccelTick {
-                end_time_ns: tick.end_time.as_ns(),
-                duration_ns: duration_ns(tick.duration),
-                readings: Readings::from_values(kind, &tick.readings)?,
-            })
-        });
-        Some(Self { first_sequence: ticks.first()?.sequence, ticks: wire.collect::<Option<_>>()? })
-    }
-}
-
-impl TemperatureBatch {
-    /// The readings as the core takes them, in time order per channel.
-    pub fn to_core(&self) -> impl Iterator<Item = core::TemperatureReading> {
-        self.ticks.iter().flat_map(|tick| {
-            self.channels.iter().zip(&tick.raw).map(|(&channel, &raw)| core::TemperatureReading {
-                channel,
-                time: Timestamp::from_ns(tick.time_ns),
-                raw,
-            })
-        })
-    }
-}
+#[cfg(test)]
+mod tests;

@@ -4,7 +4,7 @@ use isotherm_correction::drift;
 use isotherm_correction::units::Timestamp;
 use serde::{Deserialize, Serialize};
 
-use crate::codec::{CodecError, Kind, Message};
+use crate::codec::{CodecError, Kind, PlainMessage};
 use crate::version::{self, Versions};
 
 /// Mean inertial angular rate of a unit over a span of time, as another instrument or the stand knows it.
@@ -22,7 +22,7 @@ pub struct Reference {
     pub sigma_rad_per_s: f64,
 }
 
-impl Message for Reference {
+impl PlainMessage for Reference {
     const KIND: Kind = Kind::Reference;
     const VERSIONS: Versions = version::REFERENCE;
 

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::codec::{Kind, Message, bounded};
+use crate::codec::{Kind, PlainMessage, bounded};
 use crate::digest::Digest;
 use crate::status::{Fault, MAX_FAULTS, Output, State};
 use crate::version::{self, Versions};
@@ -100,7 +100,7 @@ pub struct ServiceStatus {
     pub swaps_refused: u64,
 }
 
-impl Message for ServiceStatus {
+impl PlainMessage for ServiceStatus {
     const KIND: Kind = Kind::ServiceStatus;
     const VERSIONS: Versions = version::SERVICE_STATUS;
 }

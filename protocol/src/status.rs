@@ -25,7 +25,7 @@ pub use self_test::{SelfTestItem, SelfTestReport};
 pub use sensor::{SensorKind, SensorStatus};
 pub use traffic::{Counter, Fault, InputRates, Latency, LatencyBucket};
 
-use crate::codec::{Kind, Message, bounded};
+use crate::codec::{CodecError, Kind, PlainMessage, bounded, whole};
 use crate::corrected::Revision;
 use crate::version::{self, Versions};
 
@@ -159,14 +159,14 @@ pub struct Status {
     pub latency: Latency,
 }
 
-impl Message for Status {
+impl PlainMessage for Status {
     const KIND: Kind = Kind::Status;
     const VERSIONS: Versions = version::STATUS;
 
-    fn read_body(version: u8, body: &[u8]) -> postcard::Result<(Self, &[u8])> {
+    fn read(version: u8, body: &[u8]) -> Result<Self, CodecError> {
         match version {
-            1 => postcard::take_from_bytes::<v1::Status>(body).map(|(old, rest)| (old.into(), rest)),
-            _ => postcard::take_from_bytes(body),
+            1 => whole::<v1::Status>(body).map(Into::into),
+            _ => whole(body),
         }
     }
 }

@@ -8,18 +8,19 @@ mod edge;
 mod heard;
 mod label;
 mod memory;
+mod outgoing;
 mod revisions;
-mod room;
 mod status;
 #[cfg(test)]
 mod tests;
 
-use std::collections::VecDeque;
+use std::cell::Cell;
 use std::sync::Arc;
 
+use arrayvec::ArrayVec;
 use isotherm_correction::calibration::Calibration;
-use isotherm_correction::operation::{Command, Refusal, State};
-use isotherm_correction::sample::{CorrectedTick, TickFlags};
+use isotherm_correction::operation::{Command, HealthReading, Refusal, State};
+use isotherm_correction::sample::{AccelTick, CorrectedTick, GyroTick, TemperatureReading, TickFlags};
 use isotherm_correction::unit::{At, Change, Event, Unit, UnitSettings};
 use isotherm_correction::units::Span;
 use serde::{Deserialize, Serialize};
@@ -29,16 +30,31 @@ pub use edge::Edge;
 pub use heard::Heard;
 pub use label::Label;
 pub use memory::{MEMORY_VERSION, MemoryError};
+use outgoing::Last;
+pub use outgoing::Outgoing;
 pub use revisions::InForce;
 use revisions::Revisions;
-use room::{Queues, Room};
 
-use crate::codec::{self, CodecError, MAX_TICKS};
-use crate::corrected::{AppliedTemperature, CorrectedBody, Revision, Ticks};
+use crate::codec::{self, CodecError};
+use crate::corrected::{AppliedTemperature, Revision};
 use crate::key::{Input, RawStream, UnitId};
 use crate::raw::{self, HealthBatch};
 use crate::reference::Reference;
 use crate::status::{Counter, LastTick};
+
+/// What a message is read into. One thread deals with a message from its first byte to its last corrected tick, so that
+/// units need no such room of their own.
+#[derive(Debug, Default)]
+struct Scratch {
+    gyro_ticks: Vec<GyroTick>,
+    accel_ticks: Vec<AccelTick>,
+    readings: Vec<TemperatureReading>,
+    health: Vec<HealthReading>,
+}
+
+thread_local! {
+    static SCRATCH: Cell<Scratch> = Cell::default();
+}
 
 /// One unit's stream.
 ///
@@ -50,7 +66,7 @@ pub struct UnitStream {
     heard: [Heard; Input::ALL.len()],
     unit: Unit,
     revisions: Revisions,
-    ready: VecDeque<CorrectedTick>,
+    outgoing: Outgoing,
     bad_frames: u64,
     last: Option<LastTick>,
     /// Series of the last raw gyro tick.
@@ -70,13 +86,21 @@ impl UnitStream {
             heard: [Heard::default(); Input::ALL.len()],
             unit: Unit::new(settings),
             revisions: Revisions::new(0),
-            ready: VecDeque::new(),
+            outgoing: Outgoing::default(),
             bad_frames: 0,
             last: None,
             incoming_series: 0,
             series: None,
             pre_launch_ended_ns: None,
         }
+    }
+
+    /// The same stream for whoever wants the ticks rather than frames: they are kept as they are, and
+    /// [`UnitStream::next_frame`] writes them when it is called. Not part of its memory.
+    #[must_use]
+    pub fn keeping_ticks(mut self) -> Self {
+        self.outgoing.keep_ticks();
+        self
     }
 
     /// Lets the revision counter go on behind `highest`, the highest that the unit was ever given; at the start only.
@@ -159,31 +183,38 @@ impl UnitStream {
     /// [`CodecError`] for a frame that cannot be read: it is counted, and nothing else changes.
     pub fn receive(&mut self, stream: RawStream, frame: &[u8]) -> Result<(), CodecError> {
         self.note_heard(Input::Raw(stream), frame);
-        let received = room::with(|room| self.receive_frame(stream, frame, room));
+        let mut scratch = SCRATCH.take();
+        let received = self.receive_frame(stream, frame, &mut scratch);
+        SCRATCH.set(scratch);
         self.bad_frames += u64::from(received.is_err());
         received
     }
 
-    fn receive_frame(&mut self, stream: RawStream, frame: &[u8], room: &mut Room) -> Result<(), CodecError> {
-        let Room { gyro_ticks, accel_ticks, readings, health, queues } = room;
+    fn receive_frame(
+        &mut self,
+        stream: RawStream,
+        frame: &[u8],
+        scratch: &mut Scratch,
+    ) -> Result<(), CodecError> {
+        let Scratch { gyro_ticks, accel_ticks, readings, health } = scratch;
         match stream {
             RawStream::Gyro => {
-                let output = raw::read_gyro(frame, gyro_ticks)?;
-                self.handle_in(queues, Event::Gyro { output, ticks: gyro_ticks });
+                let output = raw::read_ticks(frame, gyro_ticks)?;
+                self.handle(Event::Gyro { output, ticks: gyro_ticks });
             }
             RawStream::Accel => {
-                let output = raw::read_accel(frame, accel_ticks)?;
-                self.handle_in(queues, Event::Accel { output, ticks: accel_ticks });
+                let output = raw::read_ticks(frame, accel_ticks)?;
+                self.handle(Event::Accel { output, ticks: accel_ticks });
             }
             RawStream::Temperature => {
                 raw::read_temperatures(frame, readings)?;
-                self.handle_in(queues, Event::Temperature(readings));
+                self.handle(Event::Temperature(readings));
             }
             RawStream::Health => {
                 let batch: HealthBatch = codec::decode(frame)?;
                 health.clear();
                 health.extend(batch.to_core());
-                self.handle_in(queues, Event::Health(health));
+                self.handle(Event::Health(health));
             }
         }
         Ok(())
@@ -203,18 +234,13 @@ impl UnitStream {
 
     /// Takes one event that is no frame, or no longer.
     pub fn handle(&mut self, event: Event<'_>) {
-        room::with(|room| self.handle_in(&mut room.queues, event));
-    }
-
-    fn handle_in(&mut self, queues: &mut Queues, event: Event<'_>) {
-        queues.lend(&mut self.ready);
         if let Event::Gyro { ticks, .. } = event {
             self.incoming_series = ticks.last().map_or(self.incoming_series, |tick| tick.series);
         }
         let before = (self.unit.calibration().map(|(_, counter)| counter), self.unit.counters().ticks_out);
         let state = self.unit.state();
-        let Self { unit, ready, revisions, series, incoming_series, .. } = self;
-        unit.handle(event, &mut |tick| {
+        let Self { unit, outgoing, revisions, series, incoming_series, .. } = self;
+        unit.handle(event, &mut |tick: &CorrectedTick| {
             // Only a restart changes the series.
             if tick.flags.contains(TickFlags::RESTART) || series.is_none() {
                 *series = Some(*incoming_series);
@@ -226,14 +252,13 @@ impl UnitStream {
                 sequence: tick.sequence.saturating_sub(u64::from(tick.ticks.saturating_sub(1))),
                 end_time_ns: tick.end_time.as_ns(),
             });
-            ready.push_back(tick.clone());
+            outgoing.push(tick);
         });
         let after = (self.unit.calibration().map(|(_, counter)| counter), self.unit.counters().ticks_out);
         if before.1 != after.1 {
             before.0.into_iter().chain(after.0).for_each(|counter| self.revisions.made_ticks(counter));
         }
         self.note_pre_launch(state);
-        queues.take_back(&mut self.ready);
     }
 
     /// Does something with the unit that may end a pre-launch calibration.
@@ -258,48 +283,34 @@ impl UnitStream {
 
     /// Corrected ticks that have not been taken yet.
     #[must_use]
-    pub fn ready(&self) -> &VecDeque<CorrectedTick> {
-        &self.ready
+    pub fn ready(&self) -> &Outgoing {
+        &self.outgoing
     }
 
     /// Takes the corrected ticks as they are.
     pub fn take_ready(&mut self) -> Vec<CorrectedTick> {
-        let mut ticks = Vec::with_capacity(self.ready.len());
-        self.let_go(self.ready.len(), |tick| ticks.push(tick));
+        let (ticks, last) = self.outgoing.take();
+        self.note_taken(last);
         ticks
     }
 
-    /// Encodes the next batch of corrected ticks, all of one revision, into `frame`; `false` where there is none.
+    /// Makes the next frame of corrected ticks, all of one revision, in the place of `frame`, whose capacity the stream keeps
+    /// for the one after it; `false` where there is none.
     pub fn next_frame(&mut self, frame: &mut Vec<u8>) -> bool {
-        let Some(first) = self.ready.front() else { return false };
-        let counter = first.revision;
-        let ticks = self.ready.iter().take(MAX_TICKS).take_while(|tick| tick.revision == counter);
-        let count = ticks.count();
-        let batch = CorrectedBody {
-            unit: self.id.as_str(),
-            revision: self.revisions.revision(counter),
-            temperatures: self.temperatures().collect(),
-            ticks: Ticks { ready: &self.ready, count },
-        };
-        let encoded = batch.encode_into(frame).is_ok();
-        self.drop_ready(count);
-        encoded
-    }
-
-    /// Drops the first ready ticks: they were taken.
-    pub fn drop_ready(&mut self, count: usize) {
-        self.let_go(count.min(self.ready.len()), drop);
-    }
-
-    /// Lets the first ready ticks go; there must be so many.
-    fn let_go(&mut self, count: usize, each: impl FnMut(CorrectedTick)) {
-        let last = count.checked_sub(1).and_then(|last| self.ready.get(last));
-        let last = last.map(|tick| (tick.end_time.as_ns(), tick.sequence, tick.revision));
-        self.note_taken(last);
-        self.ready.drain(..count).for_each(each);
-        if self.ready.is_empty() {
-            room::with(|room| room.queues.take_ready(&mut self.ready));
+        if self.outgoing.is_empty() {
+            return false;
         }
+        let temperatures = self.temperatures();
+        let revision = |counter| self.revisions.revision(counter);
+        let last = self.outgoing.next_frame(frame, self.id.as_str(), revision, &temperatures);
+        self.note_taken(last);
+        last.is_some()
+    }
+
+    /// Gives up the ready ticks: they were taken.
+    pub fn drop_ready(&mut self) {
+        let last = self.outgoing.clear();
+        self.note_taken(last);
     }
 
     /// The first output of each revision, in order and once each; ask after every frame.
@@ -308,23 +319,25 @@ impl UnitStream {
     }
 
     /// Remembers the last tick taken, and drops revisions of which nothing can be waiting any more.
-    fn note_taken(&mut self, last: Option<(i64, u64, u64)>) {
-        let Some((end_time_ns, sequence, revision)) = last else { return };
+    fn note_taken(&mut self, last: Option<Last>) {
+        let Some(Last { end_time_ns, sequence, revision }) = last else { return };
         let series = self.series.unwrap_or_default();
         self.last = Some(LastTick { end_time_ns, sequence, series });
         self.revisions.taken(revision);
     }
 
-    fn temperatures(&self) -> impl Iterator<Item = AppliedTemperature> + '_ {
+    /// As many as a batch takes.
+    fn temperatures(&self) -> ArrayVec<AppliedTemperature, { raw::MAX_CHANNELS }> {
         let channels = self.unit.channels().take(raw::MAX_CHANNELS);
-        channels.filter_map(|channel| {
+        let applied = channels.filter_map(|channel| {
             let state = channel.state?;
             Some(AppliedTemperature {
                 channel: channel.name,
                 temperature_deg_c: state.temperature,
                 rate_deg_c_per_s: state.rate,
             })
-        })
+        });
+        applied.collect()
     }
 
     /// Every counter of the unit, by name.

@@ -50,8 +50,6 @@ pub struct UnitActor {
     stream: UnitStream,
     plan: Plan,
     outlet: Outlet,
-    /// Length of the last frame that was published (bytes).
-    frame_length: usize,
     faults: FaultLog,
     latency: Histogram,
     quiet: Quiet,
@@ -83,7 +81,6 @@ impl UnitActor {
             stream: UnitStream::new(id, settings),
             plan: Plan::default(),
             outlet,
-            frame_length: 0,
             faults: FaultLog::default(),
             latency: Histogram::default(),
             quiet: Quiet::new(quiet),
@@ -222,10 +219,9 @@ impl UnitActor {
     fn publish(&mut self) -> bool {
         let mut published = false;
         while let ready @ 1.. = self.stream.ready().len() {
-            // It goes away with the frame: room for one like the last, made at once.
-            let mut frame = Vec::with_capacity(self.frame_length + self.frame_length / 8);
+            // The one that the stream has written into goes away: nothing is given back for it.
+            let mut frame = Vec::new();
             let encoded = self.stream.next_frame(&mut frame);
-            self.frame_length = frame.len();
             let taken = (ready - self.stream.ready().len()) as u64;
             let sent = if encoded { (self.outlet)(frame) } else { Err("cannot be encoded".into()) };
             match sent {

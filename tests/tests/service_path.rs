@@ -10,9 +10,7 @@ use isotherm_correction::sample::ChannelName;
 use isotherm_protocol::codec;
 use isotherm_protocol::document::Document;
 use isotherm_protocol::key::{self, RawStream, UnitId};
-use isotherm_protocol::raw::{
-    AccelBatch, AccelTick, GyroBatch, GyroTick, Readings, TemperatureBatch, TemperatureTick,
-};
+use isotherm_protocol::raw::{AccelBatch, GyroBatch, TemperatureBatch};
 use isotherm_service::calibrations::Calibrations;
 use isotherm_service::config::Settings;
 use isotherm_service::intake::Intake;
@@ -95,8 +93,10 @@ fn a_message_allocates_nothing_but_the_frame_that_it_publishes() {
 
 /// The messages with a batch of ticks, readings of every channel once a second before it.
 fn messages(unit: &UnitId, first: u64, batch: u64, channels: &[ChannelName]) -> Vec<Message> {
-    let end_time_ns = |tick: u64| ((tick + 1) * TICK_NS).cast_signed();
-    let readings = || Readings::Means([0.01, 0.02, 0.03].into_iter().collect());
+    let end_time = |tick: u64| Timestamp::from_ns(((tick + 1) * TICK_NS).cast_signed());
+    let duration = Span::from_ns(TICK_NS.cast_signed());
+    let readings: Sensors<f64> = [0.01, 0.02, 0.03].into_iter().collect();
+    let output = OutputKind::Mean;
     let ticks = first..first + batch;
     let mut messages = Vec::new();
     let message = |stream, frame: Result<Vec<u8>, codec::CodecError>| {
@@ -104,30 +104,27 @@ fn messages(unit: &UnitId, first: u64, batch: u64, channels: &[ChannelName]) -> 
     };
     if let Some(second) = ticks.clone().find(|tick| tick % TICKS_PER_S == 0) {
         let celsius = if (second / TICKS_PER_S).is_multiple_of(2) { 1.75 } else { 1.76 };
-        let tick = TemperatureTick {
-            time_ns: (second * TICK_NS).cast_signed(),
-            raw: channels.iter().map(|_| celsius).collect(),
-        };
-        let batch = TemperatureBatch { channels: channels.iter().copied().collect(), ticks: vec![tick] };
+        let time = Timestamp::from_ns((second * TICK_NS).cast_signed());
+        let readings = channels.iter().map(|&channel| TemperatureReading { channel, time, raw: celsius });
+        let batch = TemperatureBatch { readings: readings.collect() };
         messages.push(message(RawStream::Temperature, codec::encode(&batch)));
     }
-    let accels = ticks.clone().map(|tick| AccelTick {
-        end_time_ns: end_time_ns(tick),
-        duration_ns: TICK_NS,
-        readings: readings(),
+    let accels = ticks.clone().map(|sequence| AccelTick {
+        sequence,
+        end_time: end_time(sequence),
+        duration,
+        readings: readings.clone(),
     });
-    let accels = AccelBatch { first_sequence: first, ticks: accels.collect() };
+    let accels = AccelBatch { output, ticks: accels.collect() };
     messages.push(message(RawStream::Accel, codec::encode(&accels)));
-    let gyros = ticks.map(|tick| GyroTick {
-        end_time_ns: end_time_ns(tick),
-        duration_ns: TICK_NS,
-        readings: readings(),
-        mode: None,
-        switch_command: false,
-        meander: None,
-        half_periods: [].into_iter().collect(),
+    let gyros = ticks.map(|sequence| GyroTick {
+        sequence,
+        end_time: end_time(sequence),
+        duration,
+        readings: readings.clone(),
+        ..GyroTick::default()
     });
-    let gyros = GyroBatch { first_sequence: first, series: 0, ticks: gyros.collect() };
+    let gyros = GyroBatch { output, ticks: gyros.collect() };
     messages.push(message(RawStream::Gyro, codec::encode(&gyros)));
     messages
 }

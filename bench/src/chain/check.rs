@@ -79,8 +79,8 @@ fn corrected(unit: usize, sent: &[Message], kept: &[Kept]) -> Result<Result<(), 
 
 /// The tick as it would be if nothing had been missing before it: what was lost on the way in is missing at the sink, and told there.
 fn without_gap(tick: &CorrectedTick) -> CorrectedTick {
-    let gap = if tick.missed > 0 { TickFlags::GAP.bits() } else { 0 };
-    CorrectedTick { missed: 0, flags: tick.flags & !gap, ..tick.clone() }
+    let gap = if tick.missed > 0 { TickFlags::GAP } else { TickFlags::empty() };
+    CorrectedTick { missed: 0, flags: tick.flags - gap, ..tick.clone() }
 }
 
 /// What an offline correction gives, by sequence number.
@@ -98,7 +98,7 @@ pub(crate) fn offline(unit: usize, sent: &[Message]) -> Result<BTreeMap<u64, Cor
         stream.receive(RawStream::Gyro, &message.gyro).map_err(bad)?;
     }
     stream.flush();
-    Ok(stream.take_ready().iter().map(|tick| (tick.sequence, tick.into())).collect())
+    Ok(stream.take_ready().into_iter().map(|tick| (tick.sequence, tick)).collect())
 }
 
 /// Every tick, by the same few lines.
@@ -165,11 +165,10 @@ mod tests {
         let expected = offline(0, &sent().1).unwrap();
         assert_eq!(expected.len(), 200);
         for tick in expected.values() {
-            let sound = |flags: &u8| SensorFlags::from_bits_retain(*flags).contains(SensorFlags::VALID);
+            let sound = |flags: &SensorFlags| flags.contains(SensorFlags::VALID);
             assert!(tick.gyro_flags.iter().chain(&tick.accel_flags).all(sound), "{tick:?}");
-            let flags = TickFlags::from_bits_retain(tick.flags);
             assert!(
-                !flags.intersects(TickFlags::UNCALIBRATED | TickFlags::ACCELEROMETER_MISSING),
+                !tick.flags.intersects(TickFlags::UNCALIBRATED | TickFlags::ACCELEROMETER_MISSING),
                 "{tick:?}"
             );
             assert_eq!((tick.missed, tick.gyro_flags.len(), tick.accel_flags.len()), (0, 3, 3));
@@ -184,8 +183,8 @@ mod tests {
             let tick = &whole[&sequence];
             let duration_s = 1e-3;
             for axis in 0..3 {
-                let rate_error = (plain[axis] - tick.delta_angle_rad[axis]) / duration_s;
-                let force_error = (plain[3 + axis] - tick.delta_velocity_m_per_s[axis]) / duration_s;
+                let rate_error = (plain[axis] - tick.delta_angle[axis]) / duration_s;
+                let force_error = (plain[3 + axis] - tick.delta_velocity[axis]) / duration_s;
                 // 5 °C of self-heating: 20 °/h and 6 mm/s² per axis, and 1 % would be seen.
                 assert!(rate_error.abs() < 2e-4 && force_error.abs() < 0.02, "{rate_error} {force_error}");
             }
@@ -209,7 +208,7 @@ mod tests {
         let right = codec::encode(&batch(ticks.clone())).unwrap();
         assert_eq!(corrected(0, &sent, &frame(&right)).unwrap(), Ok(()));
         let mut off = ticks;
-        off[1].delta_angle_rad[2] = f64::from_bits(off[1].delta_angle_rad[2].to_bits() + 1);
+        off[1].delta_angle[2] = f64::from_bits(off[1].delta_angle[2].to_bits() + 1);
         let wrong = codec::encode(&batch(off)).unwrap();
         assert!(corrected(0, &sent, &frame(&wrong)).unwrap().is_err());
 

@@ -56,9 +56,9 @@ impl Constants {
         else {
             return Vec::new();
         };
-        let first = gyro.first_sequence;
-        let gyro = gyro.to_core().map(|tick| (three(&tick.readings), tick.duration.as_s()));
-        let accel = accel.to_core().map(|tick| three(&tick.readings));
+        let first = gyro.ticks.first().map_or(0, |first| first.sequence);
+        let gyro = gyro.ticks.iter().map(|tick| (three(&tick.readings), tick.duration.as_s()));
+        let accel = accel.ticks.iter().map(|tick| three(&tick.readings));
         let ticks = gyro.zip(accel).map(|((rate, duration), force)| {
             let angle: [f64; 3] = std::array::from_fn(|axis| {
                 (rate[axis] * self.gyro_weight[axis] - self.gyro_bias[axis]) * duration

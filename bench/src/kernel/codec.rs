@@ -1,12 +1,10 @@
 //! Decoding and encoding apart, per batch size, as the service does them.
 
-use std::collections::VecDeque;
-
 use arrayvec::ArrayVec;
-use isotherm_correction::sample::{CorrectedTick, GyroTick};
+use isotherm_correction::sample::GyroTick;
 use isotherm_protocol::codec;
-use isotherm_protocol::corrected::{CorrectedBatch, CorrectedBody, Revision, Ticks};
-use isotherm_protocol::raw::{GyroBatch, read_gyro};
+use isotherm_protocol::corrected::{CorrectedBatch, Revision};
+use isotherm_protocol::raw::{GyroBatch, read_ticks};
 
 use super::{Kernel, unit};
 use crate::error::Error;
@@ -25,7 +23,7 @@ pub(super) struct Decode {
 /// Encoding of corrected ticks of the Zeeman unit.
 pub(super) struct Encode {
     name: String,
-    batches: Vec<VecDeque<CorrectedTick>>,
+    batches: Vec<CorrectedBatch>,
     room: Vec<u8>,
 }
 
@@ -35,15 +33,15 @@ impl Decode {
         let unit = unit::zeeman()?;
         let [output, _] = unit.outputs();
         let ticks: Vec<_> = unit.gyro_ticks().take(TICKS).cloned().collect();
-        let frames =
-            ticks.chunks(size).filter_map(|ticks| codec::encode(&GyroBatch::from_core(output, ticks)?).ok());
+        let batches = ticks.chunks(size).map(|ticks| GyroBatch { output, ticks: ticks.to_vec() });
+        let frames = batches.filter_map(|batch| codec::encode(&batch).ok());
         let name = format!("decode raw gyros, batches of {size}");
         Ok(Self { name, frames: frames.collect(), ticks, room: Vec::new() })
     }
 
     fn decode(&mut self, each: &mut dyn FnMut(&GyroTick)) {
         for frame in &self.frames {
-            if read_gyro(frame, &mut self.room).is_ok() {
+            if read_ticks(frame, &mut self.room).is_ok() {
                 self.room.iter().for_each(&mut *each);
             }
         }
@@ -89,20 +87,19 @@ impl Encode {
     /// Batches of `size`.
     pub(super) fn of(size: usize) -> Result<Self, Error> {
         let corrected: Vec<_> = unit::zeeman()?.corrected().into_iter().take(TICKS).collect();
-        let batches = corrected.chunks(size).map(|ticks| ticks.iter().cloned().collect());
+        let batches = corrected.chunks(size).map(|ticks| CorrectedBatch {
+            unit: "ZLG-0001".to_owned(),
+            revision: Revision { counter: 1, digest: [7; 8] },
+            temperatures: ArrayVec::new(),
+            ticks: ticks.to_vec(),
+        });
         let name = format!("encode corrected, batches of {size}");
         Ok(Self { name, batches: batches.collect(), room: Vec::new() })
     }
 
     fn encode(&mut self, each: &mut dyn FnMut(&[u8])) {
-        for ticks in &self.batches {
-            let batch = CorrectedBody {
-                unit: "ZLG-0001",
-                revision: Revision { counter: 1, digest: [7; 8] },
-                temperatures: ArrayVec::new(),
-                ticks: Ticks { ready: ticks, count: ticks.len() },
-            };
-            if batch.encode_into(&mut self.room).is_ok() {
+        for batch in &self.batches {
+            if codec::encode_into(batch, &mut self.room).is_ok() {
                 each(&self.room);
             }
         }
@@ -115,7 +112,7 @@ impl Kernel for Encode {
     }
 
     fn ticks(&self) -> usize {
-        self.batches.iter().map(VecDeque::len).sum()
+        self.batches.iter().map(|batch| batch.ticks.len()).sum()
     }
 
     #[inline(never)]
@@ -133,7 +130,7 @@ impl Kernel for Encode {
                 back.extend(batch.ticks);
             }
         });
-        let wire: Vec<_> = self.batches.iter().flatten().map(Into::into).collect();
-        compare(&self.name, &back, &wire)
+        let ticks: Vec<_> = self.batches.iter().flat_map(|batch| batch.ticks.iter().cloned()).collect();
+        compare(&self.name, &back, &ticks)
     }
 }

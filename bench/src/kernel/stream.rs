@@ -3,12 +3,11 @@
 use std::sync::Arc;
 
 use isotherm_correction::calibration::Calibration;
-use isotherm_correction::sample::TemperatureReading;
 use isotherm_correction::unit::UnitSettings;
 use isotherm_protocol::codec;
 use isotherm_protocol::corrected::CorrectedBatch;
 use isotherm_protocol::key::{RawStream, UnitId};
-use isotherm_protocol::raw::{AccelBatch, GyroBatch, TemperatureBatch, TemperatureTick};
+use isotherm_protocol::raw::{AccelBatch, GyroBatch, TemperatureBatch};
 use isotherm_protocol::stream::UnitStream;
 
 use super::codec::{TICKS, compare};
@@ -39,13 +38,13 @@ impl Stream {
         for (gyros, accels) in gyros.chunks(size).zip(accels.chunks(size)) {
             let end_time = gyros.last().map(|tick| tick.end_time);
             while let Some(readings) = readings.next_if(|at| at.first().map(|it| it.time) < end_time) {
-                frames.extend(temperatures(readings).map(|frame| (RawStream::Temperature, frame)));
+                let readings = TemperatureBatch { readings: readings.to_vec() };
+                frames.extend(codec::encode(&readings).map(|frame| (RawStream::Temperature, frame)));
             }
-            let accels =
-                AccelBatch::from_core(accel_output, accels).and_then(|batch| codec::encode(&batch).ok());
-            let gyros = GyroBatch::from_core(output, gyros).and_then(|batch| codec::encode(&batch).ok());
-            frames.extend(accels.map(|frame| (RawStream::Accel, frame)));
-            frames.extend(gyros.map(|frame| (RawStream::Gyro, frame)));
+            let accels = AccelBatch { output: accel_output, ticks: accels.to_vec() };
+            let gyros = GyroBatch { output, ticks: gyros.to_vec() };
+            frames.extend(codec::encode(&accels).map(|frame| (RawStream::Accel, frame)));
+            frames.extend(codec::encode(&gyros).map(|frame| (RawStream::Gyro, frame)));
         }
         let id = UnitId::new("ZLG-0001").map_err(|error| Error::Count(error.to_string()))?;
         Ok(Self {
@@ -73,14 +72,6 @@ impl Stream {
             each(&self.room);
         }
     }
-}
-
-/// A frame of the readings of one time.
-fn temperatures(readings: &[TemperatureReading]) -> Option<Vec<u8>> {
-    let time_ns = readings.first()?.time.as_ns();
-    let raw = readings.iter().map(|reading| reading.raw).collect();
-    let channels = readings.iter().map(|reading| reading.channel).collect();
-    codec::encode(&TemperatureBatch { channels, ticks: vec![TemperatureTick { time_ns, raw }] }).ok()
 }
 
 impl Kernel for Stream {

@@ -1,11 +1,12 @@
 //! Raw frames of simulated units, the same whoever makes them: the source publishes them, the check corrects them offline.
 
 use arrayvec::ArrayVec;
-use isotherm_correction::sample::{ChannelName, MAX_SENSORS};
-use isotherm_protocol::codec;
-use isotherm_protocol::raw::{
-    AccelBatch, AccelTick, GyroBatch, GyroTick, MAX_CHANNELS, Readings, TemperatureBatch, TemperatureTick,
+use isotherm_correction::sample::{
+    AccelTick, ChannelName, GyroTick, OutputKind, Sensors, TemperatureReading,
 };
+use isotherm_correction::units::{Span, Timestamp};
+use isotherm_protocol::codec;
+use isotherm_protocol::raw::{AccelBatch, GyroBatch, MAX_CHANNELS, TemperatureBatch};
 use isotherm_simulator::{Scenario, Simulation, presets};
 
 use super::Plan;
@@ -21,8 +22,8 @@ const START_NS: u64 = 1_000_000_000_000;
 /// What a unit reads: three gyros, three accelerometers and eight temperature channels of the micromechanical preset.
 #[derive(Debug)]
 pub(crate) struct Instrument {
-    gyro: Vec<ArrayVec<f64, MAX_SENSORS>>,
-    accel: Vec<ArrayVec<f64, MAX_SENSORS>>,
+    gyro: Vec<Sensors<f64>>,
+    accel: Vec<Sensors<f64>>,
     channels: ArrayVec<ChannelName, MAX_CHANNELS>,
     temperatures: Vec<ArrayVec<f64, MAX_CHANNELS>>,
 }
@@ -61,50 +62,36 @@ impl Instrument {
     pub(crate) fn message(&self, plan: &Plan, unit: usize, index: usize) -> Result<Message, Error> {
         let first = index * plan.batch;
         let (start_ns, tick_ns) = (START_NS.cast_signed(), plan.tick_ns().cast_signed());
-        let end_time_ns = |tick: usize| start_ns + (tick as u64 + 1).cast_signed() * tick_ns;
-        let means = |of: &[ArrayVec<f64, MAX_SENSORS>], tick: usize| {
+        let end_time = |tick: usize| Timestamp::from_ns(start_ns + (tick as u64 + 1).cast_signed() * tick_ns);
+        let (output, duration) = (OutputKind::Mean, Span::from_ns(tick_ns));
+        let means = |of: &[Sensors<f64>], tick: usize| {
             let place = (tick + unit * AHEAD) % of.len().max(1);
-            Readings::Means(of.get(place).cloned().unwrap_or_default())
+            of.get(place).cloned().unwrap_or_default()
         };
         let ticks = first..first + plan.batch;
         let second = ticks.clone().find(|tick| tick % plan.rate_hz as usize == 0);
-        let temperatures = second.map(|tick| TemperatureBatch {
-            channels: self.channels.clone(),
-            ticks: vec![TemperatureTick {
-                time_ns: end_time_ns(tick) - tick_ns,
-                raw: self
-                    .temperatures
-                    .get(tick / plan.rate_hz as usize % self.temperatures.len().max(1))
-                    .cloned()
-                    .unwrap_or_default(),
-            }],
+        let temperatures = second.map(|tick| {
+            let time = Timestamp::from_ns(end_time(tick).as_ns() - tick_ns);
+            let place = tick / plan.rate_hz as usize % self.temperatures.len().max(1);
+            let raw = self.temperatures.get(place).cloned().unwrap_or_default();
+            let reading = |(&channel, raw)| TemperatureReading { channel, time, raw };
+            TemperatureBatch { readings: self.channels.iter().zip(raw).map(reading).collect() }
         });
-        let accel = AccelBatch {
-            first_sequence: first as u64,
-            ticks: ticks
-                .clone()
-                .map(|tick| AccelTick {
-                    end_time_ns: end_time_ns(tick),
-                    duration_ns: plan.tick_ns(),
-                    readings: means(&self.accel, tick),
-                })
-                .collect(),
-        };
-        let gyro = GyroBatch {
-            first_sequence: first as u64,
-            series: 0,
-            ticks: ticks
-                .map(|tick| GyroTick {
-                    end_time_ns: end_time_ns(tick),
-                    duration_ns: plan.tick_ns(),
-                    readings: means(&self.gyro, tick),
-                    mode: None,
-                    switch_command: false,
-                    meander: None,
-                    half_periods: ArrayVec::new(),
-                })
-                .collect(),
-        };
+        let accels = ticks.clone().map(|tick| AccelTick {
+            sequence: tick as u64,
+            end_time: end_time(tick),
+            duration,
+            readings: means(&self.accel, tick),
+        });
+        let accel = AccelBatch { output, ticks: accels.collect() };
+        let gyros = ticks.map(|tick| GyroTick {
+            sequence: tick as u64,
+            end_time: end_time(tick),
+            duration,
+            readings: means(&self.gyro, tick),
+            ..GyroTick::default()
+        });
+        let gyro = GyroBatch { output, ticks: gyros.collect() };
         let encoding = |error: codec::CodecError| Error::Part { part: "source", what: error.to_string() };
         Ok(Message {
             temperatures: temperatures.map(|batch| codec::encode(&batch)).transpose().map_err(encoding)?,

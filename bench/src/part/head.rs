@@ -100,23 +100,9 @@ mod tests {
         let message = Instrument::simulate(1000).unwrap().message(&plan(), 4, 7).unwrap();
         let raw: GyroBatch = codec::decode(&message.gyro).unwrap();
         assert_eq!(read(Format::Raw, &message.gyro), Some(Head { first: 21, ticks: 3, revision: 0 }));
-        assert_eq!((raw.first_sequence, raw.ticks.len()), (21, 3));
+        assert_eq!((raw.ticks[0].sequence, raw.ticks.len()), (21, 3));
 
-        let tick = CorrectedTick {
-            sequence: 300,
-            end_time_ns: 1,
-            duration_ns: 1,
-            ticks: 1,
-            missed: 0,
-            delta_angle_rad: [0.0; 3],
-            delta_velocity_m_per_s: [0.0; 3],
-            mode: None,
-            flags: 0,
-            gyro_flags: ArrayVec::new(),
-            accel_flags: ArrayVec::new(),
-            gyro_parity_rad_per_s: ArrayVec::new(),
-            accel_parity_m_per_s2: ArrayVec::new(),
-        };
+        let tick = CorrectedTick { sequence: 300, ticks: 1, ..CorrectedTick::default() };
         let batch = CorrectedBatch {
             unit: unit_name(42).unwrap().to_string(),
             revision: Revision { counter: 1000, digest: [9; 8] },

@@ -29,7 +29,7 @@ impl Run {
                 Piece::Event(LogEvent::Gyro { output, tick }) => each(*output, tick),
                 Piece::Message(message) if matches!(message.topic, Topic::Raw(_, RawStream::Gyro)) => {
                     if let Ok(batch) = codec::decode::<GyroBatch>(&message.frame) {
-                        batch.to_core().for_each(|tick| each(batch.output(), &tick));
+                        batch.ticks.iter().for_each(|tick| each(batch.output, tick));
                     }
                 }
                 Piece::Event(_) | Piece::Message(_) => {}

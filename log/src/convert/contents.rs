@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use isotherm_correction::sample::{ChannelName, OutputKind};
+use isotherm_correction::sample::{ChannelName, OutputKind, Sensors};
 use isotherm_protocol::corrected::CorrectedBatch;
 use isotherm_protocol::key::UnitId;
-use isotherm_protocol::raw::{GyroBatch, Readings};
+use isotherm_protocol::raw::GyroBatch;
 
 use super::decoded::{Decoded, decode};
 use crate::message::Message;
@@ -27,8 +27,8 @@ pub struct Shape {
 impl Shape {
     /// Of readings, with half-period counts or without.
     #[must_use]
-    pub fn of(readings: &Readings, half_periods: bool) -> Self {
-        Self { counts: readings.kind() == OutputKind::Counts, sensors: readings.len(), half_periods }
+    pub fn of(output: OutputKind, readings: &Sensors<f64>, half_periods: bool) -> Self {
+        Self { counts: output == OutputKind::Counts, sensors: readings.len(), half_periods }
     }
 
     /// What the readings stand for.
@@ -129,12 +129,12 @@ impl UnitContents {
             Decoded::Gyro(batch) => self.add_gyro(batch),
             Decoded::Accel(batch) => {
                 for tick in &batch.ticks {
-                    *self.accel.entry(Shape::of(&tick.readings, false)).or_default() += 1;
+                    *self.accel.entry(Shape::of(batch.output, &tick.readings, false)).or_default() += 1;
                 }
             }
             Decoded::Temperature(batch) => {
-                self.temperature_readings += (batch.channels.len() * batch.ticks.len()) as u64;
-                add_channels(&mut self.channels, batch.channels.iter());
+                self.temperature_readings += batch.readings.len() as u64;
+                add_channels(&mut self.channels, batch.readings.iter().map(|reading| &reading.channel));
             }
             Decoded::Health(batch) => {
                 self.health_readings +=
@@ -149,7 +149,8 @@ impl UnitContents {
 
     fn add_gyro(&mut self, batch: &GyroBatch) {
         for tick in &batch.ticks {
-            *self.gyro.entry(Shape::of(&tick.readings, !tick.half_periods.is_empty())).or_default() += 1;
+            let shape = Shape::of(batch.output, &tick.readings, !tick.half_periods.is_empty());
+            *self.gyro.entry(shape).or_default() += 1;
             self.mode |= tick.mode.is_some() || tick.switch_command;
             self.meander |= tick.meander.is_some();
         }
@@ -162,8 +163,8 @@ impl UnitContents {
         for tick in &batch.ticks {
             shape.gyros = shape.gyros.max(tick.gyro_flags.len());
             shape.accels = shape.accels.max(tick.accel_flags.len());
-            shape.gyro_parity = shape.gyro_parity.max(tick.gyro_parity_rad_per_s.len());
-            shape.accel_parity = shape.accel_parity.max(tick.accel_parity_m_per_s2.len());
+            shape.gyro_parity = shape.gyro_parity.max(tick.gyro_parity.len());
+            shape.accel_parity = shape.accel_parity.max(tick.accel_parity.len());
         }
     }
 }

@@ -119,14 +119,14 @@ impl Rows {
     pub fn take(&mut self, decoded: &Decoded) {
         match decoded {
             Decoded::Gyro(batch) => {
-                let output = batch.output();
-                batch.to_core().for_each(|tick| self.gyro(output, tick));
+                batch.ticks.iter().for_each(|tick| self.gyro(batch.output, tick.clone()));
             }
             Decoded::Accel(batch) => {
-                let output = batch.output();
-                batch.to_core().for_each(|tick| self.accel(output, tick));
+                batch.ticks.iter().for_each(|tick| self.accel(batch.output, tick.clone()));
             }
-            Decoded::Temperature(batch) => batch.to_core().for_each(|reading| self.temperature(reading)),
+            Decoded::Temperature(batch) => {
+                batch.readings.iter().for_each(|reading| self.temperature(*reading))
+            }
             _ => {}
         }
     }

@@ -170,7 +170,7 @@ impl Recording {
                 Topic::Corrected(unit) => {
                     // A frame that cannot be read is missing: its ticks will be.
                     let Ok(batch) = codec::decode::<CorrectedBatch>(&frame) else { continue };
-                    let mut ticks = Ticks { unit, ..ticks_of(&batch)? };
+                    let mut ticks = Ticks { unit, ..ticks_of(batch)? };
                     let event = self.events.remove(&ticks.unit);
                     if let (Some(first), Some(event)) = (ticks.ticks.first_mut(), event) {
                         first.event = Some(event.into());
@@ -192,15 +192,11 @@ impl Recording {
 }
 
 /// The ticks of a batch.
-pub(crate) fn ticks_of(batch: &CorrectedBatch) -> Result<Ticks, Error> {
+pub(crate) fn ticks_of(batch: CorrectedBatch) -> Result<Ticks, Error> {
     let CorrectedBatch { unit, revision, ticks, .. } = batch;
     let digest = (revision.counter > 0).then_some(revision.digest);
-    let tick = |tick: &isotherm_protocol::corrected::CorrectedTick| LogTick {
-        tick: tick.to_core(revision.counter),
-        digest,
-        event: None,
-    };
-    Ok(Ticks { unit: unit_id(unit)?, ticks: ticks.iter().map(tick).collect() })
+    let tick = |tick| LogTick { tick, digest, event: None };
+    Ok(Ticks { unit: unit_id(&unit)?, ticks: ticks.into_iter().map(tick).collect() })
 }
 
 /// The next rows of a CSV.

@@ -76,7 +76,7 @@ impl CorrectedSurvey {
                 && info.revisions.len() < MAX_LISTED
             {
                 let first_sequence = first.sequence.saturating_sub(u64::from(first.ticks.saturating_sub(1)));
-                let first_end_ns = first.end_time_ns;
+                let first_end_ns = first.end_time.as_ns();
                 info.revisions.push(RevisionInfo { revision: batch.revision, first_sequence, first_end_ns });
             }
         }
@@ -86,9 +86,9 @@ impl CorrectedSurvey {
             info.gaps += u64::from(tick.missed > 0);
             info.missed_ticks = info.missed_ticks.saturating_add(tick.missed);
             info.longest_gap_ticks = info.longest_gap_ticks.max(tick.missed);
-            count(&mut self.flags, tick.flags);
+            count(&mut self.flags, tick.flags.bits());
             let sensors = tick.gyro_flags.iter().chain(&tick.accel_flags);
-            let any = sensors.fold(0, |bits, flags| bits | flags) & !SensorFlags::VALID.bits();
+            let any = sensors.fold(0, |bits, flags| bits | flags.bits()) & !SensorFlags::VALID.bits();
             count(&mut self.sensor_flags, u16::from(any));
         }
         for applied in &batch.temperatures {

@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use isotherm_protocol::raw::{GyroBatch, HealthBatch, Mode, TemperatureBatch};
+use isotherm_correction::sample::LasingMode;
+use isotherm_protocol::raw::{GyroBatch, HealthBatch, TemperatureBatch};
 use serde::Serialize;
 
 use super::histogram::{Histogram, Spread};
@@ -71,10 +72,8 @@ impl Readings {
     }
 
     pub(super) fn temperatures(&mut self, batch: &TemperatureBatch) {
-        for tick in &batch.ticks {
-            for (channel, &raw) in batch.channels.iter().zip(&tick.raw) {
-                self.add(channel, raw);
-            }
+        for reading in &batch.readings {
+            self.add(&reading.channel, reading.raw);
         }
     }
 
@@ -106,7 +105,7 @@ pub(super) struct Modes {
     ticks: [u64; 2],
     changes: u64,
     commands: u64,
-    mode: Option<Mode>,
+    mode: Option<LasingMode>,
     changed_ns: Option<i64>,
     between: Histogram,
 }
@@ -120,14 +119,15 @@ impl Modes {
         for tick in &batch.ticks {
             self.commands += u64::from(tick.switch_command);
             match tick.mode {
-                Some(Mode::Plus) => self.ticks[0] += 1,
-                Some(Mode::Minus) => self.ticks[1] += 1,
+                Some(LasingMode::Plus) => self.ticks[0] += 1,
+                Some(LasingMode::Minus) => self.ticks[1] += 1,
                 None => continue,
             }
             if self.mode.is_some_and(|mode| Some(mode) != tick.mode) {
                 self.changes += 1;
-                if let Some(before) = self.changed_ns.replace(tick.end_time_ns) {
-                    self.between.add(tick.end_time_ns.saturating_sub(before).max(0).unsigned_abs());
+                let end_ns = tick.end_time.as_ns();
+                if let Some(before) = self.changed_ns.replace(end_ns) {
+                    self.between.add(end_ns.saturating_sub(before).max(0).unsigned_abs());
                 }
             }
             self.mode = tick.mode;

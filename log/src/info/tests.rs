@@ -4,7 +4,6 @@ use isotherm_correction::sample as core;
 use isotherm_correction::units::{Span, Timestamp};
 use isotherm_protocol::corrected::Revision;
 use isotherm_protocol::journal::{JournalEntry, JournalEvent, split};
-use isotherm_protocol::raw::{GyroTick, Mode, Readings as WireReadings, TemperatureTick};
 
 use super::*;
 use crate::recording::{RecordingOptions, RecordingReport, RecordingWriter};
@@ -28,17 +27,21 @@ fn received_ns(sequence: u64, late_ns: u64) -> u64 {
 
 /// A batch of gyro ticks, ten to a mode.
 fn gyro(first: u64, ticks: u64, late_ns: u64) -> Message {
-    let tick = |sequence: u64| GyroTick {
-        end_time_ns: end_ns(sequence),
-        duration_ns: TICK_NS,
-        readings: WireReadings::Counts([1, 2, 3].into_iter().collect()),
-        mode: Some(if (sequence / 10).is_multiple_of(2) { Mode::Plus } else { Mode::Minus }),
+    let tick = |sequence: u64| core::GyroTick {
+        sequence,
+        end_time: Timestamp::from_ns(end_ns(sequence)),
+        duration: Span::from_ns(TICK_NS.cast_signed()),
+        readings: [1.0, 2.0, 3.0].into_iter().collect(),
+        mode: Some(if (sequence / 10).is_multiple_of(2) {
+            core::LasingMode::Plus
+        } else {
+            core::LasingMode::Minus
+        }),
         switch_command: sequence > 0 && sequence.is_multiple_of(10),
-        meander: None,
-        half_periods: std::iter::empty().collect(),
+        ..core::GyroTick::default()
     };
-    let batch =
-        GyroBatch { first_sequence: first, series: 0, ticks: (first..first + ticks).map(tick).collect() };
+    let output = core::OutputKind::Counts;
+    let batch = GyroBatch { output, ticks: (first..first + ticks).map(tick).collect() };
     Message {
         topic: Topic::Raw(unit(), RawStream::Gyro),
         received_ns: received_ns(first + ticks - 1, late_ns),
@@ -47,18 +50,15 @@ fn gyro(first: u64, ticks: u64, late_ns: u64) -> Message {
 }
 
 fn corrected(sequences: &[u64], missed: u64, counter: u64) -> Message {
-    let tick = |&sequence: &u64| {
-        let core = core::CorrectedTick {
-            sequence,
-            end_time: Timestamp::from_ns(end_ns(sequence)),
-            duration: Span::from_ns(5_000_000),
-            ticks: 1,
-            missed: if Some(&sequence) == sequences.first() { missed } else { 0 },
-            flags: core::TickFlags::WARM_UP,
-            gyro_flags: std::iter::once(core::SensorFlags::VALID | core::SensorFlags::OVERRANGE).collect(),
-            ..core::CorrectedTick::default()
-        };
-        isotherm_protocol::corrected::CorrectedTick::from(&core)
+    let tick = |&sequence: &u64| core::CorrectedTick {
+        sequence,
+        end_time: Timestamp::from_ns(end_ns(sequence)),
+        duration: Span::from_ns(5_000_000),
+        ticks: 1,
+        missed: if Some(&sequence) == sequences.first() { missed } else { 0 },
+        flags: core::TickFlags::WARM_UP,
+        gyro_flags: std::iter::once(core::SensorFlags::VALID | core::SensorFlags::OVERRANGE).collect(),
+        ..core::CorrectedTick::default()
     };
     let batch = CorrectedBatch {
         unit: unit().to_string(),
@@ -159,17 +159,14 @@ fn corrected_ticks_show_gaps_flags_and_revisions() {
 
 #[test]
 fn temperatures_have_their_range_and_what_is_missing() {
-    let channels = ["body", "coil"].map(|name| core::ChannelName::from(name).unwrap()).into_iter().collect();
+    let channels = ["body", "coil"].map(|name| core::ChannelName::from(name).unwrap());
     let ticks = [(0, [20.0, f64::NAN]), (1, [-3.5, 30.0]), (2, [25.0, 31.0])];
-    let batch = TemperatureBatch {
-        channels,
-        ticks: ticks
-            .map(|(second, raw)| TemperatureTick {
-                time_ns: second * 1_000_000_000,
-                raw: raw.into_iter().collect(),
-            })
-            .to_vec(),
+    let tick = |(second, raw): (i64, [f64; 2])| {
+        let time = Timestamp::from_ns(second * 1_000_000_000);
+        let reading = move |(channel, raw)| core::TemperatureReading { channel, time, raw };
+        channels.into_iter().zip(raw).map(reading)
     };
+    let batch = TemperatureBatch { readings: ticks.into_iter().flat_map(tick).collect() };
     let frame = codec::encode(&batch).unwrap();
     let topic = Topic::Raw(unit(), RawStream::Temperature);
     let info = info_of(&[Message { topic, received_ns: 1, frame }]);

@@ -38,7 +38,7 @@ impl Published {
                 self.bytes -= frame.len();
                 // What cannot be read is missing.
                 let batch = codec::decode::<CorrectedBatch>(&frame).ok();
-                let ticks = batch.and_then(|batch| ticks_of(&batch).ok());
+                let ticks = batch.and_then(|batch| ticks_of(batch).ok());
                 ticks
                     .into_iter()
                     .flat_map(|ticks| ticks.ticks)
@@ -60,7 +60,7 @@ impl Published {
 mod tests {
     use isotherm_correction::sample::CorrectedTick;
     use isotherm_correction::units::Timestamp;
-    use isotherm_protocol::corrected::{self, Revision};
+    use isotherm_protocol::corrected::Revision;
 
     use super::*;
     use crate::diff::{DiffOptions, LogTick};
@@ -79,9 +79,7 @@ mod tests {
                 unit: "A-1".to_owned(),
                 revision: Revision { counter: 1, digest: [7; 8] },
                 temperatures: std::iter::empty().collect(),
-                ticks: (first..first + 100)
-                    .map(|sequence| corrected::CorrectedTick::from(&tick(sequence)))
-                    .collect(),
+                ticks: (first..first + 100).map(tick).collect(),
             };
             published.push(codec::encode(&batch).unwrap());
         }

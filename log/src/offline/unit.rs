@@ -216,26 +216,26 @@ impl Taker {
             return;
         }
         if let Some(comparison) = &mut self.comparison {
-            for tick in stream.ready() {
+            for tick in stream.ready().ticks() {
                 let event = self.event.take();
                 comparison.push(Side::A, LogTick { tick: tick.clone(), digest: None, event });
             }
         }
         if self.received_ns < self.from_ns {
-            stream.drop_ready(usize::MAX);
+            stream.drop_ready();
             return;
         }
-        for tick in stream.ready() {
+        for tick in stream.ready().ticks() {
             self.sums.add(tick);
             self.output.ticks += u64::from(tick.ticks);
         }
         match self.form {
-            Form::Sums => stream.drop_ready(usize::MAX),
+            Form::Sums => stream.drop_ready(),
             // Writing to a vector does not fail.
             Form::Csv => {
-                let mut ticks = stream.ready().iter();
+                let mut ticks = stream.ready().ticks().iter();
                 let _ = ticks.try_for_each(|tick| write_tick(&mut self.output.bytes, tick));
-                stream.drop_ready(usize::MAX);
+                stream.drop_ready();
             }
             Form::Wire => {
                 while stream.next_frame(&mut self.frame) {

@@ -2,7 +2,7 @@
 
 use std::iter::repeat;
 
-use isotherm_protocol::raw::Readings;
+use isotherm_correction::sample::{self, OutputKind};
 
 use super::table::{Cell, Column, I32, I64, Kind, U64, full, sparse};
 use crate::convert::contents::{CorrectedShape, Shape, Shapes};
@@ -46,12 +46,17 @@ impl Sensors {
         columns
     }
 
-    pub(super) fn cells(self, readings: &Readings) -> impl Iterator<Item = Cell<'static>> {
-        let (counts, means): (&[i32], &[f64]) = match readings {
-            Readings::Counts(counts) => (counts, &[]),
-            Readings::Means(means) => (&[], means),
+    pub(super) fn cells(
+        self,
+        output: OutputKind,
+        readings: &sample::Sensors<f64>,
+    ) -> impl Iterator<Item = Cell<'static>> {
+        let (counts, means): (&[f64], &[f64]) = match output {
+            OutputKind::Counts => (readings, &[]),
+            OutputKind::Mean => (&[], readings),
         };
-        let counts = padded(counts.iter().map(|count| i64::from(*count).into()), self.counts);
+        #[expect(clippy::cast_possible_truncation, reason = "counts are whole numbers of 32 bits")]
+        let counts = padded(counts.iter().map(|count| (*count as i64).into()), self.counts);
         counts
             .chain(padded(means.iter().map(|mean| (*mean).into()), self.means))
             .collect::<Vec<_>>()

@@ -3,8 +3,10 @@
 use std::fmt::Write as _;
 use std::iter::once;
 
+use isotherm_correction::sample::{GyroTick, LasingMode, SensorFlags};
+use isotherm_correction::units::Span;
 use isotherm_protocol::corrected::{CorrectedBatch, CorrectedTick};
-use isotherm_protocol::raw::{AccelBatch, GyroBatch, GyroTick, HealthBatch, Mode, TemperatureBatch};
+use isotherm_protocol::raw::{AccelBatch, GyroBatch, HealthBatch, TemperatureBatch};
 use isotherm_protocol::reference::Reference;
 use isotherm_protocol::status::Status;
 
@@ -21,19 +23,18 @@ pub(super) fn write_gyro(
     batch: &GyroBatch,
 ) -> Result<(), Error> {
     let Some(table) = table else { return Ok(()) };
-    for (tick, index) in batch.ticks.iter().zip(0..) {
-        let sequence = batch.first_sequence.saturating_add(index);
+    for tick in &batch.ticks {
         let head = [
             received_ns.into(),
-            sequence.into(),
-            batch.series.into(),
-            tick.end_time_ns.into(),
-            tick.duration_ns.into(),
+            tick.sequence.into(),
+            tick.series.into(),
+            tick.end_time.as_ns().into(),
+            length_ns(tick.duration),
             mode(tick.mode),
             Cell::Boolean(tick.switch_command),
             mode(tick.meander),
         ];
-        let cells = head.into_iter().chain(sensors.cells(&tick.readings));
+        let cells = head.into_iter().chain(sensors.cells(batch.output, &tick.readings));
         table.push(cells.chain(half_periods(tick, sensors.half_periods)))?;
     }
     Ok(())
@@ -53,10 +54,14 @@ pub(super) fn write_accel(
     batch: &AccelBatch,
 ) -> Result<(), Error> {
     let Some(table) = table else { return Ok(()) };
-    for (tick, index) in batch.ticks.iter().zip(0..) {
-        let sequence = batch.first_sequence.saturating_add(index);
-        let head = [received_ns.into(), sequence.into(), tick.end_time_ns.into(), tick.duration_ns.into()];
-        table.push(head.into_iter().chain(sensors.cells(&tick.readings)))?;
+    for tick in &batch.ticks {
+        let head = [
+            received_ns.into(),
+            tick.sequence.into(),
+            tick.end_time.as_ns().into(),
+            length_ns(tick.duration),
+        ];
+        table.push(head.into_iter().chain(sensors.cells(batch.output, &tick.readings)))?;
     }
     Ok(())
 }
@@ -68,10 +73,9 @@ pub(super) fn write_temperature(
     batch: &TemperatureBatch,
 ) -> Result<(), Error> {
     let Some(table) = table else { return Ok(()) };
-    for tick in &batch.ticks {
-        for (channel, raw) in batch.channels.iter().zip(&tick.raw) {
-            table.push([received_ns.into(), tick.time_ns.into(), Cell::Text(channel), (*raw).into()])?;
-        }
+    for reading in &batch.readings {
+        let time_ns = reading.time.as_ns();
+        table.push([received_ns.into(), time_ns.into(), Cell::Text(&reading.channel), reading.raw.into()])?;
     }
     Ok(())
 }
@@ -132,21 +136,23 @@ fn corrected_cells<'a>(
     let head = [
         received_ns.into(),
         tick.sequence.into(),
-        tick.end_time_ns.into(),
-        tick.duration_ns.into(),
+        tick.end_time.as_ns().into(),
+        length_ns(tick.duration),
         i64::from(tick.ticks).into(),
         tick.missed.into(),
     ];
-    let deltas = tick.delta_angle_rad.iter().chain(&tick.delta_velocity_m_per_s);
-    let flags = |flags: &'a [u8], length| padded(flags.iter().map(|bits| i64::from(*bits).into()), length);
+    let deltas = tick.delta_angle.iter().chain(&tick.delta_velocity);
+    let flags = |flags: &'a [SensorFlags], length| {
+        padded(flags.iter().map(|flags| i64::from(flags.bits()).into()), length)
+    };
     let parity = |parity: &'a [f64], length| padded(parity.iter().map(|value| (*value).into()), length);
     head.into_iter()
         .chain(deltas.map(|delta| (*delta).into()))
-        .chain([mode(tick.mode), i64::from(tick.flags).into()])
+        .chain([mode(tick.mode), i64::from(tick.flags.bits()).into()])
         .chain(flags(&tick.gyro_flags, shape.gyros))
         .chain(flags(&tick.accel_flags, shape.accels))
-        .chain(parity(&tick.gyro_parity_rad_per_s, shape.gyro_parity))
-        .chain(parity(&tick.accel_parity_m_per_s2, shape.accel_parity))
+        .chain(parity(&tick.gyro_parity, shape.gyro_parity))
+        .chain(parity(&tick.accel_parity, shape.accel_parity))
 }
 
 /// A row per channel.
@@ -159,7 +165,7 @@ pub(super) fn write_applied(
     for applied in &batch.temperatures {
         table.push([
             received_ns.into(),
-            last.end_time_ns.into(),
+            last.end_time.as_ns().into(),
             Cell::Text(&applied.channel),
             applied.temperature_deg_c.into(),
             applied.rate_deg_c_per_s.into(),
@@ -185,10 +191,15 @@ pub(super) fn write_status(
     table.push([received_ns.into(), Cell::Text(&state), Cell::Text(&text)])
 }
 
-fn mode(mode: Option<Mode>) -> Cell<'static> {
+/// Length of a span (ns).
+fn length_ns(span: Span) -> Cell<'static> {
+    span.as_ns().unsigned_abs().into()
+}
+
+fn mode(mode: Option<LasingMode>) -> Cell<'static> {
     Cell::from(mode.map(|mode| match mode {
-        Mode::Plus => 1_i64,
-        Mode::Minus => -1,
+        LasingMode::Plus => 1_i64,
+        LasingMode::Minus => -1,
     }))
 }
 

@@ -3,9 +3,13 @@
 use std::fs::File;
 use std::path::Path;
 
+use isotherm_correction::sample::{
+    GyroTick, HalfPeriodCounts, LasingMode, OutputKind, SensorFlags, TickFlags,
+};
+use isotherm_correction::units::{Span, Timestamp};
 use isotherm_protocol::corrected::{CorrectedBatch, CorrectedTick, Revision};
 use isotherm_protocol::key::UnitId;
-use isotherm_protocol::raw::{GyroBatch, GyroTick, HalfPeriod, Mode, Readings};
+use isotherm_protocol::raw::GyroBatch;
 use isotherm_protocol::status::Status;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::record::Field;
@@ -64,40 +68,43 @@ fn a_cell_that_does_not_fit_is_an_error() {
 }
 
 /// A gyro batch of two ticks.
-fn gyro(readings: &Readings, half_periods: bool) -> GyroBatch {
-    let halves = (0..readings.len()).map(|_| HalfPeriod { positive: 5, negative: -6 });
+fn gyro(output: OutputKind, readings: &[f64], half_periods: bool) -> GyroBatch {
+    let halves = readings.iter().map(|_| HalfPeriodCounts { positive: 5, negative: -6 });
     let tick = GyroTick {
-        end_time_ns: -5,
-        duration_ns: 10,
-        readings: readings.clone(),
-        mode: Some(Mode::Minus),
+        sequence: u64::MAX - 1,
+        end_time: Timestamp::from_ns(-5),
+        duration: Span::from_ns(10),
+        readings: readings.iter().copied().collect(),
+        mode: Some(LasingMode::Minus),
         switch_command: true,
         meander: None,
         half_periods: halves.filter(|_| half_periods).collect(),
+        series: 7,
     };
-    GyroBatch { first_sequence: u64::MAX - 1, series: 7, ticks: vec![tick.clone(), tick] }
+    GyroBatch { output, ticks: vec![tick.clone(), GyroTick { sequence: u64::MAX, ..tick }] }
 }
 
 #[test]
 fn streams_have_columns_for_every_shape_of_tick() {
     let folder = tempfile::tempdir().unwrap();
     let unit = UnitId::new("A-1").unwrap();
-    let counts = gyro(&Readings::Counts([1, -2].into_iter().collect()), true);
-    let means = gyro(&Readings::Means([0.5, f64::NAN, -0.0].into_iter().collect()), false);
+    let counts = gyro(OutputKind::Counts, &[1.0, -2.0], true);
+    let means = gyro(OutputKind::Mean, &[0.5, f64::NAN, -0.0], false);
     let tick = CorrectedTick {
         sequence: 3,
-        end_time_ns: 30,
-        duration_ns: 10,
+        end_time: Timestamp::from_ns(30),
+        duration: Span::from_ns(10),
         ticks: 2,
         missed: 1,
-        delta_angle_rad: [0.1, 0.2, 0.3],
-        delta_velocity_m_per_s: [1.0, 2.0, 3.0],
+        delta_angle: [0.1, 0.2, 0.3],
+        delta_velocity: [1.0, 2.0, 3.0],
         mode: None,
-        flags: 0x3fff,
-        gyro_flags: [1, 255].into_iter().collect(),
+        flags: TickFlags::all(),
+        gyro_flags: [1, 255].map(SensorFlags::from_bits_retain).into_iter().collect(),
         accel_flags: [].into_iter().collect(),
-        gyro_parity_rad_per_s: [0.25].into_iter().collect(),
-        accel_parity_m_per_s2: [].into_iter().collect(),
+        gyro_parity: [0.25].into_iter().collect(),
+        accel_parity: [].into_iter().collect(),
+        revision: 4,
     };
     let revision = Revision { counter: 4, digest: [0xab; 8] };
     let corrected = CorrectedBatch {

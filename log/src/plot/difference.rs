@@ -49,7 +49,7 @@ impl Difference {
 
     /// Takes a tick of a log (0 or 1) at a time of the common axis.
     pub(super) fn take(&mut self, log: usize, at_ns: i64, tick: &CorrectedTick) {
-        let waiting = Waiting { at_ns, increments: increments(tick), angle_rad: tick.delta_angle_rad };
+        let waiting = Waiting { at_ns, increments: increments(tick), angle_rad: tick.delta_angle };
         let [first, second] = &mut self.waiting;
         (if log == 0 { first } else { second }).push_back(waiting);
         self.compare();
@@ -109,12 +109,8 @@ mod tests {
     use super::*;
 
     fn tick(angle: f64) -> CorrectedTick {
-        let core = isotherm_correction::sample::CorrectedTick {
-            delta_angle: [angle, 0.0, 0.0],
-            duration: isotherm_correction::units::Span::from_ms(10),
-            ..Default::default()
-        };
-        CorrectedTick::from(&core)
+        let duration = isotherm_correction::units::Span::from_ms(10);
+        CorrectedTick { delta_angle: [angle, 0.0, 0.0], duration, ..CorrectedTick::default() }
     }
 
     #[test]

@@ -23,23 +23,16 @@ fn recording(
     let mut writer = RecordingWriter::create(path, RecordingOptions::default()).unwrap();
     let unit = UnitId::new(unit).unwrap();
     for first in ticks.clone().step_by(10) {
-        let tick = |sequence: u64| {
-            let tick = core::CorrectedTick {
-                sequence,
-                end_time: Timestamp::from_ns(i64::try_from(sequence).unwrap() * 5_000_000),
-                duration: Span::from_ns(5_000_000),
-                ticks: 1,
-                delta_angle: [delta(sequence), 0.0, 1e-6],
-                delta_velocity: [0.0, 0.0, 0.049],
-                mode: Some(core::LasingMode::Plus),
-                flags: if sequence == 15 {
-                    core::TickFlags::ANGLE_RESTORED
-                } else {
-                    core::TickFlags::empty()
-                },
-                ..core::CorrectedTick::default()
-            };
-            isotherm_protocol::corrected::CorrectedTick::from(&tick)
+        let tick = |sequence: u64| core::CorrectedTick {
+            sequence,
+            end_time: Timestamp::from_ns(i64::try_from(sequence).unwrap() * 5_000_000),
+            duration: Span::from_ns(5_000_000),
+            ticks: 1,
+            delta_angle: [delta(sequence), 0.0, 1e-6],
+            delta_velocity: [0.0, 0.0, 0.049],
+            mode: Some(core::LasingMode::Plus),
+            flags: if sequence == 15 { core::TickFlags::ANGLE_RESTORED } else { core::TickFlags::empty() },
+            ..core::CorrectedTick::default()
         };
         let batch = CorrectedBatch {
             unit: unit.to_string(),
@@ -127,7 +120,7 @@ fn ten_million_ticks_make_a_bounded_page() {
     for first in (0..ticks).step_by(256) {
         let tick = |sequence: u64| {
             let noise = f64::from(u16::try_from(sequence * 7919 % 1000).unwrap());
-            let tick = core::CorrectedTick {
+            core::CorrectedTick {
                 sequence,
                 end_time: Timestamp::from_ns(i64::try_from(sequence).unwrap() * 5_000_000),
                 duration: Span::from_ns(5_000_000),
@@ -135,8 +128,7 @@ fn ten_million_ticks_make_a_bounded_page() {
                 delta_angle: [1e-9 * noise, 2e-9 * noise, 1e-6],
                 delta_velocity: [0.0, 1e-6 * noise, 0.049],
                 ..core::CorrectedTick::default()
-            };
-            isotherm_protocol::corrected::CorrectedTick::from(&tick)
+            }
         };
         let batch = CorrectedBatch {
             unit: unit.to_string(),

@@ -2,12 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use isotherm_correction::sample::OutputKind;
+use isotherm_correction::sample::{LasingMode, OutputKind, SensorFlags};
+use isotherm_correction::units::{Span, Timestamp};
 use isotherm_protocol::codec;
 use isotherm_protocol::corrected::{CorrectedBatch, CorrectedTick, Revision};
 use isotherm_protocol::journal::{Joiner, JournalEvent, JournalPart};
 use isotherm_protocol::key::RawStream;
-use isotherm_protocol::raw::{AccelBatch, GyroBatch, Mode, TemperatureBatch};
+use isotherm_protocol::raw::{AccelBatch, GyroBatch, TemperatureBatch};
 use isotherm_protocol::status::{Output, Status};
 
 use super::nominal::{DEG_PER_H, Nominal};
@@ -127,9 +128,9 @@ impl UnitPlot {
         Some(())
     }
 
-    /// Time on the axis (ns) of a time of the producer's clock.
-    fn time(&mut self, stream: Stream, event_ns: i64) -> i64 {
-        let (at_ns, jumped) = self.clock.axis(stream, event_ns);
+    /// Place on the axis (ns) of a time of the producer's clock.
+    fn time(&mut self, stream: Stream, event: Timestamp) -> i64 {
+        let (at_ns, jumped) = self.clock.axis(stream, event.as_ns());
         if let Some(by_ns) = jumped {
             let by = seconds(by_ns);
             let words = format!("the producer's clock jumps by {by:.3} s; the axis goes on");
@@ -147,42 +148,41 @@ impl UnitPlot {
     }
 
     fn take_gyro(&mut self, batch: &GyroBatch) {
-        let mut track = self.gyro.take().unwrap_or_else(|| RawTrack::new(batch.output(), self.detail));
-        track.begin(
-            batch.first_sequence,
-            batch.ticks.first().map(|tick| self.time(Stream::Gyro, tick.end_time_ns)),
-        );
+        let mut track = self.gyro.take().unwrap_or_else(|| RawTrack::new(batch.output, self.detail));
+        if let Some(first) = batch.ticks.first() {
+            track.begin(first.sequence, self.time(Stream::Gyro, first.end_time));
+        }
         for tick in &batch.ticks {
             let mode = match tick.mode {
-                Some(Mode::Plus) => 1 << MODE_PLUS,
-                Some(Mode::Minus) => 1 << MODE_MINUS,
+                Some(LasingMode::Plus) => 1 << MODE_PLUS,
+                Some(LasingMode::Minus) => 1 << MODE_MINUS,
                 None => 0,
             };
             let bits = mode | u32::from(tick.switch_command) << SWITCH;
-            let at_ns = self.time(Stream::Gyro, tick.end_time_ns);
-            track.push(at_ns, tick.duration_ns, &tick.readings.values(), bits);
+            let at_ns = self.time(Stream::Gyro, tick.end_time);
+            track.push(at_ns, tick.duration, &tick.readings, bits);
         }
         self.gyro = Some(track);
     }
 
     fn take_accel(&mut self, batch: &AccelBatch) {
-        let mut track = self.accel.take().unwrap_or_else(|| RawTrack::new(batch.output(), self.detail));
-        track.begin(
-            batch.first_sequence,
-            batch.ticks.first().map(|tick| self.time(Stream::Accel, tick.end_time_ns)),
-        );
+        let mut track = self.accel.take().unwrap_or_else(|| RawTrack::new(batch.output, self.detail));
+        if let Some(first) = batch.ticks.first() {
+            track.begin(first.sequence, self.time(Stream::Accel, first.end_time));
+        }
         for tick in &batch.ticks {
-            let at_ns = self.time(Stream::Accel, tick.end_time_ns);
-            track.push(at_ns, tick.duration_ns, &tick.readings.values(), 0);
+            let at_ns = self.time(Stream::Accel, tick.end_time);
+            track.push(at_ns, tick.duration, &tick.readings, 0);
         }
         self.accel = Some(track);
     }
 
     fn take_temperatures(&mut self, batch: &TemperatureBatch) {
-        for tick in &batch.ticks {
-            let at_ns = self.time(Stream::Temperature, tick.time_ns);
-            for (channel, raw) in batch.channels.iter().zip(&tick.raw) {
-                push(&mut self.readings, channel, self.detail, at_ns, *raw);
+        for tick in batch.ticks() {
+            let Some(first) = tick.first() else { continue };
+            let at_ns = self.time(Stream::Temperature, first.time);
+            for reading in tick {
+                push(&mut self.readings, &reading.channel, self.detail, at_ns, reading.raw);
             }
         }
     }
@@ -190,14 +190,14 @@ impl UnitPlot {
     fn take_corrected(&mut self, batch: &CorrectedBatch, corrected: &mut dyn FnMut(i64, &CorrectedTick)) {
         let mut last_ns = None;
         for tick in &batch.ticks {
-            let at_ns = self.time(Stream::Corrected, tick.end_time_ns);
+            let at_ns = self.time(Stream::Corrected, tick.end_time);
             if last_ns.is_none() && self.revision != Some(batch.revision) {
                 self.change(at_ns, batch.revision, tick.sequence);
             }
             let track = self.corrected.get_or_insert_with(|| Track::new(6, self.detail));
             if tick.missed > 0 && tick.missed < u64::MAX {
                 self.missed = self.missed.saturating_add(tick.missed);
-                let until = at_ns.saturating_sub(i64::try_from(tick.duration_ns).unwrap_or(0));
+                let until = at_ns.saturating_sub(tick.duration.as_ns());
                 track.gap(until);
             }
             track.push(at_ns, &increments(tick), flags(tick));
@@ -289,18 +289,18 @@ impl RawTrack {
     }
 
     /// A batch begins with this tick.
-    fn begin(&mut self, sequence: u64, at_ns: Option<i64>) {
-        if let (true, Some(at_ns)) = (self.track.ticks() > 0 && sequence > self.next_sequence, at_ns) {
+    fn begin(&mut self, sequence: u64, at_ns: i64) {
+        if self.track.ticks() > 0 && sequence > self.next_sequence {
             self.track.gap(at_ns);
         }
         self.next_sequence = sequence;
     }
 
-    fn push(&mut self, at_ns: i64, duration_ns: u64, readings: &[f64], bits: u32) {
+    fn push(&mut self, at_ns: i64, duration: Span, readings: &[f64], bits: u32) {
         self.next_sequence = self.next_sequence.saturating_add(1);
         self.sensors = self.sensors.max(readings.len());
         let per_reading = match self.kind {
-            OutputKind::Counts => per_second(duration_ns),
+            OutputKind::Counts => per_second(duration),
             OutputKind::Mean => 1.0,
         };
         let mut values = [f64::NAN; SENSORS];
@@ -330,9 +330,9 @@ fn push(tracks: &mut BTreeMap<String, Track>, channel: &str, detail: usize, at_n
 
 /// Rates (°/h) and specific forces (m/s²) of a tick.
 pub(super) fn increments(tick: &CorrectedTick) -> [f64; 6] {
-    let per_second = per_second(tick.duration_ns);
-    let rates = tick.delta_angle_rad.map(|angle| angle * per_second * DEG_PER_H);
-    let forces = tick.delta_velocity_m_per_s.map(|velocity| velocity * per_second);
+    let per_second = per_second(tick.duration);
+    let rates = tick.delta_angle.map(|angle| angle * per_second * DEG_PER_H);
+    let forces = tick.delta_velocity.map(|velocity| velocity * per_second);
     let mut all = [0.0; 6];
     for (to, from) in all.iter_mut().zip(rates.into_iter().chain(forces)) {
         *to = from;
@@ -341,20 +341,22 @@ pub(super) fn increments(tick: &CorrectedTick) -> [f64; 6] {
 }
 
 /// What to multiply increments with (1/s); not a number for no time at all.
-fn per_second(duration_ns: u64) -> f64 {
-    let span_s = seconds(i64::try_from(duration_ns).unwrap_or(i64::MAX));
-    if duration_ns == 0 { f64::NAN } else { 1.0 / span_s }
+fn per_second(duration: Span) -> f64 {
+    let span_s = seconds(duration.as_ns());
+    if duration == Span::ZERO { f64::NAN } else { 1.0 / span_s }
 }
 
 /// All flags of a tick in one word.
 fn flags(tick: &CorrectedTick) -> u32 {
-    let any = |flags: &[u8]| u32::from(flags.iter().fold(0, |bits, flags| bits | flags) >> 1 & 0b1_1111);
+    let any = |flags: &[SensorFlags]| {
+        u32::from(flags.iter().fold(0, |bits, flags| bits | flags.bits()) >> 1 & 0b1_1111)
+    };
     let mode = match tick.mode {
-        Some(Mode::Plus) => 1 << MODE_PLUS,
-        Some(Mode::Minus) => 1 << MODE_MINUS,
+        Some(LasingMode::Plus) => 1 << MODE_PLUS,
+        Some(LasingMode::Minus) => 1 << MODE_MINUS,
         None => 0,
     };
-    let tick_flags = u32::from(tick.flags) & ((1 << GYRO_FLAGS) - 1);
+    let tick_flags = u32::from(tick.flags.bits()) & ((1 << GYRO_FLAGS) - 1);
     tick_flags | any(&tick.gyro_flags) << GYRO_FLAGS | any(&tick.accel_flags) << ACCEL_FLAGS | mode
 }
 

@@ -8,7 +8,7 @@ use isotherm_correction::sample::ChannelName;
 use isotherm_correction::units::Span;
 use isotherm_protocol::codec;
 use isotherm_protocol::key::{RawStream, UnitId};
-use isotherm_protocol::raw::{TemperatureBatch, TemperatureTick};
+use isotherm_protocol::raw::TemperatureBatch;
 
 use super::*;
 use crate::error::Error;
@@ -17,10 +17,10 @@ use crate::part::{LogFiles, Part};
 use crate::source::LogReport;
 
 fn message(serial: &str, time_ns: i64, received_ns: u64) -> Message {
-    let channels = [ChannelName::from("board").unwrap()].into_iter().collect();
-    let ticks = vec![TemperatureTick { time_ns, raw: [25.0].into_iter().collect() }];
+    let (channel, time) = (ChannelName::from("board").unwrap(), Timestamp::from_ns(time_ns));
+    let batch = TemperatureBatch { readings: vec![TemperatureReading { channel, time, raw: 25.0 }] };
     let topic = Topic::Raw(UnitId::new(serial).unwrap(), RawStream::Temperature);
-    Message { topic, received_ns, frame: codec::encode(&TemperatureBatch { channels, ticks }).unwrap() }
+    Message { topic, received_ns, frame: codec::encode(&batch).unwrap() }
 }
 
 fn read(paths: &[&Path]) -> (Vec<Message>, RecordingReader) {

@@ -163,7 +163,7 @@ impl Stepper {
         while let Some(done) = self.advance()? {
             if let Done::Frame { input: Input::Raw(RawStream::Gyro), frame, .. } = &done
                 && let Ok(batch) = codec::decode::<GyroBatch>(frame)
-                && batch.first_sequence.saturating_add(batch.ticks.len() as u64) > sequence
+                && batch.ticks.last().is_some_and(|last| last.sequence >= sequence)
             {
                 return Ok(Some(self.describe(&done)));
             }
@@ -275,15 +275,25 @@ fn in_frame(input: Input, frame: &[u8], taken: &Result<(), CodecError>) -> What 
     let (first_sequence, times) = match input {
         Input::Raw(RawStream::Gyro) => codec::decode::<GyroBatch>(frame).map_or_else(
             |_| Default::default(),
-            |batch| (Some(batch.first_sequence), batch.ticks.iter().map(|tick| tick.end_time_ns).collect()),
+            |batch| {
+                (
+                    batch.ticks.first().map(|first| first.sequence),
+                    batch.ticks.iter().map(|tick| tick.end_time.as_ns()).collect(),
+                )
+            },
         ),
         Input::Raw(RawStream::Accel) => codec::decode::<AccelBatch>(frame).map_or_else(
             |_| Default::default(),
-            |batch| (Some(batch.first_sequence), batch.ticks.iter().map(|tick| tick.end_time_ns).collect()),
+            |batch| {
+                (
+                    batch.ticks.first().map(|first| first.sequence),
+                    batch.ticks.iter().map(|tick| tick.end_time.as_ns()).collect(),
+                )
+            },
         ),
         Input::Raw(RawStream::Temperature) => codec::decode::<TemperatureBatch>(frame).map_or_else(
             |_| Default::default(),
-            |batch| (None, batch.ticks.iter().map(|tick| tick.time_ns).collect()),
+            |batch| (None, batch.ticks().filter_map(|tick| Some(tick.first()?.time.as_ns())).collect()),
         ),
         Input::Raw(RawStream::Health) => codec::decode::<HealthBatch>(frame).map_or_else(
             |_| Default::default(),

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::JournalEntry;
-use crate::codec::{CodecError, Kind, Message, bounded};
+use crate::codec::{CodecError, Kind, PlainMessage, bounded};
 use crate::version::{self, Versions};
 
 /// Most bytes of an entry in one part.
@@ -29,7 +29,7 @@ pub struct JournalPart {
     pub bytes: Vec<u8>,
 }
 
-impl Message for JournalPart {
+impl PlainMessage for JournalPart {
     const KIND: Kind = Kind::Journal;
     const VERSIONS: Versions = version::JOURNAL;
 

@@ -6,7 +6,8 @@ use isotherm_correction::sample::{AccelTick, GyroTick, OutputKind, TemperatureRe
 use isotherm_correction::units::Timestamp;
 use thiserror::Error;
 
-use super::{AccelBatch, GyroBatch, MAX_CHANNELS, TemperatureBatch, TemperatureTick};
+use super::temperature::ticks;
+use super::{RawBatch, RawTick, TemperatureBatch};
 use crate::codec::{self, CodecError, MAX_TICKS, Message};
 use crate::key::RawStream;
 
@@ -71,11 +72,11 @@ impl Batcher {
     /// # Errors
     /// [`BatchError`]: the batch that cannot be a frame is given up.
     pub fn gyro(&mut self, output: OutputKind, tick: GyroTick) -> Result<(), BatchError> {
-        if !self.gyro.continues(output, tick.sequence, tick.readings.len()) {
+        if !self.gyro.continues(output, &tick) {
             self.flush()?;
         }
         self.gyro.push(output, tick);
-        if self.gyro.len() >= self.batch_ticks { self.flush() } else { Ok(()) }
+        if self.gyro.ticks.len() >= self.batch_ticks { self.flush() } else { Ok(()) }
     }
 
     /// Takes one accelerometer tick.
@@ -83,8 +84,7 @@ impl Batcher {
     /// # Errors
     /// As [`Batcher::gyro`].
     pub fn accel(&mut self, output: OutputKind, tick: AccelTick) -> Result<(), BatchError> {
-        if !self.accel.continues(output, tick.sequence, tick.readings.len()) || self.accel.len() == MAX_TICKS
-        {
+        if !self.accel.continues(output, &tick) || self.accel.ticks.len() == MAX_TICKS {
             self.flush_accel()?;
         }
         self.accel.push(output, tick);
@@ -118,32 +118,32 @@ impl Batcher {
     fn flush_temperatures(&mut self) -> Result<(), BatchError> {
         let readings = std::mem::take(&mut self.temperature);
         for batch in temperature_batches(&readings) {
-            let time = batch.ticks.last().map_or(0, |tick| tick.time_ns);
-            let ticks = batch.ticks.len();
-            self.push(RawStream::Temperature, &batch, Timestamp::from_ns(time), 0, ticks)?;
+            let time = batch.readings.last().map_or_else(Timestamp::default, |reading| reading.time);
+            self.push(RawStream::Temperature, &batch, time, 0, batch.ticks().count())?;
         }
         Ok(())
     }
 
     fn flush_accel(&mut self) -> Result<(), BatchError> {
-        let Some(output) = self.accel.output() else { return Ok(()) };
-        let ticks = self.accel.take();
+        let (output, ticks) = self.accel.take();
         for part in ticks.chunks(self.batch_ticks) {
-            let (Some(first), Some(last)) = (part.first(), part.last()) else { continue };
-            let batch = AccelBatch::from_core(output, part)
-                .ok_or(BatchError::NotCounts { sequence: first.sequence })?;
-            self.push(RawStream::Accel, &batch, last.end_time, first.sequence, part.len())?;
+            self.push_ticks(RawStream::Accel, RawBatch { output, ticks: part.to_vec() })?;
         }
         Ok(())
     }
 
     fn flush_gyro(&mut self) -> Result<(), BatchError> {
-        let Some(output) = self.gyro.output() else { return Ok(()) };
-        let ticks = self.gyro.take();
-        let (Some(first), Some(last)) = (ticks.first(), ticks.last()) else { return Ok(()) };
-        let batch =
-            GyroBatch::from_core(output, &ticks).ok_or(BatchError::NotCounts { sequence: first.sequence })?;
-        self.push(RawStream::Gyro, &batch, last.end_time, first.sequence, ticks.len())
+        let (output, ticks) = self.gyro.take();
+        self.push_ticks(RawStream::Gyro, RawBatch { output, ticks })
+    }
+
+    fn push_ticks<T: RawTick>(&mut self, stream: RawStream, batch: RawBatch<T>) -> Result<(), BatchError> {
+        let (Some(first), Some(last)) = (batch.ticks.first(), batch.ticks.last()) else { return Ok(()) };
+        let (sequence, (time, _)) = (first.sequence(), last.times());
+        self.push(stream, &batch, time, sequence, batch.ticks.len()).map_err(|error| match error {
+            BatchError::Codec(CodecError::NotCounts { .. }) => BatchError::NotCounts { sequence },
+            error => error,
+        })
     }
 
     fn push(
@@ -160,111 +160,57 @@ impl Batcher {
     }
 }
 
-/// A tick with a sequence number and readings.
-trait Sequenced {
-    fn sequence(&self) -> u64;
-    fn sensors(&self) -> usize;
-}
-
-impl Sequenced for GyroTick {
-    fn sequence(&self) -> u64 {
-        self.sequence
-    }
-    fn sensors(&self) -> usize {
-        self.readings.len()
-    }
-}
-
-impl Sequenced for AccelTick {
-    fn sequence(&self) -> u64 {
-        self.sequence
-    }
-    fn sensors(&self) -> usize {
-        self.readings.len()
-    }
-}
-
 /// Consecutive ticks of one kind and number of readings.
 #[derive(Debug)]
 struct Pending<T> {
-    output: Option<OutputKind>,
+    output: OutputKind,
     ticks: Vec<T>,
 }
 
 impl<T> Default for Pending<T> {
     fn default() -> Self {
-        Self { output: None, ticks: Vec::new() }
+        Self { output: OutputKind::Counts, ticks: Vec::new() }
     }
 }
 
-impl<T: Sequenced> Pending<T> {
+impl<T: RawTick> Pending<T> {
     /// Whether such a tick can stand in the same batch as those that wait.
-    fn continues(&self, output: OutputKind, sequence: u64, sensors: usize) -> bool {
+    fn continues(&self, output: OutputKind, tick: &T) -> bool {
         self.ticks.last().is_none_or(|last| {
-            self.output == Some(output)
-                && last.sequence().checked_add(1) == Some(sequence)
-                && last.sensors() == sensors
+            self.output == output
+                && last.sequence().checked_add(1) == Some(tick.sequence())
+                && last.readings().len() == tick.readings().len()
         })
     }
 
     fn push(&mut self, output: OutputKind, tick: T) {
-        self.output = Some(output);
+        self.output = output;
         self.ticks.push(tick);
     }
 
-    fn len(&self) -> usize {
-        self.ticks.len()
-    }
-
-    /// What the readings stand for; `None` where no tick waits.
-    fn output(&self) -> Option<OutputKind> {
-        if self.ticks.is_empty() { None } else { self.output }
-    }
-
-    fn take(&mut self) -> Vec<T> {
-        std::mem::take(&mut self.ticks)
+    fn take(&mut self) -> (OutputKind, Vec<T>) {
+        (self.output, std::mem::take(&mut self.ticks))
     }
 }
 
-/// Batches of the readings in their order: readings of one time make a tick, ticks of the same channels a batch.
+/// Batches of the readings in their order, each of ticks of the same channels.
 fn temperature_batches(readings: &[TemperatureReading]) -> Vec<TemperatureBatch> {
     let mut batches: Vec<TemperatureBatch> = Vec::new();
-    let mut rest = readings;
-    while let Some(first) = rest.first() {
-        let count = tick_length(rest, first.time);
-        let (tick, others) = rest.split_at(count);
-        rest = others;
-        let wire = TemperatureTick {
-            time_ns: first.time.as_ns(),
-            raw: tick.iter().map(|reading| reading.raw).collect(),
-        };
+    // A tick of the last batch, and how many it has.
+    let mut last: (&[TemperatureReading], usize) = (&[], 0);
+    for tick in ticks(readings) {
+        let alike =
+            last.0.iter().map(|reading| reading.channel).eq(tick.iter().map(|reading| reading.channel));
         match batches.last_mut() {
-            Some(batch)
-                if batch.ticks.len() < MAX_TICKS
-                    && batch.channels.iter().eq(tick.iter().map(|r| &r.channel)) =>
-            {
-                batch.ticks.push(wire);
+            Some(batch) if last.1 < MAX_TICKS && alike => batch.readings.extend_from_slice(tick),
+            _ => {
+                batches.push(TemperatureBatch { readings: tick.to_vec() });
+                last.1 = 0;
             }
-            _ => batches.push(TemperatureBatch {
-                channels: tick.iter().map(|reading| reading.channel).collect(),
-                ticks: vec![wire],
-            }),
         }
+        last = (tick, last.1 + 1);
     }
     batches
-}
-
-/// Number of readings in front that belong to one tick: one time, each channel once.
-fn tick_length(readings: &[TemperatureReading], time: Timestamp) -> usize {
-    readings
-        .iter()
-        .take(MAX_CHANNELS)
-        .enumerate()
-        .take_while(|(index, reading)| {
-            reading.time == time
-                && readings[..*index].iter().all(|earlier| earlier.channel != reading.channel)
-        })
-        .count()
 }
 
 #[cfg(test)]
@@ -291,21 +237,37 @@ mod tests {
             reading("coil", 3, 22.5),
         ];
         let batches = temperature_batches(&readings);
-        let shape: Vec<_> = batches.iter().map(|batch| (batch.channels.len(), batch.ticks.len())).collect();
-        assert_eq!(shape, [(2, 2), (1, 2)]);
-        let back: Vec<_> = batches.iter().flat_map(TemperatureBatch::to_core).collect();
+        let shape: Vec<_> =
+            batches.iter().map(|batch| batch.ticks().map(<[_]>::len).collect::<Vec<_>>()).collect();
+        assert_eq!(shape, [vec![2, 2], vec![1, 1]]);
+        let back: Vec<_> = batches.into_iter().flat_map(|batch| batch.readings).collect();
         assert_eq!(back, readings);
         assert!(temperature_batches(&[]).is_empty());
     }
 
     #[test]
     fn a_jump_of_the_sequence_or_another_kind_ends_a_batch() {
+        let tick = |sequence, sensors: usize| AccelTick {
+            sequence,
+            readings: (0..sensors).map(|_| 0.0).collect(),
+            ..AccelTick::default()
+        };
         let mut pending = Pending::default();
-        assert!(pending.continues(OutputKind::Counts, 9, 3));
-        pending.push(OutputKind::Counts, AccelTick { sequence: 9, ..AccelTick::default() });
-        assert!(pending.continues(OutputKind::Counts, 10, 0));
-        assert!(!pending.continues(OutputKind::Counts, 11, 0), "jump");
-        assert!(!pending.continues(OutputKind::Mean, 10, 0), "kind");
-        assert!(!pending.continues(OutputKind::Counts, 10, 3), "sensors");
+        assert!(pending.continues(OutputKind::Counts, &tick(9, 3)));
+        pending.push(OutputKind::Counts, tick(9, 0));
+        assert!(pending.continues(OutputKind::Counts, &tick(10, 0)));
+        assert!(!pending.continues(OutputKind::Counts, &tick(11, 0)), "jump");
+        assert!(!pending.continues(OutputKind::Mean, &tick(10, 0)), "kind");
+        assert!(!pending.continues(OutputKind::Counts, &tick(10, 3)), "sensors");
+    }
+
+    #[test]
+    fn readings_that_are_no_counts_are_named() {
+        let mut batcher = Batcher::new(1);
+        let readings = [1.0, 0.5].into_iter().collect();
+        let error = batcher
+            .gyro(OutputKind::Counts, GyroTick { sequence: 7, readings, ..GyroTick::default() })
+            .unwrap_err();
+        assert_eq!(error.to_string(), "tick 7: its readings are no counts of 32 bits");
     }
 }

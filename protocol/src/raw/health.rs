@@ -5,7 +5,7 @@ use isotherm_correction::sample::ChannelName;
 use isotherm_correction::units::Timestamp;
 use serde::{Deserialize, Serialize};
 
-use crate::codec::{CodecError, Kind, MAX_TICKS, Message, bounded};
+use crate::codec::{CodecError, Kind, MAX_TICKS, PlainMessage, bounded};
 use crate::version::{self, Versions};
 
 /// Most readings at one time.
@@ -38,7 +38,7 @@ pub struct HealthBatch {
     pub ticks: Vec<HealthTick>,
 }
 
-impl Message for HealthBatch {
+impl PlainMessage for HealthBatch {
     const KIND: Kind = Kind::RawHealth;
     const VERSIONS: Versions = version::RAW_HEALTH;
 

@@ -1,11 +1,10 @@
 //! Pre-launch calibration: how far it is, and what came of the last one (models §7).
 
-use isotherm_correction::sample::MAX_SENSORS;
+use isotherm_correction::sample::{LasingMode, MAX_SENSORS};
 use serde::{Deserialize, Serialize};
 
 use crate::codec::bounded;
 use crate::digest::Digest;
-use crate::raw::Mode;
 
 /// Most lasing modes: plus, minus and none.
 const MAX_MODES: usize = 3;
@@ -16,7 +15,7 @@ const MAX_REASONS: usize = 64;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PreLaunchMode {
     /// The mode; `None` for an instrument without modes.
-    pub mode: Option<Mode>,
+    pub mode: Option<LasingMode>,
     /// Good ticks.
     pub ticks: u64,
     /// Their duration together (s).

@@ -4,7 +4,7 @@ use isotherm_correction::sample::ChannelName;
 use serde::{Deserialize, Serialize};
 
 use super::{ActiveCalibration, Counter, LastTick, Latency, MAX_ENTRIES, Output};
-use crate::codec::{Kind, Message, bounded};
+use crate::codec::{Kind, PlainMessage, bounded};
 use crate::corrected::Revision;
 use crate::version::Versions;
 
@@ -63,7 +63,7 @@ pub struct Status {
     pub added_latency_p99_ns: u64,
 }
 
-impl Message for Status {
+impl PlainMessage for Status {
     const KIND: Kind = Kind::Status;
     const VERSIONS: Versions = Versions { min: 1, current: 1 };
 }

@@ -1,6 +1,5 @@
 //! What a service did to a stream beside giving it frames, done again.
 
-use std::collections::VecDeque;
 use std::sync::Arc;
 
 use isotherm_correction::navigation::NavigationStep;
@@ -158,7 +157,9 @@ impl UnitStream {
     /// its next revision behind `highest_revision`.
     pub fn begin_anew(&mut self, settings: UnitSettings, highest_revision: u64) {
         let anew = Self::new(self.id.clone(), settings).with_revision(highest_revision);
-        *self = Self { heard: self.heard, ..anew };
+        self.outgoing.clear();
+        let outgoing = std::mem::take(&mut self.outgoing);
+        *self = Self { heard: self.heard, outgoing, ..anew };
     }
 
     fn remember(&mut self, memory: &[u8]) -> Result<(), JournalError> {
@@ -167,9 +168,9 @@ impl UnitStream {
             let (got, need) = (remembered.id.to_string(), self.id.to_string());
             return Err(JournalError::OtherUnit { got, need });
         }
-        let mut ready: VecDeque<_> = std::mem::take(&mut self.ready);
-        ready.append(&mut remembered.ready);
-        *self = Self { ready, ..remembered };
+        let mut outgoing = std::mem::take(&mut self.outgoing);
+        remembered.outgoing.take().0.iter().for_each(|tick| outgoing.push(tick));
+        *self = Self { outgoing, ..remembered };
         Ok(())
     }
 }

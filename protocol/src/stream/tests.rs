@@ -1,7 +1,7 @@
 use isotherm_correction::earth::Place as Site;
 use isotherm_correction::operation::Command;
 use isotherm_correction::prelaunch::PreLaunchSettings;
-use isotherm_correction::sample::{AccelTick, ChannelName, GyroTick, LasingMode, Sensors};
+use isotherm_correction::sample::{ChannelName, LasingMode, Sensors};
 use isotherm_correction::units::Timestamp;
 
 use super::status::reason;
@@ -12,7 +12,7 @@ use crate::corrected::CorrectedBatch;
 use crate::digest::Digest;
 use crate::document::Document;
 use crate::raw::{AccelBatch, GyroBatch};
-use crate::raw::{HealthReading as WireReading, HealthTick, TemperatureBatch, TemperatureTick};
+use crate::raw::{HealthReading as WireReading, HealthTick, TemperatureBatch};
 use crate::status::{Output, Place, PreLaunchVerdict, SensorKind, State as WireState, Status};
 
 const FULL: &str = include_str!("../../../config/calibration/example-full.toml");
@@ -40,9 +40,10 @@ fn tick(stream: &mut UnitStream, series: u64, sequence: u64) {
     let readings = |count: usize| -> Sensors<f64> { (0..count).map(|_| wobble).collect() };
     if sequence.is_multiple_of(200) {
         let channels = ["block", "coil", "accel", "board"].map(|name| ChannelName::from(name).unwrap());
-        let raw = [1.8, 25.0, 4770.0, 72.5].into_iter().collect();
-        let ticks = vec![TemperatureTick { time_ns: end(sequence).as_ns() - TICK_NS, raw }];
-        let batch = TemperatureBatch { channels: channels.into_iter().collect(), ticks };
+        let time = Timestamp::from_ns(end(sequence).as_ns() - TICK_NS);
+        let readings = channels.into_iter().zip([1.8, 25.0, 4770.0, 72.5]);
+        let readings = readings.map(|(channel, raw)| TemperatureReading { channel, time, raw });
+        let batch = TemperatureBatch { readings: readings.collect() };
         stream.receive(RawStream::Temperature, &encode(&batch).unwrap()).unwrap();
     }
     let duration = Span::from_ns(TICK_NS);
@@ -52,7 +53,7 @@ fn tick(stream: &mut UnitStream, series: u64, sequence: u64) {
         duration,
         readings: readings(calibration.accel_count()),
     };
-    let batch = AccelBatch::from_core(calibration.accel_output(), &[accel]).unwrap();
+    let batch = AccelBatch { output: calibration.accel_output(), ticks: vec![accel] };
     stream.receive(RawStream::Accel, &encode(&batch).unwrap()).unwrap();
     let gyro = GyroTick {
         sequence,
@@ -63,7 +64,7 @@ fn tick(stream: &mut UnitStream, series: u64, sequence: u64) {
         series,
         ..GyroTick::default()
     };
-    let batch = GyroBatch::from_core(calibration.gyro_output(), &[gyro]).unwrap();
+    let batch = GyroBatch { output: calibration.gyro_output(), ticks: vec![gyro] };
     stream.receive(RawStream::Gyro, &encode(&batch).unwrap()).unwrap();
 }
 

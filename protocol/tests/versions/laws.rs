@@ -5,17 +5,18 @@ mod status;
 
 use std::fmt::Debug;
 
-use isotherm_correction::sample::{MAX_CHANNEL_NAME, MAX_PARITY, MAX_SENSORS};
+use isotherm_correction::sample::{LasingMode as Mode, MAX_CHANNEL_NAME, MAX_PARITY, MAX_SENSORS};
 use isotherm_protocol::codec::{CodecError, Message, decode, encode};
-use isotherm_protocol::corrected::{AppliedTemperature, CorrectedBatch, CorrectedTick, Revision};
-use isotherm_protocol::raw::{
-    AccelBatch, AccelTick, GyroBatch, GyroTick, HalfPeriod, MAX_CHANNELS, Mode, Readings, TemperatureBatch,
-    TemperatureTick,
-};
-use proptest::collection::vec;
+use isotherm_protocol::corrected::{AppliedTemperature, Revision};
+use isotherm_protocol::raw::MAX_CHANNELS;
+use proptest::collection::{hash_set, vec};
 use proptest::prelude::*;
 use proptest::sample::select;
 
+use super::form::{
+    AccelBatch, AccelTick, CorrectedBatch, CorrectedTick, Form, GyroBatch, GyroTick, HalfPeriod, Readings,
+    TemperatureBatch, TemperatureTick,
+};
 use super::{bytes, decode_as, frames};
 
 /// Any binary64 at all: every NaN, infinities, subnormal numbers.
@@ -86,7 +87,7 @@ fn channel() -> impl Strategy<Value = isotherm_correction::sample::ChannelName> 
 }
 
 fn temperature_batch() -> impl Strategy<Value = TemperatureBatch> {
-    vec(channel(), 0..=MAX_CHANNELS).prop_flat_map(|channels| {
+    hash_set(channel(), 1..=MAX_CHANNELS).prop_flat_map(|channels| {
         let tick = (any::<i64>(), vec(number(), channels.len()))
             .prop_map(|(time_ns, raw)| TemperatureTick { time_ns, raw: raw.into_iter().collect() });
         vec(tick, 1..20)
@@ -163,10 +164,10 @@ proptest! {
         health in status::health_batch(),
         reference in status::reference(),
     ) {
-        comes_back(&gyro)?;
-        comes_back(&accel)?;
-        comes_back(&temperature)?;
-        comes_back(&corrected)?;
+        comes_back(&gyro.message())?;
+        comes_back(&accel.message())?;
+        comes_back(&temperature.message())?;
+        comes_back(&corrected.message())?;
         comes_back(&status)?;
         comes_back(&service)?;
         comes_back(&health)?;

@@ -1,6 +1,7 @@
 //! The bytes of the wire messages: frozen vectors of every version, laws of the codec, and `docs/wire.md`.
 #![expect(clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 
+mod form;
 mod laws;
 mod page;
 mod v1;
@@ -8,12 +9,14 @@ mod v2;
 mod v3;
 
 use isotherm_protocol::codec::{self, CodecError, Kind};
-use isotherm_protocol::corrected::CorrectedBatch;
 use isotherm_protocol::journal::JournalPart;
-use isotherm_protocol::raw::{AccelBatch, GyroBatch, HealthBatch, TemperatureBatch};
+use isotherm_protocol::raw::HealthBatch;
 use isotherm_protocol::reference::Reference;
 use isotherm_protocol::service_status::ServiceStatus;
 use isotherm_protocol::status::{self, Status};
+use serde::Serialize;
+
+use form::{AccelBatch, CorrectedBatch, Form, GyroBatch, TemperatureBatch};
 
 /// Name and frame of every vector, in hexadecimal, in the order of the page.
 fn frames() -> impl Iterator<Item = (&'static str, &'static str)> {
@@ -34,14 +37,20 @@ fn bytes(hex: &str) -> Vec<u8> {
 
 /// Decodes a frame as a message of a kind, and gives it back in JSON (NaN as null).
 fn decode_as(kind: u8, frame: &[u8]) -> Result<serde_json::Value, CodecError> {
-    fn json<M: codec::Message>(frame: &[u8]) -> Result<serde_json::Value, CodecError> {
+    fn json<M: codec::Message + Serialize>(frame: &[u8]) -> Result<serde_json::Value, CodecError> {
         codec::decode::<M>(frame).map(|message| serde_json::to_value(message).expect("JSON takes it"))
     }
+    fn form<F: Form>(frame: &[u8]) -> Result<serde_json::Value, CodecError> {
+        let message = codec::decode::<F::Message>(frame)?;
+        let form: F = postcard::from_bytes(&frame[2..frame.len() - 4]).expect("what the library reads");
+        assert_eq!(format!("{message:?}"), format!("{:?}", form.message()), "both read the same");
+        Ok(serde_json::to_value(form).expect("JSON takes it"))
+    }
     match kind {
-        1 => json::<GyroBatch>(frame),
-        2 => json::<AccelBatch>(frame),
-        3 => json::<TemperatureBatch>(frame),
-        4 => json::<CorrectedBatch>(frame),
+        1 => form::<GyroBatch>(frame),
+        2 => form::<AccelBatch>(frame),
+        3 => form::<TemperatureBatch>(frame),
+        4 => form::<CorrectedBatch>(frame),
         5 if frame.get(1) == Some(&1) => {
             let old = json::<status::v1::Status>(frame);
             let current = codec::decode::<Status>(frame).err();

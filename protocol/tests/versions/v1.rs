@@ -7,15 +7,17 @@
 //! While 1 is also the version that is written, both directions hold. The status has a version 2: the body of version 1
 //! is a type of its own, and for it both directions hold too.
 
+use isotherm_correction::sample::LasingMode as Mode;
 use isotherm_protocol::codec::{Message, decode, encode};
-use isotherm_protocol::corrected::{AppliedTemperature, CorrectedBatch, CorrectedTick, Revision};
-use isotherm_protocol::raw::{
-    AccelBatch, AccelTick, GyroBatch, GyroTick, HalfPeriod, Mode, Readings, TemperatureBatch, TemperatureTick,
-};
+use isotherm_protocol::corrected::{AppliedTemperature, Revision};
 use isotherm_protocol::status::Counter;
 use isotherm_protocol::status::v1::{ChannelStatus, State, Status};
 
 use super::bytes;
+use super::form::{
+    AccelBatch, AccelTick, CorrectedBatch, CorrectedTick, Form, GyroBatch, GyroTick, HalfPeriod, Readings,
+    TemperatureBatch, TemperatureTick,
+};
 
 mod frames;
 
@@ -36,6 +38,18 @@ fn holds<M: Message + std::fmt::Debug>(name: &str, message: &M) {
     assert_eq!(format!("{read:?}"), format!("{message:?}"), "{name} is read");
     if M::VERSIONS.current == 1 {
         assert_eq!(encode(message).expect("a good message"), frame, "{name} is written");
+    }
+}
+
+/// The same of a message in its plain form: that has the bytes too, whatever the library makes of them.
+fn form_holds<F: Form>(name: &str, form: &F) {
+    let frame = frame(name);
+    assert_eq!(postcard::to_allocvec(form).expect("bytes"), frame[2..frame.len() - 4], "{name} has its form");
+    if form.is_written() {
+        holds(name, &form.message());
+    } else {
+        let read: F::Message = decode(&frame).expect("a good frame");
+        assert_eq!(format!("{read:?}"), format!("{:?}", form.message()), "{name} is read");
     }
 }
 
@@ -64,7 +78,7 @@ fn raw_gyro() {
         meander: Some(Mode::Plus),
         half_periods: [].into_iter().collect(),
     };
-    holds(
+    form_holds(
         "raw-gyro-counts",
         &GyroBatch { first_sequence: 1000, series: 1_700_000_000_000_000_000, ticks: vec![counts, switch] },
     );
@@ -80,7 +94,7 @@ fn raw_gyro() {
         meander: None,
         half_periods: [].into_iter().collect(),
     };
-    holds("raw-gyro-means", &GyroBatch { first_sequence: 0, series: 0, ticks: vec![means] });
+    form_holds("raw-gyro-means", &GyroBatch { first_sequence: 0, series: 0, ticks: vec![means] });
 
     let edges = GyroTick {
         end_time_ns: i64::MIN,
@@ -91,7 +105,10 @@ fn raw_gyro() {
         meander: Some(Mode::Minus),
         half_periods: [half(i32::MIN, i32::MAX); 8].into_iter().collect(),
     };
-    holds("raw-gyro-edges", &GyroBatch { first_sequence: u64::MAX, series: u64::MAX, ticks: vec![edges] });
+    form_holds(
+        "raw-gyro-edges",
+        &GyroBatch { first_sequence: u64::MAX, series: u64::MAX, ticks: vec![edges] },
+    );
 
     let empty = GyroTick {
         end_time_ns: 0,
@@ -102,7 +119,7 @@ fn raw_gyro() {
         meander: None,
         half_periods: [].into_iter().collect(),
     };
-    holds("raw-gyro-empty", &GyroBatch { first_sequence: 128, series: 0, ticks: vec![empty] });
+    form_holds("raw-gyro-empty", &GyroBatch { first_sequence: 128, series: 0, ticks: vec![empty] });
 }
 
 #[test]
@@ -113,14 +130,14 @@ fn raw_accel() {
         readings: Readings::Counts(counts.into_iter().collect()),
     };
     let ticks = vec![counts(5_000_000, [0, -1, 392]), counts(10_000_000, [1, -2, 393])];
-    holds("raw-accel-counts", &AccelBatch { first_sequence: 300, ticks });
+    form_holds("raw-accel-counts", &AccelBatch { first_sequence: 300, ticks });
 
     let means = AccelTick {
         end_time_ns: i64::MAX,
         duration_ns: 1,
         readings: Readings::Means([9.80665, -0.125, 0.0, -9.75].into_iter().collect()),
     };
-    holds("raw-accel-means", &AccelBatch { first_sequence: 1 << 32, ticks: vec![means] });
+    form_holds("raw-accel-means", &AccelBatch { first_sequence: 1 << 32, ticks: vec![means] });
 }
 
 #[test]
@@ -128,16 +145,19 @@ fn raw_temperature() {
     let tick = |time_ns, raw: [f64; 2]| TemperatureTick { time_ns, raw: raw.into_iter().collect() };
     let channels = [channel("body"), channel("катушка")].into_iter().collect();
     let ticks = vec![tick(1_000_000_000, [0.5125, f64::NAN]), tick(1_500_000_000, [0.5, -40.25])];
-    holds("raw-temp", &TemperatureBatch { channels, ticks });
+    form_holds("raw-temp", &TemperatureBatch { channels, ticks });
 
     let empty = TemperatureTick { time_ns: 7, raw: [].into_iter().collect() };
-    holds("raw-temp-empty", &TemperatureBatch { channels: [].into_iter().collect(), ticks: vec![empty] });
+    form_holds(
+        "raw-temp-empty",
+        &TemperatureBatch { channels: [].into_iter().collect(), ticks: vec![empty] },
+    );
 }
 
 #[test]
 fn nan_keeps_its_bits() {
-    let batch: TemperatureBatch = decode(&frame("raw-temp")).unwrap();
-    assert_eq!(batch.ticks[0].raw[1].to_bits(), 0x7ff8_0000_0000_0000);
+    let batch: isotherm_protocol::raw::TemperatureBatch = decode(&frame("raw-temp")).unwrap();
+    assert_eq!(batch.readings[1].raw.to_bits(), 0x7ff8_0000_0000_0000);
 }
 
 #[test]
@@ -181,7 +201,7 @@ fn corrected() {
         temperatures: [body].into_iter().collect(),
         ticks: vec![first, second],
     };
-    holds("corrected", &batch);
+    form_holds("corrected", &batch);
 
     let edges = CorrectedTick {
         sequence: u64::MAX,
@@ -204,7 +224,7 @@ fn corrected() {
         temperatures: [].into_iter().collect(),
         ticks: vec![edges],
     };
-    holds("corrected-edges", &batch);
+    form_holds("corrected-edges", &batch);
 }
 
 #[test]

@@ -183,7 +183,6 @@ impl UnitBag {
     ) -> Result<(), Error> {
         let mut topic = String::new();
         for tick in &batch.ticks {
-            let tick = tick.to_core(batch.revision.counter);
             if tick.flags.contains(TickFlags::UNCALIBRATED) {
                 converted.leave_out("uncalibrated ticks, which have no unit of measure", 1);
             } else if tick.duration.as_ns() <= 0 {
@@ -191,7 +190,7 @@ impl UnitBag {
             } else {
                 topic.clone_from(&self.base);
                 topic.push_str("/data");
-                let imu = |header| Imu::of_tick(header, &tick);
+                let imu = |header| Imu::of_tick(header, tick);
                 self.write(&topic, None, tick.end_time.as_ns(), imu, bag, converted)?;
             }
         }
@@ -200,7 +199,7 @@ impl UnitBag {
             let message =
                 |header| Temperature { header, temperature: applied.temperature_deg_c, variance: 0.0 };
             let topic = self.channel_topic("temperature", &applied.channel);
-            self.write(&topic, Some(&applied.channel), last.end_time_ns, message, bag, converted)?;
+            self.write(&topic, Some(&applied.channel), last.end_time.as_ns(), message, bag, converted)?;
         }
         Ok(())
     }

@@ -247,8 +247,7 @@ fn write(
 }
 
 fn write_corrected(batch: &CorrectedBatch, writer: &mut dyn Write) -> io::Result<u64> {
-    let revision = batch.revision.counter;
-    batch.ticks.iter().try_for_each(|tick| write_tick(writer, &tick.to_core(revision)))?;
+    batch.ticks.iter().try_for_each(|tick| write_tick(writer, tick))?;
     Ok(batch.ticks.len() as u64)
 }
 

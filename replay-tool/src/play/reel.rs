@@ -153,14 +153,14 @@ impl<'a> Reel<'a> {
             Input::Raw(RawStream::Gyro) => return self.gyro(unit, frame),
             Input::Raw(RawStream::Accel) => codec::decode::<AccelBatch>(&frame).map_or(unreadable, |batch| {
                 let ends = (batch.ticks.first().zip(batch.ticks.last()))
-                    .map(|(first, last)| (at(first.end_time_ns), at(last.end_time_ns)));
+                    .map(|(first, last)| (first.end_time, last.end_time));
                 (Load::Accel(batch.ticks.len() as u64), ends)
             }),
             Input::Raw(RawStream::Temperature) => {
                 codec::decode::<TemperatureBatch>(&frame).map_or(unreadable, |batch| {
-                    let ends = (batch.ticks.first().zip(batch.ticks.last()))
-                        .map(|(first, last)| (at(first.time_ns), at(last.time_ns)));
-                    (Load::Temperature((batch.ticks.len() * batch.channels.len()) as u64), ends)
+                    let ends = (batch.readings.first().zip(batch.readings.last()))
+                        .map(|(first, last)| (first.time, last.time));
+                    (Load::Temperature(batch.readings.len() as u64), ends)
                 })
             }
             Input::Raw(RawStream::Health) => {
@@ -181,12 +181,13 @@ impl<'a> Reel<'a> {
         let Ok(mut batch) = codec::decode::<GyroBatch>(&frame) else {
             return (Load::Unreadable, frame.into(), None, false);
         };
-        let (series, begins) = self.series.number(unit, batch.series);
-        batch.series = series;
-        let times = (batch.ticks.first().zip(batch.ticks.last())).map(|(first, last)| {
-            (Timestamp::from_ns(first.end_time_ns), Timestamp::from_ns(last.end_time_ns))
-        });
-        let ticks = GyroTicks { series, first: batch.first_sequence, count: batch.ticks.len() as u64 };
+        let (Some(first), Some(last)) = (batch.ticks.first(), batch.ticks.last()) else {
+            return (Load::Unreadable, frame.into(), None, false);
+        };
+        let (series, begins) = self.series.number(unit, first.series);
+        let times = Some((first.end_time, last.end_time));
+        let ticks = GyroTicks { series, first: first.sequence, count: batch.ticks.len() as u64 };
+        batch.ticks.iter_mut().for_each(|tick| tick.series = series);
         // What could be decoded can be encoded.
         let bytes = codec::encode(&batch).unwrap_or(frame);
         (Load::Gyro(ticks), bytes.into(), times, begins)

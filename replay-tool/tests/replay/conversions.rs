@@ -9,8 +9,9 @@ use isotherm_log::message::{Message, Topic};
 use isotherm_log::recording::{RecordingOptions, RecordingReader, RecordingWriter};
 use isotherm_log::text::{LogEvent, LogReader};
 use isotherm_protocol::codec;
-use isotherm_protocol::raw::{AccelBatch, GyroBatch, GyroTick, HealthBatch, HealthReading, HealthTick};
-use isotherm_protocol::raw::{Readings, TemperatureBatch, TemperatureTick};
+use isotherm_protocol::raw::{
+    AccelBatch, GyroBatch, HealthBatch, HealthReading, HealthTick, TemperatureBatch,
+};
 use serde_json::Value;
 
 use crate::common::{check, mapping, replay, stdout};
@@ -89,34 +90,39 @@ fn with_data_real_logs_come_back_to_the_bit() {
 
 /// A gyro message of one tick of three counts that ends at so many milliseconds.
 fn gyro(unit: &str, series: u64, sequence: u64, end_ms: i64) -> Message {
-    let number = i32::try_from(sequence).unwrap();
+    let number = f64::from(i32::try_from(sequence).unwrap());
     let tick = GyroTick {
-        end_time_ns: end_ms * 1_000_000,
-        duration_ns: 10_000_000,
-        readings: Readings::Counts([number, -number, i32::MIN].into_iter().collect()),
-        mode: None,
-        switch_command: false,
-        meander: None,
-        half_periods: [].into_iter().collect(),
+        sequence,
+        end_time: Timestamp::from_ns(end_ms * 1_000_000),
+        duration: Span::from_ms(10),
+        readings: [number, -number, f64::from(i32::MIN)].into_iter().collect(),
+        series,
+        ..GyroTick::default()
     };
-    let frame = codec::encode(&GyroBatch { first_sequence: sequence, series, ticks: vec![tick] }).unwrap();
+    let frame = codec::encode(&GyroBatch { output: OutputKind::Counts, ticks: vec![tick] }).unwrap();
     Message { topic: Topic::of(&format!("imu/{unit}/raw/gyro")), received_ns: 5, frame }
 }
 
 fn accel(unit: &str, sequence: u64, end_ms: i64, volts: &[f64]) -> Message {
-    let tick = isotherm_protocol::raw::AccelTick {
-        end_time_ns: end_ms * 1_000_000,
-        duration_ns: 10_000_000,
-        readings: Readings::Means(volts.iter().copied().collect()),
+    let tick = AccelTick {
+        sequence,
+        end_time: Timestamp::from_ns(end_ms * 1_000_000),
+        duration: Span::from_ms(10),
+        readings: volts.iter().copied().collect(),
     };
-    let frame = codec::encode(&AccelBatch { first_sequence: sequence, ticks: vec![tick] }).unwrap();
+    let frame = codec::encode(&AccelBatch { output: OutputKind::Mean, ticks: vec![tick] }).unwrap();
     Message { topic: Topic::of(&format!("imu/{unit}/raw/accel")), received_ns: 5, frame }
 }
 
 fn temperatures(unit: &str, channels: &[&str], time_ms: i64, raw: &[f64]) -> Message {
-    let channels = channels.iter().map(|name| ChannelName::from(name).unwrap()).collect();
-    let ticks = vec![TemperatureTick { time_ns: time_ms * 1_000_000, raw: raw.iter().copied().collect() }];
-    let frame = codec::encode(&TemperatureBatch { channels, ticks }).unwrap();
+    let time = Timestamp::from_ns(time_ms * 1_000_000);
+    let reading = |(name, raw): (&&str, &f64)| TemperatureReading {
+        channel: ChannelName::from(name).unwrap(),
+        time,
+        raw: *raw,
+    };
+    let readings = channels.iter().zip(raw).map(reading).collect();
+    let frame = codec::encode(&TemperatureBatch { readings }).unwrap();
     Message { topic: Topic::of(&format!("imu/{unit}/raw/temp")), received_ns: 5, frame }
 }
 

@@ -7,21 +7,24 @@ mod recover;
 use std::path::PathBuf;
 use std::process::Command;
 
-use isotherm_correction::sample::ChannelName;
+use isotherm_correction::sample::{ChannelName, TemperatureReading};
+use isotherm_correction::units::Timestamp;
 use isotherm_log::message::{Message, Topic};
 use isotherm_protocol::codec;
 use isotherm_protocol::key::{RawStream, UnitId};
-use isotherm_protocol::raw::{TemperatureBatch, TemperatureTick};
+use isotherm_protocol::raw::TemperatureBatch;
 
 use crate::common::replay;
 
 /// A message that is told from others by its number.
 fn temperature(serial: &str, number: u32) -> Message {
-    let channels = [ChannelName::from("board").unwrap()].into_iter().collect();
-    let raw = [f64::from(number) * 1.1].into_iter().collect();
-    let ticks = vec![TemperatureTick { time_ns: i64::from(number) * 5_000_000, raw }];
+    let reading = TemperatureReading {
+        channel: ChannelName::from("board").unwrap(),
+        time: Timestamp::from_ns(i64::from(number) * 5_000_000),
+        raw: f64::from(number) * 1.1,
+    };
     let topic = Topic::Raw(UnitId::new(serial).unwrap(), RawStream::Temperature);
-    let frame = codec::encode(&TemperatureBatch { channels, ticks }).unwrap();
+    let frame = codec::encode(&TemperatureBatch { readings: vec![reading] }).unwrap();
     Message { topic, received_ns: 1_000 + u64::from(number), frame }
 }
 

@@ -117,7 +117,7 @@ impl Score {
     }
 
     fn compare(&mut self, sent: &SentTick, tick: &CorrectedTick) {
-        let corrected = tick.delta_angle_rad;
+        let corrected = tick.delta_angle;
         self.windows.add(
             sent.end_s,
             sent.duration_s,
@@ -130,7 +130,7 @@ impl Score {
             corrected,
             truth: sent.truth,
             switch_command: sent.switch_command,
-            interpolated: TickFlags::from_bits_retain(tick.flags).contains(TickFlags::INTERPOLATED),
+            interpolated: tick.flags.contains(TickFlags::INTERPOLATED),
         });
     }
 
@@ -163,7 +163,6 @@ pub(super) fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use isotherm_correction::sample as core;
     use isotherm_protocol::corrected::Revision;
     use std::time::Duration;
 
@@ -180,11 +179,7 @@ mod tests {
     }
 
     fn received(sequences: &[u64]) -> CorrectedBatch {
-        let tick = |&sequence| {
-            let tick =
-                core::CorrectedTick { sequence, delta_angle: [1.5; 3], ..core::CorrectedTick::default() };
-            CorrectedTick::from(&tick)
-        };
+        let tick = |&sequence| CorrectedTick { sequence, delta_angle: [1.5; 3], ..CorrectedTick::default() };
         CorrectedBatch {
             unit: "A".into(),
             revision: Revision::default(),

@@ -13,7 +13,7 @@ fn gyro_frame(sequence: u64) -> Vec<u8> {
         readings: [1.0, 2.0, 3.0].into_iter().collect(),
         ..GyroTick::default()
     };
-    encode(&GyroBatch::from_core(OutputKind::Counts, &[tick]).unwrap()).unwrap()
+    encode(&GyroBatch { output: OutputKind::Counts, ticks: vec![tick] }).unwrap()
 }
 
 fn intake(max_units: usize, calibrated: &[&str]) -> Intake {

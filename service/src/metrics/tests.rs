@@ -8,7 +8,7 @@ use isotherm_correction::units::{Span, Timestamp};
 use isotherm_protocol::codec::encode;
 use isotherm_protocol::document::{Document, Parsed};
 use isotherm_protocol::key::UnitId;
-use isotherm_protocol::raw::{AccelBatch, GyroBatch, TemperatureBatch, TemperatureTick};
+use isotherm_protocol::raw::{AccelBatch, GyroBatch, TemperatureBatch};
 
 use super::*;
 use crate::calibrations::Calibrations;
@@ -80,7 +80,7 @@ fn gyro_frame(kind: OutputKind, sequence: u64, sensors: usize) -> Vec<u8> {
         readings: std::iter::repeat_n(1.0, sensors).collect(),
         ..GyroTick::default()
     };
-    encode(&GyroBatch::from_core(kind, &[tick]).unwrap()).unwrap()
+    encode(&GyroBatch { output: kind, ticks: vec![tick] }).unwrap()
 }
 
 /// Everything goes out.
@@ -244,13 +244,8 @@ fn fleet(document: &str, units: usize, ticks: u64) -> Arc<Intake> {
         .collect();
     for sequence in 1..=ticks {
         let end_time = Timestamp::from_ns(i64::try_from(sequence).unwrap() * 5_000_000);
-        let temperatures = TemperatureBatch {
-            channels: channels.iter().copied().collect(),
-            ticks: vec![TemperatureTick {
-                time_ns: end_time.as_ns(),
-                raw: channels.iter().map(|_| 1.8).collect(),
-            }],
-        };
+        let reading = |&channel| TemperatureReading { channel, time: end_time, raw: 1.8 };
+        let temperatures = TemperatureBatch { readings: channels.iter().map(reading).collect() };
         let temperatures = encode(&temperatures).unwrap();
         let accel = AccelTick {
             sequence,
@@ -258,7 +253,7 @@ fn fleet(document: &str, units: usize, ticks: u64) -> Arc<Intake> {
             duration: Span::from_ms(5),
             readings: std::iter::repeat_n(1.0, calibration.accel_count()).collect(),
         };
-        let accel = encode(&AccelBatch::from_core(calibration.accel_output(), &[accel]).unwrap()).unwrap();
+        let accel = encode(&AccelBatch { output: calibration.accel_output(), ticks: vec![accel] }).unwrap();
         let gyro = gyro_frame(calibration.gyro_output(), sequence, calibration.gyro_count());
         for serial in &serials {
             for (stream, frame) in [("temp", &temperatures), ("accel", &accel), ("gyro", &gyro)] {

@@ -25,8 +25,8 @@ fn frames(sequence: u64) -> [(RawStream, Vec<u8>); 2] {
     let accel = AccelTick { sequence, end_time, duration, readings: readings.clone() };
     let gyro = GyroTick { sequence, end_time, duration, readings, ..GyroTick::default() };
     [
-        (RawStream::Accel, encode(&AccelBatch::from_core(OutputKind::Counts, &[accel]).unwrap()).unwrap()),
-        (RawStream::Gyro, encode(&GyroBatch::from_core(OutputKind::Counts, &[gyro]).unwrap()).unwrap()),
+        (RawStream::Accel, encode(&AccelBatch { output: OutputKind::Counts, ticks: vec![accel] }).unwrap()),
+        (RawStream::Gyro, encode(&GyroBatch { output: OutputKind::Counts, ticks: vec![gyro] }).unwrap()),
     ]
 }
 

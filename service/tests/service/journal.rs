@@ -14,7 +14,7 @@ use isotherm_protocol::control::{CommandReply, SwapOutcome, SwapReply};
 use isotherm_protocol::corrected::CorrectedBatch;
 use isotherm_protocol::journal::{Joiner, JournalEntry, JournalEvent, JournalPart};
 use isotherm_protocol::key::{self, Input, RawStream, UnitId};
-use isotherm_protocol::raw::{AccelBatch, GyroBatch, TemperatureBatch, TemperatureTick};
+use isotherm_protocol::raw::{AccelBatch, GyroBatch, TemperatureBatch};
 use isotherm_protocol::reference::Reference;
 use isotherm_protocol::stream::UnitStream;
 use isotherm_service::{Settings, start};
@@ -112,16 +112,18 @@ fn messages(sequence: u64, last: bool) -> Vec<(Input, Vec<u8>)> {
     let readings: Sensors<f64> = [wobble, 2.0, -wobble, 1.0].into_iter().collect();
     let mut messages = Vec::new();
     if sequence.is_multiple_of(20) {
-        let raw =
-            CHANNELS.iter().map(|(_, raw)| raw * (1.0 + 1e-6 * f64::from(u32::try_from(sequence).unwrap())));
-        let ticks = vec![TemperatureTick { time_ns: end_ns(sequence) - TICK_NS, raw: raw.collect() }];
-        let channels = CHANNELS.iter().map(|(name, _)| ChannelName::from(name).unwrap()).collect();
-        let batch = TemperatureBatch { channels, ticks };
+        let time = Timestamp::from_ns(end_ns(sequence) - TICK_NS);
+        let readings = CHANNELS.iter().map(|(name, raw)| TemperatureReading {
+            channel: ChannelName::from(name).unwrap(),
+            time,
+            raw: raw * (1.0 + 1e-6 * f64::from(u32::try_from(sequence).unwrap())),
+        });
+        let batch = TemperatureBatch { readings: readings.collect() };
         messages.push((Input::Raw(RawStream::Temperature), encode(&batch).unwrap()));
     }
     if !last {
         let accel = AccelTick { sequence, end_time, duration, readings: readings.clone() };
-        let batch = AccelBatch::from_core(OutputKind::Counts, &[accel]).unwrap();
+        let batch = AccelBatch { output: OutputKind::Counts, ticks: vec![accel] };
         messages.push((Input::Raw(RawStream::Accel), encode(&batch).unwrap()));
     }
     let switches = sequence / 50;
@@ -136,7 +138,7 @@ fn messages(sequence: u64, last: bool) -> Vec<(Input, Vec<u8>)> {
         series: 3,
         ..GyroTick::default()
     };
-    let batch = GyroBatch::from_core(OutputKind::Counts, &[gyro]).unwrap();
+    let batch = GyroBatch { output: OutputKind::Counts, ticks: vec![gyro] };
     messages.push((Input::Raw(RawStream::Gyro), encode(&batch).unwrap()));
     messages
 }

@@ -118,8 +118,7 @@ async fn calibrated_units_run_and_others_pass_through() {
             let batch = next(&mut consumer).await;
             let expected = u64::from(*unit == calibrated);
             assert_eq!(batch.revision.counter, expected);
-            let uncalibrated =
-                TickFlags::from_bits_retain(batch.ticks[0].flags).contains(TickFlags::UNCALIBRATED);
+            let uncalibrated = batch.ticks[0].flags.contains(TickFlags::UNCALIBRATED);
             assert_eq!(uncalibrated, *unit == strange);
         }
     }
@@ -144,7 +143,7 @@ async fn rubbish_of_every_kind_leaves_another_units_output_untouched() {
     produce(&mut dirty_producer, 0..1).await;
     presence::wait_for_service(&session, LIMIT).await.unwrap();
 
-    let good = encode(&GyroBatch::from_core(OutputKind::Counts, &[tick(0).1]).unwrap()).unwrap();
+    let good = encode(&GyroBatch { output: OutputKind::Counts, ticks: vec![tick(0).1] }).unwrap();
     let mut version = good.clone();
     version[1] = 99;
     let mut flipped = good.clone();

@@ -1,7 +1,6 @@
 //! I2 over a memory: a stream that is written down at any moment, read back and gone on with gives the same bits as one
 //! that was not.
 
-
 use isotherm_correction::operation::State;
 use isotherm_protocol::stream::{InForce, Label, MemoryError, UnitStream};
 use isotherm_tests::dice::Dice;
@@ -18,16 +17,8 @@ struct Given {
 }
 
 /// Takes the steps; writes the stream down and reads it back before each step that `cut` says.
-fn run(scenario: &Scenario, cut: impl FnMut(usize, &UnitStream) -> bool) -> Given {
-    run_stream(scenario, scenario.stream(), cut)
-}
-
-/// Likewise with a stream that has been begun.
-fn run_stream(
-    scenario: &Scenario,
-    mut stream: UnitStream,
-    mut cut: impl FnMut(usize, &UnitStream) -> bool,
-) -> Given {
+fn run(scenario: &Scenario, mut cut: impl FnMut(usize, &UnitStream) -> bool) -> Given {
+    let mut stream = scenario.stream();
     let (mut frames, mut in_force) = (Vec::new(), Vec::new());
     for (index, step) in scenario.steps.iter().enumerate() {
         if cut(index, &stream) {

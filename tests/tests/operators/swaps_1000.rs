@@ -348,7 +348,7 @@ fn offline(scenario: &Scenario, revisions: &[Compiled]) -> Vec<CorrectedTick> {
         unit.handle(Event::Accel { output: accel_output, ticks: &[accel] }, &mut emit);
         unit.handle(Event::Gyro { output, ticks: &[step.gyro] }, &mut emit);
     }
-    unit.handle(Event::Flush, &mut |tick| ticks.push(tick.clone()));
+    unit.handle(Event::Flush, &mut |tick: &CorrectedTick| ticks.push(tick.clone()));
     assert!(revisions.next().is_none(), "every revision was put in force");
     ticks
 }
@@ -378,7 +378,7 @@ fn judge(number: u64, batches: &[CorrectedBatch], revisions: &[Written], state: 
         }
         let (of_batch, rest) = expected.split_at(batch.ticks.len());
         assert!(of_batch.iter().all(|tick| tick.revision == batch.revision.counter));
-        let offline = CorrectedBatch { ticks: of_batch.iter().map(Into::into).collect(), ..batch.clone() };
+        let offline = CorrectedBatch { ticks: of_batch.to_vec(), ..batch.clone() };
         if encode(&offline).unwrap() != encode(batch).unwrap() {
             let differ = offline.ticks.iter().zip(&batch.ticks).find(|(offline, online)| offline != online);
             panic!("{unit}, {:?}: offline and online differ: {differ:#?}", batch.revision);

@@ -3,6 +3,7 @@
 
 use isotherm_bus::{Producer, ProducerOptions, close, open, presence};
 use isotherm_correction::sample::OutputKind;
+use isotherm_correction::units::{Span, Timestamp};
 use isotherm_protocol::codec::encode;
 use isotherm_protocol::corrected::CorrectedTick;
 use isotherm_protocol::key::UnitId;
@@ -18,14 +19,14 @@ const VICTIM: &str = "VICTIM";
 
 /// A gyro batch of one tick, changed, and the accelerometer batch that belongs to it.
 fn tick(k: u64, change: impl Fn(&mut GyroBatch)) -> Vec<(&'static str, Vec<u8>)> {
-    let mut batch = GyroBatch::from_core(OutputKind::Mean, &[gyro(k, &[0.1, 0.2, 0.3])]).unwrap();
+    let mut batch = GyroBatch { output: OutputKind::Mean, ticks: vec![gyro(k, &[0.1, 0.2, 0.3])] };
     change(&mut batch);
-    let accels = AccelBatch::from_core(OutputKind::Mean, &[accel(k, &[0.0, 0.0, 9.8])]).unwrap();
+    let accels = AccelBatch { output: OutputKind::Mean, ticks: vec![accel(k, &[0.0, 0.0, 9.8])] };
     vec![("imu/VICTIM/raw/accel", encode(&accels).unwrap()), ("imu/VICTIM/raw/gyro", encode(&batch).unwrap())]
 }
 
 fn mean(batch: &mut GyroBatch, readings: &[f64]) {
-    batch.ticks[0].readings = isotherm_protocol::raw::Readings::Means(readings.iter().copied().collect());
+    batch.ticks[0].readings = readings.iter().copied().collect();
 }
 
 /// Everything that I7 lists, and then some.
@@ -53,13 +54,16 @@ fn broken() -> Vec<(&'static str, Vec<u8>)> {
     broken.extend(tick(12, |b| mean(b, &[0.0; 8])));
     broken.extend(tick(13, |b| mean(b, &[0.0])));
     broken.extend(tick(14, |b| {
-        b.ticks[0].readings = isotherm_protocol::raw::Readings::Counts([1, 2, 3].into_iter().collect());
+        mean(b, &[1.0, 2.0, 3.0]);
+        b.output = OutputKind::Counts;
     }));
-    broken.extend(tick(15, |b| b.ticks[0].duration_ns = 0));
-    broken.extend(tick(16, |b| b.ticks[0].duration_ns = u64::MAX));
-    broken.extend(tick(17, |b| b.ticks[0].end_time_ns -= 3_000_000_000));
-    broken.extend(tick(18, |b| b.ticks[0].end_time_ns = i64::MAX));
-    broken.extend(tick(19, |b| b.first_sequence = u64::MAX));
+    broken.extend(tick(15, |b| b.ticks[0].duration = Span::ZERO));
+    broken.extend(tick(16, |b| b.ticks[0].duration = Span::from_ns(i64::MAX)));
+    broken.extend(tick(17, |b| {
+        b.ticks[0].end_time = Timestamp::from_ns(b.ticks[0].end_time.as_ns() - 3_000_000_000);
+    }));
+    broken.extend(tick(18, |b| b.ticks[0].end_time = Timestamp::from_ns(i64::MAX)));
+    broken.extend(tick(19, |b| b.ticks[0].sequence = u64::MAX));
     broken.extend(good(1_000_030));
     broken
 }
@@ -145,7 +149,7 @@ async fn i7_the_unit_itself_goes_on() {
     }
     let ticks = bench.receive(VICTIM, 200).await;
     assert!(ticks.iter().zip(0..).all(|(tick, k)| tick.sequence == k), "each tick once, in order");
-    assert!(ticks[30..].iter().all(|tick| (tick.delta_angle_rad[0] - 0.1 * 0.005).abs() < 1e-15));
+    assert!(ticks[30..].iter().all(|tick| (tick.delta_angle[0] - 0.1 * 0.005).abs() < 1e-15));
     close(session, LIMIT).await.unwrap();
     let (totals, _) = bench.stop().await;
     let unit = totals.unit(&UnitId::new(VICTIM).unwrap());

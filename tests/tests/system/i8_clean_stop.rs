@@ -22,8 +22,7 @@ async fn i8_what_waits_inside_is_published_on_stop() {
     let ticks: Vec<_> = ticks.into_iter().map(|(_, tick)| tick).collect();
     assert_eq!(ticks.len(), 100, "{totals:?}");
     assert!(ticks.iter().zip(0..).all(|(tick, k)| tick.sequence == k), "each once, in order");
-    let missing = TickFlags::ACCELEROMETER_MISSING.bits();
-    assert!(ticks.iter().all(|tick| tick.flags & missing != 0));
+    assert!(ticks.iter().all(|tick| tick.flags.contains(TickFlags::ACCELEROMETER_MISSING)));
     assert_eq!(totals.unit(&unit).ticks_out, 100);
     close(session, LIMIT).await.unwrap();
 }

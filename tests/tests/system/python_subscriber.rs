@@ -56,11 +56,11 @@ impl Account {
         self.revision = json!({ "counter": batch.revision.counter, "digest": digest });
         for tick in &batch.ticks {
             self.outputs += 1;
-            self.flags_seen |= tick.flags;
+            self.flags_seen |= tick.flags.bits();
             self.sha256.update(tick.sequence.to_le_bytes());
-            self.sha256.update(tick.end_time_ns.to_le_bytes());
-            self.sha256.update(tick.flags.to_le_bytes());
-            let increments = tick.delta_angle_rad.iter().chain(&tick.delta_velocity_m_per_s);
+            self.sha256.update(tick.end_time.as_ns().to_le_bytes());
+            self.sha256.update(tick.flags.bits().to_le_bytes());
+            let increments = tick.delta_angle.iter().chain(&tick.delta_velocity);
             for (sum, increment) in self.sums.iter_mut().zip(increments) {
                 *sum += increment;
                 self.sha256.update(increment.to_le_bytes());

@@ -72,7 +72,7 @@ async fn real_laser_gyro_log_from_the_data_folder_keeps_every_tick_and_its_mean_
     );
     // Mean over the first 1800 s of 10 ms ticks (°/h), from the log's README.
     for (axis, expected) in [-12.265, 0.474, 8.354].into_iter().enumerate() {
-        let angle: f64 = ticks[..180_000].iter().map(|tick| tick.delta_angle_rad[axis]).sum();
+        let angle: f64 = ticks[..180_000].iter().map(|tick| tick.delta_angle[axis]).sum();
         let rate = angle / 1800.0 / RAD_PER_S_IN_DEG_PER_H;
         println!("axis {axis}: {rate:.5} °/h, expected {expected}");
         assert!((rate - expected).abs() < 0.001, "axis {axis}: {rate} °/h, expected {expected}");
@@ -86,10 +86,10 @@ async fn real_chamber_log_from_the_data_folder_reaches_the_cubic_residuals() {
     let ticks = play("CHAMBER-MEMS", "config/mappings/chamber-mems.toml", log.to_str().unwrap(), 8400).await;
     // The first row is an outlier; its figures are left out of the published ones.
     let ticks = &ticks[1..];
-    assert!(ticks.iter().all(|tick| tick.flags & TickFlags::ACCELEROMETER_MISSING.bits() == 0));
-    let seconds = |tick: &CorrectedTick| tick.to_core(0).duration.as_s();
-    let gyro_y = ticks.iter().map(|tick| tick.delta_angle_rad[1] / seconds(tick) / RAD_PER_DEG);
-    let accel_z = ticks.iter().map(|tick| tick.delta_velocity_m_per_s[2] / seconds(tick));
+    assert!(ticks.iter().all(|tick| !tick.flags.contains(TickFlags::ACCELEROMETER_MISSING)));
+    let seconds = |tick: &CorrectedTick| tick.duration.as_s();
+    let gyro_y = ticks.iter().map(|tick| tick.delta_angle[1] / seconds(tick) / RAD_PER_DEG);
+    let accel_z = ticks.iter().map(|tick| tick.delta_velocity[2] / seconds(tick));
     for (name, (_, got), expected) in [
         ("gyro.y (°/s)", mean_and_deviation(gyro_y), 9.5e-4),
         ("acc.z (m/s²)", mean_and_deviation(accel_z), 0.044),

@@ -156,8 +156,8 @@ impl Sequencer {
             frames.iter().filter(|frame| frame.received_ns.saturating_add(NEAR_NS) >= mark.received_ns);
         let gyro = near.filter_map(|frame| {
             let batch: GyroBatch = codec::decode(&frame.bytes).ok()?;
-            let last = batch.first_sequence.saturating_add(batch.ticks.len() as u64);
-            ((batch.first_sequence..last).contains(&sequence)).then_some(frame.order)
+            let numbers = batch.ticks.first()?.sequence..batch.ticks.last()?.sequence.saturating_add(1);
+            numbers.contains(&sequence).then_some(frame.order)
         });
         let first = gyro.min()?;
         // What was recorded right before it came to the service with it: the frames of a tick belong together.

@@ -1,14 +1,15 @@
 //! A service and a recorder beside it, and what a replica makes of what was recorded.
 
 use isotherm_correction::operation::Command;
-use isotherm_correction::sample::ChannelName;
+use isotherm_correction::sample::{
+    AccelTick, ChannelName, GyroTick, OutputKind, Sensors, TemperatureReading,
+};
+use isotherm_correction::units::{Span, Timestamp};
 use isotherm_protocol::codec::encode;
 use isotherm_protocol::digest::Digest;
 use isotherm_protocol::journal::{JournalEvent, split};
 use isotherm_protocol::key::RawStream;
-use isotherm_protocol::raw::{
-    AccelBatch, AccelTick, GyroBatch, GyroTick, Readings, TemperatureBatch, TemperatureTick,
-};
+use isotherm_protocol::raw::{AccelBatch, GyroBatch, TemperatureBatch};
 
 use super::super::*;
 use crate::diff::{Account, Comparison, DiffOptions, LogTick, Side, ticks_of};
@@ -138,36 +139,28 @@ impl Session {
     pub(super) fn ticks(&mut self, count: u64) {
         for _ in 0..count {
             let sequence = self.sequence;
-            let end_time_ns = i64::try_from((sequence + 1) * TICK_NS).unwrap();
-            let wobble = |scale: f64| {
+            let end_time = Timestamp::from_ns(i64::try_from((sequence + 1) * TICK_NS).unwrap());
+            let (output, duration) = (OutputKind::Mean, Span::from_ns(TICK_NS.cast_signed()));
+            let wobble = |scale: f64| -> Sensors<f64> {
                 (0..3)
-                    .map(move |axis| scale * f64::from(u32::try_from((sequence * 7919 + axis) % 97).unwrap()))
+                    .map(|axis| scale * f64::from(u32::try_from((sequence * 7919 + axis) % 97).unwrap()))
+                    .collect()
             };
             if sequence.is_multiple_of(50) {
                 let names = ["gyro0", "gyro1", "gyro2", "accel0", "accel1", "accel2", "board", "housing"];
-                let channels = names.map(|name| ChannelName::from(name).unwrap()).into_iter().collect();
-                let raw = (0..8)
-                    .map(|n| 30.0 + 0.001 * f64::from(u32::try_from(sequence).unwrap()) + f64::from(n))
-                    .collect();
-                let ticks = vec![TemperatureTick { time_ns: end_time_ns, raw }];
-                self.frame(RawStream::Temperature, &encode(&TemperatureBatch { channels, ticks }).unwrap());
+                let reading = |(name, n): (&str, u32)| TemperatureReading {
+                    channel: ChannelName::from(name).unwrap(),
+                    time: end_time,
+                    raw: 30.0 + 0.001 * f64::from(u32::try_from(sequence).unwrap()) + f64::from(n),
+                };
+                let batch = TemperatureBatch { readings: names.into_iter().zip(0..).map(reading).collect() };
+                self.frame(RawStream::Temperature, &encode(&batch).unwrap());
             }
-            let readings = Readings::Means(wobble(0.01).collect());
-            let tick = AccelTick { end_time_ns, duration_ns: TICK_NS, readings };
-            self.frame(
-                RawStream::Accel,
-                &encode(&AccelBatch { first_sequence: sequence, ticks: vec![tick] }).unwrap(),
-            );
-            let tick = GyroTick {
-                end_time_ns,
-                duration_ns: TICK_NS,
-                readings: Readings::Means(wobble(1e-4).collect()),
-                mode: None,
-                switch_command: false,
-                meander: None,
-                half_periods: [].into_iter().collect(),
-            };
-            let batch = GyroBatch { first_sequence: sequence, series: 1, ticks: vec![tick] };
+            let tick = AccelTick { sequence, end_time, duration, readings: wobble(0.01) };
+            self.frame(RawStream::Accel, &encode(&AccelBatch { output, ticks: vec![tick] }).unwrap());
+            let readings = wobble(1e-4);
+            let tick = GyroTick { sequence, end_time, duration, readings, series: 1, ..GyroTick::default() };
+            let batch = GyroBatch { output, ticks: vec![tick] };
             self.frame(RawStream::Gyro, &encode(&batch).unwrap());
             self.sequence += 1;
             self.now_ns += TICK_NS / self.speed;

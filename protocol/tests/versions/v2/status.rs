@@ -1,6 +1,6 @@
 //! Version 2 of the status, and version 1 as it is read today.
 
-use isotherm_protocol::raw::Mode;
+use isotherm_correction::sample::LasingMode as Mode;
 use isotherm_protocol::status::{
     ActiveCalibration, AppliedCorrection, ChannelStatus, ConstantsChange, DriftStatus, InputRates, LastTick,
     PendingChange, Place, PreLaunchGyro, PreLaunchMode, PreLaunchOutcome, PreLaunchProgress,

@@ -1,11 +1,11 @@
 //! Units as operators may meet them, for tests.
 
+use isotherm_correction::sample::LasingMode as Mode;
 use isotherm_correction::sample::SensorFlags;
 use isotherm_correction::units::{AngularRate, STANDARD_GRAVITY_M_PER_S2};
 use isotherm_protocol::control::Schedule;
 use isotherm_protocol::corrected::Revision;
 use isotherm_protocol::digest::Digest;
-use isotherm_protocol::raw::Mode;
 use isotherm_protocol::service_status::{
     BadDocument, FolderState, FolderStatus, ServiceStatus, StoreStatus, UnitSummary,
 };

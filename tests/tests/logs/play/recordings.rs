@@ -30,7 +30,7 @@ fn gyro(series: u64, first: u64, count: u64, clock_ns: i64) -> Vec<u8> {
             ..GyroTick::default()
         })
         .collect();
-    codec::encode(&GyroBatch::from_core(OutputKind::Counts, &ticks).unwrap()).unwrap()
+    codec::encode(&GyroBatch { output: OutputKind::Counts, ticks }).unwrap()
 }
 
 fn accel(sequence: u64, clock_ns: i64) -> Vec<u8> {
@@ -40,7 +40,7 @@ fn accel(sequence: u64, clock_ns: i64) -> Vec<u8> {
         duration: Span::from_ms(10),
         readings: [0.0, 0.0, 9.81].into_iter().collect(),
     };
-    codec::encode(&AccelBatch::from_core(OutputKind::Mean, &[tick]).unwrap()).unwrap()
+    codec::encode(&AccelBatch { output: OutputKind::Mean, ticks: vec![tick] }).unwrap()
 }
 
 /// Two units, batches of 1 to 7 ticks every 10 ms of reception; the producer of A restarts in the middle, with another
@@ -99,7 +99,7 @@ fn without_series(heard: &[(String, Vec<u8>)]) -> (Vec<usize>, Vec<(String, Vec<
         let mut frame = frame.clone();
         if let Some((unit, GYRO)) = parse_input(key) {
             let mut batch: GyroBatch = codec::decode(&frame).unwrap();
-            let series = (unit.to_owned(), std::mem::take(&mut batch.series));
+            let series = (unit.to_owned(), std::mem::take(&mut batch.ticks[0].series));
             let place = known.iter().position(|other| *other == series).unwrap_or(known.len());
             if place == known.len() {
                 known.push(series);
@@ -131,7 +131,7 @@ async fn a_recording_is_played_as_it_was_received() {
     assert_eq!(summary["units"][1]["ticks_sent"], 100);
     let series = |heard: &[(String, Vec<u8>)]| {
         let batches = heard.iter().filter(|(key, _)| key.ends_with("gyro"));
-        batches.map(|(_, frame)| codec::decode::<GyroBatch>(frame).unwrap().series).max().unwrap()
+        batches.map(|(_, frame)| codec::decode::<GyroBatch>(frame).unwrap().ticks[0].series).max().unwrap()
     };
 
     // Twice over, one unit under another name: the second pass is of series that none had before.
@@ -165,7 +165,7 @@ async fn a_part_of_a_recording_keeps_its_time_by_either_clock() {
         assert!(begun.elapsed().as_secs_f64() > 0.48, "{:?}", begun.elapsed());
         assert_eq!(heard.len(), 25);
         let first: GyroBatch = codec::decode(&heard[0].1).unwrap();
-        assert_eq!(first.first_sequence, 520);
+        assert_eq!(first.ticks[0].sequence, 520);
         let log_s = summary["log_s"].as_f64().unwrap();
         assert!((log_s - 0.24).abs() < 1e-6, "{summary}");
         assert_eq!(summary["lateness"]["messages"], 24);

@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
+use isotherm_correction::sample::LasingMode as Mode;
 use isotherm_correction::units::AngularRate;
-use isotherm_protocol::raw::Mode;
 use isotherm_protocol::status::{
     ConstantsChange, PreLaunchGyro, PreLaunchMode, PreLaunchVerdict, SelfTestItem, Status,
 };

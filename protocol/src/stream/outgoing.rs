@@ -1,0 +1,196 @@
+//! Corrected ticks on their way out: each is written once, into the frame that it leaves in.
+
+use std::collections::VecDeque;
+
+use isotherm_correction::sample::CorrectedTick;
+use serde::{Deserialize, Serialize};
+
+use crate::codec::{MAX_FRAME, MAX_TICKS, WINDOW, begin, seal};
+use crate::corrected::{AppliedTemperature, CorrectedBatch, MAX_TICK, Revision, append_head, append_tick};
+use crate::raw::MAX_CHANNELS;
+
+/// Corrected ticks that have not been taken yet.
+#[derive(Debug, Default, Clone, Serialize, Deserialize)]
+#[serde(into = "Waiting", from = "Waiting")]
+pub struct Outgoing {
+    /// Frames that nothing can be added to; mostly none.
+    full: VecDeque<Frame>,
+    open: Frame,
+    /// Lengths of the last frame and of what stood before its ticks, in bytes: the next one is likely to be as long.
+    length: usize,
+    head: usize,
+    /// Ticks are kept as they are, and written when a frame is asked for.
+    as_ticks: bool,
+    ticks: Vec<CorrectedTick>,
+}
+
+/// What a memory has of them: each tick and its revision.
+type Waiting = Vec<(CorrectedTick, u64)>;
+
+// Full frames are never too long for their reader: the parts of a head have fewer bytes than a tick.
+const _: () = assert!((MAX_TICKS + MAX_CHANNELS + 4) * MAX_TICK < MAX_FRAME);
+
+/// A frame whose ticks are written and whose head is not.
+#[derive(Debug, Default, Clone)]
+struct Frame {
+    /// Room for the head, then the ticks.
+    bytes: Vec<u8>,
+    /// Length of that room in bytes.
+    room: usize,
+    count: usize,
+    last: Last,
+}
+
+/// The last of some ticks.
+#[derive(Debug, Default, Clone, Copy)]
+pub(super) struct Last {
+    pub(super) end_time_ns: i64,
+    pub(super) sequence: u64,
+    pub(super) revision: u64,
+}
+
+impl Outgoing {
+    /// How many ticks there are.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.frames().map(|frame| frame.count).sum::<usize>() + self.ticks.len()
+    }
+
+    /// Whether there is none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.open.count == 0 && self.full.is_empty() && self.ticks.is_empty()
+    }
+
+    /// The ticks that are kept as they are: all there are in a stream that [keeps them](super::UnitStream::keeping_ticks).
+    #[must_use]
+    pub fn ticks(&self) -> &[CorrectedTick] {
+        &self.ticks
+    }
+
+    /// Has ticks kept as they are.
+    pub(super) fn keep_ticks(&mut self) {
+        self.as_ticks = true;
+    }
+
+    /// One tick more.
+    #[inline]
+    pub(super) fn push(&mut self, tick: &CorrectedTick) {
+        if self.as_ticks {
+            self.ticks.push(tick.clone());
+        } else {
+            self.write(tick);
+        }
+    }
+
+    fn write(&mut self, tick: &CorrectedTick) {
+        let Frame { count, last, .. } = &self.open;
+        if *count == MAX_TICKS || (*count > 0 && last.revision != tick.revision) {
+            self.full.push_back(std::mem::take(&mut self.open));
+        }
+        if self.open.count == 0 {
+            // One allocation for a frame like the last, and what writing wants behind its end.
+            self.open.bytes.clear();
+            self.open.bytes.reserve(self.length + self.length / 8 + self.head + WINDOW);
+            self.open.bytes.resize(self.head, 0);
+            self.open.room = self.head;
+        }
+        append_tick(&mut self.open.bytes, tick);
+        self.open.count += 1;
+        self.open.last = Last::of(tick);
+    }
+
+    /// Makes the next frame, all of one revision, in the place of `into`, whose capacity is kept for the one after it; its
+    /// last tick.
+    pub(super) fn next_frame(
+        &mut self,
+        into: &mut Vec<u8>,
+        unit: &str,
+        revision: impl FnOnce(u64) -> Revision,
+        temperatures: &[AppliedTemperature],
+    ) -> Option<Last> {
+        let mut ticks = std::mem::take(&mut self.ticks);
+        ticks.drain(..).for_each(|tick| self.write(&tick));
+        self.ticks = ticks;
+        let mut frame = self.full.pop_front().unwrap_or_else(|| std::mem::take(&mut self.open));
+        if frame.count == 0 {
+            self.open = frame;
+            return None;
+        }
+        let end = frame.bytes.len();
+        begin::<CorrectedBatch>(&mut frame.bytes);
+        append_head(&mut frame.bytes, unit, revision(frame.last.revision), temperatures, frame.count);
+        self.head = frame.bytes.len() - end;
+        if self.head == frame.room {
+            frame.bytes.copy_within(end.., 0);
+            frame.bytes.truncate(end);
+        } else {
+            frame.bytes.drain(..frame.room);
+            frame.bytes.rotate_right(self.head);
+        }
+        seal(&mut frame.bytes);
+        self.length = frame.bytes.len();
+        std::mem::swap(into, &mut frame.bytes);
+        if self.open.count == 0 {
+            self.open.bytes = frame.bytes;
+        }
+        Some(frame.last)
+    }
+
+    /// Takes all ticks as they are.
+    pub(super) fn take(&mut self) -> (Vec<CorrectedTick>, Option<Last>) {
+        let mut ticks: Vec<_> = self.frames().flat_map(Frame::ticks).collect();
+        ticks.append(&mut self.ticks);
+        let last = ticks.last().map(Last::of);
+        self.clear();
+        (ticks, last)
+    }
+
+    /// Gives all ticks up; the last of them.
+    pub(super) fn clear(&mut self) -> Option<Last> {
+        let last = self.ticks.last().map(Last::of);
+        let last =
+            last.or_else(|| self.frames().filter(|frame| frame.count > 0).last().map(|frame| frame.last));
+        self.full.clear();
+        self.open.count = 0;
+        self.ticks.clear();
+        last
+    }
+
+    fn frames(&self) -> impl Iterator<Item = &Frame> {
+        self.full.iter().chain(std::iter::once(&self.open))
+    }
+}
+
+impl Frame {
+    /// The ticks, read back.
+    fn ticks(&self) -> impl Iterator<Item = CorrectedTick> {
+        let mut rest = self.bytes.get(self.room..).unwrap_or_default();
+        (0..self.count).map_while(move |_| {
+            let (tick, behind) = postcard::take_from_bytes::<CorrectedTick>(rest).ok()?;
+            rest = behind;
+            Some(CorrectedTick { revision: self.last.revision, ..tick })
+        })
+    }
+}
+
+impl Last {
+    fn of(tick: &CorrectedTick) -> Self {
+        Self { end_time_ns: tick.end_time.as_ns(), sequence: tick.sequence, revision: tick.revision }
+    }
+}
+
+impl From<Outgoing> for Waiting {
+    fn from(outgoing: Outgoing) -> Self {
+        let ticks = outgoing.frames().flat_map(Frame::ticks).chain(outgoing.ticks.iter().cloned());
+        ticks.map(|tick| (CorrectedTick { revision: 0, ..tick.clone() }, tick.revision)).collect()
+    }
+}
+
+impl From<Waiting> for Outgoing {
+    fn from(waiting: Waiting) -> Self {
+        let mut outgoing = Self::default();
+        waiting.into_iter().for_each(|(tick, revision)| outgoing.push(&CorrectedTick { revision, ..tick }));
+        outgoing
+    }
+}
