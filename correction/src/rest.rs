@@ -29,7 +29,7 @@ use core::fmt;
 
 use serde::{Deserialize, Serialize};
 
-pub use limits::{RestLimits, RestLimitsError};
+pub use limits::RestLimits;
 use track::{Finding, Scale, Track};
 use window::Window;
 

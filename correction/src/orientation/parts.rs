@@ -120,6 +120,20 @@ pub enum OrientationError {
     ParityConfirm,
 }
 
+impl OrientationError {
+    /// Field of the parts that it speaks of; of a number in a list, what the number is.
+    pub(crate) fn field(&self) -> &'static str {
+        match self {
+            Self::ListCount { name, .. } | Self::NotFinite { name, .. } => name,
+            Self::WeightNotPositive { .. } | Self::WeightRatio { .. } => "weights",
+            Self::EmptyRange { .. } => "range_deg_c",
+            Self::ParityLimit { .. } => "parity_limit",
+            Self::ParityConfirm => "parity_confirm_ticks",
+            Self::RowCount { .. } | Self::RowNorm { .. } | Self::Condition { .. } => "rows",
+        }
+    }
+}
+
 impl OrientationParts {
     /// Checks the lengths of the lists.
     pub(super) fn check_counts(&self, errors: &mut Vec<OrientationError>) {
