@@ -47,6 +47,7 @@ pub mod observation;
 pub mod operation;
 pub mod orientation;
 pub mod prelaunch;
+mod recent;
 pub mod rest;
 pub mod reversal;
 pub mod sample;

@@ -167,9 +167,7 @@ impl Timestamp {
         };
         ns as f64 * 1e-9
     }
-}
 
-impl Timestamp {
     /// Whether it is less than 2⁶² ns (146 years) from the clock's epoch, so that no difference of two such times saturates.
     pub(crate) const fn is_near(self) -> bool {
         const FAR: i64 = 1 << 62;
@@ -181,6 +179,16 @@ impl Timestamp {
     #[expect(clippy::cast_precision_loss, reason = "as in `seconds_from`")]
     pub(crate) const fn seconds_from_near(self, other: Self) -> f64 {
         self.0.wrapping_sub(other.0) as f64 * 1e-9
+    }
+
+    /// Number of the cell that it lies in, where time since the epoch is divided into cells of this length.
+    pub(crate) const fn cell(self, length: Span) -> i64 {
+        self.0.div_euclid(length.0)
+    }
+
+    /// Start of the cell of this number.
+    pub(crate) const fn of_cell(number: i64, length: Span) -> Self {
+        Self(number.saturating_mul(length.0))
     }
 }
 

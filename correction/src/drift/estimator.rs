@@ -6,9 +6,9 @@ use serde::{Deserialize, Serialize};
 
 use super::DriftModel;
 use super::filter::{Measured, Verdict};
-use super::gyro::{DriftEstimate, GyroDrift, grid_cell};
+use super::gyro::{DriftEstimate, GRID, GyroDrift};
 use super::reference::{Reference, ReferenceCounters, ReferenceRefusal, Waiting};
-use super::ring::{Covered, NoMean, cell_end};
+use super::ring::{Covered, cell_end};
 use crate::observation::Observation;
 use crate::sample::{SensorFlags, Sensors};
 use crate::units::{Span, Timestamp};
@@ -73,8 +73,10 @@ impl DriftEstimator {
 
     /// Goes on where `before` is, after a swap of the calibration, for each gyro whose drift parameters are the same and
     /// for which `same_bias` says that the other biases are too; what is left of a bias that changed is another drift.
-    pub fn carry(&mut self, before: Self, same_bias: impl Fn(usize) -> bool) {
-        for (index, (new, old)) in self.gyros.iter_mut().zip(before.gyros).enumerate() {
+    pub fn carry(&mut self, mut before: Self, same_bias: impl Fn(usize) -> bool) {
+        let old = core::mem::take(&mut before.gyros);
+        let mut gyros = core::mem::take(&mut self.gyros);
+        for (index, (new, old)) in gyros.iter_mut().zip(old).enumerate() {
             if let (Some(new), Some(old)) = (new, old)
                 && new.filter.model() == old.filter.model()
                 && same_bias(index)
@@ -82,13 +84,7 @@ impl DriftEstimator {
                 *new = old;
             }
         }
-        self.waiting = before.waiting;
-        self.counters = before.counters;
-        self.last_refusal = before.last_refusal;
-        self.now = before.now;
-        self.grid = before.grid;
-        self.observed_until = before.observed_until;
-        self.used_until = before.used_until;
+        *self = Self { gyros, settings: self.settings, ..before };
     }
 
     /// Takes a reference from an aiding source.
@@ -97,7 +93,7 @@ impl DriftEstimator {
     ///
     /// What is wrong with it by itself, or that too many wait. What shows only when it takes effect is counted then.
     pub fn submit(&mut self, reference: &Reference) -> Result<(), ReferenceRefusal> {
-        self.wait(reference)?;
+        self.submit_at_rest(reference)?;
         if self.now.is_some_and(|now| self.effective(reference) < now) {
             self.counters.late += 1;
         }
@@ -110,10 +106,6 @@ impl DriftEstimator {
     ///
     /// As [`submit`](Self::submit).
     pub fn submit_at_rest(&mut self, reference: &Reference) -> Result<(), ReferenceRefusal> {
-        self.wait(reference)
-    }
-
-    fn wait(&mut self, reference: &Reference) -> Result<(), ReferenceRefusal> {
         self.counters.received += 1;
         let idle = if self.is_idle() { Err(ReferenceRefusal::NoDrift) } else { Ok(()) };
         if let Err(refusal) = idle.and_then(|()| reference.check()) {
@@ -159,7 +151,7 @@ impl DriftEstimator {
 
     /// Goes on where there are gyros to follow.
     fn go_on(&mut self, end_time: Timestamp, restart: bool, project: &dyn Fn([f64; 3]) -> Sensors<f64>) {
-        let grid = grid_cell(end_time);
+        let grid = end_time.cell(GRID);
         if restart {
             self.restart(end_time, grid);
         } else if grid != self.grid || self.now.is_none() {
@@ -195,7 +187,7 @@ impl DriftEstimator {
             let mean = match gyro.ring.mean(reference) {
                 Ok(mean) => mean,
                 Err(no_mean) => {
-                    gap |= no_mean == NoMean::Gap;
+                    gap |= no_mean == ReferenceRefusal::Gap;
                     continue;
                 }
             };

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::DriftModel;
-use super::filter::{Filter, Predicted};
+use super::filter::Filter;
 use super::ring::Ring;
 use crate::thermal::Ramp;
 use crate::units::{Span, Timestamp};
@@ -11,8 +11,8 @@ use crate::units::{Span, Timestamp};
 /// What an update changes is subtracted bit by bit over this time, so that the corrected rate has no step.
 pub const SUBTRACTION_RAMP: Span = Span::from_ms(10_000);
 
-/// Distance of the grid on which the prediction is evaluated.
-const GRID: Span = Span::from_ms(1_000);
+/// Length of the cells at whose ends the prediction is evaluated.
+pub(super) const GRID: Span = Span::from_ms(1_000);
 
 /// The drift of one gyro as it is known at the last tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -70,12 +70,13 @@ impl GyroDrift {
 
     /// Draws the line over the grid cell of this number.
     pub(super) fn draw(&mut self, grid: i64) {
-        let from = self.filter.rate_at(grid_point(grid));
-        self.line = Line { from, step: self.filter.rate_at(grid_point(grid.saturating_add(1))) - from };
+        let from = self.filter.rate_at(Timestamp::of_cell(grid, GRID));
+        self.line =
+            Line { from, step: self.filter.rate_at(Timestamp::of_cell(grid.saturating_add(1), GRID)) - from };
     }
 
     fn predicted(&self, grid: i64, time: Timestamp) -> f64 {
-        self.line.from + self.line.step * (time.seconds_from(grid_point(grid)) / GRID.as_s())
+        self.line.from + self.line.step * (time.seconds_from(Timestamp::of_cell(grid, GRID)) / GRID.as_s())
     }
 
     pub(super) fn subtrahend(&self, grid: i64, time: Timestamp) -> f64 {
@@ -92,29 +93,6 @@ impl GyroDrift {
 
     /// The drift at `time`, that of the last tick.
     pub(super) fn estimate(&self, grid: i64, time: Timestamp) -> DriftEstimate {
-        let Predicted { sigma, trend, trend_sigma } = self.filter.predict(time);
-        let [updates, refused, believed] = self.filter.counts();
-        DriftEstimate {
-            rate: self.predicted(grid, time),
-            sigma,
-            trend,
-            trend_sigma,
-            updates,
-            refused,
-            believed,
-            last_update: self.filter.last_update(),
-            normalised_innovation: self.filter.last_innovation(),
-            mean_nis: self.filter.mean_nis(),
-        }
+        DriftEstimate { rate: self.predicted(grid, time), ..self.filter.estimate(time) }
     }
-}
-
-/// Number of the grid cell that holds a time.
-pub(super) const fn grid_cell(time: Timestamp) -> i64 {
-    time.as_ns().div_euclid(GRID.as_ns())
-}
-
-/// Time of a grid point.
-const fn grid_point(number: i64) -> Timestamp {
-    Timestamp::from_ns(number.saturating_mul(GRID.as_ns()))
 }

@@ -193,18 +193,13 @@ impl Waiting {
 
     /// Puts a reference in its place; gives back the one furthest in the future where that is one too many.
     pub(super) fn push(&mut self, reference: &Reference) -> Option<Reference> {
-        let mut over = None;
         let references = self.references.room();
-        if references.is_full() {
-            let last = references.last().copied()?;
-            if reference.order(&last).is_ge() {
-                return Some(*reference);
-            }
-            over = references.pop();
+        let place = references.partition_point(|waiting| reference.order(waiting).is_ge());
+        if references.is_full() && place == references.len() {
+            return Some(*reference);
         }
-        let place = references.iter().position(|r| reference.order(r).is_lt());
-        let place = place.unwrap_or(references.len());
-        // There is room: one was taken out above.
+        let over = if references.is_full() { references.pop() } else { None };
+        // There is room: one was taken out.
         references.try_insert(place, *reference).ok();
         over
     }
