@@ -36,6 +36,7 @@
 
 extern crate alloc;
 
+mod by_mode;
 pub mod calibration;
 pub mod channel;
 pub mod curve;
@@ -56,4 +57,5 @@ pub mod stated;
 pub mod thermal;
 pub mod unit;
 pub mod units;
+mod vector;
 mod written;
