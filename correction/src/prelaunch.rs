@@ -44,7 +44,7 @@ use crate::earth::Place;
 use crate::observation::{GyroSeen, Observation};
 use crate::orientation::Orientation;
 use crate::rest::{Rest, RestMonitor};
-use crate::sample::{LasingMode, OutputKind, SensorFlags, Sensors, TickFlags};
+use crate::sample::{LasingMode, SensorFlags, Sensors, TickFlags};
 use crate::units::{Span, Timestamp};
 use crate::vector::TimeMean;
 
@@ -78,20 +78,12 @@ impl PreLaunch {
         let Some(place) = settings.place.filter(|_| errors.is_empty()) else {
             return Err(errors);
         };
-        let count_rad = |weight: f64| match calibration.gyro_output() {
-            OutputKind::Counts => weight.abs(),
-            OutputKind::Mean => 0.0,
-        };
         Ok(Self {
             settings: *settings,
             place,
             orientation: calibration.gyro_orientation.clone(),
             rest: RestMonitor::new(&settings.limits.rest, calibration),
-            gyros: calibration
-                .gyros
-                .iter()
-                .map(|gyro| GyroRun::new(count_rad(gyro.increment_weight)))
-                .collect(),
+            gyros: calibration.count_rad().map(GyroRun::new).collect(),
             missed: 0,
             span: None,
             force: TimeMean::default(),

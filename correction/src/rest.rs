@@ -136,12 +136,7 @@ impl RestMonitor {
     /// A monitor of a unit with this calibration, from which it takes what a count is worth.
     #[must_use]
     pub fn new(limits: &RestLimits, calibration: &Calibration) -> Self {
-        let angle_rad = match calibration.gyro_output() {
-            OutputKind::Counts => {
-                calibration.gyros.iter().map(|g| g.increment_weight.abs()).fold(0.0, f64::max)
-            }
-            OutputKind::Mean => 0.0,
-        };
+        let angle_rad = calibration.count_rad().fold(0.0, f64::max);
         let velocity_m_per_s = match calibration.accel_output() {
             OutputKind::Counts => {
                 let assumed_deg_c = calibration.filter.assumed_deg_c;

@@ -34,17 +34,6 @@ struct Refusals {
     variance: f64,
 }
 
-/// What became of a measurement.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Verdict {
-    /// It was used.
-    Taken,
-    /// Its innovation was beyond the gate.
-    Refused,
-    /// As [`Taken`](Self::Taken), after refusals that agree with it.
-    Believed,
-}
-
 /// The measured mean drift over a span.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Measured {
@@ -155,8 +144,9 @@ impl Filter {
         (transition * self.state, propagated(&transition, &self.covariance, &noise))
     }
 
-    /// Takes the mean drift over a span that starts no earlier than the last one ended.
-    pub(super) fn update(&mut self, measured: &Measured) -> Verdict {
+    /// Takes the mean drift over a span that starts no earlier than the last one ended; whether it is within the gate, or
+    /// believed after refusals that agree with it.
+    pub(super) fn update(&mut self, measured: &Measured) -> bool {
         let parts = *self.model.parts();
         let span_s = measured.end.since(measured.start).as_s();
         let since_s = self.time.map_or(0.0, |t| measured.start.since(t).as_s());
@@ -168,15 +158,13 @@ impl Filter {
             Posterior::new(&state, covariance, span_s, &parts, measured.mean, variance)
         };
         let mut after = posterior(&covariance);
-        let mut verdict = Verdict::Taken;
         if !after.plausible() {
             if !self.believes(&after) {
                 self.refused += 1;
-                return Verdict::Refused;
+                return false;
             }
             // The step is taken to be one of the constant part, of the size that it shows.
             self.believed += 1;
-            verdict = Verdict::Believed;
             covariance.m11 += after.innovation * after.innovation;
             after = posterior(&covariance);
         }
@@ -186,7 +174,7 @@ impl Filter {
         self.last_innovation = Some(normalised);
         self.innovations.push(normalised * normalised);
         self.updates += 1;
-        verdict
+        true
     }
 
     /// Whether this implausible measurement ends a row of refusals that agree with each other.

@@ -180,7 +180,7 @@ impl Reference {
 /// References that wait for the first tick which is to feel them, the earliest first.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Waiting {
-    references: Later<Reference, MAX_WAITING_REFERENCES>,
+    pub(super) references: Later<Reference, MAX_WAITING_REFERENCES>,
 }
 
 impl Waiting {
@@ -207,10 +207,6 @@ impl Waiting {
     /// The next reference that `due` holds for.
     pub(super) fn pop_if(&mut self, due: impl Fn(&Reference) -> bool) -> Option<Reference> {
         if self.references.first().is_some_and(due) { self.references.room().pop_at(0) } else { None }
-    }
-
-    pub(super) fn len(&self) -> usize {
-        self.references.len()
     }
 
     /// Drops references from another time, after a step of the producer's clock; how many.

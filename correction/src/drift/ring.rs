@@ -20,7 +20,7 @@ use crate::units::{Span, Timestamp};
 /// Length of a cell.
 pub const CELL: Span = Span::from_ms(250);
 /// Cells kept: 128 s.
-pub const RING_CELLS: usize = 512;
+pub const RING_CELLS: u16 = 512;
 /// Largest share of a span that may be bridged: white noise then adds at most a tenth to the variance over a minute.
 pub const LARGEST_UNOBSERVED_SHARE: f64 = 0.02;
 
@@ -76,7 +76,7 @@ pub(super) struct Ring {
 
 impl Ring {
     pub(super) fn new() -> Self {
-        Self { cells: alloc::vec![Cell::default(); RING_CELLS], newest: None }
+        Self { cells: alloc::vec![Cell::default(); RING_CELLS.into()], newest: None }
     }
 
     pub(super) fn clear(&mut self) {
@@ -91,7 +91,7 @@ impl Ring {
             return;
         }
         let before = self.newest.unwrap_or(i64::MIN);
-        let oldest_new = before.saturating_add(1).max(number.saturating_sub(cells_kept() - 1));
+        let oldest_new = before.saturating_add(1).max(number.saturating_sub(i64::from(RING_CELLS) - 1));
         for new in oldest_new..=number {
             if let Some(cell) = self.cells.get_mut(slot(new)) {
                 *cell = Cell::default();
@@ -163,18 +163,13 @@ impl Ring {
     }
 
     fn oldest(&self) -> i64 {
-        self.newest.map_or(i64::MAX, |newest| newest.saturating_sub(cells_kept() - 1))
+        self.newest.map_or(i64::MAX, |newest| newest.saturating_sub(i64::from(RING_CELLS) - 1))
     }
 }
 
 /// End of the cell in which a span ends.
 pub(super) fn cell_end(end: Timestamp) -> Timestamp {
     Timestamp::of_cell(last_number(end).saturating_add(1), CELL)
-}
-
-#[expect(clippy::cast_possible_wrap, reason = "a small constant")]
-const fn cells_kept() -> i64 {
-    RING_CELLS as i64
 }
 
 /// Number of the cell in which a span ends.
@@ -184,7 +179,7 @@ const fn last_number(end: Timestamp) -> i64 {
 
 /// Place of a cell in the ring.
 fn slot(number: i64) -> usize {
-    usize::try_from(number.rem_euclid(cells_kept())).unwrap_or(0)
+    usize::try_from(number.rem_euclid(i64::from(RING_CELLS))).unwrap_or(0)
 }
 
 /// How much of a cell lies between two times.

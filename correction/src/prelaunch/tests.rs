@@ -5,6 +5,7 @@ use alloc::vec::Vec;
 
 use super::*;
 use crate::rest::fixture::{FORCE_M_PER_S2, RATE_RAD_PER_S, Still, calibration};
+use crate::sample::OutputKind;
 use crate::units::AngularRate;
 
 fn deg_per_h(value: f64) -> f64 {

@@ -173,8 +173,8 @@ impl Track {
 
     /// Deviation of the last minute from the minutes before, times a minute; looked at whenever a block is complete.
     pub(super) fn drift_since_before(&self, scale: &Scale, floor: f64) -> Option<Finding> {
-        let (before, minute) = self.blocks.split_at_checked(self.blocks.len().checked_sub(MINUTE)?)?;
-        if self.block.1 > 0 || before.len() < MINUTE {
+        let (before, minute) = self.last_minute()?;
+        if before.len() < MINUTE {
             return None;
         }
         let change = minus(Usual::of(minute).mean, Usual::of(before).mean);
@@ -183,11 +183,14 @@ impl Track {
 
     /// Deviation of the last minute's mean from that of the first; looked at whenever a block is complete.
     pub(super) fn drift_since_start(&self, scale: &Scale, floor: f64) -> Option<Finding> {
-        let minute = self.blocks.get(self.blocks.len().checked_sub(MINUTE)?..)?;
-        if self.block.1 > 0 {
-            return None;
-        }
+        let (_, minute) = self.last_minute()?;
         self.drift(scale, minus(Usual::of(minute).mean, self.first_minute?), floor, 1.0)
+    }
+
+    /// The blocks before the last minute, and those in it; `None` while a block is open.
+    fn last_minute(&self) -> Option<(&[[f64; 3]], &[[f64; 3]])> {
+        let before = self.blocks.len().checked_sub(MINUTE).filter(|_| self.block.1 == 0)?;
+        self.blocks.split_at_checked(before)
     }
 
     /// Judges the change of a minute's mean, which stands `times` that mean's unit of measure.
