@@ -97,6 +97,12 @@ impl Calibration {
         self.accel_output
     }
 
+    /// What one count of each gyro is worth (rad); zero where the readings are no counts.
+    pub(crate) fn count_rad(&self) -> impl Iterator<Item = f64> {
+        let counts = self.gyro_output == OutputKind::Counts;
+        self.gyros.iter().map(move |gyro| if counts { gyro.increment_weight.abs() } else { 0.0 })
+    }
+
     /// Whether another set filters the same channels in the same way, so that thermal memory means the same in both.
     pub(crate) fn same_thermal_basis(&self, other: &Self) -> bool {
         self.filter == other.filter && self.channels == other.channels

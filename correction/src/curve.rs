@@ -107,26 +107,19 @@ pub struct Evaluated {
     pub clamped: bool,
 }
 
-/// One stretch of a table or spline: `Σ c_k·(x − from)^k` up to the next stretch's start.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-struct Piece {
-    from: f64,
-    coefficients: [f64; 4],
-}
-
-/// Compiled form.
+/// One stretch of a curve: `Σ c_k·(x − origin)^k` up to the next one's origin.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-enum Form {
-    /// Reference and coefficients in ascending order.
-    Polynomial(f64, ArrayVec<f64, MAX_COEFFICIENTS>),
-    /// One piece per knot: the last one holds the last knot's value, so that it is met exactly.
-    Pieces(Vec<Piece>),
+struct Piece {
+    origin: f64,
+    coefficients: ArrayVec<f64, MAX_COEFFICIENTS>,
 }
 
 /// A validated curve, ready to evaluate without allocation.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Curve {
-    form: Form,
+    /// A polynomial is one piece, about its reference. A table or spline has one per knot: the last one holds the last
+    /// knot's value, so that it is met exactly.
+    pieces: Vec<Piece>,
     range: [f64; 2],
 }
 
@@ -149,9 +142,8 @@ impl Curve {
     /// The same value everywhere; only a NaN argument counts as clamped.
     #[must_use]
     pub fn constant(value: f64) -> Self {
-        let mut coefficients = ArrayVec::new();
-        coefficients.push(value);
-        Self { form: Form::Polynomial(0.0, coefficients), range: [f64::NEG_INFINITY, f64::INFINITY] }
+        let piece = Piece { origin: 0.0, coefficients: [value].into_iter().collect() };
+        Self { pieces: [piece].into(), range: [f64::NEG_INFINITY, f64::INFINITY] }
     }
 
     /// Evaluates at `x`, clamped to the fitted range.
@@ -161,19 +153,11 @@ impl Curve {
     pub fn at(&self, x: f64) -> Evaluated {
         let [first, last] = self.range;
         let clamped = !(x >= first && x <= last);
-        let value = match &self.form {
-            Form::Polynomial(reference, coefficients) => {
-                let x = if x.is_nan() { *reference } else { x };
-                nested(coefficients, x.max(first).min(last) - reference)
-            }
-            Form::Pieces(pieces) => {
-                // `max` returns the other operand for a NaN: the first knot.
-                let x = x.max(first).min(last);
-                let after = pieces.partition_point(|piece| piece.from <= x);
-                let piece = pieces.get(after.saturating_sub(1));
-                piece.map_or(0.0, |piece| nested(&piece.coefficients, x - piece.from))
-            }
-        };
+        let stated = if x.is_nan() { self.pieces.first().map_or(x, |piece| piece.origin) } else { x };
+        let x = stated.max(first).min(last);
+        let after = self.pieces.partition_point(|piece| piece.origin <= x);
+        let piece = self.pieces.get(after.saturating_sub(1));
+        let value = piece.map_or(0.0, |piece| nested(&piece.coefficients, x - piece.origin));
         Evaluated { value, clamped }
     }
 
@@ -197,9 +181,10 @@ fn is_bounded(coefficients: &[f64], x: f64) -> bool {
     bound.is_finite()
 }
 
-/// Checks one number.
-fn finite(name: &'static str, index: usize, got: f64) -> Result<(), CurveError> {
-    if got.is_finite() { Ok(()) } else { Err(CurveError::NotFinite { name, index, got }) }
+/// Checks numbers of one kind, the first of which has this index.
+fn finite(name: &'static str, first: usize, numbers: &[f64]) -> Result<(), CurveError> {
+    let broken = numbers.iter().enumerate().find(|(_, got)| !got.is_finite());
+    broken.map_or(Ok(()), |(index, got)| Err(CurveError::NotFinite { name, index: first + index, got: *got }))
 }
 
 /// Compiles a polynomial.
@@ -208,48 +193,39 @@ fn polynomial(reference: f64, stated: &[f64], range: [f64; 2]) -> Result<Curve, 
     if stated.is_empty() || coefficients.try_extend_from_slice(stated).is_err() {
         return Err(CurveError::CoefficientCount { got: stated.len(), max: MAX_COEFFICIENTS });
     }
-    finite("reference", 0, reference)?;
-    for (index, got) in stated.iter().enumerate() {
-        finite("coefficient", index, *got)?;
-    }
-    for (index, got) in range.iter().enumerate() {
-        finite("range limit", index, *got)?;
-    }
+    finite("reference", 0, &[reference])?;
+    finite("coefficient", 0, stated)?;
+    finite("range limit", 0, &range)?;
     let [first, last] = range;
     if first >= last {
         return Err(CurveError::EmptyRange { first, last });
     }
-    for end in range {
-        if !is_bounded(stated, end - reference) {
-            return Err(CurveError::Overflow { near: end });
-        }
+    if let Some(near) = range.into_iter().find(|end| !is_bounded(stated, end - reference)) {
+        return Err(CurveError::Overflow { near });
     }
-    Ok(Curve { form: Form::Polynomial(reference, coefficients), range })
+    Ok(Curve { pieces: [Piece { origin: reference, coefficients }].into(), range })
 }
 
 /// Compiles a table or spline; `second` gives the second derivatives at the knots, empty for straight lines.
 fn pieces(knots: &[[f64; 2]], second: fn(&[[f64; 2]]) -> Vec<f64>) -> Result<Curve, CurveError> {
-    let ([first, ..], [.., last]) = (knots, knots) else {
-        return Err(CurveError::KnotCount { got: 0, min: MIN_KNOTS, max: MAX_KNOTS });
-    };
-    if knots.len() < MIN_KNOTS || knots.len() > MAX_KNOTS {
+    let ([first, ..], [.., last], MIN_KNOTS..=MAX_KNOTS) = (knots, knots, knots.len()) else {
         return Err(CurveError::KnotCount { got: knots.len(), min: MIN_KNOTS, max: MAX_KNOTS });
-    }
+    };
     for (index, [x, y]) in knots.iter().enumerate() {
-        finite("argument of knot", index, *x)?;
-        finite("value of knot", index, *y)?;
+        finite("argument of knot", index, &[*x])?;
+        finite("value of knot", index, &[*y])?;
     }
-    for (index, (a, b)) in knots.iter().zip(knots.iter().skip(1)).enumerate() {
-        if b[0] <= a[0] {
-            let (previous, got) = (a[0], b[0]);
-            return Err(CurveError::KnotsNotIncreasing { index: index + 1, previous, got });
+    let stretches = || knots.iter().zip(knots.iter().skip(1)).enumerate();
+    for (index, ([previous, _], [got, _])) in stretches() {
+        if got <= previous {
+            return Err(CurveError::KnotsNotIncreasing { index: index + 1, previous: *previous, got: *got });
         }
     }
 
     let second = second(knots);
     let second_at = |index: usize| second.get(index).copied().unwrap_or(0.0);
     let mut pieces = Vec::with_capacity(knots.len());
-    for (index, (a, b)) in knots.iter().zip(knots.iter().skip(1)).enumerate() {
+    for (index, (a, b)) in stretches() {
         let width = b[0] - a[0];
         let (m, n) = (second_at(index), second_at(index + 1));
         let slope = (b[1] - a[1]) / width - width * (2.0 * m + n) / 6.0;
@@ -257,10 +233,10 @@ fn pieces(knots: &[[f64; 2]], second: fn(&[[f64; 2]]) -> Vec<f64>) -> Result<Cur
         if !is_bounded(&coefficients, width) {
             return Err(CurveError::Overflow { near: a[0] });
         }
-        pieces.push(Piece { from: a[0], coefficients });
+        pieces.push(Piece { origin: a[0], coefficients: coefficients.into_iter().collect() });
     }
-    pieces.push(Piece { from: last[0], coefficients: [last[1], 0.0, 0.0, 0.0] });
-    Ok(Curve { form: Form::Pieces(pieces), range: [first[0], last[0]] })
+    pieces.push(Piece { origin: last[0], coefficients: [last[1], 0.0, 0.0, 0.0].into_iter().collect() });
+    Ok(Curve { pieces, range: [first[0], last[0]] })
 }
 
 /// Second derivatives of the natural cubic spline at its knots.

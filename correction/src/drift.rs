@@ -43,6 +43,8 @@ pub use reference::{
 pub use rest_feeder::{REST_CONFIRMATION, REST_SPAN, RestFeeder};
 pub use ring::{CELL, LARGEST_UNOBSERVED_SHARE, RING_CELLS};
 
+use crate::stated::{OutOfRange, outside};
+
 /// Smallest and largest sigma of the Markov part (rad/s); zero means that there is none.
 pub const SIGMA_RANGE_RAD_PER_S: [f64; 2] = [0.0, 0.1];
 /// Shortest and longest correlation time (s): drift faster than a reference span is noise, not drift.
@@ -71,24 +73,6 @@ pub struct DriftParts {
     pub angle_random_walk_rad_per_sqrt_s: f64,
 }
 
-/// What is wrong with a stated drift.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum DriftError {
-    /// A number is outside its range, or not a number.
-    #[error("{name} is {got}; from {min} to {max} is allowed")]
-    OutOfRange {
-        /// Field of [`DriftParts`].
-        name: &'static str,
-        /// The number.
-        got: f64,
-        /// Smallest allowed.
-        min: f64,
-        /// Largest allowed.
-        max: f64,
-    },
-}
-
 /// A validated drift of one gyro.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct DriftModel {
@@ -101,8 +85,8 @@ impl DriftModel {
     /// # Errors
     ///
     /// Everything that is wrong with it.
-    pub fn new(parts: &DriftParts) -> Result<Self, Vec<DriftError>> {
-        let stated = [
+    pub fn new(parts: &DriftParts) -> Result<Self, Vec<OutOfRange>> {
+        let outside = outside([
             ("sigma_rad_per_s", parts.sigma_rad_per_s, SIGMA_RANGE_RAD_PER_S),
             ("correlation_time_s", parts.correlation_time_s, CORRELATION_TIME_RANGE_S),
             ("trend_sigma_rad_per_s2", parts.trend_sigma_rad_per_s2, TREND_SIGMA_RANGE_RAD_PER_S2),
@@ -113,10 +97,8 @@ impl DriftModel {
                 parts.angle_random_walk_rad_per_sqrt_s,
                 ANGLE_RANDOM_WALK_RANGE_RAD_PER_SQRT_S,
             ),
-        ];
-        let outside = stated.into_iter().filter(|(_, got, [min, max])| !(min..=max).contains(&got));
-        let errors: Vec<_> =
-            outside.map(|(name, got, [min, max])| DriftError::OutOfRange { name, got, min, max }).collect();
+        ]);
+        let errors: Vec<_> = outside.collect();
         if errors.is_empty() { Ok(Self { parts: *parts }) } else { Err(errors) }
     }
 

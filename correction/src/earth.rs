@@ -96,18 +96,6 @@ impl Place {
         if errors.is_empty() { Ok(place) } else { Err(errors) }
     }
 
-    /// Geodetic latitude (rad, north positive).
-    #[must_use]
-    pub const fn latitude_rad(&self) -> f64 {
-        self.latitude_rad
-    }
-
-    /// Heading of the case's x axis from north towards east (rad).
-    #[must_use]
-    pub const fn heading_rad(&self) -> f64 {
-        self.heading_rad
-    }
-
     /// How the case stands.
     #[must_use]
     pub const fn tilt(&self) -> Tilt {

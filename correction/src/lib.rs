@@ -13,6 +13,7 @@
 //! | module | holds |
 //! |---|---|
 //! | [`units`] | one newtype per quantity, with named constructors |
+//! | [`stated`] | a stated number outside its range |
 //! | [`sample`] | what goes in (raw ticks, temperature readings) and what comes out (corrected ticks, flags) |
 //! | [`calibration`] | the immutable, validated coefficient set |
 //! | [`curve`] | polynomial, piecewise-linear table and cubic spline, clamped to their fitted range |
@@ -36,6 +37,7 @@
 
 extern crate alloc;
 
+mod by_mode;
 pub mod calibration;
 pub mod channel;
 pub mod curve;
@@ -48,11 +50,14 @@ pub mod observation;
 pub mod operation;
 pub mod orientation;
 pub mod prelaunch;
+mod recent;
 pub mod rest;
 pub mod reversal;
 pub mod sample;
 pub mod servo;
+pub mod stated;
 pub mod thermal;
 pub mod unit;
 pub mod units;
+mod vector;
 mod written;

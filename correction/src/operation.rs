@@ -12,10 +12,12 @@
 
 mod self_test;
 
+use alloc::string::ToString;
 use alloc::vec::Vec;
 use core::fmt;
 
 use serde::{Deserialize, Serialize};
+use thiserror::Error;
 
 pub use self_test::{
     CheckItem, CheckResult, HealthReading, SelfTest, SelfTestCounter, SelfTestParts, SelfTestReport,
@@ -132,9 +134,10 @@ impl Command {
 }
 
 /// Why a command was refused; the state is as before.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Error)]
 pub enum Refusal {
     /// The state does not take it.
+    #[error("{command} is not possible in state {state}; possible now: {}", state.allowed().join(", "))]
     State {
         /// The state.
         state: State,
@@ -142,43 +145,20 @@ pub enum Refusal {
         command: &'static str,
     },
     /// It needs a calibration.
+    #[error("{command} needs a calibration, and none is in force: give the unit one first")]
     Uncalibrated {
         /// The command.
         command: &'static str,
     },
     /// The calibration knows no mode reversal.
+    #[error(
+        "the calibration in force has no [mode_reversal]: run without, or swap to a document that has it"
+    )]
     NoReversal,
     /// The calibration has no parameters for the drift estimator.
+    #[error("no gyro of the calibration in force has a [gyro.sensor.drift]: there is no estimator to feed")]
     NoDrift,
     /// Settings of the pre-launch calibration are wrong.
+    #[error("{}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))]
     PreLaunch(Vec<PreLaunchError>),
-}
-
-impl fmt::Display for Refusal {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::State { state, command } => {
-                write!(f, "{command} is not possible in state {state}; possible now: ")?;
-                for (i, name) in state.allowed().iter().enumerate() {
-                    write!(f, "{}{name}", if i == 0 { "" } else { ", " })?;
-                }
-                Ok(())
-            }
-            Self::Uncalibrated { command } => {
-                write!(f, "{command} needs a calibration, and none is in force: give the unit one first")
-            }
-            Self::NoReversal => f.write_str(
-                "the calibration in force has no [mode_reversal]: run without, or swap to a document that has it",
-            ),
-            Self::NoDrift => f.write_str(
-                "no gyro of the calibration in force has a [gyro.sensor.drift]: there is no estimator to feed",
-            ),
-            Self::PreLaunch(errors) => {
-                for (i, error) in errors.iter().enumerate() {
-                    write!(f, "{}{error}", if i == 0 { "" } else { "; " })?;
-                }
-                Ok(())
-            }
-        }
-    }
 }

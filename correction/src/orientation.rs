@@ -287,7 +287,8 @@ impl Inverse {
     #[inline]
     pub(crate) fn lerp_apply<const N: usize>(&self, other: &Self, u: f64, readings: &[f64; N]) -> [f64; 3] {
         let mut sum = [0.0; 4];
-        let mut add = |column: [f64; 4], reading| sum = array::from_fn(|axis| sum[axis] + column[axis] * reading);
+        let mut add =
+            |column: [f64; 4], reading| sum = array::from_fn(|axis| sum[axis] + column[axis] * reading);
         let columns = self.columns.iter().zip(&other.columns).zip(readings);
         if self.leads_to(other, u) {
             columns.for_each(|((from, to), reading)| {

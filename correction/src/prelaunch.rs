@@ -32,19 +32,21 @@ use alloc::vec::Vec;
 
 use serde::{Deserialize, Serialize};
 
-use gyro::GyroRun;
+use gyro::{Gathered, GyroRun};
 pub use outcome::{
-    BiasConstant, ByMode, GyroConstants, GyroProgress, ModeTotals, Outcome, PreLaunchProgress, Refusal,
+    BiasConstant, GyroConstants, GyroProgress, ModeTotals, Outcome, PreLaunchProgress, Refusal,
 };
 pub use settings::{DURATION_RANGE_S, PreLaunchError, PreLaunchLimits, PreLaunchSettings};
 
+pub use crate::by_mode::ByMode;
 use crate::calibration::Calibration;
 use crate::earth::Place;
 use crate::observation::{GyroSeen, Observation};
 use crate::orientation::Orientation;
 use crate::rest::{Rest, RestMonitor};
-use crate::sample::{LasingMode, OutputKind, SensorFlags, Sensors, TickFlags};
+use crate::sample::{LasingMode, SensorFlags, Sensors, TickFlags};
 use crate::units::{Span, Timestamp};
+use crate::vector::TimeMean;
 
 /// A pre-launch calibration that is running, or over.
 ///
@@ -61,8 +63,8 @@ pub struct PreLaunch {
     missed: u64,
     /// Start of the first tick and end of the last one.
     span: Option<(Timestamp, Timestamp)>,
-    /// ∫f dt in case axes (m/s) and its time (s).
-    velocity: ([f64; 3], f64),
+    /// Specific force in case axes (m/s²).
+    force: TimeMean,
     outcome: Option<Outcome>,
 }
 
@@ -76,23 +78,15 @@ impl PreLaunch {
         let Some(place) = settings.place.filter(|_| errors.is_empty()) else {
             return Err(errors);
         };
-        let count_rad = |weight: f64| match calibration.gyro_output() {
-            OutputKind::Counts => weight.abs(),
-            OutputKind::Mean => 0.0,
-        };
         Ok(Self {
             settings: *settings,
             place,
             orientation: calibration.gyro_orientation.clone(),
             rest: RestMonitor::new(&settings.limits.rest, calibration),
-            gyros: calibration
-                .gyros
-                .iter()
-                .map(|gyro| GyroRun::new(count_rad(gyro.increment_weight)))
-                .collect(),
+            gyros: calibration.count_rad().map(GyroRun::new).collect(),
             missed: 0,
             span: None,
-            velocity: ([0.0; 3], 0.0),
+            force: TimeMean::default(),
             outcome: None,
         })
     }
@@ -117,7 +111,9 @@ impl PreLaunch {
             self.refuse(Refusal::Moved(moved));
             return;
         }
-        self.gather_force(observation);
+        if let Some(force) = observation.specific_force {
+            self.force.add(force, observation.duration.as_s());
+        }
         self.gather_rates(observation);
         if self.outcome.is_none() && self.elapsed() >= self.settings.duration {
             // The last second may have been a nudge.
@@ -142,13 +138,9 @@ impl PreLaunch {
     /// How far it is.
     #[must_use]
     pub fn progress(&self) -> PreLaunchProgress {
-        let gyro = |run: &GyroRun| {
-            let modes = run.modes.map(gyro::Gathered::totals);
-            GyroProgress {
-                modes,
-                mean_temperature_deg_c: mean_temperature(&modes),
-                standard_error_rad_per_s: run.sigma_rad_per_s(),
-            }
+        let gyro = |run: &GyroRun| GyroProgress {
+            modes: run.modes.map(Gathered::totals),
+            standard_error_rad_per_s: run.sigma_rad_per_s(),
         };
         PreLaunchProgress {
             elapsed: self.elapsed(),
@@ -157,28 +149,12 @@ impl PreLaunch {
         }
     }
 
-    /// The settings it was made with.
-    #[must_use]
-    pub fn settings(&self) -> &PreLaunchSettings {
-        &self.settings
-    }
-
     fn elapsed(&self) -> Span {
         self.span.map_or(Span::ZERO, |(start, end)| end.since(start))
     }
 
     fn refuse(&mut self, refusal: Refusal) {
         self.outcome = Some(Outcome::Refused(alloc::vec![refusal]));
-    }
-
-    fn gather_force(&mut self, observation: &Observation) {
-        if let Some(force) = observation.specific_force {
-            let duration_s = observation.duration.as_s();
-            for (sum, force) in self.velocity.0.iter_mut().zip(force) {
-                *sum += force * duration_s;
-            }
-            self.velocity.1 += duration_s;
-        }
     }
 
     fn gather_rates(&mut self, observation: &Observation) {
@@ -222,8 +198,7 @@ impl PreLaunch {
             Rest::Learning => refusals.push(Refusal::RestNotSeen),
             Rest::Moved(moved) => refusals.push(Refusal::Moved(moved)),
         }
-        let (sum, time_s) = self.velocity;
-        let mean_force = (time_s > 0.0).then(|| sum.map(|sum| sum / time_s));
+        let mean_force = self.force.mean();
         let earth = self.place.earth_rate_in_case(mean_force);
         if earth.is_none() {
             refusals.push(Refusal::NotLevelled { mean_force_m_per_s2: mean_force });
@@ -251,24 +226,27 @@ impl PreLaunch {
     fn check_coverage(&self, gyro: usize, run: &GyroRun, refusals: &mut Vec<Refusal>) {
         let limits = &self.settings.limits;
         let least_s = limits.time_per_mode.as_s();
-        let needed: &[Option<LasingMode>] =
-            if run.has_modes() { &[Some(LasingMode::Plus), Some(LasingMode::Minus)] } else { &[None] };
+        let ByMode { without, plus, minus } = run.modes.map(|gathered| gathered.ticks);
+        // A tick without a mode says nothing of an instrument that has modes.
+        let (needed, good, stray): (&[Option<LasingMode>], _, _) = if run.has_modes() {
+            (&[Some(LasingMode::Plus), Some(LasingMode::Minus)], plus + minus, without)
+        } else {
+            (&[None], without, 0)
+        };
         for &mode in needed {
-            let time_s = run.modes.get(mode).totals().time_s;
+            let time_s = run.modes.get(mode).time_s;
             if time_s < least_s {
                 refusals.push(Refusal::TooLittleTime { gyro, mode, time_s, limit_s: least_s });
             }
         }
-        // A tick without a mode says nothing of an instrument that has modes.
-        let without_mode = if run.has_modes() { run.modes.without.totals().ticks } else { 0 };
-        let good = real(run.good_ticks() - without_mode);
-        let all = good + real(run.bad_ticks + without_mode) + real(self.missed);
+        let good = real(good);
+        let all = good + real(run.bad_ticks + stray) + real(self.missed);
         let (good_share, limit) = (good / all.max(1.0), limits.good_share);
         if good_share < limit {
             refusals.push(Refusal::TooManyBadTicks { gyro, good_share, limit });
         }
         if run.has_modes() {
-            let [plus, minus] = [&run.modes.plus, &run.modes.minus].map(|mode| real(mode.totals().ticks));
+            let (plus, minus) = (real(plus), real(minus));
             let (imbalance, limit) = ((plus - minus).abs() / (plus + minus), limits.mode_imbalance);
             if imbalance > limit {
                 refusals.push(Refusal::ModesUnbalanced { gyro, imbalance, limit });
@@ -278,11 +256,11 @@ impl PreLaunch {
 
     /// Solves the pair of equations of one gyro; `None` where its noise is not known.
     fn solve(&self, index: usize, run: &GyroRun, earth: [f64; 3]) -> Option<GyroConstants> {
-        let modes = run.modes.map(gyro::Gathered::totals);
+        let modes = run.modes.map(Gathered::totals);
         let input = self.orientation.forward(mean_temperature(&modes)?, earth);
         let earth_rate_rad_per_s = *input.get(index)?;
         let sigma = run.sigma_rad_per_s()?;
-        let excess = |gathered: &gyro::Gathered| Some(gathered.rate_rad_per_s()? - earth_rate_rad_per_s);
+        let excess = |gathered: &Gathered| Some(gathered.rate_rad_per_s()? - earth_rate_rad_per_s);
         let (static_bias, magnetic_bias) = if run.has_modes() {
             let (plus, minus) = (excess(&run.modes.plus)?, excess(&run.modes.minus)?);
             (0.5 * (plus + minus), Some(0.5 * (plus - minus)))
@@ -301,23 +279,10 @@ impl PreLaunch {
 
     fn check_change(&self, gyro: usize, constants: &GyroConstants, refusals: &mut Vec<Refusal>) {
         let limits = &self.settings.limits;
-        let changes = [
-            (
-                BiasConstant::Static,
-                Some(constants.static_bias_change_rad_per_s),
-                limits.static_bias_change_rad_per_s,
-            ),
-            (
-                BiasConstant::Magnetic,
-                constants.magnetic_bias_change_rad_per_s,
-                limits.magnetic_bias_change_rad_per_s,
-            ),
-        ];
-        for (constant, change, limit_rad_per_s) in changes {
+        let mut check = |constant, change: Option<f64>, limit_rad_per_s: f64| {
             // What is no number is beyond any limit.
-            if let Some(change_rad_per_s) = change
-                && (change_rad_per_s.is_nan() || change_rad_per_s.abs() > limit_rad_per_s)
-            {
+            let beyond = change.filter(|change| change.is_nan() || change.abs() > limit_rad_per_s);
+            if let Some(change_rad_per_s) = beyond {
                 refusals.push(Refusal::ChangeBeyondLimit {
                     gyro,
                     constant,
@@ -325,13 +290,17 @@ impl PreLaunch {
                     limit_rad_per_s,
                 });
             }
-        }
+        };
+        let static_bias = Some(constants.static_bias_change_rad_per_s);
+        check(BiasConstant::Static, static_bias, limits.static_bias_change_rad_per_s);
+        let magnetic_bias = constants.magnetic_bias_change_rad_per_s;
+        check(BiasConstant::Magnetic, magnetic_bias, limits.magnetic_bias_change_rad_per_s);
     }
 }
 
 /// Mean over the good time of all modes (°C); `None` without any.
 fn mean_temperature(modes: &ByMode<ModeTotals>) -> Option<f64> {
-    let each = [&modes.without, &modes.plus, &modes.minus];
+    let each = modes.each();
     let time_s: f64 = each.iter().map(|mode| mode.time_s).sum();
     let sum: f64 = each.iter().filter_map(|mode| Some(mode.mean_temperature_deg_c? * mode.time_s)).sum();
     (time_s > 0.0).then(|| sum / time_s)

@@ -29,15 +29,16 @@ use core::fmt;
 
 use serde::{Deserialize, Serialize};
 
-pub use limits::{RestLimits, RestLimitsError};
+pub use limits::RestLimits;
 use track::{Finding, Scale, Track};
 use window::Window;
 
+use crate::by_mode::ByMode;
 use crate::calibration::Calibration;
 use crate::observation::Observation;
 use crate::sample::{LasingMode, OutputKind, TickFlags};
 use crate::thermal::AccelModel;
-use crate::units::{Angle, AngularRate, SpecificForce, Timestamp};
+use crate::units::{Angle, SpecificForce, Timestamp};
 
 /// Kinds of motion, each with the unit of measure of its value and limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -75,29 +76,30 @@ pub struct Moved {
     pub at: Timestamp,
 }
 
+fn degrees(rad: f64) -> f64 {
+    Angle::from_rad(rad).as_deg()
+}
+
+fn milli_g(m_per_s2: f64) -> f64 {
+    SpecificForce::from_m_per_s2(m_per_s2).as_g() * 1e3
+}
+
 impl fmt::Display for Moved {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let axis = ["x", "y", "z"].get(self.axis).copied().unwrap_or("?");
-        let numbers = |value: fn(f64) -> f64| (value(self.value), value(self.limit));
-        let degrees = |rad| Angle::from_rad(rad).as_deg();
-        let milli_g = |force| SpecificForce::from_m_per_s2(force).as_g() * 1e3;
-        let rate = |rate| AngularRate::from_rad_per_s(rate).as_deg_per_s();
-        let (what, (value, limit), unit) = match self.what {
-            Motion::Turn => ("turned by", numbers(degrees), "°"),
-            Motion::SlowTurn => ("turned within a minute by", numbers(degrees), "°"),
-            Motion::Rate => ("turns steadily at", numbers(rate), "°/s"),
-            Motion::Push => ("was pushed by", numbers(milli_g), " mg·s"),
-            Motion::ForceChange => ("was tilted: its force changed by", numbers(milli_g), " mg"),
-            Motion::Shake => ("was shaken by", numbers(milli_g), " mg rms"),
-            Motion::RestlessTurn => ("is too restless: angle in a second within", numbers(degrees), "°"),
+        let (what, converted, unit, about): (_, fn(f64) -> f64, _, _) = match self.what {
+            Motion::Turn => ("turned by", degrees, "°", "about"),
+            Motion::SlowTurn => ("turned within a minute by", degrees, "°", "about"),
+            Motion::Rate => ("turns steadily at", degrees, "°/s", "about"),
+            Motion::Push => ("was pushed by", milli_g, " mg·s", "along"),
+            Motion::ForceChange => ("was tilted: its force changed by", milli_g, " mg", "along"),
+            Motion::Shake => ("was shaken by", milli_g, " mg rms", "along"),
+            Motion::RestlessTurn => ("is too restless: angle in a second within", degrees, "°", "about"),
             Motion::RestlessPush => {
-                ("is too restless: velocity in a second within", numbers(milli_g), " mg·s")
+                ("is too restless: velocity in a second within", milli_g, " mg·s", "along")
             }
         };
-        let about = match self.what {
-            Motion::Push | Motion::ForceChange | Motion::Shake | Motion::RestlessPush => "along",
-            _ => "about",
-        };
+        let [value, limit] = [self.value, self.limit].map(converted);
         write!(f, "the unit {what} {value:.4}{unit} {about} {axis}, at most {limit:.4}{unit} is rest")
     }
 }
@@ -121,8 +123,7 @@ pub struct RestMonitor {
     force_scale: Scale,
     /// What one count of the coarsest accelerometer is worth (m/s).
     force_quantum_m_per_s: f64,
-    /// One per lasing mode, and one for an instrument without.
-    rates: [Track; 3],
+    rates: ByMode<Track>,
     rate: Window,
     rate_mode: Option<LasingMode>,
     forces: Track,
@@ -135,12 +136,7 @@ impl RestMonitor {
     /// A monitor of a unit with this calibration, from which it takes what a count is worth.
     #[must_use]
     pub fn new(limits: &RestLimits, calibration: &Calibration) -> Self {
-        let angle_rad = match calibration.gyro_output() {
-            OutputKind::Counts => {
-                calibration.gyros.iter().map(|g| g.increment_weight.abs()).fold(0.0, f64::max)
-            }
-            OutputKind::Mean => 0.0,
-        };
+        let angle_rad = calibration.count_rad().fold(0.0, f64::max);
         let velocity_m_per_s = match calibration.accel_output() {
             OutputKind::Counts => {
                 let assumed_deg_c = calibration.filter.assumed_deg_c;
@@ -159,11 +155,11 @@ impl RestMonitor {
             ),
             force_quantum_m_per_s: velocity_m_per_s,
             limits: *limits,
-            rates: [Track::new(), Track::new(), Track::new()],
+            rates: ByMode::default(),
             rate: Window::default(),
             rate_mode: None,
-            forces: Track::new(),
-            shakes: Track::new(),
+            forces: Track::default(),
+            shakes: Track::default(),
             force: Window::default(),
             moved: None,
         }
@@ -213,15 +209,14 @@ impl RestMonitor {
 
     /// Whether every kind of window that has been seen has been seen often enough.
     fn has_learned(&self) -> bool {
-        let rates = self.rates.iter().all(|track| track.is_empty() || track.has_learned());
-        let any = self.rates.iter().any(Track::has_learned);
+        let rates = self.rates.each().into_iter().all(|track| track.is_empty() || track.has_learned());
+        let any = self.rates.each().into_iter().any(Track::has_learned);
         rates && any && (self.forces.is_empty() || self.forces.has_learned())
     }
 
     fn start_anew(&mut self) {
-        for track in self.rates.iter_mut().chain([&mut self.forces, &mut self.shakes]) {
-            track.clear();
-        }
+        self.rates = ByMode::default();
+        (self.forces, self.shakes) = (Track::default(), Track::default());
         (self.rate, self.force) = (Window::default(), Window::default());
     }
 
@@ -235,7 +230,7 @@ impl RestMonitor {
         if observation.mode != self.rate_mode {
             seen = self.close_rate(false);
             self.rate_mode = observation.mode;
-            self.rate_track().cut();
+            self.rates.get_mut(self.rate_mode).cut();
         }
         self.rate.add(observation.angular_rate, observation.duration);
         self.rate.switched |= !observation.settled;
@@ -245,39 +240,21 @@ impl RestMonitor {
         seen
     }
 
-    /// The windows of the present mode.
-    fn rate_track(&mut self) -> &mut Track {
-        let [without, plus, minus] = &mut self.rates;
-        match self.rate_mode {
-            None => without,
-            Some(LasingMode::Plus) => plus,
-            Some(LasingMode::Minus) => minus,
-        }
-    }
-
     /// Judges the open window of rates. One that was cut short, or with a switch in it, is no reference for others.
     fn close_rate(&mut self, full: bool) -> Option<(Motion, Finding)> {
         let window = core::mem::take(&mut self.rate);
-        let (mean, duration_s) = (window.mean()?, window.duration_s());
-        let RestLimits { slow_turn_rad, rate_rad_per_s, .. } = self.limits;
+        let (mean, duration_s) = (window.over_time.mean()?, window.over_time.time_s);
+        let RestLimits { slow_turn_rad, rate_rad_per_s, switch_turn_rad, .. } = self.limits;
         let scale = self.rate_scale;
+        let track = self.rates.get_mut(self.rate_mode);
         if window.switched || !full {
-            let scale = if window.switched { scale.at_least(self.limits.switch_turn_rad) } else { scale };
-            let finding = self.rate_track().take_aside(&scale, mean, duration_s)?;
-            return Some((Motion::Turn, finding));
+            let scale = if window.switched { scale.at_least(switch_turn_rad) } else { scale };
+            return track.take_aside(&scale, mean, duration_s).map(of(Motion::Turn));
         }
-        let track = self.rate_track();
-        if let Some(finding) = track.take(&scale, mean, duration_s) {
-            return Some((Motion::Turn, finding));
-        }
-        if let Some(finding) = track.restless(&scale) {
-            return Some((Motion::RestlessTurn, finding));
-        }
-        if let Some(finding) = track.large(rate_rad_per_s) {
-            return Some((Motion::Rate, finding));
-        }
-        let slow = track.drift_since_before(&scale, slow_turn_rad);
-        slow.map(|finding| (Motion::SlowTurn, finding))
+        let turn = track.take(&scale, mean, duration_s).map(of(Motion::Turn));
+        turn.or_else(|| track.restless(&scale).map(of(Motion::RestlessTurn)))
+            .or_else(|| track.large(rate_rad_per_s).map(of(Motion::Rate)))
+            .or_else(|| track.drift_since_before(&scale, slow_turn_rad).map(of(Motion::SlowTurn)))
     }
 
     fn observe_force(&mut self, observation: &Observation) -> Option<(Motion, Finding)> {
@@ -289,27 +266,29 @@ impl RestMonitor {
     /// Judges the open window of forces.
     fn close_force(&mut self, full: bool) -> Option<(Motion, Finding)> {
         let window = core::mem::take(&mut self.force);
-        let (mean, duration_s) = (window.mean()?, window.duration_s());
-        let scale = &self.force_scale;
+        let (mean, duration_s) = (window.over_time.mean()?, window.over_time.time_s);
+        let (scale, track) = (&self.force_scale, &mut self.forces);
         if !full {
-            let finding = self.forces.take_aside(scale, mean, duration_s)?;
-            return Some((Motion::Push, finding));
+            return track.take_aside(scale, mean, duration_s).map(of(Motion::Push));
         }
-        if let Some(finding) = self.forces.take(scale, mean, duration_s) {
-            return Some((Motion::Push, finding));
-        }
-        if let Some(finding) = self.forces.restless(scale) {
-            return Some((Motion::RestlessPush, finding));
-        }
-        if let Some(finding) = self.forces.drift_since_start(scale, self.limits.force_change_m_per_s2) {
-            return Some((Motion::ForceChange, finding));
+        let push = track.take(scale, mean, duration_s).map(of(Motion::Push));
+        let seen = push.or_else(|| track.restless(scale).map(of(Motion::RestlessPush))).or_else(|| {
+            track.drift_since_start(scale, self.limits.force_change_m_per_s2).map(of(Motion::ForceChange))
+        });
+        if seen.is_some() {
+            return seen;
         }
         let scatter = window.scatter()?;
         // One count more or less in a tick is no vibration.
         let count = self.force_quantum_m_per_s / window.tick_s();
         let scale = Scale::one_sided(self.limits.shake_m_per_s2, self.limits.sigmas, count);
-        self.shakes.take(&scale, scatter, 1.0).map(|finding| (Motion::Shake, finding))
+        self.shakes.take(&scale, scatter, 1.0).map(of(Motion::Shake))
     }
+}
+
+/// Says what kind of motion a finding is.
+fn of(what: Motion) -> impl FnOnce(Finding) -> (Motion, Finding) {
+    move |finding| (what, finding)
 }
 
 #[cfg(test)]

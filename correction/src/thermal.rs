@@ -11,7 +11,7 @@ mod ramp;
 
 pub use accel::AccelModel;
 pub(crate) use bank::Bank;
-pub(crate) use gyro::{TermError, Trends};
 pub use gyro::{GyroModel, GyroTerms, TrendModel};
+pub(crate) use gyro::{TermError, Trends};
 pub use lag::MAX_LAGS;
 pub(crate) use ramp::Ramp;

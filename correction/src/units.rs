@@ -69,14 +69,6 @@ quantity! {
         from_g / as_g = STANDARD_GRAVITY_M_PER_S2;
     }
 }
-quantity! {
-    /// Temperature on the Celsius scale.
-    Temperature {
-        /// Degrees Celsius.
-        from_deg_c / as_deg_c = 1.0;
-    }
-}
-
 /// A span of event time in nanoseconds, never negative.
 ///
 /// Range: 0…2⁶³−1 ns (292 years); construction from seconds saturates.
@@ -118,12 +110,8 @@ impl Span {
 
     /// In seconds.
     #[must_use]
-    #[expect(
-        clippy::cast_precision_loss,
-        reason = "spans handled as seconds are far below 2⁵³ ns (104 days)"
-    )]
     pub const fn as_s(self) -> f64 {
-        self.0 as f64 * 1e-9
+        seconds(self.0)
     }
 }
 
@@ -155,18 +143,29 @@ impl Timestamp {
 
     /// Signed time from `other` to `self` (s).
     #[must_use]
-    #[expect(
-        clippy::cast_precision_loss,
-        reason = "differences handled as seconds are far below 2⁵³ ns (104 days)"
-    )]
     pub const fn seconds_from(self, other: Self) -> f64 {
         // What `saturating_sub` gives, with a branch that is never taken in place of what it always computes.
-        let ns = match self.0.checked_sub(other.0) {
-            Some(ns) => ns,
-            None => ends_apart(self.0),
-        };
-        ns as f64 * 1e-9
+        match self.0.checked_sub(other.0) {
+            Some(ns) => seconds(ns),
+            None => seconds(ends_apart(self.0)),
+        }
     }
+
+    /// Number of the cell that it lies in, where time since the epoch is divided into cells of this length.
+    pub(crate) const fn cell(self, length: Span) -> i64 {
+        self.0.div_euclid(length.0)
+    }
+
+    /// Start of the cell of this number.
+    pub(crate) const fn of_cell(number: i64, length: Span) -> Self {
+        Self(number.saturating_mul(length.0))
+    }
+}
+
+/// Nanoseconds as seconds.
+#[expect(clippy::cast_precision_loss, reason = "what is handled as seconds is far below 2⁵³ ns (104 days)")]
+const fn seconds(ns: i64) -> f64 {
+    ns as f64 * 1e-9
 }
 
 /// The saturated difference of two times that are too far apart, the first of which is `from`.

@@ -3,10 +3,10 @@
 use thiserror::Error;
 
 use crate::curve::CurveError;
-use crate::drift::DriftError;
 use crate::orientation::OrientationError;
 use crate::reversal::ReversalError;
 use crate::servo::ServoError;
+use crate::stated;
 
 /// Part of the calibration in which a defect lies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -116,17 +116,17 @@ pub enum DefectKind {
     },
     /// A curve is wrong.
     #[error(transparent)]
-    Curve(CurveError),
+    Curve(#[from] CurveError),
     /// The orientation is wrong.
     #[error(transparent)]
-    Orientation(OrientationError),
+    Orientation(#[from] OrientationError),
     /// The substitution is wrong.
     #[error(transparent)]
-    Reversal(ReversalError),
+    Reversal(#[from] ReversalError),
     /// The servo transient is wrong.
     #[error(transparent)]
-    Servo(ServoError),
+    Servo(#[from] ServoError),
     /// The drift is wrong.
     #[error(transparent)]
-    Drift(DriftError),
+    Drift(#[from] stated::OutOfRange),
 }

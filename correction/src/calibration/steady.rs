@@ -139,20 +139,18 @@ impl Steady {
             EARTH_RATE.as_rad_per_s(),
         );
         let accel_ratios = self.accel_scale.iter().zip(&next.accel_scale).map(|(old, new)| old / new);
-        let specific_force = next.accel_inverse.as_ref().map(|inverse| {
-            step(
+        let specific_force = match &next.accel_inverse {
+            Some(inverse) => step(
                 (&self.accel_axes, &self.accel_bias),
                 (inverse, &next.accel_bias),
                 &accel_ratios.collect::<Sensors<f64>>(),
                 STANDARD_GRAVITY_M_PER_S2,
-            )
-        });
-        if specific_force.is_none() && !next.accel_bias.is_empty() {
-            return None;
-        }
-        let jump = Jump { angular_rate, specific_force: specific_force.unwrap_or_default() };
-        let finite = |vector: [f64; 3]| vector.iter().all(|x| x.is_finite());
-        (finite(jump.angular_rate) && finite(jump.specific_force)).then_some(jump)
+            ),
+            None if next.accel_bias.is_empty() => [0.0; 3],
+            None => return None,
+        };
+        let finite = angular_rate.iter().chain(&specific_force).all(|x| x.is_finite());
+        finite.then_some(Jump { angular_rate, specific_force })
     }
 }
 
@@ -167,20 +165,15 @@ fn step(
     size: f64,
 ) -> [f64; 3] {
     let biases = ratios.iter().zip(bias).zip(next_bias).map(|((ratio, old), new)| ratio * old - new);
-    let fixed = inverse.apply(&biases.collect::<Sensors<f64>>());
-    let column = |axis: usize| {
-        let along = ratios.iter().zip(axes).map(|(ratio, row)| ratio * row.get(axis).copied().unwrap_or(0.0));
+    let mut step = inverse.apply(&biases.collect::<Sensors<f64>>());
+    let columns = [0, 1, 2].map(|axis| {
+        let along = ratios.iter().zip(axes).map(|(ratio, row)| ratio * row[axis]);
         inverse.apply(&along.collect::<Sensors<f64>>())
-    };
-    let columns = [column(0), column(1), column(2)];
-    let mut step = fixed;
+    });
     for (i, step) in step.iter_mut().enumerate() {
-        let mut square = 0.0;
-        for (j, column) in columns.iter().enumerate() {
-            let unit = if i == j { 1.0 } else { 0.0 };
-            let turned = column.get(i).copied().unwrap_or(unit) - unit;
-            square += turned * turned;
-        }
+        let unit = |j| if i == j { 1.0 } else { 0.0 };
+        let turned = columns.iter().enumerate().map(|(j, column)| column[i] - unit(j));
+        let square: f64 = turned.map(|turned| turned * turned).sum();
         *step += libm::copysign(libm::sqrt(square) * size, *step);
     }
     step

@@ -5,10 +5,9 @@ use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 
 use super::DriftModel;
-use super::filter::{Measured, Verdict};
-use super::gyro::{DriftEstimate, GyroDrift, grid_cell};
+use super::gyro::{DriftEstimate, GRID, GyroDrift};
 use super::reference::{Reference, ReferenceCounters, ReferenceRefusal, Waiting};
-use super::ring::{Covered, NoMean, cell_end};
+use super::ring::{Covered, cell_end};
 use crate::observation::Observation;
 use crate::sample::{SensorFlags, Sensors};
 use crate::units::{Span, Timestamp};
@@ -34,7 +33,6 @@ pub struct DriftEstimator {
     settings: DriftSettings,
     waiting: Waiting,
     counters: ReferenceCounters,
-    last_refusal: Option<(Reference, ReferenceRefusal)>,
     /// End of the tick of the last [`advance`](Self::advance).
     now: Option<Timestamp>,
     /// Number of the grid cell in which it lies.
@@ -57,7 +55,6 @@ impl DriftEstimator {
             settings,
             waiting: if gyros.is_empty() { Waiting::default() } else { Waiting::with_room() },
             counters: ReferenceCounters::default(),
-            last_refusal: None,
             now: None,
             grid: 0,
             observed_until: None,
@@ -73,8 +70,10 @@ impl DriftEstimator {
 
     /// Goes on where `before` is, after a swap of the calibration, for each gyro whose drift parameters are the same and
     /// for which `same_bias` says that the other biases are too; what is left of a bias that changed is another drift.
-    pub fn carry(&mut self, before: Self, same_bias: impl Fn(usize) -> bool) {
-        for (index, (new, old)) in self.gyros.iter_mut().zip(before.gyros).enumerate() {
+    pub fn carry(&mut self, mut before: Self, same_bias: impl Fn(usize) -> bool) {
+        let old = core::mem::take(&mut before.gyros);
+        let mut gyros = core::mem::take(&mut self.gyros);
+        for (index, (new, old)) in gyros.iter_mut().zip(old).enumerate() {
             if let (Some(new), Some(old)) = (new, old)
                 && new.filter.model() == old.filter.model()
                 && same_bias(index)
@@ -82,13 +81,7 @@ impl DriftEstimator {
                 *new = old;
             }
         }
-        self.waiting = before.waiting;
-        self.counters = before.counters;
-        self.last_refusal = before.last_refusal;
-        self.now = before.now;
-        self.grid = before.grid;
-        self.observed_until = before.observed_until;
-        self.used_until = before.used_until;
+        *self = Self { gyros, settings: self.settings, ..before };
     }
 
     /// Takes a reference from an aiding source.
@@ -97,7 +90,7 @@ impl DriftEstimator {
     ///
     /// What is wrong with it by itself, or that too many wait. What shows only when it takes effect is counted then.
     pub fn submit(&mut self, reference: &Reference) -> Result<(), ReferenceRefusal> {
-        self.wait(reference)?;
+        self.submit_at_rest(reference)?;
         if self.now.is_some_and(|now| self.effective(reference) < now) {
             self.counters.late += 1;
         }
@@ -110,28 +103,19 @@ impl DriftEstimator {
     ///
     /// As [`submit`](Self::submit).
     pub fn submit_at_rest(&mut self, reference: &Reference) -> Result<(), ReferenceRefusal> {
-        self.wait(reference)
-    }
-
-    fn wait(&mut self, reference: &Reference) -> Result<(), ReferenceRefusal> {
         self.counters.received += 1;
         let idle = if self.is_idle() { Err(ReferenceRefusal::NoDrift) } else { Ok(()) };
         if let Err(refusal) = idle.and_then(|()| reference.check()) {
-            self.refuse(reference, refusal);
+            self.counters.refuse(refusal);
             return Err(refusal);
         }
         if let Some(over) = self.waiting.push(reference) {
-            self.refuse(&over, ReferenceRefusal::TooMany);
+            self.counters.refuse(ReferenceRefusal::TooMany);
             if over == *reference {
                 return Err(ReferenceRefusal::TooMany);
             }
         }
         Ok(())
-    }
-
-    fn refuse(&mut self, reference: &Reference, refusal: ReferenceRefusal) {
-        self.counters.refuse(refusal);
-        self.last_refusal = Some((*reference, refusal));
     }
 
     /// Ticks that end after this time feel the reference.
@@ -159,7 +143,7 @@ impl DriftEstimator {
 
     /// Goes on where there are gyros to follow.
     fn go_on(&mut self, end_time: Timestamp, restart: bool, project: &dyn Fn([f64; 3]) -> Sensors<f64>) {
-        let grid = grid_cell(end_time);
+        let grid = end_time.cell(GRID);
         if restart {
             self.restart(end_time, grid);
         } else if grid != self.grid || self.now.is_none() {
@@ -173,7 +157,7 @@ impl DriftEstimator {
         while let Some(reference) = self.waiting.pop_if(due) {
             match self.apply(&reference, end_time, project) {
                 Ok(()) => self.counters.used += 1,
-                Err(refusal) => self.refuse(&reference, refusal),
+                Err(refusal) => self.counters.refuse(refusal),
             }
         }
     }
@@ -189,39 +173,17 @@ impl DriftEstimator {
             return Err(ReferenceRefusal::Overlap);
         }
         let grid = self.grid;
-        let (mut taken, mut gated, mut gap) = (false, false, false);
-        for (gyro, rate) in self.gyros.iter_mut().zip(project(reference.angular_rate)) {
-            let Some(gyro) = gyro else { continue };
-            let mean = match gyro.ring.mean(reference) {
-                Ok(mean) => mean,
-                Err(no_mean) => {
-                    gap |= no_mean == NoMean::Gap;
-                    continue;
-                }
-            };
-            let before = gyro.subtrahend(grid, now);
-            let verdict = gyro.filter.update(&Measured {
-                start: reference.start,
-                end: reference.end,
-                mean: mean.rate - rate,
-                variance: mean.variance + reference.sigma * reference.sigma,
-            });
-            if verdict == Verdict::Refused {
-                gated = true;
-            } else {
-                gyro.hand_over(before, grid, now);
-                taken = true;
-            }
-        }
-        if taken || gated {
+        let gyros = self.gyros.iter_mut().zip(project(reference.angular_rate));
+        let measured =
+            gyros.filter_map(|(gyro, rate)| Some(gyro.as_mut()?.measure(reference, rate, grid, now)));
+        let measured: Sensors<_> = measured.collect();
+        let furthest = [Ok(()), Err(ReferenceRefusal::Gated), Err(ReferenceRefusal::Gap)];
+        let furthest = furthest.into_iter().find(|furthest| measured.contains(furthest));
+        let furthest = furthest.unwrap_or(Err(ReferenceRefusal::TooOld));
+        if matches!(furthest, Ok(()) | Err(ReferenceRefusal::Gated)) {
             self.used_until = Some(reference.end);
         }
-        match (taken, gated, gap) {
-            (true, ..) => Ok(()),
-            (_, true, _) => Err(ReferenceRefusal::Gated),
-            (.., true) => Err(ReferenceRefusal::Gap),
-            _ => Err(ReferenceRefusal::TooOld),
-        }
+        furthest
     }
 
     /// The producer restarted: its readings are forgotten, the estimate goes on by prediction. Where time stepped back,
@@ -303,18 +265,6 @@ impl DriftEstimator {
     #[must_use]
     pub const fn counters(&self) -> &ReferenceCounters {
         &self.counters
-    }
-
-    /// The last reference that was refused, and why.
-    #[must_use]
-    pub const fn last_refusal(&self) -> Option<&(Reference, ReferenceRefusal)> {
-        self.last_refusal.as_ref()
-    }
-
-    /// How many references wait to take effect.
-    #[must_use]
-    pub fn waiting(&self) -> usize {
-        self.waiting.len()
     }
 }
 

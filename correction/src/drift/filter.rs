@@ -1,10 +1,11 @@
 //! Kalman filter of one gyro's drift over (ε0, ε1, χ), with a gate against wrong references.
 
-use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
+use nalgebra::{Matrix3, Matrix4, SMatrix, Vector3, Vector4};
 use serde::{Deserialize, Serialize};
 
 use super::moments::Step;
-use super::{DriftModel, DriftParts};
+use super::{DriftEstimate, DriftModel, DriftParts};
+use crate::recent::Recent;
 use crate::units::Timestamp;
 
 /// An innovation beyond this many of its sigmas is refused.
@@ -19,39 +20,11 @@ pub const INNOVATIONS_KEPT: usize = 60;
 /// those of χ² with as many degrees of freedom, divided by them.
 pub const MEAN_NIS_BOUNDS: [f64; 2] = [0.6747, 1.3883];
 
+type SquareMatrix<const N: usize> = SMatrix<f64, N, N>;
+
 /// A measurement counts for no better than this share of the prediction's variance: beyond it rounding would eat up the
 /// covariance. The next one goes on from there.
 const FINEST: f64 = 1e-10;
-
-/// The last normalised innovations squared.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-struct Innovations {
-    #[serde(with = "crate::written::array")]
-    squares: [f64; INNOVATIONS_KEPT],
-    next: usize,
-    kept: usize,
-}
-
-impl Innovations {
-    const fn new() -> Self {
-        Self { squares: [0.0; INNOVATIONS_KEPT], next: 0, kept: 0 }
-    }
-
-    fn push(&mut self, square: f64) {
-        if let Some(place) = self.squares.get_mut(self.next) {
-            *place = square;
-        }
-        self.next = (self.next + 1) % INNOVATIONS_KEPT;
-        self.kept = (self.kept + 1).min(INNOVATIONS_KEPT);
-    }
-
-    /// Mean over what is kept; summed anew, so that no rounding collects.
-    fn mean(&self) -> Option<f64> {
-        let (sum, count) =
-            self.squares.iter().take(self.kept).fold((0.0, 0.0), |(sum, n), square| (sum + square, n + 1.0));
-        (count > 0.0).then(|| sum / count)
-    }
-}
 
 /// Refusals in a row that agree with each other.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -59,17 +32,6 @@ struct Refusals {
     count: u32,
     innovation: f64,
     variance: f64,
-}
-
-/// What became of a measurement.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Verdict {
-    /// It was used.
-    Taken,
-    /// Its innovation was beyond the gate.
-    Refused,
-    /// As [`Taken`](Self::Taken), after refusals that agree with it.
-    Believed,
 }
 
 /// The measured mean drift over a span.
@@ -83,17 +45,6 @@ pub(super) struct Measured {
     pub(super) variance: f64,
 }
 
-/// What a filter says of a time beside the rate.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Predicted {
-    /// Sigma of the drift (rad/s).
-    pub(super) sigma: f64,
-    /// Trend rate (rad/s²).
-    pub(super) trend: f64,
-    /// Its sigma (rad/s²).
-    pub(super) trend_sigma: f64,
-}
-
 /// The filter of one gyro.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Filter {
@@ -104,7 +55,8 @@ pub(super) struct Filter {
     state: Vector3<f64>,
     covariance: Matrix3<f64>,
     refusals: Option<Refusals>,
-    innovations: Innovations,
+    /// Normalised innovations squared of the last measurements taken.
+    innovations: Recent<f64, INNOVATIONS_KEPT>,
     last_innovation: Option<f64>,
     last_update: Option<Timestamp>,
     updates: u64,
@@ -120,7 +72,7 @@ impl Filter {
             state: Vector3::zeros(),
             covariance: Matrix3::from_diagonal(&initial_variances(&model)),
             refusals: None,
-            innovations: Innovations::new(),
+            innovations: Recent::default(),
             last_innovation: None,
             last_update: None,
             updates: 0,
@@ -156,37 +108,32 @@ impl Filter {
         self.state.x + markov * self.state.y + trend_s * self.state.z
     }
 
-    /// What the rate alone does not say, at `time`.
-    pub(super) fn predict(&self, time: Timestamp) -> Predicted {
+    /// The drift as it is known at `time`.
+    pub(super) fn estimate(&self, time: Timestamp) -> DriftEstimate {
         let since_s = self.time.map_or(0.0, |t| time.since(t).as_s());
         let (state, covariance) = self.predicted(since_s);
         let drift = Vector3::new(1.0, 1.0, 0.0);
         let variance = drift.dot(&(covariance * drift));
         let sigma = |variance: f64| libm::sqrt(variance.max(0.0));
-        Predicted { sigma: sigma(variance), trend: state.z, trend_sigma: sigma(covariance.m33) }
+        // Summed anew, so that no rounding collects.
+        let (squares, kept) =
+            self.innovations.iter().fold((0.0, 0.0), |(sum, n), square| (sum + square, n + 1.0));
+        DriftEstimate {
+            rate: self.rate_at(time),
+            sigma: sigma(variance),
+            trend: state.z,
+            trend_sigma: sigma(covariance.m33),
+            updates: self.updates,
+            refused: self.refused,
+            believed: self.believed,
+            last_update: self.last_update,
+            normalised_innovation: self.last_innovation,
+            mean_nis: (kept > 0.0).then(|| squares / kept),
+        }
     }
 
     pub(super) const fn model(&self) -> &DriftModel {
         &self.model
-    }
-
-    pub(super) const fn last_update(&self) -> Option<Timestamp> {
-        self.last_update
-    }
-
-    /// Measurements taken, refused by the gate, and believed after refusals (these are among the taken ones).
-    pub(super) const fn counts(&self) -> [u64; 3] {
-        [self.updates, self.refused, self.believed]
-    }
-
-    /// Innovation of the last measurement taken, in its sigmas.
-    pub(super) const fn last_innovation(&self) -> Option<f64> {
-        self.last_innovation
-    }
-
-    /// Mean of the normalised innovations squared over the last [`INNOVATIONS_KEPT`] measurements taken.
-    pub(super) fn mean_nis(&self) -> Option<f64> {
-        self.innovations.mean()
     }
 
     /// State and covariance this long after the last update (s).
@@ -194,43 +141,40 @@ impl Filter {
         let step = Step::over(since_s, self.model.parts());
         let transition: Matrix3<f64> = step.transition.fixed_view::<3, 3>(0, 0).into_owned();
         let noise: Matrix3<f64> = step.noise.fixed_view::<3, 3>(0, 0).into_owned();
-        let covariance = transition * self.covariance * transition.transpose() + noise;
-        (transition * self.state, symmetric(&covariance))
+        (transition * self.state, propagated(&transition, &self.covariance, &noise))
     }
 
-    /// Takes the mean drift over a span that starts no earlier than the last one ended.
-    pub(super) fn update(&mut self, measured: &Measured) -> Verdict {
+    /// Takes the mean drift over a span that starts no earlier than the last one ended; whether it is within the gate, or
+    /// believed after refusals that agree with it.
+    pub(super) fn update(&mut self, measured: &Measured) -> bool {
         let parts = *self.model.parts();
         let span_s = measured.end.since(measured.start).as_s();
         let since_s = self.time.map_or(0.0, |t| measured.start.since(t).as_s());
         let white = parts.angle_random_walk_rad_per_sqrt_s;
         let variance = measured.variance + white * white / span_s;
 
-        let (mut state, mut covariance) = self.predicted(since_s);
-        let mut posterior = Posterior::new(&state, &covariance, span_s, &parts, measured.mean, variance);
-        let mut verdict = Verdict::Taken;
-        if !posterior.plausible() {
-            self.refused += 1;
-            if !self.believes(&posterior) {
-                return Verdict::Refused;
+        let (state, mut covariance) = self.predicted(since_s);
+        let posterior = |covariance: &Matrix3<f64>| {
+            Posterior::new(&state, covariance, span_s, &parts, measured.mean, variance)
+        };
+        let mut after = posterior(&covariance);
+        if !after.plausible() {
+            if !self.believes(&after) {
+                self.refused += 1;
+                return false;
             }
             // The step is taken to be one of the constant part, of the size that it shows.
-            self.refused -= 1;
             self.believed += 1;
-            verdict = Verdict::Believed;
-            covariance.m11 += posterior.innovation * posterior.innovation;
-            posterior = Posterior::new(&state, &covariance, span_s, &parts, measured.mean, variance);
+            covariance.m11 += after.innovation * after.innovation;
+            after = posterior(&covariance);
         }
-        self.refusals = None;
-        (state, covariance) = (posterior.state, posterior.covariance);
-        self.state = state;
-        self.covariance = covariance;
-        self.time = Some(measured.end);
-        self.last_update = Some(measured.end);
-        self.last_innovation = Some(posterior.normalised());
-        self.innovations.push(posterior.normalised() * posterior.normalised());
+        let normalised = after.innovation / libm::sqrt(after.innovation_variance);
+        (self.state, self.covariance, self.refusals) = (after.state, after.covariance, None);
+        (self.time, self.last_update) = (Some(measured.end), Some(measured.end));
+        self.last_innovation = Some(normalised);
+        self.innovations.push(normalised * normalised);
         self.updates += 1;
-        verdict
+        true
     }
 
     /// Whether this implausible measurement ends a row of refusals that agree with each other.
@@ -283,7 +227,7 @@ impl Posterior {
         let state = step.transition * state.push(0.0);
         let mut start = Matrix4::zeros();
         start.fixed_view_mut::<3, 3>(0, 0).copy_from(covariance);
-        let before = symmetric(&(step.transition * start * step.transition.transpose() + step.noise));
+        let before = propagated(&step.transition, &start, &step.noise);
 
         let h = Vector4::new(0.0, 0.0, 0.0, 1.0 / span_s);
         let innovation = mean - h.dot(&state);
@@ -299,11 +243,6 @@ impl Posterior {
         Self { innovation, innovation_variance, state: state.xyz(), covariance: symmetric(&covariance) }
     }
 
-    /// Innovation in its sigmas.
-    fn normalised(&self) -> f64 {
-        self.innovation / libm::sqrt(self.innovation_variance)
-    }
-
     /// Within the gate; a variance that is no number says that the readings were none.
     fn plausible(&self) -> bool {
         self.innovation_variance.is_finite()
@@ -311,8 +250,17 @@ impl Posterior {
     }
 }
 
+/// Covariance after a transition, with its noise.
+fn propagated<const N: usize>(
+    transition: &SquareMatrix<N>,
+    covariance: &SquareMatrix<N>,
+    noise: &SquareMatrix<N>,
+) -> SquareMatrix<N> {
+    symmetric(&(transition * covariance * transition.transpose() + noise))
+}
+
 /// The symmetric part: rounding would otherwise let the two halves drift apart.
-fn symmetric<const N: usize>(matrix: &nalgebra::SMatrix<f64, N, N>) -> nalgebra::SMatrix<f64, N, N> {
+fn symmetric<const N: usize>(matrix: &SquareMatrix<N>) -> SquareMatrix<N> {
     (matrix + matrix.transpose()) * 0.5
 }
 

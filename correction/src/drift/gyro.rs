@@ -2,17 +2,17 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::DriftModel;
-use super::filter::{Filter, Predicted};
+use super::filter::{Filter, Measured};
 use super::ring::Ring;
+use super::{DriftModel, Reference, ReferenceRefusal};
 use crate::thermal::Ramp;
 use crate::units::{Span, Timestamp};
 
 /// What an update changes is subtracted bit by bit over this time, so that the corrected rate has no step.
 pub const SUBTRACTION_RAMP: Span = Span::from_ms(10_000);
 
-/// Distance of the grid on which the prediction is evaluated.
-const GRID: Span = Span::from_ms(1_000);
+/// Length of the cells at whose ends the prediction is evaluated.
+pub(super) const GRID: Span = Span::from_ms(1_000);
 
 /// The drift of one gyro as it is known at the last tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,41 +41,32 @@ pub struct DriftEstimate {
     pub mean_nis: Option<f64>,
 }
 
-/// The prediction on its way from one grid point to the next.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-struct Line {
-    from: f64,
-    step: f64,
-}
-
 /// One gyro.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct GyroDrift {
     pub(super) filter: Filter,
     pub(super) ring: Ring,
-    line: Line,
+    /// The prediction on its way over a cell of the grid: at its start, and how much it gains (rad/s).
+    line: [f64; 2],
     /// What is subtracted beyond the line: the rest of what updates have changed.
     offset: Ramp,
 }
 
 impl GyroDrift {
     pub(super) fn new(model: DriftModel) -> Self {
-        Self {
-            filter: Filter::new(model),
-            ring: Ring::new(),
-            line: Line::default(),
-            offset: Ramp::hold(0.0),
-        }
+        Self { filter: Filter::new(model), ring: Ring::new(), line: [0.0; 2], offset: Ramp::hold(0.0) }
     }
 
     /// Draws the line over the grid cell of this number.
     pub(super) fn draw(&mut self, grid: i64) {
-        let from = self.filter.rate_at(grid_point(grid));
-        self.line = Line { from, step: self.filter.rate_at(grid_point(grid.saturating_add(1))) - from };
+        let from = self.filter.rate_at(Timestamp::of_cell(grid, GRID));
+        let to = self.filter.rate_at(Timestamp::of_cell(grid.saturating_add(1), GRID));
+        self.line = [from, to - from];
     }
 
     fn predicted(&self, grid: i64, time: Timestamp) -> f64 {
-        self.line.from + self.line.step * (time.seconds_from(grid_point(grid)) / GRID.as_s())
+        let [from, gain] = self.line;
+        from + gain * (time.seconds_from(Timestamp::of_cell(grid, GRID)) / GRID.as_s())
     }
 
     pub(super) fn subtrahend(&self, grid: i64, time: Timestamp) -> f64 {
@@ -89,31 +80,27 @@ impl GyroDrift {
         self.offset.turn(time, SUBTRACTION_RAMP, 0.0);
     }
 
+    /// Measures the drift against a reference that gives this rate (rad/s) along the input axis, at the tick that ends `now`.
+    pub(super) fn measure(
+        &mut self,
+        reference: &Reference,
+        rate: f64,
+        grid: i64,
+        now: Timestamp,
+    ) -> Result<(), ReferenceRefusal> {
+        let &Reference { start, end, sigma, .. } = reference;
+        let mean = self.ring.mean(reference)?;
+        let before = self.subtrahend(grid, now);
+        let variance = mean.variance + sigma * sigma;
+        if !self.filter.update(&Measured { start, end, mean: mean.rate - rate, variance }) {
+            return Err(ReferenceRefusal::Gated);
+        }
+        self.hand_over(before, grid, now);
+        Ok(())
+    }
+
     /// The drift at `time`, that of the last tick.
     pub(super) fn estimate(&self, grid: i64, time: Timestamp) -> DriftEstimate {
-        let Predicted { sigma, trend, trend_sigma } = self.filter.predict(time);
-        let [updates, refused, believed] = self.filter.counts();
-        DriftEstimate {
-            rate: self.predicted(grid, time),
-            sigma,
-            trend,
-            trend_sigma,
-            updates,
-            refused,
-            believed,
-            last_update: self.filter.last_update(),
-            normalised_innovation: self.filter.last_innovation(),
-            mean_nis: self.filter.mean_nis(),
-        }
+        DriftEstimate { rate: self.predicted(grid, time), ..self.filter.estimate(time) }
     }
-}
-
-/// Number of the grid cell that holds a time.
-pub(super) const fn grid_cell(time: Timestamp) -> i64 {
-    time.as_ns().div_euclid(GRID.as_ns())
-}
-
-/// Time of a grid point.
-const fn grid_point(number: i64) -> Timestamp {
-    Timestamp::from_ns(number.saturating_mul(GRID.as_ns()))
 }

@@ -180,7 +180,7 @@ impl Reference {
 /// References that wait for the first tick which is to feel them, the earliest first.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Waiting {
-    references: Later<Reference, MAX_WAITING_REFERENCES>,
+    pub(super) references: Later<Reference, MAX_WAITING_REFERENCES>,
 }
 
 impl Waiting {
@@ -193,18 +193,13 @@ impl Waiting {
 
     /// Puts a reference in its place; gives back the one furthest in the future where that is one too many.
     pub(super) fn push(&mut self, reference: &Reference) -> Option<Reference> {
-        let mut over = None;
         let references = self.references.room();
-        if references.is_full() {
-            let last = references.last().copied()?;
-            if reference.order(&last).is_ge() {
-                return Some(*reference);
-            }
-            over = references.pop();
+        let place = references.partition_point(|waiting| reference.order(waiting).is_ge());
+        if references.is_full() && place == references.len() {
+            return Some(*reference);
         }
-        let place = references.iter().position(|r| reference.order(r).is_lt());
-        let place = place.unwrap_or(references.len());
-        // There is room: one was taken out above.
+        let over = if references.is_full() { references.pop() } else { None };
+        // There is room: one was taken out.
         references.try_insert(place, *reference).ok();
         over
     }
@@ -212,10 +207,6 @@ impl Waiting {
     /// The next reference that `due` holds for.
     pub(super) fn pop_if(&mut self, due: impl Fn(&Reference) -> bool) -> Option<Reference> {
         if self.references.first().is_some_and(due) { self.references.room().pop_at(0) } else { None }
-    }
-
-    pub(super) fn len(&self) -> usize {
-        self.references.len()
     }
 
     /// Drops references from another time, after a step of the producer's clock; how many.

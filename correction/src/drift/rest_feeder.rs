@@ -30,16 +30,18 @@ impl RestFeeder {
         Self::default()
     }
 
-    /// Takes one tick and whether the unit stands still in it; gives the span of a minute that was spent at rest and
-    /// that another minute of rest has confirmed.
+    /// Takes one tick (its end and its duration) and whether the unit stands still in it; gives a reference over a minute
+    /// that was spent at rest and that another minute of rest has confirmed.
     ///
-    /// Each whole minute of event time is given at most once. A step back of time ends the rest.
-    pub fn observe(
+    /// Each whole minute of event time is given at most once. A step back of time ends the rest. `earth_rate` gives the
+    /// Earth's rate in case axes (rad/s) and its sigma (rad/s), and is asked only where a minute is complete; `None` from it
+    /// gives no reference.
+    pub fn reference(
         &mut self,
-        end_time: Timestamp,
-        duration: Span,
+        (end_time, duration): (Timestamp, Span),
         at_rest: bool,
-    ) -> Option<(Timestamp, Timestamp)> {
+        earth_rate: impl FnOnce() -> Option<([f64; 3], f64)>,
+    ) -> Option<Reference> {
         let start = end_time - duration;
         let last = self.last.replace(end_time).unwrap_or(start);
         if !at_rest || end_time < last || start.since(last) > LONGEST_GAP {
@@ -49,32 +51,15 @@ impl RestFeeder {
             return None;
         }
         let since = *self.since.get_or_insert(start);
-        let confirmed = minute(end_time - REST_CONFIRMATION);
-        if confirmed <= minute(last - REST_CONFIRMATION) {
+        let [before, confirmed] = [last, end_time].map(|time| (time - REST_CONFIRMATION).cell(REST_SPAN));
+        let end = Timestamp::of_cell(confirmed, REST_SPAN);
+        let start = end - REST_SPAN;
+        if confirmed <= before || start < since {
             return None;
         }
-        let end = Timestamp::from_ns(confirmed.saturating_mul(REST_SPAN.as_ns()));
-        let start = end - REST_SPAN;
-        (start >= since).then_some((start, end))
-    }
-
-    /// As [`observe`](Self::observe), with the Earth's rate in case axes (rad/s) and its sigma (rad/s), asked for only where
-    /// a minute is complete; `None` from it gives no reference.
-    pub fn reference(
-        &mut self,
-        (end_time, duration): (Timestamp, Span),
-        at_rest: bool,
-        earth_rate: impl FnOnce() -> Option<([f64; 3], f64)>,
-    ) -> Option<Reference> {
-        let (start, end) = self.observe(end_time, duration, at_rest)?;
         let (angular_rate, sigma) = earth_rate()?;
         Some(Reference { start, end, angular_rate, sigma })
     }
-}
-
-/// Number of the minute of event time.
-const fn minute(time: Timestamp) -> i64 {
-    time.as_ns().div_euclid(REST_SPAN.as_ns())
 }
 
 #[cfg(test)]

@@ -14,13 +14,13 @@ use alloc::vec::Vec;
 
 use serde::{Deserialize, Serialize};
 
-use super::Reference;
+use super::{Reference, ReferenceRefusal};
 use crate::units::{Span, Timestamp};
 
 /// Length of a cell.
 pub const CELL: Span = Span::from_ms(250);
 /// Cells kept: 128 s.
-pub const RING_CELLS: usize = 512;
+pub const RING_CELLS: u16 = 512;
 /// Largest share of a span that may be bridged: white noise then adds at most a tenth to the variance over a minute.
 pub const LARGEST_UNOBSERVED_SHARE: f64 = 0.02;
 
@@ -61,18 +61,9 @@ pub(super) struct Covered {
 impl Covered {
     /// Of a tick from `start` to `end`.
     pub(super) fn new(start: Timestamp, end: Timestamp) -> Self {
-        let (first, last) = (first_number(start), last_number(end));
+        let (first, last) = (start.cell(CELL), last_number(end));
         Self { start, end, first, last, slot: slot(last), in_last_s: overlap(last, start, end).as_s() }
     }
-}
-
-/// Why there is no mean over a span.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum NoMean {
-    /// The span begins before what is kept.
-    TooOld,
-    /// Too little of the span was observed.
-    Gap,
 }
 
 /// The cells of one gyro.
@@ -85,7 +76,7 @@ pub(super) struct Ring {
 
 impl Ring {
     pub(super) fn new() -> Self {
-        Self { cells: alloc::vec![Cell::default(); RING_CELLS], newest: None }
+        Self { cells: alloc::vec![Cell::default(); RING_CELLS.into()], newest: None }
     }
 
     pub(super) fn clear(&mut self) {
@@ -100,7 +91,7 @@ impl Ring {
             return;
         }
         let before = self.newest.unwrap_or(i64::MIN);
-        let oldest_new = before.saturating_add(1).max(number.saturating_sub(cells_kept() - 1));
+        let oldest_new = before.saturating_add(1).max(number.saturating_sub(i64::from(RING_CELLS) - 1));
         for new in oldest_new..=number {
             if let Some(cell) = self.cells.get_mut(slot(new)) {
                 *cell = Cell::default();
@@ -128,11 +119,11 @@ impl Ring {
     }
 
     /// Mean rate over a span whose last cell is complete.
-    pub(super) fn mean(&self, reference: &Reference) -> Result<Mean, NoMean> {
+    pub(super) fn mean(&self, reference: &Reference) -> Result<Mean, ReferenceRefusal> {
         let Reference { start, end, .. } = *reference;
-        let (first, last) = (first_number(start), last_number(end));
+        let (first, last) = (start.cell(CELL), last_number(end));
         if first < self.oldest() {
-            return Err(NoMean::TooOld);
+            return Err(ReferenceRefusal::TooOld);
         }
         let span_s = end.since(start).as_s();
         let used = || {
@@ -147,7 +138,7 @@ impl Ring {
         let unobserved = (1.0 - observed_s / span_s).max(0.0);
         // Clocks that count a tick's duration and its end time differ by some parts in a thousand, not more.
         if unobserved > LARGEST_UNOBSERVED_SHARE || observed_s > span_s * (1.0 + LARGEST_UNOBSERVED_SHARE) {
-            return Err(NoMean::Gap);
+            return Err(ReferenceRefusal::Gap);
         }
         let rate = angle_rad / observed_s;
         let scatter = used().fold(0.0, |sum, (angle, s)| {
@@ -172,38 +163,28 @@ impl Ring {
     }
 
     fn oldest(&self) -> i64 {
-        self.newest.map_or(i64::MAX, |newest| newest.saturating_sub(cells_kept() - 1))
+        self.newest.map_or(i64::MAX, |newest| newest.saturating_sub(i64::from(RING_CELLS) - 1))
     }
 }
 
 /// End of the cell in which a span ends.
 pub(super) fn cell_end(end: Timestamp) -> Timestamp {
-    Timestamp::from_ns(last_number(end).saturating_add(1).saturating_mul(CELL.as_ns()))
-}
-
-#[expect(clippy::cast_possible_wrap, reason = "a small constant")]
-const fn cells_kept() -> i64 {
-    RING_CELLS as i64
-}
-
-/// Number of the cell in which a span starts.
-const fn first_number(start: Timestamp) -> i64 {
-    start.as_ns().div_euclid(CELL.as_ns())
+    Timestamp::of_cell(last_number(end).saturating_add(1), CELL)
 }
 
 /// Number of the cell in which a span ends.
 const fn last_number(end: Timestamp) -> i64 {
-    end.as_ns().saturating_sub(1).div_euclid(CELL.as_ns())
+    Timestamp::from_ns(end.as_ns().saturating_sub(1)).cell(CELL)
 }
 
 /// Place of a cell in the ring.
 fn slot(number: i64) -> usize {
-    usize::try_from(number.rem_euclid(cells_kept())).unwrap_or(0)
+    usize::try_from(number.rem_euclid(i64::from(RING_CELLS))).unwrap_or(0)
 }
 
 /// How much of a cell lies between two times.
 fn overlap(number: i64, start: Timestamp, end: Timestamp) -> Span {
-    let from = Timestamp::from_ns(number.saturating_mul(CELL.as_ns()));
+    let from = Timestamp::of_cell(number, CELL);
     end.min(from + CELL).since(start.max(from))
 }
 

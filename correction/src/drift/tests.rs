@@ -20,7 +20,7 @@ fn every_wrong_number_is_named_at_once() {
         angle_random_walk_rad_per_sqrt_s: 0.0,
     };
     let errors = DriftModel::new(&broken).unwrap_err();
-    let names: Vec<_> = errors.iter().map(|DriftError::OutOfRange { name, .. }| *name).collect();
+    let names: Vec<_> = errors.iter().map(|error| error.name).collect();
     assert_eq!(
         names,
         [

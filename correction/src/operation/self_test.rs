@@ -134,12 +134,31 @@ impl Liveness {
     }
 }
 
-/// First, last and worst of what the producer reported under one name.
+/// What the producer reported under one name.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct Reported {
-    first: f64,
-    last: f64,
-    worst: f64,
+    item: CheckItem,
+    name: ChannelName,
+    limits: [f64; 2],
+    /// The first value, and the one that counts: of a voltage the worst so far, of a counter the last.
+    values: Option<(f64, f64)>,
+}
+
+impl Reported {
+    fn take(&mut self, value: f64) {
+        let [low, high] = self.limits;
+        let excess =
+            |value: f64| if value.is_nan() { f64::INFINITY } else { (low - value).max(value - high) };
+        let (_, counts) = self.values.get_or_insert((value, value));
+        let stays = matches!(self.item, CheckItem::Voltage(_)) && excess(*counts) > excess(value);
+        *counts = if stays { *counts } else { value };
+    }
+
+    fn result(&self) -> CheckResult {
+        let increases = matches!(self.item, CheckItem::Counter(_));
+        let value = self.values.map(|(first, counts)| if increases { counts - first } else { counts });
+        within(self.item, value, self.limits)
+    }
 }
 
 /// A self-test that is running.
@@ -151,9 +170,7 @@ pub struct SelfTest {
     accel_ticks: u64,
     gyros: Sensors<Liveness>,
     accels: Sensors<Liveness>,
-    parts: SelfTestParts,
-    voltages: Vec<Option<Reported>>,
-    counters: Vec<Option<Reported>>,
+    reported: Vec<Reported>,
 }
 
 impl SelfTest {
@@ -166,7 +183,11 @@ impl SelfTest {
     #[must_use]
     pub fn new(calibration: &Calibration) -> Self {
         let fresh = |sensors: usize| (0..sensors.min(MAX_SENSORS)).map(|_| Liveness::default()).collect();
-        let parts = calibration.self_test().clone();
+        let SelfTestParts { voltages, counters } = calibration.self_test();
+        let reported = |item, name, limits| Reported { item, name, limits, values: None };
+        let voltages = voltages.iter().map(|it| reported(CheckItem::Voltage(it.name), it.name, it.range_v));
+        let counters =
+            counters.iter().map(|it| reported(CheckItem::Counter(it.name), it.name, [0.0, it.max_increase]));
         Self {
             start: None,
             end: Timestamp::default(),
@@ -174,9 +195,7 @@ impl SelfTest {
             accel_ticks: 0,
             gyros: fresh(calibration.gyro_count()),
             accels: fresh(calibration.accel_count()),
-            voltages: alloc::vec![None; parts.voltages.len()],
-            counters: alloc::vec![None; parts.counters.len()],
-            parts,
+            reported: voltages.chain(counters).collect(),
         }
     }
 
@@ -204,17 +223,8 @@ impl SelfTest {
 
     /// Takes what the producer reports of itself.
     pub fn health(&mut self, reading: &HealthReading) {
-        let voltages = self.parts.voltages.iter().zip(&mut self.voltages);
-        for (voltage, reported) in voltages.filter(|(voltage, _)| voltage.name == reading.name) {
-            let excess = |value: f64| {
-                let [low, high] = voltage.range_v;
-                if value.is_nan() { f64::INFINITY } else { (low - value).max(value - high) }
-            };
-            report(reported, reading.value, |new, worst| excess(new) > excess(worst));
-        }
-        let counters = self.parts.counters.iter().zip(&mut self.counters);
-        for (_, reported) in counters.filter(|(counter, _)| counter.name == reading.name) {
-            report(reported, reading.value, |_, _| false);
+        for reported in self.reported.iter_mut().filter(|reported| reported.name == reading.name) {
+            reported.take(reading.value);
         }
     }
 
@@ -226,36 +236,19 @@ impl SelfTest {
         revision: u64,
         temperature: &dyn Fn(&ChannelName) -> Option<f64>,
     ) -> SelfTestReport {
-        let mut checks = Vec::new();
-        checks.push(calibration_check(revision));
-        for (i, gyro) in self.gyros.iter().enumerate() {
-            checks.push(gyro.result(CheckItem::Gyro(i), self.ticks));
-        }
-        for (i, accel) in self.accels.iter().enumerate() {
-            checks.push(accel.result(CheckItem::Accel(i), self.accel_ticks));
-        }
-        for channel in calibration.channels() {
-            let value = temperature(channel.name());
-            checks.push(within(CheckItem::Temperature(*channel.name()), value, channel.range_deg_c()));
-        }
-        for (voltage, reported) in self.parts.voltages.iter().zip(&self.voltages) {
-            let value = reported.map(|reported| reported.worst);
-            checks.push(within(CheckItem::Voltage(voltage.name), value, voltage.range_v));
-        }
-        for (counter, reported) in self.parts.counters.iter().zip(&self.counters) {
-            let value = reported.map(|reported| reported.last - reported.first);
-            checks.push(within(CheckItem::Counter(counter.name), value, [0.0, counter.max_increase]));
-        }
+        let mut checks = Vec::from([calibration_check(revision)]);
+        let gyros = self.gyros.iter().enumerate();
+        checks.extend(gyros.map(|(i, gyro)| gyro.result(CheckItem::Gyro(i), self.ticks)));
+        let accels = self.accels.iter().enumerate();
+        checks.extend(accels.map(|(i, accel)| accel.result(CheckItem::Accel(i), self.accel_ticks)));
+        checks.extend(calibration.channels().iter().map(|channel| {
+            let name = channel.name();
+            within(CheckItem::Temperature(*name), temperature(name), channel.range_deg_c())
+        }));
+        checks.extend(self.reported.iter().map(Reported::result));
         let length = self.start.map_or(Span::ZERO, |start| self.end.since(start));
         SelfTestReport { ended: self.start.map(|_| self.end), length, checks }
     }
-}
-
-/// Enters a value; `worse` compares it with the worst so far.
-fn report(reported: &mut Option<Reported>, value: f64, worse: impl Fn(f64, f64) -> bool) {
-    let entry = reported.get_or_insert(Reported { first: value, last: value, worst: value });
-    entry.last = value;
-    entry.worst = if worse(entry.worst, value) { entry.worst } else { value };
 }
 
 fn within(item: CheckItem, value: Option<f64>, limits: [f64; 2]) -> CheckResult {

@@ -51,11 +51,6 @@ impl ParityCheck {
         Self::default()
     }
 
-    /// Forgets the compiled matrix and the suspect: call it when the calibration changes.
-    pub fn reset(&mut self) {
-        *self = Self::default();
-    }
-
     /// Judges one tick.
     ///
     /// `readings` are the sensors' mean rates or forces over the tick (rad/s or m/s²), one per sensor; those
@@ -92,13 +87,10 @@ impl ParityCheck {
         };
         let energy: f64 = verdict.residuals.iter().map(|p| p * p).sum();
         verdict.exceeded = energy.is_nan() || energy > limit * limit;
-        let suspect = if verdict.exceeded {
-            isolate(compiled, &orientation.root_weights, &verdict.residuals, limit)
-        } else {
-            None
-        };
-
-        self.suspect = suspect.map(|index| match self.suspect {
+        let suspect = verdict.exceeded.then(|| {
+            isolate(compiled, &orientation.root_weights, &verdict.residuals, (energy, limit * limit))
+        });
+        self.suspect = suspect.flatten().map(|index| match self.suspect {
             Some((same, ticks)) if same == index => (index, ticks.saturating_add(1)),
             _ => (index, 1),
         });
@@ -140,18 +132,17 @@ impl ParityCheck {
     }
 }
 
-/// The sensor whose removal explains the residuals, if there is exactly one.
+/// The sensor whose removal explains the residuals, if there is exactly one; from their squared length and its limit.
 fn isolate(
     compiled: &Compiled,
     root_weights: &[f64; MAX_SENSORS],
     residuals: &[f64],
-    limit: f64,
+    (energy, limit): (f64, f64),
 ) -> Option<usize> {
     // One residual is explained equally well by every sensor.
     if residuals.len() < 2 {
         return None;
     }
-    let energy: f64 = residuals.iter().map(|p| p * p).sum();
     let mut best: Option<(usize, f64)> = None;
     let mut second = f64::INFINITY;
     for (index, root_weight) in root_weights.iter().enumerate() {
@@ -176,7 +167,6 @@ fn isolate(
         }
     }
     let (index, remaining) = best?;
-    let explained = remaining <= limit * limit;
     let clearly = remaining < ISOLATION_RATIO * ISOLATION_RATIO * second;
-    (explained && clearly).then_some(index)
+    (remaining <= limit && clearly).then_some(index)
 }

@@ -120,6 +120,20 @@ pub enum OrientationError {
     ParityConfirm,
 }
 
+impl OrientationError {
+    /// Field of the parts that it speaks of; of a number in a list, what the number is.
+    pub(crate) fn field(&self) -> &'static str {
+        match self {
+            Self::ListCount { name, .. } | Self::NotFinite { name, .. } => name,
+            Self::WeightNotPositive { .. } | Self::WeightRatio { .. } => "weights",
+            Self::EmptyRange { .. } => "range_deg_c",
+            Self::ParityLimit { .. } => "parity_limit",
+            Self::ParityConfirm => "parity_confirm_ticks",
+            Self::RowCount { .. } | Self::RowNorm { .. } | Self::Condition { .. } => "rows",
+        }
+    }
+}
+
 impl OrientationParts {
     /// Checks the lengths of the lists.
     pub(super) fn check_counts(&self, errors: &mut Vec<OrientationError>) {
@@ -137,35 +151,23 @@ impl OrientationParts {
 
     /// Checks every number by itself, and the weights against each other.
     pub(super) fn check_numbers(&self, errors: &mut Vec<OrientationError>) {
-        let mut finite = |name, index, got: f64| {
-            if !got.is_finite() {
-                errors.push(OrientationError::NotFinite { name, index, got });
-            }
-            got.is_finite()
-        };
-        finite("reference temperature", 0, self.reference_deg_c);
-        for (name, rows) in [("row", &self.rows), ("slope", &self.slopes_per_deg_c)] {
-            for (index, row) in rows.iter().enumerate() {
-                for c in row {
-                    finite(name, index, *c);
-                }
-            }
+        fn named(name: &'static str, rows: &[[f64; 3]]) -> impl Iterator<Item = (&'static str, usize, f64)> {
+            rows.iter().enumerate().flat_map(move |(index, row)| row.map(|c| (name, index, c)))
         }
         let [first, last] = self.range_deg_c;
-        let range_is_finite = finite("range limit", 0, first) & finite("range limit", 1, last);
-        let limit_is_finite = self.parity_limit.is_some_and(|limit| finite("parity limit", 0, limit));
-        let (mut smallest, mut largest) = (f64::INFINITY, 0.0_f64);
-        let mut weights_are_finite = true;
-        for (index, weight) in self.weights.iter().enumerate() {
-            weights_are_finite &= finite("weight", index, *weight);
-            smallest = smallest.min(*weight);
-            largest = largest.max(*weight);
-        }
+        let weights = self.weights.iter().copied().enumerate();
+        let numbers = [("reference temperature", 0, self.reference_deg_c)].into_iter();
+        let numbers = numbers.chain(named("row", &self.rows)).chain(named("slope", &self.slopes_per_deg_c));
+        let numbers = numbers.chain([("range limit", 0, first), ("range limit", 1, last)]);
+        let numbers = numbers.chain(self.parity_limit.map(|limit| ("parity limit", 0, limit)));
+        let numbers = numbers.chain(weights.clone().map(|(index, weight)| ("weight", index, weight)));
+        let broken = numbers.filter(|(.., got)| !got.is_finite());
+        errors.extend(broken.map(|(name, index, got)| OrientationError::NotFinite { name, index, got }));
 
-        if range_is_finite && first > last {
+        if first.is_finite() && last.is_finite() && first > last {
             errors.push(OrientationError::EmptyRange { first, last });
         }
-        if let (true, Some(got)) = (limit_is_finite, self.parity_limit) {
+        if let Some(got) = self.parity_limit.filter(|limit| limit.is_finite()) {
             if got <= 0.0 {
                 errors.push(OrientationError::ParityLimit { got });
             }
@@ -173,14 +175,13 @@ impl OrientationParts {
                 errors.push(OrientationError::ParityConfirm);
             }
         }
-        if !weights_are_finite {
+        if !self.weights.iter().all(|weight| weight.is_finite()) {
             return;
         }
-        for (index, got) in self.weights.iter().copied().enumerate() {
-            if got <= 0.0 {
-                errors.push(OrientationError::WeightNotPositive { index, got });
-            }
-        }
+        let wrong = weights.filter(|(_, got)| *got <= 0.0);
+        errors.extend(wrong.map(|(index, got)| OrientationError::WeightNotPositive { index, got }));
+        let smallest = self.weights.iter().copied().fold(f64::INFINITY, f64::min);
+        let largest = self.weights.iter().copied().fold(0.0, f64::max);
         if smallest > 0.0 && largest / smallest > WEIGHT_RATIO_LIMIT {
             let (got, limit) = (largest / smallest, WEIGHT_RATIO_LIMIT);
             errors.push(OrientationError::WeightRatio { got, limit });

@@ -2,15 +2,16 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::outcome::{ByMode, ModeTotals};
+use super::outcome::ModeTotals;
 use super::scatter::Scatter;
+use crate::by_mode::ByMode;
 use crate::sample::LasingMode;
 
 /// Good ticks of one mode.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 pub(super) struct Gathered {
-    ticks: u64,
-    time_s: f64,
+    pub(super) ticks: u64,
+    pub(super) time_s: f64,
     /// ∫(K·P/Δt − Ω) dt (rad): the input and what is wrong with the bias.
     angle_rad: f64,
     /// ∫T dt (°C·s).
@@ -89,11 +90,6 @@ impl GyroRun {
     /// The next tick does not continue the last one.
     pub(super) fn cut(&mut self) {
         self.last.0 = false;
-    }
-
-    /// Ticks of any mode.
-    pub(super) fn good_ticks(&self) -> u64 {
-        self.modes.without.ticks + self.modes.plus.ticks + self.modes.minus.ticks
     }
 
     /// Whether it has lasing modes.

@@ -1,49 +1,16 @@
 //! What a pre-launch calibration says: progress, constants, reasons for a refusal.
 
+use alloc::format;
+use alloc::string::String;
 use alloc::vec::Vec;
-use core::fmt;
 
 use serde::{Deserialize, Serialize};
+use thiserror::Error;
 
+use crate::by_mode::ByMode;
 use crate::rest::Moved;
 use crate::sample::{LasingMode, Sensors};
 use crate::units::{AngularRate, Span};
-
-/// One value per lasing mode, and one for an instrument without modes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct ByMode<T> {
-    /// Instrument without modes.
-    pub without: T,
-    /// Mode plus.
-    pub plus: T,
-    /// Mode minus.
-    pub minus: T,
-}
-
-impl<T> ByMode<T> {
-    /// That of a mode.
-    pub fn get(&self, mode: Option<LasingMode>) -> &T {
-        match mode {
-            None => &self.without,
-            Some(LasingMode::Plus) => &self.plus,
-            Some(LasingMode::Minus) => &self.minus,
-        }
-    }
-
-    /// That of a mode.
-    pub(super) fn get_mut(&mut self, mode: Option<LasingMode>) -> &mut T {
-        match mode {
-            None => &mut self.without,
-            Some(LasingMode::Plus) => &mut self.plus,
-            Some(LasingMode::Minus) => &mut self.minus,
-        }
-    }
-
-    /// The same of each.
-    pub(super) fn map<U>(&self, f: impl Fn(&T) -> U) -> ByMode<U> {
-        ByMode { without: f(&self.without), plus: f(&self.plus), minus: f(&self.minus) }
-    }
-}
 
 /// Good ticks of one gyro in one mode.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -61,8 +28,6 @@ pub struct ModeTotals {
 pub struct GyroProgress {
     /// Good ticks so far.
     pub modes: ByMode<ModeTotals>,
-    /// Mean temperature over all good ticks so far (°C); `None` without any.
-    pub mean_temperature_deg_c: Option<f64>,
     /// Standard error that the constants would have now (rad/s); `None` while too little is known.
     pub standard_error_rad_per_s: Option<f64>,
 }
@@ -105,23 +70,30 @@ pub struct GyroConstants {
 }
 
 /// One of the two constants of a gyro.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Error, Serialize, Deserialize)]
 pub enum BiasConstant {
     /// C0, of the static bias.
+    #[error("C0 (static bias)")]
     Static,
     /// B0, of the magnetic bias.
+    #[error("B0 (magnetic bias)")]
     Magnetic,
 }
 
 /// Why the old constants stay.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Error, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Refusal {
     /// The unit moved.
+    #[error("{0}")]
     Moved(Moved),
     /// Whether the unit stood still could not be seen.
+    #[error("too little was seen to say that the unit stood still")]
     RestNotSeen,
     /// The temperature of a gyro, or of the gyros' axes, left the range that the calibration was fitted over.
+    #[error(
+        "gyro {gyro} at {temperature_deg_c:.2} °C is outside the temperatures that its calibration was fitted over"
+    )]
     TemperatureOutOfRange {
         /// Index of the gyro.
         gyro: usize,
@@ -129,8 +101,10 @@ pub enum Refusal {
         temperature_deg_c: f64,
     },
     /// The producer started anew.
+    #[error("the producer restarted: begin again")]
     Restarted,
     /// The stream ended before its time.
+    #[error("it ended after {:.1} s, {:.1} s are needed", elapsed.as_s(), duration.as_s())]
     TooShort {
         /// How long it lasted.
         elapsed: Span,
@@ -138,6 +112,7 @@ pub enum Refusal {
         duration: Span,
     },
     /// A gyro has too little good time in a mode.
+    #[error("gyro {gyro} was good for {time_s:.1} s{}, {limit_s:.1} s are needed", of_mode(*mode))]
     TooLittleTime {
         /// Index of the gyro.
         gyro: usize,
@@ -149,6 +124,7 @@ pub enum Refusal {
         limit_s: f64,
     },
     /// A gyro has too few good ticks in all that were produced.
+    #[error("{:.1} % of the ticks of gyro {gyro} were good, {:.1} % are needed", good_share * 100.0, limit * 100.0)]
     TooManyBadTicks {
         /// Index of the gyro.
         gyro: usize,
@@ -158,6 +134,9 @@ pub enum Refusal {
         limit: f64,
     },
     /// One mode has many more good ticks than the other.
+    #[error(
+        "the modes of gyro {gyro} are unbalanced: (n₊ − n₋)/(n₊ + n₋) is {imbalance:.3}, at most {limit:.3} is allowed"
+    )]
     ModesUnbalanced {
         /// Index of the gyro.
         gyro: usize,
@@ -167,16 +146,22 @@ pub enum Refusal {
         limit: f64,
     },
     /// The mode never stood still long enough for the noise of a gyro to be seen.
+    #[error("the noise of gyro {gyro} is not known: leave the mode alone for half a minute at least")]
     NoiseNotSeen {
         /// Index of the gyro.
         gyro: usize,
     },
     /// The mean specific force does not say how the unit stands.
+    #[error("the unit cannot be levelled{}", not_levelled(*mean_force_m_per_s2))]
     NotLevelled {
         /// Mean specific force in case axes (m/s²); `None` without any.
         mean_force_m_per_s2: Option<[f64; 3]>,
     },
     /// A constant would change by more than it may.
+    #[error(
+        "{constant} of gyro {gyro} would change by {:+.4} °/h, at most {:.4} °/h is allowed",
+        deg_per_h(*change_rad_per_s), deg_per_h(*limit_rad_per_s)
+    )]
     ChangeBeyondLimit {
         /// Index of the gyro.
         gyro: usize,
@@ -189,63 +174,22 @@ pub enum Refusal {
     },
 }
 
-impl fmt::Display for Refusal {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let deg_per_h = |rate| AngularRate::from_rad_per_s(rate).as_deg_per_h();
-        match self {
-            Self::Moved(moved) => moved.fmt(f),
-            Self::RestNotSeen => f.write_str("too little was seen to say that the unit stood still"),
-            Self::TemperatureOutOfRange { gyro, temperature_deg_c } => write!(
-                f,
-                "gyro {gyro} at {temperature_deg_c:.2} °C is outside the temperatures that its calibration was fitted over"
-            ),
-            Self::Restarted => f.write_str("the producer restarted: begin again"),
-            Self::TooShort { elapsed, duration } => {
-                write!(f, "it ended after {:.1} s, {:.1} s are needed", elapsed.as_s(), duration.as_s())
-            }
-            Self::TooLittleTime { gyro, mode, time_s, limit_s } => {
-                write!(f, "gyro {gyro} was good for {time_s:.1} s")?;
-                match mode {
-                    Some(LasingMode::Plus) => f.write_str(" of mode plus")?,
-                    Some(LasingMode::Minus) => f.write_str(" of mode minus")?,
-                    None => {}
-                }
-                write!(f, ", {limit_s:.1} s are needed")
-            }
-            Self::TooManyBadTicks { gyro, good_share, limit } => {
-                let (good, least) = (good_share * 100.0, limit * 100.0);
-                write!(f, "{good:.1} % of the ticks of gyro {gyro} were good, {least:.1} % are needed")
-            }
-            Self::ModesUnbalanced { gyro, imbalance, limit } => write!(
-                f,
-                "the modes of gyro {gyro} are unbalanced: (n₊ − n₋)/(n₊ + n₋) is {imbalance:.3}, at most {limit:.3} is \
-                 allowed"
-            ),
-            Self::NoiseNotSeen { gyro } => {
-                write!(
-                    f,
-                    "the noise of gyro {gyro} is not known: leave the mode alone for half a minute at least"
-                )
-            }
-            Self::NotLevelled { mean_force_m_per_s2: Some([x, y, z]) } => write!(
-                f,
-                "the unit cannot be levelled from its mean force of {x:.3}, {y:.3}, {z:.3} m/s²: within 2 % of 9.807 is \
-                 needed, and x not vertical"
-            ),
-            Self::NotLevelled { mean_force_m_per_s2: None } => {
-                f.write_str("the unit cannot be levelled: no accelerometer tick came")
-            }
-            Self::ChangeBeyondLimit { gyro, constant, change_rad_per_s, limit_rad_per_s } => {
-                let constant = match constant {
-                    BiasConstant::Static => "C0 (static bias)",
-                    BiasConstant::Magnetic => "B0 (magnetic bias)",
-                };
-                let (change, limit) = (deg_per_h(*change_rad_per_s), deg_per_h(*limit_rad_per_s));
-                write!(
-                    f,
-                    "{constant} of gyro {gyro} would change by {change:+.4} °/h, at most {limit:.4} °/h is allowed"
-                )
-            }
-        }
+fn deg_per_h(rad_per_s: f64) -> f64 {
+    AngularRate::from_rad_per_s(rad_per_s).as_deg_per_h()
+}
+
+fn of_mode(mode: Option<LasingMode>) -> &'static str {
+    match mode {
+        Some(LasingMode::Plus) => " of mode plus",
+        Some(LasingMode::Minus) => " of mode minus",
+        None => "",
     }
+}
+
+/// What a mean force lacks for levelling.
+fn not_levelled(mean_force: Option<[f64; 3]>) -> String {
+    let Some([x, y, z]) = mean_force else { return ": no accelerometer tick came".into() };
+    format!(
+        " from its mean force of {x:.3}, {y:.3}, {z:.3} m/s²: within 2 % of 9.807 is needed, and x not vertical"
+    )
 }

@@ -7,13 +7,14 @@ use thiserror::Error;
 
 use crate::calibration::Calibration;
 use crate::earth::{Place, Tilt};
-use crate::rest::{RestLimits, RestLimitsError};
+use crate::rest::RestLimits;
+use crate::stated::{OutOfRange, outside};
 use crate::units::{AngularRate, Span};
 
 /// Shortest and longest calibration (s).
 pub const DURATION_RANGE_S: [f64; 2] = [30.0, 86_400.0];
-/// Shortest usable time of a mode that may be asked for (s): the monitor of rest needs half a minute of each.
-const SHORTEST_MODE_S: f64 = 30.0;
+/// Shortest and longest usable time of a mode that may be asked for (s): the monitor of rest needs half a minute of each.
+const MODE_TIME_RANGE_S: [f64; 2] = [30.0, DURATION_RANGE_S[1]];
 
 /// A pre-launch calibration as it is asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -66,21 +67,12 @@ impl Default for PreLaunchLimits {
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 #[non_exhaustive]
 pub enum PreLaunchError {
-    /// A number is outside its range, or not a number.
-    #[error("{name} is {got}; from {min} to {max} is allowed")]
-    OutOfRange {
-        /// Field of [`PreLaunchSettings`] or [`PreLaunchLimits`], times in seconds.
-        name: &'static str,
-        /// The number.
-        got: f64,
-        /// Smallest allowed.
-        min: f64,
-        /// Largest allowed.
-        max: f64,
-    },
+    /// A number, times in seconds, is outside its range, or not a number.
+    #[error(transparent)]
+    OutOfRange(#[from] OutOfRange),
     /// A limit of the monitor of rest.
     #[error("rest.{0}")]
-    Rest(RestLimitsError),
+    Rest(OutOfRange),
     /// Nobody said where the unit is.
     #[error("no place: latitude and heading are needed for the rate of the Earth")]
     NoPlace,
@@ -94,19 +86,16 @@ impl PreLaunchSettings {
     #[must_use]
     pub fn validate(&self, calibration: &Calibration) -> Vec<PreLaunchError> {
         let limits = &self.limits;
-        let (shortest_s, longest_s) = (DURATION_RANGE_S[0], DURATION_RANGE_S[1]);
-        let least = f64::MIN_POSITIVE;
-        let numbers = [
-            ("duration_s", self.duration.as_s(), shortest_s, longest_s),
-            ("static_bias_change_rad_per_s", limits.static_bias_change_rad_per_s, least, f64::MAX),
-            ("magnetic_bias_change_rad_per_s", limits.magnetic_bias_change_rad_per_s, least, f64::MAX),
-            ("mode_imbalance", limits.mode_imbalance, 0.0, 1.0),
-            ("time_per_mode_s", limits.time_per_mode.as_s(), SHORTEST_MODE_S, longest_s),
-            ("good_share", limits.good_share, 0.0, 1.0),
-        ];
-        let wrong = numbers.into_iter().filter(|(_, got, min, max)| !(min..=max).contains(&got));
-        let mut errors: Vec<_> =
-            wrong.map(|(name, got, min, max)| PreLaunchError::OutOfRange { name, got, min, max }).collect();
+        let above_zero = [f64::MIN_POSITIVE, f64::MAX];
+        let outside = outside([
+            ("duration_s", self.duration.as_s(), DURATION_RANGE_S),
+            ("static_bias_change_rad_per_s", limits.static_bias_change_rad_per_s, above_zero),
+            ("magnetic_bias_change_rad_per_s", limits.magnetic_bias_change_rad_per_s, above_zero),
+            ("mode_imbalance", limits.mode_imbalance, [0.0, 1.0]),
+            ("time_per_mode_s", limits.time_per_mode.as_s(), MODE_TIME_RANGE_S),
+            ("good_share", limits.good_share, [0.0, 1.0]),
+        ]);
+        let mut errors: Vec<PreLaunchError> = outside.map(Into::into).collect();
         errors.extend(limits.rest.validate().into_iter().map(PreLaunchError::Rest));
         match self.place.map(|place| place.tilt()) {
             None => errors.push(PreLaunchError::NoPlace),

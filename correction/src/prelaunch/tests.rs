@@ -5,6 +5,7 @@ use alloc::vec::Vec;
 
 use super::*;
 use crate::rest::fixture::{FORCE_M_PER_S2, RATE_RAD_PER_S, Still, calibration};
+use crate::sample::OutputKind;
 use crate::units::AngularRate;
 
 fn deg_per_h(value: f64) -> f64 {
@@ -315,6 +316,8 @@ fn progress_tells_time_ticks_and_the_errors_so_far() {
     let progress = run(&settings(), with_modes(20), 120.0, |_, _| {}).progress();
     let gyro = progress.gyros[2];
     assert_eq!((gyro.modes.plus.ticks, gyro.modes.minus.ticks), (3500, 2500));
-    assert!((gyro.mean_temperature_deg_c.unwrap() - 20.2).abs() < 1e-3);
+    let sum = |mode: ModeTotals| mode.mean_temperature_deg_c.unwrap() * mode.time_s;
+    let mean = (sum(gyro.modes.plus) + sum(gyro.modes.minus)) / 120.0;
+    assert!((mean - 20.2).abs() < 1e-3);
     assert!(gyro.standard_error_rad_per_s.unwrap() > 0.0);
 }

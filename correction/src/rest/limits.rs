@@ -3,8 +3,8 @@
 use alloc::vec::Vec;
 
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
+use crate::stated::{OutOfRange, outside};
 use crate::units::{Angle, AngularRate, SpecificForce};
 
 /// Range of the noise factor.
@@ -58,38 +58,23 @@ impl Default for RestLimits {
     }
 }
 
-/// A limit that cannot be.
-#[derive(Debug, Clone, Copy, PartialEq, Error)]
-#[error("{name} is {got}; from {min} to {max} is allowed")]
-pub struct RestLimitsError {
-    /// Field of [`RestLimits`].
-    pub name: &'static str,
-    /// The value.
-    pub got: f64,
-    /// Smallest allowed.
-    pub min: f64,
-    /// Largest allowed.
-    pub max: f64,
-}
-
 impl RestLimits {
-    /// Everything that is wrong with the limits; empty for limits that can be used.
+    /// Everything that is wrong with the limits, each with the field's name; empty for limits that can be used.
     #[must_use]
-    pub fn validate(&self) -> Vec<RestLimitsError> {
-        let (least, [fewest, most]) = (f64::MIN_POSITIVE, SIGMAS_RANGE);
-        let checks = [
-            ("turn_rad", self.turn_rad, least, f64::MAX),
-            ("switch_turn_rad", self.switch_turn_rad, least, f64::MAX),
-            ("slow_turn_rad", self.slow_turn_rad, least, f64::MAX),
-            ("rate_rad_per_s", self.rate_rad_per_s, least, f64::MAX),
-            ("push_m_per_s", self.push_m_per_s, least, f64::MAX),
-            ("force_change_m_per_s2", self.force_change_m_per_s2, least, f64::MAX),
-            ("shake_m_per_s2", self.shake_m_per_s2, least, f64::MAX),
-            ("sigmas", self.sigmas, fewest, most),
-            ("turn_ceiling_rad", self.turn_ceiling_rad, self.turn_rad.max(least), f64::MAX),
-            ("push_ceiling_m_per_s", self.push_ceiling_m_per_s, self.push_m_per_s.max(least), f64::MAX),
-        ];
-        let wrong = checks.into_iter().filter(|(_, got, min, max)| !(min..=max).contains(&got));
-        wrong.map(|(name, got, min, max)| RestLimitsError { name, got, min, max }).collect()
+    pub fn validate(&self) -> Vec<OutOfRange> {
+        let (least, above_zero) = (f64::MIN_POSITIVE, [f64::MIN_POSITIVE, f64::MAX]);
+        let outside = outside([
+            ("turn_rad", self.turn_rad, above_zero),
+            ("switch_turn_rad", self.switch_turn_rad, above_zero),
+            ("slow_turn_rad", self.slow_turn_rad, above_zero),
+            ("rate_rad_per_s", self.rate_rad_per_s, above_zero),
+            ("push_m_per_s", self.push_m_per_s, above_zero),
+            ("force_change_m_per_s2", self.force_change_m_per_s2, above_zero),
+            ("shake_m_per_s2", self.shake_m_per_s2, above_zero),
+            ("sigmas", self.sigmas, SIGMAS_RANGE),
+            ("turn_ceiling_rad", self.turn_ceiling_rad, [self.turn_rad.max(least), f64::MAX]),
+            ("push_ceiling_m_per_s", self.push_ceiling_m_per_s, [self.push_m_per_s.max(least), f64::MAX]),
+        ]);
+        outside.collect()
     }
 }

@@ -1,10 +1,12 @@
 //! One kind of window over time: what is usual, and what is not.
 
-use alloc::vec::Vec;
 use core::f64::consts::SQRT_2;
 
 use arrayvec::ArrayVec;
 use serde::{Deserialize, Serialize};
+
+use crate::recent::Recent;
+use crate::vector::{minus, plus};
 
 /// Windows from which the first picture of the noise is taken.
 const LEARNING: usize = 30;
@@ -87,11 +89,10 @@ impl Scale {
 }
 
 /// Means of windows in the order in which they came.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(super) struct Track {
-    /// The last windows; the oldest is overwritten once there are [`RECENT`].
-    recent: Vec<[f64; 3]>,
-    oldest: usize,
+    /// The last windows.
+    recent: Recent<[f64; 3], RECENT>,
     learned: bool,
     /// The last window's deviation, times its length.
     last: [f64; 3],
@@ -103,30 +104,6 @@ pub(super) struct Track {
 }
 
 impl Track {
-    pub(super) fn new() -> Self {
-        Self::with_memory(Vec::with_capacity(RECENT))
-    }
-
-    fn with_memory(recent: Vec<[f64; 3]>) -> Self {
-        Self {
-            recent,
-            oldest: 0,
-            learned: false,
-            last: [0.0; 3],
-            held: ArrayVec::new(),
-            block: ([0.0; 3], 0),
-            blocks: ArrayVec::new(),
-            first_minute: None,
-        }
-    }
-
-    /// Forgets everything but where its memory is.
-    pub(super) fn clear(&mut self) {
-        let mut recent = core::mem::take(&mut self.recent);
-        recent.clear();
-        *self = Self::with_memory(recent);
-    }
-
     pub(super) fn is_empty(&self) -> bool {
         self.recent.is_empty()
     }
@@ -196,8 +173,8 @@ impl Track {
 
     /// Deviation of the last minute from the minutes before, times a minute; looked at whenever a block is complete.
     pub(super) fn drift_since_before(&self, scale: &Scale, floor: f64) -> Option<Finding> {
-        let (before, minute) = self.blocks.split_at_checked(self.blocks.len().checked_sub(MINUTE)?)?;
-        if self.block.1 > 0 || before.len() < MINUTE {
+        let (before, minute) = self.last_minute()?;
+        if before.len() < MINUTE {
             return None;
         }
         let change = minus(Usual::of(minute).mean, Usual::of(before).mean);
@@ -206,11 +183,14 @@ impl Track {
 
     /// Deviation of the last minute's mean from that of the first; looked at whenever a block is complete.
     pub(super) fn drift_since_start(&self, scale: &Scale, floor: f64) -> Option<Finding> {
-        let minute = self.blocks.get(self.blocks.len().checked_sub(MINUTE)?..)?;
-        if self.block.1 > 0 {
-            return None;
-        }
+        let (_, minute) = self.last_minute()?;
         self.drift(scale, minus(Usual::of(minute).mean, self.first_minute?), floor, 1.0)
+    }
+
+    /// The blocks before the last minute, and those in it; `None` while a block is open.
+    fn last_minute(&self) -> Option<(&[[f64; 3]], &[[f64; 3]])> {
+        let before = self.blocks.len().checked_sub(MINUTE).filter(|_| self.block.1 == 0)?;
+        self.blocks.split_at_checked(before)
     }
 
     /// Judges the change of a minute's mean, which stands `times` that mean's unit of measure.
@@ -224,41 +204,27 @@ impl Track {
     /// Judges the first windows together: by medians, so that one that does not belong to them does not hide itself.
     fn learn(&mut self, scale: &Scale) -> Option<Finding> {
         self.learned = true;
-        let (mut single, mut both, mut sigmas) = ([0.0; 3], [0.0; 3], [0.0; 3]);
-        for (axis, sigma) in sigmas.iter_mut().enumerate() {
-            let windows = self.recent.iter().filter_map(|window| window.get(axis).copied());
-            let mut deviations: ArrayVec<f64, LEARNING> = windows.take(LEARNING).collect();
-            let middle = median(&mut deviations.clone());
-            for deviation in &mut deviations {
-                *deviation -= middle;
-            }
-            let mut sizes: ArrayVec<f64, LEARNING> = deviations.iter().map(|away| away.abs()).collect();
-            *sigma = LEARNING_FACTOR * SIGMA_PER_MEDIAN * median(&mut sizes);
-            let pairs = deviations.iter().zip(deviations.iter().skip(1)).map(|(a, b)| scale.size(a + b));
-            let largest = [
-                (&mut single, deviations.iter().map(|away| scale.size(*away)).fold(0.0, f64::max)),
-                (&mut both, pairs.fold(0.0, f64::max)),
-            ];
-            for (values, largest) in largest {
-                if let Some(value) = values.get_mut(axis) {
-                    *value = largest;
-                }
-            }
-        }
-        Finding::worst(single, sigmas.map(|sigma| scale.limit(sigma)))
-            .or_else(|| Finding::worst(both, sigmas.map(|sigma| scale.limit(sigma * SQRT_2))))
+        let axes = [0, 1, 2].map(|axis| {
+            let windows = self.recent.iter().take(LEARNING);
+            let mut away: ArrayVec<f64, LEARNING> = windows.map(|window| window[axis]).collect();
+            let middle = median(&mut away.clone());
+            away.iter_mut().for_each(|away| *away -= middle);
+            let mut sizes: ArrayVec<f64, LEARNING> = away.iter().map(|away| away.abs()).collect();
+            let sigma = LEARNING_FACTOR * SIGMA_PER_MEDIAN * median(&mut sizes);
+            let largest = away.iter().map(|away| scale.size(*away)).fold(0.0, f64::max);
+            let pairs = away.iter().zip(away.iter().skip(1)).map(|(a, b)| scale.size(a + b));
+            (sigma, largest, pairs.fold(0.0, f64::max))
+        });
+        let limits = |times: f64| axes.map(|(sigma, ..)| scale.limit(sigma * times));
+        Finding::worst(axes.map(|(_, single, _)| single), limits(1.0))
+            .or_else(|| Finding::worst(axes.map(|(.., pair)| pair), limits(SQRT_2)))
             .or_else(|| {
                 self.held.iter().find_map(|(scale, mean, duration_s)| self.judge(scale, *mean, *duration_s))
             })
     }
 
     fn remember(&mut self, mean: [f64; 3]) {
-        if self.recent.len() < RECENT {
-            self.recent.push(mean);
-        } else if let Some(oldest) = self.recent.get_mut(self.oldest) {
-            *oldest = mean;
-            self.oldest = (self.oldest + 1) % RECENT;
-        }
+        self.recent.push(mean);
         let (sum, count) = &mut self.block;
         *sum = plus(*sum, mean);
         *count += 1;
@@ -304,12 +270,4 @@ impl Usual {
 fn median(values: &mut [f64]) -> f64 {
     values.sort_unstable_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(0.0)
-}
-
-fn plus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
-}
-
-fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }

@@ -4,6 +4,8 @@ use alloc::vec::Vec;
 
 use serde::{Deserialize, Serialize};
 
+use crate::stated::{OutOfRange, outside};
+
 /// Most ticks of one transition.
 pub const MAX_TRANSITION_TICKS: u8 = 3;
 /// Most readings of one fit on either side of the switch.
@@ -49,17 +51,8 @@ impl Default for ReversalParts {
 #[non_exhaustive]
 pub enum ReversalError {
     /// A number is outside its range.
-    #[error("{name} is {got}; from {min} to {max} is allowed")]
-    OutOfRange {
-        /// Field of [`ReversalParts`].
-        name: &'static str,
-        /// The number.
-        got: u8,
-        /// Smallest allowed.
-        min: u8,
-        /// Largest allowed.
-        max: u8,
-    },
+    #[error(transparent)]
+    OutOfRange(#[from] OutOfRange<u8>),
     /// A polynomial has more coefficients than readings to fit them to.
     #[error("{name} is {got} with {readings} readings; it must be below their number")]
     DegreeNeedsReadings {
@@ -70,6 +63,15 @@ pub enum ReversalError {
         /// Readings of that fit.
         readings: u8,
     },
+}
+
+impl ReversalError {
+    /// Field of [`ReversalParts`] that it speaks of.
+    pub(crate) fn field(&self) -> &'static str {
+        match self {
+            Self::OutOfRange(OutOfRange { name, .. }) | Self::DegreeNeedsReadings { name, .. } => name,
+        }
+    }
 }
 
 /// A validated substitution.
@@ -85,19 +87,15 @@ impl Reversal {
     ///
     /// Everything that is wrong with it.
     pub fn new(parts: &ReversalParts) -> Result<Self, Vec<ReversalError>> {
-        let mut errors = Vec::new();
-        for (name, got, min, max) in [
-            ("transition_ticks", parts.transition_ticks, 1, MAX_TRANSITION_TICKS),
-            ("predict_readings", parts.predict_readings, 1, MAX_FIT_READINGS),
-            ("predict_degree", parts.predict_degree, 0, MAX_PREDICT_DEGREE),
-            ("fit_readings_before", parts.fit_readings_before, 1, MAX_FIT_READINGS),
-            ("fit_readings_after", parts.fit_readings_after, 1, MAX_FIT_READINGS),
-            ("fit_degree", parts.fit_degree, 0, MAX_FIT_DEGREE),
-        ] {
-            if !(min..=max).contains(&got) {
-                errors.push(ReversalError::OutOfRange { name, got, min, max });
-            }
-        }
+        let outside = outside([
+            ("transition_ticks", parts.transition_ticks, [1, MAX_TRANSITION_TICKS]),
+            ("predict_readings", parts.predict_readings, [1, MAX_FIT_READINGS]),
+            ("predict_degree", parts.predict_degree, [0, MAX_PREDICT_DEGREE]),
+            ("fit_readings_before", parts.fit_readings_before, [1, MAX_FIT_READINGS]),
+            ("fit_readings_after", parts.fit_readings_after, [1, MAX_FIT_READINGS]),
+            ("fit_degree", parts.fit_degree, [0, MAX_FIT_DEGREE]),
+        ]);
+        let mut errors: Vec<ReversalError> = outside.map(Into::into).collect();
         let fit_readings = parts.fit_readings_before.saturating_add(parts.fit_readings_after);
         for (name, got, readings) in [
             ("predict_degree", parts.predict_degree, parts.predict_readings),

@@ -5,6 +5,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::sample::Sensors;
+use crate::stated::OutOfRange;
 
 const ARCSEC: f64 = PI / 180.0 / 3600.0;
 const TICK_NS: i64 = 5_000_000;
@@ -417,7 +418,7 @@ fn every_error_is_reported_at_once() {
         fit_degree: 3,
     };
     let errors = Reversal::new(&parts).unwrap_err();
-    let out = |name, got, min, max| ReversalError::OutOfRange { name, got, min, max };
+    let out = |name, got, min, max| ReversalError::OutOfRange(OutOfRange { name, got, min, max });
     let degree = |name, got, readings| ReversalError::DegreeNeedsReadings { name, got, readings };
     assert_eq!(
         errors,

@@ -78,12 +78,7 @@ impl Follows<2> for AccelModel {
         &self.lags
     }
 
-    fn terms(
-        &self,
-        thermal: &ThermalState,
-        lagged: &[f64; MAX_LAGS],
-        _: &ThermalFilter,
-    ) -> ([f64; 2], bool) {
+    fn terms(&self, thermal: &ThermalState, lagged: &[f64; MAX_LAGS], _: &ThermalFilter) -> ([f64; 2], bool) {
         let temperature = thermal.temperature;
         let (bias, scale_factor) = (self.bias.at(temperature), self.scale_factor.at(temperature));
         let mut sum = bias.value;

@@ -102,7 +102,8 @@ impl<const T: usize> Bank<T> {
         (old_sensors, old): (&[S], &Self),
         kept: impl Fn(usize) -> bool,
     ) {
-        let decays = |sensor: &S| sensor.lags().iter().map(|lag| lag.decay).collect::<ArrayVec<_, MAX_LAGS>>();
+        let decays =
+            |sensor: &S| sensor.lags().iter().map(|lag| lag.decay).collect::<ArrayVec<_, MAX_LAGS>>();
         let lagged = self.lagged.iter_mut().zip(&old.lagged);
         for (lane, ((sensor, before), (lagged, old))) in
             sensors.iter().zip(old_sensors).zip(lagged).enumerate()
@@ -130,7 +131,12 @@ impl<const T: usize> Bank<T> {
     }
 
     /// Moves the lags of a channel's sensors on by one grid point.
-    pub(crate) fn grid_point<S: Follows<T>>(&mut self, sensors: &[S], channel: usize, thermal: &ThermalState) {
+    pub(crate) fn grid_point<S: Follows<T>>(
+        &mut self,
+        sensors: &[S],
+        channel: usize,
+        thermal: &ThermalState,
+    ) {
         for (sensor, lagged) in sensors.iter().zip(&mut self.lagged) {
             if sensor.channel() == Some(channel) {
                 super::lag::advance(sensor.lags(), lagged, thermal.temperature);

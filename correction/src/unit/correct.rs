@@ -103,15 +103,15 @@ impl Corrector {
             slew: None,
             slew_share: 0.0,
         };
-        let Some((old_calibration, old)) = before
-            .filter(|(old, _)| old.gyro_count() == gyros && old.accel_count() == accels)
+        let Some((old_calibration, old)) =
+            before.filter(|(old, _)| old.gyro_count() == gyros && old.accel_count() == accels)
         else {
             return new;
         };
         let same_output = old_calibration.gyro_output == calibration.gyro_output
             && old_calibration.accel_output == calibration.accel_output;
-        let slew = (slew > Span::ZERO && same_output)
-            .then(|| Box::new(old.in_use(&old_calibration, takeover)));
+        let slew =
+            (slew > Span::ZERO && same_output).then(|| Box::new(old.in_use(&old_calibration, takeover)));
         let same_basis = old_calibration.same_thermal_basis(calibration);
         let same_bias = |i| same_basis && old_calibration.gyros.get(i) == calibration.gyros.get(i);
         let Self { mut drift, thermal, .. } = new;

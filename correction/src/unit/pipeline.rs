@@ -173,8 +173,7 @@ impl Pipeline {
         let Released { tick, output, .. } = released;
         // The run that a sequence number or a time was meant for is over with a restart.
         if self.pending.is_some()
-            && let Some(change) =
-                self.pending.take_if(|change| released.restart || change.at.is_due(tick))
+            && let Some(change) = self.pending.take_if(|change| released.restart || change.at.is_due(tick))
         {
             self.take_effect(change);
         }

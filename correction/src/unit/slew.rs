@@ -46,7 +46,9 @@ impl Slewing<'_> {
     /// Terms on their way from the old ones.
     pub(super) fn terms<const N: usize, const T: usize>(&self, new: &mut [[f64; N]; T], old: &[Lanes; T]) {
         for (new, old) in new.iter_mut().zip(old) {
-            new.iter_mut().zip(narrow::<N>(old)).for_each(|(new, old)| *new = between(*new, *old, self.share));
+            new.iter_mut()
+                .zip(narrow::<N>(old))
+                .for_each(|(new, old)| *new = between(*new, *old, self.share));
         }
     }
 

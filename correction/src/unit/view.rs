@@ -30,7 +30,8 @@ impl Unit {
 
     /// The temperature channels as they stand at the last tick; none without a calibration.
     pub fn channels(&self) -> impl Iterator<Item = ChannelReport> + '_ {
-        self.pipeline.active
+        self.pipeline
+            .active
             .iter()
             .flat_map(|active| active.corrector.thermal().report(&active.calibration, self.pipeline.last_end))
     }
@@ -119,8 +120,9 @@ impl Unit {
     /// Ends a self-test that gets no ticks with what it has seen: for the owner's clock.
     pub fn expire_self_test(&mut self) {
         if let Some(active) = &self.pipeline.active {
-            let temperature =
-                |name: &_| active.corrector.thermal().alive(&active.calibration, name, self.pipeline.last_end);
+            let temperature = |name: &_| {
+                active.corrector.thermal().alive(&active.calibration, name, self.pipeline.last_end)
+            };
             self.pipeline.operating.end_self_test((&active.calibration, active.revision), &temperature);
         }
     }

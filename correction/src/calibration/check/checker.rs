@@ -3,65 +3,95 @@
 use alloc::vec::Vec;
 
 use super::super::defect::{Defect, DefectKind, Section};
+use crate::sample::ChannelName;
 
 /// Collects defects.
 pub(super) struct Checker {
     pub(super) defects: Vec<Defect>,
+    section: Section,
+    /// How many temperature channels there are to be named.
+    channels: usize,
 }
 
 impl Checker {
-    pub(super) fn push(&mut self, section: Section, field: &'static str, kind: DefectKind) {
-        self.defects.push(Defect { section, field, kind });
+    pub(super) fn new(channels: usize) -> Self {
+        Self { defects: Vec::new(), section: Section::Filter, channels }
     }
 
-    pub(super) fn within(&mut self, section: Section, field: &'static str, value: f64, low: f64, high: f64) {
+    /// What is looked at from now on is part of this section.
+    pub(super) fn at(&mut self, section: Section) -> &mut Self {
+        self.section = section;
+        self
+    }
+
+    pub(super) fn push(&mut self, field: &'static str, kind: impl Into<DefectKind>) {
+        self.defects.push(Defect { section: self.section, field, kind: kind.into() });
+    }
+
+    pub(super) fn within(&mut self, field: &'static str, value: f64, low: f64, high: f64) {
         if !(low..=high).contains(&value) {
-            self.push(section, field, DefectKind::OutOfRange { value, low, high });
+            self.push(field, DefectKind::OutOfRange { value, low, high });
         }
     }
 
-    pub(super) fn count(
-        &mut self,
-        section: Section,
-        field: &'static str,
-        count: usize,
-        low: usize,
-        high: usize,
-    ) {
+    pub(super) fn positive(&mut self, field: &'static str, value: f64) {
+        self.within(field, value, f64::MIN_POSITIVE, HUGE);
+    }
+
+    pub(super) fn count(&mut self, field: &'static str, count: usize, low: usize, high: usize) {
         if !(low..=high).contains(&count) {
-            self.push(section, field, DefectKind::Count { count, low, high });
+            self.push(field, DefectKind::Count { count, low, high });
+        }
+    }
+
+    /// Coefficients of a polynomial, at least one of them.
+    pub(super) fn coefficients(&mut self, field: &'static str, coefficients: &[f64], most: usize) {
+        self.count(field, coefficients.len(), 1, most);
+        for &coefficient in coefficients {
+            self.within(field, coefficient, -HUGE, HUGE);
         }
     }
 
     /// A range that runs upwards and lies within limits.
-    pub(super) fn range(
-        &mut self,
-        section: Section,
-        field: &'static str,
-        [from, to]: [f64; 2],
-        low: f64,
-        high: f64,
-    ) {
+    pub(super) fn range(&mut self, field: &'static str, [from, to]: [f64; 2], low: f64, high: f64) {
         if from >= to {
-            self.push(section, field, DefectKind::InvertedRange { low: from, high: to });
+            self.push(field, DefectKind::InvertedRange { low: from, high: to });
         }
         for end in [from, to] {
-            self.within(section, field, end, low, high);
+            self.within(field, end, low, high);
         }
     }
 
-    pub(super) fn channel(
-        &mut self,
-        section: Section,
-        field: &'static str,
-        index: Option<usize>,
-        channels: usize,
-    ) {
-        if let Some(index) = index
-            && index >= channels
-        {
-            self.push(section, field, DefectKind::NoSuchChannel { index, channels });
+    pub(super) fn channel(&mut self, field: &'static str, index: Option<usize>) {
+        let channels = self.channels;
+        if let Some(index) = index.filter(|index| *index >= channels) {
+            self.push(field, DefectKind::NoSuchChannel { index, channels });
         }
+    }
+
+    /// A name that none of the earlier things has; each of these with what it is, its index and its name.
+    pub(super) fn unique(
+        &mut self,
+        name: ChannelName,
+        mut earlier: impl Iterator<Item = (&'static str, usize, ChannelName)>,
+    ) {
+        if let Some((of, other, _)) = earlier.find(|(.., taken)| *taken == name) {
+            self.push("name", DefectKind::DuplicateName { of, other });
+        }
+    }
+
+    /// What was compiled; its errors otherwise, each with the field that it speaks of.
+    pub(super) fn compiled<T, E: Into<DefectKind>>(
+        &mut self,
+        compiled: Result<T, Vec<E>>,
+        field: fn(&E) -> &'static str,
+    ) -> Option<T> {
+        let errors = compiled.map_err(|errors| {
+            for error in errors {
+                self.push(field(&error), error);
+            }
+        });
+        errors.ok()
     }
 }
 

@@ -9,30 +9,30 @@ use crate::sample::ChannelName;
 pub const MAX_SELF_TEST_READINGS: usize = 32;
 
 /// Every limit is one, and no name stands for two readings: both kinds come in on one topic.
-pub(super) fn check_self_test(checker: &mut Checker, parts: &SelfTestParts) {
-    let (voltages, counters) = (&parts.voltages, &parts.counters);
-    checker.count(Section::SelfTest, "voltages", voltages.len(), 0, MAX_SELF_TEST_READINGS);
-    checker.count(Section::SelfTest, "counters", counters.len(), 0, MAX_SELF_TEST_READINGS);
+pub(super) fn check_self_test(checker: &mut Checker, SelfTestParts { voltages, counters }: &SelfTestParts) {
+    checker.at(Section::SelfTest).count("voltages", voltages.len(), 0, MAX_SELF_TEST_READINGS);
+    checker.count("counters", counters.len(), 0, MAX_SELF_TEST_READINGS);
+    let voltage_names = || voltages.iter().enumerate().map(|(i, voltage)| ("voltage", i, voltage.name));
+    let counter_names = || counters.iter().enumerate().map(|(i, counter)| ("counter", i, counter.name));
     for (i, voltage) in voltages.iter().enumerate() {
-        let section = Section::SelfTestVoltage(i);
-        let other = voltages.iter().take(i).position(|earlier| earlier.name == voltage.name);
-        name(checker, section, &voltage.name, other.map(|other| ("voltage", other)));
-        checker.range(section, "range_v", voltage.range_v, -HUGE, HUGE);
+        name(checker.at(Section::SelfTestVoltage(i)), voltage.name, voltage_names().take(i));
+        checker.range("range_v", voltage.range_v, -HUGE, HUGE);
     }
     for (i, counter) in counters.iter().enumerate() {
-        let section = Section::SelfTestCounter(i);
-        let voltage = voltages.iter().position(|earlier| earlier.name == counter.name);
-        let other = counters.iter().take(i).position(|earlier| earlier.name == counter.name);
-        let other = voltage.map(|other| ("voltage", other)).or(other.map(|other| ("counter", other)));
-        name(checker, section, &counter.name, other);
-        checker.within(section, "max_increase", counter.max_increase, 0.0, HUGE);
+        let earlier = voltage_names().chain(counter_names().take(i));
+        name(checker.at(Section::SelfTestCounter(i)), counter.name, earlier);
+        checker.within("max_increase", counter.max_increase, 0.0, HUGE);
     }
 }
 
-fn name(checker: &mut Checker, section: Section, name: &ChannelName, other: Option<(&'static str, usize)>) {
+fn name(
+    checker: &mut Checker,
+    name: ChannelName,
+    earlier: impl Iterator<Item = (&'static str, usize, ChannelName)>,
+) {
     if name.is_empty() {
-        checker.push(section, "name", DefectKind::NoName);
-    } else if let Some((of, other)) = other {
-        checker.push(section, "name", DefectKind::DuplicateName { of, other });
+        checker.push("name", DefectKind::NoName);
+    } else {
+        checker.unique(name, earlier);
     }
 }

@@ -61,7 +61,7 @@ fn the_one_furthest_in_the_future_makes_room() {
     assert_eq!(waiting.push(&reference(0, 60)), Some(broken));
     let later = reference(6000, 6060);
     assert_eq!(waiting.push(&later), Some(later));
-    assert_eq!(waiting.len(), MAX_WAITING_REFERENCES);
+    assert_eq!(waiting.references.len(), MAX_WAITING_REFERENCES);
 }
 
 #[test]

@@ -63,11 +63,11 @@ fn an_end_inside_a_cell_errs_by_no_more_than_it_says() {
 #[test]
 fn time_before_the_ring_is_refused_and_forgotten_cells_do_not_come_back() {
     let ring = fed(0.0, 300.0, TICK, |t| Some(if t < 172.0 { 1.0 } else { 0.0 }));
-    assert_eq!(ring.mean(&span(171.9, 240.0)), Err(NoMean::TooOld));
+    assert_eq!(ring.mean(&span(171.9, 240.0)), Err(ReferenceRefusal::TooOld));
     assert!(ring.mean(&span(172.25, 292.0)).unwrap().rate.abs() < 1e-15);
     let late = fed(100.0, 200.0, TICK, |_| Some(0.0));
-    assert_eq!(late.mean(&span(90.0, 110.0)), Err(NoMean::Gap));
-    assert_eq!(Ring::new().mean(&span(0.0, 60.0)), Err(NoMean::TooOld));
+    assert_eq!(late.mean(&span(90.0, 110.0)), Err(ReferenceRefusal::Gap));
+    assert_eq!(Ring::new().mean(&span(0.0, 60.0)), Err(ReferenceRefusal::TooOld));
 }
 
 #[test]
@@ -78,7 +78,7 @@ fn a_few_lost_ticks_are_bridged_and_a_gap_is_refused() {
     assert!((mean.rate / 2e-5 - 1.0).abs() < 1e-12, "{mean:?}");
     let gone = |gap_s: f64| move |t: f64| (!(30.0..30.0 + gap_s).contains(&t)).then_some(2e-5);
     assert!(fed(0.0, 61.0, TICK, gone(1.1)).mean(&span(0.0, 60.0)).is_ok());
-    assert_eq!(fed(0.0, 61.0, TICK, gone(1.3)).mean(&span(0.0, 60.0)), Err(NoMean::Gap));
+    assert_eq!(fed(0.0, 61.0, TICK, gone(1.3)).mean(&span(0.0, 60.0)), Err(ReferenceRefusal::Gap));
 }
 
 #[test]

@@ -6,8 +6,8 @@ fn name(text: &str) -> ChannelName {
 
 #[test]
 fn a_voltage_is_judged_by_its_worst_value_and_a_counter_by_its_increase() {
-    let voltage = SelfTestVoltage { name: name("half_wave_x"), range_v: [180.0, 220.0] };
-    let counter = SelfTestCounter { name: name("crc_errors"), max_increase: 2.0 };
+    let [voltage, counter] = [name("half_wave_x"), name("crc_errors")];
+    let reported = |item, name, limits| Reported { item, name, limits, values: None };
     let mut test = SelfTest {
         start: None,
         end: Timestamp::default(),
@@ -15,23 +15,23 @@ fn a_voltage_is_judged_by_its_worst_value_and_a_counter_by_its_increase() {
         accel_ticks: 0,
         gyros: Sensors::new(),
         accels: Sensors::new(),
-        parts: SelfTestParts { voltages: [voltage].into(), counters: [counter].into() },
-        voltages: alloc::vec![None],
-        counters: alloc::vec![None],
+        reported: [
+            reported(CheckItem::Voltage(voltage), voltage, [180.0, 220.0]),
+            reported(CheckItem::Counter(counter), counter, [0.0, 2.0]),
+        ]
+        .into(),
     };
     let mut feed = |name, value| test.health(&HealthReading { name, time: Timestamp::default(), value });
     for value in [200.0, 221.5, 199.0] {
-        feed(voltage.name, value);
+        feed(voltage, value);
     }
     for value in [70.0, 71.0, 73.0] {
-        feed(counter.name, value);
+        feed(counter, value);
     }
     feed(name("something_else"), 1e9);
-    let worst = |reported: &Option<Reported>| reported.map(|reported| reported.worst);
-    assert_eq!(worst(&test.voltages[0]), Some(221.5));
-    let increase = test.counters[0].map(|reported| reported.last - reported.first);
-    assert_eq!(increase, Some(3.0));
-    assert!(!within(CheckItem::Counter(counter.name), increase, [0.0, counter.max_increase]).passed);
+    let [voltage, counter] = [0, 1].map(|index| test.reported[index].result());
+    assert_eq!((voltage.value, voltage.passed), (Some(221.5), false));
+    assert_eq!((counter.value, counter.passed), (Some(3.0), false));
 }
 
 #[test]

@@ -34,7 +34,8 @@ impl Corrector {
         self.seen.specific_force = None;
         self.seen.accels.count = 0;
         out.accel_flags = of_sensors([SensorFlags::empty(); MAX_SENSORS], count);
-        let (Some(orientation), Some(axes)) = (&calibration.accel_orientation, &self.thermal.accel_axes) else {
+        let (Some(orientation), Some(axes)) = (&calibration.accel_orientation, &self.thermal.accel_axes)
+        else {
             return;
         };
         let Some(raw) = tick.accel else {

@@ -8,9 +8,7 @@ use crate::calibration::Calibration;
 use crate::lanes::{narrow, of_readings, put};
 use crate::orientation::SensorMask;
 use crate::reversal::{Substitution, TickInput};
-use crate::sample::{
-    CorrectedTick, GyroTick, LasingMode, MIN_SENSORS, OutputKind, SensorFlags, TickFlags,
-};
+use crate::sample::{CorrectedTick, GyroTick, LasingMode, MIN_SENSORS, OutputKind, SensorFlags, TickFlags};
 use crate::servo::{ServoTick, Transient};
 use crate::unit::counters::Counters;
 use crate::unit::pipeline::Released;
