@@ -2,12 +2,12 @@
 
 use std::collections::VecDeque;
 
-use isotherm_correction::sample::{AccelTick, GyroTick, OutputKind, Sensors, TemperatureReading};
+use isotherm_correction::sample::{AccelTick, ChannelName, GyroTick, OutputKind, Sensors, TemperatureReading};
 use isotherm_correction::units::Timestamp;
 use isotherm_protocol::codec::encode;
 use isotherm_protocol::key::{Input, RawStream};
 use isotherm_protocol::raw::{
-    AccelBatch, GyroBatch, HealthBatch, HealthReading, HealthTick, TemperatureBatch, TemperatureTick,
+    AccelBatch, GyroBatch, HealthBatch, HealthReading, HealthTick, TemperatureBatch,
 };
 use isotherm_simulator::Simulation;
 
@@ -90,10 +90,7 @@ impl Script {
     }
 
     fn temperature_frame(&mut self, readings: &[TemperatureReading]) {
-        let time = readings.first().map_or(0, |reading| reading.time.as_ns());
-        let raw = readings.iter().map(|reading| reading.raw).collect();
-        let channels = readings.iter().map(|reading| reading.channel).collect();
-        let batch = TemperatureBatch { channels, ticks: vec![TemperatureTick { time_ns: time, raw }] };
+        let batch = TemperatureBatch { readings: readings.to_vec() };
         let frame = encode(&batch).expect("it can be encoded");
         self.steps.push(Step::Frame(Input::Raw(RawStream::Temperature), frame));
     }
@@ -169,10 +166,14 @@ impl Script {
     fn temperatures(&mut self) -> Vec<u8> {
         let warming = self.warming * f64::from(u32::try_from(self.next % 50_000).expect("a small number"));
         let noise = 0.01 * self.dice.between_minus_one_and_one();
-        let raw = self.channels.iter().map(|(_, raw)| raw * (1.0 + 1e-3 * (warming + noise))).collect();
-        let ticks = vec![TemperatureTick { time_ns: self.now_ns.saturating_sub(self.tick.as_ns()), raw }];
-        let channels = self.channels.iter().map(|(name, _)| *name).collect();
-        encode(&TemperatureBatch { channels, ticks }).expect("it can be encoded")
+        let time = Timestamp::from_ns(self.now_ns.saturating_sub(self.tick.as_ns()));
+        let reading = |&(channel, raw): &(ChannelName, f64)| TemperatureReading {
+            channel,
+            time,
+            raw: raw * (1.0 + 1e-3 * (warming + noise)),
+        };
+        let readings = self.channels.iter().map(reading).collect();
+        encode(&TemperatureBatch { readings }).expect("it can be encoded")
     }
 
     fn health(&mut self) -> Vec<u8> {
@@ -188,11 +189,11 @@ impl Script {
 }
 
 fn gyro_frame(output: OutputKind, ticks: &[GyroTick]) -> Step {
-    let batch = GyroBatch::from_core(output, ticks).expect("readings of that kind");
+    let batch = GyroBatch { output, ticks: ticks.to_vec() };
     Step::Frame(Input::Raw(RawStream::Gyro), encode(&batch).expect("it can be encoded"))
 }
 
 fn accel_frame(output: OutputKind, ticks: &[AccelTick]) -> Step {
-    let batch = AccelBatch::from_core(output, ticks).expect("readings of that kind");
+    let batch = AccelBatch { output, ticks: ticks.to_vec() };
     Step::Frame(Input::Raw(RawStream::Accel), encode(&batch).expect("it can be encoded"))
 }

@@ -147,7 +147,7 @@ mod tests {
         assert_eq!(compare(&committed, &recording(|_| ())), Ok(()));
         let flip = |batch: &mut CorrectedBatch| {
             for tick in batch.ticks.iter_mut().filter(|tick| tick.sequence == 1071) {
-                let angle = &mut tick.delta_angle_rad[1];
+                let angle = &mut tick.delta_angle[1];
                 *angle = f64::from_bits(angle.to_bits() ^ 1);
             }
         };

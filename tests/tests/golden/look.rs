@@ -92,8 +92,8 @@ fn observation(unit: &Unit, say: &mut impl FnMut(&str, String)) {
         let values = [gyro.reading, gyro.rate, gyro.bias, gyro.drift, gyro.temperature_deg_c];
         say(&format!("gyro {index}"), format!("{} {:x}", bits(values), gyro.flags.bits()));
     }
-    for (index, accel) in seen.accels.iter().enumerate() {
-        say(&format!("accelerometer {index}"), format!("{} {:x}", bits([accel.reading]), accel.flags.bits()));
+    for (index, (reading, flags)) in seen.accels.iter().enumerate() {
+        say(&format!("accelerometer {index}"), format!("{} {:x}", bits([reading]), flags.bits()));
     }
     say("seen in case axes", format!("{} {:?}", bits(seen.angular_rate), seen.specific_force.map(bits)));
 }
@@ -148,13 +148,20 @@ fn modes(modes: &ByMode<ModeTotals>) -> String {
     .join(", ")
 }
 
+fn mean_temperature(modes: &ByMode<ModeTotals>) -> Option<f64> {
+    let each = [&modes.without, &modes.plus, &modes.minus];
+    let time_s: f64 = each.iter().map(|mode| mode.time_s).sum();
+    let sum: f64 = each.iter().filter_map(|mode| Some(mode.mean_temperature_deg_c? * mode.time_s)).sum();
+    (time_s > 0.0).then(|| sum / time_s)
+}
+
 fn pre_launch(view: &PreLaunchView<'_>) -> String {
     match view {
         PreLaunchView::Aborted => "aborted".to_owned(),
         PreLaunchView::Running(progress) => {
             let gyros = progress.gyros.iter().map(|gyro| {
                 let error = optional(gyro.standard_error_rad_per_s);
-                format!("{} {} {error}", modes(&gyro.modes), optional(gyro.mean_temperature_deg_c))
+                format!("{} {} {error}", modes(&gyro.modes), optional(mean_temperature(&gyro.modes)))
             });
             let gyros: Vec<_> = gyros.collect();
             format!("{} of {}: {}", progress.elapsed.as_ns(), progress.duration.as_ns(), gyros.join("; "))

@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 
 use isotherm_protocol::codec::decode;
-use isotherm_protocol::corrected::{CorrectedBatch, CorrectedTick};
-use isotherm_protocol::raw::Mode;
+use isotherm_correction::sample::{CorrectedTick, LasingMode, SensorFlags};
+use isotherm_protocol::corrected::CorrectedBatch;
 use isotherm_protocol::stream::{InForce, Label, UnitStream};
 use isotherm_tests::script::{Scenario, Step};
 use sha2::{Digest as _, Sha256};
@@ -129,23 +129,24 @@ fn bits(tick: &CorrectedTick) -> Vec<u8> {
     let mut bits = Vec::new();
     let mode = match tick.mode {
         None => 0,
-        Some(Mode::Plus) => 1,
-        Some(Mode::Minus) => 2,
+        Some(LasingMode::Plus) => 1,
+        Some(LasingMode::Minus) => 2,
     };
-    for number in [tick.sequence, tick.end_time_ns.cast_unsigned(), tick.duration_ns, tick.missed] {
+    let times = [tick.end_time.as_ns(), tick.duration.as_ns()].map(i64::cast_unsigned);
+    for number in [tick.sequence, times[0], times[1], tick.missed] {
         bits.extend(number.to_le_bytes());
     }
-    for number in [tick.ticks, tick.flags, mode] {
+    for number in [tick.ticks, tick.flags.bits(), mode] {
         bits.extend(number.to_le_bytes());
     }
-    for value in tick.delta_angle_rad.iter().chain(&tick.delta_velocity_m_per_s) {
+    for value in tick.delta_angle.iter().chain(&tick.delta_velocity) {
         bits.extend(value.to_bits().to_le_bytes());
     }
     for flags in [&tick.gyro_flags, &tick.accel_flags] {
         bits.push(u8::try_from(flags.len()).unwrap());
-        bits.extend(flags);
+        bits.extend(flags.iter().map(SensorFlags::bits));
     }
-    for parity in [&tick.gyro_parity_rad_per_s, &tick.accel_parity_m_per_s2] {
+    for parity in [&tick.gyro_parity, &tick.accel_parity] {
         bits.push(u8::try_from(parity.len()).unwrap());
         bits.extend(parity.iter().flat_map(|value| value.to_bits().to_le_bytes()));
     }

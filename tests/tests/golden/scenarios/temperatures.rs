@@ -1,10 +1,11 @@
 //! Temperatures: absent, late, broken, quick.
 
+use isotherm_correction::sample::{ChannelName, TemperatureReading};
 use isotherm_correction::unit::UnitSettings;
-use isotherm_correction::units::Span;
+use isotherm_correction::units::{Span, Timestamp};
 use isotherm_protocol::codec::encode;
 use isotherm_protocol::key::{Input, RawStream};
-use isotherm_protocol::raw::{TemperatureBatch, TemperatureTick};
+use isotherm_protocol::raw::TemperatureBatch;
 use isotherm_tests::lives::skewed;
 use isotherm_tests::script::{Scenario, Script, Step};
 
@@ -74,14 +75,14 @@ pub(crate) fn temperatures_too_many() -> Scenario {
     script.ticks(40);
     let names: Vec<String> = (0..14).map(|index| format!("c{index}")).collect();
     let names = ["t", "board"].into_iter().chain(names.iter().map(String::as_str));
-    let channels = TemperatureBatch {
-        channels: names.map(|name| name.try_into().unwrap()).collect(),
-        ticks: Vec::new(),
-    };
+    let channels: Vec<ChannelName> = names.map(|name| name.try_into().unwrap()).collect();
     for batch in 0..3 {
         let time = |tick: i64| script.now_ns + 4_000_000_000_000 + (batch * 4096 + tick) * 1_000_000;
-        let ticks = (0..4096).map(|tick| TemperatureTick { time_ns: time(tick), raw: [24.0; 16].into() });
-        let batch = TemperatureBatch { ticks: ticks.collect(), ..channels.clone() };
+        let of_time = |tick| {
+            let time = Timestamp::from_ns(time(tick));
+            channels.iter().map(move |&channel| TemperatureReading { channel, time, raw: 24.0 })
+        };
+        let batch = TemperatureBatch { readings: (0..4096).flat_map(of_time).collect() };
         script.steps.push(Step::Frame(Input::Raw(RawStream::Temperature), encode(&batch).unwrap()));
     }
     script.ticks(40);
