@@ -10,8 +10,8 @@ mod lag;
 mod ramp;
 
 pub use accel::AccelModel;
-pub(crate) use bank::Bank;
+pub(crate) use bank::{Bank, Paces, Shares};
 pub use gyro::{GyroModel, GyroTerms, TrendModel};
 pub(crate) use gyro::{TermError, Trends};
 pub use lag::MAX_LAGS;
-pub(crate) use ramp::Ramp;
+pub(crate) use ramp::{Pace, Ramp};

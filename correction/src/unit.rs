@@ -165,7 +165,7 @@ impl Unit {
             if !self.pipeline.takes_gyro(tick, output) {
                 continue;
             }
-            if self.gyros.is_next(tick) && self.pass_next(tick, output, emit) {
+            if self.gyros.is_next(tick) && self.pass_next(tick, emit) {
                 continue;
             }
             starts_anew |= self.gyros.admit(tick, output, &mut self.pipeline.counters);
@@ -184,7 +184,6 @@ impl Unit {
     fn pass_next<E: FnMut(&CorrectedTick) + ?Sized>(
         &mut self,
         tick: &GyroTick,
-        output: OutputKind,
         emit: &mut E,
     ) -> bool {
         let accel = self.accels.meets(tick, &mut self.pipeline.counters);
@@ -193,7 +192,8 @@ impl Unit {
             return false;
         }
         self.gyros.passed(tick);
-        self.pipeline.pass(Released { tick, output, missed: 0, restart: false }, accel, emit);
+        self.pipeline.begin(tick, false);
+        self.pipeline.pass(Released { tick, missed: 0, restart: false }, true, accel, emit);
         self.accels.gyro_released(tick.end_time, met);
         true
     }
@@ -211,7 +211,9 @@ impl Unit {
             }
             let Some(Left { tick, output, missed, restart }) = self.gyros.release() else { return };
             let accel = self.accels.front().filter(|_| met);
-            self.pipeline.pass(Released { tick: &tick, output, missed, restart }, accel, emit);
+            self.pipeline.begin(&tick, restart);
+            let fits = self.pipeline.takes_gyro(&tick, output);
+            self.pipeline.pass(Released { tick: &tick, missed, restart }, fits, accel, emit);
             self.accels.gyro_released(tick.end_time, met);
         }
     }

@@ -13,7 +13,7 @@ use crate::channel::{ThermalFilter, ThermalState};
 use crate::lanes::Line;
 use crate::orientation::SensorMask;
 use crate::sample::MAX_SENSORS;
-use crate::units::{Span, Timestamp};
+use crate::units::Timestamp;
 
 /// A sensor model with `T` terms that follow one temperature channel.
 pub(crate) trait Follows<const T: usize> {
@@ -30,18 +30,68 @@ pub(crate) trait Follows<const T: usize> {
     ) -> ([f64; T], bool);
 }
 
+/// Most channels that all sensors of a unit follow: one for each gyro, each accelerometer and each accelerometer's board.
+const MOST_FOLLOWED: usize = 3 * MAX_SENSORS;
+
+/// How far along its way everything is that follows a channel, at one time: by the channel's place among those that are
+/// followed. What follows none stands still at the last place.
+pub(crate) type Shares = [f64; MOST_FOLLOWED + 1];
+
+/// The channels that sensors follow. Whatever follows one is turned at once with all the rest: hence one pace for each.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub(crate) struct Paces {
+    followed: ArrayVec<(usize, Pace), MOST_FOLLOWED>,
+}
+
+impl Paces {
+    /// Place of a channel, which is followed from now on.
+    fn place(&mut self, channel: Option<usize>) -> u8 {
+        let place = channel.map_or(MOST_FOLLOWED, |channel| {
+            let known = self.followed.iter().position(|(followed, _)| *followed == channel);
+            known.unwrap_or_else(|| {
+                self.followed.push((channel, Pace::default()));
+                self.followed.len() - 1
+            })
+        });
+        u8::try_from(place).unwrap_or_default()
+    }
+
+    /// How far along everything is at `time`.
+    #[inline]
+    pub(crate) fn shares(&self, time: Timestamp) -> Shares {
+        let mut shares = [0.0; MOST_FOLLOWED + 1];
+        for (share, (_, pace)) in shares.iter_mut().zip(&self.followed) {
+            *share = pace.share(time);
+        }
+        shares
+    }
+
+    /// How far along whatever follows a channel is at `time`.
+    pub(crate) fn share(&self, channel: usize, time: Timestamp) -> f64 {
+        let place = self.followed.iter().find(|(followed, _)| *followed == channel);
+        place.map_or(0.0, |(_, pace)| pace.share(time))
+    }
+
+    /// Goes on as others do.
+    pub(crate) fn carry(&mut self, old: &Self) {
+        old.followed.iter().for_each(|(channel, pace)| self.set(*channel, *pace));
+    }
+
+    /// Has everything that follows a channel go another way.
+    pub(crate) fn set(&mut self, channel: usize, pace: Pace) {
+        self.followed.iter_mut().filter(|(followed, _)| *followed == channel).for_each(|(_, old)| *old = pace);
+    }
+}
+
 /// `T` terms of each sensor of a kind.
 ///
-/// Each line runs from one thermal evaluation to the next, so that the corrected rate has no staircase. All sensors that follow
-/// one channel are turned together; hence one pace for each channel.
+/// Each line runs from one thermal evaluation to the next, so that the corrected rate has no staircase.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct Bank<const T: usize> {
     #[serde(with = "crate::written::array")]
     lines: [Line; T],
-    /// Of each channel that is followed; `None` for the sensors that follow none.
-    paces: ArrayVec<(Option<usize>, Pace), MAX_SENSORS>,
-    /// Which of the paces is the sensor's.
-    pace_of: [u8; MAX_SENSORS],
+    /// Which of the shares is the sensor's.
+    share_of: [u8; MAX_SENSORS],
     /// Sensors that have seen a reading: the first one is not approached from the assumed temperature, but met.
     started: SensorMask,
     /// Sensors of which an argument was outside its fitted range at the last evaluation.
@@ -52,24 +102,18 @@ pub(crate) struct Bank<const T: usize> {
 
 impl<const T: usize> Bank<T> {
     /// Starts with the terms as they are at the assumed temperature.
-    pub(crate) fn new<S: Follows<T>>(sensors: &[S], filter: &ThermalFilter) -> Self {
+    pub(crate) fn new<S: Follows<T>>(sensors: &[S], filter: &ThermalFilter, paces: &mut Paces) -> Self {
         let any_lags = sensors.iter().any(|sensor| !sensor.lags().is_empty());
         let mut bank = Self {
             lines: [Line::ZERO; T],
-            paces: ArrayVec::new(),
-            pace_of: [0; MAX_SENSORS],
+            share_of: [paces.place(None); MAX_SENSORS],
             started: SensorMask::NONE,
             clamped: SensorMask::NONE,
             lagged: alloc::vec![[filter.assumed_deg_c; MAX_LAGS]; if any_lags { sensors.len() } else { 0 }],
         };
         let assumed = ThermalState { temperature: filter.assumed_deg_c, ..ThermalState::default() };
         for (lane, sensor) in sensors.iter().take(MAX_SENSORS).enumerate() {
-            let known = bank.paces.iter().position(|(channel, _)| *channel == sensor.channel());
-            let pace = known.unwrap_or(bank.paces.len());
-            if known.is_none() {
-                bank.paces.push((sensor.channel(), Pace::default()));
-            }
-            bank.pace_of[lane] = u8::try_from(pace).unwrap_or_default();
+            bank.share_of[lane] = paces.place(sensor.channel());
             let (terms, clamped) = sensor.terms(&assumed, &bank.lagged(lane), filter);
             bank.hold(lane, terms, clamped);
         }
@@ -122,12 +166,6 @@ impl<const T: usize> Bank<T> {
         if let (Some(lagged), Some(old)) = (self.lagged.get_mut(lane), old.lagged.get(lane)) {
             *lagged = *old;
         }
-        let before = old.paces.get(usize::from(old.pace_of[lane]));
-        if let (Some((_, pace)), Some((_, old))) =
-            (self.paces.get_mut(usize::from(self.pace_of[lane])), before)
-        {
-            *pace = *old;
-        }
     }
 
     /// Moves the lags of a channel's sensors on by one grid point.
@@ -144,24 +182,21 @@ impl<const T: usize> Bank<T> {
         }
     }
 
-    /// Evaluates every term of a channel's sensors and turns towards the result, `over` a sample interval from `start` on.
+    /// Evaluates every term of a channel's sensors, which then are on their way to the result from where they are so far along
+    /// their present way; or there `at_once`.
     pub(crate) fn update<S: Follows<T>>(
         &mut self,
         sensors: &[S],
         (channel, thermal): (usize, &ThermalState),
         filter: &ThermalFilter,
-        (start, over): (Timestamp, Span),
+        (share, at_once): (f64, bool),
     ) {
-        let Some(place) = self.paces.iter().position(|(followed, _)| *followed == Some(channel)) else {
-            return;
-        };
-        let share = self.paces[place].1.share(start);
         for (lane, sensor) in sensors.iter().enumerate() {
             if sensor.channel() != Some(channel) {
                 continue;
             }
             let (terms, clamped) = sensor.terms(thermal, &self.lagged(lane), filter);
-            if over == Span::ZERO || !self.started.contains(lane) {
+            if at_once || !self.started.contains(lane) {
                 self.hold(lane, terms, clamped);
             } else {
                 self.lines.iter_mut().zip(terms).for_each(|(line, term)| line.turn(lane, share, term));
@@ -169,7 +204,6 @@ impl<const T: usize> Bank<T> {
             }
             self.started = self.started.with(lane);
         }
-        self.paces[place].1 = Pace::new(start, over);
     }
 
     /// Arrives at once where the terms are heading: after a step of the producer's clock the way there means nothing.
@@ -177,14 +211,10 @@ impl<const T: usize> Bank<T> {
         self.lines.iter_mut().for_each(Line::settle);
     }
 
-    /// The terms in use at `time`, term by term.
+    /// The terms so far along, term by term.
     #[inline]
-    pub(crate) fn at<const N: usize>(&self, time: Timestamp) -> [[f64; N]; T] {
-        let mut shares = [0.0; MAX_SENSORS];
-        for (share, (_, pace)) in shares.iter_mut().zip(&self.paces) {
-            *share = pace.share(time);
-        }
-        let share = array::from_fn(|lane| shares[usize::from(self.pace_of[lane]) % MAX_SENSORS]);
+    pub(crate) fn at<const N: usize>(&self, shares: &Shares) -> [[f64; N]; T] {
+        let share = array::from_fn(|lane| shares[usize::from(self.share_of[lane]).min(MOST_FOLLOWED)]);
         array::from_fn(|term| self.lines[term].at(&share))
     }
 

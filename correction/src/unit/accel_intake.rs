@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::counters::Counters;
 use super::gyro_intake::{LONGEST_KEPT, MAX_DURATION};
+use crate::lanes::{Lanes, of_readings};
 use crate::sample::{AccelTick, GyroTick, OutputKind};
 use crate::units::{Span, Timestamp};
 
@@ -15,11 +16,21 @@ const MAX_PENDING: usize = 8192;
 /// A tick that waits for its gyro tick, or has met it.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct PendingAccel {
-    pub(super) tick: AccelTick,
-    /// What its readings stand for.
+    end_time: Timestamp,
+    pub(super) duration: Span,
+    /// What its readings stand for, and how many there are.
     pub(super) output: OutputKind,
+    pub(super) count: usize,
+    pub(super) readings: Lanes,
     /// Messages of gyro ticks that had come before it.
     after: u64,
+}
+
+impl PendingAccel {
+    /// One reading per accelerometer: counts, or mean output.
+    pub(super) fn readings(&self) -> &[f64] {
+        self.readings.get(..self.count).unwrap_or_default()
+    }
 }
 
 /// Memory of the accelerometer stream.
@@ -42,7 +53,10 @@ impl AccelIntake {
             counters.bad_duration += 1;
             return;
         }
-        let pending = PendingAccel { tick: tick.clone(), output, after: self.gyro_messages };
+        let &AccelTick { end_time, duration, ref readings, .. } = tick;
+        let (count, readings) = (readings.len(), of_readings(readings));
+        let pending =
+            PendingAccel { end_time, duration, output, count, readings, after: self.gyro_messages };
         if self.released.is_some_and(|released| tick.end_time <= released) {
             counters.accel_late += 1;
             if self.behind.len() < MAX_PENDING {
@@ -54,11 +68,10 @@ impl AccelIntake {
     }
 
     /// Puts a tick in its place in time.
-    #[inline]
     fn insert(&mut self, pending: PendingAccel, counters: &mut Counters) {
-        let time = pending.tick.end_time;
+        let time = pending.end_time;
         if self.pending.len() < MAX_PENDING
-            && self.pending.back().is_none_or(|last| last.tick.end_time < time)
+            && self.pending.back().is_none_or(|last| last.end_time < time)
         {
             self.pending.push_back(pending);
         } else {
@@ -68,9 +81,9 @@ impl AccelIntake {
 
     /// Likewise a tick that is not the newest, or one too many.
     fn insert_between(&mut self, pending: PendingAccel, counters: &mut Counters) {
-        let time = pending.tick.end_time;
-        let place = self.pending.iter().rposition(|p| p.tick.end_time < time).map_or(0, |i| i + 1);
-        if self.pending.get(place).is_some_and(|p| p.tick.end_time == time) {
+        let time = pending.end_time;
+        let place = self.pending.iter().rposition(|p| p.end_time < time).map_or(0, |i| i + 1);
+        if self.pending.get(place).is_some_and(|p| p.end_time == time) {
             counters.accel_duplicates += 1;
             return;
         }
@@ -86,11 +99,11 @@ impl AccelIntake {
     /// come.
     pub(super) fn meets(&mut self, gyro: &GyroTick, counters: &mut Counters) -> Option<&PendingAccel> {
         let half = Span::from_ns(gyro.duration.as_ns() / 2);
-        while self.pending.front().is_some_and(|front| front.tick.end_time + half <= gyro.end_time) {
+        while self.pending.front().is_some_and(|front| front.end_time + half <= gyro.end_time) {
             self.pending.pop_front();
             counters.accel_unpaired += 1;
         }
-        self.pending.front().filter(|front| front.tick.end_time < gyro.end_time + half)
+        self.pending.front().filter(|front| front.end_time < gyro.end_time + half)
     }
 
     /// The oldest tick that waits: what [`meets`](Self::meets) has found, until its gyro tick has gone.
@@ -131,7 +144,7 @@ impl AccelIntake {
         if self.released.take().is_none() {
             return;
         }
-        let near = |PendingAccel { tick, .. }: &PendingAccel| {
+        let near = |tick: &PendingAccel| {
             tick.end_time + MAX_DURATION > end_time && tick.end_time < end_time + MAX_DURATION
         };
         let before = self.pending.len();

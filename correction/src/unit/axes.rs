@@ -22,6 +22,8 @@ pub(super) struct Axes {
     mask: SensorMask,
     from: Option<Inverse>,
     to: Option<Inverse>,
+    /// There is no way from the one to the other.
+    stands: bool,
     /// Sensors that the parity check has not excluded.
     included: SensorMask,
     parity: ParityCheck,
@@ -40,6 +42,7 @@ impl Axes {
             mask,
             from: inverse,
             to: inverse,
+            stands: true,
             included: mask,
             parity: ParityCheck::new(),
         }
@@ -58,6 +61,7 @@ impl Axes {
         let now = self.at(start);
         self.to = orientation.inverse(temperature, self.mask);
         self.from = now.or(self.to);
+        self.stands = self.from == self.to;
         self.target = temperature;
         self.clamped = outside(orientation, temperature);
         self.temperature.turn(start, over, temperature);
@@ -70,6 +74,7 @@ impl Axes {
     pub(super) fn settle(&mut self) {
         self.temperature.settle();
         self.from = self.to;
+        self.stands = true;
     }
 
     /// Whether the temperature is outside the fitted range.
@@ -92,31 +97,20 @@ impl Axes {
         readings: &[f64; N],
         time: Timestamp,
     ) -> ([f64; 3], bool) {
-        if let Some(vector) = self.resolve_with(orientation, usable, readings, time) {
-            return (vector, true);
+        if usable != self.mask {
+            self.choose(orientation, usable, time);
         }
-        (self.resolve_with(orientation, self.included, readings, time).unwrap_or_default(), false)
-    }
-
-    /// Case axes from the sensors of `mask`; `None` where they do not span the space.
-    #[inline]
-    fn resolve_with<const N: usize>(
-        &mut self,
-        orientation: &Orientation,
-        mask: SensorMask,
-        readings: &[f64; N],
-        time: Timestamp,
-    ) -> Option<[f64; 3]> {
-        if mask != self.mask {
-            self.choose(orientation, mask, time);
+        let trusted = self.from.is_some() && self.to.is_some();
+        if !trusted {
+            self.choose(orientation, self.included, time);
         }
-        let (from, to) = (self.from.as_ref()?, self.to.as_ref()?);
-        let share = self.temperature.share(time);
-        if mask == SensorMask::all(orientation.sensors()) {
-            return Some(from.lerp_apply(to, share, readings));
+        let (Some(from), Some(to)) = (&self.from, &self.to) else { return ([0.0; 3], false) };
+        let share = if self.stands { 1.0 } else { self.temperature.share(time) };
+        if self.mask == SensorMask::all(orientation.sensors()) {
+            return (from.lerp_apply(to, share, readings), trusted);
         }
-        let readings = array::from_fn(|lane| if mask.contains(lane) { readings[lane] } else { 0.0 });
-        Some(from.lerp_apply::<N>(to, share, &readings))
+        let readings = array::from_fn(|lane| if self.mask.contains(lane) { readings[lane] } else { 0.0 });
+        (from.lerp_apply::<N>(to, share, &readings), trusted)
     }
 
     /// Goes on with other sensors: both ends anew, from where the temperature is now, so that the change of sensors is all that
@@ -126,6 +120,7 @@ impl Axes {
         self.mask = mask;
         self.from = orientation.inverse(self.temperature.at(time), mask);
         self.to = orientation.inverse(self.target, mask);
+        self.stands = self.from == self.to;
     }
 
     /// Temperature that the orientation follows (°C).

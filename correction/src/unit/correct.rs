@@ -14,6 +14,7 @@ use alloc::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
+use super::accel_intake::PendingAccel;
 use super::counters::Counters;
 use super::health::Health;
 use super::pipeline::Released;
@@ -25,7 +26,7 @@ use crate::lanes::Lanes;
 use crate::observation::Observation;
 use crate::orientation::{Inverse, SensorMask};
 use crate::reversal::Substitution;
-use crate::sample::{AccelTick, CorrectedTick, GyroTick, MAX_SENSORS, SensorFlags, Sensors, TickFlags};
+use crate::sample::{CorrectedTick, GyroTick, MAX_SENSORS, SensorFlags, Sensors, TickFlags};
 use crate::servo::ServoMemory;
 use crate::units::{Span, Timestamp};
 
@@ -74,7 +75,7 @@ pub(super) struct Takeover {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct OnItsWay<'a> {
     pub(super) released: &'a Released<'a>,
-    pub(super) accel: Option<&'a AccelTick>,
+    pub(super) accel: Option<&'a PendingAccel>,
     pub(super) since_turn_on_s: f64,
 }
 
@@ -131,11 +132,12 @@ impl Corrector {
                 _ => now,
             };
         let old = self.slew.as_deref();
-        let (accels, boards) = self.accel_terms(now);
+        let shares = self.thermal.paces.shares(now);
+        let (accels, boards) = self.accel_terms(&shares);
         Slew {
             start: now,
             over,
-            gyros: self.gyro_terms(calibration, now, since_turn_on_s),
+            gyros: self.gyro_terms(calibration, &shares, since_turn_on_s),
             accels,
             boards,
             gyro_axes: on_its_way(self.thermal.gyro_axes.in_use(now), old.and_then(|slew| slew.gyro_axes)),
@@ -201,8 +203,9 @@ impl Corrector {
         out.gyro_parity.clear();
         out.accel_parity.clear();
         out.flags = if self.thermal.warming_up { TickFlags::WARM_UP } else { TickFlags::empty() };
-        self.gyros::<N>(calibration, tick, counters, out);
-        self.accels::<N>(calibration, tick, counters, out);
+        let shares = self.thermal.paces.shares(raw.end_time);
+        self.gyros::<N>(calibration, tick, &shares, counters, out);
+        self.accels::<N>(calibration, tick, &shares, counters, out);
 
         let per_second = 1.0 / raw.duration.as_s();
         let seen = &mut self.seen;
@@ -228,7 +231,7 @@ impl Corrector {
         let gyros = self.thermal.gyro_axes.in_use(time);
         let accels = self.thermal.accel_axes.as_ref().and_then(|axes| axes.in_use(time));
         let rates: Sensors<f64> = self.seen.gyros.iter().map(|gyro| gyro.bias + gyro.drift).collect();
-        let ([bias, per_scale_factor], [ratio]) = self.accel_terms::<MAX_SENSORS>(time);
+        let ([bias, per_scale_factor], [ratio]) = self.accel_terms::<MAX_SENSORS>(&self.thermal.paces.shares(time));
         let lanes = 0..calibration.accels.len();
         let forces: Sensors<f64> =
             lanes.map(|lane| bias[lane] * ratio[lane] * per_scale_factor[lane]).collect();
@@ -247,7 +250,7 @@ fn of_sensors(flags: [SensorFlags; MAX_SENSORS], sensors: usize) -> Sensors<Sens
 }
 
 /// The first three raw readings as they are, unscaled and flagged.
-pub(super) fn pass_through(tick: &GyroTick, accel: Option<&AccelTick>) -> CorrectedTick {
+pub(super) fn pass_through(tick: &GyroTick, accel: Option<&PendingAccel>) -> CorrectedTick {
     let first_three = |readings: &[f64]| {
         core::array::from_fn(|i| readings.get(i).copied().filter(|r| r.is_finite()).unwrap_or(0.0))
     };
@@ -257,15 +260,17 @@ pub(super) fn pass_through(tick: &GyroTick, accel: Option<&AccelTick>) -> Correc
         duration: tick.duration,
         ticks: 1,
         delta_angle: first_three(&tick.readings),
-        delta_velocity: accel.map_or([0.0; 3], |accel| first_three(&accel.readings)),
+        delta_velocity: accel.map_or([0.0; 3], |accel| first_three(accel.readings())),
         mode: tick.mode,
         flags: TickFlags::UNCALIBRATED
             | TickFlags::ANGLE_INVALID
             | TickFlags::VELOCITY_INVALID
             | if accel.is_none() { TickFlags::ACCELEROMETER_MISSING } else { TickFlags::empty() },
-        gyro_flags: tick.readings.iter().map(|_| SensorFlags::empty()).collect(),
-        accel_flags: accel
-            .map_or_else(Sensors::new, |a| a.readings.iter().map(|_| SensorFlags::empty()).collect()),
+        gyro_flags: of_sensors([SensorFlags::empty(); MAX_SENSORS], tick.readings.len()),
+        accel_flags: of_sensors(
+            [SensorFlags::empty(); MAX_SENSORS],
+            accel.map_or(0, |accel| accel.count),
+        ),
         ..CorrectedTick::default()
     }
 }

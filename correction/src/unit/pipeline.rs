@@ -31,8 +31,6 @@ pub(super) struct Active {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Released<'a> {
     pub(super) tick: &'a GyroTick,
-    /// What its readings stand for.
-    pub(super) output: OutputKind,
     /// Ticks that are missing before it.
     pub(super) missed: u64,
     pub(super) restart: bool,
@@ -107,7 +105,7 @@ impl Pipeline {
         }
     }
 
-    /// Whether a gyro tick fits the calibration that will correct it.
+    /// Whether a gyro tick fits the calibration that will correct it, as things stand.
     #[inline]
     pub(super) fn takes_gyro(&mut self, tick: &GyroTick, output: OutputKind) -> bool {
         let due = self.pending.as_ref().is_some_and(|change| change.at.is_due(tick));
@@ -162,26 +160,31 @@ impl Pipeline {
         self.active.as_ref().is_none_or(|active| active.calibration.accel_count() > 0)
     }
 
-    /// Corrects one tick and gives it out.
+    /// Has the change that waits take effect, where it is due at a tick.
+    #[inline]
+    pub(super) fn begin(&mut self, tick: &GyroTick, restart: bool) {
+        // The run that a sequence number or a time was meant for is over with a restart.
+        if self.pending.is_some()
+            && let Some(change) = self.pending.take_if(|change| restart || change.at.is_due(tick))
+        {
+            self.take_effect(change);
+        }
+    }
+
+    /// Corrects one tick and gives it out. `fits`: its readings are those that the calibration in force takes.
     #[inline]
     pub(super) fn pass<E: FnMut(&CorrectedTick) + ?Sized>(
         &mut self,
         mut released: Released<'_>,
+        fits: bool,
         accel: Option<&PendingAccel>,
         emit: &mut E,
     ) {
-        let Released { tick, output, .. } = released;
-        // The run that a sequence number or a time was meant for is over with a restart.
-        if self.pending.is_some()
-            && let Some(change) = self.pending.take_if(|change| released.restart || change.at.is_due(tick))
-        {
-            self.take_effect(change);
-        }
-        // A swap since they came may have changed what fits.
-        let accel = accel.filter(|PendingAccel { tick, output, .. }| {
-            self.fits(false, *output, tick.readings.len(), |c| (c.accel_output(), c.accel_count()))
+        let Released { tick, .. } = released;
+        // A swap since it came may have changed what fits.
+        let accel = accel.filter(|accel| {
+            self.fits(false, accel.output, accel.count, |c| (c.accel_output(), c.accel_count()))
         });
-        let fits = self.fits(false, output, tick.readings.len(), |c| (c.gyro_output(), c.gyro_count()));
         self.last_end = tick.end_time;
         if released.restart {
             self.waiting.restart(self.last_end);
@@ -200,7 +203,7 @@ impl Pipeline {
             Some(active) if fits => {
                 let tick = OnItsWay {
                     released: &released,
-                    accel: accel.map(|accel| &accel.tick),
+                    accel,
                     since_turn_on_s: tick.end_time.seconds_from(turn_on),
                 };
                 let waiting = (&mut self.waiting, self.settings.temperature_delay);
@@ -214,7 +217,7 @@ impl Pipeline {
             Some(_) => {}
             None => {
                 held = self.settings.uncalibrated == Uncalibrated::Hold;
-                self.corrected = pass_through(tick, accel.map(|accel| &accel.tick));
+                self.corrected = pass_through(tick, accel);
             }
         }
         held |= !self.operating.state().is_running();

@@ -11,7 +11,7 @@ use crate::calibration::Calibration;
 use crate::channel::{ChannelMemory, ThermalState, Verdict};
 use crate::lanes::Lanes;
 use crate::sample::{ChannelName, MAX_SENSORS, SensorFlags, TemperatureReading};
-use crate::thermal::{AccelModel, Bank};
+use crate::thermal::{AccelModel, Bank, Pace, Paces};
 use crate::units::{Span, Timestamp};
 
 /// Most readings that wait to take effect: two messages of 4096 times with 16 channels each, since a producer sends a
@@ -116,6 +116,7 @@ impl Footing {
 pub(super) struct ThermalMemory {
     channels: Vec<ChannelMemory>,
     updated: Vec<Option<Timestamp>>,
+    pub(super) paces: Paces,
     /// Increment weight, bias, magnetic and slow-meander term.
     pub(super) gyros: Bank<4>,
     /// S and 1/K.
@@ -145,18 +146,20 @@ impl ThermalMemory {
             });
             kept.unwrap_or_else(|| ChannelMemory::new(filter))
         });
+        let mut paces = Paces::default();
         let axes = |orientation| Axes::new(orientation, filter.assumed_deg_c);
         let mut memory = Self {
             channels: channels.collect(),
             updated: alloc::vec![None; calibration.channels.len()],
-            gyros: Bank::new(&calibration.gyros, filter),
-            accels: Bank::new(&calibration.accels, filter),
-            boards: Bank::new(&calibration.accels, filter),
+            gyros: Bank::new(&calibration.gyros, filter, &mut paces),
+            accels: Bank::new(&calibration.accels, filter, &mut paces),
+            boards: Bank::new(&calibration.accels, filter, &mut paces),
             gyro_axes: axes(&calibration.gyro_orientation),
             accel_axes: calibration.accel_orientation.as_ref().map(axes),
             gyro_footing: Footing::default(),
             accel_footing: Footing::default(),
             warming_up: false,
+            paces,
         };
         for index in 0..memory.channels.len() {
             if let Some(state) = memory.channels.get(index).and_then(ChannelMemory::state) {
@@ -191,6 +194,7 @@ impl ThermalMemory {
     /// Goes on with what a swap did not change, on its way as it is: a swap to the same coefficients is no event.
     fn carry_unchanged(&mut self, calibration: &Calibration, (old, old_memory): (&Calibration, &Self)) {
         self.updated.clone_from(&old_memory.updated);
+        self.paces.carry(&old_memory.paces);
         for (lane, (new, old)) in calibration.gyros.iter().zip(&old.gyros).enumerate() {
             if new == old {
                 self.gyros.carry(&old_memory.gyros, lane);
@@ -292,10 +296,12 @@ impl ThermalMemory {
         if let Some(updated) = self.updated.get_mut(channel) {
             *updated = Some(start);
         }
-        let (to, way, filter) = ((channel, &state), (start, over), &calibration.filter);
+        let (to, filter) = ((channel, &state), &calibration.filter);
+        let way = (self.paces.share(channel, start), over == Span::ZERO);
         self.gyros.update(&calibration.gyros, to, filter, way);
         self.accels.update(&calibration.accels, to, filter, way);
         self.boards.update(&calibration.accels, to, filter, way);
+        self.paces.set(channel, Pace::new(start, over));
         let channels = &self.channels;
         let follow = |axes: &mut Axes, orientation, following: &[usize]| {
             if following.contains(&channel)

@@ -5,15 +5,15 @@ use core::array;
 use super::patch::{Patch, SOUND, within};
 use super::{Corrector, OnItsWay, of_sensors};
 use crate::calibration::Calibration;
-use crate::lanes::{narrow, of_readings, put};
+use crate::lanes::{narrow, put};
 use crate::sample::{CorrectedTick, MAX_SENSORS, MIN_SENSORS, OutputKind, SensorFlags, TickFlags};
+use crate::thermal::Shares;
 use crate::unit::counters::Counters;
-use crate::units::Timestamp;
 
 impl Corrector {
     /// The terms of the accelerometers in use: S and 1/K, and r of their boards.
-    pub(super) fn accel_terms<const N: usize>(&self, time: Timestamp) -> ([[f64; N]; 2], [[f64; N]; 1]) {
-        let (mut terms, mut board) = (self.thermal.accels.at::<N>(time), self.thermal.boards.at::<N>(time));
+    pub(super) fn accel_terms<const N: usize>(&self, shares: &Shares) -> ([[f64; N]; 2], [[f64; N]; 1]) {
+        let (mut terms, mut board) = (self.thermal.accels.at::<N>(shares), self.thermal.boards.at::<N>(shares));
         if let Some(slewing) = self.slewing() {
             slewing.terms(&mut terms, &slewing.from.accels);
             slewing.terms(&mut board, &slewing.from.boards);
@@ -27,6 +27,7 @@ impl Corrector {
         &mut self,
         calibration: &Calibration,
         tick: &OnItsWay<'_>,
+        shares: &Shares,
         counters: &mut Counters,
         out: &mut CorrectedTick,
     ) {
@@ -45,8 +46,8 @@ impl Corrector {
         };
         // The corrected tick has the gyro tick's time.
         let (time, duration_s) = (out.end_time, raw.duration.as_s());
-        let ([bias, per_scale_factor], [ratio]) = self.accel_terms::<N>(time);
-        let readings: [f64; N] = of_readings(&raw.readings);
+        let ([bias, per_scale_factor], [ratio]) = self.accel_terms::<N>(shares);
+        let readings = narrow::<N>(&raw.readings);
         let corrected = |lane: usize, reading: f64| {
             let output = match calibration.accel_output {
                 OutputKind::Counts => reading / duration_s,
@@ -58,13 +59,13 @@ impl Corrector {
 
         let mut usable = axes.included();
         let footing = &self.thermal.accel_footing;
-        let flags = if footing.is_sound(time) & within(&readings, narrow(&calibration.accel_limits)) {
+        let flags = if footing.is_sound(time) & within(readings, narrow(&calibration.accel_limits)) {
             put(&mut self.last_forces, forces);
             self.accel_health.note_sound();
             SOUND
         } else {
             let limits = &calibration.accel_limits;
-            let patch = Patch { count, readings: &raw.readings, limits, footing, time };
+            let patch = Patch { count, readings: raw.readings(), limits, footing, time };
             let last = &self.last_forces;
             let flags = patch.apply(&mut usable, counters, |lane, reading| {
                 forces[lane] = reading.map_or(last[lane], |reading| corrected(lane, reading));
@@ -78,7 +79,7 @@ impl Corrector {
         };
         let seen = &mut self.seen.accels;
         seen.count = count;
-        put(&mut seen.reading, readings);
+        seen.reading = raw.readings;
         seen.flags = flags;
         out.accel_flags = of_sensors(flags, count);
 

@@ -10,9 +10,9 @@ use crate::orientation::SensorMask;
 use crate::reversal::{Substitution, TickInput};
 use crate::sample::{CorrectedTick, GyroTick, LasingMode, MIN_SENSORS, OutputKind, SensorFlags, TickFlags};
 use crate::servo::{ServoTick, Transient};
+use crate::thermal::Shares;
 use crate::unit::counters::Counters;
 use crate::unit::pipeline::Released;
-use crate::units::Timestamp;
 
 /// What the substitution did, and the servo could not: counted.
 const SWITCHING: TickFlags = TickFlags::INTERPOLATED
@@ -30,10 +30,10 @@ impl Corrector {
     pub(super) fn gyro_terms<const N: usize>(
         &self,
         calibration: &Calibration,
-        time: Timestamp,
+        shares: &Shares,
         since_turn_on_s: f64,
     ) -> [[f64; N]; 4] {
-        let mut terms = self.thermal.gyros.at::<N>(time);
+        let mut terms = self.thermal.gyros.at::<N>(shares);
         let trend = calibration.trends.as_ref().map_or([0.0; N], |trends| trends.at(since_turn_on_s));
         terms[1] = array::from_fn(|i| terms[1][i] + trend[i]);
         if let Some(slewing) = self.slewing() {
@@ -48,6 +48,7 @@ impl Corrector {
         &mut self,
         calibration: &Calibration,
         tick: &OnItsWay<'_>,
+        shares: &Shares,
         counters: &mut Counters,
         out: &mut CorrectedTick,
     ) {
@@ -57,7 +58,7 @@ impl Corrector {
         let input = input(tick.released);
         let lost = calibration.reversal.as_ref().is_some_and(|r| self.substitution.is_lost(r, &input));
 
-        let [weight, bias, magnetic, meander] = self.gyro_terms::<N>(calibration, time, tick.since_turn_on_s);
+        let [weight, bias, magnetic, meander] = self.gyro_terms::<N>(calibration, shares, tick.since_turn_on_s);
         let (mode_sign, meander_sign) = (sign(raw.mode), sign(raw.meander));
         let mut bias: [f64; N] =
             array::from_fn(|i| bias[i] + mode_sign * magnetic[i] + meander_sign * meander[i]);
