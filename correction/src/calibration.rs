@@ -60,8 +60,8 @@ pub struct Calibration {
     pub(crate) accel_limits: Lanes,
     /// `None` where no gyro has a trend.
     pub(crate) trends: Option<Box<Trends>>,
-    /// Whether any gyro has a perimeter servo.
-    pub(crate) has_servo: bool,
+    /// The longest time that a gyro's perimeter servo takes to settle (s); `None` where no gyro has one.
+    pub(crate) servos_settle_s: Option<f64>,
 }
 
 impl Calibration {

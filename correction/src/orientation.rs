@@ -284,7 +284,8 @@ impl Inverse {
 
     /// What [`lerp`](Self::lerp) to `other` and then [`apply`](Self::apply) give, without the matrix in between; the readings of
     /// sensors outside the mask must be zero.
-    #[inline]
+    #[expect(clippy::inline_always, reason = "twice per tick: a call costs as much as half of the work")]
+    #[inline(always)]
     pub(crate) fn lerp_apply<const N: usize>(&self, other: &Self, u: f64, readings: &[f64; N]) -> [f64; 3] {
         let mut sum = [0.0; 4];
         let mut add =

@@ -26,6 +26,7 @@ use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 
 use crate::curve::{Curve, CurveError, CurveParts};
+use crate::lanes::Lanes;
 use crate::sample::{HalfPeriodCounts, MAX_SENSORS};
 use crate::units::{Span, Timestamp};
 
@@ -170,7 +171,7 @@ impl Transient {
 }
 
 /// Memory of the transients of one unit: all gyros switch together, each has its own `f_1`.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ServoMemory {
     /// A transition is running: its ticks carry nothing.
     switching: bool,
@@ -178,8 +179,22 @@ pub struct ServoMemory {
     settles_from: Option<Timestamp>,
     /// Per gyro: middle of the first tick measured after the transition, and its `f_1` (Hz).
     first: [Option<(Timestamp, f64)>; MAX_SENSORS],
-    /// Per gyro: middle of the last good tick, and its mean rate without the transient (counts/s).
-    last: [Option<(Timestamp, f64)>; MAX_SENSORS],
+    /// Per gyro: middle of the last good tick.
+    last: [Timestamp; MAX_SENSORS],
+    /// Per gyro: mean rate in it without the transient (counts/s); NaN where that is not known.
+    last_mean_hz: Lanes,
+}
+
+impl Default for ServoMemory {
+    fn default() -> Self {
+        Self {
+            switching: false,
+            settles_from: None,
+            first: [None; MAX_SENSORS],
+            last: [Timestamp::default(); MAX_SENSORS],
+            last_mean_hz: [f64::NAN; MAX_SENSORS],
+        }
+    }
 }
 
 impl ServoMemory {
@@ -195,7 +210,8 @@ impl ServoMemory {
     /// [`Substitution::is_lost`](crate::reversal::Substitution::is_lost)).
     pub fn advance(&mut self, lost: bool, end_time: Timestamp, duration: Span) {
         if lost {
-            *self = Self { switching: true, last: self.last, ..Self::default() };
+            let Self { last, last_mean_hz, .. } = *self;
+            *self = Self { switching: true, last, last_mean_hz, ..Self::default() };
         } else if self.switching {
             self.switching = false;
             self.settles_from = Some(end_time - duration);
@@ -217,37 +233,49 @@ impl ServoMemory {
     /// tick's middle.
     pub fn apparent_rate(&mut self, sensor: usize, servo: &Servo, tick: &ServoTick) -> Transient {
         let middle = middle(tick.end_time, tick.duration);
-        let mean_hz = tick.half_periods.and_then(|counts| mean_hz(counts, tick.duration));
-        // A tick before the end of the transition cannot be: its clock is broken.
-        let settles = 0.0..=servo.settle_time_s();
-        let running = self.settles_from.is_some_and(|start| settles.contains(&middle.seconds_from(start)));
-        if !running {
-            if let Some(last) = self.last.get_mut(sensor) {
-                *last = mean_hz.map(|mean| (middle, mean));
-            }
-            return Transient::Settled;
+        let mean_hz = tick.half_periods.map_or(f64::NAN, |counts| mean_hz(counts, tick.duration.as_s()));
+        let (mut mean_left_hz, mut transient) = (mean_hz, Transient::Settled);
+        if self.is_running(servo.settle_time_s(), middle) {
+            let unbalance = libm::tanh(tick.duration.as_s() / (2.0 * servo.time_constant_s));
+            let excess_hz = self.frequency_excess_hz(sensor, servo, tick, (middle, mean_hz), unbalance);
+            mean_left_hz -= unbalance * excess_hz.unwrap_or(0.0);
+            let rate = excess_hz.map(|excess_hz| tick.scale_rad_per_count * unbalance * excess_hz);
+            transient = match rate.filter(|rate| rate.is_finite()) {
+                Some(rate_rad_per_s) => Transient::Apparent { rate_rad_per_s },
+                None => Transient::Unmeasured,
+            };
         }
-        self.running_rate(sensor, servo, tick, (middle, mean_hz))
+        if let (Some(last), Some(mean)) = (self.last.get_mut(sensor), self.last_mean_hz.get_mut(sensor)) {
+            (*last, *mean) = (middle, mean_left_hz);
+        }
+        transient
     }
 
-    /// The apparent rate while the transient runs; remembers the mean rate without it.
-    fn running_rate(
+    /// Whether a servo that settles within `settles_s` (s) after a transition has a transient in a tick about `middle`.
+    fn is_running(&self, settles_s: f64, middle: Timestamp) -> bool {
+        // A tick before the end of the transition cannot be: its clock is broken.
+        self.settles_from.is_some_and(|start| (0.0..=settles_s).contains(&middle.seconds_from(start)))
+    }
+
+    /// Where no servo has a transient, all of them settling within `settles_s` (s): remembers the tick, as
+    /// [`apparent_rate`](Self::apparent_rate) does for each gyro.
+    #[inline]
+    pub(crate) fn pass_settled(
         &mut self,
-        sensor: usize,
-        servo: &Servo,
-        tick: &ServoTick,
-        (middle, mean_hz): (Timestamp, Option<f64>),
-    ) -> Transient {
-        let unbalance = libm::tanh(tick.duration.as_s() / (2.0 * servo.time_constant_s));
-        let excess_hz = self.frequency_excess_hz(sensor, servo, tick, middle, unbalance);
-        if let Some(last) = self.last.get_mut(sensor) {
-            *last = mean_hz.map(|mean| (middle, mean - unbalance * excess_hz.unwrap_or(0.0)));
+        settles_s: f64,
+        (end_time, duration): (Timestamp, Span),
+        half_periods: &[HalfPeriodCounts],
+    ) -> bool {
+        let middle = middle(end_time, duration);
+        if self.is_running(settles_s, middle) {
+            return false;
         }
-        let rate = excess_hz.map(|excess_hz| tick.scale_rad_per_count * unbalance * excess_hz);
-        match rate.filter(|rate| rate.is_finite()) {
-            Some(rate_rad_per_s) => Transient::Apparent { rate_rad_per_s },
-            None => Transient::Unmeasured,
-        }
+        let duration_s = duration.as_s();
+        let mut means_hz = [f64::NAN; MAX_SENSORS];
+        let known = means_hz.iter_mut().zip(half_periods);
+        known.for_each(|(mean, counts)| *mean = mean_hz(*counts, duration_s));
+        (self.last, self.last_mean_hz) = ([middle; MAX_SENSORS], means_hz);
+        true
     }
 
     /// `f_i − f0` (Hz), measured or modelled.
@@ -256,13 +284,13 @@ impl ServoMemory {
         sensor: usize,
         servo: &Servo,
         tick: &ServoTick,
-        middle: Timestamp,
+        (middle, mean_hz): (Timestamp, f64),
         unbalance: f64,
     ) -> Option<f64> {
         let rest_hz = servo.rest_frequency_hz.at(tick.temperature_deg_c).value;
         let measured = tick.half_periods.and_then(|counts| {
             let excess = frequency_hz(counts, tick.duration)? - rest_hz;
-            let (weight, change) = self.input_change(sensor, tick, middle);
+            let (weight, change) = self.input_change(sensor, tick.duration.as_s(), (middle, mean_hz));
             // The change of rate since the last tick has `unbalance` times the excess itself in it.
             Some((excess + weight * change) / (1.0 + weight * unbalance))
         });
@@ -280,15 +308,13 @@ impl ServoMemory {
 
     /// Change of the mean rate since the last good tick (counts/s), and the weight with which it stands for r·Δt/4;
     /// nothing where that tick is too far away.
-    fn input_change(&self, sensor: usize, tick: &ServoTick, middle: Timestamp) -> (f64, f64) {
-        let last = self.last.get(sensor).copied().flatten();
-        let now = tick.half_periods.and_then(|counts| mean_hz(counts, tick.duration));
-        let (Some((then, before)), Some(now)) = (last, now) else {
+    fn input_change(&self, sensor: usize, duration_s: f64, (middle, now): (Timestamp, f64)) -> (f64, f64) {
+        let (Some(then), Some(before)) = (self.last.get(sensor), self.last_mean_hz.get(sensor)) else {
             return (0.0, 0.0);
         };
-        let (between_s, duration_s) = (middle.seconds_from(then), tick.duration.as_s());
-        let near = between_s > 0.0 && between_s <= REACH_TICKS * duration_s;
-        if near { (0.25 * duration_s / between_s, now - before) } else { (0.0, 0.0) }
+        let (between_s, change) = (middle.seconds_from(*then), now - before);
+        let near = between_s > 0.0 && between_s <= REACH_TICKS * duration_s && !change.is_nan();
+        if near { (0.25 * duration_s / between_s, change) } else { (0.0, 0.0) }
     }
 }
 
@@ -297,10 +323,9 @@ fn middle(end_time: Timestamp, duration: Span) -> Timestamp {
     end_time - Span::from_ns(duration.as_ns() / 2)
 }
 
-/// `(c⁺ + c⁻)/Δt` (counts/s); `None` for a tick without duration.
-fn mean_hz(counts: HalfPeriodCounts, duration: Span) -> Option<f64> {
-    let sum = f64::from(counts.positive) + f64::from(counts.negative);
-    (duration > Span::ZERO).then(|| sum / duration.as_s())
+/// `(c⁺ + c⁻)/Δt` (counts/s).
+fn mean_hz(counts: HalfPeriodCounts, duration_s: f64) -> f64 {
+    (f64::from(counts.positive) + f64::from(counts.negative)) / duration_s
 }
 
 /// `f_i = (c⁺ − c⁻)/Δt` (Hz); `None` for a tick without duration.

@@ -181,11 +181,7 @@ impl Unit {
 
     /// Gives out a tick that is the next, where its accelerometers are at hand; whether they were.
     #[inline]
-    fn pass_next<E: FnMut(&CorrectedTick) + ?Sized>(
-        &mut self,
-        tick: &GyroTick,
-        emit: &mut E,
-    ) -> bool {
+    fn pass_next<E: FnMut(&CorrectedTick) + ?Sized>(&mut self, tick: &GyroTick, emit: &mut E) -> bool {
         let accel = self.accels.meets(tick, &mut self.pipeline.counters);
         let met = accel.is_some();
         if !met && self.pipeline.expects_accels() {

@@ -15,6 +15,7 @@ use crate::drift::DriftModel;
 use crate::lanes::Lanes;
 use crate::reversal::{Reversal, ReversalError};
 use crate::sample::{MAX_SENSORS, MIN_SENSORS};
+use crate::servo::Servo;
 use crate::thermal::Trends;
 
 use checker::{Checker, HUGE};
@@ -63,6 +64,7 @@ pub(super) fn compile(parts: &CalibrationParts) -> Result<Calibration, Vec<Defec
     let reversal = parts.reversal.as_ref().map(Reversal::new);
     let reversal = reversal.and_then(|reversal| checker.compiled(reversal, ReversalError::field));
     check_self_test(checker, &parts.self_test);
+    let servos = models.iter().filter_map(|gyro| gyro.servo.as_ref());
     match gyro_orientation {
         Some(gyro_orientation) if checker.defects.is_empty() => Ok(Calibration {
             filter,
@@ -71,7 +73,7 @@ pub(super) fn compile(parts: &CalibrationParts) -> Result<Calibration, Vec<Defec
             gyro_limits: limits(models.iter().map(|gyro| gyro.input_limit)),
             accel_limits: limits(accels.iter().map(|accel| accel.input_limit)),
             trends: Trends::of(&models).map(Box::new),
-            has_servo: models.iter().any(|gyro| gyro.servo.is_some()),
+            servos_settle_s: servos.map(Servo::settle_time_s).reduce(f64::max),
             gyros: models,
             drifts,
             gyro_orientation,

@@ -33,20 +33,27 @@ pub(crate) trait Follows<const T: usize> {
 /// Most channels that all sensors of a unit follow: one for each gyro, each accelerometer and each accelerometer's board.
 const MOST_FOLLOWED: usize = 3 * MAX_SENSORS;
 
-/// How far along its way everything is that follows a channel, at one time: by the channel's place among those that are
-/// followed. What follows none stands still at the last place.
-pub(crate) type Shares = [f64; MOST_FOLLOWED + 1];
+/// How far along its way everything is that follows a channel, at one time. What follows none stands still anyway.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Shares {
+    /// Everything is equally far, as it is where a unit's channels are read together.
+    Together(f64),
+    /// By the channel's place among those that are followed.
+    Apart([f64; MOST_FOLLOWED]),
+}
 
 /// The channels that sensors follow. Whatever follows one is turned at once with all the rest: hence one pace for each.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(crate) struct Paces {
     followed: ArrayVec<(usize, Pace), MOST_FOLLOWED>,
+    /// Whether some differ from others.
+    apart: bool,
 }
 
 impl Paces {
     /// Place of a channel, which is followed from now on.
     fn place(&mut self, channel: Option<usize>) -> u8 {
-        let place = channel.map_or(MOST_FOLLOWED, |channel| {
+        let place = channel.map_or(0, |channel| {
             let known = self.followed.iter().position(|(followed, _)| *followed == channel);
             known.unwrap_or_else(|| {
                 self.followed.push((channel, Pace::default()));
@@ -59,11 +66,16 @@ impl Paces {
     /// How far along everything is at `time`.
     #[inline]
     pub(crate) fn shares(&self, time: Timestamp) -> Shares {
-        let mut shares = [0.0; MOST_FOLLOWED + 1];
-        for (share, (_, pace)) in shares.iter_mut().zip(&self.followed) {
-            *share = pace.share(time);
+        match self.followed.first() {
+            Some(_) if self.apart => {
+                let mut shares = [0.0; MOST_FOLLOWED];
+                let shared = shares.iter_mut().zip(&self.followed);
+                shared.for_each(|(share, (_, pace))| *share = pace.share(time));
+                Shares::Apart(shares)
+            }
+            Some((_, pace)) => Shares::Together(pace.share(time)),
+            None => Shares::Together(0.0),
         }
-        shares
     }
 
     /// How far along whatever follows a channel is at `time`.
@@ -79,7 +91,12 @@ impl Paces {
 
     /// Has everything that follows a channel go another way.
     pub(crate) fn set(&mut self, channel: usize, pace: Pace) {
-        self.followed.iter_mut().filter(|(followed, _)| *followed == channel).for_each(|(_, old)| *old = pace);
+        self.followed
+            .iter_mut()
+            .filter(|(followed, _)| *followed == channel)
+            .for_each(|(_, old)| *old = pace);
+        let first = self.followed.first().map(|(_, pace)| *pace);
+        self.apart = self.followed.iter().any(|(_, pace)| Some(*pace) != first);
     }
 }
 
@@ -214,7 +231,12 @@ impl<const T: usize> Bank<T> {
     /// The terms so far along, term by term.
     #[inline]
     pub(crate) fn at<const N: usize>(&self, shares: &Shares) -> [[f64; N]; T] {
-        let share = array::from_fn(|lane| shares[usize::from(self.share_of[lane]).min(MOST_FOLLOWED)]);
+        let share = match shares {
+            Shares::Together(share) => [*share; N],
+            Shares::Apart(shares) => {
+                array::from_fn(|lane| shares[usize::from(self.share_of[lane]) % MOST_FOLLOWED])
+            }
+        };
         array::from_fn(|term| self.lines[term].at(&share))
     }
 

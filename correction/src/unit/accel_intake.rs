@@ -55,8 +55,7 @@ impl AccelIntake {
         }
         let &AccelTick { end_time, duration, ref readings, .. } = tick;
         let (count, readings) = (readings.len(), of_readings(readings));
-        let pending =
-            PendingAccel { end_time, duration, output, count, readings, after: self.gyro_messages };
+        let pending = PendingAccel { end_time, duration, output, count, readings, after: self.gyro_messages };
         if self.released.is_some_and(|released| tick.end_time <= released) {
             counters.accel_late += 1;
             if self.behind.len() < MAX_PENDING {
@@ -68,11 +67,10 @@ impl AccelIntake {
     }
 
     /// Puts a tick in its place in time.
+    #[inline]
     fn insert(&mut self, pending: PendingAccel, counters: &mut Counters) {
         let time = pending.end_time;
-        if self.pending.len() < MAX_PENDING
-            && self.pending.back().is_none_or(|last| last.end_time < time)
-        {
+        if self.pending.len() < MAX_PENDING && self.pending.back().is_none_or(|last| last.end_time < time) {
             self.pending.push_back(pending);
         } else {
             self.insert_between(pending, counters);
@@ -80,6 +78,7 @@ impl AccelIntake {
     }
 
     /// Likewise a tick that is not the newest, or one too many.
+    #[cold]
     fn insert_between(&mut self, pending: PendingAccel, counters: &mut Counters) {
         let time = pending.end_time;
         let place = self.pending.iter().rposition(|p| p.end_time < time).map_or(0, |i| i + 1);

@@ -89,7 +89,8 @@ impl Axes {
 
     /// Case axes from the sensors of `usable`, and whether they can be trusted: where the usable ones do not span the space, from
     /// all that are not excluded, and not to be trusted.
-    #[inline]
+    #[expect(clippy::inline_always, reason = "twice per tick: a call costs as much as half of the work")]
+    #[inline(always)]
     pub(super) fn resolve<const N: usize>(
         &mut self,
         orientation: &Orientation,

@@ -231,7 +231,8 @@ impl Corrector {
         let gyros = self.thermal.gyro_axes.in_use(time);
         let accels = self.thermal.accel_axes.as_ref().and_then(|axes| axes.in_use(time));
         let rates: Sensors<f64> = self.seen.gyros.iter().map(|gyro| gyro.bias + gyro.drift).collect();
-        let ([bias, per_scale_factor], [ratio]) = self.accel_terms::<MAX_SENSORS>(&self.thermal.paces.shares(time));
+        let ([bias, per_scale_factor], [ratio]) =
+            self.accel_terms::<MAX_SENSORS>(&self.thermal.paces.shares(time));
         let lanes = 0..calibration.accels.len();
         let forces: Sensors<f64> =
             lanes.map(|lane| bias[lane] * ratio[lane] * per_scale_factor[lane]).collect();
@@ -267,10 +268,7 @@ pub(super) fn pass_through(tick: &GyroTick, accel: Option<&PendingAccel>) -> Cor
             | TickFlags::VELOCITY_INVALID
             | if accel.is_none() { TickFlags::ACCELEROMETER_MISSING } else { TickFlags::empty() },
         gyro_flags: of_sensors([SensorFlags::empty(); MAX_SENSORS], tick.readings.len()),
-        accel_flags: of_sensors(
-            [SensorFlags::empty(); MAX_SENSORS],
-            accel.map_or(0, |accel| accel.count),
-        ),
+        accel_flags: of_sensors([SensorFlags::empty(); MAX_SENSORS], accel.map_or(0, |accel| accel.count)),
         ..CorrectedTick::default()
     }
 }

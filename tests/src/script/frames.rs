@@ -2,7 +2,9 @@
 
 use std::collections::VecDeque;
 
-use isotherm_correction::sample::{AccelTick, ChannelName, GyroTick, OutputKind, Sensors, TemperatureReading};
+use isotherm_correction::sample::{
+    AccelTick, ChannelName, GyroTick, OutputKind, Sensors, TemperatureReading,
+};
 use isotherm_correction::units::Timestamp;
 use isotherm_protocol::codec::encode;
 use isotherm_protocol::key::{Input, RawStream};

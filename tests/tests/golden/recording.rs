@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
-use isotherm_protocol::codec::decode;
 use isotherm_correction::sample::{CorrectedTick, LasingMode, SensorFlags};
+use isotherm_protocol::codec::decode;
 use isotherm_protocol::corrected::CorrectedBatch;
 use isotherm_protocol::stream::{InForce, Label, UnitStream};
 use isotherm_tests::script::{Scenario, Step};

@@ -13,7 +13,8 @@ use crate::unit::counters::Counters;
 impl Corrector {
     /// The terms of the accelerometers in use: S and 1/K, and r of their boards.
     pub(super) fn accel_terms<const N: usize>(&self, shares: &Shares) -> ([[f64; N]; 2], [[f64; N]; 1]) {
-        let (mut terms, mut board) = (self.thermal.accels.at::<N>(shares), self.thermal.boards.at::<N>(shares));
+        let (mut terms, mut board) =
+            (self.thermal.accels.at::<N>(shares), self.thermal.boards.at::<N>(shares));
         if let Some(slewing) = self.slewing() {
             slewing.terms(&mut terms, &slewing.from.accels);
             slewing.terms(&mut board, &slewing.from.boards);

@@ -58,12 +58,15 @@ impl Corrector {
         let input = input(tick.released);
         let lost = calibration.reversal.as_ref().is_some_and(|r| self.substitution.is_lost(r, &input));
 
-        let [weight, bias, magnetic, meander] = self.gyro_terms::<N>(calibration, shares, tick.since_turn_on_s);
+        let [weight, bias, magnetic, meander] =
+            self.gyro_terms::<N>(calibration, shares, tick.since_turn_on_s);
         let (mode_sign, meander_sign) = (sign(raw.mode), sign(raw.meander));
         let mut bias: [f64; N] =
             array::from_fn(|i| bias[i] + mode_sign * magnetic[i] + meander_sign * meander[i]);
         self.servo.advance(lost, time, raw.duration);
-        if calibration.has_servo && !lost {
+        if let Some(settles_s) = calibration.servos_settle_s.filter(|_| !lost)
+            && !self.servo.pass_settled(settles_s, (time, raw.duration), &raw.half_periods)
+        {
             out.flags |= self.servo_transients(calibration, raw, &weight, &mut bias);
         }
         let drift: [f64; N] = if self.drift.subtracts() {
@@ -132,6 +135,7 @@ impl Corrector {
     }
 
     /// Adds what the gyros' servos show in a good tick to their biases (rad/s); `weight` in rad per count.
+    #[cold]
     fn servo_transients<const N: usize>(
         &mut self,
         calibration: &Calibration,
