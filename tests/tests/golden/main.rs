@@ -3,13 +3,7 @@
 //! Every recording drives a stream through a scenario and compares each corrected tick and everything that the stream can
 //! be asked with what is committed. `ISOTHERM_BLESS=1` writes the files anew: only where a change of the output is meant.
 
-#![expect(
-    clippy::expect_used,
-    clippy::unwrap_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    reason = "what does not hold ends the test"
-)]
+#![expect(clippy::unwrap_used, clippy::panic, reason = "what does not hold ends the test")]
 
 mod file;
 mod look;

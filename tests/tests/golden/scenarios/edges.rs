@@ -1,5 +1,6 @@
 //! Places where one step more or less makes another decision.
 
+use isotherm_correction::curve::CurveParts;
 use isotherm_correction::operation::Command;
 use isotherm_correction::reversal::ReversalParts;
 use isotherm_correction::sample::OutputKind;
@@ -29,11 +30,7 @@ pub(crate) fn edge_of_an_orientation_s_range() -> Scenario {
 /// Branched terms over a derivative that leaves the range of one branch only.
 pub(crate) fn edge_of_a_branch_s_range() -> Scenario {
     let mut parts = rich_parts(0.0);
-    let narrow = |range| isotherm_correction::curve::CurveParts::Polynomial {
-        reference: 0.0,
-        coefficients: vec![1e-4, 1e-5],
-        range,
-    };
+    let narrow = |range| CurveParts::Polynomial { reference: 0.0, coefficients: vec![1e-4, 1e-5], range };
     let rate = parts.gyros[0].thermal_rate.as_mut().unwrap();
     (rate.run_up, rate.braking) = (narrow([-1e-3, 1e-3]), narrow([-50.0, 50.0]));
     let acceleration = parts.gyros[1].thermal_acceleration.as_mut().unwrap();

@@ -3,14 +3,15 @@
 use isotherm_correction::earth::Place;
 use isotherm_correction::operation::Command;
 use isotherm_correction::prelaunch::PreLaunchSettings;
-use isotherm_correction::unit::UnitSettings;
+use isotherm_correction::sample::OutputKind;
+use isotherm_correction::unit::{At, UnitSettings};
 use isotherm_correction::units::Span;
 use isotherm_protocol::journal::JournalEvent;
 use isotherm_tests::calibrations::compile;
 use isotherm_tests::lives::{FULL_CHANNELS, full, place, skewed};
 use isotherm_tests::script::{Kind, Odd, Scenario, Script};
 
-use crate::plain::{RICH_CHANNELS, redundant_script, rich_parts, rich_script, told};
+use crate::plain::{RICH_CHANNELS, redundant_script, rich, rich_parts, rich_script, told};
 
 /// A unit that begins in standby, with sensors that stand still, fail and come back in its self-tests.
 pub(crate) fn self_tests() -> Scenario {
@@ -85,8 +86,8 @@ pub(crate) fn standby_and_run() -> Scenario {
         match what {
             1 => script.gap(7),
             2 => script.restart(),
-            3 => script.give(crate::plain::rich(0.5), Default::default(), Span::from_ms(200)),
-            4 => script.foreign(isotherm_correction::sample::OutputKind::Counts, 3),
+            3 => script.give(rich(0.5), At::NextTick, Span::from_ms(200)),
+            4 => script.foreign(OutputKind::Counts, 3),
             _ => {}
         }
         script.ticks(21);
