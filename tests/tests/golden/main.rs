@@ -12,6 +12,7 @@ mod recording;
 mod scenarios {
     pub(crate) mod accels;
     pub(crate) mod documents;
+    pub(crate) mod drift;
     pub(crate) mod edges;
     pub(crate) mod modes;
     pub(crate) mod outputs;
@@ -152,10 +153,16 @@ recordings! {
         times_about_half_of_the_last_one
         times_from_one_end_to_the_other
     }
+    recording::record: scenarios::drift {
+        drift_references_not_believed_at_first
+        drift_references_out_of_reach
+        drift_at_rest_that_is_nudged
+    }
     recording::record: scenarios::edges {
         edge_of_an_orientation_s_range
         edge_of_a_branch_s_range
         edge_of_the_board_s_freshness
+        edge_of_a_line_s_end
         edge_of_a_plausible_step
         edge_of_what_is_late
         edge_of_a_restart

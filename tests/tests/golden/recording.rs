@@ -12,7 +12,7 @@ use sha2::{Digest as _, Sha256};
 use crate::look;
 
 /// Steps between two looks at what a stream knows.
-const LOOK_EVERY: usize = 50;
+const LOOK_EVERY: usize = 64;
 
 /// A corrected tick: its number, and what is left of its bits.
 pub(crate) struct Tick {

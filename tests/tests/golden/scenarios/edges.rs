@@ -60,6 +60,20 @@ pub(crate) fn edge_of_the_board_s_freshness() -> Scenario {
     told(script)
 }
 
+/// Readings come in unequal steps, so that terms reach what they move to and stay there.
+pub(crate) fn edge_of_a_line_s_end() -> Scenario {
+    let mut script = rich_script(169);
+    (script.batch, script.thermometers) = (2, false);
+    let mut raw = 24.0;
+    for ticks in [10, 30, 10, 60, 20, 70, 10, 40, 40, 30, 14, 80] {
+        raw += 0.37;
+        script.temperature("t", raw, -3_000_000);
+        script.temperature("board", 2.0 * raw - 20.0, -3_000_000);
+        script.ticks(ticks);
+    }
+    told(script)
+}
+
 /// More ticks are claimed than the time can hold, by so little that it is believed, or is not.
 pub(crate) fn edge_of_a_plausible_step() -> Scenario {
     let mut script = rich_script(154);
@@ -261,6 +275,12 @@ pub(crate) fn edge_of_a_servo_at_a_restart() -> Scenario {
         script.ticks(50 - script.next % 50 + place);
         script.series += 1;
         script.ticks(20);
+    }
+    // Counts of ticks that are far, and not too far, apart.
+    for lost in [7, 8, 9, 14, 15, 16, 17] {
+        script.ticks(50 - script.next % 50 + 5);
+        script.gap(lost);
+        script.ticks(3);
     }
     told(script)
 }
