@@ -106,6 +106,8 @@ pub struct Script {
     pub switches: u64,
     /// More ticks at whose start a switch is commanded.
     pub commands: Vec<u64>,
+    /// Ticks after a switch is commanded until the reported mode is the new one.
+    pub mode_late: u64,
     /// Half-period counts come with the ticks of an instrument with modes.
     pub halves: bool,
     /// Ticks of half a period of the slow meander; 0 where it stays as it is.
@@ -130,6 +132,8 @@ pub struct Script {
     pub accels: Accels,
     late_accels: Vec<Step>,
     mode: LasingMode,
+    /// Ticks since the last switch.
+    since_switch: u64,
 }
 
 impl Script {
@@ -154,6 +158,7 @@ impl Script {
             mishaps: 0,
             switches: 0,
             commands: Vec::new(),
+            mode_late: 0,
             halves: true,
             meander: 0,
             fails: None,
@@ -167,6 +172,7 @@ impl Script {
             accels: Accels::Before,
             late_accels: Vec::new(),
             mode: LasingMode::Plus,
+            since_switch: u64::MAX,
         };
         let calibration = Arc::clone(calibration);
         script.give(calibration, At::NextTick, Span::ZERO);

@@ -44,7 +44,10 @@ impl Script {
         let switch_command = periodic || self.commands.contains(&sequence);
         if switch_command {
             self.mode = self.mode.reversed();
+            self.since_switch = 0;
         }
+        let reported = if self.since_switch < self.mode_late { self.mode.reversed() } else { self.mode };
+        self.since_switch = self.since_switch.saturating_add(1);
         let readings = self.gyro_readings(sequence);
         let has_modes = self.switches > 0;
         let counts = self.calibration.gyro_output() == OutputKind::Counts;
@@ -59,7 +62,7 @@ impl Script {
             duration,
             half_periods,
             readings,
-            mode: has_modes.then_some(self.mode),
+            mode: has_modes.then_some(reported),
             switch_command,
             meander: has_modes.then(|| self.meander_of(sequence)),
             series: self.series,

@@ -12,6 +12,7 @@
 //! ```
 
 use std::collections::BTreeMap;
+use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use isotherm_tests::data::root;
@@ -53,7 +54,7 @@ pub(crate) fn text(recording: &Recording) -> String {
     let entries: Vec<_> = recording.entries.iter().map(|entry| entry.digest).collect();
     for (what, digests) in [("ticks", ticks), ("entries", entries)] {
         for (line, some) in digests.chunks(TO_A_LINE).enumerate() {
-            text += &format!("{what} from {}: {}\n", line * TO_A_LINE, hex(some));
+            writeln!(text, "{what} from {}: {}", line * TO_A_LINE, hex(some)).unwrap();
         }
     }
     text

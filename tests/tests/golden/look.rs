@@ -5,6 +5,7 @@ use isotherm_correction::prelaunch::{ByMode, ModeTotals, Outcome};
 use isotherm_correction::rest::Rest;
 use isotherm_correction::sample::LasingMode;
 use isotherm_correction::unit::{At, PreLaunchView, SensorHealth, Unit};
+use isotherm_correction::units::Timestamp;
 use isotherm_protocol::stream::{Edge, UnitStream};
 
 use crate::recording::Recording;
@@ -107,7 +108,7 @@ fn drift(unit: &Unit, say: &mut impl FnMut(&str, String)) {
     for (index, estimate) in unit.drift().iter().enumerate() {
         let words = estimate.as_ref().map(|drift| {
             let values = bits([drift.rate, drift.sigma, drift.trend, drift.trend_sigma]);
-            let last = drift.last_update.map(|time| time.as_ns());
+            let last = drift.last_update.map(Timestamp::as_ns);
             format!("{values} {} {} {} {last:?}", drift.updates, drift.refused, drift.believed)
         });
         say(&format!("drift of gyro {index}"), format!("{words:?}"));
@@ -136,7 +137,7 @@ fn report_words(report: &SelfTestReport) -> String {
         };
         format!("{item} {} {} {}", optional(check.value), bits(check.limits), check.passed)
     });
-    let ended = report.ended.map(|time| time.as_ns());
+    let ended = report.ended.map(Timestamp::as_ns);
     format!("{ended:?} {} {}", report.length.as_ns(), checks.collect::<Vec<_>>().join(", "))
 }
 

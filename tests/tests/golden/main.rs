@@ -3,13 +3,7 @@
 //! Every recording drives a stream through a scenario and compares each corrected tick and everything that the stream can
 //! be asked with what is committed. `ISOTHERM_BLESS=1` writes the files anew: only where a change of the output is meant.
 
-#![expect(
-    clippy::expect_used,
-    clippy::unwrap_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    reason = "what does not hold ends the test"
-)]
+#![expect(clippy::unwrap_used, clippy::panic, reason = "what does not hold ends the test")]
 
 mod file;
 mod look;
@@ -18,6 +12,8 @@ mod recording;
 mod scenarios {
     pub(crate) mod accels;
     pub(crate) mod documents;
+    pub(crate) mod drift;
+    pub(crate) mod edges;
     pub(crate) mod modes;
     pub(crate) mod outputs;
     pub(crate) mod producer;
@@ -156,6 +152,30 @@ recordings! {
         times_near_the_first_one
         times_about_half_of_the_last_one
         times_from_one_end_to_the_other
+    }
+    recording::record: scenarios::drift {
+        drift_references_not_believed_at_first
+        drift_references_out_of_reach
+        drift_at_rest_that_is_nudged
+    }
+    recording::record: scenarios::edges {
+        edge_of_an_orientation_s_range
+        edge_of_a_branch_s_range
+        edge_of_the_board_s_freshness
+        edge_of_a_line_s_end
+        edge_of_a_plausible_step
+        edge_of_what_is_late
+        edge_of_a_restart
+        edge_of_modes_as_they_are
+        edge_of_a_switch_s_reach
+        edge_of_other_fits_in_a_transition
+        edge_of_a_suspicion
+        edge_of_a_median
+        edge_of_a_self_test
+        edge_of_a_servo_at_a_restart
+        edge_of_the_last_good_rate
+        edge_of_other_outputs
+        edge_of_a_calibration_that_comes_late
     }
     recording::record: rich {
         life_of_mode_reversal_with_mishaps

@@ -12,7 +12,7 @@ use sha2::{Digest as _, Sha256};
 use crate::look;
 
 /// Steps between two looks at what a stream knows.
-const LOOK_EVERY: usize = 50;
+const LOOK_EVERY: usize = 64;
 
 /// A corrected tick: its number, and what is left of its bits.
 pub(crate) struct Tick {
@@ -73,11 +73,15 @@ pub(crate) fn record(scenario: &Scenario) -> Recording {
     let mut recording = Recording::default();
     let mut stream = scenario.stream();
     for (index, step) in scenario.steps.iter().enumerate() {
+        if !matches!(step, Step::Frame(..)) {
+            // What it ends may not be seen any more behind it.
+            look::at(&stream, index, &mut recording);
+        }
         if let Some(said) = give(&mut stream, step) {
             recording.entry(format!("step {index}: {said}"));
         }
-        take_out(&mut stream, &mut recording);
-        if index % LOOK_EVERY == LOOK_EVERY - 1 {
+        let first = take_out(&mut stream, &mut recording);
+        if first || index % LOOK_EVERY == LOOK_EVERY - 1 {
             look::at(&stream, index, &mut recording);
         }
     }
@@ -103,15 +107,18 @@ pub(crate) fn give(stream: &mut UnitStream, step: &Step) -> Option<String> {
     }
 }
 
-fn take_out(stream: &mut UnitStream, recording: &mut Recording) {
-    let mut frame = Vec::new();
+/// Takes everything out; whether there was the first output of a revision.
+fn take_out(stream: &mut UnitStream, recording: &mut Recording) -> bool {
+    let (mut frame, mut first) = (Vec::new(), false);
     while stream.next_frame(&mut frame) {
         recording.frame(&frame);
     }
     while let Some(InForce { revision, series, sequence, end_time_ns }) = stream.take_in_force() {
         let counter = revision.counter;
+        first = true;
         recording.entry(format!("revision {counter} in force: {series} {sequence} {end_time_ns}"));
     }
+    first
 }
 
 /// What a frame says beside its ticks.

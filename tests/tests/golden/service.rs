@@ -4,6 +4,7 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use isotherm_correction::operation::Command;
+use isotherm_correction::unit::UnitSettings;
 use isotherm_correction::units::Span;
 use isotherm_protocol::codec::decode;
 use isotherm_protocol::control::Schedule;
@@ -180,7 +181,7 @@ pub(crate) fn service_and_its_journal() -> Scenario {
     script.command(Command::Run { reversal: Some(false) }, true);
     script.ticks(60);
     script.document(&example("Again"), Schedule::Sequence(script.next + 100), Span::ZERO);
-    let settings = isotherm_correction::unit::UnitSettings::default();
+    let settings = UnitSettings::default();
     script.event(JournalEvent::Began { settings, highest_revision: 0 });
     script.ticks(160);
     told(script)

@@ -3,8 +3,9 @@
 use isotherm_correction::sample::OutputKind;
 use isotherm_correction::unit::UnitSettings;
 use isotherm_correction::units::Span;
+use isotherm_protocol::key::{Input, RawStream};
 use isotherm_tests::calibrations::compile;
-use isotherm_tests::script::{Accels, Scenario, Script};
+use isotherm_tests::script::{Accels, Scenario, Script, Step};
 
 use crate::plain::{RICH_CHANNELS, rich_parts, rich_script, told, with_outputs};
 
@@ -62,8 +63,8 @@ pub(crate) fn accelerometers_beside_their_gyro_ticks() -> Scenario {
             let from = accels.steps.len();
             accels.ticks(1);
             let accel = accels.steps.drain(from..).find(|step| {
-                let accel = isotherm_protocol::key::Input::Raw(isotherm_protocol::key::RawStream::Accel);
-                matches!(step, isotherm_tests::script::Step::Frame(input, _) if *input == accel)
+                let accel = Input::Raw(RawStream::Accel);
+                matches!(step, Step::Frame(input, _) if *input == accel)
             });
             script.steps.extend(accel);
             script.ticks(1);

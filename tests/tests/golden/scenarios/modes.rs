@@ -90,7 +90,7 @@ pub(crate) fn mode_switches_by_other_fits() -> Scenario {
     told(script)
 }
 
-fn servo(seed: u64, halves: bool) -> Script {
+pub(crate) fn servo(seed: u64, halves: bool) -> Script {
     let mut parts = with_outputs(rich_parts(0.0), OutputKind::Counts, OutputKind::Counts);
     for (gyro, form) in
         parts.gyros.iter_mut().zip([ServoForm::Measured, ServoForm::Modelled, ServoForm::Modelled])

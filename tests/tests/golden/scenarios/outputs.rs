@@ -5,7 +5,7 @@ use isotherm_correction::unit::{At, Uncalibrated, UnitSettings};
 use isotherm_correction::units::Span;
 use isotherm_protocol::journal::JournalEvent;
 use isotherm_tests::lives::{FULL_CHANNELS, full, skewed};
-use isotherm_tests::script::{Scenario, Script};
+use isotherm_tests::script::{Accels, Scenario, Script};
 
 use crate::plain::{rich, rich_script, told};
 
@@ -82,9 +82,9 @@ fn from_time(seed: u64, now_ns: i64) -> Scenario {
     (script.batch, script.switches, script.now_ns) = (2, 50, now_ns);
     script.ticks(130);
     script.reference();
-    script.accels = isotherm_tests::script::Accels::Lost(50);
+    script.accels = Accels::Lost(50);
     script.ticks(30);
-    script.accels = isotherm_tests::script::Accels::Before;
+    script.accels = Accels::Before;
     script.give(rich(0.2), At::NextTick, Span::from_ms(200));
     script.ticks(60);
     (script.next, script.now_ns, script.series) = (10, now_ns, script.series + 1);

@@ -5,9 +5,9 @@ use isotherm_correction::unit::UnitSettings;
 use isotherm_correction::units::Span;
 use isotherm_protocol::journal::JournalEvent;
 use isotherm_tests::calibrations::compile;
-use isotherm_tests::script::{Scenario, Step};
+use isotherm_tests::script::{Accels, Scenario, Script, Step};
 
-use crate::plain::{rich_parts, rich_script, told, without_accels};
+use crate::plain::{RICH_CHANNELS, rich_parts, rich_script, told, without_accels};
 
 pub(crate) fn producer_restarts() -> Scenario {
     let mut script = rich_script(71);
@@ -146,7 +146,7 @@ pub(crate) fn wrong_sensors_and_wrong_outputs() -> Scenario {
 pub(crate) fn ticks_that_wait_too_many() -> Scenario {
     let mut script = rich_script(79);
     script.batch = 100;
-    script.accels = isotherm_tests::script::Accels::Lost(100);
+    script.accels = Accels::Lost(100);
     script.ticks(8300);
     let settings = UnitSettings { pairing_window: Span::from_ms(200_000), ..UnitSettings::default() };
     script.scenario("", settings, Vec::new())
@@ -159,9 +159,9 @@ pub(crate) fn flushed_tails() -> Scenario {
     for lost in [0, 1, 5] {
         script.ticks(33);
         script.gap(lost);
-        script.accels = isotherm_tests::script::Accels::Lost(100);
+        script.accels = Accels::Lost(100);
         script.ticks(6);
-        script.accels = isotherm_tests::script::Accels::Before;
+        script.accels = Accels::Before;
         script.event(JournalEvent::Flushed);
     }
     let from = script.steps.len();
@@ -187,7 +187,7 @@ pub(crate) fn messages_of_other_lengths() -> Scenario {
 
 pub(crate) fn unit_without_accelerometers() -> Scenario {
     let calibration = compile(&without_accels(rich_parts(0.0)));
-    let mut script = isotherm_tests::script::Script::new(82, &calibration, &crate::plain::RICH_CHANNELS);
+    let mut script = Script::new(82, &calibration, &RICH_CHANNELS);
     (script.switches, script.mishaps, script.batch) = (70, 2, 3);
     script.ticks(600);
     script.foreign(OutputKind::Mean, 3);

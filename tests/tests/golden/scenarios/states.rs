@@ -3,14 +3,15 @@
 use isotherm_correction::earth::Place;
 use isotherm_correction::operation::Command;
 use isotherm_correction::prelaunch::PreLaunchSettings;
-use isotherm_correction::unit::UnitSettings;
+use isotherm_correction::sample::OutputKind;
+use isotherm_correction::unit::{At, UnitSettings};
 use isotherm_correction::units::Span;
 use isotherm_protocol::journal::JournalEvent;
 use isotherm_tests::calibrations::compile;
 use isotherm_tests::lives::{FULL_CHANNELS, full, place, skewed};
 use isotherm_tests::script::{Kind, Odd, Scenario, Script};
 
-use crate::plain::{RICH_CHANNELS, redundant_script, rich_parts, rich_script, told};
+use crate::plain::{RICH_CHANNELS, redundant_script, rich, rich_parts, rich_script, told};
 
 /// A unit that begins in standby, with sensors that stand still, fail and come back in its self-tests.
 pub(crate) fn self_tests() -> Scenario {
@@ -85,8 +86,8 @@ pub(crate) fn standby_and_run() -> Scenario {
         match what {
             1 => script.gap(7),
             2 => script.restart(),
-            3 => script.give(crate::plain::rich(0.5), Default::default(), Span::from_ms(200)),
-            4 => script.foreign(isotherm_correction::sample::OutputKind::Counts, 3),
+            3 => script.give(rich(0.5), At::NextTick, Span::from_ms(200)),
+            4 => script.foreign(OutputKind::Counts, 3),
             _ => {}
         }
         script.ticks(21);
@@ -108,29 +109,31 @@ fn pre_launch_of(place: Place, duration_s: u32, change_rad_per_s: f64) -> Comman
     Command::PreLaunch(settings)
 }
 
-/// Accepted, with modes and levelled by its accelerometers; then refused for a limit, a move, a restart, a short time.
+/// Accepted, with modes, levelled or not; then refused for a limit, modes of unequal time, a move, a restart, a short time.
 pub(crate) fn pre_launch_calibrations() -> Scenario {
     let mut parts = rich_parts(0.0);
     parts.filter.stale_after_s = 30.0;
     let mut script = Script::new(114, &compile(&parts), &RICH_CHANNELS);
-    (script.tick, script.batch, script.switches) = (Span::from_ms(100), 10, 100);
+    (script.tick, script.batch, script.switches) = (Span::from_ms(100), 10, 400);
     (script.swing, script.scatter, script.warming) = (0.0, 5.0, 1e-3);
     let levelled = Place::new(55.0, 30.0, None).unwrap();
     script.command(Command::Standby, true);
-    for (place, change, what) in
-        [(levelled, 1.0, 0), (place(), 1.0, 0), (place(), 1e-9, 0), (place(), 1.0, 1), (place(), 1.0, 2)]
+    for (place, duration_s, change) in
+        [(levelled, 160, 1.0), (place(), 160, 1.0), (place(), 160, 1e-9), (place(), 120, 1.0)]
     {
-        script.command(pre_launch_of(place, 80, change), true);
+        // Whole stretches between two switches.
+        script.ticks(400 - script.next % 400);
+        script.command(pre_launch_of(place, duration_s, change), true);
+        script.ticks(u64::from(10 * duration_s + 20));
+    }
+    for moves in [true, false] {
+        script.command(pre_launch_of(place(), 80, 1.0), true);
         script.ticks(400);
-        match what {
-            1 => script.odd.push(Odd {
-                kind: Kind::Gyro,
-                sensor: Some(1),
-                ticks: script.next..script.next + 20,
-                value: 0.02,
-            }),
-            2 => script.restart(),
-            _ => {}
+        let ticks = script.next..script.next + 20;
+        if moves {
+            script.odd = vec![Odd { kind: Kind::Gyro, sensor: Some(1), ticks, value: 0.02 }];
+        } else {
+            script.restart();
         }
         script.ticks(420);
     }

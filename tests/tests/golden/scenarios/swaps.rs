@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use isotherm_correction::calibration::LagParts;
 use isotherm_correction::sample::OutputKind;
-use isotherm_correction::unit::At;
+use isotherm_correction::unit::{At, UnitSettings};
 use isotherm_correction::units::{Span, Timestamp};
 use isotherm_tests::calibrations::{compile, constant, polynomial};
 use isotherm_tests::lives::{FULL_CHANNELS, full, skewed};
@@ -63,7 +63,7 @@ pub(crate) fn swaps_slewed() -> Scenario {
     told(script)
 }
 
-/// Half a second is a hundred ticks exactly.
+/// Lags, filter, channels and axes that are carried over a swap, and those that are not.
 pub(crate) fn swaps_with_other_terms_and_channels() -> Scenario {
     let mut script = rich_script(103);
     (script.batch, script.warming) = (5, 0.1);
@@ -168,6 +168,6 @@ pub(crate) fn swaps_and_the_drift() -> Scenario {
         script.give(Arc::clone(set), At::NextTick, Span::from_ms(500));
     }
     script.ticks(60);
-    let settings = isotherm_correction::unit::UnitSettings { subtract_drift: true, ..Default::default() };
+    let settings = UnitSettings { subtract_drift: true, ..UnitSettings::default() };
     script.scenario("", settings, Vec::new())
 }
