@@ -40,6 +40,7 @@ extern crate alloc;
 mod by_mode;
 pub mod calibration;
 pub mod channel;
+mod counting;
 pub mod curve;
 pub mod drift;
 pub mod earth;

@@ -93,33 +93,37 @@ impl PreLaunch {
 
     /// Takes one tick. Once there is an outcome, further ticks change nothing.
     pub fn observe(&mut self, observation: &Observation) {
-        if self.outcome.is_some() {
-            return;
+        if self.outcome.is_none() {
+            let outcome = self.gather(observation);
+            self.outcome = outcome.unwrap_or_else(|refusal| Some(Outcome::Refused(alloc::vec![refusal])));
         }
+    }
+
+    /// Takes one tick while there is no outcome; the outcome once its time has passed, or a refusal that is certain.
+    fn gather(&mut self, observation: &Observation) -> Result<Option<Outcome>, Refusal> {
         let end = observation.end_time;
-        if let Some((start, _)) = self.span {
+        if let Some((_, last)) = &mut self.span {
             if observation.flags.contains(TickFlags::RESTART) {
-                self.refuse(Refusal::Restarted);
-                return;
+                return Err(Refusal::Restarted);
             }
             self.missed = self.missed.saturating_add(observation.missed);
-            self.span = Some((start, end));
+            *last = end;
         } else {
             self.span = Some((end - observation.duration, end));
         }
         if let Rest::Moved(moved) = self.rest.observe(observation) {
-            self.refuse(Refusal::Moved(moved));
-            return;
+            return Err(Refusal::Moved(moved));
         }
         if let Some(force) = observation.specific_force {
             self.force.add(force, observation.duration.as_s());
         }
-        self.gather_rates(observation);
-        if self.outcome.is_none() && self.elapsed() >= self.settings.duration {
-            // The last second may have been a nudge.
-            let rest = self.rest.finish(end);
-            self.outcome = Some(self.conclude(rest));
+        self.gather_rates(observation)?;
+        if self.elapsed() < self.settings.duration {
+            return Ok(None);
         }
+        // The last second may have been a nudge.
+        let rest = self.rest.finish(end);
+        Ok(Some(self.conclude(rest)))
     }
 
     /// Says what came of it once it is over: when its time has passed, or as soon as a refusal is certain.
@@ -153,11 +157,7 @@ impl PreLaunch {
         self.span.map_or(Span::ZERO, |(start, end)| end.since(start))
     }
 
-    fn refuse(&mut self, refusal: Refusal) {
-        self.outcome = Some(Outcome::Refused(alloc::vec![refusal]));
-    }
-
-    fn gather_rates(&mut self, observation: &Observation) {
+    fn gather_rates(&mut self, observation: &Observation) -> Result<(), Refusal> {
         // The bias rests on derivatives that are not known yet, or holds a transient that was not measured.
         let unknown = TickFlags::WARM_UP | TickFlags::UNCALIBRATED | TickFlags::SERVO_UNMEASURED;
         let usable = observation.settled && !observation.flags.intersects(unknown);
@@ -185,9 +185,7 @@ impl PreLaunch {
             }
             run.good(observation.mode, rate - bias, temperature_deg_c, duration_s);
         }
-        if let Some(refusal) = outside {
-            self.refuse(refusal);
-        }
+        outside.map_or(Ok(()), Err)
     }
 
     /// The constants, or every reason against them.

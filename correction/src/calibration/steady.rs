@@ -76,21 +76,19 @@ impl Calibration {
         };
         let sign = mode.map_or(1.0, LasingMode::sign);
 
-        let (mut gyro_bias, mut gyro_weight) = (Sensors::new(), Sensors::new());
-        for gyro in &self.gyros {
+        let gyros = self.gyros.iter().map(|gyro| {
             let terms = gyro.steady(&state(gyro.channel), &self.filter);
             let trend = gyro.trend.as_ref().map_or(0.0, TrendModel::last);
-            gyro_bias.push(terms.bias + trend + sign * terms.magnetic + terms.meander);
-            gyro_weight.push(terms.increment_weight);
-        }
-        let (mut accel_bias, mut accel_scale) = (Sensors::new(), Sensors::new());
-        for accel in &self.accels {
+            (terms.bias + trend + sign * terms.magnetic + terms.meander, terms.increment_weight)
+        });
+        let (gyro_bias, gyro_weight): (Sensors<_>, Sensors<_>) = gyros.unzip();
+        let accels = self.accels.iter().map(|accel| {
             let (bias, scale_factor) = accel.steady(&state(accel.channel), &self.filter);
             let ratio = accel.board_ratio.at(state(accel.board_channel).temperature).value;
             let scale = scale_factor / ratio;
-            accel_bias.push(bias / scale);
-            accel_scale.push(scale);
-        }
+            (bias / scale, scale)
+        });
+        let (accel_bias, accel_scale): (Sensors<_>, Sensors<_>) = accels.unzip();
         let gyro_temperature = mean(&self.gyro_orientation_channels);
         let accel_temperature = mean(&self.accel_orientation_channels);
         let accel_orientation = self.accel_orientation.as_ref();

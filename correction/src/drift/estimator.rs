@@ -247,18 +247,13 @@ impl DriftEstimator {
         gyro.map_or(0.0, |gyro| gyro.subtrahend(self.grid, time))
     }
 
-    /// The drift of gyro `gyro` as it is known at the last tick; `None` for a gyro without a stated drift.
+    /// The drift of every gyro as it is known at the last tick, in the calibration's order; `None` for a gyro without a
+    /// stated drift, nothing where none states one.
     ///
     /// The rate comes from a grid of 1 s and moves linearly in between; sigma and trend are evaluated here.
-    #[must_use]
-    pub fn estimate(&self, gyro: usize) -> Option<DriftEstimate> {
-        let gyro = self.gyros.get(gyro)?.as_ref()?;
-        Some(gyro.estimate(self.grid, self.now.unwrap_or_default()))
-    }
-
-    /// The drift of every gyro, in the calibration's order.
     pub fn estimates(&self) -> impl Iterator<Item = Option<DriftEstimate>> + '_ {
-        (0..self.gyros.len()).map(|gyro| self.estimate(gyro))
+        let now = self.now.unwrap_or_default();
+        self.gyros.iter().map(move |gyro| Some(gyro.as_ref()?.estimate(self.grid, now)))
     }
 
     /// What became of the references.

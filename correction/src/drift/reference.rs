@@ -4,6 +4,7 @@ use core::cmp::Ordering;
 
 use serde::{Deserialize, Serialize};
 
+use crate::counting::counters;
 use crate::later::Later;
 use crate::units::{Span, Timestamp};
 
@@ -79,58 +80,39 @@ pub enum ReferenceRefusal {
     Restarted,
 }
 
-/// What became of the references of a unit; they only ever grow.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct ReferenceCounters {
-    /// References received from outside or made at rest.
-    pub received: u64,
-    /// Used by at least one gyro.
-    pub used: u64,
-    /// Came after ticks that should have felt it; applied from the next tick on.
-    pub late: u64,
-    /// Refused: the calibration in force states no drift.
-    pub no_drift: u64,
-    /// Refused: no number, or far outside what can be.
-    pub not_plausible: u64,
-    /// Refused: span too short.
-    pub too_short: u64,
-    /// Refused: span too long.
-    pub too_long: u64,
-    /// Dropped because too many were waiting.
-    pub overflow: u64,
-    /// Refused: the readings of its time are no longer kept.
-    pub too_old: u64,
-    /// Refused: the span overlaps one that was used, or lies before it.
-    pub overlap: u64,
-    /// Refused: too many readings of the span are missing or unusable, for every gyro.
-    pub gap: u64,
-    /// Refused by the gate of every gyro that had the readings.
-    pub gated: u64,
-    /// Dropped: the producer restarted.
-    pub restarted: u64,
+counters! {
+    /// What became of the references of a unit; they only ever grow.
+    ReferenceCounters {
+        /// References received from outside or made at rest.
+        received,
+        /// Used by at least one gyro.
+        used,
+        /// Came after ticks that should have felt it; applied from the next tick on.
+        late,
+        /// Refused: the calibration in force states no drift.
+        no_drift,
+        /// Refused: no number, or far outside what can be.
+        not_plausible,
+        /// Refused: span too short.
+        too_short,
+        /// Refused: span too long.
+        too_long,
+        /// Dropped because too many were waiting.
+        overflow,
+        /// Refused: the readings of its time are no longer kept.
+        too_old,
+        /// Refused: the span overlaps one that was used, or lies before it.
+        overlap,
+        /// Refused: too many readings of the span are missing or unusable, for every gyro.
+        gap,
+        /// Refused by the gate of every gyro that had the readings.
+        gated,
+        /// Dropped: the producer restarted.
+        restarted,
+    }
 }
 
 impl ReferenceCounters {
-    /// Name and value of every counter, in the order of their declaration.
-    pub fn iter(&self) -> impl Iterator<Item = (&'static str, u64)> {
-        [
-            ("received", self.received),
-            ("used", self.used),
-            ("late", self.late),
-            ("no_drift", self.no_drift),
-            ("not_plausible", self.not_plausible),
-            ("too_short", self.too_short),
-            ("too_long", self.too_long),
-            ("overflow", self.overflow),
-            ("too_old", self.too_old),
-            ("overlap", self.overlap),
-            ("gap", self.gap),
-            ("gated", self.gated),
-            ("restarted", self.restarted),
-        ]
-        .into_iter()
-    }
-
     /// Counts a refusal.
     pub(super) fn refuse(&mut self, refusal: ReferenceRefusal) {
         let counter = match refusal {

@@ -8,6 +8,9 @@ use serde::{Deserialize, Serialize};
 use crate::recent::Recent;
 use crate::vector::{minus, plus};
 
+/// Means of some windows.
+type Windows<'a> = &'a [[f64; 3]];
+
 /// Windows from which the first picture of the noise is taken.
 const LEARNING: usize = 30;
 /// Windows that make the reference later on.
@@ -188,7 +191,7 @@ impl Track {
     }
 
     /// The blocks before the last minute, and those in it; `None` while a block is open.
-    fn last_minute(&self) -> Option<(&[[f64; 3]], &[[f64; 3]])> {
+    fn last_minute(&self) -> Option<(Windows<'_>, Windows<'_>)> {
         let before = self.blocks.len().checked_sub(MINUTE).filter(|_| self.block.1 == 0)?;
         self.blocks.split_at_checked(before)
     }
@@ -250,7 +253,7 @@ struct Usual {
 }
 
 impl Usual {
-    fn of(windows: &[[f64; 3]]) -> Self {
+    fn of(windows: Windows<'_>) -> Self {
         let mut count = 0.0;
         let mut mean = [0.0; 3];
         for window in windows {
