@@ -5,7 +5,7 @@ use std::sync::Arc;
 use isotherm_correction::calibration::Calibration;
 use isotherm_correction::operation::Command;
 use isotherm_correction::sample::{
-    AccelTick, ChannelName, GyroTick, HalfPeriodCounts, LasingMode, OutputKind,
+    AccelTick, ChannelName, GyroTick, HalfPeriodCounts, LasingMode, OutputKind, TemperatureReading,
 };
 use isotherm_correction::unit::{At, Change, UnitSettings};
 use isotherm_correction::units::{Span, Timestamp};
