@@ -14,7 +14,7 @@ use isotherm_correction::units::{Span, Timestamp};
 pub use batcher::{BatchError, Batcher, RawFrame};
 pub use health::{HealthBatch, HealthReading, HealthTick, MAX_HEALTH};
 pub use temperature::{MAX_CHANNELS, TemperatureBatch, read_temperatures};
-pub use tick::RawTick;
+pub use tick::{Parts, RawTick};
 
 use crate::codec::{self, Body, CodecError, Kind, MAX_TICKS, Message, Stretch, append};
 use crate::version::Versions;
@@ -47,25 +47,25 @@ impl<T: RawTick> Message for RawBatch<T> {
     }
 
     fn write_body(&self, frame: &mut Vec<u8>) -> Result<(), CodecError> {
-        let first = self.ticks.first();
+        let first = self.ticks.first().map(RawTick::parts);
         append(frame, |to| {
-            to.u64(first.map_or(0, RawTick::sequence));
-            if let Some(series) = first.and_then(RawTick::series) {
-                to.u64(series);
+            to.u64(first.map_or(0, |first| first.sequence));
+            if T::HAS_SERIES {
+                to.u64(first.map_or(0, |first| first.series));
             }
             to.length(self.ticks.len());
         });
         for (index, tick) in self.ticks.iter().enumerate() {
             let mut fits = true;
             append(frame, |to| {
-                let (end_time, duration) = tick.times();
+                let Parts { times: (end_time, duration), readings, .. } = tick.parts();
                 to.i64(end_time.as_ns());
                 to.u64(duration.as_ns().unsigned_abs());
                 to.byte(u8::from(self.output == OutputKind::Mean));
-                to.length(tick.readings().len());
+                to.length(readings.len());
                 match self.output {
-                    OutputKind::Mean => to.f64s(tick.readings()),
-                    OutputKind::Counts => tick.readings().iter().for_each(|&reading| match whole(reading) {
+                    OutputKind::Mean => to.f64s(readings),
+                    OutputKind::Counts => readings.iter().for_each(|&reading| match whole(reading) {
                         Some(count) => to.i32(count),
                         None => fits = false,
                     }),
@@ -124,8 +124,8 @@ fn read_all<T: RawTick>(body: &mut Body<'_>, ticks: &mut Vec<T>, alike: &mut Ali
             let end_time = Timestamp::from_ns(part.i64()?);
             // What is longer than the longest span becomes that, which the core then refuses.
             let duration = Span::from_ns(i64::try_from(part.u64()?).unwrap_or(i64::MAX));
-            tick.begin(first.saturating_add(index as u64), series, (end_time, duration));
-            let output = read_readings(part, tick.readings_mut())?;
+            let readings = tick.begin(first.saturating_add(index as u64), series, (end_time, duration));
+            let output = read_readings(part, readings)?;
             tick.read_rest(part)?;
             alike.note(index, output, tick);
             Some(())
@@ -177,7 +177,8 @@ struct Alike {
 impl Alike {
     #[inline]
     fn note(&mut self, index: usize, output: OutputKind, tick: &impl RawTick) {
-        let (need, got) = (tick.readings().len(), tick.half_periods());
+        let Parts { readings, half_periods: got, .. } = tick.parts();
+        let need = readings.len();
         if *self.first.get_or_insert((output, need)) != (output, need) {
             self.mixed.get_or_insert(CodecError::MixedReadings { index });
         }

@@ -6,7 +6,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
-use isotherm_correction::sample::ChannelName;
+use isotherm_correction::sample::{
+    AccelTick, ChannelName, GyroTick, OutputKind, Sensors, TemperatureReading,
+};
+use isotherm_correction::units::{Span, Timestamp};
 use isotherm_protocol::codec;
 use isotherm_protocol::document::Document;
 use isotherm_protocol::key::{self, RawStream, UnitId};

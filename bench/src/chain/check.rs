@@ -77,10 +77,11 @@ fn corrected(unit: usize, sent: &[Message], kept: &[Kept]) -> Result<Result<(), 
     }))
 }
 
-/// The tick as it would be if nothing had been missing before it: what was lost on the way in is missing at the sink, and told there.
+/// The tick as it would be if nothing had been missing before it: what was lost on the way in is missing at the sink, and told there; and
+/// without the number of its revision, which counts what a service was given.
 fn without_gap(tick: &CorrectedTick) -> CorrectedTick {
     let gap = if tick.missed > 0 { TickFlags::GAP } else { TickFlags::empty() };
-    CorrectedTick { missed: 0, flags: tick.flags - gap, ..tick.clone() }
+    CorrectedTick { missed: 0, flags: tick.flags - gap, revision: 0, ..tick.clone() }
 }
 
 /// What an offline correction gives, by sequence number.
@@ -98,7 +99,11 @@ pub(crate) fn offline(unit: usize, sent: &[Message]) -> Result<BTreeMap<u64, Cor
         stream.receive(RawStream::Gyro, &message.gyro).map_err(bad)?;
     }
     stream.flush();
-    Ok(stream.take_ready().into_iter().map(|tick| (tick.sequence, tick)).collect())
+    Ok(stream
+        .take_ready()
+        .into_iter()
+        .map(|tick| (tick.sequence, CorrectedTick { revision: 0, ..tick }))
+        .collect())
 }
 
 /// Every tick, by the same few lines.

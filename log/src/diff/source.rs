@@ -135,7 +135,7 @@ impl CorrectedLog {
             }
             Source::Wire { bytes, units, frame } => loop {
                 let Some(batch) = read_frame(bytes, frame).map_err(failed)? else { return Ok(None) };
-                let ticks = ticks_of(&batch)?;
+                let ticks = ticks_of(batch)?;
                 if units.is_empty() || units.contains(&ticks.unit) {
                     return Ok(Some(ticks));
                 }

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use isotherm_correction::sample::ChannelName;
-use isotherm_correction::units::Span;
+use isotherm_correction::sample::{ChannelName, TemperatureReading};
+use isotherm_correction::units::{Span, Timestamp};
 use isotherm_protocol::codec;
 use isotherm_protocol::key::{RawStream, UnitId};
 use isotherm_protocol::raw::TemperatureBatch;

@@ -64,10 +64,8 @@ impl Writer<'_> {
         let bits = bits & 0x007f_007f_007f_007f | (bits & 0x3f80_3f80_3f80_3f80) << 1;
         if highest == 0 {
             let behind = number.ilog2() / 7;
-            self.put(
-                (bits | GOES_ON & ((1 << (8 * behind)) - 1)).to_le_bytes(),
-                [1, 2, 3, 4, 5, 6, 7, 8][behind as usize & 7],
-            );
+            let [length, ..] = (behind + 1).to_le_bytes();
+            self.put((bits | GOES_ON & ((1 << (8 * behind)) - 1)).to_le_bytes(), length);
         } else {
             // Nanoseconds since 1970 have nine bytes.
             self.bytes((bits | GOES_ON).to_le_bytes());

@@ -139,7 +139,7 @@ impl Batcher {
 
     fn push_ticks<T: RawTick>(&mut self, stream: RawStream, batch: RawBatch<T>) -> Result<(), BatchError> {
         let (Some(first), Some(last)) = (batch.ticks.first(), batch.ticks.last()) else { return Ok(()) };
-        let (sequence, (time, _)) = (first.sequence(), last.times());
+        let (sequence, (time, _)) = (first.parts().sequence, last.parts().times);
         self.push(stream, &batch, time, sequence, batch.ticks.len()).map_err(|error| match error {
             BatchError::Codec(CodecError::NotCounts { .. }) => BatchError::NotCounts { sequence },
             error => error,
@@ -177,9 +177,10 @@ impl<T: RawTick> Pending<T> {
     /// Whether such a tick can stand in the same batch as those that wait.
     fn continues(&self, output: OutputKind, tick: &T) -> bool {
         self.ticks.last().is_none_or(|last| {
+            let (last, tick) = (last.parts(), tick.parts());
             self.output == output
-                && last.sequence().checked_add(1) == Some(tick.sequence())
-                && last.readings().len() == tick.readings().len()
+                && last.sequence.checked_add(1) == Some(tick.sequence)
+                && last.readings.len() == tick.readings.len()
         })
     }
 

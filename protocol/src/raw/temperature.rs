@@ -22,7 +22,7 @@ pub struct TemperatureBatch {
 
 impl TemperatureBatch {
     /// The readings by time.
-    pub fn ticks(&self) -> impl Iterator<Item = &[TemperatureReading]> {
+    pub fn ticks(&self) -> impl Iterator<Item = &[TemperatureReading]> + Clone {
         ticks(&self.readings)
     }
 
@@ -32,7 +32,7 @@ impl TemperatureBatch {
 }
 
 /// Readings of one time make a tick, each channel once.
-pub(super) fn ticks(readings: &[TemperatureReading]) -> impl Iterator<Item = &[TemperatureReading]> {
+pub(super) fn ticks(readings: &[TemperatureReading]) -> impl Iterator<Item = &[TemperatureReading]> + Clone {
     let mut rest = readings;
     std::iter::from_fn(move || {
         let time = rest.first()?.time;

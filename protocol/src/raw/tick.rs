@@ -16,24 +16,31 @@ pub trait RawTick: Default {
     /// Whether the batch says the number of the producer's run.
     const HAS_SERIES: bool;
 
-    /// Producer's number of this tick.
-    fn sequence(&self) -> u64;
-    /// Number of the producer's run.
-    fn series(&self) -> Option<u64>;
-    /// End on the producer's clock, and measured duration.
-    fn times(&self) -> (Timestamp, Span);
-    /// Sets number, run and times.
-    fn begin(&mut self, sequence: u64, series: u64, times: (Timestamp, Span));
-    /// One reading per sensor.
-    fn readings(&self) -> &Sensors<f64>;
-    /// Likewise, to write to.
-    fn readings_mut(&mut self) -> &mut Sensors<f64>;
-    /// How many sensors have half-period counts.
-    fn half_periods(&self) -> usize;
+    /// What both have.
+    fn parts(&self) -> Parts<'_>;
+    /// Sets number, run and times; gives the readings, to be set next.
+    fn begin(&mut self, sequence: u64, series: u64, times: (Timestamp, Span)) -> &mut Sensors<f64>;
     /// Writes what stands behind the readings.
-    fn write_rest(&self, to: &mut Writer<'_>);
+    fn write_rest(&self, _: &mut Writer<'_>) {}
     /// Reads what stands behind the readings.
-    fn read_rest(&mut self, part: &mut Stretch<'_>) -> Option<()>;
+    fn read_rest(&mut self, _: &mut Stretch<'_>) -> Option<()> {
+        Some(())
+    }
+}
+
+/// What gyro and accelerometer ticks both have.
+#[derive(Debug, Clone, Copy)]
+pub struct Parts<'a> {
+    /// Producer's number of the tick.
+    pub sequence: u64,
+    /// Number of the producer's run; 0 where the batch does not say it.
+    pub series: u64,
+    /// End on the producer's clock, and measured duration.
+    pub times: (Timestamp, Span),
+    /// One reading per sensor.
+    pub readings: &'a Sensors<f64>,
+    /// How many sensors have half-period counts.
+    pub half_periods: usize,
 }
 
 impl RawTick for GyroTick {
@@ -41,33 +48,18 @@ impl RawTick for GyroTick {
     const VERSIONS: Versions = version::RAW_GYRO;
     const HAS_SERIES: bool = true;
 
-    fn sequence(&self) -> u64 {
-        self.sequence
+    #[inline]
+    fn parts(&self) -> Parts<'_> {
+        let Self { sequence, series, ref readings, .. } = *self;
+        let times = (self.end_time, self.duration);
+        Parts { sequence, series, times, readings, half_periods: self.half_periods.len() }
     }
 
-    fn series(&self) -> Option<u64> {
-        Some(self.series)
-    }
-
-    fn times(&self) -> (Timestamp, Span) {
-        (self.end_time, self.duration)
-    }
-
-    fn begin(&mut self, sequence: u64, series: u64, times: (Timestamp, Span)) {
+    #[inline]
+    fn begin(&mut self, sequence: u64, series: u64, times: (Timestamp, Span)) -> &mut Sensors<f64> {
         (self.sequence, self.series) = (sequence, series);
         (self.end_time, self.duration) = times;
-    }
-
-    fn readings(&self) -> &Sensors<f64> {
-        &self.readings
-    }
-
-    fn readings_mut(&mut self) -> &mut Sensors<f64> {
         &mut self.readings
-    }
-
-    fn half_periods(&self) -> usize {
-        self.half_periods.len()
     }
 
     fn write_rest(&self, to: &mut Writer<'_>) {
@@ -99,38 +91,16 @@ impl RawTick for AccelTick {
     const VERSIONS: Versions = version::RAW_ACCEL;
     const HAS_SERIES: bool = false;
 
-    fn sequence(&self) -> u64 {
-        self.sequence
+    #[inline]
+    fn parts(&self) -> Parts<'_> {
+        let Self { sequence, ref readings, .. } = *self;
+        Parts { sequence, series: 0, times: (self.end_time, self.duration), readings, half_periods: 0 }
     }
 
-    fn series(&self) -> Option<u64> {
-        None
-    }
-
-    fn times(&self) -> (Timestamp, Span) {
-        (self.end_time, self.duration)
-    }
-
-    fn begin(&mut self, sequence: u64, _: u64, times: (Timestamp, Span)) {
+    #[inline]
+    fn begin(&mut self, sequence: u64, _: u64, times: (Timestamp, Span)) -> &mut Sensors<f64> {
         self.sequence = sequence;
         (self.end_time, self.duration) = times;
-    }
-
-    fn readings(&self) -> &Sensors<f64> {
-        &self.readings
-    }
-
-    fn readings_mut(&mut self) -> &mut Sensors<f64> {
         &mut self.readings
-    }
-
-    fn half_periods(&self) -> usize {
-        0
-    }
-
-    fn write_rest(&self, _: &mut Writer<'_>) {}
-
-    fn read_rest(&mut self, _: &mut Stretch<'_>) -> Option<()> {
-        Some(())
     }
 }

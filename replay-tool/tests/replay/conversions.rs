@@ -3,7 +3,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use isotherm_correction::sample::{ChannelName, OutputKind};
+use isotherm_correction::sample::{AccelTick, ChannelName, GyroTick, OutputKind, TemperatureReading};
+use isotherm_correction::units::{Span, Timestamp};
 use isotherm_log::mapping::Mapping;
 use isotherm_log::message::{Message, Topic};
 use isotherm_log::recording::{RecordingOptions, RecordingReader, RecordingWriter};

@@ -3,7 +3,7 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Mutex as StdMutex, PoisonError};
 use std::time::Instant;
 
-use isotherm_correction::sample::{AccelTick, ChannelName, GyroTick, OutputKind};
+use isotherm_correction::sample::{AccelTick, ChannelName, GyroTick, OutputKind, TemperatureReading};
 use isotherm_correction::units::{Span, Timestamp};
 use isotherm_protocol::codec::encode;
 use isotherm_protocol::document::{Document, Parsed};

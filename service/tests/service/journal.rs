@@ -6,7 +6,9 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use isotherm_bus::{SessionOptions, close, locators, open, presence};
-use isotherm_correction::sample::{AccelTick, ChannelName, GyroTick, LasingMode, OutputKind, Sensors};
+use isotherm_correction::sample::{
+    AccelTick, ChannelName, GyroTick, LasingMode, OutputKind, Sensors, TemperatureReading,
+};
 use isotherm_correction::unit::UnitSettings;
 use isotherm_correction::units::{Span, Timestamp};
 use isotherm_protocol::codec::{decode, encode};
