@@ -1,12 +1,12 @@
 //! Corrected batches: what a navigation computer subscribes to.
 
 use arrayvec::ArrayVec;
-use isotherm_correction::sample::ChannelName;
+use isotherm_correction::sample::{ChannelName, MAX_PARITY, MAX_SENSORS};
 use serde::{Deserialize, Serialize};
 
 pub use isotherm_correction::sample::CorrectedTick;
 
-use crate::codec::{CodecError, Kind, MAX_TICKS, Message, append, append_str, bounded, whole};
+use crate::codec::{CodecError, Kind, MAX_NUMBER, MAX_TICKS, Message, append, bounded, whole};
 use crate::raw::MAX_CHANNELS;
 use crate::version::{self, Versions};
 
@@ -55,7 +55,11 @@ impl Message for CorrectedBatch {
     }
 
     fn write_body(&self, frame: &mut Vec<u8>) -> Result<(), CodecError> {
-        append_head(frame, &self.unit, self.revision, &self.temperatures, self.ticks.len());
+        let temperatures = self.temperatures.iter();
+        let temperatures = temperatures
+            .map(|applied| (&applied.channel, [applied.temperature_deg_c, applied.rate_deg_c_per_s]));
+        let (unit, revision, ticks) = (self.unit.as_str(), self.revision, self.ticks.len());
+        Head { unit, revision, temperatures, ticks }.append(frame);
         self.ticks.iter().for_each(|tick| append_tick(frame, tick));
         Ok(())
     }
@@ -68,33 +72,45 @@ impl Message for CorrectedBatch {
     }
 }
 
-/// Appends what stands before the ticks of a batch.
-pub(crate) fn append_head(
-    frame: &mut Vec<u8>,
-    unit: &str,
-    revision: Revision,
-    temperatures: &[AppliedTemperature],
-    ticks: usize,
-) {
-    append_str(frame, unit);
-    append(frame, |to| {
-        to.u64(revision.counter);
-        to.bytes(revision.digest);
-        to.length(temperatures.len());
-    });
-    for applied in temperatures {
-        append_str(frame, &applied.channel);
-        append(frame, |to| to.f64s(&[applied.temperature_deg_c, applied.rate_deg_c_per_s]));
-    }
-    append(frame, |to| to.length(ticks));
+/// What stands before the ticks of a batch.
+pub(crate) struct Head<'a, T> {
+    pub(crate) unit: &'a str,
+    pub(crate) revision: Revision,
+    /// Channel, smoothed temperature (°C), its rate (°C/s).
+    pub(crate) temperatures: T,
+    pub(crate) ticks: usize,
 }
 
+impl<'a, T: Iterator<Item = (&'a ChannelName, [f64; 2])> + Clone> Head<'a, T> {
+    /// Appends it to a frame.
+    pub(crate) fn append(self, frame: &mut Vec<u8>) {
+        let Self { unit, revision, temperatures, ticks } = self;
+        let (count, names) =
+            temperatures.clone().fold((0, 0), |(count, names), (name, _)| (count + 1, names + name.len()));
+        let numbers = (count + 4) * MAX_NUMBER + (2 * count + 1) * size_of::<f64>();
+        append(frame, unit.len() + names + numbers, |to| {
+            to.text(unit);
+            to.u64(revision.counter);
+            to.bytes(revision.digest);
+            to.length(count);
+            for (channel, state) in temperatures {
+                to.text(channel);
+                to.f64s(&state);
+            }
+            to.length(ticks);
+        });
+    }
+}
+
+/// Longest form of a tick without its parity, in bytes.
+const MOST_OF_TICK: usize = 8 * MAX_NUMBER + 6 * size_of::<f64>() + 2 * MAX_SENSORS + 4;
 /// Longest form of a tick, in bytes.
-pub(crate) const MAX_TICK: usize = 196;
+pub(crate) const MAX_TICK: usize = MOST_OF_TICK + 2 * MAX_PARITY * size_of::<f64>();
 
 /// Appends one tick: the one place where corrected ticks become bytes.
 pub(crate) fn append_tick(frame: &mut Vec<u8>, tick: &CorrectedTick) {
-    append(frame, |to| {
+    let parities = tick.gyro_parity.len() + tick.accel_parity.len();
+    append(frame, MOST_OF_TICK + parities * size_of::<f64>(), |to| {
         to.u64(tick.sequence);
         to.i64(tick.end_time.as_ns());
         to.u64(tick.duration.as_ns().unsigned_abs());

@@ -16,7 +16,7 @@ pub use health::{HealthBatch, HealthReading, HealthTick, MAX_HEALTH};
 pub use temperature::{MAX_CHANNELS, TemperatureBatch, read_temperatures};
 pub use tick::{Parts, RawTick};
 
-use crate::codec::{self, Body, CodecError, Kind, MAX_TICKS, Message, Stretch, append};
+use crate::codec::{self, Body, CodecError, Kind, MAX_NUMBER, MAX_TICKS, Message, Stretch, append};
 use crate::version::Versions;
 
 /// Consecutive ticks of one unit; gyro ticks are of one series.
@@ -33,6 +33,8 @@ pub type GyroBatch = RawBatch<GyroTick>;
 /// Raw accelerometer ticks.
 pub type AccelBatch = RawBatch<AccelTick>;
 
+/// Most bytes of a tick: its times, lengths and modes, and three numbers for each sensor.
+const MOST_BYTES: usize = (8 + 3 * MAX_SENSORS) * MAX_NUMBER;
 /// Fewest bytes of a tick: its times, kind and number of readings.
 const FEWEST_BYTES: usize = 4;
 
@@ -48,7 +50,7 @@ impl<T: RawTick> Message for RawBatch<T> {
 
     fn write_body(&self, frame: &mut Vec<u8>) -> Result<(), CodecError> {
         let first = self.ticks.first().map(RawTick::parts);
-        append(frame, |to| {
+        append(frame, 3 * MAX_NUMBER, |to| {
             to.u64(first.map_or(0, |first| first.sequence));
             if T::HAS_SERIES {
                 to.u64(first.map_or(0, |first| first.series));
@@ -57,7 +59,7 @@ impl<T: RawTick> Message for RawBatch<T> {
         });
         for (index, tick) in self.ticks.iter().enumerate() {
             let mut fits = true;
-            append(frame, |to| {
+            append(frame, MOST_BYTES, |to| {
                 let Parts { times: (end_time, duration), readings, .. } = tick.parts();
                 to.i64(end_time.as_ns());
                 to.u64(duration.as_ns().unsigned_abs());

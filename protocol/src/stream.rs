@@ -14,10 +14,9 @@ mod status;
 #[cfg(test)]
 mod tests;
 
-use std::cell::Cell;
+use std::cell::RefCell;
 use std::sync::Arc;
 
-use arrayvec::ArrayVec;
 use isotherm_correction::calibration::Calibration;
 use isotherm_correction::operation::{Command, HealthReading, Refusal, State};
 use isotherm_correction::sample::{AccelTick, CorrectedTick, GyroTick, TemperatureReading, TickFlags};
@@ -36,7 +35,7 @@ pub use revisions::InForce;
 use revisions::Revisions;
 
 use crate::codec::{self, CodecError};
-use crate::corrected::{AppliedTemperature, Revision};
+use crate::corrected::Revision;
 use crate::key::{Input, RawStream, UnitId};
 use crate::raw::{self, HealthBatch};
 use crate::reference::Reference;
@@ -53,7 +52,7 @@ struct Scratch {
 }
 
 thread_local! {
-    static SCRATCH: Cell<Scratch> = Cell::default();
+    static SCRATCH: RefCell<Scratch> = RefCell::default();
 }
 
 /// One unit's stream.
@@ -183,9 +182,10 @@ impl UnitStream {
     /// [`CodecError`] for a frame that cannot be read: it is counted, and nothing else changes.
     pub fn receive(&mut self, stream: RawStream, frame: &[u8]) -> Result<(), CodecError> {
         self.note_heard(Input::Raw(stream), frame);
-        let mut scratch = SCRATCH.take();
-        let received = self.receive_frame(stream, frame, &mut scratch);
-        SCRATCH.set(scratch);
+        let received = SCRATCH.with(|scratch| match scratch.try_borrow_mut() {
+            Ok(mut scratch) => self.receive_frame(stream, frame, &mut scratch),
+            Err(_) => self.receive_frame(stream, frame, &mut Scratch::default()),
+        });
         self.bad_frames += u64::from(received.is_err());
         received
     }
@@ -300,9 +300,11 @@ impl UnitStream {
         if self.outgoing.is_empty() {
             return false;
         }
-        let temperatures = self.temperatures();
-        let revision = |counter| self.revisions.revision(counter);
-        let last = self.outgoing.next_frame(frame, self.id.as_str(), revision, &temperatures);
+        let Self { id, unit, revisions, outgoing, .. } = self;
+        let temperatures = unit.temperatures().take(raw::MAX_CHANNELS);
+        let temperatures = temperatures.map(|(name, state)| (name, [state.temperature, state.rate]));
+        let revision = |counter| revisions.revision(counter);
+        let last = outgoing.next_frame(frame, id.as_str(), revision, temperatures);
         self.note_taken(last);
         last.is_some()
     }
@@ -324,20 +326,6 @@ impl UnitStream {
         let series = self.series.unwrap_or_default();
         self.last = Some(LastTick { end_time_ns, sequence, series });
         self.revisions.taken(revision);
-    }
-
-    /// As many as a batch takes.
-    fn temperatures(&self) -> ArrayVec<AppliedTemperature, { raw::MAX_CHANNELS }> {
-        let channels = self.unit.channels().take(raw::MAX_CHANNELS);
-        let applied = channels.filter_map(|channel| {
-            let state = channel.state?;
-            Some(AppliedTemperature {
-                channel: channel.name,
-                temperature_deg_c: state.temperature,
-                rate_deg_c_per_s: state.rate,
-            })
-        });
-        applied.collect()
     }
 
     /// Every counter of the unit, by name.

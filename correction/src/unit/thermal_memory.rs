@@ -368,6 +368,15 @@ impl ThermalMemory {
         memory.state().map(|state| state.temperature)
     }
 
+    /// Every channel that has been read, with its state.
+    pub(super) fn temperatures<'a>(
+        &'a self,
+        calibration: &'a Calibration,
+    ) -> impl Iterator<Item = (&'a ChannelName, ThermalState)> + Clone {
+        let channels = calibration.channels.iter().zip(&self.channels);
+        channels.filter_map(|(channel, memory)| Some((channel.name(), memory.state()?)))
+    }
+
     /// Every channel as it stands at `time`.
     pub(super) fn report<'a>(
         &'a self,

@@ -4,10 +4,11 @@ use alloc::sync::Arc;
 
 use super::{Applied, At, AtRest, ChannelReport, Counters, PreLaunchView, SensorHealth, Unit, UnitSettings};
 use crate::calibration::Calibration;
+use crate::channel::ThermalState;
 use crate::drift::{DriftEstimate, ReferenceCounters};
 use crate::observation::Observation;
 use crate::operation::{SelfTestReport, State};
-use crate::sample::Sensors;
+use crate::sample::{ChannelName, Sensors};
 
 impl Unit {
     /// What has been counted.
@@ -34,6 +35,12 @@ impl Unit {
             .active
             .iter()
             .flat_map(|active| active.corrector.thermal().report(&active.calibration, self.pipeline.last_end))
+    }
+
+    /// The temperatures in use, by the channel's name; none without a calibration, and of a channel that was not read yet.
+    pub fn temperatures(&self) -> impl Iterator<Item = (&ChannelName, ThermalState)> + Clone {
+        let active = self.pipeline.active.iter();
+        active.flat_map(|active| active.corrector.thermal().temperatures(&active.calibration))
     }
 
     /// Whether ticks wait for their accelerometer tick, a missing neighbour, or the end of a navigation step.

@@ -4,7 +4,7 @@ use arrayvec::ArrayVec;
 use isotherm_correction::sample::{ChannelName, TemperatureReading};
 use isotherm_correction::units::Timestamp;
 
-use crate::codec::{self, Body, CodecError, Kind, MAX_TICKS, Message, append, append_str};
+use crate::codec::{self, Body, CodecError, Kind, MAX_NUMBER, MAX_TICKS, Message, append};
 use crate::version::{self, Versions};
 
 /// Most temperature channels in one batch.
@@ -65,11 +65,14 @@ impl Message for TemperatureBatch {
     }
 
     fn write_body(&self, frame: &mut Vec<u8>) -> Result<(), CodecError> {
-        append(frame, |to| to.length(self.channels().count()));
-        self.channels().for_each(|channel| append_str(frame, channel));
-        append(frame, |to| to.length(self.ticks().count()));
+        let names: usize = self.channels().map(|channel| MAX_NUMBER + channel.len()).sum();
+        append(frame, names + 2 * MAX_NUMBER, |to| {
+            to.length(self.channels().count());
+            self.channels().for_each(|channel| to.text(channel));
+            to.length(self.ticks().count());
+        });
         for tick in self.ticks() {
-            append(frame, |to| {
+            append(frame, 2 * MAX_NUMBER + tick.len() * size_of::<f64>(), |to| {
                 to.i64(tick.first().map_or(0, |reading| reading.time.as_ns()));
                 to.length(tick.len());
                 tick.iter().for_each(|reading| to.f64s(&[reading.raw]));

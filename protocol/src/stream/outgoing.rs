@@ -2,11 +2,11 @@
 
 use std::collections::VecDeque;
 
-use isotherm_correction::sample::CorrectedTick;
+use isotherm_correction::sample::{ChannelName, CorrectedTick};
 use serde::{Deserialize, Serialize};
 
-use crate::codec::{MAX_FRAME, MAX_TICKS, WINDOW, begin, seal};
-use crate::corrected::{AppliedTemperature, CorrectedBatch, MAX_TICK, Revision, append_head, append_tick};
+use crate::codec::{MAX_FRAME, MAX_TICKS, begin, seal};
+use crate::corrected::{CorrectedBatch, Head, MAX_TICK, Revision, append_tick};
 use crate::raw::MAX_CHANNELS;
 
 /// Corrected ticks that have not been taken yet.
@@ -91,7 +91,7 @@ impl Outgoing {
         if self.open.count == 0 {
             // One allocation for a frame like the last, and what writing wants behind its end.
             self.open.bytes.clear();
-            self.open.bytes.reserve(self.length + self.length / 8 + self.head + WINDOW);
+            self.open.bytes.reserve(self.length + self.length / 8 + self.head + MAX_TICK);
             self.open.bytes.resize(self.head, 0);
             self.open.room = self.head;
         }
@@ -102,16 +102,18 @@ impl Outgoing {
 
     /// Makes the next frame, all of one revision, in the place of `into`, whose capacity is kept for the one after it; its
     /// last tick.
-    pub(super) fn next_frame(
+    pub(super) fn next_frame<'a>(
         &mut self,
         into: &mut Vec<u8>,
-        unit: &str,
+        unit: &'a str,
         revision: impl FnOnce(u64) -> Revision,
-        temperatures: &[AppliedTemperature],
+        temperatures: impl Iterator<Item = (&'a ChannelName, [f64; 2])> + Clone,
     ) -> Option<Last> {
-        let mut ticks = std::mem::take(&mut self.ticks);
-        ticks.drain(..).for_each(|tick| self.write(&tick));
-        self.ticks = ticks;
+        if !self.ticks.is_empty() {
+            let mut ticks = std::mem::take(&mut self.ticks);
+            ticks.drain(..).for_each(|tick| self.write(&tick));
+            self.ticks = ticks;
+        }
         let mut frame = self.full.pop_front().unwrap_or_else(|| std::mem::take(&mut self.open));
         if frame.count == 0 {
             self.open = frame;
@@ -119,7 +121,8 @@ impl Outgoing {
         }
         let end = frame.bytes.len();
         begin::<CorrectedBatch>(&mut frame.bytes);
-        append_head(&mut frame.bytes, unit, revision(frame.last.revision), temperatures, frame.count);
+        let revision = revision(frame.last.revision);
+        Head { unit, revision, temperatures, ticks: frame.count }.append(&mut frame.bytes);
         self.head = frame.bytes.len() - end;
         if self.head == frame.room {
             frame.bytes.copy_within(end.., 0);

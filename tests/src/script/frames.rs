@@ -127,8 +127,11 @@ impl Script {
     fn messages(&mut self) -> Vec<Step> {
         let mut sent = Vec::new();
         let frame = |stream, frame| Step::Frame(Input::Raw(stream), frame);
-        if (self.next.is_multiple_of(20) || self.dice.below(4) == 0) && self.thermometers {
-            sent.push(frame(RawStream::Temperature, self.temperatures()));
+        if (self.next.is_multiple_of(20) || self.dice.below(4) == 0)
+            && self.thermometers
+            && !self.channels.is_empty()
+        {
+            sent.extend(self.temperatures().map(|temperatures| frame(RawStream::Temperature, temperatures)));
         }
         if self.dice.below(10) == 0 {
             sent.push(frame(RawStream::Health, self.health()));
@@ -165,7 +168,8 @@ impl Script {
         sent
     }
 
-    fn temperatures(&mut self) -> Vec<u8> {
+    /// `None` for a unit without channels.
+    fn temperatures(&mut self) -> Option<Vec<u8>> {
         let warming = self.warming * f64::from(u32::try_from(self.next % 50_000).expect("a small number"));
         let noise = 0.01 * self.dice.between_minus_one_and_one();
         let time = Timestamp::from_ns(self.now_ns.saturating_sub(self.tick.as_ns()));
@@ -175,7 +179,8 @@ impl Script {
             raw: raw * (1.0 + 1e-3 * (warming + noise)),
         };
         let readings = self.channels.iter().map(reading).collect();
-        encode(&TemperatureBatch { readings }).expect("it can be encoded")
+        let any = !self.channels.is_empty();
+        any.then(|| encode(&TemperatureBatch { readings }).expect("it can be encoded"))
     }
 
     fn health(&mut self) -> Vec<u8> {
