@@ -17,6 +17,11 @@ impl<T, const N: usize> Later<T, N> {
         self.0.get_or_insert_default()
     }
 
+    /// Whether there is no element.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.0.as_deref().is_none_or(ArrayVec::is_empty)
+    }
+
     /// Takes all elements out; the room stays.
     pub(crate) fn take(&mut self) -> ArrayVec<T, N> {
         self.0.as_deref_mut().map(core::mem::take).unwrap_or_default()

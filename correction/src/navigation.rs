@@ -21,6 +21,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::sample::{CorrectedTick, SensorFlags, Sensors, TickFlags};
 use crate::units::Span;
+use crate::vector::plus;
 
 /// Most ticks of one step.
 pub const MAX_STEP_TICKS: u16 = 1000;
@@ -235,11 +236,6 @@ fn rotation(angle: [f64; 3], velocity: [f64; 3]) -> [f64; 3] {
     let once = cross(angle, velocity);
     let twice = cross(angle, once);
     plus(once.map(|c| c * first), twice.map(|c| c * second))
-}
-
-/// Sum of two vectors.
-fn plus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
 /// Vector product.

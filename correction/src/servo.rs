@@ -28,6 +28,7 @@ use serde::{Deserialize, Serialize};
 use crate::curve::{Curve, CurveError, CurveParts};
 use crate::lanes::Lanes;
 use crate::sample::{HalfPeriodCounts, MAX_SENSORS};
+use crate::stated::{OutOfRange, outside};
 use crate::units::{Span, Timestamp};
 
 /// Shortest and longest time constant of a servo (s).
@@ -67,17 +68,8 @@ pub struct ServoParts {
 #[non_exhaustive]
 pub enum ServoError {
     /// A number is outside its range, or not a number.
-    #[error("{name} is {got}; from {min} to {max} is allowed")]
-    OutOfRange {
-        /// Field of [`ServoParts`].
-        name: &'static str,
-        /// The number.
-        got: f64,
-        /// Smallest allowed.
-        min: f64,
-        /// Largest allowed.
-        max: f64,
-    },
+    #[error(transparent)]
+    OutOfRange(OutOfRange),
     /// The rest frequency is not a valid curve.
     #[error("rest_frequency: {0}")]
     RestFrequency(CurveError),
@@ -99,15 +91,11 @@ impl Servo {
     ///
     /// Everything that is wrong with it.
     pub fn new(parts: &ServoParts) -> Result<Self, Vec<ServoError>> {
-        let mut errors = Vec::new();
-        for (name, got, [min, max]) in [
+        let stated = outside([
             ("time_constant_s", parts.time_constant_s, TIME_CONSTANT_RANGE_S),
             ("settle_time_constants", parts.settle_time_constants, SETTLE_RANGE),
-        ] {
-            if !(min..=max).contains(&got) {
-                errors.push(ServoError::OutOfRange { name, got, min, max });
-            }
-        }
+        ]);
+        let mut errors: Vec<_> = stated.map(ServoError::OutOfRange).collect();
         match Curve::new(&parts.rest_frequency) {
             Ok(rest_frequency_hz) if errors.is_empty() => Ok(Self {
                 form: parts.form,

@@ -8,7 +8,7 @@ use super::DriftModel;
 use super::gyro::{DriftEstimate, GRID, GyroDrift};
 use super::reference::{Reference, ReferenceCounters, ReferenceRefusal, Waiting};
 use super::ring::{Covered, cell_end};
-use crate::observation::Observation;
+use crate::observation::{GyroLanes, Observation};
 use crate::sample::{SensorFlags, Sensors};
 use crate::units::{Span, Timestamp};
 
@@ -221,12 +221,14 @@ impl DriftEstimator {
         let end = observation.end_time;
         let start = end - observation.duration;
         let covered = Covered::new(start, end);
-        for (gyro, seen) in self.gyros.iter_mut().zip(observation.gyros.iter()) {
+        let GyroLanes { count, rate, bias, flags, .. } = &observation.gyros;
+        let lanes = rate.iter().zip(bias).zip(flags).take(*count);
+        for (gyro, ((rate, bias), flags)) in self.gyros.iter_mut().zip(lanes) {
             let Some(gyro) = gyro else { continue };
             gyro.filter.start(start);
             gyro.ring.reach(&covered);
-            let residual = seen.rate - seen.bias;
-            if observation.settled && seen.flags.contains(SensorFlags::VALID) && residual.is_finite() {
+            let residual = rate - bias;
+            if observation.settled && flags.contains(SensorFlags::VALID) && residual.is_finite() {
                 gyro.ring.add(&covered, residual);
             }
         }

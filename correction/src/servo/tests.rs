@@ -153,8 +153,8 @@ fn every_error_is_reported_at_once() {
     assert!(matches!(
         errors[..],
         [
-            ServoError::OutOfRange { name: "time_constant_s", .. },
-            ServoError::OutOfRange { name: "settle_time_constants", .. },
+            ServoError::OutOfRange(OutOfRange { name: "time_constant_s", .. }),
+            ServoError::OutOfRange(OutOfRange { name: "settle_time_constants", .. }),
             ServoError::RestFrequency(CurveError::KnotCount { .. }),
         ]
     ));

@@ -127,10 +127,7 @@ impl Script {
     fn messages(&mut self) -> Vec<Step> {
         let mut sent = Vec::new();
         let frame = |stream, frame| Step::Frame(Input::Raw(stream), frame);
-        if (self.next.is_multiple_of(20) || self.dice.below(4) == 0)
-            && self.thermometers
-            && !self.channels.is_empty()
-        {
+        if (self.next.is_multiple_of(20) || self.dice.below(4) == 0) && self.thermometers {
             sent.extend(self.temperatures().map(|temperatures| frame(RawStream::Temperature, temperatures)));
         }
         if self.dice.below(10) == 0 {
