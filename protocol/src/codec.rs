@@ -21,7 +21,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 use thiserror::Error;
 
 pub(crate) use reader::{Body, Stretch};
-pub(crate) use writer::{Writer, append, append_str};
+pub(crate) use writer::{Writer, append, append_length, append_str};
 
 use crate::version::Versions;
 

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 pub use isotherm_correction::sample::CorrectedTick;
 
-use crate::codec::{CodecError, Kind, MAX_TICKS, Message, append, append_str, bounded, whole};
+use crate::codec::{CodecError, Kind, MAX_TICKS, Message, append, append_length, append_str, bounded, whole};
 use crate::raw::MAX_CHANNELS;
 use crate::version::{self, Versions};
 
@@ -86,7 +86,7 @@ pub(crate) fn append_head(
         append_str(frame, &applied.channel);
         append(frame, |to| to.f64s(&[applied.temperature_deg_c, applied.rate_deg_c_per_s]));
     }
-    append(frame, |to| to.length(ticks));
+    append_length(frame, ticks);
 }
 
 /// Longest form of a tick, in bytes.

@@ -159,27 +159,12 @@ impl Ledger {
 
 #[cfg(test)]
 mod tests {
-    use arrayvec::ArrayVec;
 
     use super::*;
 
     /// A tick that came back, of so many raw ones.
     fn tick(sequence: u64, ticks: u16) -> CorrectedTick {
-        CorrectedTick {
-            sequence,
-            end_time_ns: 0,
-            duration_ns: 1,
-            ticks,
-            missed: 0,
-            delta_angle_rad: [0.0; 3],
-            delta_velocity_m_per_s: [0.0; 3],
-            mode: None,
-            flags: 0,
-            gyro_flags: ArrayVec::new(),
-            accel_flags: ArrayVec::new(),
-            gyro_parity_rad_per_s: ArrayVec::new(),
-            accel_parity_m_per_s2: ArrayVec::new(),
-        }
+        CorrectedTick { sequence, ticks, ..CorrectedTick::default() }
     }
 
     /// One thing that happens: sent (series, first, count), or back (number, raw ticks).

@@ -24,9 +24,17 @@ pub(crate) fn append(frame: &mut Vec<u8>, write: impl FnOnce(&mut Writer<'_>)) {
     frame.truncate(before + written);
 }
 
+/// Appends how many elements follow.
+pub(crate) fn append_length(frame: &mut Vec<u8>, length: usize) {
+    match u8::try_from(length) {
+        Ok(byte @ ..0x80) => frame.push(byte),
+        _ => append(frame, |to| to.length(length)),
+    }
+}
+
 /// Appends a text of any length.
 pub(crate) fn append_str(frame: &mut Vec<u8>, text: &str) {
-    append(frame, |to| to.length(text.len()));
+    append_length(frame, text.len());
     frame.extend_from_slice(text.as_bytes());
 }
 

@@ -4,7 +4,7 @@ use arrayvec::ArrayVec;
 use isotherm_correction::sample::{ChannelName, TemperatureReading};
 use isotherm_correction::units::Timestamp;
 
-use crate::codec::{self, Body, CodecError, Kind, MAX_TICKS, Message, append, append_str};
+use crate::codec::{self, Body, CodecError, Kind, MAX_TICKS, Message, append, append_length, append_str};
 use crate::version::{self, Versions};
 
 /// Most temperature channels in one batch.
@@ -65,9 +65,9 @@ impl Message for TemperatureBatch {
     }
 
     fn write_body(&self, frame: &mut Vec<u8>) -> Result<(), CodecError> {
-        append(frame, |to| to.length(self.channels().count()));
+        append_length(frame, self.channels().count());
         self.channels().for_each(|channel| append_str(frame, channel));
-        append(frame, |to| to.length(self.ticks().count()));
+        append_length(frame, self.ticks().count());
         for tick in self.ticks() {
             append(frame, |to| {
                 to.i64(tick.first().map_or(0, |reading| reading.time.as_ns()));
@@ -96,9 +96,9 @@ pub fn read_temperatures(frame: &[u8], readings: &mut Vec<TemperatureReading>) -
 }
 
 fn read_body(bytes: &[u8], readings: &mut Vec<TemperatureReading>) -> Result<(), CodecError> {
-    let mut body = Body(bytes);
+    let mut body = Body::new(bytes);
     let (count, mixed) = read_all(&mut body, readings).ok_or(CodecError::Malformed)?;
-    body.end()?;
+    body.ends()?;
     match mixed {
         _ if count == 0 => Err(CodecError::Ticks { count }),
         Some(index) => Err(CodecError::MixedReadings { index }),

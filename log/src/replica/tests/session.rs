@@ -215,7 +215,7 @@ pub(super) fn replay(recording: &[Message], changes: Changes) -> (Account, Repli
         match message {
             Some(message) => {
                 if let Topic::Corrected(_) = &message.topic {
-                    let ticks = ticks_of(&codec::decode(&message.frame).unwrap()).unwrap();
+                    let ticks = ticks_of(codec::decode(&message.frame).unwrap()).unwrap();
                     ticks.ticks.into_iter().for_each(|tick| comparison.push(Side::B, tick));
                 }
                 replica.take(message);

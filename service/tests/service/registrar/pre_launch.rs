@@ -92,7 +92,7 @@ async fn the_result_is_an_overlay_that_takes_the_bias_away_and_can_be_taken_back
     // What is left of the rate is the Earth's.
     stand.command(UNIT, r#"{"command":"run"}"#).await;
     let ticks = stand.run_unit(UNIT, 4000).await;
-    let mean = |axis: usize| ticks.iter().map(|(_, tick)| tick.delta_angle_rad[axis]).sum::<f64>() / 20.0;
+    let mean = |axis: usize| ticks.iter().map(|(_, tick)| tick.delta_angle[axis]).sum::<f64>() / 20.0;
     let (sin, cos) = 55.0_f64.to_radians().sin_cos();
     for (axis, expected) in [EARTH_RAD_PER_S * cos, 0.0, -EARTH_RAD_PER_S * sin].into_iter().enumerate() {
         let rate = mean(axis);

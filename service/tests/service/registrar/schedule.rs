@@ -67,13 +67,13 @@ async fn a_slewed_swap_moves_from_the_old_output_to_the_new_without_a_jump() {
     assert!((reply.slew_s - 0.5).abs() < 1e-9);
     let ticks = stand.run_unit(UNIT, 200).await;
     let whole = 100.0_f64.to_radians() / 3600.0 * 0.005;
-    let mut last = before.delta_angle_rad[0];
+    let mut last = before.delta_angle[0];
     for (revision, tick) in &ticks {
         assert_eq!(*revision, 2);
-        let step = (tick.delta_angle_rad[0] - last).abs();
+        let step = (tick.delta_angle[0] - last).abs();
         assert!(step < 0.02 * whole, "tick {}: {step} of {whole}", tick.sequence);
-        last = tick.delta_angle_rad[0];
+        last = tick.delta_angle[0];
     }
-    assert!((before.delta_angle_rad[0] - last - whole).abs() < 0.01 * whole);
+    assert!((before.delta_angle[0] - last - whole).abs() < 0.01 * whole);
     stand.stop().await;
 }
