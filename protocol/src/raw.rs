@@ -107,10 +107,10 @@ pub fn read_ticks<T: RawTick>(frame: &[u8], ticks: &mut Vec<T>) -> Result<Output
 }
 
 fn read_body<T: RawTick>(bytes: &[u8], ticks: &mut Vec<T>) -> Result<OutputKind, CodecError> {
-    let mut body = Body(bytes);
+    let mut body = Body::new(bytes);
     let mut alike = Alike::default();
     read_all(&mut body, ticks, &mut alike).ok_or(CodecError::Malformed)?;
-    body.end()?;
+    body.ends()?;
     alike.judge(ticks.len())
 }
 
@@ -118,9 +118,12 @@ fn read_body<T: RawTick>(bytes: &[u8], ticks: &mut Vec<T>) -> Result<OutputKind,
 fn read_all<T: RawTick>(body: &mut Body<'_>, ticks: &mut Vec<T>, alike: &mut Alike) -> Option<()> {
     // Never more than the body can hold, whatever it says.
     let most = MAX_TICKS.min(body.left() / FEWEST_BYTES);
-    let (first, series) =
-        body.part(|part| Some((part.u64()?, if T::HAS_SERIES { part.u64()? } else { 0 })))?;
-    ticks.resize_with(body.length(most)?, T::default);
+    let (first, series, count) = body.part(|part| {
+        let first = part.u64()?;
+        let series = if T::HAS_SERIES { part.u64()? } else { 0 };
+        Some((first, series, part.length(most)?))
+    })?;
+    ticks.resize_with(count, T::default);
     for (index, tick) in ticks.iter_mut().enumerate() {
         body.part(|part| {
             let end_time = Timestamp::from_ns(part.i64()?);
@@ -137,9 +140,10 @@ fn read_all<T: RawTick>(body: &mut Body<'_>, ticks: &mut Vec<T>, alike: &mut Ali
 }
 
 /// Reads the readings of a tick; what they stand for.
-#[inline]
+#[inline(always)]
+#[expect(clippy::inline_always, reason = "else how far a tick has been read leaves its register")]
 fn read_readings(part: &mut Stretch<'_>, readings: &mut Sensors<f64>) -> Option<OutputKind> {
-    let kind = part.u32()?;
+    let kind = part.variant()?;
     resize(readings, part.length(MAX_SENSORS)?);
     match kind {
         0 => {
@@ -171,9 +175,9 @@ fn resize<V: Default>(values: &mut Sensors<V>, count: usize) {
 struct Alike {
     first: Option<(OutputKind, usize)>,
     /// The first tick with other readings.
-    mixed: Option<CodecError>,
-    /// The first tick with half-period counts of some gyros.
-    some_halves: Option<CodecError>,
+    mixed: Option<usize>,
+    /// The first tick with half-period counts of some gyros, and how many there are of both.
+    some_halves: Option<[usize; 3]>,
 }
 
 impl Alike {
@@ -181,18 +185,33 @@ impl Alike {
     fn note(&mut self, index: usize, output: OutputKind, tick: &impl RawTick) {
         let Parts { readings, half_periods: got, .. } = tick.parts();
         let need = readings.len();
-        if *self.first.get_or_insert((output, need)) != (output, need) {
-            self.mixed.get_or_insert(CodecError::MixedReadings { index });
+        if self.first != Some((output, need)) || (got != 0 && got != need) {
+            self.note_other(index, (output, need), got);
         }
+    }
+
+    /// The first tick, or one that differs.
+    #[cold]
+    fn note_other(&mut self, index: usize, readings: (OutputKind, usize), got: usize) {
+        if *self.first.get_or_insert(readings) != readings {
+            self.mixed.get_or_insert(index);
+        }
+        let (_, need) = readings;
         if got != 0 && got != need {
-            self.some_halves.get_or_insert(CodecError::HalfPeriods { index, got, need });
+            self.some_halves.get_or_insert([index, got, need]);
         }
     }
 
     /// What is wrong with a batch of `count` ticks; otherwise what its readings stand for.
-    fn judge(self, count: usize) -> Result<OutputKind, CodecError> {
-        let (output, _) = self.first.filter(|_| count <= MAX_TICKS).ok_or(CodecError::Ticks { count })?;
-        self.mixed.or(self.some_halves).map_or(Ok(output), Err)
+    fn judge(&self, count: usize) -> Result<OutputKind, CodecError> {
+        match (self.first, self.mixed, self.some_halves) {
+            (Some((output, _)), None, None) if count <= MAX_TICKS => Ok(output),
+            (Some(_), Some(index), _) if count <= MAX_TICKS => Err(CodecError::MixedReadings { index }),
+            (Some(_), None, Some([index, got, need])) if count <= MAX_TICKS => {
+                Err(CodecError::HalfPeriods { index, got, need })
+            }
+            _ => Err(CodecError::Ticks { count }),
+        }
     }
 }
 

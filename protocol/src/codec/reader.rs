@@ -7,9 +7,15 @@ use isotherm_correction::sample::LasingMode;
 
 use super::{CodecError, GOES_ON, WINDOW};
 
-/// What is left of a body.
+/// A body, and how far it has been read.
 #[derive(Debug)]
-pub(crate) struct Body<'a>(pub(crate) &'a [u8]);
+pub(crate) struct Body<'a> {
+    bytes: &'a [u8],
+    at: usize,
+    /// The end of the body with zeros behind it, once what is left is shorter than a window.
+    end: [u8; 2 * WINDOW],
+    end_from: Option<usize>,
+}
 
 /// A stretch of a body that has its full length always, so that no step in it has to ask whether a byte is there.
 #[derive(Debug)]
@@ -20,33 +26,41 @@ pub struct Stretch<'a> {
 }
 
 impl<'a> Body<'a> {
-    /// Reads a part of at most 255 bytes.
-    ///
-    /// Near the end the window is filled up with zeros; whoever has read of them has read a body that is cut off.
+    /// All of a body.
+    pub(crate) fn new(bytes: &'a [u8]) -> Self {
+        Self { bytes, at: 0, end: [0; 2 * WINDOW], end_from: None }
+    }
+
+    /// Reads a part of at most 255 bytes. Whoever has read of the zeros behind the end has read a body that is cut off.
     #[inline]
     pub(crate) fn part<T>(&mut self, read: impl FnOnce(&mut Stretch<'_>) -> Option<T>) -> Option<T> {
-        let mut filled;
-        let bytes = if let Some(bytes) = self.0.first_chunk() {
-            bytes
+        let rest = self.bytes.get(self.at..)?;
+        let window = if let Some(window) = rest.first_chunk() {
+            window
         } else {
-            filled = [0; WINDOW];
-            filled.get_mut(..self.0.len())?.copy_from_slice(self.0);
-            &filled
+            let from = match self.end_from {
+                Some(from) => from,
+                None => {
+                    self.end.get_mut(..rest.len())?.copy_from_slice(rest);
+                    *self.end_from.insert(self.at)
+                }
+            };
+            self.end.get(self.at - from..)?.first_chunk()?
         };
-        let mut stretch = Stretch { bytes, at: 0 };
+        let mut stretch = Stretch { bytes: window, at: 0 };
         let value = read(&mut stretch)?;
-        self.0 = self.0.get(usize::from(stretch.at)..)?;
-        Some(value)
+        self.at += usize::from(stretch.at);
+        (self.at <= self.bytes.len()).then_some(value)
     }
 
     /// How many bytes are left.
     pub(crate) fn left(&self) -> usize {
-        self.0.len()
+        self.bytes.len() - self.at
     }
 
     /// A body ends here.
-    pub(crate) fn end(&self) -> Result<(), CodecError> {
-        if self.0.is_empty() { Ok(()) } else { Err(CodecError::Trailing { count: self.left() }) }
+    pub(crate) fn ends(&self) -> Result<(), CodecError> {
+        if self.left() == 0 { Ok(()) } else { Err(CodecError::Trailing { count: self.left() }) }
     }
 
     /// A stated number of elements, at most `most`.
@@ -56,9 +70,9 @@ impl<'a> Body<'a> {
 
     /// Reads a text.
     pub(crate) fn str(&mut self) -> Option<&'a str> {
-        let length = self.length(self.0.len())?;
-        let (text, rest) = self.0.split_at_checked(length)?;
-        self.0 = rest;
+        let length = self.length(self.left())?;
+        let text = self.bytes.get(self.at..)?.get(..length)?;
+        self.at += length;
         str::from_utf8(text).ok()
     }
 }
@@ -69,32 +83,59 @@ impl Stretch<'_> {
         self.bytes.get(usize::from(self.at)..)?.first_chunk().copied()
     }
 
-    /// Up to ten bytes of seven bits each, the lowest first; the number, and how many bytes it has.
     #[inline]
-    fn varint(&mut self) -> Option<(u64, u8)> {
-        let word = u64::from_le_bytes(self.ahead()?);
-        let (number, length) = if word & 0x8080 == 0x8080 {
-            many_bytes(word, self.ahead::<10>()?)?
-        } else {
-            // One byte or two, as most numbers have, without asking which.
-            let goes_on = word >> 7 & 1;
-            let second = word >> 1 & 0x3f80 & goes_on.wrapping_neg();
-            (word & 0x7f | second, if goes_on == 0 { 1 } else { 2 })
-        };
-        self.at = self.at.wrapping_add(length);
-        Some((number, length))
+    fn pass(&mut self, bytes: u8) {
+        self.at = self.at.wrapping_add(bytes);
+    }
+
+    /// A number of one byte or two, as most have, without asking which; `None` for a longer one.
+    #[inline]
+    fn short(&mut self) -> Option<u16> {
+        let word = u16::from_le_bytes(self.ahead()?);
+        if word & 0x8080 == 0x8080 {
+            return None;
+        }
+        let goes_on = word >> 7 & 1;
+        self.pass(if goes_on == 0 { 1 } else { 2 });
+        Some(word & 0x7f | word >> 1 & 0x3f80 & goes_on.wrapping_neg())
+    }
+
+    /// A number of up to ten bytes of seven bits each, and how many bytes it has.
+    #[inline]
+    fn long(&mut self) -> Option<(u64, u8)> {
+        let [number @ .., ninth, tenth] = self.ahead::<10>()?;
+        let (number, length) = long(u64::from_le_bytes(number), ninth, tenth);
+        self.pass(length);
+        (length > 0).then_some((number, length))
     }
 
     #[inline]
     pub(crate) fn u64(&mut self) -> Option<u64> {
-        self.varint().map(|(number, _)| number)
+        match self.short() {
+            Some(number) => Some(number.into()),
+            None => self.long().map(|(number, _)| number),
+        }
     }
 
     /// Of up to five bytes.
     #[inline]
     pub(crate) fn u32(&mut self) -> Option<u32> {
-        let (number, length) = self.varint()?;
-        u32::try_from(number).ok().filter(|_| length <= 5)
+        match self.short() {
+            Some(number) => Some(number.into()),
+            None => self.long().filter(|(_, length)| *length <= 5)?.0.try_into().ok(),
+        }
+    }
+
+    /// Two numbers; where each has two bytes, as half-period counts mostly have, they move together.
+    #[inline]
+    pub(crate) fn two_i32(&mut self) -> Option<[i32; 2]> {
+        let word = u32::from_le_bytes(self.ahead()?);
+        if word & 0x8080_8080 != 0x0080_0080 {
+            return Some([self.i32()?, self.i32()?]);
+        }
+        self.pass(4);
+        let both = word & 0x007f_007f | word >> 1 & 0x3f80_3f80;
+        Some([both & 0xffff, both >> 16].map(unfolded))
     }
 
     #[inline]
@@ -105,28 +146,45 @@ impl Stretch<'_> {
 
     #[inline]
     pub(crate) fn i32(&mut self) -> Option<i32> {
-        let folded = self.u32()?;
-        Some((folded >> 1).cast_signed() ^ -(folded & 1).cast_signed())
+        self.u32().map(unfolded)
     }
 
     #[inline]
     pub(crate) fn f64(&mut self) -> Option<f64> {
         let bytes = self.ahead()?;
-        self.at = self.at.wrapping_add(8);
+        self.pass(8);
         Some(f64::from_le_bytes(bytes))
     }
 
     #[inline]
     pub(crate) fn bool(&mut self) -> Option<bool> {
         let [byte] = self.ahead()?;
-        self.at = self.at.wrapping_add(1);
+        self.pass(1);
         (byte <= 1).then_some(byte == 1)
     }
 
-    /// A stated number of elements, at most `most`.
+    /// Number of a variant: one byte, unless somebody has written it longer than it is.
+    #[inline]
+    pub(crate) fn variant(&mut self) -> Option<u32> {
+        let [byte] = self.ahead()?;
+        if byte >= 0x80 {
+            return self.u32();
+        }
+        self.pass(1);
+        Some(byte.into())
+    }
+
+    /// A stated number of elements, at most `most`; of a tick's it has one byte.
     #[inline]
     pub(crate) fn length(&mut self, most: usize) -> Option<usize> {
-        usize::try_from(self.u64()?).ok().filter(|length| *length <= most)
+        let [byte] = self.ahead()?;
+        let length = if byte < 0x80 {
+            self.pass(1);
+            byte.into()
+        } else {
+            usize::try_from(self.u64()?).ok()?
+        };
+        (length <= most).then_some(length)
     }
 
     /// A lasing mode, or none.
@@ -135,7 +193,7 @@ impl Stretch<'_> {
         if !self.bool()? {
             return Some(None);
         }
-        match self.u32()? {
+        match self.variant()? {
             0 => Some(Some(LasingMode::Plus)),
             1 => Some(Some(LasingMode::Minus)),
             _ => None,
@@ -143,27 +201,31 @@ impl Stretch<'_> {
     }
 }
 
-/// A number of three bytes or more, of which `word` has the first eight.
-#[inline]
-fn many_bytes(word: u64, bytes: [u8; 10]) -> Option<(u64, u8)> {
+/// A number whose bytes have seven bits each, the lowest first, and how many they are: 0 where they are none.
+fn long(word: u64, ninth: u8, tenth: u8) -> (u64, u8) {
     let ends = !word & GOES_ON;
     // Up to the byte that ends it; then pairs of seven bits, of fourteen, of twenty-eight move together.
     let bits = word & (ends ^ ends.wrapping_sub(1)) & !GOES_ON;
     let bits = bits & 0x007f_007f_007f_007f | (bits & 0x7f00_7f00_7f00_7f00) >> 1;
     let bits = bits & 0x0000_3fff_0000_3fff | (bits & 0x3fff_0000_3fff_0000) >> 2;
     let bits = bits & 0x0fff_ffff | (bits & 0x0fff_ffff_0000_0000) >> 4;
-    if ends != 0 {
-        return Some((bits, u8::try_from(ends.trailing_zeros() / 8 + 1).ok()?));
-    }
-    // Nanoseconds since 1970 have nine.
-    let [.., ninth, tenth] = bytes;
-    let bits = bits | u64::from(ninth & 0x7f) << 56;
-    match (ninth < 0x80, tenth) {
-        (true, _) => Some((bits, 9)),
+    match (ends, ninth, tenth) {
+        (1.., _, _) => {
+            let [length, ..] = (ends.trailing_zeros() / 8 + 1).to_le_bytes();
+            (bits, length)
+        }
+        // Nanoseconds since 1970 have nine.
+        (0, ..0x80, _) => (bits | u64::from(ninth) << 56, 9),
         // Of the tenth byte one bit is left.
-        (false, 0 | 1) => Some((bits | u64::from(tenth) << 63, 10)),
-        _ => None,
+        (0, _, 0 | 1) => (bits | u64::from(ninth & 0x7f) << 56 | u64::from(tenth) << 63, 10),
+        _ => (0, 0),
     }
+}
+
+/// From 0, −1, 1, −2 as 0, 1, 2, 3.
+#[inline]
+fn unfolded(folded: u32) -> i32 {
+    (folded >> 1).cast_signed() ^ -(folded & 1).cast_signed()
 }
 
 #[cfg(test)]
@@ -176,14 +238,16 @@ mod tests {
             bytes: &[u8],
             read: impl FnOnce(&mut Stretch<'_>) -> Option<T>,
         ) {
-            let mut body = Body(bytes);
-            let number = body.part(read).map(|number| (number, body.0));
-            assert_eq!(number, postcard::take_from_bytes(bytes).ok(), "{bytes:02x?}");
+            let mut body = Body::new(bytes);
+            let number = body.part(read).map(|number| (number, body.left()));
+            let postcard = postcard::take_from_bytes(bytes).ok().map(|(number, rest)| (number, rest.len()));
+            assert_eq!(number, postcard, "{bytes:02x?}");
         }
         reads::<u64>(bytes, |part| part.u64());
         reads::<i64>(bytes, |part| part.i64());
         reads::<u32>(bytes, |part| part.u32());
         reads::<i32>(bytes, |part| part.i32());
+        reads::<[i32; 2]>(bytes, |part| part.two_i32());
         reads::<bool>(bytes, |part| part.bool());
         reads::<Option<LasingMode>>(bytes, |part| part.mode());
     }
@@ -207,8 +271,8 @@ mod tests {
 
     #[test]
     fn a_text_that_is_longer_than_what_is_left_is_refused() {
-        assert_eq!(Body(&[3, b'a', b'b', b'c', 9]).str(), Some("abc"));
-        assert_eq!(Body(&[3, b'a', b'b']).str(), None);
-        assert_eq!(Body(&[1, 0xff]).str(), None, "no UTF-8");
+        assert_eq!(Body::new(&[3, b'a', b'b', b'c', 9]).str(), Some("abc"));
+        assert_eq!(Body::new(&[3, b'a', b'b']).str(), None);
+        assert_eq!(Body::new(&[1, 0xff]).str(), None, "no UTF-8");
     }
 }

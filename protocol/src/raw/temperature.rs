@@ -99,9 +99,9 @@ pub fn read_temperatures(frame: &[u8], readings: &mut Vec<TemperatureReading>) -
 }
 
 fn read_body(bytes: &[u8], readings: &mut Vec<TemperatureReading>) -> Result<(), CodecError> {
-    let mut body = Body(bytes);
+    let mut body = Body::new(bytes);
     let (count, mixed) = read_all(&mut body, readings).ok_or(CodecError::Malformed)?;
-    body.end()?;
+    body.ends()?;
     match mixed {
         _ if count == 0 => Err(CodecError::Ticks { count }),
         Some(index) => Err(CodecError::MixedReadings { index }),

@@ -80,7 +80,8 @@ impl RawTick for GyroTick {
         self.meander = part.mode()?;
         resize(&mut self.half_periods, part.length(MAX_SENSORS)?);
         for half in &mut self.half_periods {
-            *half = HalfPeriodCounts { positive: part.i32()?, negative: part.i32()? };
+            let [positive, negative] = part.two_i32()?;
+            *half = HalfPeriodCounts { positive, negative };
         }
         Some(())
     }
