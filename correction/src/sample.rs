@@ -221,6 +221,7 @@ mod written {
 
         use crate::units::Span;
 
+        #[expect(clippy::trivially_copy_pass_by_ref, reason = "as serde hands it over")]
         pub(in super::super) fn serialize<S: Serializer>(span: &Span, to: S) -> Result<S::Ok, S::Error> {
             to.serialize_u64(span.as_ns().unsigned_abs())
         }
@@ -237,6 +238,7 @@ mod written {
 
         use crate::sample::TickFlags;
 
+        #[expect(clippy::trivially_copy_pass_by_ref, reason = "as serde hands it over")]
         pub(in super::super) fn serialize<S: Serializer>(
             flags: &TickFlags,
             to: S,

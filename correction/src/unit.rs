@@ -137,7 +137,9 @@ impl Unit {
             }
             Event::Temperature(readings) => pipeline.take_temperatures(readings),
             Event::Health(readings) => {
-                readings.iter().for_each(|reading| pipeline.operating.health(reading));
+                for reading in readings {
+                    pipeline.operating.health(reading);
+                }
             }
             Event::Reference(reference) => {
                 if let Some(active) = &mut pipeline.active {

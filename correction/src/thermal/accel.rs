@@ -94,6 +94,7 @@ impl Follows<2> for AccelModel {
 
 /// r (dimensionless) over the electronics board's temperature.
 impl Follows<1> for AccelModel {
+    #[expect(clippy::misnamed_getters, reason = "the channel that the board follows")]
     fn channel(&self) -> Option<usize> {
         self.board_channel
     }

@@ -69,8 +69,8 @@ impl Paces {
         match self.followed.first() {
             Some(_) if self.apart => {
                 let mut shares = [0.0; MOST_FOLLOWED];
-                let shared = shares.iter_mut().zip(&self.followed);
-                shared.for_each(|(share, (_, pace))| *share = pace.share(time));
+                let followed = shares.iter_mut().zip(&self.followed);
+                followed.for_each(|(share, (_, pace))| *share = pace.share(time));
                 Shares::Apart(shares)
             }
             Some((_, pace)) => Shares::Together(pace.share(time)),

@@ -49,8 +49,8 @@ impl Health {
     }
 
     /// Enters the flags of one tick.
-    pub(super) fn note(&mut self, flags: &[SensorFlags; MAX_SENSORS]) {
-        self.flags = *flags;
+    pub(super) fn note(&mut self, flags: [SensorFlags; MAX_SENSORS]) {
+        self.flags = flags;
         self.ticks += 1;
         for (account, flags) in self.accounts.iter_mut().zip(flags) {
             account.invalid += u64::from(!flags.contains(SensorFlags::VALID));

@@ -125,7 +125,9 @@ impl Rows {
                 batch.ticks.iter().for_each(|tick| self.accel(batch.output, tick.clone()));
             }
             Decoded::Temperature(batch) => {
-                batch.readings.iter().for_each(|reading| self.temperature(*reading))
+                for reading in &batch.readings {
+                    self.temperature(*reading);
+                }
             }
             _ => {}
         }

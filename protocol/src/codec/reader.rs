@@ -38,12 +38,11 @@ impl<'a> Body<'a> {
         let window = if let Some(window) = rest.first_chunk() {
             window
         } else {
-            let from = match self.end_from {
-                Some(from) => from,
-                None => {
-                    self.end.get_mut(..rest.len())?.copy_from_slice(rest);
-                    *self.end_from.insert(self.at)
-                }
+            let from = if let Some(from) = self.end_from {
+                from
+            } else {
+                self.end.get_mut(..rest.len())?.copy_from_slice(rest);
+                *self.end_from.insert(self.at)
             };
             self.end.get(self.at - from..)?.first_chunk()?
         };
@@ -189,6 +188,7 @@ impl Stretch<'_> {
 
     /// A lasing mode, or none.
     #[inline]
+    #[expect(clippy::option_option, reason = "no mode is one thing, a mode that there is not another")]
     pub(crate) fn mode(&mut self) -> Option<Option<LasingMode>> {
         if !self.bool()? {
             return Some(None);
@@ -233,6 +233,10 @@ mod tests {
     use super::*;
 
     /// What postcard and this reader make of the same bytes.
+    #[expect(
+        clippy::redundant_closure_for_method_calls,
+        reason = "a method alone is not general enough in its lifetime"
+    )]
     fn both(bytes: &[u8]) {
         fn reads<T: PartialEq + std::fmt::Debug + for<'de> serde::Deserialize<'de>>(
             bytes: &[u8],

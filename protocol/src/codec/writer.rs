@@ -90,7 +90,9 @@ impl Writer<'_> {
     /// Numbers as they are in memory.
     #[inline]
     pub(crate) fn f64s(&mut self, numbers: &[f64]) {
-        numbers.iter().for_each(|number| self.bytes(number.to_le_bytes()));
+        for number in numbers {
+            self.bytes(number.to_le_bytes());
+        }
     }
 
     /// How many elements follow.

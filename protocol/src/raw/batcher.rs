@@ -127,20 +127,20 @@ impl Batcher {
     fn flush_accel(&mut self) -> Result<(), BatchError> {
         let (output, ticks) = self.accel.take();
         for part in ticks.chunks(self.batch_ticks) {
-            self.push_ticks(RawStream::Accel, RawBatch { output, ticks: part.to_vec() })?;
+            self.push_ticks(RawStream::Accel, &RawBatch { output, ticks: part.to_vec() })?;
         }
         Ok(())
     }
 
     fn flush_gyro(&mut self) -> Result<(), BatchError> {
         let (output, ticks) = self.gyro.take();
-        self.push_ticks(RawStream::Gyro, RawBatch { output, ticks })
+        self.push_ticks(RawStream::Gyro, &RawBatch { output, ticks })
     }
 
-    fn push_ticks<T: RawTick>(&mut self, stream: RawStream, batch: RawBatch<T>) -> Result<(), BatchError> {
+    fn push_ticks<T: RawTick>(&mut self, stream: RawStream, batch: &RawBatch<T>) -> Result<(), BatchError> {
         let (Some(first), Some(last)) = (batch.ticks.first(), batch.ticks.last()) else { return Ok(()) };
         let (sequence, (time, _)) = (first.parts().sequence, last.parts().times);
-        self.push(stream, &batch, time, sequence, batch.ticks.len()).map_err(|error| match error {
+        self.push(stream, batch, time, sequence, batch.ticks.len()).map_err(|error| match error {
             BatchError::Codec(CodecError::NotCounts { .. }) => BatchError::NotCounts { sequence },
             error => error,
         })

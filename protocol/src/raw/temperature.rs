@@ -75,7 +75,9 @@ impl Message for TemperatureBatch {
             append(frame, 2 * MAX_NUMBER + tick.len() * size_of::<f64>(), |to| {
                 to.i64(tick.first().map_or(0, |reading| reading.time.as_ns()));
                 to.length(tick.len());
-                tick.iter().for_each(|reading| to.f64s(&[reading.raw]));
+                for reading in tick {
+                    to.f64s(&[reading.raw]);
+                }
             });
         }
         Ok(())

@@ -51,13 +51,13 @@ impl Readings {
 }
 
 fn check_plain<'a>(
-    readings: impl ExactSizeIterator<Item = &'a Readings> + Clone,
+    mut readings: impl ExactSizeIterator<Item = &'a Readings>,
 ) -> Result<OutputKind, CodecError> {
     let count = readings.len();
     let like = |readings: &Readings| (readings.output(), readings.values().len());
-    let Some(first) = readings.clone().next() else { return Err(CodecError::Ticks { count }) };
-    match readings.clone().position(|readings| like(readings) != like(first)) {
-        Some(index) => Err(CodecError::MixedReadings { index }),
+    let Some(first) = readings.next() else { return Err(CodecError::Ticks { count }) };
+    match readings.position(|readings| like(readings) != like(first)) {
+        Some(index) => Err(CodecError::MixedReadings { index: index + 1 }),
         None => Ok(first.output()),
     }
 }

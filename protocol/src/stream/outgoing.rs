@@ -193,7 +193,9 @@ impl From<Outgoing> for Waiting {
 impl From<Waiting> for Outgoing {
     fn from(waiting: Waiting) -> Self {
         let mut outgoing = Self::default();
-        waiting.into_iter().for_each(|(tick, revision)| outgoing.push(&CorrectedTick { revision, ..tick }));
+        for (tick, revision) in waiting {
+            outgoing.push(&CorrectedTick { revision, ..tick });
+        }
         outgoing
     }
 }

@@ -238,7 +238,7 @@ fn modes(by_mode: &ByMode<ModeTotals>) -> Vec<PreLaunchMode> {
     let totals = modes.map(|mode| (mode, by_mode.get(mode)));
     let seen = totals.into_iter().filter(|(_, totals)| totals.ticks > 0);
     let mode = seen.map(|(mode, totals)| PreLaunchMode {
-        mode: mode.map(Into::into),
+        mode,
         ticks: totals.ticks,
         time_s: totals.time_s,
         mean_temperature_deg_c: totals.mean_temperature_deg_c,

@@ -75,7 +75,7 @@ impl Corrector {
             for lane in (0..count).filter(|lane| !flags[*lane].intersects(taken)) {
                 self.last_forces[lane] = forces[lane];
             }
-            self.accel_health.note(&flags);
+            self.accel_health.note(flags);
             flags
         };
         let seen = &mut self.seen.accels;

@@ -95,11 +95,11 @@ impl Corrector {
                 increments = [0.0; N];
                 patch.lost()
             } else {
-                let last = &self.last_rates;
+                let good = &self.last_rates;
                 patch.apply(&mut usable, counters, |lane, reading| {
                     increments[lane] = match reading {
                         Some(reading) => corrected(lane, reading),
-                        None => last[lane] * duration_s,
+                        None => good[lane] * duration_s,
                     };
                 })
             }
@@ -113,7 +113,7 @@ impl Corrector {
             for lane in (0..count).filter(|lane| flags[*lane].contains(SensorFlags::VALID)) {
                 self.last_rates[lane] = rates[lane];
             }
-            self.gyro_health.note(&flags);
+            self.gyro_health.note(flags);
         }
 
         let seen = &mut self.seen.gyros;
