@@ -153,7 +153,7 @@ impl Corrector {
         &self.thermal
     }
 
-    /// Corrects one tick, with its accelerometers', of a unit that was turned on at `turn_on`.
+    /// Corrects one tick, with its accelerometers'; readings of `waiting` that fall due before its end take effect first.
     pub(super) fn correct(
         &mut self,
         calibration: &Calibration,

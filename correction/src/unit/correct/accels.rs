@@ -35,12 +35,13 @@ impl Corrector {
         let count = calibration.accels.len();
         self.seen.specific_force = None;
         self.seen.accels.count = 0;
-        out.accel_flags = of_sensors([SensorFlags::empty(); MAX_SENSORS], count);
         let (Some(orientation), Some(axes)) = (&calibration.accel_orientation, &self.thermal.accel_axes)
         else {
+            out.accel_flags.clear();
             return;
         };
         let Some(raw) = tick.accel else {
+            out.accel_flags = of_sensors([SensorFlags::empty(); MAX_SENSORS], count);
             out.flags |= TickFlags::ACCELEROMETER_MISSING | TickFlags::VELOCITY_INVALID;
             counters.accel_missing += 1;
             return;
