@@ -265,12 +265,6 @@ pub struct Inverse {
 }
 
 impl Inverse {
-    /// The sensors that take part.
-    #[must_use]
-    pub const fn mask(&self) -> SensorMask {
-        self.mask
-    }
-
     /// v = C⁺·s (unit of `readings`).
     ///
     /// A sensor outside the mask is not looked at, so its reading may be anything, NaN too. Readings that are

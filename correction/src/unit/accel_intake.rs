@@ -5,7 +5,7 @@ use alloc::collections::VecDeque;
 use serde::{Deserialize, Serialize};
 
 use super::counters::Counters;
-use super::gyro_intake::{LONGEST_KEPT, MAX_DURATION};
+use super::gyro_intake::{LONGEST_KEPT, MAX_DURATION, is_possible};
 use crate::lanes::{Lanes, of_readings};
 use crate::sample::{AccelTick, GyroTick, OutputKind};
 use crate::units::{Span, Timestamp};
@@ -49,7 +49,7 @@ pub(super) struct AccelIntake {
 impl AccelIntake {
     /// Takes one tick.
     pub(super) fn admit(&mut self, tick: &AccelTick, output: OutputKind, counters: &mut Counters) {
-        if tick.duration == Span::ZERO || tick.duration > MAX_DURATION {
+        if !is_possible(tick.duration) {
             counters.bad_duration += 1;
             return;
         }

@@ -169,7 +169,9 @@ impl Corrector {
             self.servo.reset();
             self.slew = None;
         }
-        self.thermal.advance(calibration, waiting, delay, time, counters);
+        if waiting.is_due(time, delay) {
+            self.thermal.advance(calibration, waiting, delay, time, counters);
+        }
         self.drift.advance(time, restart, &|rate| {
             calibration.gyro_orientation.forward(self.thermal.gyro_axes.temperature_deg_c(time), rate)
         });

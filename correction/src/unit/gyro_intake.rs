@@ -116,7 +116,7 @@ impl GyroIntake {
         let step_ns = tick.end_time.as_ns().saturating_sub(newest.end_time.as_ns());
         let duration_ns = tick.duration.as_ns();
         in_order
-            && (1..=MAX_DURATION.as_ns()).contains(&duration_ns)
+            && is_possible(tick.duration)
             && (1..=MAX_STEP.as_ns()).contains(&step_ns)
             && step_ns >= duration_ns / 2
             && self.pending.is_empty()
@@ -140,7 +140,7 @@ impl GyroIntake {
 
     /// Takes one tick of a batch; whether it starts a new series.
     pub(super) fn admit(&mut self, tick: &GyroTick, output: OutputKind, counters: &mut Counters) -> bool {
-        if tick.duration == Span::ZERO || tick.duration > MAX_DURATION {
+        if !is_possible(tick.duration) {
             counters.bad_duration += 1;
             return false;
         }
@@ -336,6 +336,11 @@ impl GyroIntake {
     pub(super) fn is_empty(&self) -> bool {
         self.pending.is_empty()
     }
+}
+
+/// Whether a tick can have lasted so long.
+pub(super) fn is_possible(duration: Span) -> bool {
+    (1..=MAX_DURATION.as_ns()).contains(&duration.as_ns())
 }
 
 /// Whether a later sequence number and its time fit the newest tick.

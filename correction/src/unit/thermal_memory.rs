@@ -218,23 +218,9 @@ impl ThermalMemory {
         }
     }
 
-    /// Applies every waiting reading that takes effect before a tick ending at `end_time`.
-    #[inline]
-    pub(super) fn advance(
-        &mut self,
-        calibration: &Calibration,
-        waiting: &mut Waiting,
-        delay: Span,
-        end_time: Timestamp,
-        counters: &mut Counters,
-    ) {
-        if waiting.is_due(end_time, delay) {
-            self.take_due(calibration, waiting, delay, end_time, counters);
-        }
-    }
-
+    /// Applies every waiting reading that takes effect before a tick ending at `end_time`, where [one is due](Waiting::is_due).
     #[cold]
-    fn take_due(
+    pub(super) fn advance(
         &mut self,
         calibration: &Calibration,
         waiting: &mut Waiting,
