@@ -16,11 +16,10 @@
 //! How a text becomes a calibration:
 //!
 //! 1. size, UTF-8, TOML syntax: an error here ends the matter, for nothing after it can be trusted;
-//! 2. the walk (`read`) asks for every key and replaces what is wrong by a harmless stand-in;
+//! 2. every key is read by the schema of its type; what is wrong is replaced by a harmless stand-in;
 //! 3. the checks between keys (`check`), then the core's own, on everything that is not a stand-in.
 
 mod check;
-pub(crate) mod common;
 mod convert;
 mod correction_change;
 mod curve;
@@ -28,20 +27,18 @@ mod defects;
 mod difference;
 mod measure;
 mod nominal;
-mod problem;
-mod read;
-pub(crate) mod reader;
 mod reference;
-pub(crate) mod schema;
-mod suggest;
 #[cfg(test)]
 mod tests;
-pub(crate) mod text;
 mod types;
-pub(crate) mod values;
 mod warnings;
 
+use std::sync::LazyLock;
+
 use isotherm_correction::calibration::Calibration;
+pub use isotherm_document::Problem;
+use isotherm_document::{Form, Reader, published, unplaced, utf8};
+use serde_json::Value as Json;
 use sha2::{Digest, Sha256};
 
 pub use correction_change::{Side, correction_change};
@@ -51,18 +48,13 @@ pub use curve::{
 };
 pub use difference::difference;
 pub use measure::{Argument, Unit};
-pub use problem::Problem;
 pub use reference::reference;
-pub use schema::schema;
 pub use types::{
     Accel, AccelLag, AccelOrientation, AccelOutput, AccelParity, AccelSensor, Branches, Channel, Created,
     Document, Drift, Filter, Gyro, GyroOrientation, GyroOutput, GyroParity, GyroSensor, Lag, Log, Measure,
     ModeReversal, Orientation, OrientationThermal, Origin, Residual, Sample, SelfTest, SelfTestCounter,
     SelfTestVoltage, Servo, ServoKind, Temperature, Trend,
 };
-
-use reader::{Reader, Table};
-use text::unplaced;
 
 /// Oldest version of the document's form that is still read.
 ///
@@ -76,7 +68,16 @@ pub const MIN_SCHEMA: u32 = 1;
 pub const CURRENT_SCHEMA: u32 = 1;
 
 /// Longest document that is read, in bytes.
-pub const MAX_DOCUMENT_BYTES: usize = 1 << 20;
+pub const MAX_DOCUMENT_BYTES: usize = isotherm_document::MAX_BYTES;
+
+static FORM: LazyLock<Form> =
+    LazyLock::new(|| Form::of::<Document>().versions("schema", [MIN_SCHEMA, CURRENT_SCHEMA]));
+
+/// JSON schema (draft 07) of the document, as published in `config/calibration.schema.json`.
+#[must_use]
+pub fn schema() -> Json {
+    published::<Document>()
+}
 
 /// A document that holds, and what was made of it.
 #[derive(Debug, Clone, PartialEq)]
@@ -98,10 +99,12 @@ impl Document {
     /// Every [`Problem`], in the order of the text.
     pub fn parse(text: &str, file: Option<&str>) -> Result<Parsed, Vec<Problem>> {
         let mut reader = Reader::new(text, file);
-        let Some(root) = reader.root(text, [MIN_SCHEMA, CURRENT_SCHEMA]) else {
+        let Some(mut document) = reader.read::<Self>(&FORM) else {
             return Err(reader.into_problems().unwrap_or_default());
         };
-        let document = read::document(&mut reader, Table::root(root.get_ref()));
+        if let Some(origin) = &mut document.origin {
+            origin.details = reader.free_table("origin.details");
+        }
         check::check(&mut reader, &document);
         let compiled = Calibration::new(&document.to_parts());
         if let Err(defects) = &compiled {
@@ -126,7 +129,7 @@ impl Document {
     /// # Errors
     /// Every [`Problem`], in the order of the text; the first bytes that are not UTF-8 are the only one.
     pub fn parse_bytes(bytes: &[u8], file: Option<&str>) -> Result<Parsed, Vec<Problem>> {
-        Self::parse(text::utf8(bytes, file)?, file)
+        Self::parse(utf8(bytes, file)?, file)
     }
 
     /// Writes the document as text that [`Document::parse`] reads back as an equal document.

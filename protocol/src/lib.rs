@@ -30,7 +30,6 @@ pub mod control;
 pub mod corrected;
 pub mod digest;
 pub mod document;
-pub mod escape;
 pub mod history;
 pub mod journal;
 pub mod key;
@@ -42,3 +41,5 @@ pub mod signature;
 pub mod status;
 pub mod stream;
 pub mod version;
+
+pub use isotherm_document::escape;

@@ -18,24 +18,27 @@
 
 mod apply;
 mod candidate;
-mod read;
+mod check;
 #[cfg(test)]
 mod tests;
 mod types;
 
 use std::collections::BTreeMap;
+use std::sync::LazyLock;
 
+use isotherm_document::{Form, Reader, published};
 use toml::de::DeTable;
 
 pub use candidate::Candidate;
 pub use types::{GyroOverlay, Overlay, PreLaunchRecord};
 
 use crate::digest::Digest;
-use crate::document::reader::{Reader, Table};
 use crate::document::{MAX_DOCUMENT_BYTES, Problem};
 
 /// The version of the overlay's form; the policy is that of [`crate::document::MIN_SCHEMA`].
 pub const OVERLAY_SCHEMA: u32 = 1;
+static FORM: LazyLock<Form> =
+    LazyLock::new(|| Form::of::<Overlay>().versions("schema", [OVERLAY_SCHEMA, OVERLAY_SCHEMA]));
 /// The key that makes a document an overlay.
 const OVERLAY_OF: &str = "overlay_of";
 
@@ -54,7 +57,7 @@ pub struct ParsedOverlay {
 /// JSON schema (draft 07) of the overlay, as published in `config/overlay.schema.json`.
 #[must_use]
 pub fn overlay_schema() -> serde_json::Value {
-    crate::document::schema::of::<Overlay>()
+    published::<Overlay>()
 }
 
 /// Whether a text is meant to be an overlay: it has the key `overlay_of` at its top level.
@@ -72,10 +75,10 @@ impl Overlay {
     /// Every [`Problem`], in the order of the text.
     pub fn parse(text: &str, file: Option<&str>) -> Result<ParsedOverlay, Vec<Problem>> {
         let mut reader = Reader::new(text, file);
-        let Some(root) = reader.root(text, [OVERLAY_SCHEMA, OVERLAY_SCHEMA]) else {
+        let Some(overlay) = reader.read::<Self>(&FORM) else {
             return Err(reader.into_problems().unwrap_or_default());
         };
-        let overlay = read::overlay(&mut reader, Table::root(root.get_ref()));
+        check::check(&mut reader, &overlay);
         let places = reader.positions();
         match reader.into_problems() {
             Some(problems) => Err(problems),

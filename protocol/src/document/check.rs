@@ -3,14 +3,16 @@
 //! The core checks most of this again when it compiles the parts; it is checked here first because here the key
 //! and its line are known. A path that was reported is marked, so that the core does not report it once more.
 
+mod output;
+
 use std::collections::BTreeMap;
 
 use isotherm_correction::curve::{Curve as CoreCurve, CurveError};
 use isotherm_correction::orientation::ROW_NORM_TOLERANCE;
 
 use super::curve::{Curve, Quantity};
-use super::reader::{Reader, element, join};
 use super::types::{AccelSensor, Branches, Document, Filter, GyroSensor, Orientation, SelfTest};
+use isotherm_document::{Reader, element, join};
 
 /// Checks everything between keys.
 pub(super) fn check(r: &mut Reader<'_>, document: &Document) {
@@ -18,6 +20,7 @@ pub(super) fn check(r: &mut Reader<'_>, document: &Document) {
     let channels = channels.as_deref();
     names(r, "gyro.sensor", document.gyro.sensor.iter().map(|sensor| sensor.name.as_str()));
     for (i, sensor) in document.gyro.sensor.iter().enumerate() {
+        output::gyro(r, &element("gyro.sensor", i), document.gyro.output, sensor);
         gyro(r, &element("gyro.sensor", i), sensor, channels);
         let taus = sensor.lag.iter().map(|lag| (lag.time_constant_s, &lag.gain));
         lags(r, &element("gyro.sensor", i), taus, document.temperature.filter.as_ref());
@@ -27,6 +30,7 @@ pub(super) fn check(r: &mut Reader<'_>, document: &Document) {
     if let Some(section) = &document.accel {
         names(r, "accel.sensor", section.sensor.iter().map(|sensor| sensor.name.as_str()));
         for (i, sensor) in section.sensor.iter().enumerate() {
+            output::accel(r, &element("accel.sensor", i), section.output, sensor);
             accel(r, &element("accel.sensor", i), sensor, channels);
             let taus = sensor.lag.iter().map(|lag| (lag.time_constant_s, &lag.gain));
             lags(r, &element("accel.sensor", i), taus, document.temperature.filter.as_ref());
@@ -38,19 +42,13 @@ pub(super) fn check(r: &mut Reader<'_>, document: &Document) {
     }
 }
 
-/// Reports, and marks what was reported.
-fn report(r: &mut Reader<'_>, path: &str, message: String) {
-    r.report(path, message);
-    r.damage(path);
-}
-
 /// No two sensors of a kind have one name.
 fn names<'n>(r: &mut Reader<'_>, sensors: &str, names: impl Iterator<Item = &'n str>) {
     let mut seen = BTreeMap::new();
     for (i, name) in names.enumerate() {
         if let Some(earlier) = seen.insert(name, i) {
             let path = join(&element(sensors, i), "name");
-            report(r, &path, format!("is {name:?}, the name of {sensors}[{earlier}] too: names must differ"));
+            r.refuse(&path, format!("is {name:?}, the name of {sensors}[{earlier}] too: names must differ"));
         }
     }
 }
@@ -65,7 +63,7 @@ fn self_test_names(r: &mut Reader<'_>, self_test: &SelfTest) {
         if let Some(earlier) = voltages.clone().position(|voltage| voltage == name) {
             let path = join(&element("self_test.counter", i), "name");
             let voltage = element("self_test.voltage", earlier);
-            report(r, &path, format!("is {name:?}, the name of {voltage} too: names must differ"));
+            r.refuse(&path, format!("is {name:?}, the name of {voltage} too: names must differ"));
         }
     }
 }
@@ -86,7 +84,7 @@ fn channel(r: &mut Reader<'_>, path: &str, name: Option<&str>, channels: Option<
         && !channels.contains(&name)
     {
         let known = if channels.is_empty() { "none".into() } else { channels.join(", ") };
-        report(r, path, format!("is {name:?}, which is no temperature channel; the channels are: {known}"));
+        r.refuse(path, format!("is {name:?}, which is no temperature channel; the channels are: {known}"));
     }
 }
 
@@ -117,8 +115,7 @@ fn lags<'l, Q: Quantity>(
         let Some(Filter { grid_step_s, .. }) = filter else { continue };
         if tau < *grid_step_s && !r.is_damaged("temperature.filter.grid_step_s") {
             let path = join(&path, "time_constant_s");
-            report(
-                r,
+            r.refuse(
                 &path,
                 format!("is {tau} s, must be at least temperature.filter.grid_step_s, {grid_step_s} s"),
             );
@@ -147,7 +144,7 @@ fn curve<Q: Quantity>(r: &mut Reader<'_>, path: &str, curve: Option<&Curve<Q>>) 
         CurveError::EmptyRange { .. } => join(path, &keys.range),
         _ => path.to_owned(),
     };
-    report(r, &place, error.to_string());
+    r.refuse(&place, error.to_string());
 }
 
 /// Both curves of a branched coefficient have one argument.
@@ -161,8 +158,7 @@ fn branches<Q: Quantity>(r: &mut Reader<'_>, path: &str, branches: Option<&Branc
         && !r.is_damaged(&run_up_path)
     {
         let (first, second) = (first.symbol(), second.symbol());
-        report(
-            r,
+        r.refuse(
             &braking_path,
             format!("is over {second}, but run_up is over {first}: both must have one argument"),
         );
@@ -174,10 +170,9 @@ fn filter(r: &mut Reader<'_>, document: &Document) {
     const KEY: &str = "branch_dead_band_deg_c2_per_s3";
     let Some(filter) = &document.temperature.filter else {
         if !document.temperature.channel.is_empty() {
-            report(
-                r,
+            r.refuse(
                 "temperature.filter",
-                "is missing: temperature.channel[0] needs it, add `[temperature.filter]`".into(),
+                "is missing: temperature.channel[0] needs it, add `[temperature.filter]`",
             );
         }
         return;
@@ -188,8 +183,7 @@ fn filter(r: &mut Reader<'_>, document: &Document) {
     let Some(i) = sensors.position(branched) else { return };
     if filter.branch_dead_band_deg_c2_per_s3.is_none() {
         let why = "run-up and braking curves of";
-        report(
-            r,
+        r.refuse(
             &join("temperature.filter", KEY),
             format!("is missing: the {why} gyro.sensor[{i}] need it, add `{KEY}`"),
         );
@@ -214,8 +208,7 @@ fn orientation<P>(
         let path = join_dotted(&path, key);
         if count.is_some_and(|count| count != sensors) && !r.is_marked(&join(section, "sensor")) {
             let count = count.unwrap_or_default();
-            report(
-                r,
+            r.refuse(
                 &path,
                 format!("has {count} entries, must have {sensors}: one for each {section}.sensor"),
             );
@@ -225,8 +218,7 @@ fn orientation<P>(
         let norm = row.iter().map(|c| c * c).sum::<f64>().sqrt();
         if (norm - 1.0).abs() > ROW_NORM_TOLERANCE {
             let path = element(&join(&path, "rows"), i);
-            report(
-                r,
+            r.refuse(
                 &path,
                 format!("has norm {norm:.6}, must be 1 within {ROW_NORM_TOLERANCE}: a unit vector"),
             );

@@ -17,10 +17,11 @@ use super::types::{
     AccelLag, AccelOutput, AccelSensor, Branches, Channel, Document, Drift, GyroOutput, GyroSensor, Lag,
     ModeReversal, Orientation, SelfTest, Servo, ServoKind, Temperature, Trend,
 };
-use super::values::HUGE;
 
 /// Temperature range of an orientation that does not depend on temperature (°C): nothing lies outside.
 const EVERYWHERE_DEG_C: [f64; 2] = [-1e9, 1e9];
+/// Input limit where none is stated: beyond every reading.
+const NO_LIMIT: f64 = 1e100;
 /// Half width of the blend where no term is branched (°C²/s³): any positive number.
 const NO_BRANCHES: f64 = 1.0;
 /// Filter of a unit without temperature channels: never run.
@@ -103,7 +104,7 @@ impl Document {
             channel: sensor.channel.as_ref().map(|name| self.channel_index(name)),
             increment_weight: increment_weight.unwrap_or(f64::NAN),
             increment_weight_error: sensor.increment_weight_error.as_ref().map(|curve| curve.to_parts(0.0)),
-            input_limit: input_limit.unwrap_or(HUGE),
+            input_limit: input_limit.unwrap_or(NO_LIMIT),
             static_bias: sensor.static_bias.as_ref().map(|curve| curve.to_parts(0.0)),
             magnetic_bias: sensor.magnetic_bias.as_ref().map(|curve| curve.to_parts(0.0)),
             slow_meander: sensor.slow_meander.as_ref().map(|curve| curve.to_parts(0.0)),
@@ -129,7 +130,7 @@ impl Document {
             bias: sensor.bias.as_ref().map(|curve| curve.to_parts(0.0)),
             lags: sensor.lag.iter().map(accel_lag).collect(),
             board_ratio: sensor.board_ratio_error.as_ref().map(|curve| curve.to_parts(1.0)),
-            input_limit: input_limit.unwrap_or(HUGE),
+            input_limit: input_limit.unwrap_or(NO_LIMIT),
         }
     }
 }

@@ -4,12 +4,11 @@ mod schema;
 
 use std::marker::PhantomData;
 
-use isotherm_correction::curve::{Curve as CoreCurve, CurveParts, MAX_COEFFICIENTS, MAX_KNOTS, MIN_KNOTS};
+use isotherm_correction::curve::{Curve as CoreCurve, CurveParts};
+use serde::de::{Deserialize, Deserializer, Error as _};
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
 use super::measure::{Argument, Unit};
-use super::reader::{Reader, Table};
-use super::values::Limits;
 
 /// What a curve's values stand for: which units and arguments its keys may name.
 pub trait Quantity: std::fmt::Debug + Clone + PartialEq + 'static {
@@ -233,50 +232,6 @@ impl<Q: Quantity> Curve<Q> {
     pub(super) fn keys(&self) -> Keys {
         Keys::new(self.unit, self.argument)
     }
-
-    /// Reads a curve whose values must be in `unit`.
-    pub(super) fn read(reader: &mut Reader<'_>, mut table: Table<'_>, unit: Unit) -> Self {
-        let kinds = ["constant", "polynomial", "piecewise-linear", "spline"].map(|kind| (kind, kind));
-        let kind = table.choice(reader, "kind", &kinds);
-        let argument = Q::ARGUMENTS
-            .iter()
-            .copied()
-            .find(|argument| Keys::new(unit, *argument).over().iter().any(|key| table.has(key)))
-            .or_else(|| Q::ARGUMENTS.first().copied())
-            .unwrap_or(Argument::DegC);
-        let Keys { value, reference, coefficients, range, knots } = Keys::new(unit, argument);
-        let shape = match kind {
-            Some("constant") => Shape::Constant { value: table.number(reader, value, Limits::Any) },
-            Some("polynomial") => Shape::Polynomial {
-                reference: table.number(reader, reference, Limits::Any),
-                coefficients: {
-                    let numbers =
-                        table.numbers_opt(reader, coefficients.clone(), (1, MAX_COEFFICIENTS), Limits::Any);
-                    table.need(reader, &coefficients, numbers, vec![1.0])
-                },
-                range: table.pair(reader, range, Limits::Any),
-            },
-            Some("piecewise-linear") => {
-                Shape::PiecewiseLinear { knots: table.rows(reader, knots, (MIN_KNOTS, MAX_KNOTS)) }
-            }
-            Some("spline") => Shape::Spline { knots: table.rows(reader, knots, (MIN_KNOTS, MAX_KNOTS)) },
-            _ => {
-                // Without its kind nothing can be said about the other keys.
-                let path = table.path().to_owned();
-                reader.damage(&path);
-                return Self::new(Shape::Constant { value: 1.0 }).in_unit(unit);
-            }
-        };
-        for other in Q::UNITS.iter().copied().filter(|other| *other != unit) {
-            let keys = Keys::new(other, argument);
-            let why = format!("is in {}, but the output calls for {}", other.symbol(), unit.symbol());
-            for key in [keys.value, keys.coefficients, keys.knots] {
-                table.forbid(reader, key, &why);
-            }
-        }
-        table.finish(reader);
-        Self::new(shape).in_unit(unit).over(argument)
-    }
 }
 
 /// Keys of a curve's numbers.
@@ -304,9 +259,9 @@ impl Keys {
         }
     }
 
-    /// The keys that tell the argument.
-    fn over(&self) -> [&str; 3] {
-        [&self.reference, &self.range, &self.knots]
+    /// The keys whose spelling tells the unit of the values.
+    pub(super) fn of_values(&self) -> [&str; 3] {
+        [&self.value, &self.coefficients, &self.knots]
     }
 }
 
@@ -327,5 +282,36 @@ impl<Q: Quantity> Serialize for Curve<Q> {
             }
         }
         map.end()
+    }
+}
+
+impl<'de, Q: Quantity> Deserialize<'de> for Curve<Q> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let table = toml::Table::deserialize(deserializer)?;
+        let form =
+            |unit: &Unit| Q::ARGUMENTS.iter().find_map(|argument| Self::stated(&table, *unit, *argument));
+        Q::UNITS.iter().find_map(form).ok_or_else(|| D::Error::custom("a curve must have one of its forms"))
+    }
+}
+
+impl<Q: Quantity> Curve<Q> {
+    /// The curve that a table states in one unit over one argument.
+    fn stated(table: &toml::Table, unit: Unit, argument: Argument) -> Option<Self> {
+        fn get<'de, T: Deserialize<'de>>(table: &toml::Table, key: &str) -> Option<T> {
+            table.get(key)?.clone().try_into().ok()
+        }
+        let Keys { value, reference, coefficients, range, knots } = Keys::new(unit, argument);
+        let shape = match table.get("kind")?.as_str()? {
+            "constant" => Shape::Constant { value: get(table, &value)? },
+            "polynomial" => Shape::Polynomial {
+                reference: get(table, &reference)?,
+                coefficients: get(table, &coefficients)?,
+                range: get(table, &range)?,
+            },
+            "piecewise-linear" => Shape::PiecewiseLinear { knots: get(table, &knots)? },
+            "spline" => Shape::Spline { knots: get(table, &knots)? },
+            _ => return None,
+        };
+        Some(Self::new(shape).in_unit(unit).over(argument))
     }
 }

@@ -5,8 +5,8 @@ use std::collections::BTreeSet;
 use isotherm_correction::calibration::{Defect, DefectKind, Section};
 use isotherm_correction::reversal::ReversalError;
 
-use super::reader::{Reader, element};
 use super::types::{Document, GyroOutput};
+use isotherm_document::{Reader, element};
 
 /// Reports what the core found, but for what follows from a value that was replaced.
 pub(super) fn report(r: &mut Reader<'_>, document: &Document, defects: &[Defect]) {

@@ -33,7 +33,7 @@ pub fn difference(before: &Document, after: &Document) -> Vec<DocumentChange> {
 
 /// Compares two tables: the keys of the later one in its order, then those that are gone.
 fn tables(path: &str, before: &Table, after: &Table, changes: &mut Vec<DocumentChange>) {
-    let path_of = |key: &str| super::reader::join(path, key);
+    let path_of = |key: &str| isotherm_document::join(path, key);
     for (key, node) in after {
         let old = before.iter().find(|(name, _)| name == key).map(|(_, node)| node);
         nodes(&path_of(key), old, Some(node), changes);
@@ -68,7 +68,7 @@ fn nodes(path: &str, before: Option<&Node>, after: Option<&Node>, changes: &mut 
 
 /// Compares two lists, by name where every entry has one of its own.
 fn lists(path: &str, before: &[Node], after: &[Node], changes: &mut Vec<DocumentChange>) {
-    let element = |index| super::reader::element(path, index);
+    let element = |index| isotherm_document::element(path, index);
     let (Some(old_names), Some(new_names)) = (tree::names(before), tree::names(after)) else {
         for index in 0..before.len().max(after.len()) {
             nodes(&element(index), before.get(index), after.get(index), changes);

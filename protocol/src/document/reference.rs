@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use serde_json::{Map, Value as Json};
 
 use super::measure::unit_of_key;
-use super::schema::schema;
+use super::schema;
 use crate::overlay::overlay_schema;
 
 /// What stands above the tables.

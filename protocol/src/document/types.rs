@@ -20,17 +20,20 @@ pub use self_test::{SelfTest, SelfTestCounter, SelfTestVoltage};
 
 use isotherm_correction::reversal::ReversalParts;
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// The calibration of one unit.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Isotherm calibration document")]
 pub struct Document {
     /// Version of the document's form. Source: `document::MIN_SCHEMA`, `document::CURRENT_SCHEMA`.
     #[schemars(range(min = super::MIN_SCHEMA, max = super::CURRENT_SCHEMA))]
     pub schema: u32,
     /// Serial of the unit: 1 to 64 letters, digits, '.', '_' or '-'; the chunk that stands for it in every key.
-    #[schemars(regex(pattern = "^[A-Za-z0-9._-]{1,64}$"))]
+    #[schemars(
+        regex(pattern = "^[A-Za-z0-9._-]{1,64}$"),
+        extend("x-must-be" = "1 to 64 letters A-Z a-z, digits, '.', '_' or '-'")
+    )]
     pub unit: String,
     /// Date, or date and time with offset, of the calibration: RFC 3339, without quotes.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -57,7 +60,7 @@ pub struct Document {
 }
 
 /// Temperature channels and the filter that all of them use.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Temperature")]
 pub struct Temperature {
     /// Temperature that every term assumes before its channel's first reading, and for ever without a channel.
@@ -67,15 +70,15 @@ pub struct Temperature {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub filter: Option<Filter>,
     /// The channels; sensors follow them by name. None for a unit without temperature sensors.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    #[schemars(default, length(max = 32))]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(length(max = 32))]
     pub channel: Vec<Channel>,
 }
 
 /// Filter of all temperature channels.
 ///
 /// It belongs to the fit: coefficients that were fitted with one filter are wrong with another.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Temperature filter")]
 pub struct Filter {
     /// Step of the grid of event time on which temperature is evaluated. Source: models §1.
@@ -98,16 +101,18 @@ pub struct Filter {
 }
 
 /// One temperature channel.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Temperature channel")]
 pub struct Channel {
     /// Name, as on the raw temperature topic (1 to 24 bytes).
-    #[schemars(length(min = 1, max = 24))]
+    #[schemars(length(min = 1, max = 24), extend("x-must-be" = "a name of 1 to 24 bytes"))]
     pub name: String,
     /// a₀, a₁, … of T = Σ aⱼ·Uʲ, U being the raw reading (V, counts or already °C): °C per raw unitʲ. Source: models §1, 003.
-    #[schemars(length(min = 1, max = 8), default = "Channel::identity")]
+    #[serde(default = "Channel::identity")]
+    #[schemars(length(min = 1, max = 8))]
     pub conversion_deg_c: Vec<f64>,
     /// Physical range of the sensor; a reading outside is rejected.
+    #[schemars(inner(range(min = -273.15, max = 1000.0)), extend("x-rising" = true))]
     pub range_deg_c: [f64; 2],
     /// Largest distance from the median of the last five readings; a reading beyond is rejected.
     #[schemars(extend("exclusiveMinimum" = 0))]
@@ -122,7 +127,7 @@ impl Channel {
 }
 
 /// Input axes in case axes: `s = C(T)·v`, with `C(T) = C0 + C1·(T − T_ref)`.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields)]
 pub struct Orientation<P> {
     /// C0: one unit vector per sensor, in the order of the sensors (norm 1 within 10⁻³). Source: models §4, 004.
@@ -130,7 +135,7 @@ pub struct Orientation<P> {
     pub rows: Vec<[f64; 3]>,
     /// Weight of each sensor in the pseudo-inverse, above 0, 1/σ² up to a common factor; equal where left out. Source: models §4.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(length(min = 3, max = 8))]
+    #[schemars(length(min = 3, max = 8), extend("items" = { "type": "number", "exclusiveMinimum": 0 }))]
     pub weights: Option<Vec<f64>>,
     /// Change with temperature; absent where C does not depend on it.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -141,15 +146,17 @@ pub struct Orientation<P> {
 }
 
 /// How the input axes turn with temperature.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Thermal slopes of an orientation")]
 pub struct OrientationThermal {
     /// Temperature channels whose mean is T.
     #[schemars(length(min = 1, max = 8))]
     pub channels: Vec<String>,
     /// `T_ref`, at which C is C0.
+    #[schemars(range(min = -273.15, max = 1000.0))]
     pub reference_deg_c: f64,
     /// Fitted range; outside it T is clamped.
+    #[schemars(inner(range(min = -273.15, max = 1000.0)), extend("x-rising" = true))]
     pub range_deg_c: [f64; 2],
     /// C1: change of each row; an element of C is a direction cosine, 1 rad = 206265″. Source: 004.
     #[schemars(length(min = 3, max = 8))]
@@ -157,8 +164,9 @@ pub struct OrientationThermal {
 }
 
 /// The four-step substitution over a switch of the lasing mode.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-#[schemars(deny_unknown_fields, default, title = "Mode reversal")]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+#[schemars(deny_unknown_fields, title = "Mode reversal")]
 pub struct ModeReversal {
     /// n: ticks without a signal, the one with the switch command included. Source: 003.
     #[schemars(range(min = 1, max = 3))]

@@ -2,9 +2,9 @@
 
 use super::curve::{Curve, Quantity};
 use super::measure::Argument;
-use super::problem::Problem;
-use super::reader::{Reader, element, join};
 use super::types::{Document, Filter, GyroSensor, Orientation, Temperature};
+use isotherm_document::Problem;
+use isotherm_document::{Reader, element, join};
 
 /// Everything doubtful, in the order of its keys.
 pub(super) fn warnings(r: &Reader<'_>, document: &Document) -> Vec<Problem> {

@@ -2,8 +2,8 @@
 
 use super::{OVERLAY_OF, Overlay, ParsedOverlay};
 use crate::digest::Digest;
-use crate::document::reader::{element, join};
 use crate::document::{Curve, Document, Origin, Problem, Quantity, Shape};
+use isotherm_document::{element, join};
 
 /// Key of `origin.details` that lists the overlays a document was made with, the last one last.
 const DETAILS_KEY: &str = "overlays";

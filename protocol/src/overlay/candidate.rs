@@ -4,8 +4,8 @@ use isotherm_correction::calibration::Calibration;
 
 use super::{Overlay, ParsedOverlay, is_overlay};
 use crate::digest::Digest;
-use crate::document::text::{unplaced, utf8};
 use crate::document::{Document, Parsed, Problem, Side};
+use isotherm_document::{unplaced, utf8};
 
 /// A calibration that holds, with the text that it is known by.
 #[derive(Debug, Clone, PartialEq)]

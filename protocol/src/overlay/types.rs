@@ -4,22 +4,25 @@
 //! `docs/calibration-document.md`.
 
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::document::Created;
 
 /// Changes of the bias constants of one calibration document.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Isotherm calibration overlay")]
 pub struct Overlay {
     /// Version of the overlay's form. Source: `overlay::OVERLAY_SCHEMA`.
     #[schemars(range(min = super::OVERLAY_SCHEMA, max = super::OVERLAY_SCHEMA))]
     pub schema: u32,
     /// SHA-256 of the text of the document that it changes, 64 lower-case hexadecimal digits.
-    #[schemars(regex(pattern = "^[0-9a-f]{64}$"))]
+    #[schemars(regex(pattern = "^[0-9a-f]{64}$"), extend("x-must-be" = "64 lower-case hexadecimal digits"))]
     pub overlay_of: String,
     /// Serial of the unit, that of the document.
-    #[schemars(regex(pattern = "^[A-Za-z0-9._-]{1,64}$"))]
+    #[schemars(
+        regex(pattern = "^[A-Za-z0-9._-]{1,64}$"),
+        extend("x-must-be" = "1 to 64 letters A-Z a-z, digits, '.', '_' or '-'")
+    )]
     pub unit: String,
     /// Date, or date and time with offset: RFC 3339, without quotes.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -36,11 +39,11 @@ pub struct Overlay {
 }
 
 /// Changes of one gyro. A curve keeps its shape: the change is added to all of its values.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Changes of one gyro")]
 pub struct GyroOverlay {
     /// Name of the gyro in the document.
-    #[schemars(length(min = 1, max = 24))]
+    #[schemars(length(min = 1, max = 24), extend("x-must-be" = "a name of 1 to 24 bytes"))]
     pub name: String,
     /// Added to the static bias: new C0 less old. Source: models §7, 003.
     #[schemars(range(min = -100_000.0, max = 100_000.0))]
@@ -59,7 +62,7 @@ pub struct GyroOverlay {
 }
 
 /// How and when a pre-launch calibration was made: for readers, never for the correction.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Pre-launch calibration")]
 pub struct PreLaunchRecord {
     /// Geodetic latitude.
@@ -76,8 +79,10 @@ pub struct PreLaunchRecord {
     #[schemars(range(min = 0.0, max = 1e6))]
     pub duration_s: f64,
     /// Start, on the producer's clock.
+    #[schemars(extend("x-must-be" = "a whole number of nanoseconds from -2^63 to 2^63 - 1"))]
     pub start_ns: i64,
     /// End, on the producer's clock.
+    #[schemars(extend("x-must-be" = "a whole number of nanoseconds from -2^63 to 2^63 - 1"))]
     pub end_ns: i64,
     /// Mean temperature of each gyro of the document, in its order.
     #[schemars(length(min = 3, max = 8), inner(range(min = -273.15, max = 1000.0)))]

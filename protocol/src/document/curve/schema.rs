@@ -81,7 +81,10 @@ fn coefficients(description: &str) -> Json {
 }
 
 fn range(description: &str) -> Json {
-    json!({ "type": "array", "items": { "type": "number" }, "minItems": 2, "maxItems": 2, "description": description })
+    json!({
+        "type": "array", "items": { "type": "number" }, "minItems": 2, "maxItems": 2, "description": description,
+        "x-rising": true,
+    })
 }
 
 fn pairs(description: &str) -> Json {

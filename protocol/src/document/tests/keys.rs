@@ -1,13 +1,10 @@
-//! The walk and the schema know the same keys, the same limits and the same forms of curves.
-
-use std::collections::BTreeSet;
+//! The keys, limits and forms of curves that the schema states are those that are read.
 
 use serde_json::Value as Json;
 use toml::Value;
 
 use super::super::measure::unit_of_key;
-use super::super::reader::{Reader, Table};
-use super::super::{Document, read, schema};
+use super::super::{Document, schema};
 use super::{FULL, OTHER, accept, refuse};
 
 /// A key of the schema.
@@ -52,24 +49,6 @@ fn is_curve(key: &Key) -> bool {
         .get("title")
         .and_then(Json::as_str)
         .is_some_and(|t| t.starts_with("Curve of"))
-}
-
-#[test]
-fn the_walk_asks_for_the_keys_of_the_schema_and_no_others() {
-    let mut asked = BTreeSet::new();
-    for text in [FULL, OTHER] {
-        let root = toml::de::DeTable::parse(text).unwrap();
-        let mut reader = Reader::new(text, None);
-        read::document(&mut reader, Table::root(root.get_ref()));
-        asked.append(&mut reader.asked);
-    }
-    let keys = keys_of_schema();
-    for curve in keys.iter().filter(|key| is_curve(key)) {
-        let within = format!("{}.", curve.path);
-        asked.retain(|path| !path.starts_with(&within));
-    }
-    let known: BTreeSet<_> = keys.into_iter().map(|key| key.path).collect();
-    assert_eq!(asked, known);
 }
 
 /// The values that stand at a path (indices left out) in a document, as paths with indices.

@@ -1,13 +1,13 @@
 //! The accelerometers of a document.
 
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::super::curve::{Curve, OutputBias, OutputLagGain, Relative, ScaleFactor};
 use super::Orientation;
 
 /// The accelerometers of the unit: `f = (U − S(T) − lags)·r(T_board)/K(T)`.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Accelerometers")]
 pub struct Accel {
     /// What a raw reading is: "counts" of the tick, or the mean output over the tick in "V" or "m/s2".
@@ -20,7 +20,7 @@ pub struct Accel {
 }
 
 /// What an accelerometer's raw reading is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[schemars(inline)]
 pub enum AccelOutput {
     /// Counts of the tick.
@@ -38,19 +38,19 @@ pub enum AccelOutput {
 pub type AccelOrientation = Orientation<AccelParity>;
 
 /// One accelerometer.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Accelerometer")]
 pub struct AccelSensor {
     /// Name for readers and reports, different from the other accelerometers' (1 to 24 bytes).
-    #[schemars(length(min = 1, max = 24))]
+    #[schemars(length(min = 1, max = 24), extend("x-must-be" = "a name of 1 to 24 bytes"))]
     pub name: String,
     /// Temperature channel of the sensor; `temperature.assumed_deg_c` holds where left out.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(length(min = 1, max = 24))]
+    #[schemars(length(min = 1, max = 24), extend("x-must-be" = "a name of 1 to 24 bytes"))]
     pub channel: Option<String>,
     /// Temperature channel of the electronics board; needed with `board_ratio_error`. Source: 001.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(length(min = 1, max = 24))]
+    #[schemars(length(min = 1, max = 24), extend("x-must-be" = "a name of 1 to 24 bytes"))]
     pub board_channel: Option<String>,
     /// Outputs of this magnitude and above are flagged overrange, where the output is "counts"; no limit where left out.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -70,8 +70,8 @@ pub struct AccelSensor {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bias: Option<Curve<OutputBias>>,
     /// Thermal lags of the bias: `Σ g(T)·(T − L_τ[T])/τ`, `L_τ` being a first-order low-pass; subtracted. Source: models §2, §8.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    #[schemars(default, length(max = 8))]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(length(max = 8))]
     pub lag: Vec<AccelLag>,
     /// `r(T_board) − 1`: scale factor of the board at the calibration temperature over that at `T_board`, less one.
     /// Source: models §3, 001 (y1…y3).
@@ -80,7 +80,7 @@ pub struct AccelSensor {
 }
 
 /// One thermal lag of an accelerometer's bias.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Thermal lag of an accelerometer")]
 pub struct AccelLag {
     /// τ; not below `temperature.grid_step_s`.
@@ -91,7 +91,7 @@ pub struct AccelLag {
 }
 
 /// Detection and exclusion of a failed accelerometer.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Parity check of the accelerometers")]
 pub struct AccelParity {
     /// Length of the parity vector beyond which an accelerometer must be at fault.

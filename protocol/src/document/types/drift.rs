@@ -1,11 +1,11 @@
 //! What the drift estimator is to expect of a gyro.
 
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Drift that is left after the correction: a constant, a first-order Markov process and a trend whose rate is a
 /// first-order Markov process; the in-run estimator runs for gyros that state it.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Drift")]
 pub struct Drift {
     /// σ: standard deviation of the Markov part; 0 for none. Source: models §7, 002.

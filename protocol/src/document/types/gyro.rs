@@ -2,13 +2,13 @@
 
 use isotherm_correction::servo::DEFAULT_SETTLE_TIME_CONSTANTS;
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::super::curve::{Curve, Frequency, LagGain, RateBias, Relative, ThermalAcceleration, ThermalRate};
 use super::{Drift, Orientation};
 
 /// The gyros of the unit: `θ = K(T)·P − Ω·Δt`.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Gyros")]
 pub struct Gyro {
     /// What a raw reading is: "counts" of the tick, or "mean" rate over the tick (rad/s).
@@ -21,7 +21,7 @@ pub struct Gyro {
 }
 
 /// What a gyro's raw reading is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 #[schemars(inline)]
 pub enum GyroOutput {
@@ -35,15 +35,15 @@ pub enum GyroOutput {
 pub type GyroOrientation = Orientation<GyroParity>;
 
 /// One gyro and the terms of its bias Ω; any of them may be left out.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Gyro")]
 pub struct GyroSensor {
     /// Name for readers and reports, different from the other gyros' (1 to 24 bytes).
-    #[schemars(length(min = 1, max = 24))]
+    #[schemars(length(min = 1, max = 24), extend("x-must-be" = "a name of 1 to 24 bytes"))]
     pub name: String,
     /// Temperature channel that the gyro follows; `temperature.assumed_deg_c` holds where left out.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(length(min = 1, max = 24))]
+    #[schemars(length(min = 1, max = 24), extend("x-must-be" = "a name of 1 to 24 bytes"))]
     pub channel: Option<String>,
     /// K0, where the output is "counts": the angle that one count stands for; multiplies. Negative where the
     /// input axis is mounted reversed. Source: models §2, 003.
@@ -81,8 +81,8 @@ pub struct GyroSensor {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub thermal_acceleration: Option<Branches<Curve<ThermalAcceleration>>>,
     /// Thermal lags: `Σ g(T)·(T − L_τ[T])/τ`, `L_τ` being a first-order low-pass. Source: models §2, §8.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    #[schemars(default, length(max = 8))]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(length(max = 8))]
     pub lag: Vec<Lag>,
     /// Trend since turn-on. Source: 002.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -96,7 +96,7 @@ pub struct GyroSensor {
 }
 
 /// One curve per thermal branch, both over the same argument.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields)]
 pub struct Branches<C> {
     /// The "+" curve, in use while Ṫ·T̈ > 0. Source: 000.
@@ -106,7 +106,7 @@ pub struct Branches<C> {
 }
 
 /// One thermal lag.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Thermal lag")]
 pub struct Lag {
     /// τ; not below `temperature.grid_step_s`.
@@ -117,19 +117,19 @@ pub struct Lag {
 }
 
 /// Polynomial of the time since turn-on, held outside its interval.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Trend since turn-on")]
 pub struct Trend {
     /// Coefficients of power j = 0, 1, 2 of the time in hours: °/h per hʲ.
     #[schemars(length(min = 1, max = 3))]
     pub coefficients_deg_per_h: Vec<f64>,
     /// Interval that it was fitted over, since turn-on.
-    #[schemars(inner(range(min = 0.0, max = 250_000.0)))]
+    #[schemars(inner(range(min = 0.0, max = 250_000.0)), extend("x-rising" = true))]
     pub interval_h: [f64; 2],
 }
 
 /// Transient of the perimeter servo after a mode switch.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Perimeter-servo transient")]
 pub struct Servo {
     /// "measured" from the half-period counts of the dither, or "modelled" from the first of them and τ.
@@ -140,7 +140,8 @@ pub struct Servo {
     /// f0: frequency of the dither at rest.
     pub rest_frequency: Curve<Frequency>,
     /// Time after the switch, in multiples of τ, after which the transient counts as settled.
-    #[schemars(range(min = 1.0, max = 20.0), default = "Servo::default_settling")]
+    #[serde(default = "Servo::default_settling")]
+    #[schemars(range(min = 1.0, max = 20.0))]
     pub settle_time_constants: f64,
 }
 
@@ -152,7 +153,7 @@ impl Servo {
 }
 
 /// Where the dither frequency comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 #[schemars(inline)]
 pub enum ServoKind {
@@ -163,7 +164,7 @@ pub enum ServoKind {
 }
 
 /// Detection and exclusion of a failed gyro.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Parity check of the gyros")]
 pub struct GyroParity {
     /// Length of the parity vector beyond which a gyro must be at fault.

@@ -5,11 +5,11 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use toml::value::Datetime;
 
 /// Where the numbers come from: for readers and reports, never for the correction.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Origin")]
 pub struct Origin {
     /// Program and version that made the document.
@@ -23,17 +23,19 @@ pub struct Origin {
     pub method: Option<String>,
     /// Range of temperature in the logs.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-rising" = true))]
     pub range_deg_c: Option<[f64; 2]>,
     /// Range of the temperature's rate in the logs.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-rising" = true))]
     pub rate_range_deg_c_per_s: Option<[f64; 2]>,
     /// Logs that the numbers were fitted to.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    #[schemars(default, length(max = 64))]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(length(max = 64))]
     pub log: Vec<Log>,
     /// Residuals before and after the correction.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    #[schemars(default, length(max = 256))]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(length(max = 256))]
     pub residual: Vec<Residual>,
     /// Anything else worth keeping, such as the parameters' covariance.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -42,18 +44,18 @@ pub struct Origin {
 }
 
 /// One log.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Log")]
 pub struct Log {
     /// Name of the file.
     pub name: String,
     /// SHA-256 of its bytes, 64 lower-case hexadecimal digits.
-    #[schemars(regex(pattern = "^[0-9a-f]{64}$"))]
+    #[schemars(regex(pattern = "^[0-9a-f]{64}$"), extend("x-must-be" = "64 lower-case hexadecimal digits"))]
     pub sha256: String,
 }
 
 /// Residual of one sensor over one set of samples.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Residual")]
 pub struct Residual {
     /// What it is the residual of, such as "gyro.x".
@@ -79,7 +81,7 @@ pub struct Residual {
 }
 
 /// Whether a residual was taken over the samples of the fit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 #[schemars(inline)]
 pub enum Sample {
@@ -90,7 +92,7 @@ pub enum Sample {
 }
 
 /// Unit of a residual.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[schemars(inline)]
 pub enum Measure {
     /// °/h.
@@ -102,7 +104,7 @@ pub enum Measure {
 }
 
 /// Date, or date and time with offset.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Created(Datetime);
 

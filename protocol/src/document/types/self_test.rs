@@ -1,42 +1,43 @@
 //! The self-test's limits on what the producer reports of itself.
 
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// What the producer's own voltages and counters must be in a self-test.
 ///
 /// They come in on `imu/{unit}/raw/health`. Gyros, accelerometers and temperature channels are tested without being
 /// listed here.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Self-test")]
 pub struct SelfTest {
     /// Voltages, such as the half-wave voltage `U_λ/2` of each gyro's mode control. Source: models §7, 003.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    #[schemars(default, length(max = 32))]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(length(max = 32))]
     pub voltage: Vec<SelfTestVoltage>,
     /// Counters, such as the producer's own errors.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    #[schemars(default, length(max = 32))]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(length(max = 32))]
     pub counter: Vec<SelfTestCounter>,
 }
 
 /// One voltage.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Voltage of the self-test")]
 pub struct SelfTestVoltage {
     /// Name, as on the raw health topic, different from all other voltages' and counters' (1 to 24 bytes).
-    #[schemars(length(min = 1, max = 24))]
+    #[schemars(length(min = 1, max = 24), extend("x-must-be" = "a name of 1 to 24 bytes"))]
     pub name: String,
     /// Smallest and largest good value.
+    #[schemars(extend("x-rising" = true))]
     pub range_v: [f64; 2],
 }
 
 /// One counter.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Counter of the self-test")]
 pub struct SelfTestCounter {
     /// Name, as on the raw health topic, different from all other voltages' and counters' (1 to 24 bytes).
-    #[schemars(length(min = 1, max = 24))]
+    #[schemars(length(min = 1, max = 24), extend("x-must-be" = "a name of 1 to 24 bytes"))]
     pub name: String,
     /// Largest good increase over the self-test, in what the counter counts.
     #[schemars(range(min = 0, max = 1_000_000_000))]

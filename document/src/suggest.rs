@@ -4,7 +4,7 @@
 const LONGEST: usize = 64;
 
 /// The closest of the known words, where one is close enough to be worth a guess.
-pub(super) fn closest<'k>(unknown: &str, known: impl Iterator<Item = &'k str> + Clone) -> Option<&'k str> {
+pub(crate) fn closest<'k>(unknown: &str, known: impl Iterator<Item = &'k str> + Clone) -> Option<&'k str> {
     if unknown.len() > LONGEST {
         return None;
     }
@@ -20,6 +20,12 @@ pub(super) fn closest<'k>(unknown: &str, known: impl Iterator<Item = &'k str> + 
     let first = unknown.split('_').next().filter(|first| first.len() > 2)?;
     let mut same = known.filter(|word| word.split('_').next() == Some(first));
     same.next().filter(|_| same.next().is_none())
+}
+
+/// Edits from a word to the nearest of the known ones.
+pub(crate) fn nearest<'k>(unknown: &str, known: impl Iterator<Item = &'k str>) -> usize {
+    let unknown: String = unknown.chars().take(LONGEST).collect();
+    known.map(|word| distance(&unknown, word)).min().unwrap_or_default()
 }
 
 /// Edits (insert, delete, replace, swap of neighbours) from one word to another.

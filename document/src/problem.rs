@@ -39,20 +39,20 @@ impl std::error::Error for Problem {}
 
 /// Byte offset → line and column.
 #[derive(Debug)]
-pub(super) struct Lines<'t> {
-    text: &'t str,
+pub(crate) struct Lines<'t> {
+    pub(crate) text: &'t str,
     /// Offset of the first byte of each line.
     starts: Vec<usize>,
 }
 
 impl<'t> Lines<'t> {
-    pub(super) fn new(text: &'t str) -> Self {
+    pub(crate) fn new(text: &'t str) -> Self {
         let breaks = text.bytes().enumerate().filter(|(_, byte)| *byte == b'\n').map(|(at, _)| at + 1);
         Self { text, starts: std::iter::once(0).chain(breaks).collect() }
     }
 
     /// Line and column, both from 1; an offset beyond the end is taken for the end.
-    pub(super) fn position(&self, offset: usize) -> (usize, usize) {
+    pub(crate) fn position(&self, offset: usize) -> (usize, usize) {
         let mut offset = offset.min(self.text.len());
         while !self.text.is_char_boundary(offset) {
             offset -= 1;
@@ -64,7 +64,7 @@ impl<'t> Lines<'t> {
     }
 
     /// The source text of a span, shortened to what fits in a message.
-    pub(super) fn excerpt(&self, span: std::ops::Range<usize>) -> String {
+    pub(crate) fn excerpt(&self, span: std::ops::Range<usize>) -> String {
         const LONGEST: usize = 40;
         let text = self.text.get(span).unwrap_or_default();
         let line = text.lines().next().unwrap_or_default();

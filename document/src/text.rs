@@ -3,9 +3,12 @@
 use toml::Spanned;
 use toml::de::DeTable;
 
-use super::MAX_DOCUMENT_BYTES;
-use super::problem::{Lines, Problem};
-use super::reader::Reader;
+use crate::problem::{Lines, Problem};
+use crate::reader::Reader;
+use crate::schema::Form;
+
+/// Longest text that is read, in bytes.
+pub const MAX_BYTES: usize = 1 << 20;
 
 /// What the TOML parser says of a key that is given twice.
 const DUPLICATE_KEY: &str = "duplicate key";
@@ -14,7 +17,7 @@ const DUPLICATE_KEY: &str = "duplicate key";
 ///
 /// # Errors
 /// The place of the first bytes that are not UTF-8.
-pub(crate) fn utf8<'b>(bytes: &'b [u8], file: Option<&str>) -> Result<&'b str, Vec<Problem>> {
+pub fn utf8<'b>(bytes: &'b [u8], file: Option<&str>) -> Result<&'b str, Vec<Problem>> {
     std::str::from_utf8(bytes).map_err(|error| {
         let valid = error.valid_up_to();
         let before =
@@ -26,16 +29,17 @@ pub(crate) fn utf8<'b>(bytes: &'b [u8], file: Option<&str>) -> Result<&'b str, V
 }
 
 /// A problem of the text as a whole.
-pub(crate) fn unplaced(file: Option<&str>, message: String) -> Problem {
+#[must_use]
+pub fn unplaced(file: Option<&str>, message: String) -> Problem {
     Problem { file: file.map(Into::into), line: 1, column: 1, key: String::new(), message }
 }
 
 impl<'t> Reader<'t> {
-    /// The root table of a text whose `schema` is one of `versions` (first and last); `None` where it is not worth
-    /// walking, which has been reported then.
-    pub(crate) fn root(&mut self, text: &'t str, versions: [u32; 2]) -> Option<Spanned<DeTable<'t>>> {
-        if text.len() > MAX_DOCUMENT_BYTES {
-            self.report_at(0, "", format!("is {} bytes long, may have {MAX_DOCUMENT_BYTES}", text.len()));
+    /// The root table of the text; `None` where it is not worth walking, which has been reported then.
+    pub(crate) fn root(&mut self, form: &Form) -> Option<Spanned<DeTable<'t>>> {
+        let text = self.text();
+        if text.len() > MAX_BYTES {
+            self.report_at(0, "", format!("is {} bytes long, may have {MAX_BYTES}", text.len()));
             return None;
         }
         let (root, errors) = DeTable::parse_recoverable(text);
@@ -52,19 +56,20 @@ impl<'t> Reader<'t> {
         // After a duplicate key (the first one counts) the walk can go on; after any other error of syntax it
         // would find fault with what the author never wrote.
         let broken = errors.iter().any(|error| error.message() != DUPLICATE_KEY);
-        (!broken && !self.is_foreign(root.get_ref(), versions)).then_some(root)
+        (!broken && !self.is_foreign(root.get_ref(), form)).then_some(root)
     }
 
     /// Refuses a text of another version before anything else is said about its keys.
-    fn is_foreign(&mut self, root: &DeTable<'_>, [oldest, newest]: [u32; 2]) -> bool {
-        let Some(value) = root.get("schema") else { return false };
+    fn is_foreign(&mut self, root: &DeTable<'_>, form: &Form) -> bool {
+        let Some((key, [oldest, newest])) = form.versions else { return false };
+        let Some(value) = root.get(key) else { return false };
         let version = value.get_ref().as_integer().map(|integer| integer.as_str().parse::<u32>());
         let Some(Ok(version)) = version else { return false };
         let foreign = !(oldest..=newest).contains(&version);
         if foreign {
             let known = if oldest == newest { format!("{newest}") } else { format!("{oldest} to {newest}") };
             let message = format!("is version {version}; this release reads {known}: nothing else was read");
-            self.report_at(value.span().start, "schema", message);
+            self.report_at(value.span().start, key, message);
         }
         foreign
     }

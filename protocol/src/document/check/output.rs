@@ -1,0 +1,91 @@
+//! Keys that go with one output only.
+
+use isotherm_document::{Reader, join};
+
+use super::super::curve::{Curve, Keys, Quantity};
+use super::super::measure::{Argument, Unit};
+use super::super::types::{AccelOutput, AccelSensor, GyroOutput, GyroSensor};
+
+/// Increment weight and input limit of each output, with its name.
+const GYRO_OUTPUTS: [(GyroOutput, &str, [&str; 2]); 2] = [
+    (GyroOutput::Counts, "counts", ["increment_weight_arcsec_per_count", "input_limit_counts_per_tick"]),
+    (GyroOutput::Mean, "mean", ["increment_weight_rad_per_rad", "input_limit_deg_per_s"]),
+];
+/// Input limit of each output, with its name and the units of scale factor, bias and lags.
+const ACCEL_OUTPUTS: [(AccelOutput, &str, &str, [Unit; 3]); 3] = [
+    (
+        AccelOutput::Counts,
+        "counts",
+        "input_limit_counts_per_tick",
+        [Unit::CountsPerSPerMPerS2, Unit::CountsPerS, Unit::CountsPerSPerDegCPerS],
+    ),
+    (AccelOutput::Volts, "V", "input_limit_v", [Unit::VPerMPerS2, Unit::V, Unit::VPerDegCPerS]),
+    (
+        AccelOutput::MetresPerSecondSquared,
+        "m/s2",
+        "input_limit_m_per_s2",
+        [Unit::MPerS2PerMPerS2, Unit::MPerS2, Unit::MPerS2PerDegCPerS],
+    ),
+];
+
+/// A gyro has the keys of its output, and its increment weight.
+pub(super) fn gyro(r: &mut Reader<'_>, path: &str, output: GyroOutput, sensor: &GyroSensor) {
+    // Without a valid output any of them will do.
+    if r.is_damaged("gyro.output") {
+        return;
+    }
+    let [counts, mean] = GYRO_OUTPUTS;
+    let ((_, name, keys), (_, other_name, others)) =
+        if output == counts.0 { (counts, mean) } else { (mean, counts) };
+    for (key, instead) in others.into_iter().zip(keys) {
+        let path = join(path, key);
+        if r.has(&path) {
+            let message =
+                format!("goes with output = {other_name:?}, but the output is {name:?}: give `{instead}`");
+            r.refuse(&path, message);
+        }
+    }
+    let weight = match output {
+        GyroOutput::Counts => sensor.increment_weight_arcsec_per_count,
+        GyroOutput::Mean => sensor.increment_weight_rad_per_rad,
+    };
+    let [key, _] = keys;
+    if weight.is_none() {
+        r.refuse(&join(path, key), format!("is missing: output = {name:?} needs it, add `{key}`"));
+    }
+}
+
+/// An accelerometer has the input limit of its output, and curves in its units.
+pub(super) fn accel(r: &mut Reader<'_>, path: &str, output: AccelOutput, sensor: &AccelSensor) {
+    if r.is_damaged("accel.output") {
+        // Nobody knows the units of these.
+        ["scale_factor", "bias", "lag"].iter().for_each(|key| r.damage(&join(path, key)));
+        return;
+    }
+    for (other, name, key, _) in ACCEL_OUTPUTS {
+        let path = join(path, key);
+        if other != output && r.has(&path) {
+            r.refuse(&path, format!("goes with output = {name:?} only"));
+        }
+    }
+    let Some((_, _, _, [scale_factor, bias, gain])) =
+        ACCEL_OUTPUTS.into_iter().find(|(this, ..)| *this == output)
+    else {
+        return;
+    };
+    in_unit(r, &join(path, "scale_factor"), Some(&sensor.scale_factor), scale_factor);
+    in_unit(r, &join(path, "bias"), sensor.bias.as_ref(), bias);
+    for (i, lag) in sensor.lag.iter().enumerate() {
+        in_unit(r, &format!("{path}.lag[{i}].gain"), Some(&lag.gain), gain);
+    }
+}
+
+/// A curve in the unit that the output calls for.
+fn in_unit<Q: Quantity>(r: &mut Reader<'_>, path: &str, curve: Option<&Curve<Q>>, unit: Unit) {
+    let Some(curve) = curve.filter(|curve| curve.unit() != unit) else { return };
+    let keys = Keys::new(curve.unit(), curve.argument().unwrap_or(Argument::DegC));
+    let key = keys.of_values().map(|key| join(path, key)).into_iter().find(|key| r.has(key));
+    let message = format!("is in {}, but the output calls for {}", curve.unit().symbol(), unit.symbol());
+    r.report(key.as_deref().unwrap_or(path), message);
+    r.damage(path);
+}
