@@ -43,6 +43,6 @@ instructions:
 demo:
     .ci/run demo
 
-# Measure everything and write docs/performance.md anew (about an hour; QUICK=1: whether all works)
+# Measure everything, into target/performance (about an hour; QUICK=1: whether all works)
 performance:
     bash bench/performance.sh

@@ -51,7 +51,7 @@ enum Command {
     Chain(ChainArgs),
     /// How cost, memory, start-up and swaps grow with the number of units; offline correction beside numpy
     Scale(ScaleArgs),
-    /// Write figures, printed as JSON before, into `docs/performance.md`
+    /// Write figures, printed as JSON before, as tables and plots
     Report(ReportArgs),
     /// Play one part of a chain
     #[command(hide = true)]

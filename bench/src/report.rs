@@ -1,4 +1,4 @@
-//! The figures of the other benches as tables and plots of `docs/performance.md`.
+//! The figures of the other benches as tables and plots.
 
 mod page;
 mod plot;
@@ -21,10 +21,10 @@ pub(crate) struct ReportArgs {
     #[arg(long, value_name = "FOLDER")]
     from: PathBuf,
     /// Page whose tables are written anew, between its markers
-    #[arg(long, value_name = "FILE", default_value = "docs/performance.md")]
+    #[arg(long, value_name = "FILE", default_value = "target/performance/performance.md")]
     page: PathBuf,
     /// Folder of the plots
-    #[arg(long, value_name = "FOLDER", default_value = "docs/performance")]
+    #[arg(long, value_name = "FOLDER", default_value = "target/performance")]
     plots: PathBuf,
 }
 

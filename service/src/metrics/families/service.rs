@@ -29,7 +29,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "",
         kind: Type::Gauge,
         labels: &[],
-        help: "1 where /healthz says ok, 0 where it does not",
+        help: "1 if /healthz says ok, otherwise 0",
         samples: |look, out| out.flag(&[], look.healthy),
     },
     Family {
@@ -45,7 +45,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "",
         kind: Type::Counter,
         labels: &["kind"],
-        help: "Messages refused that belong to no unit which has appeared, by kind",
+        help: "Messages refused that belong to no known unit, by kind",
         samples: |look, out| {
             let mut kinds = FaultKind::ALL.iter().filter(|kind| is_refusal(**kind)).map(|kind| kind.name());
             kinds.try_for_each(|kind| {
@@ -59,7 +59,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "",
         kind: Type::Counter,
         labels: &["outcome"],
-        help: "Calibrations accepted and refused, over all units and those that have not appeared",
+        help: "Calibrations accepted and refused, of all units, unknown ones included",
         samples: |look, out| {
             out.counter(&["accepted"], look.posted.accepted)?;
             out.counter(&["refused"], look.posted.refused)
@@ -70,7 +70,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "",
         kind: Type::Gauge,
         labels: &[],
-        help: "1 where the folder of calibration documents can be read; absent where none is configured",
+        help: "1 if the folder of calibration documents can be read; absent if none is configured",
         samples: |look, out| match &look.posted.folder {
             Some(folder) => out.flag(&[], folder.state != FolderState::Gone),
             None => Ok(()),
@@ -81,7 +81,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "",
         kind: Type::Gauge,
         labels: &[],
-        help: "Documents of that folder that are not taken, 64 at most",
+        help: "Documents of that folder that are refused, 64 at most",
         samples: |look, out| out.whole(&[], look.posted.bad_documents.len() as u64),
     },
     Family {
@@ -89,7 +89,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "",
         kind: Type::Gauge,
         labels: &[],
-        help: "1 where the state folder can be written, 0 where every swap is refused; absent where none is configured",
+        help: "1 if the state folder can be written, 0 if every swap is refused; absent if none is configured",
         samples: |look, out| look.state_folder_writable.map_or(Ok(()), |writable| out.flag(&[], writable)),
     },
     Family {
@@ -97,7 +97,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "",
         kind: Type::Gauge,
         labels: &[],
-        help: "Number of the last entry of the audit file; absent where no state folder is configured",
+        help: "Number of the last entry of the audit file; absent if no state folder is configured",
         samples: |look, out| {
             look.posted.store.as_ref().map_or(Ok(()), |store| out.whole(&[], store.audit_entries))
         },

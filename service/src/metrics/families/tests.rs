@@ -42,7 +42,8 @@ fn docs(name: &str) -> PathBuf {
 #[test]
 fn the_page_of_the_metrics_has_every_one_and_no_other() {
     let mut table = "| name | type | unit of measure | labels | says |\n|---|---|---|---|---|\n".to_owned();
-    table.extend(all().map(Family::row));
+    // Counters stand in `docs/wire.md`, in the same words.
+    table.extend(service::FAMILIES.iter().chain(unit::FAMILIES).map(Family::row));
     let file = docs("metrics.md");
     let page = std::fs::read_to_string(&file).unwrap();
     let (begin, end) = ("<!-- metrics -->\n", "<!-- end of metrics -->\n");

@@ -17,7 +17,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "",
         kind: Type::Gauge,
         labels: &["unit", "state"],
-        help: "1 for the state that the unit is in, 0 for the others",
+        help: "1 for the present state, 0 for the others",
         samples: |look, out| {
             each(look, |unit, look| {
                 let present = State::from(look.status.state);
@@ -30,7 +30,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "",
         kind: Type::Gauge,
         labels: &["unit", "output"],
-        help: "1 for what becomes of ticks in a running state, 0 for the others",
+        help: "1 for what happens to ticks in a running state, 0 for the others",
         samples: |look, out| {
             each(look, |unit, look| {
                 let outputs = [
@@ -48,7 +48,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "",
         kind: Type::Gauge,
         labels: &["unit"],
-        help: "1 where raw ticks come and no corrected ones go out though they should",
+        help: "1 if raw ticks arrive and no corrected ones are published although they should be",
         samples: |look, out| each(look, |unit, look| out.flag(&[unit], look.stalled)),
     },
     Family {
@@ -64,7 +64,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "seconds",
         kind: Type::Gauge,
         labels: &["unit"],
-        help: "Time since the document in force was made; absent where it does not say when",
+        help: "Time since the document in force was made; absent if it does not say when",
         samples: |look, out| {
             each(look, |unit, look| {
                 let calibration = look.status.calibration.as_ref();
@@ -79,7 +79,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "",
         kind: Type::Gauge,
         labels: &["unit"],
-        help: "1 where a calibration waits for its tick",
+        help: "1 if a calibration waits for its tick",
         samples: |look, out| each(look, |unit, look| out.flag(&[unit], look.status.pending.is_some())),
     },
     Family {
@@ -100,7 +100,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "",
         kind: Type::Gauge,
         labels: &["unit"],
-        help: "1 where the last self-test was passed; absent before the first",
+        help: "1 if the last self-test was passed; absent before the first",
         samples: |look, out| {
             each(look, |unit, look| {
                 look.status.self_test.as_ref().map_or(Ok(()), |report| out.flag(&[unit], report.passed))
@@ -112,7 +112,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "per_second",
         kind: Type::Gauge,
         labels: &["unit", "input"],
-        help: "What came in over the last status interval: ticks of gyros and accelerometers, readings, messages",
+        help: "Input over the last status interval: gyro ticks, accelerometer ticks, temperature readings, messages",
         samples: |look, out| {
             each(look, |unit, look| {
                 let rates = &look.status.input_rates;
@@ -152,7 +152,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "",
         kind: Type::Gauge,
         labels: &["unit", "channel"],
-        help: "1 where it lies outside the range that the calibration was fitted over; absent where one is not known",
+        help: "1 if it is outside the range that the calibration was fitted over; absent if either is unknown",
         samples: |look, out| {
             each_channel(look, |labels, channel| {
                 channel.place.map_or(Ok(()), |place| out.flag(labels, place != Place::Inside))
@@ -164,7 +164,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "",
         kind: Type::Gauge,
         labels: &["unit", "channel"],
-        help: "1 where the channel's reading is missing, rejected or too old",
+        help: "1 if the channel's reading is missing, rejected or too old",
         samples: |look, out| each_channel(look, |labels, channel| out.flag(labels, channel.stale)),
     },
     Family {
@@ -172,7 +172,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "radians_per_second",
         kind: Type::Gauge,
         labels: &["unit", "axis"],
-        help: "Correction that is subtracted at present from the angular rate about an axis of the case",
+        help: "Correction now subtracted from the angular rate about a case axis",
         samples: |look, out| {
             each(look, |unit, look| {
                 let applied = look.status.applied.map(|applied| applied.angular_rate_rad_per_s);
@@ -185,7 +185,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "meters_per_second_squared",
         kind: Type::Gauge,
         labels: &["unit", "axis"],
-        help: "Correction that is subtracted at present from the specific force along an axis of the case",
+        help: "Correction now subtracted from the specific force along a case axis",
         samples: |look, out| {
             each(look, |unit, look| {
                 let applied = look.status.applied.map(|applied| applied.specific_force_m_per_s2);
@@ -224,7 +224,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "",
         kind: Type::Counter,
         labels: &["unit", "kind", "sensor"],
-        help: "Corrected ticks in which the reading of a gyro or accelerometer did not take part as it stands",
+        help: "Corrected ticks that did not use a sensor's reading as it was",
         samples: |look, out| {
             each(look, |unit, look| {
                 look.status.sensors.iter().try_for_each(|sensor| {
@@ -255,7 +255,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "seconds",
         kind: Type::Histogram,
         labels: &["unit"],
-        help: "Time from the arrival of a raw message to the return of the put that it caused",
+        help: "Time from receiving a raw message to having published the result",
         samples: |look, out| each(look, |unit, look| latency(unit, look, out)),
     },
 ];
