@@ -47,7 +47,7 @@ mod suggest;
 mod text;
 mod walk;
 
-pub use problem::Problem;
-pub use reader::{Reader, element, join};
+pub use problem::{Problem, listed};
+pub use reader::{Reader, element, join, parse};
 pub use schema::{Form, published};
 pub use text::{MAX_BYTES, unplaced, utf8};

@@ -37,6 +37,12 @@ impl fmt::Display for Problem {
 
 impl std::error::Error for Problem {}
 
+/// Problems, a line each.
+#[must_use]
+pub fn listed(problems: &[Problem]) -> String {
+    problems.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
+}
+
 /// Byte offset → line and column.
 #[derive(Debug)]
 pub(crate) struct Lines<'t> {

@@ -8,6 +8,7 @@ use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
+use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
 use toml::Spanned;
 use toml::de::DeValue;
@@ -210,6 +211,19 @@ impl<'t> Reader<'t> {
     /// Remembers where a path stands.
     pub(crate) fn note(&mut self, path: &str, value: &Value<'_>) {
         self.places.insert(path.into(), value.span().start);
+    }
+}
+
+/// Reads a text about which nothing is to be checked but what its schema says; `file` is for messages.
+///
+/// # Errors
+/// Every problem, in the order of the text.
+pub fn parse<T: JsonSchema + DeserializeOwned>(text: &str, file: &str) -> Result<T, Vec<Problem>> {
+    let mut reader = Reader::new(text, Some(file));
+    let read = reader.read(&Form::of::<T>());
+    match (reader.into_problems(), read) {
+        (None, Some(read)) => Ok(read),
+        (problems, _) => Err(problems.unwrap_or_default()),
     }
 }
 

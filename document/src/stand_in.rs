@@ -19,6 +19,7 @@ pub(crate) fn stand_in(schema: Schema<'_>, node: &Json) -> Value {
             Value::Table(required.filter_map(entry).collect())
         }
         Kind::Forms(forms) => forms.first().map_or(Value::Table(Table::new()), |form| stand_in(schema, form)),
+        Kind::Either(forms) => forms.first().map_or(Value::Boolean(false), |form| stand_in(schema, form)),
         Kind::Array => Value::Array(fill(schema, node, Vec::new())),
         Kind::Number => Value::Float(Limits::of(node).stand_in()),
         Kind::Whole => Value::Integer(whole_limits(node).0.max(0)),

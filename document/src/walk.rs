@@ -1,9 +1,10 @@
 //! The walk through a text by its schema: every value is checked once, and what is wrong is reported and replaced.
 
 use std::cmp::Reverse;
+use std::collections::BTreeSet;
 
 use regex_lite::Regex;
-use serde_json::{Map, Value as Json};
+use serde_json::{Map, Value as Json, json};
 use toml::de::{DeTable, DeValue};
 use toml::value::Datetime;
 
@@ -33,6 +34,8 @@ pub(crate) enum Kind<'s> {
     Table,
     /// A table in one of several forms, told apart by its key `kind`.
     Forms(&'s [Json]),
+    /// A value of one of several types.
+    Either(&'s [Json]),
     /// An array.
     Array,
     /// A number, whole or not.
@@ -59,6 +62,9 @@ impl<'s> Kind<'s> {
         let is_date = |form: &Json| form.get("format").is_some_and(|format| format == "date");
         if list("anyOf").is_some_and(|forms| forms.iter().any(is_date)) {
             return Self::Date;
+        }
+        if let Some(forms) = list("anyOf") {
+            return Self::Either(forms);
         }
         if let Some(word) = node.get("const").and_then(Json::as_str) {
             return Self::Only(word);
@@ -109,7 +115,15 @@ impl<'r, 't, 's> Walk<'r, 't, 's> {
             },
             Kind::Forms(forms) => match value.get_ref().as_table() {
                 Some(entries) => Ok(self.forms(forms, path, value.span().start, entries)),
-                None => Err("a table".to_owned()),
+                None => {
+                    let words: Vec<_> = forms.iter().flat_map(words).collect();
+                    let word = text(value, |text| words.contains(&text));
+                    word.ok_or_else(|| if words.is_empty() { "a table".to_owned() } else { format!("a table, or {}", one_of(&words)) })
+                }
+            },
+            Kind::Either(forms) => match forms.iter().find(|form| self.is_of_type(form, value)) {
+                Some(form) => Ok(self.value(form, path, value)),
+                None => Err("of another type".to_owned()),
             },
             Kind::Array => self.array(node, path, value),
             Kind::Number => {
@@ -119,14 +133,12 @@ impl<'r, 't, 's> Walk<'r, 't, 's> {
             }
             Kind::Whole => {
                 let (low, high) = whole_limits(node);
-                let allowed = whole(value.get_ref()).filter(|whole| (low..=high).contains(whole));
+                let allowed = whole(value.get_ref())
+                    .filter(|whole| (low..=high).contains(whole) && node.pointer("/not/const") != Some(&json!(whole)));
                 let limits = || format!("a whole number from {low} to {high}");
                 allowed.map(toml::Value::Integer).ok_or_else(limits)
             }
-            Kind::Choice(names) => text(value, |text| names.contains(&text)).ok_or_else(|| {
-                let names: Vec<_> = names.iter().map(|name| format!("{name:?}")).collect();
-                format!("one of {}", names.join(", "))
-            }),
+            Kind::Choice(names) => text(value, |text| names.contains(&text)).ok_or_else(|| one_of(&names)),
             Kind::Only(word) => text(value, |text| text == word).ok_or_else(|| format!("{word:?}")),
             Kind::Text => text(value, |text| is_fit(node, text)).ok_or_else(|| text_must_be(node)),
             Kind::Boolean => {
@@ -147,6 +159,21 @@ impl<'r, 't, 's> Walk<'r, 't, 's> {
             self.reader.refuse_value(path, value, words.unwrap_or(&must_be));
             stand_in(self.schema, node)
         })
+    }
+
+    /// Whether a value is of the type that a schema asks for, whatever it says.
+    fn is_of_type(&self, node: &'s Json, value: &Value<'_>) -> bool {
+        let value = value.get_ref();
+        match Kind::of(self.schema.resolve(node)) {
+            Kind::Table | Kind::Forms(_) => value.is_table(),
+            Kind::Array => value.is_array(),
+            Kind::Number => value.is_float() || value.is_integer(),
+            Kind::Whole => value.is_integer(),
+            Kind::Choice(_) | Kind::Only(_) | Kind::Text => value.is_str(),
+            Kind::Boolean => value.is_bool(),
+            Kind::Date => value.is_datetime(),
+            Kind::Either(_) | Kind::Free => true,
+        }
     }
 
     /// A table. Of several forms, all of one kind, the first is the one whose keys are there.
@@ -170,7 +197,7 @@ impl<'r, 't, 's> Walk<'r, 't, 's> {
                 table.insert(key.clone(), stand_in(self.schema, property));
             }
         }
-        self.unknown_keys(properties, path, entries);
+        self.unknown_keys(forms, path, entries);
         table
     }
 
@@ -191,18 +218,23 @@ impl<'r, 't, 's> Walk<'r, 't, 's> {
     }
 
     /// Reports every key that the schema does not have.
-    fn unknown_keys(&mut self, known: &Map<String, Json>, path: &str, entries: &DeTable<'_>) {
+    fn unknown_keys(&mut self, forms: &[&'s Json], path: &str, entries: &DeTable<'_>) {
+        let mut known: Vec<&str> = Vec::new();
+        for (key, _) in forms.iter().flat_map(|form| properties_of(form)) {
+            if !known.contains(&key.as_str()) {
+                known.push(key);
+            }
+        }
         for key in entries.keys() {
             let name = key.get_ref().as_ref();
-            if known.contains_key(name) {
+            if known.contains(&name) {
                 continue;
             }
             if self.reader.is_full() {
                 self.reader.pass_over();
                 continue;
             }
-            let free: Vec<_> =
-                known.keys().map(String::as_str).filter(|known| !entries.contains_key(*known)).collect();
+            let free: Vec<_> = known.iter().copied().filter(|known| !entries.contains_key(*known)).collect();
             let advice = match closest(name, free.iter().copied()) {
                 Some(word) => format!("did you mean `{word}`?"),
                 None if free.is_empty() => "remove it".into(),
@@ -216,36 +248,27 @@ impl<'r, 't, 's> Walk<'r, 't, 's> {
         }
     }
 
-    /// A table in one of several forms.
+    /// A table in one of several forms: that of its `kind`, or the one whose keys are there.
     fn forms(&mut self, forms: &'s [Json], path: &str, start: usize, entries: &DeTable<'_>) -> toml::Value {
         const TAG: &str = "kind";
         let tag_of = |form: &'s Json| properties(form)?.get(TAG)?.get("const")?.as_str();
-        let tag = entries.get(TAG).and_then(|value| value.get_ref().as_str());
-        let mut fitting: Vec<_> = forms.iter().filter(|form| tag.is_some() && tag_of(form) == tag).collect();
-        if fitting.is_empty() {
-            let at = join(path, TAG);
-            if let Some(value) = entries.get(TAG) {
-                let mut names: Vec<_> =
-                    forms.iter().filter_map(tag_of).map(|name| format!("{name:?}")).collect();
-                let mut seen = Vec::new();
-                names.retain(|name| {
-                    !seen.contains(name) && {
-                        seen.push(name.clone());
-                        true
-                    }
-                });
-                self.reader.note(&at, value);
-                self.reader.refuse_value(&at, value, &format!("one of {}", names.join(", ")));
-            } else {
-                self.reader.report_at(start, &at, format!("is missing: add `{TAG}`"));
+        let mut fitting: Vec<_> = forms.iter().filter(|form| properties(form).is_some()).collect();
+        if fitting.iter().any(|form| tag_of(form).is_some()) {
+            let tag = entries.get(TAG).and_then(|value| value.get_ref().as_str());
+            fitting.retain(|form| tag.is_some() && tag_of(form) == tag);
+            if fitting.is_empty() {
+                let mut names: Vec<_> = forms.iter().filter_map(tag_of).collect();
+                let mut seen = BTreeSet::new();
+                names.retain(|name| seen.insert(*name));
+                self.wrong_kind(&names, &join(path, TAG), start, entries.get(TAG));
+                // Without its kind nothing can be said about the other keys.
+                self.reader.damage(path);
+                return forms
+                    .first()
+                    .map_or_else(|| toml::Table::new().into(), |form| stand_in(self.schema, form));
             }
-            // Without its kind nothing can be said about the other keys.
-            self.reader.damage(path);
-            return forms
-                .first()
-                .map_or(toml::Value::Table(toml::Table::new()), |form| stand_in(self.schema, form));
         }
-        // The form whose keys are there; where several have as many, the one that misspelled keys are nearest to.
+        // Where several have as many of the keys, the one that misspelled keys are nearest to.
         let likeness = |form: &&Json| {
             let Some(known) = properties(form) else { return (Reverse(0), 0) };
             let unknown =
@@ -257,6 +280,16 @@ impl<'r, 't, 's> Walk<'r, 't, 's> {
         let best = fitting.first().map(likeness);
         fitting.retain(|form| Some(likeness(form)) == best);
         toml::Value::Table(self.table(&fitting, path, start, entries))
+    }
+
+    /// Reports a `kind` that is missing or none of those that there are.
+    fn wrong_kind(&mut self, names: &[&str], path: &str, start: usize, value: Option<&Value<'_>>) {
+        if let Some(value) = value {
+            self.reader.note(path, value);
+            self.reader.refuse_value(path, value, &one_of(names));
+        } else {
+            self.reader.report_at(start, path, "is missing: add `kind`");
+        }
     }
 
     /// An array.
@@ -337,12 +370,22 @@ fn properties(node: &Json) -> Option<&Map<String, Json>> {
     node.get("properties").and_then(Json::as_object)
 }
 
+/// Words that stand for a form without keys.
+fn words(form: &Json) -> impl Iterator<Item = &str> {
+    form.get("const").and_then(Json::as_str).into_iter().chain(texts(form.get("enum")))
+}
+
 fn properties_of(node: &Json) -> impl Iterator<Item = (&String, &Json)> {
     properties(node).into_iter().flatten()
 }
 
 fn texts(list: Option<&Json>) -> impl Iterator<Item = &str> {
     list.and_then(Json::as_array).into_iter().flatten().filter_map(Json::as_str)
+}
+
+fn one_of(names: &[&str]) -> String {
+    let names: Vec<_> = names.iter().map(|name| format!("{name:?}")).collect();
+    format!("one of {}", names.join(", "))
 }
 
 /// How tables of an array are written.

@@ -25,7 +25,7 @@ pub enum Error {
         source: io::Error,
     },
     /// A mapping with problems.
-    #[error("{}", lines(.0))]
+    #[error("{}", isotherm_document::listed(.0))]
     Mapping(Vec<Problem>),
     /// A calibration document with problems, one per line.
     #[error("{}", .0.join("\n"))]
@@ -70,10 +70,4 @@ impl Error {
             _ => 1,
         }
     }
-}
-
-/// One line per problem.
-fn lines(problems: &[Problem]) -> String {
-    let lines: Vec<_> = problems.iter().map(ToString::to_string).collect();
-    lines.join("\n")
 }

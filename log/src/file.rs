@@ -6,10 +6,8 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, absolute};
 
 use isotherm_protocol::document::MAX_DOCUMENT_BYTES;
-use serde::de::DeserializeOwned;
 
 use crate::error::Error;
-use crate::mapping::place;
 
 /// Reads a mapping, calibration document or scenario; a log given in its place must not fill the memory.
 ///
@@ -36,29 +34,6 @@ pub fn read_small_text(path: &Path, action: &'static str) -> Result<String, Erro
         let words = format!("not UTF-8 at byte {}: is it the right file?", error.utf8_error().valid_up_to());
         Error::file(path, action, io::Error::other(words))
     })
-}
-
-/// Reads a small TOML file that is no document: a scenario, a plan, a table of steps.
-///
-/// # Errors
-/// File, line and column, both from 1, and what is wrong there.
-pub fn parse_toml<T: DeserializeOwned>(text: &str, file: &str) -> Result<T, String> {
-    toml::from_str(text).map_err(|error| {
-        let (line, column) = error.span().map_or((1, 1), |span| place(text, span.start));
-        format!("{file}:{line}:{column}: {}", without_types(error.message()))
-    })
-}
-
-/// What serde says of a value that is not as expected, without the names of types of the source.
-fn without_types(message: &str) -> String {
-    let Some((before, expected)) = message.rsplit_once("expected ") else { return message.to_owned() };
-    let words = match expected {
-        "f64" => "a number",
-        "u8" | "u16" | "u32" | "u64" | "usize" | "i8" | "i16" | "i32" | "i64" => "a whole number",
-        _ if expected.starts_with("struct ") || expected.contains("tagged enum") => "a table",
-        _ => expected,
-    };
-    format!("{before}expected {words}")
 }
 
 /// Refuses an output that is one of the other files of the command, before anything is written.
@@ -139,28 +114,6 @@ mod tests {
             error,
             "/dev/zero: cannot read the mapping: longer than 1048576 bytes: is it the right file?"
         );
-    }
-
-    #[test]
-    fn what_is_wrong_in_a_small_file_is_told_with_its_place_and_without_names_of_the_source() {
-        #[derive(Debug, serde::Deserialize)]
-        struct Small {
-            #[expect(dead_code, reason = "only what cannot be read matters")]
-            rate: f64,
-            #[expect(dead_code, reason = "likewise")]
-            count: u32,
-        }
-        for (text, expected) in [
-            ("rate = \"x\"\ncount = 1", "a.toml:1:8: invalid type: string \"x\", expected a number"),
-            (
-                "rate = 1\ncount = 0.5",
-                "a.toml:2:9: invalid type: floating point `0.5`, expected a whole number",
-            ),
-            ("rate = 1\ncount = -1", "a.toml:2:9: invalid value: integer `-1`, expected a whole number"),
-            ("rate = 1", "a.toml:1:1: missing field `count`"),
-        ] {
-            assert_eq!(parse_toml::<Small>(text, "a.toml").unwrap_err(), expected);
-        }
     }
 
     #[test]

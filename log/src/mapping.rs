@@ -3,11 +3,8 @@
 //! A mapping is a small TOML file, described in full by `docs/replay.md` and by the ready ones in
 //! `config/mappings`. Parsing reports every problem at once, each with file, line, column, key and value.
 
-mod columns;
-mod layout;
-mod problem;
-mod schema;
-mod section;
+mod keys;
+mod meaning;
 #[cfg(test)]
 mod tests;
 
@@ -15,15 +12,15 @@ use std::path::Path;
 
 use isotherm_correction::sample::{ChannelName, OutputKind};
 use isotherm_correction::units::Span;
-
-pub use problem::Problem;
-pub use problem::place;
+pub use isotherm_document::Problem;
+use schemars::JsonSchema;
+use serde::Deserialize;
 
 use crate::error::Error;
 use crate::file::read_small_text;
 
 /// Version of the mapping format that this program reads.
-pub const VERSION: i64 = 1;
+pub const VERSION: u32 = 1;
 
 /// How one log, of one or more files, is read.
 #[derive(Debug, Clone, PartialEq)]
@@ -50,7 +47,9 @@ pub struct FileMapping {
 }
 
 /// What stands between two cells.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(from = "DelimiterWord")]
+#[schemars(inline)]
 pub enum Delimiter {
     /// Any run of spaces and tabs; leading ones do not count.
     Whitespace,
@@ -59,9 +58,12 @@ pub enum Delimiter {
 }
 
 /// What happens to a row that cannot be read.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[schemars(inline)]
 pub enum OnBadRow {
     /// Reading ends with an error.
+    #[default]
     Refuse,
     /// The row is passed over and counted; its tick becomes a gap.
     Skip,
@@ -87,7 +89,9 @@ pub struct Layout {
 }
 
 /// A column, by name or by place.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(from = "ColumnWord")]
+#[schemars(inline)]
 pub enum Column {
     /// As the header spells it.
     Name(String),
@@ -96,15 +100,20 @@ pub enum Column {
 }
 
 /// Unit of a time column.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[schemars(inline)]
 pub enum TimeUnit {
     /// Nanoseconds.
+    #[serde(rename = "ns")]
     Nanoseconds,
     /// Microseconds.
+    #[serde(rename = "us")]
     Microseconds,
     /// Milliseconds.
+    #[serde(rename = "ms")]
     Milliseconds,
     /// Seconds.
+    #[serde(rename = "s")]
     Seconds,
 }
 
@@ -131,7 +140,9 @@ pub struct TimeColumn {
 }
 
 /// Which end of the tick a stamp marks.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[schemars(inline)]
 pub enum Marks {
     /// The start.
     Start,
@@ -192,15 +203,19 @@ pub struct TickMapping {
 }
 
 /// A column of two states.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
 pub struct ModeMapping {
     /// Which column.
     pub column: Column,
     /// Cell that means +1.
+    #[serde(default = "ModeMapping::plus")]
     pub plus: String,
     /// Cell that means −1.
+    #[serde(default = "ModeMapping::minus")]
     pub minus: String,
     /// An empty cell is no state at all.
+    #[serde(default)]
     pub may_be_empty: bool,
 }
 
@@ -258,6 +273,92 @@ impl Mapping {
     /// # Errors
     /// Every problem that the mapping has, in the order of its lines.
     pub fn parse(text: &str, file: &str) -> Result<Self, Vec<Problem>> {
-        schema::parse(text, file)
+        meaning::parse(text, file)
+    }
+}
+
+impl ModeMapping {
+    fn plus() -> String {
+        "1".to_owned()
+    }
+
+    fn minus() -> String {
+        "-1".to_owned()
+    }
+}
+
+/// A delimiter by its word.
+#[derive(Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[schemars(inline)]
+enum DelimiterWord {
+    Comma,
+    Semicolon,
+    Tab,
+    Pipe,
+    Whitespace,
+}
+
+impl From<DelimiterWord> for Delimiter {
+    fn from(word: DelimiterWord) -> Self {
+        Self::Character(match word {
+            DelimiterWord::Comma => b',',
+            DelimiterWord::Semicolon => b';',
+            DelimiterWord::Tab => b'\t',
+            DelimiterWord::Pipe => b'|',
+            DelimiterWord::Whitespace => return Self::Whitespace,
+        })
+    }
+}
+
+/// A column by its name in the header, or by its number from 1.
+#[derive(Deserialize, JsonSchema)]
+#[serde(untagged)]
+#[schemars(inline, extend("x-must-be" = "the column's name in the header, or its number from 1"))]
+enum ColumnWord {
+    Name(
+        #[schemars(
+            regex(pattern = r"\S"),
+            extend("x-must-be" = "the column's name in the header, or its number from 1")
+        )]
+        String,
+    ),
+    Number(#[schemars(range(min = 1, max = 4096))] u16),
+}
+
+impl From<ColumnWord> for Column {
+    fn from(word: ColumnWord) -> Self {
+        match word {
+            ColumnWord::Name(name) => Self::Name(name.trim().to_owned()),
+            ColumnWord::Number(number) => Self::Index(usize::from(number.saturating_sub(1))),
+        }
+    }
+}
+
+impl FileMapping {
+    /// All columns that the file must have.
+    pub(crate) fn columns(&self) -> impl Iterator<Item = &Column> {
+        let gyro = self.gyro.as_ref();
+        let ticks = gyro.map(|gyro| &gyro.ticks).into_iter().chain(&self.accel);
+        let sensors = ticks.clone().flat_map(|ticks| ticks.sensors.iter().map(|sensor| &sensor.column));
+        let numbering =
+            ticks.flat_map(|ticks| ticks.sequence.iter().chain(ticks.duration.as_ref().map(|d| &d.column)));
+        let modes =
+            gyro.into_iter().flat_map(|gyro| gyro.mode.iter().chain(&gyro.meander).map(|mode| &mode.column));
+        let switch = gyro.and_then(|gyro| match &gyro.switch {
+            Some(SwitchMapping::Column(column)) => Some(column),
+            _ => None,
+        });
+        let halves = gyro.into_iter().flat_map(|gyro| gyro.half_periods.iter().flat_map(|(a, b)| [a, b]));
+        let stamps = self.time.stamps.as_ref().map(|stamps| &stamps.column);
+        let temperatures = self.temperatures.iter().map(|temperature| &temperature.column);
+        stamps
+            .into_iter()
+            .chain(sensors)
+            .chain(numbering)
+            .chain(modes)
+            .chain(switch)
+            .chain(halves)
+            .chain(temperatures)
     }
 }

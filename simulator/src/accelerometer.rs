@@ -1,6 +1,7 @@
 //! Pendulous accelerometer: quartz with a pulse output, or micromechanical with an output in m/s².
 
 use isotherm_correction::sample::{OutputKind, Sensors};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::counter::Counter;
@@ -15,7 +16,7 @@ use crate::vector::dot;
 /// K leads from the input to the output (the direction opposite to the gyros'); `r = K_ref/K(T_board)` is 1 at
 /// the reference temperature. U is in volts for a quartz accelerometer and in m/s² for one that is digital; the
 /// text below writes "V" for either.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Accelerometer {
     /// Thermal node behind the housing.
@@ -34,7 +35,7 @@ pub struct Accelerometer {
 }
 
 /// What leaves the accelerometers.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum AccelerometerOutput {
     /// Counts of a voltage-to-frequency converter over the tick.
@@ -49,7 +50,7 @@ pub enum AccelerometerOutput {
 }
 
 /// All accelerometers of a unit.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Accelerometers {
     /// What leaves them.

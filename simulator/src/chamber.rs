@@ -1,9 +1,10 @@
 //! Thermal chamber: a programme of ramps and holds, as a chamber's operator writes it.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Programme of a thermal chamber. After its last segment the chamber holds its temperature.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Profile {
     /// Temperature at the start (°C, −100…200).
@@ -14,7 +15,7 @@ pub struct Profile {
 }
 
 /// One segment of a chamber programme.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Segment {
     /// Temperature changes linearly with time.

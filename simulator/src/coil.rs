@@ -1,10 +1,11 @@
 //! Heat conduction through the layers of a fibre coil.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A wound coil as a heat conductor: a slab of equal layers, heated through its outer and inner face by the
 /// housing. Layer 0 is the innermost.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Slab {
     /// Layers of fibre (4…400).

@@ -1,9 +1,10 @@
 //! Sensors that fail in the middle of a run.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// One failure. From `at_s` on it lasts to the end; the truth is not touched by it.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Failure {
     /// Which sensor.
@@ -15,7 +16,7 @@ pub struct Failure {
 }
 
 /// A sensor by its kind and its number from 0.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum FailingSensor {
     /// A gyro.
@@ -25,7 +26,7 @@ pub enum FailingSensor {
 }
 
 /// The way in which a sensor fails.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Fault {
     /// The reading stays what it was in the last good tick (zero where there was none).

@@ -1,5 +1,6 @@
 //! Fibre-optic gyro: Sagnac rate, thermal drift of its coil, static bias of its optics.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::coil::{Conduction, Slab};
@@ -12,7 +13,7 @@ use crate::winding::{Fibre, Shupe};
 ///
 /// Reading (rad/s, mean over the tick) = (input rate + drift)/K(T): K leads from the reading to the rate. T is
 /// the coil's mean temperature; the gyro's temperature channel shows that of the outermost layer, which leads it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FibreOpticGyro {
     /// The coil as a heat conductor.
@@ -36,7 +37,7 @@ pub struct FibreOpticGyro {
 
 /// Static bias of a fibre gyro's optics: an offset and the ripple of a parasitic interferometer whose path
 /// difference grows with temperature, b + a·sin(2π·(T − T₀)/P + p).
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct OpticsBias {
     /// Offset b (rad/s).

@@ -1,6 +1,7 @@
 //! One inertial unit: its gyros, accelerometers, thermometers and thermal nodes.
 
 use isotherm_correction::sample::OutputKind;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::accelerometer::Accelerometers;
@@ -12,7 +13,7 @@ use crate::thermal::Node;
 use crate::zeeman::Zeeman;
 
 /// One inertial unit.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Instrument {
     /// Step of the thermal clock (s, 0.001…10). Between its steps all temperatures and slow drifts are linear in
@@ -37,7 +38,7 @@ pub struct Instrument {
 }
 
 /// The gyros of a unit, all of one kind.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Gyros {
     /// Zeeman laser gyros.

@@ -1,5 +1,6 @@
 //! Micromechanical gyro with a rate output: bias and scale over its own temperature, noise, resolution.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::noise::{GyroNoise, Markov, Noise, Purpose};
@@ -10,7 +11,7 @@ use crate::thermal::{Interval, Node, NodeState};
 ///
 /// Reading (rad/s, mean over the tick) = (input rate + bias(T))/K(T): K leads from the reading to the rate. T is
 /// the gyro's own temperature, which its channel shows.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MemsGyro {
     /// Thermal node behind the housing.

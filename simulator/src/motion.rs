@@ -4,13 +4,14 @@
 //! about the new east axis, roll about the case's x axis, each positive by the right-hand rule. The path's own
 //! rotation is applied to the case after that. An accelerometer at rest and level feels −g along z (down).
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Rate of rotation of the Earth relative to the stars (rad/s), WGS 84.
 pub const EARTH_RATE_RAD_PER_S: f64 = 7.292_115e-5;
 
 /// Motion of the case: where it is, how it stands, and what it does there.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Motion {
     /// Geodetic latitude (°, −90…90).
@@ -38,7 +39,7 @@ fn earth_rate() -> f64 {
 }
 
 /// Movement of the case relative to the Earth. Axes are case axes and need not be unit vectors.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Path {
     /// No movement.

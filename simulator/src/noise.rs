@@ -5,6 +5,7 @@
 
 use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::{Rng, SeedableRng};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// What a stream of random numbers is for; each purpose draws from its own, so that switching one source of
@@ -78,7 +79,7 @@ impl Noise {
 }
 
 /// Random part of one gyro's drift; all zero makes a noise-free sensor.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct GyroNoise {
     /// Angle random walk (rad/√s, ≥ 0); 1 °/√h is 2.9089e-4 rad/√s.

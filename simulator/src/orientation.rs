@@ -1,6 +1,7 @@
 //! Directions of the sensors' input axes in the case, and how temperature turns them.
 
 use isotherm_correction::sample::Sensors;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::vector::{Vector, add, cross, dot, norm, scale};
@@ -10,7 +11,7 @@ use crate::vector::{Vector, add, cross, dot, norm, scale};
 /// An axis is a direction, so every row is given unit length again at each temperature. A corrector that takes
 /// the linear matrix as it stands differs from that by at most ½·|C1·(T − T₀)|² per row, relative: see
 /// [`Orientation::stretch`]. The presets keep it below 1e-9.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Orientation {
     /// Reference temperature T₀ (°C).

@@ -1,12 +1,13 @@
 //! Mode reversal and slow meander of a Zeeman unit: when the electronics switch, and for how long the light is lost.
 
 use isotherm_correction::sample::LasingMode;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::noise::{Noise, Purpose};
 
 /// Mode reversal of a Zeeman unit, common to its gyros.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Reversal {
     /// Time between switches (s, ≥ 0; 0 for a unit that stays in its first mode). The source unit has 120 s.

@@ -1,5 +1,6 @@
 //! A scenario: everything that a simulation follows from.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::chamber::Profile;
@@ -8,7 +9,7 @@ use crate::instrument::Instrument;
 use crate::motion::Motion;
 
 /// Everything that a simulation follows from, to the bit.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scenario {
     /// Serial of the unit.

@@ -2,12 +2,13 @@
 
 use isotherm_correction::sample::{ChannelName, TemperatureReading};
 use isotherm_correction::units::Timestamp;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::noise::{Noise, Purpose};
 
 /// All temperature channels of a unit.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Thermometers {
     /// Time between readings (s, ≥ one tick). All channels are read together; the first time at the start.
@@ -19,7 +20,7 @@ pub struct Thermometers {
 /// One temperature channel: raw = raw at 0 °C + raw per °C · (T + noise), rounded to the resolution.
 ///
 /// A corrector goes the other way: T = a0 + a1·raw with a1 = 1/`raw_per_deg_c`, a0 = −`raw_at_0_deg_c`·a1.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Channel {
     /// Name, 1…24 bytes.
@@ -39,7 +40,7 @@ pub struct Channel {
 }
 
 /// Where a temperature is taken.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Place {
     /// Air of the chamber.

@@ -1,9 +1,10 @@
 //! First-order thermal nodes: the parts of a unit follow the chamber with a lag.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// One lumped part of a unit behind whatever surrounds it: Ṫ = (surroundings + heating − T)/τ.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Node {
     /// Time constant τ (s, ≥ 0); zero follows at once.

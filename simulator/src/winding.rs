@@ -2,10 +2,11 @@
 
 use core::f64::consts::PI;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Order in which the two halves of the fibre are wound.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Winding {
     /// Layers belong to the halves in the order A B B A, from the middle of the fibre inside to its ends outside.
@@ -17,7 +18,7 @@ pub enum Winding {
 }
 
 /// Geometry and optics of the fibre in a coil.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Fibre {
     /// Order of winding.

@@ -5,6 +5,7 @@
 //! the halves do not cancel; the tick then carries an apparent rate, which is integrated here in closed form.
 
 use isotherm_correction::sample::{HalfPeriodCounts, LasingMode};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::counter::Counter;
@@ -17,7 +18,7 @@ use crate::thermal::{Interval, Node, NodeState};
 pub const MEANDER_REFERENCE_DEG_C: f64 = 25.0;
 
 /// All gyros of a Zeeman unit.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Zeeman {
     /// Whole counts, with the fraction carried over; otherwise exact reals (half-period counts are then rounded).
@@ -32,7 +33,7 @@ pub struct Zeeman {
 ///
 /// Counts of a tick = ∫(input rate + drift) dt/K(T): K is the angle per count and leads from the counts to the angle.
 /// T is the gyro's own temperature, which its channel shows.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ZeemanGyro {
     /// Thermal node behind the housing.

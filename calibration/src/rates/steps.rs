@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use isotherm_log::file::{parse_toml, read_small_text};
+use isotherm_log::file::read_small_text;
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::drift::figures::counted;
@@ -27,8 +28,8 @@ pub struct Step {
 }
 
 /// A row of a file.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
 struct Row {
     log: Option<usize>,
     axis: Axis,
@@ -37,15 +38,16 @@ struct Row {
     end_s: Option<f64>,
 }
 
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(untagged)]
+#[schemars(extend("x-must-be" = "x, y, z, -x, -y, -z in quotes, or three numbers"))]
 enum Axis {
     Name(String),
     Vector([f64; 3]),
 }
 
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
 struct File {
     step: Vec<Row>,
 }
@@ -120,8 +122,8 @@ pub fn read(path: &Path, runs: usize) -> Result<Vec<Step>, Error> {
     let rows = if is_csv {
         of_csv(&text).map_err(wrong)?
     } else {
-        let file = parse_toml::<File>(&text, &path.display().to_string());
-        file.map(|file| file.step).map_err(Error::Usage)?
+        let file = isotherm_document::parse::<File>(&text, &path.display().to_string());
+        file.map(|file| file.step).map_err(|problems| Error::Usage(isotherm_document::listed(&problems)))?
     };
     if rows.is_empty() || rows.len() > MOST {
         return Err(wrong(format!("{}, must be 1 to {MOST}", counted(rows.len(), "step", "steps"))));

@@ -133,12 +133,9 @@ fn what_must_hold_between_keys() {
 
 #[test]
 fn all_problems_are_reported_at_once_in_the_order_of_lines() {
-    let text = SOUND
-        .replace("unit = \"ms\"", "unit = 5")
-        .replace("every_rows", "every_row")
-        .replace("version = 1", "version = 7");
+    let text = SOUND.replace("unit = \"ms\"", "unit = 5").replace("every_rows", "every_row");
     let lines: Vec<_> = problems(&text).into_iter().map(|(line, ..)| line).collect();
-    assert_eq!(lines, [1, 7, 25]);
+    assert_eq!(lines, [7, 25]);
 }
 
 #[test]
@@ -146,7 +143,7 @@ fn a_problem_reads_like_a_sentence() {
     let problems = Mapping::parse(&SOUND.replace("\"ms\"", "\"min\""), "m.toml").unwrap_err();
     assert_eq!(
         problems[0].to_string(),
-        "m.toml:7:8: file[0].time.unit = \"min\": must be one of \"ns\", \"us\", \"ms\", \"s\""
+        "m.toml:7:8: file[0].time.unit: is \"min\" (a string), must be one of \"ns\", \"us\", \"ms\", \"s\""
     );
     let syntax = Mapping::parse("version = 1\nfile = [", "m.toml").unwrap_err();
     assert_eq!((syntax.len(), syntax[0].line), (1, 2));

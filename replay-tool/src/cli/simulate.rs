@@ -14,7 +14,7 @@ use super::{Outcome, print, seconds, show};
 use crate::error::Error;
 use crate::progress::Bar;
 use crate::simulated::{Columns, LogWriter, write_truth, write_truth_header};
-use isotherm_log::file::{parse_toml, read_small_text, refuse_overwriting};
+use isotherm_log::file::{read_small_text, refuse_overwriting};
 
 /// Simulate a log, with the mapping that reads it back beside it
 #[derive(Debug, Args)]
@@ -141,7 +141,8 @@ impl SimulateArgs {
 /// Reads a scenario from a file.
 fn load(path: &Path) -> Result<Scenario, Error> {
     let text = read_small_text(path, "read the scenario")?;
-    parse_toml(&text, &path.display().to_string()).map_err(|what| Error::Scenario(vec![what]))
+    isotherm_document::parse(&text, &path.display().to_string())
+        .map_err(|problems| Error::Scenario(problems.iter().map(ToString::to_string).collect()))
 }
 
 /// Runs the command.

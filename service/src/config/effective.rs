@@ -5,10 +5,13 @@ use std::time::Duration;
 
 use isotherm_correction::unit::Uncalibrated;
 use isotherm_correction::units::{AngularRate, Span, SpecificForce};
-use serde::Serialize;
 use zenoh::qos::CongestionControl;
 
-use super::{Settings, Severity};
+use super::Settings;
+use super::keys::{
+    Congestion, DriftEstimate, FolderKeys, InitialState, Keys, MetricsKeys, NavigationKeys, PreLaunchKeys,
+    SwapKeys, UncalibratedKey, ZenohKeys,
+};
 
 /// What is said before the text.
 const NOTE: &str = "\
@@ -17,89 +20,6 @@ const NOTE: &str = "\
 # in an endpoint.
 ";
 
-/// The keys of `config/service.toml`, in its order.
-#[derive(Serialize)]
-struct Effective {
-    #[serde(skip_serializing_if = "Option::is_none")]
-    calibrations: Option<String>,
-    strict_start: bool,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    state: Option<String>,
-    initial_state: &'static str,
-    drift_estimate: &'static str,
-    reference_delay_ms: i64,
-    uncalibrated: &'static str,
-    max_units: usize,
-    pairing_window_ms: i64,
-    temperature_delay_ms: i64,
-    tail_flush_ms: u64,
-    status_interval_ms: u64,
-    stop_timeout_ms: u64,
-    congestion: &'static str,
-    folder: Folder,
-    swap: Swap,
-    pre_launch: PreLaunch,
-    navigation: Navigation,
-    metrics: Metrics,
-    zenoh: Zenoh,
-}
-
-#[derive(Serialize)]
-struct Folder {
-    settle_ms: u64,
-    poll_s: f64,
-}
-
-#[derive(Serialize)]
-struct Swap {
-    max_age_days: u64,
-    age: &'static str,
-    outside_range: &'static str,
-    max_jump_deg_per_h: f64,
-    max_jump_mg: f64,
-    jump: &'static str,
-    old_schema: &'static str,
-    slew_ms: i64,
-    require_signature: bool,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    trusted_keys: Option<String>,
-}
-
-#[derive(Serialize)]
-struct PreLaunch {
-    duration_s: f64,
-    max_static_change_deg_per_h: f64,
-    max_magnetic_change_deg_per_h: f64,
-    max_imbalance: f64,
-    min_time_per_mode_s: f64,
-    min_good_share: f64,
-}
-
-#[derive(Serialize)]
-struct Navigation {
-    ticks: u16,
-    coning_sculling: bool,
-}
-
-#[derive(Serialize)]
-struct Metrics {
-    #[serde(skip_serializing_if = "Option::is_none")]
-    listen: Option<String>,
-    allow_remote: bool,
-}
-
-#[derive(Serialize)]
-struct Zenoh {
-    #[serde(skip_serializing_if = "Option::is_none")]
-    config: Option<String>,
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    connect: Vec<String>,
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    listen: Vec<String>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    namespace: Option<String>,
-}
-
 impl Settings {
     /// The configuration as text, the version of the program as its first line; what may be secret is left out, and it is
     /// said what.
@@ -107,63 +27,74 @@ impl Settings {
     pub fn to_toml(&self) -> String {
         let head = concat!("# isotherm ", env!("CARGO_PKG_VERSION"), "\n");
         // Nothing in it that TOML has no form for.
-        let body = toml::to_string(&self.effective()).unwrap_or_else(|error| format!("# {error}\n"));
+        let body = toml::to_string(&self.keys()).unwrap_or_else(|error| format!("# {error}\n"));
         format!("{head}{NOTE}\n{body}")
     }
 
-    fn effective(&self) -> Effective {
+    fn keys(&self) -> Keys {
         let Self { unit, pre_launch, swap, session, .. } = self;
         let limits = &pre_launch.limits;
         let deg_per_h = |rate| AngularRate::from_rad_per_s(rate).as_deg_per_h();
         let milli_g = |force| SpecificForce::from_m_per_s2(force).as_g() * 1e3;
-        Effective {
+        Keys {
             calibrations: self.calibrations.as_deref().map(text),
-            strict_start: self.strict_start,
+            strict_start: Some(self.strict_start),
             state: self.state.as_deref().map(text),
-            initial_state: if unit.in_standby { "standby" } else { "running" },
-            drift_estimate: if unit.subtract_drift { "subtract" } else { "publish" },
-            reference_delay_ms: span_ms(unit.reference_delay),
-            uncalibrated: match unit.uncalibrated {
-                Uncalibrated::PassThrough => "pass-through",
-                Uncalibrated::Hold => "hold",
+            initial_state: Some(if unit.in_standby { InitialState::Standby } else { InitialState::Running }),
+            drift_estimate: Some(if unit.subtract_drift {
+                DriftEstimate::Subtract
+            } else {
+                DriftEstimate::Publish
+            }),
+            reference_delay_ms: Some(span_ms(unit.reference_delay)),
+            uncalibrated: Some(match unit.uncalibrated {
+                Uncalibrated::PassThrough => UncalibratedKey::PassThrough,
+                Uncalibrated::Hold => UncalibratedKey::Hold,
+            }),
+            max_units: u32::try_from(self.max_units).ok(),
+            pairing_window_ms: Some(span_ms(unit.pairing_window)),
+            temperature_delay_ms: Some(span_ms(unit.temperature_delay)),
+            tail_flush_ms: Some(ms(self.tail_flush)),
+            status_interval_ms: Some(ms(self.status_interval)),
+            stop_timeout_ms: Some(ms(self.stop_timeout)),
+            congestion: Some(match self.congestion {
+                CongestionControl::Block => Congestion::Block,
+                _ => Congestion::Drop,
+            }),
+            folder: FolderKeys {
+                settle_ms: Some(ms(self.folder.settle)),
+                poll_s: Some(self.folder.poll.as_secs_f64()),
             },
-            max_units: self.max_units,
-            pairing_window_ms: span_ms(unit.pairing_window),
-            temperature_delay_ms: span_ms(unit.temperature_delay),
-            tail_flush_ms: ms(self.tail_flush),
-            status_interval_ms: ms(self.status_interval),
-            stop_timeout_ms: ms(self.stop_timeout),
-            congestion: if self.congestion == CongestionControl::Block { "block" } else { "drop" },
-            folder: Folder { settle_ms: ms(self.folder.settle), poll_s: self.folder.poll.as_secs_f64() },
-            swap: Swap {
-                max_age_days: swap.max_age.map_or(0, |age| age.as_secs() / super::swap::DAY_S),
-                age: severity(swap.age),
-                outside_range: severity(swap.outside_range),
-                max_jump_deg_per_h: swap.max_jump_rad_per_s.map_or(0.0, deg_per_h),
-                max_jump_mg: swap.max_jump_m_per_s2.map_or(0.0, milli_g),
-                jump: severity(swap.jump),
-                old_schema: severity(swap.old_schema),
-                slew_ms: span_ms(swap.slew),
-                require_signature: swap.require_signature,
+            swap: SwapKeys {
+                max_age_days: u32::try_from(swap.max_age.map_or(0, |age| age.as_secs() / super::swap::DAY_S))
+                    .ok(),
+                age: Some(swap.age),
+                outside_range: Some(swap.outside_range),
+                max_jump_deg_per_h: Some(swap.max_jump_rad_per_s.map_or(0.0, deg_per_h)),
+                max_jump_mg: Some(swap.max_jump_m_per_s2.map_or(0.0, milli_g)),
+                jump: Some(swap.jump),
+                old_schema: Some(swap.old_schema),
+                slew_ms: Some(span_ms(swap.slew)),
+                require_signature: Some(swap.require_signature),
                 trusted_keys: swap.trusted_keys.as_deref().map(text),
             },
-            pre_launch: PreLaunch {
-                duration_s: pre_launch.duration.as_s(),
-                max_static_change_deg_per_h: deg_per_h(limits.static_bias_change_rad_per_s),
-                max_magnetic_change_deg_per_h: deg_per_h(limits.magnetic_bias_change_rad_per_s),
-                max_imbalance: limits.mode_imbalance,
-                min_time_per_mode_s: limits.time_per_mode.as_s(),
-                min_good_share: limits.good_share,
+            pre_launch: PreLaunchKeys {
+                duration_s: Some(pre_launch.duration.as_s()),
+                max_static_change_deg_per_h: Some(deg_per_h(limits.static_bias_change_rad_per_s)),
+                max_magnetic_change_deg_per_h: Some(deg_per_h(limits.magnetic_bias_change_rad_per_s)),
+                max_imbalance: Some(limits.mode_imbalance),
+                min_time_per_mode_s: Some(limits.time_per_mode.as_s()),
+                min_good_share: Some(limits.good_share),
             },
-            navigation: Navigation {
-                ticks: unit.navigation.ticks(),
-                coning_sculling: unit.navigation.coning_sculling(),
+            navigation: NavigationKeys {
+                ticks: Some(unit.navigation.ticks()),
+                coning_sculling: Some(unit.navigation.coning_sculling()),
             },
-            metrics: Metrics {
+            metrics: MetricsKeys {
                 listen: self.metrics.listen.map(|address| address.to_string()),
-                allow_remote: self.metrics.allow_remote,
+                allow_remote: Some(self.metrics.allow_remote),
             },
-            zenoh: Zenoh {
+            zenoh: ZenohKeys {
                 config: session.config.as_deref().map(text),
                 connect: session.connect.iter().map(|endpoint| without_options(endpoint)).collect(),
                 listen: session.listen.iter().map(|endpoint| without_options(endpoint)).collect(),
@@ -182,19 +113,12 @@ fn without_options(endpoint: &str) -> String {
     endpoint.split(['?', '#']).next().unwrap_or_default().to_owned()
 }
 
-fn ms(duration: Duration) -> u64 {
-    u64::try_from(duration.as_millis()).unwrap_or(u64::MAX)
+fn ms(duration: Duration) -> u32 {
+    u32::try_from(duration.as_millis()).unwrap_or(u32::MAX)
 }
 
-fn span_ms(span: Span) -> i64 {
-    span.as_ns() / 1_000_000
-}
-
-fn severity(severity: Severity) -> &'static str {
-    match severity {
-        Severity::Warn => "warn",
-        Severity::Refuse => "refuse",
-    }
+fn span_ms(span: Span) -> u32 {
+    u32::try_from(span.as_ns() / 1_000_000).unwrap_or_default()
 }
 
 #[cfg(test)]

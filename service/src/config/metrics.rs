@@ -2,8 +2,6 @@
 
 use std::net::SocketAddr;
 
-use super::walk::{Table, Walk};
-
 /// Where metrics and health are served over HTTP.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct MetricsSettings {
@@ -17,23 +15,6 @@ impl MetricsSettings {
     /// Whether an address may be listened on.
     pub(crate) fn admits(&self, address: SocketAddr) -> bool {
         self.allow_remote || address.ip().to_canonical().is_loopback()
-    }
-
-    /// Reads `[metrics]`.
-    pub(super) fn read(walk: &mut Walk<'_>, root: &mut Table<'_>) -> Self {
-        let mut table = root.table(walk, "metrics");
-        let allow_remote = table.boolean(walk, "allow_remote").unwrap_or_default();
-        let settings = Self { listen: None, allow_remote };
-        let must_be = if allow_remote {
-            "an address and a port, such as \"0.0.0.0:9464\""
-        } else {
-            "a loopback address and a port, such as \"127.0.0.1:9464\"; any other needs allow_remote = true"
-        };
-        let listen = table.value(walk, "listen", must_be, |value| {
-            value.as_str()?.parse().ok().filter(|address| settings.admits(*address))
-        });
-        table.finish(walk);
-        Self { listen, ..settings }
     }
 }
 
@@ -76,6 +57,9 @@ mod tests {
             );
         }
         assert!(read("[metrics]\nlisten = 9464").is_err());
-        assert!(read("[metrics]\nport = 9464").unwrap_err()[0].contains("known here: allow_remote, listen"));
+        assert!(
+            read("[metrics]\nport = 9464").unwrap_err()[0]
+                .contains("not yet used here: listen, allow_remote")
+        );
     }
 }

@@ -1,14 +1,16 @@
 //! `[swap]` and `[folder]`: what speaks against a swap, and how the folder is watched.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Duration;
 
-use isotherm_correction::units::{AngularRate, Span, SpecificForce};
-
-use super::walk::{Table, Walk};
+use isotherm_correction::units::Span;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 /// What follows where a policy speaks against a swap.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+#[schemars(inline)]
 pub enum Severity {
     /// It is accepted, with a warning.
     Warn,
@@ -61,48 +63,6 @@ impl Default for SwapSettings {
 /// Seconds of a day.
 pub(super) const DAY_S: u64 = 86_400;
 
-impl SwapSettings {
-    /// Reads `[swap]`.
-    pub(super) fn read(walk: &mut Walk<'_>, root: &mut Table<'_>, folder: &Path) -> Self {
-        let default = Self::default();
-        let mut table = root.table(walk, "swap");
-        let age_days = table.integer(walk, "max_age_days", 0, 36_500).filter(|days| *days > 0);
-        let age = severity(walk, &mut table, "age", default.age);
-        let outside_range = severity(walk, &mut table, "outside_range", default.outside_range);
-        let rate = table.number(walk, "max_jump_deg_per_h", 0.0, 1e6).filter(|limit| *limit > 0.0);
-        let force = table.number(walk, "max_jump_mg", 0.0, 1e6).filter(|limit| *limit > 0.0);
-        let jump = severity(walk, &mut table, "jump", default.jump);
-        let old_schema = severity(walk, &mut table, "old_schema", default.old_schema);
-        let slew = table.integer(walk, "slew_ms", 0, 3_600_000).map_or(default.slew, Span::from_ms);
-        let require_signature = table.boolean(walk, "require_signature").unwrap_or(default.require_signature);
-        let trusted_keys = table.path(walk, "trusted_keys", folder, Path::is_dir, "an existing folder");
-        if require_signature && !table.has("trusted_keys") {
-            table.report(
-                walk,
-                &"require_signature is set: trusted_keys must name the folder of the public keys",
-            );
-        }
-        table.finish(walk);
-        Self {
-            max_age: age_days.map(|days| Duration::from_secs(u64::from(days) * DAY_S)),
-            age,
-            outside_range,
-            max_jump_rad_per_s: rate.map(|limit| AngularRate::from_deg_per_h(limit).as_rad_per_s()),
-            max_jump_m_per_s2: force.map(|limit| SpecificForce::from_g(limit * 1e-3).as_m_per_s2()),
-            jump,
-            old_schema,
-            slew,
-            require_signature,
-            trusted_keys,
-        }
-    }
-}
-
-fn severity(walk: &mut Walk<'_>, table: &mut Table<'_>, key: &'static str, default: Severity) -> Severity {
-    let choices = [("warn", Severity::Warn), ("refuse", Severity::Refuse)];
-    table.choice(walk, key, &choices).unwrap_or(default)
-}
-
 /// How the folder of calibration documents is watched.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FolderSettings {
@@ -115,17 +75,5 @@ pub struct FolderSettings {
 impl Default for FolderSettings {
     fn default() -> Self {
         Self { settle: Duration::from_millis(150), poll: Duration::from_secs(5) }
-    }
-}
-
-impl FolderSettings {
-    /// Reads `[folder]`.
-    pub(super) fn read(walk: &mut Walk<'_>, root: &mut Table<'_>) -> Self {
-        let default = Self::default();
-        let mut table = root.table(walk, "folder");
-        let settle = super::milliseconds(walk, &mut table, "settle_ms", 10, default.settle);
-        let poll = table.number(walk, "poll_s", 0.1, 600.0).map_or(default.poll, Duration::from_secs_f64);
-        table.finish(walk);
-        Self { settle, poll }
     }
 }

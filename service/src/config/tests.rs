@@ -1,5 +1,7 @@
+use isotherm_correction::navigation::NavigationStep;
 use isotherm_correction::prelaunch::PreLaunchLimits;
-use isotherm_correction::units::{AngularRate, SpecificForce};
+use isotherm_correction::unit::Uncalibrated;
+use isotherm_correction::units::{AngularRate, Span, SpecificForce};
 
 use super::*;
 
@@ -128,7 +130,7 @@ fn each_problem_names_its_place_its_value_and_its_limit() {
         ("pairing_window_ms = 0", "1:21: pairing_window_ms: is 0, must be a whole number from 1 to 10000"),
         (
             "temperature_delay_ms = \"5\"",
-            "1:24: temperature_delay_ms: is \"5\", must be a whole number from 0 to 10000",
+            "1:24: temperature_delay_ms: is \"5\" (a string), must be a whole number from 0 to 10000",
         ),
         ("tail_flush_ms = 9", "1:17: tail_flush_ms: is 9, must be a whole number from 10 to 60000"),
         ("stop_timeout_ms = 99", "1:19: stop_timeout_ms: is 99, must be a whole number from 100 to 60000"),
@@ -137,22 +139,28 @@ fn each_problem_names_its_place_its_value_and_its_limit() {
             "1:22: status_interval_ms: is 60001, must be a whole number from 100 to 60000",
         ),
         ("strict_start = 1", "1:16: strict_start: is 1, must be true or false"),
-        ("uncalibrated = \"drop\"", "1:16: uncalibrated: is \"drop\", must be \"pass-through\" or \"hold\""),
-        ("initial_state = \"off\"", "1:17: initial_state: is \"off\", must be \"running\" or \"standby\""),
-        ("[swap]\nage = \"no\"", "2:7: swap.age: is \"no\", must be \"warn\" or \"refuse\""),
+        (
+            "uncalibrated = \"drop\"",
+            "1:16: uncalibrated: is \"drop\" (a string), must be one of \"pass-through\", \"hold\"",
+        ),
+        (
+            "initial_state = \"off\"",
+            "1:17: initial_state: is \"off\" (a string), must be one of \"running\", \"standby\"",
+        ),
+        ("[swap]\nage = \"no\"", "2:7: swap.age: is \"no\" (a string), must be one of \"warn\", \"refuse\""),
         ("[swap]\nmax_jump_mg = -1", "2:15: swap.max_jump_mg: is -1, must be a number from 0 to 1000000"),
         ("[folder]\npoll_s = nan", "2:10: folder.poll_s: is nan, must be a number from 0.1 to 600"),
         (
             "[swap]\nrequire_signature = true",
             "1:1: swap: require_signature is set: trusted_keys must name the folder of the public keys",
         ),
-        ("congestion = true", "1:14: congestion: is true, must be \"drop\" or \"block\""),
+        ("congestion = true", "1:14: congestion: is true (a boolean), must be one of \"drop\", \"block\""),
         ("navigation = 4", "1:14: navigation: is 4, must be a table"),
         (
             "[navigation]\nticks = 1001",
             "2:9: navigation.ticks: is 1001, must be a whole number from 1 to 1000",
         ),
-        ("calibrations = 3", "1:16: calibrations: is 3, must be an existing folder"),
+        ("calibrations = 3", "1:16: calibrations: is 3, must be a string that is not empty"),
         (
             "calibrations = \"no/such\"",
             "1:16: calibrations: is \"no/such\", must be an existing folder; looked for no/such",
@@ -161,13 +169,13 @@ fn each_problem_names_its_place_its_value_and_its_limit() {
             "[zenoh]\nconfig = \"no.json5\"",
             "2:10: zenoh.config: is \"no.json5\", must be an existing file; looked for no.json5",
         ),
-        ("[zenoh]\nlisten = \"tcp/x\"", "2:10: zenoh.listen: is \"tcp/x\", must be a list of strings"),
-        ("[zenoh]\nconnect = [1]", "2:11: zenoh.connect: is [1], must be a list of strings"),
-        ("[zenoh]\nnamespace = \"\"", "2:13: zenoh.namespace: is \"\", must be a string that is not empty"),
+        ("[zenoh]\nlisten = \"tcp/x\"", "2:10: zenoh.listen: is \"tcp/x\" (a string), must be an array"),
+        ("[zenoh]\nconnect = [1]", "2:12: zenoh.connect[0]: is 1, must be a string"),
         (
-            "[navigation]\ntick = 1",
-            "2:1: navigation.tick: is not a known key; known here: ticks, coning_sculling",
+            "[zenoh]\nnamespace = \"\"",
+            "2:13: zenoh.namespace: is \"\" (a string), must be a string that is not empty",
         ),
+        ("[navigation]\ntick = 1", "2:1: navigation.tick: is not a known key: did you mean `ticks`?"),
     ];
     for (text, expected) in cases {
         assert_eq!(parse(text), Err(vec![format!("service.toml:{expected}")]), "{text}");
@@ -212,5 +220,5 @@ fn syntax_errors_stand_alone() {
     let problems = parse("max_units = \nstrict_start = 3").unwrap_err();
     assert!(problems.iter().all(|problem| problem.contains("TOML: ")), "{problems:?}");
     let problems = parse("max_units = 1\nmax_units = 0").unwrap_err();
-    assert_eq!(problems, ["service.toml:2:1: TOML: duplicate key"]);
+    assert_eq!(problems, ["service.toml:2:1: TOML: duplicate key `max_units`: remove one"]);
 }

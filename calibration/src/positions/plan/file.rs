@@ -1,6 +1,7 @@
 //! Plans as their files have them.
 
-use isotherm_log::file::parse_toml;
+use isotherm_document::{listed, parse};
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::{Attitude, Plan, Position, mounting};
@@ -8,19 +9,25 @@ use super::{Attitude, Plan, Position, mounting};
 /// Reads the text of a file with a plan: CSV or TOML. What is wrong is told with the name.
 pub(super) fn read(text: &str, name: &str, is_csv: bool) -> Result<Plan, String> {
     let named = |what| format!("{name}: {what}");
-    let written = if is_csv { of_csv(text).map_err(named)? } else { parse_toml(text, name)? };
+    let written = if is_csv {
+        of_csv(text).map_err(named)?
+    } else {
+        parse(text, name).map_err(|problems| listed(&problems))?
+    };
     Written::plan(written).map_err(named)
 }
 
 /// A plan as its file has it.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
 struct Written {
     /// Case axis along the stand's axis 1 at zero angles.
     #[serde(default = "along_1")]
+    #[schemars(regex(pattern = "^[xyz]$"), extend("x-must-be" = "x, y or z"))]
     axis_1: char,
     /// Case axis along its axis 2.
     #[serde(default = "along_2")]
+    #[schemars(regex(pattern = "^[xyz]$"), extend("x-must-be" = "x, y or z"))]
     axis_2: char,
     position: Vec<WrittenPosition>,
 }
@@ -33,8 +40,8 @@ fn along_2() -> char {
     'x'
 }
 
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
 struct WrittenPosition {
     name: String,
     axis_1_deg: Option<f64>,

@@ -1,0 +1,300 @@
+//! The mapping as types: key for key what stands in the file.
+
+use isotherm_correction::sample::OutputKind;
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use super::{Column, Delimiter, Marks, ModeMapping, OnBadRow, TimeUnit};
+
+/// How a text log is read.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields, title = "Isotherm column mapping")]
+pub(super) struct MappingKeys {
+    /// Version of the mapping's form.
+    #[schemars(range(min = 1))]
+    #[expect(dead_code, reason = "checked before anything else is read")]
+    pub(super) version: u32,
+    /// Free text for readers.
+    #[expect(dead_code, reason = "for readers only")]
+    pub(super) description: Option<String>,
+    /// The files of the log; exactly one has gyros.
+    #[schemars(length(min = 1, max = 16))]
+    pub(super) file: Vec<FileKeys>,
+}
+
+/// One file.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub(super) struct FileKeys {
+    /// Its name inside the log's folder, where the log is a folder.
+    pub(super) name: Option<String>,
+    /// What stands between two cells.
+    pub(super) delimiter: Delimiter,
+    /// Lines that begin with this are passed over.
+    #[schemars(
+        regex(pattern = r"^[^0-9\s+\-.]"),
+        extend("x-must-be" = "a prefix that no row of numbers begins with, and not empty")
+    )]
+    pub(super) comment: Option<String>,
+    /// Lines in front that are passed over.
+    #[serde(default)]
+    #[schemars(range(max = 1_000_000))]
+    pub(super) skip_lines: u64,
+    /// Whether the next line names the columns.
+    #[serde(default)]
+    pub(super) header: bool,
+    /// Rows of data in front that are passed over.
+    #[serde(default)]
+    #[schemars(range(max = 1_000_000))]
+    pub(super) drop_rows: u64,
+    /// Decimal mark.
+    #[serde(default)]
+    pub(super) decimal_mark: DecimalMark,
+    /// What happens to a row that cannot be read.
+    #[serde(default)]
+    pub(super) on_bad_row: OnBadRow,
+    /// Where the time of a row comes from.
+    pub(super) time: TimeKeys,
+    /// The gyros.
+    pub(super) gyro: Option<GyroKeys>,
+    /// The accelerometers.
+    pub(super) accel: Option<AccelKeys>,
+    /// Temperature channels.
+    #[serde(default)]
+    pub(super) temperature: Vec<TemperatureKeys>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize, JsonSchema)]
+#[schemars(inline)]
+pub(super) enum DecimalMark {
+    #[default]
+    #[serde(rename = ".")]
+    Point,
+    #[serde(rename = ",")]
+    Comma,
+}
+
+/// Where the time of a row comes from.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub(super) struct TimeKeys {
+    /// Column of stamps.
+    pub(super) column: Option<Column>,
+    /// Unit of the stamps.
+    pub(super) unit: Option<TimeUnit>,
+    /// Which end of the tick a stamp marks.
+    pub(super) marks: Option<Marks>,
+    /// Where a tick's duration comes from: the difference of stamps, or the nominal tick.
+    pub(super) duration: Option<DurationRule>,
+    /// More than this many nominal ticks between two stamps are a gap.
+    #[schemars(range(min = 1.25), extend("x-must-be" = "1.25 or more, or jitter would count as a gap"))]
+    pub(super) gap_after_ticks: Option<f64>,
+    /// Added to every stamp; without stamps, start of the first tick (ns).
+    #[serde(default)]
+    #[schemars(range(min = -2_305_843_009_213_693_952_i64, max = 2_305_843_009_213_693_951_i64))]
+    pub(super) origin_ns: i64,
+    /// Nominal tick (ns).
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub(super) tick_ns: Option<f64>,
+    /// Nominal tick (µs).
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub(super) tick_us: Option<f64>,
+    /// Nominal tick (ms).
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub(super) tick_ms: Option<f64>,
+    /// Nominal tick (s).
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub(super) tick_s: Option<f64>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[schemars(inline)]
+pub(super) enum DurationRule {
+    Measured,
+    Nominal,
+}
+
+/// The gyros of a file.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub(super) struct GyroKeys {
+    /// What the readings stand for.
+    pub(super) output: Output,
+    /// One to eight gyros, in the order of the calibration document.
+    #[schemars(length(min = 1, max = 8))]
+    pub(super) sensors: Vec<SensorKeys<GyroUnit>>,
+    /// Column of sequence numbers.
+    pub(super) sequence_column: Option<Column>,
+    /// Column of durations.
+    pub(super) duration_column: Option<Column>,
+    /// Its unit.
+    pub(super) duration_unit: Option<TimeUnit>,
+    /// A row whose cells of these sensors are all empty has no tick of them.
+    #[serde(default)]
+    pub(super) may_be_empty: bool,
+    /// Lasing mode.
+    pub(super) mode: Option<ModeMapping>,
+    /// Switch commands.
+    pub(super) switch: Option<SwitchKeys>,
+    /// Phase of the slow meander.
+    pub(super) meander: Option<ModeMapping>,
+    /// Half-period counts, one pair per gyro.
+    pub(super) half_periods: Option<Vec<HalfPeriodKeys>>,
+}
+
+/// The accelerometers of a file.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub(super) struct AccelKeys {
+    /// What the readings stand for.
+    pub(super) output: Output,
+    /// One to eight accelerometers, in the order of the calibration document.
+    #[schemars(length(min = 1, max = 8))]
+    pub(super) sensors: Vec<SensorKeys<AccelUnit>>,
+    /// Column of sequence numbers.
+    pub(super) sequence_column: Option<Column>,
+    /// Column of durations.
+    pub(super) duration_column: Option<Column>,
+    /// Its unit.
+    pub(super) duration_unit: Option<TimeUnit>,
+    /// A row whose cells of these sensors are all empty has no tick of them.
+    #[serde(default)]
+    pub(super) may_be_empty: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[schemars(inline)]
+pub(super) enum Output {
+    Counts,
+    Mean,
+}
+
+impl From<Output> for OutputKind {
+    fn from(output: Output) -> Self {
+        match output {
+            Output::Counts => Self::Counts,
+            Output::Mean => Self::Mean,
+        }
+    }
+}
+
+/// One sensor's column.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub(super) struct SensorKeys<U> {
+    /// Which column.
+    pub(super) column: Column,
+    /// Its unit.
+    pub(super) unit: Option<U>,
+    /// Direction of the sensor: 1 or −1.
+    #[schemars(range(min = -1, max = 1), extend("not" = { "const": 0 }), extend("x-must-be" = "1 or -1"))]
+    pub(super) sign: Option<i8>,
+    /// Units per unit of the column.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub(super) scale: Option<f64>,
+    /// Raw reading that stands for zero.
+    pub(super) mid_scale: Option<f64>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[schemars(inline)]
+pub(super) enum GyroUnit {
+    Counts,
+    RadPerS,
+    DegPerS,
+    DegPerH,
+    Rad,
+    Deg,
+    Arcsec,
+    Raw,
+    RawPerTick,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
+#[schemars(inline)]
+pub(super) enum AccelUnit {
+    #[serde(rename = "counts")]
+    Counts,
+    #[serde(rename = "m_per_s2")]
+    MPerS2,
+    #[serde(rename = "g")]
+    G,
+    #[serde(rename = "mg")]
+    Mg,
+    #[serde(rename = "m_per_s")]
+    MPerS,
+    #[serde(rename = "volt")]
+    Volt,
+    #[serde(rename = "raw")]
+    Raw,
+    #[serde(rename = "raw_per_tick")]
+    RawPerTick,
+}
+
+/// Where mode-switch commands come from.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub(super) struct SwitchKeys {
+    /// A column: 1 in the tick at whose start the switch was commanded, else 0.
+    pub(super) column: Option<Column>,
+    /// The first tick of the other mode.
+    pub(super) from: Option<SwitchFrom>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[schemars(inline)]
+pub(super) enum SwitchFrom {
+    ModeChange,
+}
+
+/// Half-period counts of one gyro.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub(super) struct HalfPeriodKeys {
+    /// Column of the positive half.
+    pub(super) positive: Column,
+    /// Column of the negative half.
+    pub(super) negative: Column,
+}
+
+/// One temperature channel.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub(super) struct TemperatureKeys {
+    /// Name, as the calibration document spells it.
+    #[schemars(
+        length(min = 1, max = 24),
+        regex(pattern = r"\S"),
+        extend("x-must-be" = "a name of 1 to 24 bytes")
+    )]
+    pub(super) channel: String,
+    /// Which column.
+    pub(super) column: Column,
+    /// Its unit.
+    pub(super) unit: TemperatureUnit,
+    /// Every how many rows a reading is taken, from the first on.
+    #[serde(default = "every_row")]
+    #[schemars(range(min = 1, max = 1_000_000))]
+    pub(super) every_rows: u32,
+    /// A row whose cell is empty has no reading.
+    #[serde(default)]
+    pub(super) may_be_empty: bool,
+}
+
+fn every_row() -> u32 {
+    1
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[schemars(inline)]
+pub(super) enum TemperatureUnit {
+    DegC,
+    Kelvin,
+    Volt,
+    Raw,
+}
