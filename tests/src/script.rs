@@ -110,6 +110,8 @@ pub struct Script {
     pub mode_late: u64,
     /// Half-period counts come with the ticks of an instrument with modes.
     pub halves: bool,
+    /// Frequency of the dither that they are counts of (Hz).
+    pub dither_hz: f64,
     /// Ticks of half a period of the slow meander; 0 where it stays as it is.
     pub meander: u64,
     /// A gyro that fails, and from which tick on.
@@ -160,6 +162,7 @@ impl Script {
             commands: Vec::new(),
             mode_late: 0,
             halves: true,
+            dither_hz: 60_000.0,
             meander: 0,
             fails: None,
             odd: Vec::new(),

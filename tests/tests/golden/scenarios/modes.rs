@@ -105,7 +105,7 @@ pub(crate) fn servo(seed: u64, halves: bool) -> Script {
     parts.gyros[2].servo = None;
     let mut script = Script::new(seed, &compile(&parts), &RICH_CHANNELS);
     (script.switches, script.halves, script.batch) = (100, halves, 4);
-    (script.scatter, script.swing) = (9.0, 30.0);
+    (script.scatter, script.swing, script.dither_hz) = (9.0, 30.0, 120_000.0);
     script
 }
 
