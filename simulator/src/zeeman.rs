@@ -1,7 +1,8 @@
 //! Zeeman laser gyro: a dithered counter, two lasing modes, and a perimeter servo.
 //!
-//! The counter's frequency is ±f(t) + Ω/K: the dither f is positive in the first half of each tick and negative
-//! in the second, Ω is input rate plus bias. While the servo pulls the perimeter in, f grows to its rest value and
+//! The counter's frequency is ±f(t) + Ω/K: the dither f has one sign in the first half of each tick and the other in the
+//! second, Ω is input rate plus bias. Which sign comes first is a matter of wiring: the dither is a magnetic field, whose
+//! effect turns with the lasing mode unless the electronics invert it with the mode. While the servo pulls the perimeter in, f grows to its rest value and
 //! the halves do not cancel; the tick then carries an apparent rate, which is integrated here in closed form.
 
 use isotherm_correction::sample::{HalfPeriodCounts, LasingMode};
@@ -150,7 +151,10 @@ impl ZeemanState {
         if phase.lost {
             return self.rubbish(dither_hz * 0.5 * length_s, drift_rad_per_s);
         }
-        let dither_counts = self.dither_counts(dither_hz, length_s, phase.servo_starts);
+        let turned = self.reversal.dither_turns_with_mode && phase.mode == LasingMode::Minus;
+        let sign = if turned { -1.0 } else { 1.0 };
+        let dither_counts =
+            self.dither_counts(dither_hz, length_s, phase.servo_starts).map(|counts| sign * counts);
         let own_rad = 0.5 * (drift_rad_per_s * length_s + noise_rad);
         let positive =
             self.counter.count((halves_rad[0] + own_rad) / scale_rad + dither_counts[0], self.quantised);

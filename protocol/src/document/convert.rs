@@ -219,6 +219,7 @@ fn servo(servo: &Servo) -> ServoParts {
         form: match servo.form {
             ServoKind::Measured => ServoForm::Measured,
             ServoKind::Modelled => ServoForm::Modelled,
+            ServoKind::Fitted => ServoForm::Fitted,
         },
         time_constant_s: servo.time_constant_s,
         rest_frequency: servo.rest_frequency.to_parts(0.0),

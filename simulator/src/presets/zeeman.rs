@@ -35,6 +35,7 @@ fn unit(period_s: f64) -> Instrument {
         servo_time_constant_s: 0.040,
         miss_rms_wavelengths: 0.04,
         dither_curvature: 10.0,
+        dither_turns_with_mode: false,
         meander_half_period_s: 0.0,
     };
     let gyros = vec![

@@ -47,16 +47,30 @@ fn whole_counts_keep_the_accumulated_phase_within_one_count() {
 }
 
 /// Integrates the dithered counter numerically from the perimeter's miss and compares each tick, and the formula
-/// of the correction model, `ΔΩ_i = K·(Δt/2τ)·(f_i − f0)`, good to the next order in Δt/τ.
+/// of the correction model, `ΔΩ_i = ±K·(Δt/2τ)·(f_i − f0)`, good to the next order in Δt/τ: for electronics that invert the
+/// field with the mode and for such that do not.
 #[test]
 fn the_servo_transient_is_what_numerical_integration_gives() {
-    let unit = Zeeman { quantised: false, ..unit() };
-    let mut state = state(&unit);
+    for (turns, mode, sign) in [
+        (false, LasingMode::Plus, 1.0),
+        (false, LasingMode::Minus, 1.0),
+        (true, LasingMode::Plus, 1.0),
+        (true, LasingMode::Minus, -1.0),
+    ] {
+        let mut unit = Zeeman { quantised: false, ..unit() };
+        unit.reversal.dither_turns_with_mode = turns;
+        transient_is_as_integrated(&unit, mode, sign);
+    }
+}
+
+/// `first` is the sign of the dither in the first half of a tick.
+fn transient_is_as_integrated(unit: &Zeeman, mode: LasingMode, first: f64) {
+    let mut state = state(unit);
     let gyro = unit.gyros[0];
     let reversal = unit.reversal;
     let mut largest = 0.0_f64;
     for tick in 0..40_u32 {
-        let phase = Phase { servo_starts: tick == 0, ..phase(LasingMode::Plus) };
+        let phase = Phase { servo_starts: tick == 0, ..phase(mode) };
         let result = state.tick([0.0; 2], TICK_S, 0.0, phase);
         let loss = state.dither_loss;
         let frequency = |time_s: f64| {
@@ -69,11 +83,18 @@ fn the_servo_transient_is_what_numerical_integration_gives() {
         let half = |from_s: f64| {
             (0..count).map(|part| frequency(from_s + (f64::from(part) + 0.5) * part_s) * part_s).sum::<f64>()
         };
-        let (positive, negative) = (half(begin_s), half(begin_s + 0.5 * TICK_S));
-        let numerical = gyro.scale_rad_per_count * (positive - negative) / TICK_S;
+        let (one, other) = (first * half(begin_s), first * half(begin_s + 0.5 * TICK_S));
+        let numerical = gyro.scale_rad_per_count * (one - other) / TICK_S;
         assert!((result.transient_rad_per_s - numerical).abs() < 1e-10, "tick {tick}");
-        let measured_hz = (positive + negative) / TICK_S;
-        let model = gyro.scale_rad_per_count * TICK_S / (2.0 * reversal.servo_time_constant_s)
+        // Its own drift apart, the counts are those of the halves.
+        let drift = 0.5 * result.drift_rad_per_s * TICK_S / gyro.scale_rad_per_count;
+        let counted = [result.halves.positive, result.halves.negative].map(|half| f64::from(half) - drift);
+        assert!(
+            (counted[0] - one).abs() < 1.5 && (counted[1] + other).abs() < 1.5,
+            "{counted:?}, {one}, {other}"
+        );
+        let measured_hz = first * (one + other) / TICK_S;
+        let model = first * gyro.scale_rad_per_count * TICK_S / (2.0 * reversal.servo_time_constant_s)
             * (measured_hz - gyro.dither_hz[0]);
         assert!(
             (model - numerical).abs() < 0.01 * numerical.abs() + 1e-12,

@@ -148,7 +148,8 @@ fn trend(r: &mut Reader<'_>, mut table: Table<'_>) -> Trend {
 }
 
 fn servo(r: &mut Reader<'_>, mut table: Table<'_>) -> Servo {
-    let forms = [("measured", ServoKind::Measured), ("modelled", ServoKind::Modelled)];
+    let forms =
+        [("measured", ServoKind::Measured), ("modelled", ServoKind::Modelled), ("fitted", ServoKind::Fitted)];
     let form = table.choice(r, "form", &forms).unwrap_or(ServoKind::Measured);
     let time_constant_s = table.number(r, "time_constant_s", within(TIME_CONSTANT_RANGE_S));
     let settle_time_constants = table.number_opt(r, "settle_time_constants", within(SETTLE_RANGE));
