@@ -56,9 +56,9 @@ pub use reference::reference;
 pub use schema::schema;
 pub use types::{
     Accel, AccelLag, AccelOrientation, AccelOutput, AccelParity, AccelSensor, Branches, Channel, Created,
-    Document, Drift, Filter, Gyro, GyroOrientation, GyroOutput, GyroParity, GyroSensor, Lag, Log, Measure,
-    ModeReversal, Orientation, OrientationThermal, Origin, Residual, Sample, SelfTest, SelfTestCounter,
-    SelfTestVoltage, Servo, ServoKind, Temperature, Trend,
+    Document, Drift, Filter, FitWindow, Gyro, GyroOrientation, GyroOutput, GyroParity, GyroSensor, Lag, Log,
+    Measure, ModeReversal, Orientation, OrientationThermal, Origin, Residual, Sample, SelfTest,
+    SelfTestCounter, SelfTestVoltage, Servo, ServoKind, Temperature, Trend,
 };
 
 use reader::{Reader, Table};

@@ -6,13 +6,15 @@ mod origin;
 mod self_test;
 
 use isotherm_correction::reversal::{
-    MAX_FIT_DEGREE, MAX_FIT_READINGS, MAX_PREDICT_DEGREE, MAX_TRANSITION_TICKS,
+    MAX_FIT_DEGREE, MAX_FIT_READINGS, MAX_PREDICT_DEGREE, MAX_TRANSITION_TICKS, TRANSITION_RANGE_S,
 };
 use isotherm_correction::sample::{MAX_SENSORS, MIN_SENSORS};
 
 use super::common::{created, name, unit};
 use super::reader::{Reader, Table};
-use super::types::{Channel, Document, Filter, ModeReversal, Orientation, OrientationThermal, Temperature};
+use super::types::{
+    Channel, Document, Filter, FitWindow, ModeReversal, Orientation, OrientationThermal, Temperature,
+};
 use super::values::Limits;
 use super::{CURRENT_SCHEMA, MIN_SCHEMA};
 
@@ -121,14 +123,31 @@ fn confirm_ticks(r: &mut Reader<'_>, table: &mut Table<'_>) -> u32 {
 
 fn mode_reversal(r: &mut Reader<'_>, mut table: Table<'_>) -> ModeReversal {
     let default = ModeReversal::default();
+    let [shortest, longest] = TRANSITION_RANGE_S;
+    let transition_s = table.number_opt(r, "transition_s", Limits::Within(shortest, longest));
+    let transition_ticks = if transition_s.is_some() {
+        let why = "says the same as `transition_s`: give one of the two";
+        table.forbid(r, "transition_ticks", why);
+        None
+    } else {
+        table.small_opt(r, "transition_ticks", 1, MAX_TRANSITION_TICKS).or(default.transition_ticks)
+    };
+    let windows = [("fixed", FitWindow::Fixed), ("adaptive", FitWindow::Adaptive)];
+    let fit_window = table.choice_opt(r, "fit_window", &windows).unwrap_or(default.fit_window);
+    let [before, after] = match fit_window {
+        FitWindow::Fixed => [default.fit_readings_before, default.fit_readings_after],
+        FitWindow::Adaptive => [MAX_FIT_READINGS; 2],
+    };
     let mut small = |key, low, high, default| table.small_opt(r, key, low, high).unwrap_or(default);
     let reversal = ModeReversal {
-        transition_ticks: small("transition_ticks", 1, MAX_TRANSITION_TICKS, default.transition_ticks),
+        transition_ticks,
+        transition_s,
         predict_readings: small("predict_readings", 1, MAX_FIT_READINGS, default.predict_readings),
         predict_degree: small("predict_degree", 0, MAX_PREDICT_DEGREE, default.predict_degree),
-        fit_readings_before: small("fit_readings_before", 1, MAX_FIT_READINGS, default.fit_readings_before),
-        fit_readings_after: small("fit_readings_after", 1, MAX_FIT_READINGS, default.fit_readings_after),
+        fit_readings_before: small("fit_readings_before", 1, MAX_FIT_READINGS, before),
+        fit_readings_after: small("fit_readings_after", 1, MAX_FIT_READINGS, after),
         fit_degree: small("fit_degree", 0, MAX_FIT_DEGREE, default.fit_degree),
+        fit_window,
     };
     table.finish(r);
     reversal

@@ -199,6 +199,27 @@ impl Table<'_> {
             self.need(r, key, None, ());
             return None;
         };
+        self.chosen(r, key, value, choices)
+    }
+
+    pub(crate) fn choice_opt<T: Copy>(
+        &mut self,
+        r: &mut Reader<'_>,
+        key: &'static str,
+        choices: &[(&str, T)],
+    ) -> Option<T> {
+        let value = self.take(r, key)?;
+        self.chosen(r, key, value, choices)
+    }
+
+    /// The choice that a value names; one that names none is reported.
+    fn chosen<T: Copy>(
+        &self,
+        r: &mut Reader<'_>,
+        key: &'static str,
+        value: &Value<'_>,
+        choices: &[(&str, T)],
+    ) -> Option<T> {
         let text = value.get_ref().as_str();
         let chosen = choices.iter().find(|(name, _)| text == Some(name));
         if chosen.is_none() {

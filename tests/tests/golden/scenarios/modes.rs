@@ -1,6 +1,6 @@
 //! Mode switches and what follows them.
 
-use isotherm_correction::reversal::ReversalParts;
+use isotherm_correction::reversal::{ReversalParts, Transition};
 use isotherm_correction::sample::OutputKind;
 use isotherm_correction::servo::{ServoForm, ServoParts};
 use isotherm_correction::unit::At;
@@ -69,8 +69,8 @@ pub(crate) fn mode_switches_few_ticks_apart() -> Scenario {
 /// Other figures of the substitution, each over the same switches.
 pub(crate) fn mode_switches_by_other_fits() -> Scenario {
     let [mut short, mut long, mut flat] = [ReversalParts::default(); 3];
-    (short.transition_ticks, short.predict_readings, short.fit_readings_after) = (1, 3, 1);
-    (long.predict_readings, long.predict_degree, long.transition_ticks) = (8, 2, 2);
+    (short.transition, short.predict_readings, short.fit_readings_after) = (Transition::Ticks(1), 3, 1);
+    (long.predict_readings, long.predict_degree, long.transition) = (8, 2, Transition::Ticks(2));
     (long.fit_readings_before, long.fit_readings_after, long.fit_degree) = (8, 5, 3);
     (flat.predict_readings, flat.predict_degree, flat.fit_degree) = (1, 0, 1);
     let mut script = rich_script(44);
