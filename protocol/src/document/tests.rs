@@ -5,6 +5,9 @@ mod keys;
 mod published;
 mod robust;
 
+use isotherm_correction::curve::{Curve, CurveParts};
+use isotherm_correction::units::STANDARD_GRAVITY_M_PER_S2;
+
 use super::{Document, Parsed, Problem};
 
 /// The document that shows every key.
@@ -153,4 +156,24 @@ fn problems_are_serialised_field_by_field() {
     let message = "is version 2; this release reads 1: nothing else was read";
     let expected = serde_json::json!({"file": "test.toml", "line": 1, "column": 10, "key": "schema", "message": message});
     assert_eq!(json, expected);
+}
+
+#[test]
+fn correcting_the_board_before_the_bias_would_differ_by_three_micrograms() {
+    // 001 has f = (U·r − S)/K, the corrector (U − S)·r/K: apart by S·(r − 1)/K, whatever the input.
+    let text = include_str!("../../../config/calibration/ZLG-0001.toml");
+    let parts = accept(text).document.to_parts();
+    let mut largest = 0.0_f64;
+    for accel in &parts.accels {
+        let curve = |parts: &CurveParts| Curve::new(parts).unwrap();
+        let (scale, bias) = (curve(&accel.scale_factor), curve(accel.bias.as_ref().unwrap()));
+        let ratio = curve(accel.board_ratio.as_ref().unwrap());
+        for (sensor, board) in (-40..=70).flat_map(|sensor| (-40..=85).map(move |board| (sensor, board))) {
+            let [sensor, board] = [sensor, board].map(f64::from);
+            let apart = bias.at(sensor).value * (ratio.at(board).value - 1.0) / scale.at(sensor).value;
+            largest = largest.max(apart.abs() / STANDARD_GRAVITY_M_PER_S2);
+        }
+    }
+    println!("{:.2} µg", 1e6 * largest);
+    assert!((0.5e-6..3.3e-6).contains(&largest), "{largest} g");
 }

@@ -52,7 +52,8 @@ impl Script {
         let has_modes = self.switches > 0;
         let counts = self.calibration.gyro_output() == OutputKind::Counts;
         let half_periods = if has_modes && self.halves && counts {
-            let dither = self.dither_hz * duration.as_s() / 2.0;
+            let turned = self.dither_turns && self.mode == LasingMode::Minus;
+            let dither = self.dither_hz * duration.as_s() / if turned { -2.0 } else { 2.0 };
             readings.iter().map(|reading| half_periods(*reading, dither)).collect()
         } else {
             Sensors::new()

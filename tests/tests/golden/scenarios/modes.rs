@@ -1,6 +1,6 @@
 //! Mode switches and what follows them.
 
-use isotherm_correction::reversal::{ReversalParts, Transition};
+use isotherm_correction::reversal::{FitWindow, ReversalParts, Transition};
 use isotherm_correction::sample::OutputKind;
 use isotherm_correction::servo::{ServoForm, ServoParts};
 use isotherm_correction::unit::At;
@@ -90,6 +90,26 @@ pub(crate) fn mode_switches_by_other_fits() -> Scenario {
     told(script)
 }
 
+/// The transition as a time over ticks of several lengths, and a window that adapts.
+pub(crate) fn mode_switches_of_a_stated_time() -> Scenario {
+    let mut script = rich_script(49);
+    (script.switches, script.batch) = (70, 2);
+    for (tick_ms, fit_window) in [(5, FitWindow::Adaptive), (1, FitWindow::Adaptive), (1, FitWindow::Fixed)] {
+        let mut parts = rich_parts(0.0);
+        parts.reversal = Some(ReversalParts {
+            transition: Transition::Time(0.015),
+            fit_readings_before: 8,
+            fit_readings_after: 7,
+            fit_window,
+            ..ReversalParts::default()
+        });
+        script.tick = Span::from_ms(tick_ms);
+        script.give(compile(&parts), At::NextTick, Span::ZERO);
+        script.ticks(300);
+    }
+    told(script)
+}
+
 pub(crate) fn servo(seed: u64, halves: bool) -> Script {
     let mut parts = with_outputs(rich_parts(0.0), OutputKind::Counts, OutputKind::Counts);
     for (gyro, form) in
@@ -116,6 +136,27 @@ pub(crate) fn servo_with_half_period_counts() -> Scenario {
     script.ticks(71);
     script.gap(3);
     script.ticks(100);
+    told(script)
+}
+
+/// The negative half comes first in the minus mode; one gyro in each form.
+pub(crate) fn servo_of_a_dither_that_turns_with_the_mode() -> Scenario {
+    let mut parts = with_outputs(rich_parts(0.0), OutputKind::Counts, OutputKind::Counts);
+    let forms = [ServoForm::Measured, ServoForm::Modelled, ServoForm::Fitted];
+    for (gyro, form) in parts.gyros.iter_mut().zip(forms) {
+        gyro.servo = Some(ServoParts {
+            form,
+            time_constant_s: 0.04,
+            rest_frequency: polynomial(&[59_700.0, -9.0]),
+            settle_time_constants: 6.0,
+        });
+    }
+    let mut script = Script::new(48, &compile(&parts), &RICH_CHANNELS);
+    (script.switches, script.dither_turns, script.batch) = (100, true, 4);
+    (script.scatter, script.swing) = (9.0, 30.0);
+    script.ticks(650);
+    script.gap(3);
+    script.ticks(150);
     told(script)
 }
 
