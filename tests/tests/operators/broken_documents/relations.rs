@@ -5,13 +5,12 @@ use super::Edit;
 const GYRO_ROWS: &str = "rows = [[0.99999997475, 0.00007999999798, 0.000209999994698], [-0.000239999992116, 0.99999996715, \
                          -0.0000899999970435], [0.0000699999984285, -0.00019999999551, 0.99999997755]]";
 const MODE_REVERSAL: &str = "[mode_reversal]
-transition_ticks = 3                      # or transition_s = 0.015, where the ticks are not always as long
+transition_ticks = 3
 predict_readings = 4
 predict_degree = 1
 fit_readings_before = 2
 fit_readings_after = 2
 fit_degree = 2
-fit_window = \"fixed\"                      # or \"adaptive\": as few of up to 8 readings on a side as motion asks for, as many as noise does
 ";
 
 pub(super) const EDITS: [Edit; 28] = [
