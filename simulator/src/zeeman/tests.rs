@@ -116,3 +116,48 @@ fn lost_ticks_carry_nothing_of_the_input() {
         assert!((counts - turning.tick([1e-3; 2], TICK_S, 0.0, lost).counts).abs() < 1e-12);
     }
 }
+
+#[test]
+fn lock_in_bends_the_scale_where_the_rate_comes_near_the_dither() {
+    let mut unit = Zeeman { quantised: false, ..unit() };
+    let gyro = &mut unit.gyros[0];
+    (gyro.bias_nonmagnetic_rad_per_s, gyro.bias_magnetic_rad_per_s) = ([0.0; 3], [0.0; 3]);
+    (gyro.meander_rad_per_s, gyro.noise) = ([0.0; 2], GyroNoise::default());
+    gyro.lock_in_rad_per_s = 0.2_f64.to_radians();
+    let (k, lock_in) = (gyro.scale_rad_per_count, gyro.lock_in_rad_per_s);
+    let dither = k * gyro.dither_hz[0];
+    let read = |rate: f64| {
+        let counts = state(&unit).tick([0.5 * rate * TICK_S; 2], TICK_S, 0.0, phase(LasingMode::Plus)).counts;
+        k * counts / TICK_S
+    };
+    for share in [0.01, 0.5, 0.9, 1.1, 3.0] {
+        let rate = share * dither;
+        // Adler's equation ψ̇ = R − Ω_L·sin ψ, integrated over many turns in either half period.
+        let half = |rate: f64| {
+            let (steps, turns) = (4000, 30.0);
+            let step = turns * 2.0 * core::f64::consts::PI / rate.abs() / f64::from(steps);
+            let slope = |psi: f64| rate - lock_in * libm::sin(psi);
+            let mut psi = 0.0_f64;
+            // Whole turns only: the time that each takes is the same.
+            let (mut time, mut turned) = (0.0, 0.0);
+            for _ in 0..10 * steps {
+                let k1 = slope(psi);
+                let k2 = slope(psi + 0.5 * step * k1);
+                let k3 = slope(psi + 0.5 * step * k2);
+                let k4 = slope(psi + step * k3);
+                let next = psi + step / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4);
+                time += step;
+                psi = next;
+                turned = psi;
+            }
+            turned / time
+        };
+        let expected = 0.5 * (half(rate + dither) + half(rate - dither));
+        // A part of a turn is left over in the integration: at most Ω_L of a rate over 300 turns.
+        assert!((read(rate) - expected).abs() < 1e-3 * lock_in, "{share}: {} {expected}", read(rate));
+    }
+    // Without dither nothing is counted below the lock-in rate.
+    unit.gyros[0].dither_hz = [0.0; 3];
+    let still = state(&unit).tick([0.4 * lock_in * TICK_S; 2], TICK_S, 0.0, phase(LasingMode::Plus));
+    assert!(still.counts.abs() < 1e-12);
+}
