@@ -158,10 +158,10 @@ impl EffectsState {
             let factor = 1.0 + gyro.scale_asymmetry * sign + gyro.scale_curvature_s2_per_rad2 * rate * rate;
             let stuck = play.error.at(share);
             // Halves of gyros without dither are the whole tick and nothing.
-            let lengths = if parts[1] == Increments::default() { [1.0, 0.0] } else { [0.5, 0.5] };
+            let of_tick = if parts[1] == Increments::default() { [1.0, 0.0] } else { [0.5, 0.5] };
             let mut drift_rad = 0.0;
-            for ((half, part), length) in halves.iter_mut().zip(parts).zip(lengths) {
-                let own = dot(by_force, part.velocity) + stuck * length * length_s;
+            for ((half, part), share) in halves.iter_mut().zip(parts).zip(of_tick) {
+                let own = dot(by_force, part.velocity) + stuck * share * length_s;
                 *half = factor * *half + own;
                 drift_rad += own;
             }
@@ -212,8 +212,9 @@ impl Felt {
         };
         let ends = [0.5, -0.5].map(|side| at(middle_s + side * length_s).0);
         let panel_s = length_s / f64::from(PANELS);
-        let panels = (0..PANELS).map(|panel| middle_s - 0.5 * length_s + (f64::from(panel) + 0.5) * panel_s);
-        let nodes = panels.flat_map(|centre_s| {
+        let centres_s =
+            (0..PANELS).map(|panel| middle_s - 0.5 * length_s + (f64::from(panel) + 0.5) * panel_s);
+        let nodes = centres_s.flat_map(|centre_s| {
             NODES.map(|(node, weight)| (weight / f64::from(PANELS), centre_s + 0.5 * node * panel_s))
         });
         let instants = nodes.map(|(weight, time_s)| {

@@ -54,7 +54,7 @@ pub struct ZeemanGyro {
     pub meander_rad_per_s: [f64; 2],
     /// Rest value f0 of the dither frequency (Hz) by powers of T − T₀.
     pub dither_hz: [f64; 3],
-    /// Static lock-in rate Ω_L (rad/s, ≥ 0): below it the counter stands still, above it counts √(R² − Ω_L²) of a rate R, dither
+    /// Static lock-in rate L (rad/s, ≥ 0): below it the counter stands still, above it counts √(R² − L²) of a rate R, dither
     /// included. So the scale bends where the input comes near the dither's amplitude.
     #[serde(default)]
     pub lock_in_rad_per_s: f64,

@@ -1,7 +1,7 @@
 //! The condition of C(T) over a whole range of temperature.
 //!
 //! C(T) is a straight line, and a singular value of a sum differs from that of its first part by at most the second part's norm
-//! [Weyl]. So from the singular values at a middle temperature, and ‖C_1‖ times half the width, follows a bound over all of an
+//! [Weyl]. So from the singular values at a middle temperature, and `‖C_1‖` times half the width, follows a bound over all of an
 //! interval. Where it is not tight enough the interval is halved: nothing between two looks is left to chance.
 
 use arrayvec::ArrayVec;
@@ -16,7 +16,7 @@ const DEEPEST: u8 = 60;
 /// A temperature (°C) in the range at which the condition number exceeds `limit`, and the number there, NaN where there is none;
 /// `None` where it stays within 1.01 times the limit everywhere, and within the limit wherever it was looked at.
 ///
-/// `rows_at` gives C(T), `slopes` is C_1 of the same rows (1/°C).
+/// `rows_at` gives C(T), `slopes` is `C_1` of the same rows (1/°C).
 pub(super) fn ill_conditioned(
     range_deg_c: [f64; 2],
     rows_at: impl Fn(f64) -> Rows,

@@ -131,8 +131,9 @@ impl ReversalError {
     /// Field of [`ReversalParts`] that it speaks of.
     pub(crate) fn field(&self) -> &'static str {
         match self {
-            Self::OutOfRange(OutOfRange { name, .. }) | Self::DegreeNeedsReadings { name, .. } => name,
-            Self::Time(OutOfRange { name, .. }) => name,
+            Self::OutOfRange(OutOfRange { name, .. })
+            | Self::Time(OutOfRange { name, .. })
+            | Self::DegreeNeedsReadings { name, .. } => name,
             Self::AdaptiveNeedsReadings { .. } => "fit_window",
         }
     }

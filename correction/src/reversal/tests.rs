@@ -688,7 +688,6 @@ fn a_window_that_adapts_follows_noise_at_rest_and_motion_when_there_is_any() {
         (5.0, 1e-4 * SIGMA, rms(two, 5.0, 1e-4 * SIGMA), 1.05),
     ] {
         let got = rms(adaptive, frequency_hz, sigma);
-        std::println!("{frequency_hz} Hz, noise {sigma}: {got:.2}″, {best:.2}″ at best, two readings {:.2}″", rms(two, frequency_hz, sigma));
         assert!(got < worst * best, "{frequency_hz} Hz, noise {sigma}: {got}″, {best}″ at best");
     }
     assert!(rms(eight, 5.0, SIGMA) > 20.0, "a wide window cuts the motion off");

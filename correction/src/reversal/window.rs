@@ -41,7 +41,7 @@ struct Column {
 /// `before` and `after` are its readings [abscissa (s), rate (rad/s)] from the switch outwards, `lost` the abscissas and
 /// durations of the ticks to be bridged (s), `degree` that of the fit.
 pub(super) fn choose(before: &[[f64; 2]], after: &[[f64; 2]], lost: &[[f64; 2]], degree: usize) -> usize {
-    let shortest = SHORTEST.max((degree + 2) / 2);
+    let shortest = SHORTEST.max(degree / 2 + 1);
     let all: ArrayVec<[f64; 2], MAX_POINTS> = before.iter().chain(after).copied().take(MAX_POINTS).collect();
     if all.len() < MIN_ADAPTIVE_READINGS.into() || all.len() < before.len() + after.len() {
         return shortest;
@@ -63,8 +63,8 @@ pub(super) fn choose(before: &[[f64; 2]], after: &[[f64; 2]], lost: &[[f64; 2]],
     let widest = before.len().max(after.len());
     let mut best = (f64::INFINITY, shortest);
     for readings in (shortest..=widest).rev() {
-        let (first, last) = (readings.min(before.len()), before.len() + readings.min(after.len()));
-        let taken = |index: usize| index < first || (before.len()..last).contains(&index);
+        let (old, new) = (readings.min(before.len()), readings.min(after.len()));
+        let taken = |index: usize| index < old || (before.len()..before.len() + new).contains(&index);
         let points = all.iter().enumerate().filter(|(index, _)| taken(*index)).map(|(_, point)| *point);
         let points: ArrayVec<[f64; 2], MAX_POINTS> = points.collect();
         let mut short = weights(&self::columns(&points, lost, degree), degree).into_iter();
@@ -87,13 +87,13 @@ pub(super) fn choose(before: &[[f64; 2]], after: &[[f64; 2]], lost: &[[f64; 2]],
 /// carry that degree.
 fn columns(points: &[[f64; 2]], lost: &[[f64; 2]], degree: usize) -> ArrayVec<Column, { NOISE_DEGREE + 1 }> {
     let mut columns = ArrayVec::new();
-    let first = points.iter().map(|[x, _]| *x).fold(f64::INFINITY, f64::min);
-    let last = points.iter().map(|[x, _]| *x).fold(f64::NEG_INFINITY, f64::max);
-    let half = (last - first) / 2.0;
+    let from = points.iter().map(|[x, _]| *x).fold(f64::INFINITY, f64::min);
+    let to = points.iter().map(|[x, _]| *x).fold(f64::NEG_INFINITY, f64::max);
+    let half = (to - from) / 2.0;
     if half.is_nan() || half <= 0.0 {
         return columns;
     }
-    let scaled = |x: f64| (x - first - half) / half;
+    let scaled = |x: f64| (x - from - half) / half;
     // Three-term recurrence [Forsythe 1957]: per point, and per lost tick, p_{k−1} and p_k.
     let mut work: ArrayVec<[f64; 3], MAX_POINTS> =
         points.iter().map(|[x, _]| [scaled(*x), 0.0, 1.0]).collect();

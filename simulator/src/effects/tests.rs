@@ -33,7 +33,7 @@ fn plain(motion: Motion) -> Scenario {
     scenario
 }
 
-fn with_gyros(mut scenario: Scenario, effects: [GyroEffects; 3]) -> Vec<Step> {
+fn with_gyros(mut scenario: Scenario, effects: &[GyroEffects; 3]) -> Vec<Step> {
     scenario.instrument.effects.gyros = effects.to_vec();
     Simulation::new(&scenario).unwrap().take(400).collect()
 }
@@ -59,7 +59,7 @@ fn a_drift_follows_the_specific_force_and_changes_sign_when_the_unit_is_turned_o
         GyroEffects { acceleration_rad_per_s_per_m_per_s2: [0.0, 0.0, 2e-6], ..GyroEffects::default() };
     for (roll_deg, force) in [(0.0, -G), (180.0, G), (90.0, 0.0)] {
         let scenario = plain(Motion { roll_deg, ..Motion::rest(0.0) });
-        for step in with_gyros(scenario, [effects, GyroEffects::default(), GyroEffects::default()]) {
+        for step in with_gyros(scenario, &[effects, GyroEffects::default(), GyroEffects::default()]) {
             assert!((step.gyro.readings[0] - 2e-6 * force).abs() < 1e-15, "{roll_deg}");
             assert!((step.truth.gyro_drift_rad_per_s[0] - 2e-6 * force).abs() < 1e-15);
             assert!(step.gyro.readings[1].abs() < 1e-15);
@@ -67,7 +67,7 @@ fn a_drift_follows_the_specific_force_and_changes_sign_when_the_unit_is_turned_o
     }
     // With temperature, that of the gyro itself.
     let warmer = GyroEffects { acceleration_per_k: [0.0, 0.0, 1e-7], reference_deg_c: 20.0, ..effects };
-    for step in with_gyros(plain(Motion::rest(0.0)), [warmer; 3]) {
+    for step in with_gyros(plain(Motion::rest(0.0)), &[warmer; 3]) {
         let expected = -G * (2e-6 + 1e-7 * (step.truth.gyro_deg_c[1] - 20.0));
         assert!((step.gyro.readings[1] - expected).abs() < 1e-12);
     }
@@ -83,12 +83,12 @@ fn a_dithered_gyro_drifts_with_the_force_like_any_other() {
     let k = unit.gyros.iter().map(|gyro| gyro.scale_rad_per_count).collect::<Vec<_>>();
     let steps = with_gyros(
         scenario,
-        [GyroEffects { acceleration_rad_per_s_per_m_per_s2: [0.0, 0.0, 1e-6], ..GyroEffects::default() }; 3],
+        &[GyroEffects { acceleration_rad_per_s_per_m_per_s2: [0.0, 0.0, 1e-6], ..GyroEffects::default() }; 3],
     );
     for (with, without) in steps.iter().zip(&plain) {
-        for gyro in 0..3 {
+        for (gyro, k) in k.iter().enumerate() {
             let more = with.gyro.readings[gyro] - without.gyro.readings[gyro];
-            let expected = 1e-6 * with.truth.delta_velocity[2] / k[gyro];
+            let expected = 1e-6 * with.truth.delta_velocity[2] / k;
             assert!((more / expected - 1.0).abs() < 1e-3, "{more}, {expected}");
         }
     }
@@ -102,7 +102,7 @@ fn a_scale_differs_by_direction_and_bends_with_the_rate() {
         let bent = GyroEffects { scale_curvature_s2_per_rad2: 4e-6, ..GyroEffects::default() };
         let both = [asymmetric, bent, GyroEffects::default()];
         let motion = turning([1.0, 1.0, 0.0], deg_per_s * 2.0_f64.sqrt());
-        let step = &with_gyros(plain(motion), both)[10];
+        let step = &with_gyros(plain(motion), &both)[10];
         let ratio = |gyro: usize| step.gyro.readings[gyro] / rate(deg_per_s) - 1.0;
         assert!((ratio(0) - 5e-6 * deg_per_s.signum()).abs() < 1e-12, "{deg_per_s}: {}", ratio(0));
         assert!((ratio(1) - 4e-6 * rate(deg_per_s) * rate(deg_per_s)).abs() < 1e-12, "{}", ratio(1));
