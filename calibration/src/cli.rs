@@ -109,3 +109,31 @@ pub fn main() -> ExitCode {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use isotherm_protocol::document::Document;
+
+    use super::*;
+
+    #[test]
+    fn the_full_example_names_a_command_and_files_that_there_are() {
+        let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
+        let text = std::fs::read_to_string(root.join("config/calibration/example-full.toml")).unwrap();
+        let origin = Document::parse(&text, None).unwrap().document.origin.unwrap();
+        let command = origin.command.unwrap();
+        let arguments = Cli::try_parse_from(command.split_whitespace()).unwrap();
+        assert!(matches!(arguments.command, Command::Thermal(_)), "{command}");
+        for file in command.split_whitespace().filter(|word| word.contains('/')) {
+            assert!(root.join(file).is_file(), "{file}");
+        }
+        // The logs are those that the shipped documents rest on.
+        let shipped = ["chamber-mems.toml", "rlg-static.toml"].map(|name| {
+            let text = std::fs::read_to_string(root.join("config/calibration").join(name)).unwrap();
+            Document::parse(&text, None).unwrap().document.origin.unwrap().log
+        });
+        assert_eq!(origin.log, shipped.concat());
+    }
+}

@@ -11,6 +11,7 @@
 mod linear;
 mod parity;
 mod parts;
+mod range;
 
 use alloc::vec::Vec;
 use core::array;
@@ -149,6 +150,13 @@ impl Orientation {
                 errors.push(OrientationError::Condition { temperature_deg_c, got, limit });
             }
         }
+        if errors.is_empty()
+            && let Some((temperature_deg_c, got)) =
+                orientation.ill_conditioned(SensorMask::all(MAX_SENSORS), [first, last])
+        {
+            let limit = CONDITION_LIMIT;
+            errors.push(OrientationError::ConditionInside { temperature_deg_c, got, limit });
+        }
         if errors.is_empty() { Ok(orientation) } else { Err(errors) }
     }
 
@@ -197,6 +205,24 @@ impl Orientation {
         Some(Inverse { columns, mask })
     }
 
+    /// Whether the axes of the sensors in `mask` keep clear of one plane at every temperature between two (°C): their condition
+    /// number stays within [`CONDITION_LIMIT`], or a hundredth above it.
+    #[must_use]
+    pub fn is_conditioned_between(&self, mask: SensorMask, one_deg_c: f64, other_deg_c: f64) -> bool {
+        let mask = mask.intersection(SensorMask::all(self.sensors));
+        // That of all sensors was looked at when the calibration was made.
+        mask == SensorMask::all(self.sensors) || {
+            let (one, other) = (self.clamped(one_deg_c), self.clamped(other_deg_c));
+            self.ill_conditioned(mask, [one.min(other), one.max(other)]).is_none()
+        }
+    }
+
+    /// A temperature (°C) in a range at which the sensors of `mask` are ill-conditioned, with the condition number.
+    fn ill_conditioned(&self, mask: SensorMask, range_deg_c: [f64; 2]) -> Option<(f64, f64)> {
+        let rows_at = |temperature_deg_c| masked(self.rows_at(temperature_deg_c), mask);
+        range::ill_conditioned(range_deg_c, rows_at, &masked(self.slopes_per_deg_c, mask), CONDITION_LIMIT)
+    }
+
     /// What the sensors read for the vector `v` in case axes: s = C(T)·v (unit of `v`).
     #[must_use]
     pub fn forward(&self, temperature_deg_c: f64, v: [f64; 3]) -> Sensors<f64> {
@@ -206,9 +232,7 @@ impl Orientation {
 
     /// C(T), with T clamped to the fitted range and NaN standing for the reference.
     fn rows_at(&self, temperature_deg_c: f64) -> Rows {
-        let [first, last] = self.range_deg_c;
-        let stated = if temperature_deg_c.is_nan() { self.reference_deg_c } else { temperature_deg_c };
-        let excess = stated.max(first).min(last) - self.reference_deg_c;
+        let excess = self.clamped(temperature_deg_c) - self.reference_deg_c;
         let mut rows = self.rows;
         for (row, slope) in rows.iter_mut().zip(&self.slopes_per_deg_c) {
             for (c, slope) in row.iter_mut().zip(slope) {
@@ -216,6 +240,13 @@ impl Orientation {
             }
         }
         rows
+    }
+
+    /// A temperature within the fitted range; NaN stands for the reference (°C).
+    fn clamped(&self, temperature_deg_c: f64) -> f64 {
+        let [first, last] = self.range_deg_c;
+        let stated = if temperature_deg_c.is_nan() { self.reference_deg_c } else { temperature_deg_c };
+        stated.max(first).min(last)
     }
 
     /// √W·C.

@@ -1,6 +1,6 @@
 //! The four-step substitution over a mode switch [003; models §5].
 //!
-//! While the lasing mode switches, n = 1…3 ticks carry nothing. Tick j = 0 is the last good one, j = 1 the
+//! While the lasing mode switches, n = 1…32 ticks carry nothing. Tick j = 0 is the last good one, j = 1 the
 //! commanded one:
 //!
 //! 1. before: a polynomial is fitted to the last good readings (by default j = −3…0);
@@ -15,6 +15,7 @@
 mod fit;
 mod history;
 mod parts;
+mod window;
 
 use arrayvec::ArrayVec;
 use serde::{Deserialize, Serialize};
@@ -23,18 +24,17 @@ use fit::{Fit, Points};
 use history::{History, Reading, mid_time_s};
 
 pub use parts::{
-    MAX_FIT_DEGREE, MAX_FIT_READINGS, MAX_PREDICT_DEGREE, MAX_TRANSITION_TICKS, Reversal, ReversalError,
-    ReversalParts,
+    FitWindow, MAX_FIT_DEGREE, MAX_FIT_READINGS, MAX_PREDICT_DEGREE, MAX_TRANSITION_TICKS, Reversal,
+    ReversalError, ReversalParts, TRANSITION_RANGE_S, Transition,
 };
+pub use window::MIN_ADAPTIVE_READINGS;
 
 use crate::later::Later;
 use crate::sample::{LasingMode, MAX_SENSORS, TickFlags};
 use crate::units::{Span, Timestamp};
 
-/// A reading farther than this many tick durations from the ticks to be bridged says nothing about them.
-pub const REACH_TICKS: f64 = 16.0;
-/// Most interpolated ticks that can wait for one two-sided fit (switches back to back).
-pub const MAX_LOST_TICKS: usize = 16;
+/// Most interpolated ticks that can wait for one two-sided fit: two of the longest transitions (switches back to back).
+pub const MAX_LOST_TICKS: usize = 2 * MAX_TRANSITION_TICKS as usize;
 
 /// What the substitution must know of a tick besides its increments.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -66,6 +66,8 @@ struct LostTick {
 
 /// Good readings on one side of a switch, with their abscissas (s).
 type Window<'a> = ArrayVec<(f64, &'a Reading), { MAX_FIT_READINGS as usize }>;
+/// Those of one sensor.
+type Side = ArrayVec<[f64; 2], { MAX_FIT_READINGS as usize }>;
 
 /// Memory of the substitution of one unit: all gyros switch together.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
@@ -144,7 +146,7 @@ impl Substitution {
     fn left_from(&self, reversal: Reversal, input: &TickInput) -> u8 {
         let changed = matches!((self.mode, input.mode), (Some(old), Some(new)) if old != new);
         if input.switch_command || (changed && !input.restart && !self.change_due) {
-            reversal.parts.transition_ticks
+            reversal.transition_ticks(input.duration)
         } else if input.restart {
             0
         } else {
@@ -176,7 +178,7 @@ impl Substitution {
         let mut resolved = true;
         // The switch before this one gets the fit that its readings allow; without any it is bridged
         // together with this one.
-        if self.after > 0 || self.is_overdue(input, None) {
+        if self.after > 0 || self.is_overdue(reversal, input, None) {
             resolved = self.resolve(reversal);
         }
         *flags |= TickFlags::INTERPOLATED;
@@ -184,8 +186,9 @@ impl Substitution {
         for (increment, predicted) in increments.iter_mut().zip(&predicted) {
             *increment = *predicted;
         }
+        let most = usize::from(reversal.reach_ticks(input.duration));
         let lost = self.lost.room();
-        if lost.is_full() {
+        while lost.len() >= most {
             lost.remove(0);
             resolved = false;
         }
@@ -204,7 +207,7 @@ impl Substitution {
     ) -> bool {
         let reading = Reading::new(input.end_time, input.duration, increments);
         let mut resolved = true;
-        if self.is_overdue(input, reading.as_ref()) {
+        if self.is_overdue(reversal, input, reading.as_ref()) {
             resolved = self.resolve(reversal);
         }
         if let Some(pending) = self.pending.take() {
@@ -226,7 +229,7 @@ impl Substitution {
     }
 
     /// Whether the readings after the switch are no longer to be waited for.
-    fn is_overdue(&self, input: &TickInput, reading: Option<&Reading>) -> bool {
+    fn is_overdue(&self, reversal: Reversal, input: &TickInput, reading: Option<&Reading>) -> bool {
         let Some(last) = self.lost.last() else {
             return false;
         };
@@ -234,7 +237,7 @@ impl Substitution {
         let nominal = known.map_or(last.duration, |reading| reading.duration);
         let waited = mid_time_s(input.end_time, input.duration, last.end_time)
             - mid_time_s(last.end_time, last.duration, last.end_time);
-        waited.abs() > REACH_TICKS * nominal.as_s()
+        waited.abs() > reach_s(reversal, nominal)
     }
 
     /// `P_pred` of the coming tick per sensor (rad); zero where nothing is known.
@@ -243,7 +246,7 @@ impl Substitution {
         let Some(newest) = self.history.newest() else {
             return predicted;
         };
-        let reach = REACH_TICKS * newest.duration.as_s();
+        let reach = reach_s(reversal, newest.duration);
         let x = mid_time_s(input.end_time, input.duration, input.end_time);
         let window = self.history.newest_first().take(reversal.parts.predict_readings.into());
         let window: Window<'_> = window
@@ -275,7 +278,7 @@ impl Substitution {
         }
         let parts = &reversal.parts;
         let origin = first.end_time;
-        let reach = REACH_TICKS * newest.duration.as_s();
+        let reach = reach_s(reversal, newest.duration);
         let near = |tick: &LostTick| {
             let edge = mid_time_s(tick.end_time, tick.duration, origin);
             move |(at, _): &(f64, &Reading)| (at - edge).abs() <= reach
@@ -298,14 +301,19 @@ impl Substitution {
         let mut any_restored = false;
         let mut restored = [0.0; MAX_SENSORS];
         for (sensor, restored) in restored.iter_mut().enumerate().take(last.sensors) {
-            let mut points: Points =
-                after_side.iter().filter_map(|(at, reading)| reading.point(*at, sensor)).collect();
-            if points.is_empty() {
+            let of_sensor = |side: &Window<'_>| -> Side {
+                side.iter().filter_map(|(at, reading)| reading.point(*at, sensor)).collect()
+            };
+            let (mut new, mut old) = (of_sensor(&after_side), of_sensor(&before_side));
+            if new.is_empty() {
                 // Nothing new is known of this sensor: the prediction stands.
                 resolved = false;
                 continue;
             }
-            points.extend(before_side.iter().filter_map(|(at, r)| r.point(*at, sensor)));
+            if parts.fit_window == FitWindow::Adaptive {
+                shorten(&mut old, &mut new, &waiting, origin, parts.fit_degree.into());
+            }
+            let points: Points = new.into_iter().chain(old).collect();
             let Some(fit) = Fit::new(&points, parts.fit_degree.into()) else {
                 continue;
             };
@@ -332,6 +340,22 @@ impl Substitution {
         }
         resolved
     }
+}
+
+/// How far a reading may be from a lost tick to say something about it (s), at ticks of a duration.
+fn reach_s(reversal: Reversal, duration: Span) -> f64 {
+    f64::from(reversal.reach_ticks(duration)) * duration.as_s()
+}
+
+/// Leaves the readings of one sensor, newest first on either side, that make the best fit over the lost ticks.
+fn shorten(old: &mut Side, new: &mut Side, lost: &[LostTick], origin: Timestamp, degree: usize) {
+    let bridged: ArrayVec<[f64; 2], MAX_LOST_TICKS> = (lost.iter().take(MAX_LOST_TICKS))
+        .map(|tick| [mid_time_s(tick.end_time, tick.duration, origin), tick.duration.as_s()])
+        .collect();
+    let outwards: Side = new.iter().rev().copied().collect();
+    let readings = window::choose(old, &outwards, &bridged, degree);
+    old.truncate(readings);
+    new.drain(..new.len().saturating_sub(readings));
 }
 
 #[cfg(test)]

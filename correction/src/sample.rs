@@ -58,12 +58,15 @@ impl LasingMode {
     }
 }
 
-/// Counts of one tick, split by half period of the dither.
+/// Counts of one tick, split by half period of the dither, in order of time.
+///
+/// The names are those of an instrument whose positive half always comes first. Where the dither's effect changes sign
+/// with the lasing mode, the negative half comes first in one of them: `positive` is the first half all the same.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct HalfPeriodCounts {
-    /// Counts in the positive half period, with the sign of rotation.
+    /// Counts in the tick's first half, with the sign of rotation.
     pub positive: i32,
-    /// Counts in the negative half period, with the sign of rotation.
+    /// Counts in its second half, with the sign of rotation.
     pub negative: i32,
 }
 

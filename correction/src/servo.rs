@@ -7,12 +7,17 @@
 //! f(t) = f0(T) − (f0 − f1)·e^(−2t/τ)
 //! ```
 //!
-//! A tick's counts are the sum over a positive and a negative half period of the dither, Δt/2 apart. While f
-//! is changing the halves do not cancel, and the tick shows an apparent rate that must be subtracted:
+//! A tick's counts are the sum over two half periods of the dither of opposite sign, Δt/2 apart. While f is changing
+//! the halves do not cancel, and the tick shows an apparent rate that must be subtracted:
 //!
 //! ```text
-//! ΔΩ_i = K·tanh(Δt/2τ)·(f_i − f0)        positive half period first
+//! ΔΩ_i = s·K·tanh(Δt/2τ)·(f_i − f0)      s: sign of the dither in the tick's first half
 //! ```
+//!
+//! The dither of a Zeeman laser is a magnetic field, and its effect changes sign with the lasing mode: where the
+//! electronics do not turn the field with the mode, the negative half comes first in mode −. So the counts are taken in
+//! order of time, c₁ and c₂, and s is the sign of c₁ − c₂. A frequency farther than f0/2 from f0 is not that of the dither:
+//! nothing is subtracted then.
 //!
 //! models §6 has Δt/2τ, the first term of the hyperbolic tangent; with the tangent the result is exact for any
 //! Δt (integrate the exponential over either half), and no duration, however broken, makes it large.
@@ -21,102 +26,26 @@
 //! that tick's halves do not cancel either, its own half-period counts measure `f_1 = f_i`, and it enters the
 //! two-sided fit over the switch (models §5, step 3), which would carry its error into the restored angle.
 
-use alloc::vec::Vec;
+mod decay;
+mod parts;
 
 use serde::{Deserialize, Serialize};
 
-use crate::curve::{Curve, CurveError, CurveParts};
+use decay::Decay;
+
+pub use parts::{
+    DEFAULT_SETTLE_TIME_CONSTANTS, SETTLE_RANGE, Servo, ServoError, ServoForm, ServoParts,
+    TIME_CONSTANT_RANGE_S,
+};
+
 use crate::lanes::Lanes;
 use crate::sample::{HalfPeriodCounts, MAX_SENSORS};
-use crate::stated::{OutOfRange, outside};
 use crate::units::{Span, Timestamp};
 
-/// Shortest and longest time constant of a servo (s).
-pub const TIME_CONSTANT_RANGE_S: [f64; 2] = [1e-4, 1e3];
-/// Fewest and most time constants after which the transient counts as settled.
-pub const SETTLE_RANGE: [f64; 2] = [1.0, 20.0];
-/// Time constants after which the transient counts as settled, where nothing else is stated: e⁻¹⁶ remains.
-pub const DEFAULT_SETTLE_TIME_CONSTANTS: f64 = 8.0;
-
+/// Share of f0 by which a frequency may differ from it and be the dither's: the miss of a switch costs less than that.
+const FARTHEST_FROM_REST: f64 = 0.5;
 /// Tick durations beyond which two ticks say nothing about the input's acceleration between them.
 const REACH_TICKS: f64 = 16.0;
-
-/// Where `f_i` comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub enum ServoForm {
-    /// From the half-period counts of each tick.
-    Measured,
-    /// From those of the first good tick and the exponential: less noise where τ is well known.
-    Modelled,
-}
-
-/// The servo of one gyro as the calibration document states it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ServoParts {
-    /// Where `f_i` comes from.
-    pub form: ServoForm,
-    /// τ (s, 10⁻⁴…10³).
-    pub time_constant_s: f64,
-    /// f0: dither frequency at rest (Hz: counts per second within a half period) over temperature (°C).
-    pub rest_frequency: CurveParts,
-    /// The correction stops this many τ after the transition (1…20).
-    pub settle_time_constants: f64,
-}
-
-/// What is wrong with a stated servo.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum ServoError {
-    /// A number is outside its range, or not a number.
-    #[error(transparent)]
-    OutOfRange(OutOfRange),
-    /// The rest frequency is not a valid curve.
-    #[error("rest_frequency: {0}")]
-    RestFrequency(CurveError),
-}
-
-/// A validated servo of one gyro.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Servo {
-    form: ServoForm,
-    time_constant_s: f64,
-    rest_frequency_hz: Curve,
-    settle_time_constants: f64,
-}
-
-impl Servo {
-    /// Validates a stated servo.
-    ///
-    /// # Errors
-    ///
-    /// Everything that is wrong with it.
-    pub fn new(parts: &ServoParts) -> Result<Self, Vec<ServoError>> {
-        let stated = outside([
-            ("time_constant_s", parts.time_constant_s, TIME_CONSTANT_RANGE_S),
-            ("settle_time_constants", parts.settle_time_constants, SETTLE_RANGE),
-        ]);
-        let mut errors: Vec<_> = stated.map(ServoError::OutOfRange).collect();
-        match Curve::new(&parts.rest_frequency) {
-            Ok(rest_frequency_hz) if errors.is_empty() => Ok(Self {
-                form: parts.form,
-                time_constant_s: parts.time_constant_s,
-                rest_frequency_hz,
-                settle_time_constants: parts.settle_time_constants,
-            }),
-            Ok(_) => Err(errors),
-            Err(error) => {
-                errors.push(ServoError::RestFrequency(error));
-                Err(errors)
-            }
-        }
-    }
-
-    /// Time after the transition from which nothing is subtracted (s).
-    #[must_use]
-    pub fn settle_time_s(&self) -> f64 {
-        self.settle_time_constants * self.time_constant_s
-    }
-}
 
 /// What the transient needs to know of one gyro in one good tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -140,10 +69,11 @@ pub enum Transient {
     Settled,
     /// The apparent rate to subtract (rad/s).
     Apparent {
-        /// `ΔΩ_i` of models §6.
+        /// `ΔΩ_i` of models §6, with the sign of the tick's first half.
         rate_rad_per_s: f64,
     },
-    /// There is a transient, but no half-period counts to take it from: nothing is subtracted.
+    /// There is a transient, but no half-period counts to take it from, or none that the dither explains: nothing is
+    /// subtracted.
     Unmeasured,
 }
 
@@ -165,8 +95,10 @@ pub struct ServoMemory {
     switching: bool,
     /// End of the last transition.
     settles_from: Option<Timestamp>,
-    /// Per gyro: middle of the first tick measured after the transition, and its `f_1` (Hz).
+    /// Per gyro: middle of the first tick measured after the transition, and its `s·f_1` (Hz).
     first: [Option<(Timestamp, f64)>; MAX_SENSORS],
+    /// Per gyro: the exponential through all ticks measured since then.
+    decays: [Decay; MAX_SENSORS],
     /// Per gyro: middle of the last good tick.
     last: [Timestamp; MAX_SENSORS],
     /// Per gyro: mean rate in it without the transient (counts/s); NaN where that is not known.
@@ -179,6 +111,7 @@ impl Default for ServoMemory {
             switching: false,
             settles_from: None,
             first: [None; MAX_SENSORS],
+            decays: [Decay::default(); MAX_SENSORS],
             last: [Timestamp::default(); MAX_SENSORS],
             last_mean_hz: [f64::NAN; MAX_SENSORS],
         }
@@ -214,23 +147,25 @@ impl ServoMemory {
     /// The apparent rate of gyro `sensor` in the tick of the last [`advance`](Self::advance). Call it for every good
     /// tick: the last one before a switch tells how the input accelerates over it.
     ///
-    /// Measured form: `f_i = (c⁺ − c⁻)/Δt + r·Δt/4` with the sign of rotation in the counts, since either half lasts
+    /// Measured form: `s·f_i = (c₁ − c₂)/Δt + r·Δt/4` with the sign of rotation in the counts, since either half lasts
     /// Δt/2 and `f_i` is half the difference of their rates. The input rate cancels in it, also one beyond the
     /// dither's own; its acceleration r (counts/s²) does not, and comes from this tick and the last good one. Modelled
     /// form: `f_1` is taken the same way from the first tick that has half-period counts, and decays from that
-    /// tick's middle.
+    /// tick's middle. Fitted form: see [`Decay`].
     pub fn apparent_rate(&mut self, sensor: usize, servo: &Servo, tick: &ServoTick) -> Transient {
         let middle = middle(tick.end_time, tick.duration);
         let mean_hz = tick.half_periods.map_or(f64::NAN, |counts| mean_hz(counts, tick.duration.as_s()));
         let (mut mean_left_hz, mut transient) = (mean_hz, Transient::Settled);
         if self.is_running(servo.settle_time_s(), middle) {
             let unbalance = libm::tanh(tick.duration.as_s() / (2.0 * servo.time_constant_s));
-            let excess_hz = self.frequency_excess_hz(sensor, servo, tick, (middle, mean_hz), unbalance);
-            mean_left_hz -= unbalance * excess_hz.unwrap_or(0.0);
-            let rate = excess_hz.map(|excess_hz| tick.scale_rad_per_count * unbalance * excess_hz);
-            transient = match rate.filter(|rate| rate.is_finite()) {
-                Some(rate_rad_per_s) => Transient::Apparent { rate_rad_per_s },
-                None => Transient::Unmeasured,
+            let found = self.excess(sensor, servo, tick, (middle, mean_hz), unbalance);
+            let excess = found.unwrap_or(Excess { sign: 1.0, hz: 0.0, taken_hz: 0.0 });
+            mean_left_hz -= excess.sign * (unbalance * excess.hz);
+            let rate = excess.sign * (tick.scale_rad_per_count * unbalance * excess.taken_hz);
+            transient = if found.is_some() && rate.is_finite() {
+                Transient::Apparent { rate_rad_per_s: rate }
+            } else {
+                Transient::Unmeasured
             };
         }
         if let (Some(last), Some(mean)) = (self.last.get_mut(sensor), self.last_mean_hz.get_mut(sensor)) {
@@ -266,32 +201,44 @@ impl ServoMemory {
         true
     }
 
-    /// `f_i − f0` (Hz), measured or modelled.
-    fn frequency_excess_hz(
+    /// `f_i − f0`, measured, modelled or fitted; `None` where there is nothing to take it from.
+    fn excess(
         &mut self,
         sensor: usize,
         servo: &Servo,
         tick: &ServoTick,
         (middle, mean_hz): (Timestamp, f64),
         unbalance: f64,
-    ) -> Option<f64> {
-        let rest_hz = servo.rest_frequency_hz.at(tick.temperature_deg_c).value;
+    ) -> Option<Excess> {
+        let rest_hz = servo.rest_frequency_hz.at(tick.temperature_deg_c).value.abs();
         let measured = tick.half_periods.and_then(|counts| {
-            let excess = frequency_hz(counts, tick.duration)? - rest_hz;
+            let signed_hz = frequency_hz(counts, tick.duration)?;
+            let sign = if signed_hz < 0.0 { -1.0 } else { 1.0 };
             let (weight, change) = self.input_change(sensor, tick.duration.as_s(), (middle, mean_hz));
             // The change of rate since the last tick has `unbalance` times the excess itself in it.
-            Some((excess + weight * change) / (1.0 + weight * unbalance))
+            let hz = (sign * signed_hz - rest_hz + sign * (weight * change)) / (1.0 + weight * unbalance);
+            (hz.abs() <= FARTHEST_FROM_REST * rest_hz).then_some(Excess { sign, hz, taken_hz: hz })
         });
         if servo.form == ServoForm::Measured {
             return measured;
         }
         let first = self.first.get_mut(sensor)?;
         if first.is_none() {
-            *first = measured.map(|excess| (middle, rest_hz + excess));
+            *first = measured.map(|excess| (middle, excess.sign * (rest_hz + excess.hz)));
         }
         let (since, first_hz) = (*first)?;
+        let sign = if first_hz < 0.0 { -1.0 } else { 1.0 };
         let decay = libm::exp(-2.0 * middle.seconds_from(since) / servo.time_constant_s);
-        Some((first_hz - rest_hz) * decay)
+        if servo.form == ServoForm::Modelled {
+            let hz = (first_hz.abs() - rest_hz) * decay;
+            return Some(Excess { sign, hz, taken_hz: hz });
+        }
+        // A half that came first before comes first now: a tick that says otherwise is broken.
+        let measured = measured.filter(|excess| excess.sign.to_bits() == sign.to_bits());
+        let gain = unbalance * tick.duration.as_s();
+        let (hz, taken_s) =
+            self.decays.get_mut(sensor)?.take(decay, measured.map(|excess| excess.hz), gain)?;
+        Some(Excess { sign, hz, taken_hz: taken_s / gain })
     }
 
     /// Change of the mean rate since the last good tick (counts/s), and the weight with which it stands for r·Δt/4;
@@ -306,17 +253,28 @@ impl ServoMemory {
     }
 }
 
+/// What the dither's frequency is in excess of its rest value in a tick.
+#[derive(Debug, Clone, Copy)]
+struct Excess {
+    /// Sign of the dither in the tick's first half.
+    sign: f64,
+    /// `f_i − f0` (Hz).
+    hz: f64,
+    /// The same with what earlier ticks took too little of (Hz).
+    taken_hz: f64,
+}
+
 /// Middle of a tick.
 fn middle(end_time: Timestamp, duration: Span) -> Timestamp {
     end_time - Span::from_ns(duration.as_ns() / 2)
 }
 
-/// `(c⁺ + c⁻)/Δt` (counts/s).
+/// `(c₁ + c₂)/Δt` (counts/s).
 fn mean_hz(counts: HalfPeriodCounts, duration_s: f64) -> f64 {
     (f64::from(counts.positive) + f64::from(counts.negative)) / duration_s
 }
 
-/// `f_i = (c⁺ − c⁻)/Δt` (Hz); `None` for a tick without duration.
+/// `s·f_i = (c₁ − c₂)/Δt` (Hz); `None` for a tick without duration.
 fn frequency_hz(counts: HalfPeriodCounts, duration: Span) -> Option<f64> {
     let difference = f64::from(counts.positive) - f64::from(counts.negative);
     (duration > Span::ZERO).then(|| difference / duration.as_s())

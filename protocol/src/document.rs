@@ -23,6 +23,7 @@ mod check;
 mod convert;
 mod correction_change;
 mod curve;
+mod defaults;
 mod defects;
 mod difference;
 mod measure;
@@ -51,9 +52,9 @@ pub use measure::{Argument, Unit};
 pub use reference::reference;
 pub use types::{
     Accel, AccelLag, AccelOrientation, AccelOutput, AccelParity, AccelSensor, Branches, Channel, Created,
-    Document, Drift, Filter, Gyro, GyroOrientation, GyroOutput, GyroParity, GyroSensor, Lag, Log, Measure,
-    ModeReversal, Orientation, OrientationThermal, Origin, Residual, Sample, SelfTest, SelfTestCounter,
-    SelfTestVoltage, Servo, ServoKind, Temperature, Trend,
+    Document, Drift, Filter, FitWindow, Gyro, GyroOrientation, GyroOutput, GyroParity, GyroSensor, Lag, Log,
+    Measure, ModeReversal, Orientation, OrientationThermal, Origin, Residual, Sample, SelfTest,
+    SelfTestCounter, SelfTestVoltage, Servo, ServoKind, Temperature, Trend,
 };
 
 /// Oldest version of the document's form that is still read.
@@ -105,6 +106,7 @@ impl Document {
         if let Some(origin) = &mut document.origin {
             origin.details = reader.free_table("origin.details");
         }
+        defaults::complete(&reader, &mut document);
         check::check(&mut reader, &document);
         let compiled = Calibration::new(&document.to_parts());
         if let Err(defects) = &compiled {

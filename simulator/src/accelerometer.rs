@@ -119,6 +119,11 @@ impl AccelerometersState {
         self.sensors.iter().map(|state| state.deg_c.at(share)).collect()
     }
 
+    /// Input axes at a housing temperature.
+    pub(crate) fn axes(&self, housing_deg_c: f64) -> Sensors<[f64; 3]> {
+        self.orientation.axes(housing_deg_c)
+    }
+
     /// Readings of a tick; `extra` is added to each sensor's specific force (m/s²).
     pub(crate) fn tick(
         &mut self,

@@ -2,7 +2,8 @@
 
 use crate::accelerometer::{AccelerometerOutput, Accelerometers};
 use crate::check::{ANY, DEG_C, NOT_NEGATIVE, POSITIVE, Report, at, nth};
-use crate::error::Key;
+use crate::effects::{Effects, Play};
+use crate::error::{Key, ScenarioError};
 use crate::fibre_optic::FibreOpticGyro;
 use crate::instrument::{Gyros, Instrument};
 use crate::mems::MemsGyro;
@@ -44,6 +45,41 @@ pub(crate) fn instrument(report: &mut Report, instrument: &Instrument, tick_s: f
     }
     if let Some(block) = &instrument.accelerometers {
         accelerometers(report, block);
+    }
+    effects(report, instrument);
+}
+
+fn effects(report: &mut Report, instrument: &Instrument) {
+    let Effects { gyros, accelerometers } = &instrument.effects;
+    let accels = instrument.accelerometers.as_ref().map_or(0, |block| block.sensors.len());
+    for (path, got, expected) in [
+        ("instrument.effects.gyros", gyros.len(), instrument.gyros.count()),
+        ("instrument.effects.accelerometers", accelerometers.len(), accels),
+    ] {
+        if got != 0 && got != expected {
+            report.0.push(ScenarioError::Length { key: at(path), got, expected });
+        }
+    }
+    let play = |report: &mut Report, key, play: Option<Play>| {
+        if let Some(Play { half_width_k, per_k }) = play {
+            report.number(key, half_width_k, POSITIVE);
+            report.number(key, per_k, ANY);
+        }
+    };
+    for (index, gyro) in gyros.iter().enumerate() {
+        let key = nth("instrument.effects.gyros", index);
+        report.numbers(key, &gyro.acceleration_rad_per_s_per_m_per_s2, (-1.0, 1.0));
+        report.numbers(key, &gyro.acceleration_per_k, (-1.0, 1.0));
+        report.number(key, gyro.reference_deg_c, DEG_C);
+        report.number(key, gyro.scale_asymmetry, (-0.1, 0.1));
+        report.number(key, gyro.scale_curvature_s2_per_rad2, (-1.0, 1.0));
+        play(report, key, gyro.play);
+    }
+    for (index, accel) in accelerometers.iter().enumerate() {
+        let key = nth("instrument.effects.accelerometers", index);
+        report.numbers(key, &accel.position_m, (-10.0, 10.0));
+        report.number(key, accel.second_order_s2_per_m, (-1.0, 1.0));
+        play(report, key, accel.play);
     }
 }
 
@@ -90,6 +126,7 @@ fn zeeman(report: &mut Report, index: usize, gyro: &ZeemanGyro) {
     report.numbers(key, &gyro.bias_magnetic_rad_per_s, ANY);
     report.numbers(key, &gyro.meander_rad_per_s, ANY);
     report.numbers(key, &gyro.dither_hz, (-1e7, 1e7));
+    report.number(key, gyro.lock_in_rad_per_s, (0.0, 10.0));
 }
 
 fn fibre(report: &mut Report, index: usize, gyro: &FibreOpticGyro) {

@@ -5,6 +5,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::accelerometer::Accelerometers;
+use crate::effects::Effects;
 use crate::fibre_optic::FibreOpticGyro;
 use crate::mems::MemsGyro;
 use crate::orientation::Orientation;
@@ -35,6 +36,9 @@ pub struct Instrument {
     pub accelerometers: Option<Accelerometers>,
     /// The temperature channels.
     pub thermometers: Thermometers,
+    /// What the sensors do beyond the models of their kinds.
+    #[serde(default, skip_serializing_if = "Effects::is_none")]
+    pub effects: Effects,
 }
 
 /// The gyros of a unit, all of one kind.

@@ -29,6 +29,7 @@
 //! | [`fibre_optic`], [`coil`], [`winding`] | fibre gyro; heat conduction in its coil; Shupe integral |
 //! | [`mems`] | micromechanical gyro |
 //! | [`accelerometer`] | quartz and micromechanical accelerometers |
+//! | [`effects`] | what sensors do beyond that: drift with acceleration, bent scales, lever arms, squares, friction |
 //! | [`temperature`] | temperature channels |
 //! | [`failure`] | sensors that fail |
 //! | [`instrument`], [`scenario`] | a unit; a unit in its surroundings |
@@ -42,6 +43,7 @@ mod check;
 mod check_instrument;
 pub mod coil;
 mod counter;
+pub mod effects;
 pub mod error;
 pub mod failure;
 pub mod fibre_optic;

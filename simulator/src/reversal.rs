@@ -25,6 +25,11 @@ pub struct Reversal {
     pub miss_rms_wavelengths: f64,
     /// Curvature c of the dither frequency over the miss m: f = f0·(1 − c·m²) (≥ 0). The loss is cut off at ½.
     pub dither_curvature: f64,
+    /// Whether the dither turns with the lasing mode, as a magnetic field's effect on a Zeeman laser does: then the
+    /// negative half of a tick comes first in the minus mode. False for electronics that invert the field with the mode, so
+    /// that the positive half always comes first.
+    #[serde(default)]
+    pub dither_turns_with_mode: bool,
     /// Half period of the slow meander (s, ≥ 0); 0 for one that is not reported and has the sign +1 throughout.
     #[serde(default)]
     pub meander_half_period_s: f64,
@@ -114,6 +119,7 @@ mod tests {
         servo_time_constant_s: 0.04,
         miss_rms_wavelengths: 0.05,
         dither_curvature: 10.0,
+        dither_turns_with_mode: false,
         meander_half_period_s: 0.5,
     };
 

@@ -5,6 +5,7 @@ use isotherm_correction::units::{Span, Timestamp};
 
 use crate::accelerometer::AccelerometersState;
 use crate::chamber::Chamber;
+use crate::effects::EffectsState;
 use crate::error::ScenarioErrors;
 use crate::failure::{FailingSensor, Failures};
 use crate::gyros::{GyroOutput, GyrosState, TickTime};
@@ -37,6 +38,7 @@ pub struct Simulation {
     accelerometers: Option<AccelerometersState>,
     thermometers: ThermometersState,
     failures: Failures,
+    effects: EffectsState,
     last_gyro: GyroOutput,
     last_accel: Sensors<f64>,
 }
@@ -74,6 +76,7 @@ impl Simulation {
             accelerometers: block.map(|block| AccelerometersState::new(block, seed, step_s, initial)),
             thermometers: ThermometersState::new(&instrument.thermometers, seed),
             failures: Failures::new(&scenario.failures),
+            effects: EffectsState::new(&instrument.effects),
             surroundings,
             last_gyro: GyroOutput::default(),
             last_accel: Sensors::new(),
@@ -108,16 +111,18 @@ impl Simulation {
             if let Some(accelerometers) = &mut self.accelerometers {
                 accelerometers.thermal_step(from_deg_c, to_deg_c);
             }
+            let accels = self.accelerometers.as_ref().map(|block| block.deg_c(1.0)).unwrap_or_default();
+            self.effects.thermal_step(&self.gyros.sensor_deg_c(1.0), &accels);
         }
     }
 
-    /// Input angles of the two halves of the tick for each gyro, and the increments of the whole.
+    /// Input angles of the two halves of the tick for each gyro, and the increments of either; without dither the whole is the first.
     fn inputs(
         &self,
         middle_s: f64,
         length_s: f64,
         axes: &Sensors<[f64; 3]>,
-    ) -> (Sensors<[f64; 2]>, Increments) {
+    ) -> (Sensors<[f64; 2]>, [Increments; 2]) {
         let (first, second) = if self.gyros.is_dithered() {
             let half_s = 0.5 * length_s;
             let half = |sign: f64| self.trajectory.increments(middle_s + sign * 0.5 * half_s, half_s);
@@ -126,7 +131,7 @@ impl Simulation {
             (self.trajectory.increments(middle_s, length_s), Increments::default())
         };
         let halves = axes.iter().map(|&axis| [dot(axis, first.angle), dot(axis, second.angle)]);
-        (halves.collect(), first.plus(second))
+        (halves.collect(), [first, second])
     }
 
     fn fail_gyros(&mut self, output: &mut GyroOutput, time_s: f64) {
@@ -168,8 +173,13 @@ impl Simulation {
         let share = self.surroundings.share(middle_s);
         let deg_c = (self.surroundings.housing_deg_c(share), self.surroundings.board_deg_c(share));
         let failures = &self.failures;
-        let extra = |index| failures.extra(FailingSensor::Accelerometer(index), middle_s);
-        let mut readings = self.accelerometers.as_mut()?.tick(velocity, length_s, deg_c, share, extra);
+        let block = self.accelerometers.as_mut()?;
+        let felt = self.effects.feel(&self.trajectory, (middle_s, length_s), || block.axes(deg_c.0), share);
+        let extra = |index| {
+            let felt = felt.get(index).copied().unwrap_or_default();
+            failures.extra(FailingSensor::Accelerometer(index), middle_s) + felt
+        };
+        let mut readings = block.tick(velocity, length_s, deg_c, share, extra);
         if !self.failures.is_empty() {
             self.fail_accelerometers(&mut readings, middle_s);
         }
@@ -202,7 +212,13 @@ impl Simulation {
         self.advance_to(middle_s);
         let share = self.surroundings.share(middle_s);
         let axes = self.gyro_orientation.axes(self.surroundings.housing_deg_c(share));
-        let (mut halves, whole) = self.inputs(middle_s, length_s, &axes);
+        let (mut halves, parts) = self.inputs(middle_s, length_s, &axes);
+        let whole = parts[0].plus(parts[1]);
+        let mut drifts = Sensors::new();
+        if self.effects.has_gyros() {
+            let deg_c = self.gyros.sensor_deg_c(share);
+            drifts = self.effects.sense(&mut halves, &parts, length_s, &deg_c, share);
+        }
         if !self.failures.is_empty() {
             for (index, halves) in halves.iter_mut().enumerate() {
                 let extra = self.failures.extra(FailingSensor::Gyro(index), middle_s) * 0.5 * length_s;
@@ -216,6 +232,7 @@ impl Simulation {
             share,
         };
         let mut output = self.gyros.tick(&halves, time);
+        output.drift_rad_per_s.iter_mut().zip(drifts).for_each(|(drift, more)| *drift += more);
         if !self.failures.is_empty() {
             self.fail_gyros(&mut output, middle_s);
         }

@@ -1,7 +1,8 @@
 //! Zeeman laser gyro: a dithered counter, two lasing modes, and a perimeter servo.
 //!
-//! The counter's frequency is ±f(t) + Ω/K: the dither f is positive in the first half of each tick and negative
-//! in the second, Ω is input rate plus bias. While the servo pulls the perimeter in, f grows to its rest value and
+//! The counter's frequency is ±f(t) + Ω/K: the dither f has one sign in the first half of each tick and the other in the
+//! second, Ω is input rate plus bias. Which sign comes first is a matter of wiring: the dither is a magnetic field, whose
+//! effect turns with the lasing mode unless the electronics invert it with the mode. While the servo pulls the perimeter in, f grows to its rest value and
 //! the halves do not cancel; the tick then carries an apparent rate, which is integrated here in closed form.
 
 use isotherm_correction::sample::{HalfPeriodCounts, LasingMode};
@@ -54,6 +55,10 @@ pub struct ZeemanGyro {
     pub meander_rad_per_s: [f64; 2],
     /// Rest value f0 of the dither frequency (Hz) by powers of T − T₀.
     pub dither_hz: [f64; 3],
+    /// Static lock-in rate L (rad/s, ≥ 0): below it the counter stands still, above it counts √(R² − L²) of a rate R, dither
+    /// included. So the scale bends where the input comes near the dither's amplitude.
+    #[serde(default)]
+    pub lock_in_rad_per_s: f64,
     /// Noise.
     #[serde(default)]
     pub noise: GyroNoise,
@@ -151,12 +156,16 @@ impl ZeemanState {
         if phase.lost {
             return self.rubbish(dither_hz * 0.5 * length_s, drift_rad_per_s);
         }
-        let dither_counts = self.dither_counts(dither_hz, length_s, phase.servo_starts);
+        let turned = self.reversal.dither_turns_with_mode && phase.mode == LasingMode::Minus;
+        let sign = if turned { -1.0 } else { 1.0 };
+        let dither_counts =
+            self.dither_counts(dither_hz, length_s, phase.servo_starts).map(|counts| sign * counts);
         let own_rad = 0.5 * (drift_rad_per_s * length_s + noise_rad);
-        let positive =
-            self.counter.count((halves_rad[0] + own_rad) / scale_rad + dither_counts[0], self.quantised);
-        let negative =
-            self.counter.count((halves_rad[1] + own_rad) / scale_rad - dither_counts[1], self.quantised);
+        let lock_in = self.gyro.lock_in_rad_per_s * 0.5 * length_s / scale_rad;
+        let first = beat((halves_rad[0] + own_rad) / scale_rad + dither_counts[0], lock_in);
+        let second = beat((halves_rad[1] + own_rad) / scale_rad - dither_counts[1], lock_in);
+        let positive = self.counter.count(first, self.quantised);
+        let negative = self.counter.count(second, self.quantised);
         ZeemanTick {
             counts: positive + negative,
             halves: HalfPeriodCounts { positive: whole(positive), negative: whole(negative) },
@@ -197,6 +206,15 @@ impl ZeemanState {
         let first = self.dither_loss * begin * (1.0 - half) * rest_hz / rate_per_s;
         [rest - first, rest - first * half]
     }
+}
+
+/// Counts of a half period at a constant rate that would give `counts` without lock-in, which holds up to `lock_in` of them: the
+/// mean of Adler's equation.
+fn beat(counts: f64, lock_in: f64) -> f64 {
+    if lock_in <= 0.0 {
+        return counts;
+    }
+    libm::copysign(libm::sqrt((counts * counts - lock_in * lock_in).max(0.0)), counts)
 }
 
 #[expect(

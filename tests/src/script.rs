@@ -110,6 +110,10 @@ pub struct Script {
     pub mode_late: u64,
     /// Half-period counts come with the ticks of an instrument with modes.
     pub halves: bool,
+    /// Frequency of the dither that they are counts of (Hz).
+    pub dither_hz: f64,
+    /// The dither turns with the lasing mode: its negative half comes first in the minus mode.
+    pub dither_turns: bool,
     /// Ticks of half a period of the slow meander; 0 where it stays as it is.
     pub meander: u64,
     /// A gyro that fails, and from which tick on.
@@ -160,6 +164,8 @@ impl Script {
             commands: Vec::new(),
             mode_late: 0,
             halves: true,
+            dither_hz: 60_000.0,
+            dither_turns: false,
             meander: 0,
             fails: None,
             odd: Vec::new(),

@@ -44,8 +44,8 @@ pub(super) struct ModesArgs {
     /// Order of the slow meander, 0 or 1; chosen by cross-validation without it
     #[arg(long, value_name = "ORDER", value_parser = clap::value_parser!(u8).range(0..=1))]
     meander_order: Option<u8>,
-    /// Ticks that a switch loses, 1 to 3; found in the log without it
-    #[arg(long, value_name = "TICKS", value_parser = clap::value_parser!(u8).range(1..=3))]
+    /// Ticks that a switch loses, 1 to 32; found in the log without it
+    #[arg(long, value_name = "TICKS", value_parser = clap::value_parser!(u8).range(1..=32))]
     transition_ticks: Option<u8>,
     /// Leave out this much behind every switch (s); without it, as long as the servo's transient lasts
     #[arg(long, value_name = "SECONDS")]

@@ -18,8 +18,9 @@ use crate::swapped::Shown;
 const SWITCHES: usize = 8;
 /// Largest share by which one mode may have more ticks than the other.
 const UNBALANCE: f64 = 0.2;
-/// Most ticks that a document can bridge.
+/// Most ticks that a switch loses, however long they are, and longest time that it takes (s) [003].
 const TRANSITION_TICKS: usize = 3;
+const TRANSITION_S: f64 = 0.015;
 /// Largest share of missing ticks.
 const MISSING: f64 = 0.05;
 /// Largest share of ticks with an invalid gyro, or a stale temperature.
@@ -118,9 +119,11 @@ pub fn before(switches: &Switches, document: &Document, transition_ticks: Option
     // What else is wrong with the readings makes them look lost too.
     let lost = switches.transition_ticks();
     if transition_ticks.is_none() && reasons.is_empty() {
-        if lost > TRANSITION_TICKS {
+        let is_longer = real(lost.saturating_sub(1) as u64) * switches.tick_s > TRANSITION_S;
+        if lost > TRANSITION_TICKS && is_longer {
+            let ms = short(1e3 * TRANSITION_S);
             reasons.push(format!(
-                "readings are lost up to tick {lost} behind a switch, the correction bridges {TRANSITION_TICKS}: does the log mark the \
+                "readings are lost up to tick {lost} behind a switch, which takes {ms} ms at most: does the log mark the \
                  tick of the command? State --transition-ticks to leave it at that"
             ));
         } else if lost == 0 {

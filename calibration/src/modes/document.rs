@@ -24,7 +24,8 @@ const PER_DEG_C: f64 = 10.0;
 pub fn bare(base: &Document, transition_ticks: u8, servos: &[Option<Servo>]) -> Document {
     let mut document = base.clone();
     let reversal = document.mode_reversal.take().unwrap_or_default();
-    document.mode_reversal = Some(ModeReversal { transition_ticks, ..reversal });
+    let (transition_ticks, transition_s) = (Some(transition_ticks), None);
+    document.mode_reversal = Some(ModeReversal { transition_ticks, transition_s, ..reversal });
     for (sensor, servo) in document.gyro.sensor.iter_mut().zip(servos) {
         sensor.static_bias = None;
         sensor.magnetic_bias = None;

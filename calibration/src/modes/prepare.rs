@@ -1,5 +1,6 @@
 //! What the procedure needs before it fits: windows, lost ticks, the Earth, a look at what was gathered.
 
+use isotherm_correction::units::Span;
 use isotherm_protocol::document::{Curve, Document, Servo, ServoKind, Shape};
 
 use super::cells::{Cell, Gathered};
@@ -29,7 +30,8 @@ pub(super) fn groups(sensors: usize) -> Vec<[usize; 3]> {
 }
 
 pub(super) fn transition_ticks(wanted: &Wanted<'_>, switches: &Switches, warnings: &mut Vec<String>) -> u8 {
-    let stated = wanted.base.mode_reversal.as_ref().map(|reversal| reversal.transition_ticks);
+    let tick = Span::from_s(switches.tick_s);
+    let stated = wanted.base.mode_reversal.as_ref().map(|reversal| reversal.ticks(tick));
     if let Some(given) = wanted.transition_ticks {
         return given;
     }

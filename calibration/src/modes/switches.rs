@@ -35,6 +35,8 @@ pub struct Behind {
     pub tick_s: f64,
     /// Dither frequency (Hz) by sensor and tick from the command on; empty where the instrument has no half-period counts.
     pub dither_hz: Vec<Vec<f64>>,
+    /// Whether the negative half comes first in most of these ticks, by sensor, likewise.
+    pub is_negative_first: Vec<bool>,
 }
 
 /// All switches of some runs.
@@ -226,6 +228,10 @@ impl Eye {
             dither_hz: (0..sensors)
                 .filter_map(|sensor| behind.iter().map(|tick| dither_hz(tick, sensor)).collect())
                 .collect(),
+            is_negative_first: (0..sensors)
+                .filter_map(|sensor| behind.iter().map(|tick| difference(tick, sensor)).collect())
+                .map(|differences: Vec<f64>| median(&differences) < 0.0)
+                .collect(),
         });
         self.before.clear();
     }
@@ -249,7 +255,7 @@ impl Limits {
         let readings: Vec<f64> = near.iter().filter_map(|tick| tick.readings.get(sensor).copied()).collect();
         let differences: Vec<f64> = near.iter().filter_map(|tick| difference(tick, sensor)).collect();
         let sigma = scatter(&readings);
-        let difference = (!differences.is_empty()).then(|| median(&differences));
+        let difference = (!differences.is_empty()).then(|| median(&differences).abs());
         let floor = difference.map_or(FAR_COUNTS, |counts| DITHER_SHARES[1] * counts.abs());
         let floor =
             if readings.iter().filter(|reading| reading.is_finite()).all(|reading| reading.fract() == 0.0) {
@@ -265,13 +271,15 @@ impl Limits {
         let reading =
             tick.readings.get(sensor).is_some_and(|reading| (reading - self.reading).abs() > self.far);
         let halves = match (self.difference, difference(tick, sensor)) {
-            (Some(usual), Some(now)) => (now - usual).abs() > DITHER_SHARES[0] * usual.abs(),
+            // The half that came first before the switch may come second after it.
+            (Some(usual), Some(now)) => (now.abs() - usual).abs() > DITHER_SHARES[0] * usual,
             _ => false,
         };
         reading || halves
     }
 }
 
+/// Counts of a tick's first half less those of its second: negative where the dither's negative half comes first.
 fn difference(tick: &GyroTick, sensor: usize) -> Option<f64> {
     tick.half_periods.get(sensor).map(|counts| f64::from(counts.positive) - f64::from(counts.negative))
 }
@@ -279,7 +287,7 @@ fn difference(tick: &GyroTick, sensor: usize) -> Option<f64> {
 /// Dither frequency of a gyro in a tick (Hz), where it has half-period counts (models §6).
 pub(super) fn dither_hz(tick: &GyroTick, sensor: usize) -> Option<f64> {
     let seconds = tick.duration.as_s();
-    difference(tick, sensor).filter(|_| seconds > 0.0).map(|counts| counts / seconds)
+    difference(tick, sensor).filter(|_| seconds > 0.0).map(|counts| counts.abs() / seconds)
 }
 
 /// How many ticks behind a switch are kept.

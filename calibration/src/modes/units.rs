@@ -120,5 +120,8 @@ fn dither_hz(switches: &Switches, sensor: usize) -> Option<f64> {
     };
     let hz: Vec<f64> =
         switches.behind.iter().filter_map(|behind| settled(behind.dither_hz.get(sensor)?)).collect();
-    (!hz.is_empty()).then(|| median(&hz))
+    // The half that comes first may change with the mode, but is not the negative one in both.
+    let mut firsts = switches.behind.iter().filter_map(|behind| behind.is_negative_first.get(sensor));
+    let sign = if firsts.all(|negative| *negative) { -1.0 } else { 1.0 };
+    (!hz.is_empty()).then(|| sign * median(&hz))
 }

@@ -52,10 +52,11 @@ pub(super) fn notes(document: &Document, terms: &[Term]) -> Vec<String> {
         ));
     }
     if let Some(reversal) = &document.mode_reversal {
-        notes.push(format!(
-            "At a switch of the lasing mode {} ticks are substituted.",
-            reversal.transition_ticks
-        ));
+        let transition = match (reversal.transition_ticks, reversal.transition_s) {
+            (Some(ticks), _) => format!("{ticks} ticks"),
+            (None, transition_s) => format!("the ticks of {} s", short(transition_s.unwrap_or_default())),
+        };
+        notes.push(format!("At a switch of the lasing mode {transition} are substituted."));
     }
     if terms.is_empty() {
         notes.push("No term depends on temperature.".to_owned());

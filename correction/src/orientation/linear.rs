@@ -30,13 +30,23 @@ pub(super) fn is_conditioned(rows: &Rows, limit: f64) -> bool {
 
 /// Ratio of the largest to the smallest singular value; infinite or NaN for a singular or broken matrix.
 pub(super) fn condition_number(rows: &Rows) -> f64 {
+    let [smallest, largest] = squares(rows);
+    if smallest <= 0.0 { f64::INFINITY } else { libm::sqrt(largest / smallest) }
+}
+
+/// Smallest and largest singular value; zero for the smallest of a singular matrix, NaN for those of a broken one.
+pub(super) fn singular_values(rows: &Rows) -> [f64; 2] {
+    squares(rows).map(libm::sqrt)
+}
+
+/// Squares of the smallest and the largest singular value, not below zero; NaN for those of a broken matrix.
+fn squares(rows: &Rows) -> [f64; 2] {
     let gram = gram(rows);
     if gram.iter().any(|value| !value.is_finite()) {
-        return f64::NAN;
+        return [f64::NAN; 2];
     }
     let eigenvalues = gram.symmetric_eigenvalues();
-    let (smallest, largest) = (eigenvalues.min(), eigenvalues.max());
-    if smallest <= 0.0 { f64::INFINITY } else { libm::sqrt(largest / smallest) }
+    [eigenvalues.min().max(0.0), eigenvalues.max()]
 }
 
 /// Q with orthonormal columns and upper triangular R, A = Q·R; `None` where A has no full rank.

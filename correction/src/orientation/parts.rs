@@ -85,6 +85,19 @@ pub enum OrientationError {
         /// Largest one allowed.
         limit: f64,
     },
+    /// The axes come too close to one plane at a temperature within the range.
+    #[error(
+        "C(T) has condition number {got} at {temperature_deg_c} °C, within range_deg_c; at most {limit} is allowed: check sign and \
+         unit of the slopes, or narrow range_deg_c"
+    )]
+    ConditionInside {
+        /// The temperature (°C).
+        temperature_deg_c: f64,
+        /// Condition number there.
+        got: f64,
+        /// Largest one allowed.
+        limit: f64,
+    },
     /// A weight is zero or negative.
     #[error("weight {index} is {got}; it must be above 0")]
     WeightNotPositive {
@@ -129,6 +142,7 @@ impl OrientationError {
             Self::EmptyRange { .. } => "range_deg_c",
             Self::ParityLimit { .. } => "parity_limit",
             Self::ParityConfirm => "parity_confirm_ticks",
+            Self::ConditionInside { .. } => "slopes_per_deg_c",
             Self::RowCount { .. } | Self::RowNorm { .. } | Self::Condition { .. } => "rows",
         }
     }

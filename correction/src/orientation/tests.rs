@@ -1,3 +1,4 @@
+use alloc::string::ToString as _;
 use alloc::vec;
 use alloc::vec::Vec;
 
@@ -354,4 +355,54 @@ proptest! {
             }
         }
     }
+}
+
+/// Axes of which two come to point the same way where `slope`·(T − 20 °C) is one.
+fn closing(slope: f64, range_deg_c: [f64; 2]) -> OrientationParts {
+    let mut stated = parts(identity());
+    stated.slopes_per_deg_c = vec![[0.0, slope, 0.0], [slope, 0.0, 0.0], [0.0; 3]];
+    stated.range_deg_c = range_deg_c;
+    stated
+}
+
+#[test]
+fn axes_that_are_in_one_plane_within_their_range_are_refused() {
+    // At 20 °C the condition number is 1, at either end 3, and at 50 °C there is no inverse.
+    let stated = closing(1.0 / 30.0, [20.0, 80.0]);
+    for at in [20.0, 80.0] {
+        assert!(
+            Orientation::new(&OrientationParts { range_deg_c: [at; 2], ..stated.clone() }).is_ok(),
+            "{at}"
+        );
+    }
+    let errors = Orientation::new(&stated).unwrap_err();
+    let [OrientationError::ConditionInside { temperature_deg_c, got, limit }] = errors[..] else {
+        panic!("{errors:?}")
+    };
+    assert!((temperature_deg_c - 50.0).abs() < 1.0 && got > limit, "{temperature_deg_c}, {got}");
+    let words = errors[0].to_string();
+    assert!(words.contains("at most 100") && words.contains("range_deg_c"), "{words}");
+    // A spike between the looks of any sampling: a singular temperature that is no round number, in a wide range.
+    for singular in [50.000_000_123, 33.333_333_333, 79.99] {
+        let errors = Orientation::new(&closing(1.0 / (singular - 20.0), [10.0, 500.0])).unwrap_err();
+        let [OrientationError::ConditionInside { temperature_deg_c, .. }] = errors[..] else {
+            panic!("{singular}: {errors:?}")
+        };
+        assert!((temperature_deg_c - singular).abs() < 0.03 * (singular - 20.0), "{temperature_deg_c}");
+    }
+    // The matrix shrinks to nothing at one temperature, with condition 1 everywhere else.
+    let mut vanishing = parts(identity());
+    vanishing.slopes_per_deg_c = identity().into_iter().map(|row| row.map(|c| -0.1 * c)).collect();
+    let errors = Orientation::new(&vanishing).unwrap_err();
+    assert!(
+        matches!(errors[..], [OrientationError::ConditionInside { temperature_deg_c, .. }] if (temperature_deg_c - 30.0).abs() < 1e-6),
+        "{errors:?}"
+    );
+}
+
+#[test]
+fn axes_that_come_close_to_one_plane_and_keep_off_it_are_taken() {
+    // (1 + s)/(1 − s) = 99 at s = 0.98.
+    assert!(Orientation::new(&closing(0.98 / 60.0, [-40.0, 80.0])).is_ok());
+    assert!(Orientation::new(&closing(0.981 / 60.0, [-40.0, 80.0])).is_err());
 }

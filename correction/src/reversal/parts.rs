@@ -4,10 +4,14 @@ use alloc::vec::Vec;
 
 use serde::{Deserialize, Serialize};
 
+use super::window::MIN_ADAPTIVE_READINGS;
 use crate::stated::{OutOfRange, outside};
+use crate::units::Span;
 
 /// Most ticks of one transition.
-pub const MAX_TRANSITION_TICKS: u8 = 3;
+pub const MAX_TRANSITION_TICKS: u8 = 32;
+/// Shortest and longest time that a transition may be stated to take (s).
+pub const TRANSITION_RANGE_S: [f64; 2] = [1e-4, 1.0];
 /// Most readings of one fit on either side of the switch.
 pub const MAX_FIT_READINGS: u8 = 8;
 /// Highest degree of the prediction.
@@ -15,11 +19,52 @@ pub const MAX_PREDICT_DEGREE: u8 = 2;
 /// Highest degree of the two-sided fit.
 pub const MAX_FIT_DEGREE: u8 = 3;
 
-/// The substitution as the calibration document states it.
+/// How long a transition takes: n ticks that carry nothing, the commanded one included.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub enum Transition {
+    /// That many ticks (1…32).
+    Ticks(u8),
+    /// A time from the command on (s, 10⁻⁴…1): the ticks that it covers, one that it covers by less than a sixteenth left out, and
+    /// at most 32.
+    Time(f64),
+}
+
+impl Transition {
+    /// n at ticks of a duration: ticks that carry nothing, the commanded one included (1…32).
+    #[must_use]
+    pub fn ticks(self, duration: Span) -> u8 {
+        match self {
+            Self::Ticks(ticks) => ticks,
+            Self::Time(time_s) => {
+                // In whole nanoseconds: a clock that is a little off brings no tick in or out.
+                let tick_ns = duration.as_ns().max(1);
+                let covered_ns = Span::from_s(time_s).as_ns().saturating_sub(tick_ns / TOUCHED);
+                let ticks = covered_ns / tick_ns + i64::from(covered_ns % tick_ns > 0);
+                u8::try_from(ticks.clamp(1, MAX_TRANSITION_TICKS.into())).unwrap_or(MAX_TRANSITION_TICKS)
+            }
+        }
+    }
+}
+
+/// Which readings the two-sided fit takes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum FitWindow {
+    /// All that are stated.
+    Fixed,
+    /// Those of them, as many on either side, with the least error by their own noise and motion.
+    Adaptive,
+}
+
+/// Part of a tick that a transition must cover for the tick to be lost: one over this.
+const TOUCHED: i64 = 16;
+/// Tick durations that readings reach where the transition is not long.
+const REACH_TICKS: u8 = 16;
+
+/// The substitution as the calibration document states it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ReversalParts {
-    /// n: ticks that carry nothing, the commanded one included (1…3).
-    pub transition_ticks: u8,
+    /// How long a transition takes.
+    pub transition: Transition,
     /// Readings of the prediction (1…8).
     pub predict_readings: u8,
     /// Degree of the prediction (0…2, below `predict_readings`).
@@ -30,29 +75,46 @@ pub struct ReversalParts {
     pub fit_readings_after: u8,
     /// Degree of the two-sided fit (0…3, below the number of its readings).
     pub fit_degree: u8,
+    /// Which of the readings the two-sided fit takes; where it chooses, there must be at least twelve.
+    pub fit_window: FitWindow,
 }
 
 impl Default for ReversalParts {
     /// The paper's figures, with the linear prediction that was found the most robust to noise.
     fn default() -> Self {
         Self {
-            transition_ticks: 3,
+            transition: Transition::Ticks(3),
             predict_readings: 4,
             predict_degree: 1,
             fit_readings_before: 2,
             fit_readings_after: 2,
             fit_degree: 2,
+            fit_window: FitWindow::Fixed,
         }
     }
 }
 
 /// What is wrong with a stated substitution.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReversalError {
     /// A number is outside its range.
     #[error(transparent)]
     OutOfRange(#[from] OutOfRange<u8>),
+    /// A time is outside its range, or not a number.
+    #[error(transparent)]
+    Time(#[from] OutOfRange),
+    /// Too few readings to tell noise from motion.
+    #[error(
+        "\"adaptive\" has {readings} readings before and after a switch to choose from, at least {least} are needed: raise \
+         fit_readings_before and fit_readings_after"
+    )]
+    AdaptiveNeedsReadings {
+        /// Readings on both sides.
+        readings: u8,
+        /// Fewest that are needed.
+        least: u8,
+    },
     /// A polynomial has more coefficients than readings to fit them to.
     #[error("{name} is {got} with {readings} readings; it must be below their number")]
     DegreeNeedsReadings {
@@ -69,13 +131,16 @@ impl ReversalError {
     /// Field of [`ReversalParts`] that it speaks of.
     pub(crate) fn field(&self) -> &'static str {
         match self {
-            Self::OutOfRange(OutOfRange { name, .. }) | Self::DegreeNeedsReadings { name, .. } => name,
+            Self::OutOfRange(OutOfRange { name, .. })
+            | Self::Time(OutOfRange { name, .. })
+            | Self::DegreeNeedsReadings { name, .. } => name,
+            Self::AdaptiveNeedsReadings { .. } => "fit_window",
         }
     }
 }
 
 /// A validated substitution.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Reversal {
     pub(super) parts: ReversalParts,
 }
@@ -87,15 +152,20 @@ impl Reversal {
     ///
     /// Everything that is wrong with it.
     pub fn new(parts: &ReversalParts) -> Result<Self, Vec<ReversalError>> {
-        let outside = outside([
-            ("transition_ticks", parts.transition_ticks, [1, MAX_TRANSITION_TICKS]),
+        let (ticks, time_s) = match parts.transition {
+            Transition::Ticks(ticks) => (ticks, TRANSITION_RANGE_S[0]),
+            Transition::Time(time_s) => (1, time_s),
+        };
+        let out_of_range = outside([
+            ("transition_ticks", ticks, [1, MAX_TRANSITION_TICKS]),
             ("predict_readings", parts.predict_readings, [1, MAX_FIT_READINGS]),
             ("predict_degree", parts.predict_degree, [0, MAX_PREDICT_DEGREE]),
             ("fit_readings_before", parts.fit_readings_before, [1, MAX_FIT_READINGS]),
             ("fit_readings_after", parts.fit_readings_after, [1, MAX_FIT_READINGS]),
             ("fit_degree", parts.fit_degree, [0, MAX_FIT_DEGREE]),
         ]);
-        let mut errors: Vec<ReversalError> = outside.map(Into::into).collect();
+        let mut errors: Vec<ReversalError> = out_of_range.map(Into::into).collect();
+        errors.extend(outside([("transition_s", time_s, TRANSITION_RANGE_S)]).map(ReversalError::from));
         let fit_readings = parts.fit_readings_before.saturating_add(parts.fit_readings_after);
         for (name, got, readings) in [
             ("predict_degree", parts.predict_degree, parts.predict_readings),
@@ -105,7 +175,22 @@ impl Reversal {
                 errors.push(ReversalError::DegreeNeedsReadings { name, got, readings });
             }
         }
+        if parts.fit_window == FitWindow::Adaptive && fit_readings < MIN_ADAPTIVE_READINGS {
+            let (readings, least) = (fit_readings, MIN_ADAPTIVE_READINGS);
+            errors.push(ReversalError::AdaptiveNeedsReadings { readings, least });
+        }
         if errors.is_empty() { Ok(Self { parts: *parts }) } else { Err(errors) }
+    }
+
+    /// n at ticks of a duration: see [`Transition::ticks`].
+    #[must_use]
+    pub fn transition_ticks(&self, duration: Span) -> u8 {
+        self.parts.transition.ticks(duration)
+    }
+
+    /// Tick durations beyond which a reading says nothing about a lost tick, and most lost ticks that wait for one fit.
+    pub(super) fn reach_ticks(&self, duration: Span) -> u8 {
+        REACH_TICKS.max(2 * self.transition_ticks(duration))
     }
 
     /// The statement it was made from.

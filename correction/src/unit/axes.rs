@@ -61,6 +61,7 @@ impl Axes {
         let now = self.at(start);
         self.to = orientation.inverse(temperature, self.mask);
         self.from = now.or(self.to);
+        self.give_up_across_a_plane(orientation, start, temperature);
         self.stands = self.from == self.to;
         self.target = temperature;
         self.clamped = outside(orientation, temperature);
@@ -121,7 +122,16 @@ impl Axes {
         self.mask = mask;
         self.from = orientation.inverse(self.temperature.at(time), mask);
         self.to = orientation.inverse(self.target, mask);
+        self.give_up_across_a_plane(orientation, time, self.target);
         self.stands = self.from == self.to;
+    }
+
+    /// Gives the inverses up where, on the way to a target (°C), the axes of the sensors in use come into one plane: both
+    /// ends may be sound, and what is between them nonsense. With all sensors that cannot be: the calibration was refused.
+    fn give_up_across_a_plane(&mut self, orientation: &Orientation, from: Timestamp, target: f64) {
+        if !orientation.is_conditioned_between(self.mask, self.temperature.at(from), target) {
+            (self.from, self.to) = (None, None);
+        }
     }
 
     /// Temperature that the orientation follows (°C).
@@ -164,4 +174,59 @@ impl Axes {
 fn outside(orientation: &Orientation, temperature: f64) -> bool {
     let [first, last] = orientation.range_deg_c();
     !(first..=last).contains(&temperature)
+}
+
+#[cfg(test)]
+mod tests {
+    use alloc::vec;
+
+    use super::*;
+    use crate::orientation::OrientationParts;
+
+    const TICK: Span = Span::from_ns(1_000_000_000);
+
+    fn seconds(s: i64) -> Timestamp {
+        Timestamp::from_ns(1_000_000_000 * s)
+    }
+
+    #[test]
+    fn sensors_left_that_come_into_one_plane_on_their_way_are_not_trusted() {
+        // Without the fourth, the first two come to point the same way at 30 °C.
+        let skewed = libm::sqrt(1.0 / 3.0);
+        let slope = 0.1;
+        let parts = OrientationParts {
+            reference_deg_c: 20.0,
+            rows: vec![[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [skewed, -skewed, skewed]],
+            slopes_per_deg_c: vec![[0.0, slope, 0.0], [slope, 0.0, 0.0], [0.0; 3], [0.0; 3]],
+            weights: vec![],
+            range_deg_c: [20.0, 50.0],
+            parity_limit: None,
+            parity_confirm_ticks: 0,
+        };
+        let orientation = Orientation::new(&parts).unwrap();
+        let (all, three) = (SensorMask::all(4), SensorMask::all(3));
+        let truth = [1e-5, 4e-5, -2e-5];
+        let resolve = |axes: &mut Axes, usable, s| {
+            let mut lanes = [0.0; 4];
+            lanes
+                .iter_mut()
+                .zip(orientation.forward(axes.temperature_deg_c(seconds(s)), truth))
+                .for_each(|(l, r)| *l = r);
+            axes.resolve(&orientation, usable, &lanes, seconds(s))
+        };
+        let mut axes = Axes::new(&orientation, 20.0);
+        axes.update(&orientation, 20.0, seconds(0), TICK);
+        assert!(resolve(&mut axes, three, 1).1);
+        // Both ends of the way are sound, and what is between them is not.
+        axes.update(&orientation, 45.0, seconds(1), Span::from_ns(10 * TICK.as_ns()));
+        assert!([20.0, 45.0].iter().all(|t| orientation.inverse(*t, three).is_some()));
+        for s in 2..=4 {
+            assert!(!resolve(&mut axes, three, s).1, "{s} s");
+        }
+        assert!(resolve(&mut axes, three, 7).1, "beyond 30 °C there is no plane in the way any more");
+        assert!(resolve(&mut axes, all, 9).1, "all four span the space at every temperature");
+        axes.update(&orientation, 48.0, seconds(11), TICK);
+        let (rate, trusted) = resolve(&mut axes, three, 12);
+        assert!(trusted && rate.iter().zip(truth).all(|(a, b)| (a - b).abs() < 1e-9), "{rate:?}");
+    }
 }

@@ -37,6 +37,12 @@ pub(super) fn check(r: &mut Reader<'_>, document: &Document) {
         }
         orientation(r, "accel", &section.orientation, section.sensor.len(), channels);
     }
+    if document.mode_reversal.as_ref().is_some_and(|reversal| reversal.transition_s.is_some()) {
+        let key = "mode_reversal.transition_ticks";
+        if r.has(key) {
+            r.refuse(key, "says the same as `transition_s`: give one of the two");
+        }
+    }
     if let Some(section) = &document.self_test {
         self_test_names(r, section);
     }

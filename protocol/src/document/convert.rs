@@ -7,15 +7,15 @@ use isotherm_correction::channel::{ChannelParts, ThermalFilterParts};
 use isotherm_correction::drift::DriftParts;
 use isotherm_correction::operation::{SelfTestCounter, SelfTestParts, SelfTestVoltage};
 use isotherm_correction::orientation::OrientationParts;
-use isotherm_correction::reversal::ReversalParts;
+use isotherm_correction::reversal::{FitWindow as CoreFitWindow, ReversalParts};
 use isotherm_correction::sample::{ChannelName, MAX_CHANNEL_NAME, OutputKind};
 use isotherm_correction::servo::{ServoForm, ServoParts};
 
 use super::curve::{Curve, Quantity};
 use super::measure::{ARCSEC, Argument, DEG_PER_H, DEG_PER_S, DEG_PER_SQRT_H, HOUR};
 use super::types::{
-    AccelLag, AccelOutput, AccelSensor, Branches, Channel, Document, Drift, GyroOutput, GyroSensor, Lag,
-    ModeReversal, Orientation, SelfTest, Servo, ServoKind, Temperature, Trend,
+    AccelLag, AccelOutput, AccelSensor, Branches, Channel, Document, Drift, FitWindow, GyroOutput,
+    GyroSensor, Lag, ModeReversal, Orientation, SelfTest, Servo, ServoKind, Temperature, Trend,
 };
 
 /// Temperature range of an orientation that does not depend on temperature (°C): nothing lies outside.
@@ -220,6 +220,7 @@ fn servo(servo: &Servo) -> ServoParts {
         form: match servo.form {
             ServoKind::Measured => ServoForm::Measured,
             ServoKind::Modelled => ServoForm::Modelled,
+            ServoKind::Fitted => ServoForm::Fitted,
         },
         time_constant_s: servo.time_constant_s,
         rest_frequency: servo.rest_frequency.to_parts(0.0),
@@ -256,11 +257,15 @@ fn self_test(self_test: &SelfTest) -> SelfTestParts {
 
 fn reversal(reversal: &ModeReversal) -> ReversalParts {
     ReversalParts {
-        transition_ticks: reversal.transition_ticks,
+        transition: reversal.transition(),
         predict_readings: reversal.predict_readings,
         predict_degree: reversal.predict_degree,
         fit_readings_before: reversal.fit_readings_before,
         fit_readings_after: reversal.fit_readings_after,
         fit_degree: reversal.fit_degree,
+        fit_window: match reversal.fit_window {
+            FitWindow::Fixed => CoreFitWindow::Fixed,
+            FitWindow::Adaptive => CoreFitWindow::Adaptive,
+        },
     }
 }

@@ -5,6 +5,9 @@ mod keys;
 mod published;
 mod robust;
 
+use isotherm_correction::curve::{Curve, CurveParts};
+use isotherm_correction::units::STANDARD_GRAVITY_M_PER_S2;
+
 use super::{Document, Parsed, Problem};
 
 /// The document that shows every key.
@@ -86,13 +89,13 @@ fn units_become_si() {
     close(parts.gyro_orientation.slopes_per_deg_c[0][1], (0.12_f64 / 3600.0).to_radians());
     close(parts.gyro_orientation.parity_limit.unwrap(), rad_per_s(20.0));
     match x.increment_weight_error.as_ref().unwrap() {
-        isotherm_correction::curve::CurveParts::Polynomial { coefficients, .. } => {
+        CurveParts::Polynomial { coefficients, .. } => {
             close(coefficients[1], 0.42e-6);
         }
         other => panic!("{other:?}"),
     }
     match parts.accels[0].board_ratio.as_ref().unwrap() {
-        isotherm_correction::curve::CurveParts::Polynomial { coefficients, .. } => {
+        CurveParts::Polynomial { coefficients, .. } => {
             close(coefficients[0], 1.0);
             close(coefficients[1], 8.4e-6);
         }
@@ -125,7 +128,7 @@ fn doubts_are_warnings() {
         let found = warnings.iter().any(|warning| warning.key == key && warning.message.contains(message));
         assert!(found, "{key}: {message}\nin\n{}", listed(&warnings));
     }
-    let single_mode = OTHER.replace("[mode_reversal]\n", "");
+    let single_mode = OTHER.split("[mode_reversal]\n").next().unwrap().to_owned();
     let warnings = listed(&accept(&single_mode).warnings);
     assert!(
         warnings.contains("gyro.sensor[0].magnetic_bias: changes its sign with the lasing mode"),
@@ -153,4 +156,23 @@ fn problems_are_serialised_field_by_field() {
     let message = "is version 2; this release reads 1: nothing else was read";
     let expected = serde_json::json!({"file": "test.toml", "line": 1, "column": 10, "key": "schema", "message": message});
     assert_eq!(json, expected);
+}
+
+#[test]
+fn correcting_the_board_before_the_bias_would_differ_by_eight_micrograms_at_most() {
+    // 001 has f = (U·r − S)/K, the corrector (U − S)·r/K: apart by S·(r − 1)/K, whatever the input.
+    let text = include_str!("../../../config/calibration/ZLG-0001.toml");
+    let parts = accept(text).document.to_parts();
+    let mut largest = 0.0_f64;
+    for accel in &parts.accels {
+        let curve = |parts: &CurveParts| Curve::new(parts).unwrap();
+        let (scale, bias) = (curve(&accel.scale_factor), curve(accel.bias.as_ref().unwrap()));
+        let ratio = curve(accel.board_ratio.as_ref().unwrap());
+        for (sensor, board) in (-40..=70).flat_map(|sensor| (-40..=85).map(move |board| (sensor, board))) {
+            let [sensor, board] = [sensor, board].map(f64::from);
+            let apart = bias.at(sensor).value * (ratio.at(board).value - 1.0) / scale.at(sensor).value;
+            largest = largest.max(apart.abs() / STANDARD_GRAVITY_M_PER_S2);
+        }
+    }
+    assert!((5e-6..8e-6).contains(&largest), "{largest} g");
 }

@@ -18,7 +18,8 @@ pub use gyro::{
 pub use origin::{Created, Log, Measure, Origin, Residual, Sample};
 pub use self_test::{SelfTest, SelfTestCounter, SelfTestVoltage};
 
-use isotherm_correction::reversal::ReversalParts;
+use isotherm_correction::reversal::{ReversalParts, Transition};
+use isotherm_correction::units::Span;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -168,9 +169,15 @@ pub struct OrientationThermal {
 #[serde(default)]
 #[schemars(deny_unknown_fields, title = "Mode reversal")]
 pub struct ModeReversal {
-    /// n: ticks without a signal, the one with the switch command included. Source: 003.
-    #[schemars(range(min = 1, max = 3))]
-    pub transition_ticks: u8,
+    /// n: ticks without a signal, the one with the switch command included; or give `transition_s`. Source: 003.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 1, max = 32))]
+    pub transition_ticks: Option<u8>,
+    /// Time without a signal from the switch command on, instead of `transition_ticks`: n is the number of ticks that it
+    /// covers, at most 32; one that it covers by less than a sixteenth is good. Source: 003.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0001, max = 1.0))]
+    pub transition_s: Option<f64>,
     /// Readings before the switch that the prediction is fitted to. Source: 003 step 1.
     #[schemars(range(min = 1, max = 8))]
     pub predict_readings: u8,
@@ -186,25 +193,67 @@ pub struct ModeReversal {
     /// Degree of the two-sided fit, below the number of its readings. Source: 003 step 3.
     #[schemars(range(min = 0, max = 3))]
     pub fit_degree: u8,
+    /// "fixed": the two-sided fit takes all readings that are stated. "adaptive": it takes those nearest the switch, as many
+    /// on either side as make the least error by their own noise and motion; `fit_readings_before` and `fit_readings_after`
+    /// are then the most, at least 12 together, default: 8.
+    #[serde(skip_serializing_if = "is_fixed")]
+    pub fit_window: FitWindow,
+}
+
+/// Which readings the two-sided fit takes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+#[schemars(inline)]
+pub enum FitWindow {
+    /// All that are stated.
+    Fixed,
+    /// Those with the least error by their own noise and motion.
+    Adaptive,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks like that")]
+fn is_fixed(window: &FitWindow) -> bool {
+    *window == FitWindow::Fixed
+}
+
+impl ModeReversal {
+    /// How long a transition takes; the default where neither key says so.
+    pub(super) fn transition(&self) -> Transition {
+        let stated = self.transition_ticks.map(Transition::Ticks);
+        stated.or(self.transition_s.map(Transition::Time)).unwrap_or(ReversalParts::default().transition)
+    }
+
+    /// n at ticks of a duration: those without a signal, the one with the switch command included.
+    #[must_use]
+    pub fn ticks(&self, tick: Span) -> u8 {
+        self.transition().ticks(tick)
+    }
 }
 
 impl Default for ModeReversal {
     fn default() -> Self {
         let ReversalParts {
-            transition_ticks,
+            transition,
             predict_readings,
             predict_degree,
             fit_readings_before,
             fit_readings_after,
             fit_degree,
+            fit_window: _,
         } = ReversalParts::default();
+        let (transition_ticks, transition_s) = match transition {
+            Transition::Ticks(ticks) => (Some(ticks), None),
+            Transition::Time(time_s) => (None, Some(time_s)),
+        };
         Self {
             transition_ticks,
+            transition_s,
             predict_readings,
             predict_degree,
             fit_readings_before,
             fit_readings_after,
             fit_degree,
+            fit_window: FitWindow::Fixed,
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::chamber::Profile;
 use crate::coil::Slab;
+use crate::effects::Effects;
 use crate::fibre_optic::{FibreOpticGyro, OpticsBias};
 use crate::instrument::{Gyros, Instrument};
 use crate::motion::Motion;
@@ -104,6 +105,7 @@ pub fn fibre_optic_chamber(seed: u64, chamber: Profile) -> Scenario {
             gyro_orientation: tilted(Orientation::orthogonal(), 1.0),
             accelerometers: Some(quartz()),
             thermometers: thermometers(3, 3),
+            effects: Effects::default(),
         },
         failures: Vec::new(),
     }

@@ -1,6 +1,7 @@
 //! Micromechanical units: three axes through a chamber, and six skewed axes on a moving case.
 
 use crate::chamber::Profile;
+use crate::effects::Effects;
 use crate::failure::Failure;
 use crate::instrument::{Gyros, Instrument};
 use crate::mems::MemsGyro;
@@ -34,6 +35,7 @@ fn unit(orientation: Orientation) -> Instrument {
         gyro_orientation: tilted(orientation.clone(), 1.0),
         accelerometers: Some(micromechanical(orientation)),
         thermometers: thermometers(count, count),
+        effects: Effects::default(),
     }
 }
 

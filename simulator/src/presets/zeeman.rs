@@ -1,6 +1,7 @@
 //! Zeeman laser unit: three dithered gyros at 200 Hz and three quartz accelerometers.
 
 use crate::chamber::Profile;
+use crate::effects::Effects;
 use crate::instrument::{Gyros, Instrument};
 use crate::motion::{Motion, Path};
 use crate::orientation::Orientation;
@@ -22,6 +23,7 @@ fn gyro(scale_arcsec: f64, nonmagnetic: [f64; 3], magnetic: [f64; 3], dither_hz:
         bias_magnetic_rad_per_s: magnetic.map(|b| b * DEG_PER_H),
         meander_rad_per_s: [0.06 * DEG_PER_H, 1.5e-3 * DEG_PER_H],
         dither_hz: [dither_hz, -28.0, 0.06],
+        lock_in_rad_per_s: 0.0,
         noise: walk(0.002),
     }
 }
@@ -35,6 +37,7 @@ fn unit(period_s: f64) -> Instrument {
         servo_time_constant_s: 0.040,
         miss_rms_wavelengths: 0.04,
         dither_curvature: 10.0,
+        dither_turns_with_mode: false,
         meander_half_period_s: 0.0,
     };
     let gyros = vec![
@@ -51,6 +54,7 @@ fn unit(period_s: f64) -> Instrument {
         gyro_orientation: tilted(Orientation::orthogonal(), 1.0),
         accelerometers: Some(quartz()),
         thermometers: thermometers(3, 3),
+        effects: Effects::default(),
     }
 }
 

@@ -52,7 +52,9 @@ impl Script {
         let has_modes = self.switches > 0;
         let counts = self.calibration.gyro_output() == OutputKind::Counts;
         let half_periods = if has_modes && self.halves && counts {
-            readings.iter().map(|reading| half_periods(*reading)).collect()
+            let turned = self.dither_turns && self.mode == LasingMode::Minus;
+            let dither = self.dither_hz * duration.as_s() / if turned { -2.0 } else { 2.0 };
+            readings.iter().map(|reading| half_periods(*reading, dither)).collect()
         } else {
             Sensors::new()
         };
@@ -137,9 +139,10 @@ impl Script {
     }
 }
 
-/// Half-period counts: those of the tick beside those of the dither.
-fn half_periods(reading: f64) -> HalfPeriodCounts {
+/// Half-period counts: one half of the tick's own in either, beside those of the dither.
+fn half_periods(reading: f64, dither: f64) -> HalfPeriodCounts {
     #[expect(clippy::cast_possible_truncation, reason = "a few thousand counts")]
-    let counts = reading as i32;
-    HalfPeriodCounts { positive: 300 + counts, negative: -300 }
+    let (counts, dither) = (reading as i32, dither.round() as i32);
+    let first = counts / 2;
+    HalfPeriodCounts { positive: dither + first, negative: (counts - first) - dither }
 }

@@ -146,6 +146,36 @@ fn without_quantisation_fifty_switches_keep_their_angle_within_0_05_arcsec_rms()
     assert!(got < 0.01, "{got}″");
 }
 
+#[test]
+fn a_switch_into_either_mode_keeps_its_angle_in_either_wiring() {
+    // The error from the command to the end of the transient, 8·τ = 0.32 s = 64 ticks after at most three lost ones.
+    const SETTLED: usize = 70;
+    for turns in [false, true] {
+        let (mut scenario, mut document) = (swinging(false), parsed(FILE).document);
+        finer(&mut scenario, &mut document);
+        zeeman(&mut scenario).reversal.dither_turns_with_mode = turns;
+        for gyro in &mut zeeman(&mut scenario).gyros {
+            gyro.noise = GyroNoise::default();
+        }
+        let without = {
+            let mut document = document.clone();
+            document.gyro.sensor.iter_mut().for_each(|sensor| sensor.servo = None);
+            switch_errors(&document, &scenario, SETTLED)
+        };
+        let with = switch_errors(&document, &scenario, SETTLED);
+        // The unit starts in the plus mode: every other switch goes into the minus mode.
+        for (first, mode) in [(0, LasingMode::Minus), (1, LasingMode::Plus)] {
+            let of_mode =
+                |errors: &[[f64; 3]]| rms(&errors.iter().copied().skip(first).step_by(2).collect::<Vec<_>>());
+            let (raw, left) = (of_mode(&without), of_mode(&with));
+            println!(
+                "dither turns with the mode: {turns}, into {mode:?}: {raw:.3}″, with the servo term {left:.4}″"
+            );
+            assert!(raw > 1.0 && left < 0.02, "turns: {turns}, into {mode:?}: {raw}″, {left}″");
+        }
+    }
+}
+
 /// The theoretical floor of a switch's angle under count quantisation, in counts rms.
 ///
 /// A counter carries its fraction on: a tick's counts are wrong by φ before less φ after it, φ being the fraction, which

@@ -71,8 +71,10 @@ recordings! {
         mode_switches_in_gaps
         mode_switches_few_ticks_apart
         mode_switches_by_other_fits
+        mode_switches_of_a_stated_time
         servo_with_half_period_counts
         servo_without_half_period_counts
+        servo_of_a_dither_that_turns_with_the_mode
         slow_meander_and_trend
     }
     recording::record: scenarios::sensors {

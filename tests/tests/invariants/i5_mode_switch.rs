@@ -2,8 +2,9 @@
 
 use std::f64::consts::{PI, TAU};
 
-use isotherm_correction::reversal::ReversalParts;
+use isotherm_correction::reversal::{Reversal, ReversalParts, Transition};
 use isotherm_correction::sample::{CorrectedTick, GyroTick, LasingMode, TickFlags};
+use isotherm_correction::units::Span;
 use isotherm_tests::calibrations::{MAGNETIC_BIAS_RAD_PER_S, compile, mode_reversed};
 use isotherm_tests::drive::{self, Owned};
 use isotherm_tests::streams;
@@ -44,7 +45,7 @@ fn run(
     missing: &[u64],
 ) -> Vec<CorrectedTick> {
     let calibration = compile(&mode_reversed(parts));
-    let n = u64::from(parts.transition_ticks);
+    let n = u64::from(Reversal::new(&parts).unwrap().transition_ticks(Span::from_s(TICK_S)));
     let ticks = (0..TICKS).filter(|k| !missing.contains(k)).map(|k| raw(k, frequency_hz, phase, switches, n));
     drive::run(&mut drive::unit(&calibration), &[Owned::Gyro(ticks.collect())])
 }
@@ -107,7 +108,7 @@ fn i5_the_restored_angle_does_not_depend_on_how_the_prediction_was_made() {
 fn i5_shorter_transitions_are_bridged_too() {
     let first = LAST_GOOD + 1;
     for n in 1..=3 {
-        let parts = ReversalParts { transition_ticks: n, ..ReversalParts::default() };
+        let parts = ReversalParts { transition: Transition::Ticks(n), ..ReversalParts::default() };
         let out = run(parts, 1.0, 0.7, &[first], &[]);
         assert_eq!(out.iter().filter(|t| t.flags.contains(TickFlags::INTERPOLATED)).count(), usize::from(n));
         let restored: Vec<_> = out.iter().filter(|t| t.flags.contains(TickFlags::ANGLE_RESTORED)).collect();

@@ -108,6 +108,8 @@ fn the_servo_s_time_constant_and_the_lost_ticks_are_recovered() {
     for seed in 0..25 {
         let mut scenario = scenario(seed, Profile::constant(20.0), 0.005, 2.0);
         scenario.duration_s = 100.0;
+        // With and without electronics that invert the field with the mode.
+        zeeman(&mut scenario).reversal.dither_turns_with_mode = seed % 2 == 1;
         let made = fitted(&scenario, &base);
         // 5…15 ms are two or three ticks.
         assert_eq!(made.transition_ticks, 3);

@@ -3,7 +3,9 @@
 mod relations;
 mod values;
 
-use super::{FULL, Problem, listed, refuse};
+use isotherm_correction::reversal::{FitWindow, ReversalParts, Transition};
+
+use super::{FULL, Problem, accept, listed, refuse};
 
 /// A document that is broken in one place: name, text to replace (its first occurrence), replacement, text that stands
 /// on the line of the problem after the edit, key, part of the message.
@@ -11,12 +13,13 @@ type Case = (&'static str, &'static str, &'static str, &'static str, &'static st
 
 /// The mode reversal of the full document.
 const MODE_REVERSAL: &str = "[mode_reversal]
-transition_ticks = 3
+transition_ticks = 3                      # or transition_s = 0.015, where the ticks are not always as long
 predict_readings = 4
 predict_degree = 1
 fit_readings_before = 2
 fit_readings_after = 2
 fit_degree = 2
+fit_window = \"fixed\"                      # or \"adaptive\": as few of up to 8 readings on a side as motion asks for, as many as noise does
 ";
 
 /// Line of the first occurrence, from 1.
@@ -48,6 +51,58 @@ fn axes_in_one_plane_are_refused() {
     let about_rows =
         |p: &Problem| p.key == "gyro.orientation.rows" && p.message.contains("at most 100 is allowed");
     assert!(problems.iter().all(about_rows), "{}", listed(&problems));
+}
+
+#[test]
+fn axes_that_come_into_one_plane_within_their_range_are_refused() {
+    // The first two point the same way at 55 °C, and at no other temperature.
+    let from = "    [0.0, 1.4, -0.9],\n    [-1.1, 0.0, 1.2],\n    [0.8, -1.3, 0.0],\n    [0.5, -0.2, -0.3],";
+    let to = "    [0.0, 6875.5, 0.0],\n    [6875.5, 0.0, 0.0],\n    [0.0, 0.0, 0.0],";
+    let start = FULL.find("[accel.orientation]").unwrap();
+    let three = FULL[start..].replacen("    [0.5773, 0.5775, 0.57725],\n", "", 1).replacen(from, to, 1);
+    let three = three.replacen("weights = [1.0, 1.0, 1.0, 0.5]", "weights = [1.0, 1.0, 1.0]", 1);
+    let (before, fourth) = FULL[..start].split_at(FULL[..start].rfind("[[accel.sensor]]").unwrap());
+    assert!(fourth.contains("name = \"s\""));
+    let problems = refuse(&format!("{before}{three}"));
+    let [problem] = &problems[..] else { panic!("{}", listed(&problems)) };
+    assert_eq!(problem.key, "accel.orientation.thermal.slopes_arcsec_per_deg_c");
+    for part in ["condition number", "°C, within range_deg_c", "at most 100", "narrow range_deg_c"] {
+        assert!(problem.message.contains(part), "{part}: {}", problem.message);
+    }
+}
+
+#[test]
+fn a_transition_is_stated_once_as_ticks_or_as_a_time() {
+    let with = |keys: &str| FULL.replacen(MODE_REVERSAL, &format!("[mode_reversal]\n{keys}\n"), 1);
+    let parts = |keys: &str| accept(&with(keys)).document.to_parts().reversal.unwrap();
+    let default = ReversalParts::default();
+    assert_eq!(parts(""), default);
+    assert_eq!(parts("transition_ticks = 32").transition, Transition::Ticks(32));
+    assert_eq!(parts("transition_s = 0.015").transition, Transition::Time(0.015));
+    let adaptive = ReversalParts {
+        fit_readings_before: 8,
+        fit_readings_after: 8,
+        fit_window: FitWindow::Adaptive,
+        ..default
+    };
+    assert_eq!(parts("fit_window = \"adaptive\""), adaptive);
+    for (keys, key, message) in [
+        ("transition_s = 0.015\ntransition_ticks = 3", "transition_ticks", "give one of the two"),
+        ("transition_s = 1.5", "transition_s", "1"),
+        ("transition_ticks = 33", "transition_ticks", "32"),
+        ("fit_window = \"wide\"", "fit_window", "one of \"fixed\", \"adaptive\""),
+        ("fit_window = \"adaptive\"\nfit_readings_after = 3", "fit_window", "at least 12 are needed"),
+    ] {
+        let problems = refuse(&with(keys));
+        let [problem] = &problems[..] else { panic!("{keys}:\n{}", listed(&problems)) };
+        assert_eq!(problem.key, format!("mode_reversal.{key}"));
+        assert!(problem.message.contains(message), "{keys}: {}", problem.message);
+    }
+    // What is written is what was read.
+    for keys in ["", "transition_s = 0.015", "fit_window = \"adaptive\"\ntransition_ticks = 20"] {
+        let document = accept(&with(keys)).document;
+        assert_eq!(accept(&document.to_toml().unwrap()).document, document, "{keys}");
+    }
 }
 
 #[test]

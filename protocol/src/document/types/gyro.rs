@@ -132,7 +132,8 @@ pub struct Trend {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Perimeter-servo transient")]
 pub struct Servo {
-    /// "measured" from the half-period counts of the dither, or "modelled" from the first of them and τ.
+    /// "measured" from the half-period counts of each tick, "modelled" from the first of them and τ, or "fitted" from all of
+    /// them so far and τ, by least squares.
     pub form: ServoKind,
     /// τ, with which the perimeter is pulled in.
     #[schemars(range(min = 1e-4, max = 1e3))]
@@ -161,6 +162,8 @@ pub enum ServoKind {
     Measured,
     /// From the first frequency after the switch and τ.
     Modelled,
+    /// From all frequencies after the switch and τ, by least squares.
+    Fitted,
 }
 
 /// Detection and exclusion of a failed gyro.

@@ -2,7 +2,7 @@
 
 use isotherm_correction::curve::CurveParts;
 use isotherm_correction::operation::Command;
-use isotherm_correction::reversal::ReversalParts;
+use isotherm_correction::reversal::{ReversalParts, Transition};
 use isotherm_correction::sample::OutputKind;
 use isotherm_correction::unit::{At, Uncalibrated, UnitSettings};
 use isotherm_correction::units::Span;
@@ -179,7 +179,8 @@ pub(crate) fn edge_of_other_fits_in_a_transition() -> Scenario {
         fit_degree: 3,
         ..ReversalParts::default()
     };
-    let short = ReversalParts { fit_readings_after: 1, transition_ticks: 1, ..ReversalParts::default() };
+    let short =
+        ReversalParts { fit_readings_after: 1, transition: Transition::Ticks(1), ..ReversalParts::default() };
     let sets = [long, short].map(|reversal| {
         let mut parts = rich_parts(0.0);
         parts.reversal = Some(reversal);

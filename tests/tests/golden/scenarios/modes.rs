@@ -1,6 +1,6 @@
 //! Mode switches and what follows them.
 
-use isotherm_correction::reversal::ReversalParts;
+use isotherm_correction::reversal::{FitWindow, ReversalParts, Transition};
 use isotherm_correction::sample::OutputKind;
 use isotherm_correction::servo::{ServoForm, ServoParts};
 use isotherm_correction::unit::At;
@@ -69,8 +69,8 @@ pub(crate) fn mode_switches_few_ticks_apart() -> Scenario {
 /// Other figures of the substitution, each over the same switches.
 pub(crate) fn mode_switches_by_other_fits() -> Scenario {
     let [mut short, mut long, mut flat] = [ReversalParts::default(); 3];
-    (short.transition_ticks, short.predict_readings, short.fit_readings_after) = (1, 3, 1);
-    (long.predict_readings, long.predict_degree, long.transition_ticks) = (8, 2, 2);
+    (short.transition, short.predict_readings, short.fit_readings_after) = (Transition::Ticks(1), 3, 1);
+    (long.predict_readings, long.predict_degree, long.transition) = (8, 2, Transition::Ticks(2));
     (long.fit_readings_before, long.fit_readings_after, long.fit_degree) = (8, 5, 3);
     (flat.predict_readings, flat.predict_degree, flat.fit_degree) = (1, 0, 1);
     let mut script = rich_script(44);
@@ -90,6 +90,26 @@ pub(crate) fn mode_switches_by_other_fits() -> Scenario {
     told(script)
 }
 
+/// The transition as a time over ticks of several lengths, and a window that adapts.
+pub(crate) fn mode_switches_of_a_stated_time() -> Scenario {
+    let mut script = rich_script(49);
+    (script.switches, script.batch) = (70, 2);
+    for (tick_ms, fit_window) in [(5, FitWindow::Adaptive), (1, FitWindow::Adaptive), (1, FitWindow::Fixed)] {
+        let mut parts = rich_parts(0.0);
+        parts.reversal = Some(ReversalParts {
+            transition: Transition::Time(0.015),
+            fit_readings_before: 8,
+            fit_readings_after: 7,
+            fit_window,
+            ..ReversalParts::default()
+        });
+        script.tick = Span::from_ms(tick_ms);
+        script.give(compile(&parts), At::NextTick, Span::ZERO);
+        script.ticks(300);
+    }
+    told(script)
+}
+
 pub(crate) fn servo(seed: u64, halves: bool) -> Script {
     let mut parts = with_outputs(rich_parts(0.0), OutputKind::Counts, OutputKind::Counts);
     for (gyro, form) in
@@ -105,7 +125,7 @@ pub(crate) fn servo(seed: u64, halves: bool) -> Script {
     parts.gyros[2].servo = None;
     let mut script = Script::new(seed, &compile(&parts), &RICH_CHANNELS);
     (script.switches, script.halves, script.batch) = (100, halves, 4);
-    (script.scatter, script.swing) = (9.0, 30.0);
+    (script.scatter, script.swing, script.dither_hz) = (9.0, 30.0, 120_000.0);
     script
 }
 
@@ -116,6 +136,27 @@ pub(crate) fn servo_with_half_period_counts() -> Scenario {
     script.ticks(71);
     script.gap(3);
     script.ticks(100);
+    told(script)
+}
+
+/// The negative half comes first in the minus mode; one gyro in each form.
+pub(crate) fn servo_of_a_dither_that_turns_with_the_mode() -> Scenario {
+    let mut parts = with_outputs(rich_parts(0.0), OutputKind::Counts, OutputKind::Counts);
+    let forms = [ServoForm::Measured, ServoForm::Modelled, ServoForm::Fitted];
+    for (gyro, form) in parts.gyros.iter_mut().zip(forms) {
+        gyro.servo = Some(ServoParts {
+            form,
+            time_constant_s: 0.04,
+            rest_frequency: polynomial(&[59_700.0, -9.0]),
+            settle_time_constants: 6.0,
+        });
+    }
+    let mut script = Script::new(48, &compile(&parts), &RICH_CHANNELS);
+    (script.switches, script.dither_turns, script.batch) = (100, true, 4);
+    (script.scatter, script.swing) = (9.0, 30.0);
+    script.ticks(650);
+    script.gap(3);
+    script.ticks(150);
     told(script)
 }
 

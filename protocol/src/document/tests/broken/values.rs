@@ -98,7 +98,7 @@ pub(super) const CASES: [Case; 31] = [
     ),
     (
         "digest cut short",
-        "27fb57e9",
+        "b2f301d0",
         "27fb57",
         "27fb57\"",
         "origin.log[0].sha256",

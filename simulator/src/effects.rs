@@ -1,0 +1,232 @@
+//! What real sensors do beyond the models of each kind: drift with acceleration, scale factors that depend on the rate,
+//! accelerometers away from the reference point and with a square in them, friction in what follows temperature.
+//!
+//! A scenario states each where it wants it; a unit without any is the same as ever, to the bit.
+
+use isotherm_correction::sample::Sensors;
+use serde::{Deserialize, Serialize};
+
+use crate::thermal::Interval;
+use crate::trajectory::{Increments, Trajectory};
+use crate::vector::{Vector, add, cross, dot, scale};
+
+/// Length over which a rate or a force counts as the one at its middle (s).
+const INSTANT_S: f64 = 1e-6;
+/// Parts of a tick over which squares are averaged, each by three Gauss–Legendre nodes: enough for eight periods in a tick.
+const PANELS: u8 = 8;
+
+/// Effects of all sensors of a unit; none where a list is empty.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Effects {
+    /// One entry per gyro, or none.
+    #[serde(default)]
+    pub gyros: Vec<GyroEffects>,
+    /// One entry per accelerometer, or none.
+    #[serde(default)]
+    pub accelerometers: Vec<AccelerometerEffects>,
+}
+
+impl Effects {
+    /// Whether there are none.
+    #[must_use]
+    pub fn is_none(&self) -> bool {
+        self.gyros.is_empty() && self.accelerometers.is_empty()
+    }
+}
+
+/// Effects of one gyro.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct GyroEffects {
+    /// Drift by the specific force along each case axis (rad/s per m/s²); adds to the input rate [IEEE 528].
+    pub acceleration_rad_per_s_per_m_per_s2: [f64; 3],
+    /// Its change with the gyro's temperature (rad/s per m/s² per K).
+    pub acceleration_per_k: [f64; 3],
+    /// Temperature to which the former refers (°C).
+    pub reference_deg_c: f64,
+    /// Asymmetry a of the scale (dimensionless): the gyro senses R·(1 + a) of a positive rate, R·(1 − a) of a negative one.
+    pub scale_asymmetry: f64,
+    /// Curvature c of the scale over the rate ((rad/s)⁻²): the gyro senses R·(1 + c·R²), R the mean rate of the tick.
+    pub scale_curvature_s2_per_rad2: f64,
+    /// Friction in what follows temperature.
+    pub play: Option<Play>,
+}
+
+/// Effects of one accelerometer.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct AccelerometerEffects {
+    /// Where it sits from the point whose motion is the truth, in case axes (m).
+    pub position_m: [f64; 3],
+    /// Second-order term K2 (1/(m/s²)): it senses f + K2·f², f along its axis at every instant.
+    pub second_order_s2_per_m: f64,
+    /// Friction in what follows temperature.
+    pub play: Option<Play>,
+}
+
+/// A play: something dragged along by temperature with a slack, so that the way up is not the way down [Prandtl, Ishlinskii].
+///
+/// p = T at the start, then always the nearest to its last value within T ± w; the error is g·(p − T): −g·w after enough of
+/// heating, +g·w after enough of cooling, and a loop of 2·g·w between.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Play {
+    /// Half width w of the slack (K, > 0).
+    pub half_width_k: f64,
+    /// Error g by which the sensor is off per kelvin that the play is behind (rad/s or m/s² per K).
+    pub per_k: f64,
+}
+
+/// A play with its memory.
+#[derive(Debug, Clone, Copy, Default)]
+struct PlayState {
+    /// Temperature to which it has followed (°C); `None` before the first.
+    followed_deg_c: Option<f64>,
+    error: Interval,
+}
+
+impl PlayState {
+    fn step(&mut self, play: Option<Play>, deg_c: f64) {
+        let Some(Play { half_width_k, per_k }) = play else { return };
+        let last = self.followed_deg_c.unwrap_or(deg_c);
+        let followed = last.max(deg_c - half_width_k).min(deg_c + half_width_k);
+        self.followed_deg_c = Some(followed);
+        self.error.advance(per_k * (followed - deg_c));
+    }
+}
+
+/// The effects of a unit with their memory.
+#[derive(Debug, Clone)]
+pub(crate) struct EffectsState {
+    gyros: Sensors<(GyroEffects, PlayState)>,
+    accelerometers: Sensors<(AccelerometerEffects, PlayState)>,
+}
+
+/// What the accelerometers sense of one tick beside the specific force at the reference point.
+struct Felt {
+    /// Mean rate (rad/s) and its mean change (rad/s²).
+    mean_change: Vector,
+    /// Rate and specific force at instants of the tick, each with its share of it.
+    instants: Vec<(f64, Vector, Vector)>,
+}
+
+impl EffectsState {
+    pub(crate) fn new(effects: &Effects) -> Self {
+        Self {
+            gyros: effects.gyros.iter().map(|gyro| (*gyro, PlayState::default())).collect(),
+            accelerometers: effects
+                .accelerometers
+                .iter()
+                .map(|accel| (*accel, PlayState::default()))
+                .collect(),
+        }
+    }
+
+    /// Follows the sensors' temperatures (°C) at the end of a step of the thermal clock.
+    pub(crate) fn thermal_step(&mut self, gyros_deg_c: &[f64], accels_deg_c: &[f64]) {
+        for ((gyro, play), deg_c) in self.gyros.iter_mut().zip(gyros_deg_c) {
+            play.step(gyro.play, *deg_c);
+        }
+        for ((accel, play), deg_c) in self.accelerometers.iter_mut().zip(accels_deg_c) {
+            play.step(accel.play, *deg_c);
+        }
+    }
+
+    /// Whether gyros have any.
+    pub(crate) fn has_gyros(&self) -> bool {
+        !self.gyros.is_empty()
+    }
+
+    /// Changes the input angles (rad) of both halves of a tick of `length_s`, over which the increments are `parts`; gives what
+    /// adds to each gyro's drift (rad/s).
+    pub(crate) fn sense(
+        &self,
+        halves: &mut Sensors<[f64; 2]>,
+        parts: &[Increments; 2],
+        length_s: f64,
+        gyros_deg_c: &[f64],
+        share: f64,
+    ) -> Sensors<f64> {
+        let gyros = self.gyros.iter().zip(halves).zip(gyros_deg_c);
+        let sense = |(((gyro, play), halves), deg_c): ((&(GyroEffects, PlayState), &mut [f64; 2]), &f64)| {
+            let away_k = deg_c - gyro.reference_deg_c;
+            let by_force =
+                add(gyro.acceleration_rad_per_s_per_m_per_s2, scale(gyro.acceleration_per_k, away_k));
+            let rate = (halves[0] + halves[1]) / length_s;
+            let sign = if rate < 0.0 { -1.0 } else { 1.0 };
+            let factor = 1.0 + gyro.scale_asymmetry * sign + gyro.scale_curvature_s2_per_rad2 * rate * rate;
+            let stuck = play.error.at(share);
+            // Halves of gyros without dither are the whole tick and nothing.
+            let of_tick = if parts[1] == Increments::default() { [1.0, 0.0] } else { [0.5, 0.5] };
+            let mut drift_rad = 0.0;
+            for ((half, part), share) in halves.iter_mut().zip(parts).zip(of_tick) {
+                let own = dot(by_force, part.velocity) + stuck * share * length_s;
+                *half = factor * *half + own;
+                drift_rad += own;
+            }
+            drift_rad / length_s
+        };
+        gyros.map(sense).collect()
+    }
+
+    /// What each accelerometer with input axes `axes` senses beside the specific force at the reference point (m/s²), mean of the
+    /// tick of `length_s` about `middle_s`.
+    pub(crate) fn feel(
+        &self,
+        trajectory: &Trajectory,
+        (middle_s, length_s): (f64, f64),
+        axes: impl FnOnce() -> Sensors<Vector>,
+        share: f64,
+    ) -> Sensors<f64> {
+        if self.accelerometers.is_empty() {
+            return Sensors::new();
+        }
+        let felt = Felt::of(trajectory, middle_s, length_s);
+        let sensors = self.accelerometers.iter().zip(axes());
+        sensors
+            .map(|((accel, play), axis)| {
+                let arm = accel.position_m;
+                let mut sum = dot(axis, cross(felt.mean_change, arm));
+                for (weight, rate, force) in &felt.instants {
+                    let along = dot(axis, *force);
+                    let centripetal = dot(axis, cross(*rate, cross(*rate, arm)));
+                    sum += weight * (centripetal + accel.second_order_s2_per_m * along * along);
+                }
+                sum + play.error.at(share)
+            })
+            .collect()
+    }
+}
+
+impl Felt {
+    fn of(trajectory: &Trajectory, middle_s: f64, length_s: f64) -> Self {
+        const NODES: [(f64, f64); 3] = [
+            (-0.774_596_669_241_483_4, 5.0 / 18.0),
+            (0.0, 8.0 / 18.0),
+            (0.774_596_669_241_483_4, 5.0 / 18.0),
+        ];
+        let at = |time_s: f64| {
+            let Increments { angle, velocity } = trajectory.increments(time_s, INSTANT_S);
+            (scale(angle, 1.0 / INSTANT_S), scale(velocity, 1.0 / INSTANT_S))
+        };
+        let ends = [0.5, -0.5].map(|side| at(middle_s + side * length_s).0);
+        let panel_s = length_s / f64::from(PANELS);
+        let centres_s =
+            (0..PANELS).map(|panel| middle_s - 0.5 * length_s + (f64::from(panel) + 0.5) * panel_s);
+        let nodes = centres_s.flat_map(|centre_s| {
+            NODES.map(|(node, weight)| (weight / f64::from(PANELS), centre_s + 0.5 * node * panel_s))
+        });
+        let instants = nodes.map(|(weight, time_s)| {
+            let (rate, force) = at(time_s);
+            (weight, rate, force)
+        });
+        Self {
+            mean_change: scale(add(ends[0], scale(ends[1], -1.0)), 1.0 / length_s),
+            instants: instants.collect(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;
