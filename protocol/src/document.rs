@@ -31,7 +31,6 @@ mod nominal;
 mod problem;
 mod read;
 pub(crate) mod reader;
-mod reference;
 pub(crate) mod schema;
 mod suggest;
 #[cfg(test)]
@@ -52,7 +51,6 @@ pub use curve::{
 pub use difference::difference;
 pub use measure::{Argument, Unit};
 pub use problem::Problem;
-pub use reference::reference;
 pub use schema::schema;
 pub use types::{
     Accel, AccelLag, AccelOrientation, AccelOutput, AccelParity, AccelSensor, Branches, Channel, Created,
