@@ -29,10 +29,10 @@ pub struct Document {
     /// Version of the document's schema.
     #[schemars(range(min = super::MIN_SCHEMA, max = super::CURRENT_SCHEMA))]
     pub schema: u32,
-    /// Serial of the unit: 1 to 64 letters, digits, '.', '_' or '-'.
+    /// Serial: 1 to 64 letters, digits, '.', '_' or '-'.
     #[schemars(regex(pattern = "^[A-Za-z0-9._-]{1,64}$"))]
     pub unit: String,
-    /// Date of the calibration, or date and time with offset, without quotes.
+    /// Date, or date and time with offset, unquoted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub created: Option<Created>,
     /// Free text for readers.
@@ -48,7 +48,7 @@ pub struct Document {
     /// Accelerometers, if the unit has any.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub accel: Option<Accel>,
-    /// Four-step substitution over mode switches; absent without mode reversal. Source: models §5, 003.
+    /// Substitution over mode switches. Source: models §5, 003.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mode_reversal: Option<ModeReversal>,
     /// Self-test limits of voltages and counters on `imu/{unit}/raw/health`. Source: models §7.
@@ -60,7 +60,7 @@ pub struct Document {
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Temperature")]
 pub struct Temperature {
-    /// Temperature assumed before a channel's first reading, and without a channel.
+    /// Assumed before a channel's first reading, and without a channel.
     #[schemars(range(min = -273.15, max = 1000.0))]
     pub assumed_deg_c: f64,
     /// Filter of all channels; required if there are any. It belongs to the fit: with another filter the coefficients are
@@ -108,7 +108,7 @@ pub struct Channel {
     pub conversion_deg_c: Vec<f64>,
     /// Physical range; readings outside are rejected.
     pub range_deg_c: [f64; 2],
-    /// Largest distance from the median of the last five readings; readings beyond are rejected.
+    /// Largest distance from the median of five readings; others are rejected.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub spike_limit_deg_c: f64,
 }
@@ -134,7 +134,7 @@ pub struct Orientation<P> {
     /// Change with temperature.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub thermal: Option<OrientationThermal>,
-    /// Detection and exclusion of a failed sensor; without it residuals are only published. Source: models §4.
+    /// Detection and exclusion of a failed sensor. Source: models §4.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub parity: Option<P>,
 }
@@ -162,16 +162,16 @@ pub struct ModeReversal {
     /// n: ticks lost by a switch, the commanded one included. Source: 003.
     #[schemars(range(min = 1, max = 3))]
     pub transition_ticks: u8,
-    /// Readings that the prediction is fitted to. Source: 003 step 1.
+    /// Readings of the prediction's fit. Source: 003 step 1.
     #[schemars(range(min = 1, max = 8))]
     pub predict_readings: u8,
     /// Degree of the prediction, below its readings. Source: 003 step 2.
     #[schemars(range(min = 0, max = 2))]
     pub predict_degree: u8,
-    /// Readings of the two-sided fit before the switch. Source: 003 step 3.
+    /// Readings of the two-sided fit, before. Source: 003 step 3.
     #[schemars(range(min = 1, max = 8))]
     pub fit_readings_before: u8,
-    /// Readings of the two-sided fit after it. Source: 003 step 3.
+    /// Readings of the two-sided fit, after. Source: 003 step 3.
     #[schemars(range(min = 1, max = 8))]
     pub fit_readings_after: u8,
     /// Degree of the two-sided fit, below its readings. Source: 003 step 3.

@@ -21,7 +21,7 @@ pub struct Overlay {
     /// Serial of the unit, as in the document.
     #[schemars(regex(pattern = "^[A-Za-z0-9._-]{1,64}$"))]
     pub unit: String,
-    /// Date, or date and time with offset, without quotes.
+    /// Date, or date and time with offset, unquoted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub created: Option<Created>,
     /// Free text for readers.

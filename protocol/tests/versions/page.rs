@@ -120,10 +120,11 @@ fn the_examples_of_control_messages_are_understood() {
 #[test]
 fn the_page_names_every_option_of_a_swap_and_every_command() {
     for option in ["by", "dry_run", "at_sequence", "at_time_ns", "slew_s", "any_serial", "force"] {
-        assert!(PAGE.contains(&format!("\n| `{option}` | ")), "{option}");
+        assert!(PAGE.contains(&format!("\n- `{option}`: ")), "{option}");
     }
     for command in State::ALL.into_iter().flat_map(State::allowed) {
-        assert!(PAGE.contains(&format!("\n| `{command}` | ")), "{command}");
+        let item = format!("\n- `{command}`");
+        assert!(PAGE.contains(&(item.clone() + ":")) || PAGE.contains(&(item + ",")), "{command}");
     }
 }
 
@@ -132,7 +133,7 @@ fn the_page_names_every_flag_with_its_bit() {
     let tick = TickFlags::all().iter_names().map(|(name, flag)| (name, flag.bits().trailing_zeros()));
     let sensor = SensorFlags::all().iter_names().map(|(name, flag)| (name, flag.bits().trailing_zeros()));
     for (name, bit) in tick.chain(sensor) {
-        assert!(PAGE.contains(&format!("\n| {bit} | `{name}` |")), "bit {bit}, {name}");
+        assert!(PAGE.contains(&format!("\n- {bit} `{name}`: ")), "bit {bit}, {name}");
     }
 }
 

@@ -52,15 +52,15 @@ pub struct AccelSensor {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(length(min = 1, max = 24))]
     pub board_channel: Option<String>,
-    /// Magnitude from which a reading is overrange, for counts; default: none.
+    /// Overrange from this magnitude, for counts; default: none.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub input_limit_counts_per_tick: Option<f64>,
-    /// Magnitude from which a reading is overrange, for V; default: none.
+    /// Overrange from this magnitude, for V; default: none.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub input_limit_v: Option<f64>,
-    /// Magnitude from which a reading is overrange, for m/s²; default: none.
+    /// Overrange from this magnitude, for m/s²; default: none.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub input_limit_m_per_s2: Option<f64>,
@@ -97,7 +97,7 @@ pub struct AccelParity {
     /// Limit of the parity vector's length.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub limit_m_per_s2: f64,
-    /// Consecutive ticks blaming one sensor before it is excluded.
+    /// Ticks in a row before a sensor is excluded.
     #[schemars(range(min = 1, max = 1_000_000))]
     pub confirm_ticks: u32,
 }

@@ -53,11 +53,11 @@ pub struct GyroSensor {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("not" = { "const": 0 }))]
     pub increment_weight_rad_per_rad: Option<f64>,
-    /// Magnitude from which a reading is overrange, for counts; default: none.
+    /// Overrange from this magnitude, for counts; default: none.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub input_limit_counts_per_tick: Option<f64>,
-    /// Magnitude from which a reading is overrange, for means; default: none.
+    /// Overrange from this magnitude, for means; default: none.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub input_limit_deg_per_s: Option<f64>,
@@ -169,7 +169,7 @@ pub struct GyroParity {
     /// Limit of the parity vector's length.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub limit_deg_per_h: f64,
-    /// Consecutive ticks blaming one sensor before it is excluded.
+    /// Ticks in a row before a sensor is excluded.
     #[schemars(range(min = 1, max = 1_000_000))]
     pub confirm_ticks: u32,
 }
