@@ -140,14 +140,14 @@ fn the_page_names_every_flag_with_its_bit() {
 #[test]
 fn the_page_names_every_counter_of_the_core() {
     for (name, _) in Counters::default().iter() {
-        assert!(PAGE.contains(&format!("`{name}`")), "{name}");
+        assert!(PAGE.contains(&format!("\n- `{name}`: ")), "{name}");
     }
 }
 
 #[test]
 fn the_page_names_every_counter_of_the_references() {
     for (name, _) in ReferenceCounters::default().iter() {
-        assert!(PAGE.contains(&format!("`references_{name}`")), "{name}");
+        assert!(PAGE.contains(&format!("\n- `references_{name}`: ")), "{name}");
     }
 }
 

@@ -12,10 +12,10 @@ use toml::value::Datetime;
 #[derive(Debug, Clone, PartialEq, Default, Serialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Origin")]
 pub struct Origin {
-    /// Program and version that made the document.
+    /// Program and version.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tool: Option<String>,
-    /// Command line that made the document.
+    /// Command line.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub command: Option<String>,
     /// Method of the fit, such as "joint".

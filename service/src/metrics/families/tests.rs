@@ -74,11 +74,17 @@ fn every_name_is_there_once_and_well_formed() {
 }
 
 #[test]
-fn every_counter_of_a_unit_has_its_metric() {
+fn every_counter_of_a_unit_has_its_metric_with_the_words_of_the_wire() {
     let stream = UnitStream::new(UnitId::new("U").unwrap(), UnitSettings::default());
     let names: Vec<_> = stream.counters().into_iter().map(|c| format!("isotherm_unit_{}", c.name)).collect();
     let metrics: Vec<_> = counters::FAMILIES.iter().map(|family| family.name).collect();
     assert_eq!(metrics, names);
+    let wire = std::fs::read_to_string(docs("wire.md")).unwrap().to_lowercase();
+    for family in counters::FAMILIES {
+        let item =
+            format!("- `{}`: {}\n", &family.name["isotherm_unit_".len()..], family.help.to_lowercase());
+        assert!(wire.contains(&item), "docs/wire.md does not say {item}");
+    }
     for kind in FaultKind::ALL {
         assert!(!names.contains(&format!("isotherm_unit_{}", kind.name())), "{} is a fault", kind.name());
     }
