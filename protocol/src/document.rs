@@ -28,7 +28,6 @@ mod defects;
 mod difference;
 mod measure;
 mod nominal;
-mod reference;
 #[cfg(test)]
 mod tests;
 mod types;
@@ -49,7 +48,6 @@ pub use curve::{
 };
 pub use difference::difference;
 pub use measure::{Argument, Unit};
-pub use reference::reference;
 pub use types::{
     Accel, AccelLag, AccelOrientation, AccelOutput, AccelParity, AccelSensor, Branches, Channel, Created,
     Document, Drift, Filter, FitWindow, Gyro, GyroOrientation, GyroOutput, GyroParity, GyroSensor, Lag, Log,

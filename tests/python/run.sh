@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The Python subscriber against docs/wire.md and against the Rust side; recordings, ROS 2 bags and Parquet files of
+# The Python subscriber against docs/wire-vectors.txt and against the Rust side; recordings, ROS 2 bags and Parquet files of
 # `isotherm-replay convert` against what programs of others read in them.
 #
 # Makes a virtual environment under target/ for it. Skipped, in plain words, where Python or its venv module is missing.
@@ -24,7 +24,7 @@ case "$venv" in /*) ;; *) venv=$PWD/$venv ;; esac
 [ -x "$venv/bin/pip" ] || python3 -m venv "$venv"
 "$venv/bin/pip" install --quiet --disable-pip-version-check --requirement tests/python/requirements.txt
 
-"$venv/bin/python" -B tests/python/subscriber.py --vectors docs/wire.md
+"$venv/bin/python" -B tests/python/subscriber.py --vectors docs/wire-vectors.txt
 ISOTHERM_PYTHON=$venv/bin/python cargo test --release --locked --workspace --test system python_subscriber -- --nocapture
 
 if ! "$venv/bin/python" -c 'import sys; sys.exit(sys.version_info < (3, 11))'; then

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""A subscriber of corrected increments in Python, and a check of docs/wire.md.
+"""A subscriber of corrected increments in Python, and a check of docs/wire-vectors.txt.
 
     subscriber.py --connect tcp/127.0.0.1:7447              one JSON line per output, a summary at the end
     subscriber.py --connect ... --ticks 1000 --summary      stop after 1000 raw ticks, print the summary only
-    subscriber.py --vectors docs/wire.md                    decode and encode the page's vectors, no session
+    subscriber.py --vectors docs/wire-vectors.txt           decode and encode the test vectors, no session
 
 On stdout: a line {"ready": true} once no output can be missed any more, then the outputs, then the summary. It stops
 after --ticks raw ticks (received or announced as missing, over all units) or after --idle seconds without a message.
@@ -16,7 +16,6 @@ import hashlib
 import json
 import math
 import queue
-import re
 import struct
 import sys
 import threading
@@ -163,7 +162,7 @@ def listen(arguments):
 
 
 def without_nan(value):
-    """JSON has no NaN; the page writes null."""
+    """JSON has no NaN; the vectors have null."""
     if isinstance(value, dict):
         return {name: without_nan(item) for name, item in value.items()}
     if isinstance(value, list):
@@ -171,30 +170,50 @@ def without_nan(value):
     return None if isinstance(value, float) and math.isnan(value) else value
 
 
-def check_vectors(path):
-    """Decodes and encodes every vector of the page; the exit code."""
+def read_vectors(path):
+    """The good frames (name, frame, JSON) and those to be refused (name, kind, frame) of the file of vectors."""
+    good, refused = [], []
     with open(path, encoding="utf-8") as file:
-        page = file.read()
-    good = re.findall(r"^### `([\w-]+)`\n.*?^```hex\n(.*?)^```\n.*?^```json\n(.*?)^```\n", page, re.DOTALL | re.MULTILINE)
-    refused = re.findall(r"^\| `([\w-]+)` \| (\d+) \| `([0-9a-f ]+)` \|", page, re.MULTILINE)
+        for line in file:
+            if not line.strip() or line.startswith("#"):
+                continue
+            directive, _, rest = line.rstrip("\n").partition(" ")
+            if directive == "vector":
+                vector = {"name": rest, "frame": b"", "json": ""}
+                good.append(vector)
+            elif directive == "refuse":
+                name, kind = rest.split()
+                vector = {"name": name, "kind": int(kind), "frame": b""}
+                refused.append(vector)
+            elif directive == "hex":
+                vector["frame"] += bytes.fromhex(rest.partition("#")[0])
+            elif directive == "json":
+                vector["json"] += rest + "\n"
+            else:
+                raise ValueError(f"{path}: no directive: {line}")
+    return good, refused
+
+
+def check_vectors(path):
+    """Decodes and encodes every vector of the file; the exit code."""
+    good, refused = read_vectors(path)
     failures = []
-    for name, text, expected in good:
-        # Behind "#" is a comment.
-        frame = bytes.fromhex(re.sub(r"#.*", "", text))
+    for vector in good:
+        name, frame = vector["name"], vector["frame"]
         try:
             message = wire.decode(frame, frame[0])
         except wire.Refused as error:
             failures.append(f"{name}: refused: {error}")
             continue
-        if without_nan(message) != json.loads(expected):
+        if without_nan(message) != json.loads(vector["json"]):
             failures.append(f"{name}: decoded to {json.dumps(without_nan(message))}")
         encoded = wire.encode(message, frame[0], version=frame[1])
         if encoded != frame:
             failures.append(f"{name}: encoded to {encoded.hex(' ')}")
-    for name, kind, text in refused:
+    for vector in refused:
         try:
-            wire.decode(bytes.fromhex(text), int(kind))
-            failures.append(f"{name}: accepted, must be refused")
+            wire.decode(vector["frame"], vector["kind"])
+            failures.append(f"{vector['name']}: accepted, must be refused")
         except wire.Refused:
             pass
     if not good or not refused:
@@ -209,7 +228,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     what = parser.add_mutually_exclusive_group(required=True)
     what.add_argument("--connect", metavar="ENDPOINT", help="endpoint of the service or a router")
-    what.add_argument("--vectors", metavar="PAGE", help="check the vectors of docs/wire.md and stop")
+    what.add_argument("--vectors", metavar="FILE", help="check the vectors of docs/wire-vectors.txt and stop")
     parser.add_argument("--key", default="imu/*/corrected", help="key to subscribe to (default: %(default)s)")
     parser.add_argument("--ticks", type=int, metavar="N", help="stop after N raw ticks")
     parser.add_argument("--idle", type=float, default=10.0, metavar="S", help="stop after S s of silence (default: 10)")

@@ -206,13 +206,13 @@ fn a_trend_state_comes_with_a_trend_and_costs_nothing_without() {
 }
 
 #[test]
-#[ignore = "a survey by hand: what docs/calibration/drift.md states of trends that are seen"]
+#[ignore = "a survey by hand: how often a trend is seen, by length of the log"]
 fn survey_of_trends_72() {
     survey(72.0);
 }
 
 #[test]
-#[ignore = "a survey by hand: what docs/calibration/drift.md states of trends that are seen"]
+#[ignore = "a survey by hand: how often a trend is seen, by length of the log"]
 fn survey_of_trends_24_and_216() {
     survey(24.0);
     survey(216.0);

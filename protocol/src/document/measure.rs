@@ -136,6 +136,7 @@ impl Argument {
 }
 
 /// Spellings at the end of a key that state its unit, the longest first, with the symbol for readers.
+#[cfg(test)]
 const KEY_UNITS: [(&str, &str); 25] = [
     ("_arcsec_per_deg_c", "″/°C"),
     ("_arcsec_per_count", "″/count"),
@@ -165,7 +166,7 @@ const KEY_UNITS: [(&str, &str); 25] = [
 ];
 
 /// Symbol of the unit that a key ends with; `None` for a key without one.
-#[must_use]
+#[cfg(test)]
 pub(super) fn unit_of_key(key: &str) -> Option<&'static str> {
     KEY_UNITS.iter().find(|(suffix, _)| key.ends_with(suffix)).map(|(_, symbol)| *symbol)
 }

@@ -3,6 +3,7 @@
 mod broken;
 mod keys;
 mod published;
+mod reference;
 mod robust;
 
 use isotherm_correction::curve::{Curve, CurveParts};

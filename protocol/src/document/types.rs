@@ -27,35 +27,35 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Isotherm calibration document")]
 pub struct Document {
-    /// Version of the document's form. Source: `document::MIN_SCHEMA`, `document::CURRENT_SCHEMA`.
+    /// Version of the document's schema.
     #[schemars(range(min = super::MIN_SCHEMA, max = super::CURRENT_SCHEMA))]
     pub schema: u32,
-    /// Serial of the unit: 1 to 64 letters, digits, '.', '_' or '-'; the chunk that stands for it in every key.
+    /// Serial: 1 to 64 letters, digits, '.', '_' or '-'.
     #[schemars(
         regex(pattern = "^[A-Za-z0-9._-]{1,64}$"),
         extend("x-must-be" = "1 to 64 letters A-Z a-z, digits, '.', '_' or '-'")
     )]
     pub unit: String,
-    /// Date, or date and time with offset, of the calibration: RFC 3339, without quotes.
+    /// Date, or date and time with offset, unquoted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub created: Option<Created>,
     /// Free text for readers.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub note: Option<String>,
-    /// Where the numbers come from; changes nothing. Source: models §8.
+    /// Where the numbers come from; not used by the correction. Source: models §8.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub origin: Option<Origin>,
-    /// Temperature channels and their common filter.
+    /// Temperature channels and their filter.
     pub temperature: Temperature,
     /// Gyros.
     pub gyro: Gyro,
-    /// Accelerometers; absent for a unit of gyros only.
+    /// Accelerometers, if the unit has any.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub accel: Option<Accel>,
-    /// Substitution over a switch of the lasing mode; absent for an instrument without modes. Source: models §5, 003.
+    /// Substitution over mode switches. Source: models §5, 003.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mode_reversal: Option<ModeReversal>,
-    /// Limits of the self-test on what the producer reports of itself; absent where it reports nothing. Source: models §7.
+    /// Self-test limits of voltages and counters on `imu/{unit}/raw/health`. Source: models §7.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub self_test: Option<SelfTest>,
 }
@@ -64,38 +64,37 @@ pub struct Document {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Temperature")]
 pub struct Temperature {
-    /// Temperature that every term assumes before its channel's first reading, and for ever without a channel.
+    /// Assumed before a channel's first reading, and without a channel.
     #[schemars(range(min = -273.15, max = 1000.0))]
     pub assumed_deg_c: f64,
-    /// Filter of all channels; needed where there is a channel.
+    /// Filter of all channels; required if there are any. It belongs to the fit: with another filter the coefficients are
+    /// wrong.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub filter: Option<Filter>,
-    /// The channels; sensors follow them by name. None for a unit without temperature sensors.
+    /// Channels, which sensors follow by name.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 32))]
     pub channel: Vec<Channel>,
 }
 
 /// Filter of all temperature channels.
-///
-/// It belongs to the fit: coefficients that were fitted with one filter are wrong with another.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Temperature filter")]
 pub struct Filter {
-    /// Step of the grid of event time on which temperature is evaluated. Source: models §1.
+    /// Grid step on which temperature is evaluated. Source: models §1.
     #[schemars(range(min = 0.001, max = 3600.0))]
     pub grid_step_s: f64,
-    /// Length of the causal moving average, up to 4096 grid steps; 0 for none. Source: models §1.
+    /// Causal moving average, up to 4096 grid steps; 0 for none. Source: models §1.
     #[schemars(range(min = 0.0, max = 14_745_600.0))]
     pub smoothing_s: f64,
-    /// h of the three-point backward differences, up to 4096 grid steps. Source: 000 eq. 2.
+    /// h of the backward differences, up to 4096 grid steps. Source: 000 eq. 2.
     #[schemars(range(min = 0.0, max = 14_745_600.0))]
     pub derivative_step_s: f64,
-    /// Age at which a temperature counts as stale and its sensors are flagged: 1 to 10⁴ grid steps.
+    /// Age at which a temperature is stale, 1 to 10⁴ grid steps.
     #[schemars(range(min = 0.001, max = 3.6e7))]
     pub stale_after_s: f64,
-    /// Half width, in Ṫ·T̈, of the blend between run-up and braking curves; needed where a gyro has a
-    /// `thermal_rate` or `thermal_acceleration`. Source: models §2, 000.
+    /// Half width, in Ṫ·T̈, of the blend between run-up and braking; required with `thermal_rate` or
+    /// `thermal_acceleration`. Source: models §2, 000.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub branch_dead_band_deg_c2_per_s3: Option<f64>,
@@ -105,17 +104,17 @@ pub struct Filter {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Temperature channel")]
 pub struct Channel {
-    /// Name, as on the raw temperature topic (1 to 24 bytes).
+    /// Name on the raw temperature topic, 1 to 24 bytes.
     #[schemars(length(min = 1, max = 24), extend("x-must-be" = "a name of 1 to 24 bytes"))]
     pub name: String,
-    /// a₀, a₁, … of T = Σ aⱼ·Uʲ, U being the raw reading (V, counts or already °C): °C per raw unitʲ. Source: models §1, 003.
+    /// a₀, a₁, … of T = Σ aⱼ·Uʲ, U the raw reading (V, counts or °C). Source: models §1, 003.
     #[serde(default = "Channel::identity")]
     #[schemars(length(min = 1, max = 8))]
     pub conversion_deg_c: Vec<f64>,
-    /// Physical range of the sensor; a reading outside is rejected.
+    /// Physical range; readings outside are rejected.
     #[schemars(inner(range(min = -273.15, max = 1000.0)), extend("x-rising" = true))]
     pub range_deg_c: [f64; 2],
-    /// Largest distance from the median of the last five readings; a reading beyond is rejected.
+    /// Largest distance from the median of five readings; others are rejected.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub spike_limit_deg_c: f64,
 }
@@ -131,17 +130,17 @@ impl Channel {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields)]
 pub struct Orientation<P> {
-    /// C0: one unit vector per sensor, in the order of the sensors (norm 1 within 10⁻³). Source: models §4, 004.
+    /// C0: a unit vector per sensor, norm 1 within 10⁻³. Source: models §4, 004.
     #[schemars(length(min = 3, max = 8))]
     pub rows: Vec<[f64; 3]>,
-    /// Weight of each sensor in the pseudo-inverse, above 0, 1/σ² up to a common factor; equal where left out. Source: models §4.
+    /// Weights in the pseudo-inverse, > 0, proportional to 1/σ²; default: equal. Source: models §4.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(length(min = 3, max = 8), extend("items" = { "type": "number", "exclusiveMinimum": 0 }))]
     pub weights: Option<Vec<f64>>,
-    /// Change with temperature; absent where C does not depend on it.
+    /// Change with temperature.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub thermal: Option<OrientationThermal>,
-    /// Detection and exclusion of a failed sensor; absent to publish the residuals only. Source: models §4.
+    /// Detection and exclusion of a failed sensor. Source: models §4.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub parity: Option<P>,
 }
@@ -150,16 +149,16 @@ pub struct Orientation<P> {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Thermal slopes of an orientation")]
 pub struct OrientationThermal {
-    /// Temperature channels whose mean is T.
+    /// Channels whose mean is T.
     #[schemars(length(min = 1, max = 8))]
     pub channels: Vec<String>,
-    /// `T_ref`, at which C is C0.
+    /// `T_ref`.
     #[schemars(range(min = -273.15, max = 1000.0))]
     pub reference_deg_c: f64,
-    /// Fitted range; outside it T is clamped.
+    /// Fitted range; T is clamped to it.
     #[schemars(inner(range(min = -273.15, max = 1000.0)), extend("x-rising" = true))]
     pub range_deg_c: [f64; 2],
-    /// C1: change of each row; an element of C is a direction cosine, 1 rad = 206265″. Source: 004.
+    /// C1: change of each row (direction cosines; 1 is 206265″). Source: 004.
     #[schemars(length(min = 3, max = 8))]
     pub slopes_arcsec_per_deg_c: Vec<[f64; 3]>,
 }
@@ -169,33 +168,31 @@ pub struct OrientationThermal {
 #[serde(default)]
 #[schemars(deny_unknown_fields, title = "Mode reversal")]
 pub struct ModeReversal {
-    /// n: ticks without a signal, the one with the switch command included; or give `transition_s`. Source: 003.
+    /// n: ticks lost by a switch, the commanded one included; or give `transition_s`. Source: 003.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1, max = 32))]
     pub transition_ticks: Option<u8>,
-    /// Time without a signal from the switch command on, instead of `transition_ticks`: n is the number of ticks that it
-    /// covers, at most 32; one that it covers by less than a sixteenth is good. Source: 003.
+    /// Time lost by a switch from the command on, instead of `transition_ticks`: n = ⌈t/Δt − 1/16⌉, at most 32. Source: 003.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0001, max = 1.0))]
     pub transition_s: Option<f64>,
-    /// Readings before the switch that the prediction is fitted to. Source: 003 step 1.
+    /// Readings of the prediction's fit. Source: 003 step 1.
     #[schemars(range(min = 1, max = 8))]
     pub predict_readings: u8,
-    /// Degree of the prediction, below the number of its readings. Source: 003 step 2.
+    /// Degree of the prediction, below its readings. Source: 003 step 2.
     #[schemars(range(min = 0, max = 2))]
     pub predict_degree: u8,
-    /// Readings before the switch in the two-sided fit. Source: 003 step 3.
+    /// Readings of the two-sided fit, before. Source: 003 step 3.
     #[schemars(range(min = 1, max = 8))]
     pub fit_readings_before: u8,
-    /// Readings after the switch in the two-sided fit. Source: 003 step 3.
+    /// Readings of the two-sided fit, after. Source: 003 step 3.
     #[schemars(range(min = 1, max = 8))]
     pub fit_readings_after: u8,
-    /// Degree of the two-sided fit, below the number of its readings. Source: 003 step 3.
+    /// Degree of the two-sided fit, below its readings. Source: 003 step 3.
     #[schemars(range(min = 0, max = 3))]
     pub fit_degree: u8,
-    /// "fixed": the two-sided fit takes all readings that are stated. "adaptive": it takes those nearest the switch, as many
-    /// on either side as make the least error by their own noise and motion; `fit_readings_before` and `fit_readings_after`
-    /// are then the most, at least 12 together, default: 8.
+    /// Readings of the two-sided fit: all that are stated, or as many as make the least error (`fit_readings_…` are then the
+    /// most, at least 12 together, default: 8).
     #[serde(skip_serializing_if = "is_fixed")]
     pub fit_window: FitWindow,
 }

@@ -1,5 +1,5 @@
-//! `docs/wire.md`: its vectors are the frozen ones and decode to what it says; its tables name every flag and counter, and its
-//! examples of control messages are understood.
+//! `docs/wire.md` names every field, flag and counter, and its examples of control messages are understood;
+//! `docs/wire-vectors.txt` holds the frozen vectors, which decode to the JSON beside them.
 
 use std::collections::BTreeSet;
 
@@ -18,50 +18,65 @@ use serde::de::DeserializeOwned;
 use super::{bytes, decode_as, frames};
 
 const PAGE: &str = include_str!("../../../docs/wire.md");
+const VECTORS: &str = include_str!("../../../docs/wire-vectors.txt");
 
-/// Name, hexadecimal and JSON of every vector on the page.
-fn vectors() -> impl Iterator<Item = (&'static str, &'static str, &'static str)> {
-    PAGE.split("\n### `").skip(1).filter_map(|section| {
-        let (name, rest) = section.split_once('`')?;
-        let (_, rest) = rest.split_once("\n```hex\n")?;
-        let (hex, rest) = rest.split_once("\n```\n")?;
-        let (_, rest) = rest.split_once("\n```json\n")?;
-        let (json, _) = rest.split_once("\n```\n")?;
-        Some((name, hex, json))
-    })
+/// One test vector of the file.
+#[derive(Default)]
+struct Vector {
+    name: &'static str,
+    /// Kind of the key on which the frame must be refused; none for a good frame.
+    refused_as: Option<u8>,
+    frame: Vec<u8>,
+    json: String,
 }
 
-/// Name, kind of the key and frame of every row of the table of frames to be refused.
-fn refused() -> impl Iterator<Item = (&'static str, u8, Vec<u8>)> {
-    PAGE.lines().filter_map(|line| {
-        let mut cells = line.split('|').map(str::trim).skip(1);
-        let name = cells.next()?.strip_prefix('`')?.strip_suffix('`')?;
-        let kind = cells.next()?.parse().ok()?;
-        let hex = cells.next()?.strip_prefix('`')?.strip_suffix('`')?;
-        Some((name, kind, bytes(hex)))
-    })
+/// Every vector of `docs/wire-vectors.txt`, whose head describes its form.
+fn all_vectors() -> Vec<Vector> {
+    let mut vectors: Vec<Vector> = Vec::new();
+    for line in VECTORS.lines().filter(|line| !line.is_empty() && !line.starts_with('#')) {
+        let (directive, rest) = line.split_once(' ').unwrap_or_else(|| panic!("no directive: {line}"));
+        if let ("vector" | "refuse", name) = (directive, rest) {
+            let (name, kind) = name.split_once(' ').map_or((name, None), |(name, kind)| (name, Some(kind)));
+            let refused_as = kind.map(|kind| kind.parse().expect("a kind"));
+            assert_eq!(refused_as.is_some(), directive == "refuse", "{line}");
+            vectors.push(Vector { name, refused_as, ..Vector::default() });
+            continue;
+        }
+        let vector = vectors.last_mut().expect("a frame begins with its name");
+        match directive {
+            "hex" => vector.frame.extend(bytes(rest)),
+            "json" => vector.json.extend([rest, "\n"]),
+            _ => panic!("no directive: {line}"),
+        }
+    }
+    vectors
+}
+
+/// The frames that decode.
+fn vectors() -> impl Iterator<Item = Vector> {
+    all_vectors().into_iter().filter(|vector| vector.refused_as.is_none())
 }
 
 #[test]
-fn the_vectors_of_the_page_are_the_frozen_ones() {
-    let page: Vec<_> = vectors().map(|(name, hex, _)| (name, bytes(hex))).collect();
+fn the_published_vectors_are_the_frozen_ones() {
+    let published: Vec<_> = vectors().map(|vector| (vector.name, vector.frame)).collect();
     let frozen: Vec<_> = frames().map(|(name, hex)| (name, bytes(hex))).collect();
-    assert_eq!(page, frozen);
+    assert_eq!(published, frozen);
 }
 
 #[test]
-fn the_vectors_of_the_page_decode_to_what_it_says() {
-    for (name, hex, json) in vectors() {
-        let frame = bytes(hex);
-        let said: serde_json::Value = serde_json::from_str(json).unwrap_or_else(|e| panic!("{name}: {e}"));
+fn the_published_vectors_decode_to_their_json() {
+    for Vector { name, frame, json, .. } in vectors() {
+        let said: serde_json::Value = serde_json::from_str(&json).unwrap_or_else(|e| panic!("{name}: {e}"));
         assert_eq!(decode_as(frame[0], &frame), Ok(said), "{name}");
     }
 }
 
 #[test]
-fn the_page_has_frames_that_are_refused() {
+fn every_reason_to_refuse_a_frame_has_its_vector() {
     let mut errors = BTreeSet::new();
-    for (name, kind, frame) in refused() {
+    for Vector { name, refused_as, frame, .. } in all_vectors() {
+        let Some(kind) = refused_as else { continue };
         let error = decode_as(kind, &frame).expect_err(name);
         errors.insert(format!("{error:?}").split([' ', '{']).next().unwrap_or_default().to_owned());
     }
@@ -105,10 +120,11 @@ fn the_examples_of_control_messages_are_understood() {
 #[test]
 fn the_page_names_every_option_of_a_swap_and_every_command() {
     for option in ["by", "dry_run", "at_sequence", "at_time_ns", "slew_s", "any_serial", "force"] {
-        assert!(PAGE.contains(&format!("\n| `{option}` | ")), "{option}");
+        assert!(PAGE.contains(&format!("\n- `{option}`: ")), "{option}");
     }
     for command in State::ALL.into_iter().flat_map(State::allowed) {
-        assert!(PAGE.contains(&format!("\n| `{command}` | ")), "{command}");
+        let item = format!("\n- `{command}`");
+        assert!(PAGE.contains(&(item.clone() + ":")) || PAGE.contains(&(item + ",")), "{command}");
     }
 }
 
@@ -117,21 +133,21 @@ fn the_page_names_every_flag_with_its_bit() {
     let tick = TickFlags::all().iter_names().map(|(name, flag)| (name, flag.bits().trailing_zeros()));
     let sensor = SensorFlags::all().iter_names().map(|(name, flag)| (name, flag.bits().trailing_zeros()));
     for (name, bit) in tick.chain(sensor) {
-        assert!(PAGE.contains(&format!("\n| {bit} | `{name}` |")), "bit {bit}, {name}");
+        assert!(PAGE.contains(&format!("\n- {bit} `{name}`: ")), "bit {bit}, {name}");
     }
 }
 
 #[test]
 fn the_page_names_every_counter_of_the_core() {
     for (name, _) in Counters::default().iter() {
-        assert!(PAGE.contains(&format!("\n| `{name}` |")), "{name}");
+        assert!(PAGE.contains(&format!("\n- `{name}`: ")), "{name}");
     }
 }
 
 #[test]
 fn the_page_names_every_counter_of_the_references() {
     for (name, _) in ReferenceCounters::default().iter() {
-        assert!(PAGE.contains(&format!("\n| `references_{name}` |")), "{name}");
+        assert!(PAGE.contains(&format!("\n- `references_{name}`: ")), "{name}");
     }
 }
 
@@ -148,8 +164,7 @@ fn the_page_states_the_versions_of_every_kind() {
         (Kind::Reference, version::REFERENCE),
         (Kind::Journal, version::JOURNAL),
     ] {
-        let (start, end) =
-            (format!("| {} | ", kind as u8), format!(" | {versions} | {} |", versions.current));
+        let (start, end) = (format!("| {} | ", kind as u8), format!(" | {versions} |"));
         let rows = PAGE.lines().filter(|line| line.starts_with(&start) && line.ends_with(&end));
         assert_eq!(rows.count(), 1, "{kind:?}: a row with {versions}");
     }

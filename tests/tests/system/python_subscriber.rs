@@ -240,7 +240,7 @@ async fn the_python_subscriber_gets_every_increment_to_the_bit() {
 fn the_page_names_every_counter_of_the_service() {
     let page = std::fs::read_to_string(root().join("docs/wire.md")).unwrap();
     for kind in FaultKind::ALL {
-        assert!(page.contains(&format!("\n| `{}` |", kind.name())), "{}", kind.name());
+        assert!(page.contains(&format!("\n- `{}`: ", kind.name())), "{}", kind.name());
     }
-    assert!(page.contains("\n| `bad_frames` |"), "the protocol's own");
+    assert!(page.contains("\n- `bad_frames`: "), "the protocol's own");
 }

@@ -1,5 +1,5 @@
 //! A survey of coils that the simulator does not have: slabs of many sizes, contacts, windings and thermometers, other ramps and
-//! holds, other noise. It is run by hand, and its table stands in docs/calibration/thermal.md.
+//! holds, other noise. It is run by hand, docs/calibration/thermal.md sums it up.
 //!
 //! The coil is a slab of 24 layers, explicit finite volumes, heated through both faces by a housing that follows the chamber. What the
 //! gyro shows is a weighted sum of the layers' Ṫ (the weights are what a winding leaves of Shupe's effect: the same for all layers,

@@ -22,19 +22,15 @@ impl<Q: Quantity> JsonSchema for Curve<Q> {
             for &argument in Q::ARGUMENTS {
                 let (symbol, over) = (unit.symbol(), argument.symbol());
                 let keys = Keys::new(unit, argument);
-                let pair =
-                    format!("[argument in {over}, value in {symbol}] pairs with increasing arguments.");
+                let pair = format!("Pairs [argument in {over}, value in {symbol}], arguments increasing.");
                 let knots = pairs(&pair);
                 let polynomial = vec![
-                    (keys.reference, number(&format!("Point about which the powers are taken ({over})."))),
+                    (keys.reference, number(&format!("Origin of the powers ({over})."))),
                     (
                         keys.coefficients,
                         coefficients(&format!("Coefficients of power j = 0, 1, … ({symbol} per ({over})ʲ).")),
                     ),
-                    (
-                        keys.range,
-                        range(&format!("Fitted range; outside it the argument is clamped ({over}).")),
-                    ),
+                    (keys.range, range(&format!("Fitted range; the argument is clamped to it ({over})."))),
                 ];
                 forms.push(form("polynomial", "Σ cⱼ·(x − reference)ʲ", polynomial));
                 forms.push(form(

@@ -10,12 +10,12 @@ use super::Orientation;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Accelerometers")]
 pub struct Accel {
-    /// What a raw reading is: "counts" of the tick, or the mean output over the tick in "V" or "m/s2".
+    /// Raw readings: counts of the tick, or the mean output over the tick.
     pub output: AccelOutput,
-    /// The accelerometers, in the order of the raw readings.
+    /// Accelerometers, in the order of the raw readings.
     #[schemars(length(min = 3, max = 8))]
     pub sensor: Vec<AccelSensor>,
-    /// Their input axes in case axes. Source: models §4, 004.
+    /// Input axes in case axes: `s = C(T)·v`, `C(T) = C0 + C1·(T − T_ref)`. Source: models §4, 003, 004.
     pub orientation: AccelOrientation,
 }
 
@@ -41,39 +41,39 @@ pub type AccelOrientation = Orientation<AccelParity>;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Accelerometer")]
 pub struct AccelSensor {
-    /// Name for readers and reports, different from the other accelerometers' (1 to 24 bytes).
+    /// Unique name, 1 to 24 bytes.
     #[schemars(length(min = 1, max = 24), extend("x-must-be" = "a name of 1 to 24 bytes"))]
     pub name: String,
-    /// Temperature channel of the sensor; `temperature.assumed_deg_c` holds where left out.
+    /// Temperature channel; default: `assumed_deg_c`.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(length(min = 1, max = 24), extend("x-must-be" = "a name of 1 to 24 bytes"))]
     pub channel: Option<String>,
-    /// Temperature channel of the electronics board; needed with `board_ratio_error`. Source: 001.
+    /// Temperature channel of the electronics board, for `board_ratio_error`. Source: 001.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(length(min = 1, max = 24), extend("x-must-be" = "a name of 1 to 24 bytes"))]
     pub board_channel: Option<String>,
-    /// Outputs of this magnitude and above are flagged overrange, where the output is "counts"; no limit where left out.
+    /// Overrange from this magnitude, for counts; default: none.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub input_limit_counts_per_tick: Option<f64>,
-    /// Outputs of this magnitude and above are flagged overrange, where the output is "V"; no limit where left out.
+    /// Overrange from this magnitude, for V; default: none.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub input_limit_v: Option<f64>,
-    /// Outputs of this magnitude and above are flagged overrange, where the output is "m/s2"; no limit where left out.
+    /// Overrange from this magnitude, for m/s²; default: none.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub input_limit_m_per_s2: Option<f64>,
-    /// K(T): output per specific force; divides. Never zero over its range. Source: models §3, 001 (k1…k3).
+    /// K(T): output per specific force, never 0. Source: models §3, 001 (k1…k3).
     pub scale_factor: Curve<ScaleFactor>,
-    /// S(T): output at no specific force; subtracted. Source: models §3, 001 (z1…z3).
+    /// S(T): output at zero specific force. Source: models §3, 001 (z1…z3).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bias: Option<Curve<OutputBias>>,
-    /// Thermal lags of the bias: `Σ g(T)·(T − L_τ[T])/τ`, `L_τ` being a first-order low-pass; subtracted. Source: models §2, §8.
+    /// Thermal lags of the bias, as for gyros. Source: models §2, §8.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 8))]
     pub lag: Vec<AccelLag>,
-    /// `r(T_board) − 1`: scale factor of the board at the calibration temperature over that at `T_board`, less one.
+    /// `r(T_board) − 1`, r the board's scale factor at the calibration temperature over that at `T_board`.
     /// Source: models §3, 001 (y1…y3).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub board_ratio_error: Option<Curve<Relative>>,
@@ -83,7 +83,7 @@ pub struct AccelSensor {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Thermal lag of an accelerometer")]
 pub struct AccelLag {
-    /// τ; not below `temperature.grid_step_s`.
+    /// τ, at least `grid_step_s`.
     #[schemars(range(min = 0.001, max = 1e7))]
     pub time_constant_s: f64,
     /// g(T).
@@ -94,10 +94,10 @@ pub struct AccelLag {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Parity check of the accelerometers")]
 pub struct AccelParity {
-    /// Length of the parity vector beyond which an accelerometer must be at fault.
+    /// Limit of the parity vector's length.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub limit_m_per_s2: f64,
-    /// Ticks in a row that must point at the same accelerometer before it is excluded.
+    /// Ticks in a row before a sensor is excluded.
     #[schemars(range(min = 1, max = 1_000_000))]
     pub confirm_ticks: u32,
 }

@@ -12,24 +12,24 @@ use toml::value::Datetime;
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Origin")]
 pub struct Origin {
-    /// Program and version that made the document.
+    /// Program and version.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tool: Option<String>,
-    /// Command line that made it.
+    /// Command line.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub command: Option<String>,
-    /// Method of the fit, such as "joint". Source: models §8.
+    /// Method of the fit, such as "joint".
     #[serde(skip_serializing_if = "Option::is_none")]
     pub method: Option<String>,
-    /// Range of temperature in the logs.
+    /// Temperatures in the logs.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("x-rising" = true))]
     pub range_deg_c: Option<[f64; 2]>,
-    /// Range of the temperature's rate in the logs.
+    /// Temperature rates in the logs.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("x-rising" = true))]
     pub rate_range_deg_c_per_s: Option<[f64; 2]>,
-    /// Logs that the numbers were fitted to.
+    /// Logs of the fit.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 64))]
     pub log: Vec<Log>,
@@ -37,7 +37,7 @@ pub struct Origin {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 256))]
     pub residual: Vec<Residual>,
-    /// Anything else worth keeping, such as the parameters' covariance.
+    /// Anything else, such as the covariance.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<BTreeMap<String, serde_json::Value>>")]
     pub details: Option<toml::Table>,
@@ -47,9 +47,9 @@ pub struct Origin {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Log")]
 pub struct Log {
-    /// Name of the file.
+    /// File name.
     pub name: String,
-    /// SHA-256 of its bytes, 64 lower-case hexadecimal digits.
+    /// SHA-256 of the file, 64 lower-case hexadecimal digits.
     #[schemars(regex(pattern = "^[0-9a-f]{64}$"), extend("x-must-be" = "64 lower-case hexadecimal digits"))]
     pub sha256: String,
 }
@@ -58,16 +58,16 @@ pub struct Log {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Residual")]
 pub struct Residual {
-    /// What it is the residual of, such as "gyro.x".
+    /// Sensor, such as "gyro.x".
     pub of: String,
-    /// "in" the samples of the fit, or "out" of them (cross-validation).
+    /// In or out of sample.
     pub sample: Sample,
-    /// Unit of the four numbers.
+    /// Unit of the values.
     pub measure: Measure,
-    /// Root mean square before the correction.
+    /// RMS before the correction.
     #[schemars(range(min = 0.0))]
     pub rms_before: f64,
-    /// Root mean square after it.
+    /// RMS after it.
     #[schemars(range(min = 0.0))]
     pub rms_after: f64,
     /// Peak to peak before the correction.

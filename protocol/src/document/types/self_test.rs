@@ -3,14 +3,12 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What the producer's own voltages and counters must be in a self-test.
-///
-/// They come in on `imu/{unit}/raw/health`. Gyros, accelerometers and temperature channels are tested without being
-/// listed here.
+/// Self-test limits of the producer's voltages and counters on `imu/{unit}/raw/health`; sensors and temperature channels
+/// are tested anyway.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Self-test")]
 pub struct SelfTest {
-    /// Voltages, such as the half-wave voltage `U_λ/2` of each gyro's mode control. Source: models §7, 003.
+    /// Voltages, such as the half-wave voltage `U_λ/2` of a gyro's mode control. Source: models §7, 003.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 32))]
     pub voltage: Vec<SelfTestVoltage>,
@@ -24,10 +22,10 @@ pub struct SelfTest {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Voltage of the self-test")]
 pub struct SelfTestVoltage {
-    /// Name, as on the raw health topic, different from all other voltages' and counters' (1 to 24 bytes).
+    /// Unique name on the raw health topic, 1 to 24 bytes.
     #[schemars(length(min = 1, max = 24), extend("x-must-be" = "a name of 1 to 24 bytes"))]
     pub name: String,
-    /// Smallest and largest good value.
+    /// Range of good values.
     #[schemars(extend("x-rising" = true))]
     pub range_v: [f64; 2],
 }
@@ -36,10 +34,10 @@ pub struct SelfTestVoltage {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Counter of the self-test")]
 pub struct SelfTestCounter {
-    /// Name, as on the raw health topic, different from all other voltages' and counters' (1 to 24 bytes).
+    /// Unique name on the raw health topic, 1 to 24 bytes.
     #[schemars(length(min = 1, max = 24), extend("x-must-be" = "a name of 1 to 24 bytes"))]
     pub name: String,
-    /// Largest good increase over the self-test, in what the counter counts.
+    /// Largest good increase during the test.
     #[schemars(range(min = 0, max = 1_000_000_000))]
     pub max_increase: u32,
 }

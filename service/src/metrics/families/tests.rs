@@ -82,9 +82,9 @@ fn every_counter_of_a_unit_has_its_metric_with_the_words_of_the_wire() {
     assert_eq!(metrics, names);
     let wire = std::fs::read_to_string(docs("wire.md")).unwrap().to_lowercase();
     for family in counters::FAMILIES {
-        let row =
-            format!("| `{}` | {} |\n", &family.name["isotherm_unit_".len()..], family.help.to_lowercase());
-        assert!(wire.contains(&row), "docs/wire.md does not say {row}");
+        let item =
+            format!("- `{}`: {}\n", &family.name["isotherm_unit_".len()..], family.help.to_lowercase());
+        assert!(wire.contains(&item), "docs/wire.md does not say {item}");
     }
     for kind in FaultKind::ALL {
         assert!(!names.contains(&format!("isotherm_unit_{}", kind.name())), "{} is a fault", kind.name());
