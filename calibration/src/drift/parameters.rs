@@ -154,8 +154,8 @@ impl Parameters {
 
 /// N (°/h·√s).
 fn walk(analysis: &Analysis, notes: &mut Vec<String>) -> f64 {
-    match &analysis.noise {
-        Some(noise) if noise.describes() => {
+    match analysis.stated_noise() {
+        Some(noise) => {
             let walk = noise.of_term(Term::AngleRandomWalk);
             if let Coefficient::NotObservable { .. } = walk {
                 notes.push(
@@ -164,7 +164,7 @@ fn walk(analysis: &Analysis, notes: &mut Vec<String>) -> f64 {
             }
             walk.value_or_limit()
         }
-        _ => {
+        None => {
             // What the estimator sees is means over a reference.
             let far = |tau: f64| libm::log(tau / REFERENCE_S).abs();
             let overlapping =

@@ -7,7 +7,7 @@ use super::columns::{Columns, Term};
 use super::model::{Dynamics, Spec};
 use super::scale::{self, Kept};
 use super::solve::{Solution, once, solve};
-use crate::robust::median_if_any;
+use crate::robust::{block_length, is_white, median_if_any};
 
 /// Score of a larger model, as a share of that of a smaller one, above which the smaller one is kept.
 const NO_BETTER: f64 = 0.985;
@@ -18,9 +18,6 @@ pub const WORTH_IT: f64 = 0.9;
 
 /// How many times what is usual a temperature may count.
 const CROWDED: f64 = 3.0;
-/// Windows of a log for each block that a score is averaged over, and the most that a block may have.
-const WINDOWS_PER_BLOCK: usize = 200;
-const LONGEST_BLOCK: usize = 10;
 
 /// One sensor's windows over all runs.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -119,6 +116,12 @@ impl Target {
         }
     }
 
+    /// The level, and nothing else, where what it leaves is no more than noise.
+    #[must_use]
+    pub fn flat(&self, columns: &Columns<'_>) -> Option<Solution> {
+        self.solve(columns, &Spec::default(), true).filter(|level| is_white(&level.residual))
+    }
+
     /// Root mean square of what a model leaves on pieces that were left out one by one, over temperatures that the others have
     /// too. `None` where too little can be judged.
     #[must_use]
@@ -133,7 +136,7 @@ impl Target {
         let all: Vec<&[f64]> = design.iter().map(AsRef::as_ref).collect();
         let pieces = history.piece.iter().max().map_or(0, |last| last + 1);
         // White noise is in every model alike: averaged over some windows it no longer hides which of them is better.
-        let block = (self.values.len() / WINDOWS_PER_BLOCK).clamp(1, LONGEST_BLOCK);
+        let block = block_length(self.values.len());
         let (mut square, mut weight, mut judged) = (0.0, 0.0, 0);
         for left_out in 0..pieces {
             let mut weights = self.weights.clone();
