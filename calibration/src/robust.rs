@@ -87,7 +87,10 @@ mod tests {
         for count in [60, 300, 5000] {
             let white: Vec<f64> = (0..count).map(|_| 5.0 + noise()).collect();
             assert!(is_white(&white), "{count}");
-            let slow = white.iter().zip(0..).map(|(x, k)| x + libm::sin(f64::from(k) * 6.0 / f64::from(count)));
+            let slow = white
+                .iter()
+                .zip(0..)
+                .map(|(x, k)| x + 2.0 * libm::sin(f64::from(k) * 6.0 / f64::from(count)));
             assert!(!is_white(&slow.collect::<Vec<_>>()), "{count}");
         }
         assert!(!is_white(&[1.0; 100]) && !is_white(&[1.0, -1.0, 1.0]));

@@ -286,7 +286,8 @@ fn turned(samples: &Samples) -> Option<String> {
         Some((at, libm::acos(cosine.clamp(-1.0, 1.0)).to_degrees()))
     };
     let turns = (0..samples.time_s.len()).filter_map(turn);
-    let (at, angle) = turns.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, angle)| *angle > LARGEST_TURN_DEG)?;
+    let (at, angle) =
+        turns.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, angle)| *angle > LARGEST_TURN_DEG)?;
     Some(format!(
         "{}: the unit was turned {:.0} s after the beginning: the specific force turns by {angle:.1} ° there, at most \
          {LARGEST_TURN_DEG} ° are drift. Give what is before and what is after as two runs, with --start and --duration",

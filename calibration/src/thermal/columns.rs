@@ -200,8 +200,7 @@ impl<'a> Windows<'a> {
 
     fn take(&mut self, tick: &CorrectedTick, length_s: f64) {
         #[expect(clippy::cast_precision_loss, reason = "a run is far below 2⁵³ ns")]
-        let middle =
-            tick.end_time.as_ns().saturating_sub(self.run.start_ns) as f64 * 1e-9 - 0.5 * length_s;
+        let middle = tick.end_time.as_ns().saturating_sub(self.run.start_ns) as f64 * 1e-9 - 0.5 * length_s;
         self.known |= tick.gyro_flags.iter().all(|flags| !flags.contains(SensorFlags::STALE_TEMPERATURE));
         let half = 0.5 * self.run.window_s;
         while self.run.time_s.get(self.at).is_some_and(|window| window + half < middle) {

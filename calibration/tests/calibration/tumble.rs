@@ -345,10 +345,14 @@ fn poses_that_are_put_down_alike_do_not_vouch_for_each_other() {
         let others: Vec<Matrix3<f64>> = (0..36).map(|_| stand::any_attitude(&mut dice)).collect();
         let found = analyse(&bent(&alike, 20 + seed), &settings()).unwrap();
         let new = analyse(&bent(&others, 30 + seed), &settings()).unwrap().poses;
-        let left = |outputs: &[f64]| libm::sqrt(found.accel.force(outputs).iter().map(|f| f * f).sum()) - GRAVITY;
+        let left =
+            |outputs: &[f64]| libm::sqrt(found.accel.force(outputs).iter().map(|f| f * f).sum()) - GRAVITY;
         let on_others = Size::of(&new.iter().map(|pose| left(&pose.outputs)).collect::<Vec<_>>()).rms;
         let said = Size::of(&found.held_out).rms;
-        println!("{seed}: said {said:.5}, on other poses {on_others:.5}, in sample {:.5}", Size::of(&found.accel.residual).rms);
+        println!(
+            "{seed}: said {said:.5}, on other poses {on_others:.5}, in sample {:.5}",
+            Size::of(&found.accel.residual).rms
+        );
         assert!(said > 0.5 * on_others, "{said} {on_others}");
     }
 }

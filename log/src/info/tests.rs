@@ -167,10 +167,10 @@ fn sensors_have_their_range_and_mean() {
     let info = info_of(&[gyro(0, 20, 0), spoilt.clone(), spoilt]);
     let gyros = &info.units["ZLG-0001"].gyros;
     let figures = |info: &ReadingInfo| (info.readings, info.min, info.max, info.first, info.last);
-    assert_eq!(gyros.iter().map(figures).collect::<Vec<_>>()[..2], [
-        (30, 1.0, 1.0, 1.0, 1.0),
-        (30, -7.0, 12.0, 2.0, 2.0)
-    ]);
+    assert_eq!(
+        gyros.iter().map(figures).collect::<Vec<_>>()[..2],
+        [(30, 1.0, 1.0, 1.0, 1.0), (30, -7.0, 12.0, 2.0, 2.0)]
+    );
     assert!((gyros[1].mean - 61.0 / 30.0).abs() < 1e-12 && (gyros[2].mean - 3.0).abs() < 1e-12);
     assert!(info.units["ZLG-0001"].accelerometers.is_empty());
 }

@@ -118,7 +118,8 @@ impl Columns {
             others.extend(ticks.duration.map(|time| (time.cell, format!("duration of the {kind}s"))));
         }
         others.extend(self.stamps.map(|time| (time.cell, "time".to_owned())));
-        let channel = |of: &TemperatureCell| (of.cell, format!("temperature channel {:?}", of.channel.as_str()));
+        let channel =
+            |of: &TemperatureCell| (of.cell, format!("temperature channel {:?}", of.channel.as_str()));
         others.extend(self.temperatures.iter().map(channel));
         for (at, (column, first)) in sensors.iter().enumerate() {
             let mut others = sensors.iter().skip(at + 1).chain(&others);

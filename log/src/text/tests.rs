@@ -258,8 +258,14 @@ fn sequence_numbers_carry_the_time_where_there_are_no_stamps() {
     let mapping = Mapping::parse(numbered, "m.toml").unwrap();
     // Seven ticks are missing, one row cannot be read, and the counter begins anew.
     let (events, _) = read(&mapping, b"4,1\n5,2\n13,3\n14,x\n15,4\n0,5\n1,6\n");
-    let expected =
-        [(4, 10, 10, 1.0), (5, 20, 10, 2.0), (13, 100, 10, 3.0), (15, 120, 10, 4.0), (0, 130, 10, 5.0), (1, 140, 10, 6.0)];
+    let expected = [
+        (4, 10, 10, 1.0),
+        (5, 20, 10, 2.0),
+        (13, 100, 10, 3.0),
+        (15, 120, 10, 4.0),
+        (0, 130, 10, 5.0),
+        (1, 140, 10, 6.0),
+    ];
     assert_eq!(gyro(&events), expected);
 }
 
@@ -294,7 +300,10 @@ fn a_last_row_that_is_cut_off_is_said_to_be() {
     let mapping = mapping("delimiter = \"comma\"", STAMPS);
     for cut in ["10", "2", "20,1,-", "20,"] {
         let words = error(&mapping, format!("10,1,7,20\n{cut}").as_bytes()).to_string();
-        assert!(words.contains("the last line has no line end, so the log was cut off here"), "{cut}: {words}");
+        assert!(
+            words.contains("the last line has no line end, so the log was cut off here"),
+            "{cut}: {words}"
+        );
     }
     let words = error(&mapping, b"10,1,7,20\n10,1,7,20\n").to_string();
     assert!(words.contains("time stands still") && !words.contains("cut off"), "{words}");

@@ -3,6 +3,7 @@
 use isotherm_calibration::error::Error;
 use isotherm_calibration::run::Run;
 use isotherm_calibration::thermal::{Fitted, Method, Settings, Terms, fit};
+use isotherm_calibration::validate::{JudgedLog, Wanted, validate};
 use isotherm_correction::sample::{AccelTick, GyroTick, OutputKind, TemperatureReading};
 use isotherm_correction::units::{Span, Timestamp};
 use isotherm_log::offline::unit_id;
@@ -274,6 +275,9 @@ fn readings_every_ten_seconds_are_fitted() {
         for verdict in &made.report.verdicts {
             assert!(verdict.factor().unwrap() > 5.0, "{}", made.report.to_text());
         }
+        let models = made.report.validation.as_ref().unwrap().rows.iter().flatten();
+        let twice = models.clone().find(|cell| cell.contains("30, 30"));
+        assert!(twice.is_none() && models.count() > 20, "{twice:?}");
     }
 }
 
@@ -281,15 +285,17 @@ fn readings_every_ten_seconds_are_fitted() {
 fn a_first_reading_that_is_late_is_no_temperature_of_its_own() {
     let made = tried(thermometer_at(|s| s >= 45), Method::Joint).unwrap();
     assert!(made.report.accepted() && made.report.warnings.is_empty(), "{}", made.report.to_text());
-    assert_eq!(made.written.document.origin.unwrap().range_deg_c, Some([-10.0, 40.0]));
-    // From 20 °C up only: 0 °C before the first reading made two ways of it, or a range that nobody saw.
-    let mut upwards = events(2400..3900, usual);
-    let late = Timestamp::from_ns(2_445_000_000_000);
+    let history = "Channel imu: -10.0 to 40.0 °C; ramps 20 to -10 °C at";
+    assert!(made.report.notes.iter().any(|note| note.starts_with(history)), "{:?}", made.report.notes);
+    // From 11.5 °C up.
+    let mut upwards = events(3000..3900, usual);
+    let late = Timestamp::from_ns(3_045_000_000_000);
     upwards.retain(|event| !matches!(event, LogEvent::Temperature(reading) if reading.time < late));
     let made = tried(run_of(upwards), Method::Joint).unwrap();
-    assert!(made.report.warnings.iter().any(|words| words.contains("one way only")), "{:?}", made.report.warnings);
+    let told = made.report.warnings.iter().any(|words| words.contains("one way only"));
+    assert!(told, "{:?}", made.report.warnings);
     let [low, high] = made.written.document.origin.unwrap().range_deg_c.unwrap();
-    assert!((-9.0..-8.0).contains(&low) && (39.0..=40.0).contains(&high), "{low} {high}");
+    assert!((11.0..12.5).contains(&low) && (39.0..=40.5).contains(&high), "{low} {high}");
 }
 
 #[test]
@@ -327,8 +333,17 @@ fn an_axis_that_temperature_does_nothing_to_is_a_good_one() {
             "{method:?}: {}",
             verdict.words()
         );
-        assert!(made.written.document.gyro.sensor[1].static_bias.is_none() && made.report.refusals().is_empty());
+        assert!(
+            made.written.document.gyro.sensor[1].static_bias.is_none() && made.report.refusals().is_empty()
+        );
     }
+    // Whoever judges the document says the same.
+    let written = tried(flat(), Method::Joint).unwrap().written;
+    let log = JudgedLog::new(flat(), &written.document).unwrap();
+    let report = validate("flat.toml", &written, &[log], Wanted { window_s: None, place: None }, ()).unwrap();
+    let verdict = report.verdicts.iter().find(|verdict| verdict.of == "gyro y").unwrap();
+    assert!(verdict.accepted, "{}", verdict.words());
+    assert_eq!(verdict.reason, "no temperature dependence above noise; left unchanged");
     // What moves with something else than temperature is none.
     let wandering = run(0..5400, |s| {
         let mut second = usual(s);
@@ -337,7 +352,11 @@ fn an_axis_that_temperature_does_nothing_to_is_a_good_one() {
     });
     let made = tried(wandering, Method::Joint).unwrap();
     let verdict = made.report.verdicts.iter().find(|verdict| verdict.of == "gyro y").unwrap();
-    assert!(!verdict.accepted && verdict.reason.contains("something else than temperature"), "{}", verdict.words());
+    assert!(
+        !verdict.accepted && verdict.reason.contains("something else than temperature"),
+        "{}",
+        verdict.words()
+    );
 }
 
 #[test]
@@ -375,7 +394,8 @@ fn ticks_that_no_corrector_takes_are_refused_by_their_length() {
             let channel = isotherm_correction::sample::ChannelName::from("imu").unwrap();
             events.push(LogEvent::Temperature(TemperatureReading { channel, time, raw: deg_c }));
             let readings = rates.into_iter().collect();
-            let tick = GyroTick { sequence, end_time: time + duration, duration, readings, ..GyroTick::default() };
+            let tick =
+                GyroTick { sequence, end_time: time + duration, duration, readings, ..GyroTick::default() };
             events.push(LogEvent::Gyro { output: OutputKind::Mean, tick });
         }
         events

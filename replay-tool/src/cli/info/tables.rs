@@ -295,7 +295,10 @@ fn states(text: &mut String, status: &StatusInfo, begin_ns: i64) {
 fn readings(text: &mut String, what: &str, name: &str, info: &ReadingInfo) {
     let missing = if info.missing > 0 { format!(", {} missing", info.missing) } else { String::new() };
     let ReadingInfo { readings, min, max, mean, .. } = info;
-    line(text, format_args!("{what} {name}: {readings} readings, {min} to {max}, mean {mean:.6e} as sent{missing}"));
+    line(
+        text,
+        format_args!("{what} {name}: {readings} readings, {min} to {max}, mean {mean:.6e} as sent{missing}"),
+    );
 }
 
 /// Says that a list is longer than what was printed.
