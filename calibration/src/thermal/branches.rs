@@ -119,7 +119,7 @@ impl History {
             }
             let steepest = slopes[from..to].iter().copied().filter(|s| s.is_finite());
             let steepest = steepest.fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
-            let ends = [known().next(), known().last()].map(|t| t.unwrap_or(f64::NAN));
+            let ends = [known().next(), known().next_back()].map(|t| t.unwrap_or(f64::NAN));
             self.ramps.push(Ramp { from_to_deg_c: ends, deg_c_per_min: steepest * 60.0 });
         }
     }

@@ -331,7 +331,9 @@ fn poses_that_are_put_down_alike_do_not_vouch_for_each_other() {
         // Accelerometers that are not straight, beyond what nine parameters hold.
         let mut track = track(&instrument, attitudes, &how(seed)).0;
         for (column, share) in track.outputs.iter_mut().zip([2e-4, -3e-4, 2.5e-4]) {
-            column.iter_mut().for_each(|reading| *reading += share * *reading * *reading);
+            for reading in column {
+                *reading += share * *reading * *reading;
+            }
         }
         track
     };
