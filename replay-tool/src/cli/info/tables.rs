@@ -198,10 +198,14 @@ fn topic_details(text: &mut String, topic: &TopicInfo) {
 
 fn unit_details(text: &mut String, unit: &UnitInfo, begin_ns: i64) {
     for (what, sensors) in [("gyro", &unit.gyros), ("accelerometer", &unit.accelerometers)] {
-        sensors.iter().zip(1..).for_each(|(info, number)| readings(text, what, &number.to_string(), info));
+        for (info, number) in sensors.iter().zip(1..) {
+            readings(text, what, &number.to_string(), info);
+        }
     }
     for (what, named) in [("temperature", &unit.temperatures), ("health", &unit.health)] {
-        named.by_name.iter().for_each(|(name, info)| readings(text, what, name, info));
+        for (name, info) in &named.by_name {
+            readings(text, what, name, info);
+        }
     }
     if let Some(modes) = &unit.modes {
         let between = modes.between_changes.map_or_else(String::new, |between| {
