@@ -32,7 +32,7 @@ pub use batch::{BatchRow, BatchTable, UnitReport, in_parallel, of_unit};
 pub use curve::{Curve, Judged, Rest, judge, output_unit};
 pub use sheet::Sheet;
 pub use sigma::Sigmas;
-pub use verdict::{Figure, SAME_SHARE, Verdict, residuals};
+pub use verdict::{FLAT, Figure, SAME_SHARE, Verdict, residuals};
 
 use crate::drift::figures::{short, table};
 

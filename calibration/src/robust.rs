@@ -48,3 +48,51 @@ pub fn scatter_of_steps(values: &[f64]) -> f64 {
     let steps: Vec<f64> = values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
     median(&steps) / STEP_PER_SIGMA
 }
+
+/// Windows of a log for each block that is averaged over, and the most that a block may have.
+const WINDOWS_PER_BLOCK: usize = 200;
+const LONGEST_BLOCK: usize = 10;
+
+/// Length of the blocks that so many windows are averaged over before something slow is looked for in them: white noise no longer hides it.
+#[must_use]
+pub fn block_length(windows: usize) -> usize {
+    (windows / WINDOWS_PER_BLOCK).clamp(1, LONGEST_BLOCK)
+}
+
+/// Whether windows scatter about their mean as white noise does, block by block: neighbours then differ by as much as any two
+/// (von Neumann 1941: half the mean square step over the variance is 1 ± 1/√n). Windows that are no number are left out; fewer than
+/// twenty blocks tell nothing.
+#[must_use]
+#[expect(clippy::cast_precision_loss, reason = "windows of a log are far below 2⁵³")]
+pub fn is_white(windows: &[f64]) -> bool {
+    const FEWEST: usize = 20;
+    const SIGMAS: f64 = 3.0;
+    let good: Vec<f64> = windows.iter().copied().filter(|value| value.is_finite()).collect();
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    let blocks: Vec<f64> = good.chunks_exact(block_length(good.len())).map(mean).collect();
+    let middle = mean(&blocks);
+    let square: f64 = blocks.iter().map(|block| (block - middle) * (block - middle)).sum();
+    let steps: f64 = blocks.windows(2).map(|pair| (pair[1] - pair[0]) * (pair[1] - pair[0])).sum();
+    blocks.len() >= FEWEST && 0.5 * steps / square > 1.0 - SIGMAS / (blocks.len() as f64).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixture::noise;
+
+    #[test]
+    fn noise_is_white_and_what_moves_below_it_is_not() {
+        let mut noise = noise();
+        for count in [60, 300, 5000] {
+            let white: Vec<f64> = (0..count).map(|_| 5.0 + noise()).collect();
+            assert!(is_white(&white), "{count}");
+            let slow = white
+                .iter()
+                .zip(0..)
+                .map(|(x, k)| x + 2.0 * libm::sin(f64::from(k) * 6.0 / f64::from(count)));
+            assert!(!is_white(&slow.collect::<Vec<_>>()), "{count}");
+        }
+        assert!(!is_white(&[1.0; 100]) && !is_white(&[1.0, -1.0, 1.0]));
+    }
+}

@@ -20,9 +20,14 @@ use isotherm_protocol::codec;
 use isotherm_protocol::key::{RawStream, UnitId};
 use isotherm_protocol::raw::{AccelBatch, GyroBatch};
 
+use crate::drift::figures::six;
 use crate::error::Error;
+use crate::robust::median;
 use crate::series::Series;
 use cut::Cut;
+
+/// Longest tick that the corrector takes (s).
+const LONGEST_TICK_S: f64 = 10.0;
 
 /// What one log has of one unit.
 #[derive(Debug, Clone)]
@@ -140,13 +145,22 @@ impl Run {
     /// Its readings as columns.
     ///
     /// # Errors
-    /// [`Error::Log`]; as [`Series::take_message`].
+    /// [`Error::Log`]; as [`Series::take_message`]; [`Error::Refused`] where it has no ticks, or ticks too long to be corrected.
     pub fn series(&self, watch: impl Watch) -> Result<Series, Error> {
         let mut series = Series::empty(self.unit.clone());
         self.walk(watch, |piece| match piece {
             Piece::Event(event) => series.take_event(event),
             Piece::Message(message) => series.take_message(message),
         })?;
+        for (kind, ticks) in [("gyro", &series.gyros), ("accelerometer", &series.accels)] {
+            if median(&ticks.duration_s) > LONGEST_TICK_S {
+                return Err(Error::Refused(vec![format!(
+                    "{}: its {kind} ticks last {} s, at most {LONGEST_TICK_S} s can be corrected: log more often",
+                    self.name,
+                    six(median(&ticks.duration_s))
+                )]));
+            }
+        }
         if series.gyros.is_empty() && series.accels.is_empty() {
             let mut reasons = vec![format!("{} has no raw ticks of unit {}", self.name, self.unit)];
             reasons.extend(self.cut_short().map(str::to_owned));

@@ -15,7 +15,8 @@ use isotherm_protocol::document::{Document, Sample};
 use crate::drift::figures::short;
 use crate::error::Error;
 use crate::means::{Means, Size, is_one_g, usual_window_s};
-use crate::report::{Curve, Figure, FitReport, Rest, SAME_SHARE, Verdict};
+use crate::report::{Curve, FLAT, Figure, FitReport, Rest, SAME_SHARE, Verdict};
+use crate::robust::is_white;
 use crate::run::Watch;
 use crate::swapped::{Shown, up};
 use crate::thermal::Stand;
@@ -120,7 +121,13 @@ pub fn validate(
             *verdict =
                 verdict.clone().refused("it does not change: the sensor is dead, or its column is wrong");
         } else if verdict.accepted && (after.rms - before.rms).abs() <= before.rms * SAME {
-            "the document changes nothing of it".clone_into(&mut verdict.reason);
+            let mine = report.residuals.iter().filter(|curve| curve.of == verdict.of);
+            let flat = mine.flat_map(|curve| curve.before.iter().copied()).collect::<Vec<f64>>();
+            verdict.reason = if is_white(&flat) {
+                format!("{FLAT}; left unchanged")
+            } else {
+                "the document changes nothing of it".to_owned()
+            };
         } else if verdict.accepted && (after.rms - before.rms).abs() <= before.rms * SAME_SHARE {
             "unchanged within 1 %".clone_into(&mut verdict.reason);
         }

@@ -75,6 +75,10 @@ pub struct AttachmentInfo {
 pub struct UnitInfo {
     /// Its topics, in the order of their keys.
     pub topics: Vec<TopicInfo>,
+    /// Readings of each gyro as they were sent: counts, or mean rates (rad/s).
+    pub gyros: Vec<ReadingInfo>,
+    /// Readings of each accelerometer as they were sent: counts, or mean outputs (V or m/s²).
+    pub accelerometers: Vec<ReadingInfo>,
     /// Raw temperatures by channel, as they were sent.
     pub temperatures: Readings,
     /// Lasing modes; `None` for an instrument without.
@@ -132,6 +136,8 @@ pub struct Survey {
 #[derive(Debug, Default)]
 struct UnitSurvey {
     topics: BTreeMap<Topic, TopicSurvey>,
+    gyros: Vec<ReadingInfo>,
+    accelerometers: Vec<ReadingInfo>,
     temperatures: Readings,
     modes: Modes,
     health: Readings,
@@ -205,6 +211,8 @@ impl Survey {
         let units = self.units.into_iter().map(|(unit, survey)| {
             let info = UnitInfo {
                 topics: finished(survey.topics.into_values().collect()),
+                gyros: survey.gyros,
+                accelerometers: survey.accelerometers,
                 temperatures: survey.temperatures,
                 modes: survey.modes.finish(),
                 health: survey.health,
@@ -261,14 +269,21 @@ impl UnitSurvey {
                 let times = batch.ticks.iter().map(|tick| (tick.end_time.as_ns(), length_ns(tick.duration)));
                 match survey.ticks(first.series, first.sequence, received_ns, &times) {
                     Place::Old => {}
-                    place => self.modes.take(&batch, place == Place::Start),
+                    place => {
+                        self.modes.take(&batch, place == Place::Start);
+                        let readings = batch.ticks.iter().map(|tick| &tick.readings);
+                        readings.for_each(|readings| ReadingInfo::tick(&mut self.gyros, readings));
+                    }
                 }
             }
             Topic::Raw(_, RawStream::Accel) => {
                 let batch: AccelBatch = codec::decode(frame)?;
                 let Some(first) = batch.ticks.first() else { return Ok(()) };
                 let times = batch.ticks.iter().map(|tick| (tick.end_time.as_ns(), length_ns(tick.duration)));
-                survey.ticks(0, first.sequence, received_ns, &times);
+                if survey.ticks(0, first.sequence, received_ns, &times) != Place::Old {
+                    let readings = batch.ticks.iter().map(|tick| &tick.readings);
+                    readings.for_each(|readings| ReadingInfo::tick(&mut self.accelerometers, readings));
+                }
             }
             Topic::Raw(_, RawStream::Temperature) => {
                 let batch: TemperatureBatch = codec::decode(frame)?;

@@ -7,6 +7,9 @@
 //! The squares are fitted by least squares, none below zero, weighted with the covariance that the fitted noise itself
 //! gives the variances; fit and covariance are taken in turns until they agree. A coefficient that the log does not show
 //! is left out of the fit, and an upper limit is stated in its place.
+//!
+//! Where the five terms do not describe a log within its statistics, the shortest τ, which are known best, would decide alone over what
+//! the curve shows elsewhere. Then every point has a model error beside its statistical one, and counts as much as the others.
 
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -111,6 +114,8 @@ pub struct NoiseFit {
     pub coefficients: [Coefficient; 5],
     /// χ² of the fit over its degrees of freedom; near 1 where the five terms describe the log.
     pub chi_square_per_degree: f64,
+    /// Model error that every deviation is given, as a share of it: zero where the five terms describe the log without.
+    pub model_error: f64,
 }
 
 /// Fits and covariances that are taken in turns.
@@ -119,6 +124,10 @@ const ROUNDS: usize = 6;
 const LEAST_SIGMAS: f64 = 1.645;
 /// χ² per degree of freedom beyond which the five terms do not describe a log.
 const LARGEST_CHI_SQUARE: f64 = 3.0;
+/// The same without a model error: beyond it the shortest τ decide over the others.
+const LARGEST_EXACT_CHI_SQUARE: f64 = 2.0;
+/// Model error of every deviation, as a share of it, where they do not.
+const MODEL_ERROR: f64 = 0.1;
 /// Half width of a 95 % interval in sigmas.
 const SIGMAS_95: f64 = 1.96;
 
@@ -127,30 +136,13 @@ impl NoiseFit {
     #[must_use]
     pub fn of(variances: &[Variance], tick_s: f64) -> Option<Self> {
         let problem = Problem::new(variances, tick_s)?;
-        let mut squares = problem.first_guess()?;
-        let mut whitened = problem.whiten(&squares)?;
-        for _ in 0..ROUNDS {
-            squares = whitened.eliminate()?.0;
-            whitened = problem.whiten(&squares)?;
-        }
-        let (squares, kept) = whitened.eliminate()?;
-        let (_, cost, sigmas) = whitened.solve(&kept)?;
-        let degrees = variances.len().saturating_sub(kept.len()).max(1);
-        #[expect(clippy::cast_precision_loss, reason = "a handful")]
-        let chi_square_per_degree = cost / degrees as f64;
-        let widen = widen(chi_square_per_degree);
-        let mut coefficients = [Coefficient::NotObservable { below: 0.0 }; 5];
-        for (place, coefficient) in coefficients.iter_mut().enumerate() {
-            let square = squares[place];
-            *coefficient = match kept.iter().position(|term| *term == place) {
-                Some(at) => observed(square, widen * sigmas.get(at).copied().unwrap_or(0.0)),
-                None => Coefficient::NotObservable { below: whitened.limit(&kept, place, widen) },
-            };
-        }
-        Some(Self { coefficients, chi_square_per_degree })
+        let exact = problem.fit(0.0)?;
+        let by_itself = exact.chi_square_per_degree <= LARGEST_EXACT_CHI_SQUARE;
+        if by_itself { Some(exact) } else { problem.fit(MODEL_ERROR).or(Some(exact)) }
     }
 
-    /// Whether the five terms describe the log; otherwise something else than noise is in it, and uncertainties are widened.
+    /// Whether the five terms describe the log, if only within the model error; otherwise something else than noise is in it, and its
+    /// coefficients say nothing.
     #[must_use]
     pub fn describes(&self) -> bool {
         self.chi_square_per_degree <= LARGEST_CHI_SQUARE
@@ -178,11 +170,6 @@ impl NoiseFit {
         let largest = Term::ALL.into_iter().max_by(|a, b| of[*a as usize].total_cmp(&of[*b as usize]));
         largest.filter(|term| of[*term as usize] > 0.0).unwrap_or(Term::AngleRandomWalk)
     }
-}
-
-/// Factor on all sigmas where the five terms do not describe the log.
-fn widen(chi_square_per_degree: f64) -> f64 {
-    if chi_square_per_degree > LARGEST_CHI_SQUARE { chi_square_per_degree.sqrt() } else { 1.0 }
 }
 
 /// A coefficient with the interval that χ² with its equivalent degrees of freedom gives its square.
@@ -227,6 +214,30 @@ impl<'a> Problem<'a> {
         Some(Self { variances, tick_s, design, values })
     }
 
+    /// Fit and covariance in turns, with a model error of each deviation.
+    fn fit(&self, model_error: f64) -> Option<NoiseFit> {
+        let mut squares = self.first_guess()?;
+        let mut whitened = self.whiten(&squares, model_error)?;
+        for _ in 0..ROUNDS {
+            squares = whitened.eliminate()?.0;
+            whitened = self.whiten(&squares, model_error)?;
+        }
+        let (squares, kept) = whitened.eliminate()?;
+        let (_, cost, sigmas) = whitened.solve(&kept)?;
+        let degrees = self.variances.len().saturating_sub(kept.len()).max(1);
+        #[expect(clippy::cast_precision_loss, reason = "a handful")]
+        let chi_square_per_degree = cost / degrees as f64;
+        let mut coefficients = [Coefficient::NotObservable { below: 0.0 }; 5];
+        for (place, coefficient) in coefficients.iter_mut().enumerate() {
+            let square = squares[place];
+            *coefficient = match kept.iter().position(|term| *term == place) {
+                Some(at) => observed(square, sigmas.get(at).copied().unwrap_or(0.0)),
+                None => Coefficient::NotObservable { below: whitened.limit(&kept, place) },
+            };
+        }
+        Some(NoiseFit { coefficients, chi_square_per_degree, model_error })
+    }
+
     /// With the variances' own sizes as their weights.
     fn first_guess(&self) -> Option<[f64; 5]> {
         let sigmas = self.variances.iter().map(|v| {
@@ -240,7 +251,7 @@ impl<'a> Problem<'a> {
     }
 
     /// Rows made independent and of unit variance, as the noise of these squares has them.
-    fn whiten(&self, squares: &[f64; 5]) -> Option<Whitened> {
+    fn whiten(&self, squares: &[f64; 5], model_error: f64) -> Option<Whitened> {
         let count = self.values.len();
         let [quantization, white, flicker, random_walk, ramp] = *squares;
         let mixture = Mixture {
@@ -257,7 +268,8 @@ impl<'a> Problem<'a> {
         let floor = |row: usize| {
             let (ticks, differences) = place(row);
             let nu = degrees_of_freedom(Estimator::Overlapping, PowerLaw::White, ticks, differences);
-            1e-2 * 2.0 * model[row] * model[row] / nu
+            let of_model = 2.0 * model_error * self.values[row];
+            1e-2 * 2.0 * model[row] * model[row] / nu + of_model * of_model
         };
         for row in 0..count {
             covariance[(row, row)] += floor(row);
@@ -359,11 +371,11 @@ impl Whitened {
     }
 
     /// What the coefficient of a term that was left out is below.
-    fn limit(&self, kept: &[usize], term: usize, widen: f64) -> f64 {
+    fn limit(&self, kept: &[usize], term: usize) -> f64 {
         let mut terms = kept.to_vec();
         terms.push(term);
         let Some((squares, _, sigmas)) = self.solve(&terms) else { return f64::INFINITY };
         let square = squares.last().copied().unwrap_or(0.0).max(0.0);
-        (square + widen * SIGMAS_95 * sigmas.last().copied().unwrap_or(f64::INFINITY)).sqrt()
+        (square + SIGMAS_95 * sigmas.last().copied().unwrap_or(f64::INFINITY)).sqrt()
     }
 }

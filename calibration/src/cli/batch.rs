@@ -44,6 +44,8 @@ pub(super) struct Named<'a> {
     pub(super) judge: &'a [PathBuf],
     /// A document, or the folder that has UNIT.toml of each unit.
     pub(super) document: Option<&'a Path>,
+    /// What a text log's unit is called where nothing is written of it and nobody says.
+    pub(super) unnamed: Option<UnitId>,
 }
 
 /// A unit with its work, or with why there is none.
@@ -101,7 +103,7 @@ impl<'a> Named<'a> {
     /// Logs that are one run of each unit.
     pub(super) fn together(reading: &'a Reading, logs: &'a [PathBuf], document: Option<&'a PathBuf>) -> Self {
         let document = document.map(PathBuf::as_path);
-        Self { reading, logs, together: true, judging: reading, judge: &[], document }
+        Self { reading, logs, together: true, judging: reading, judge: &[], document, unnamed: None }
     }
 
     /// Logs of which each is a run, and others to judge on.
@@ -135,7 +137,7 @@ impl<'a> Named<'a> {
             }
             return Ok(vec![(unit, Ok(work))]);
         }
-        let of_units = self.runs(None)?;
+        let of_units = self.runs(self.unnamed.as_ref())?;
         if of_units.is_empty() {
             return Err(Error::Refused(vec![NOTHING.to_owned()]));
         }
@@ -256,7 +258,7 @@ impl Batch<'_> {
                 one(&work, &Names(None), Bar::reading).map_err(|error| error.beside(&work.cuts()))?;
             let json = self.output.json;
             print(if json { format!("{}\n", report.to_json()) } else { report.to_text() }.as_bytes())?;
-            return self.end(report.refusals(), Vec::new(), work.cuts());
+            return Error::end(refusals(&report, self.accept_partial), work.cuts());
         }
         units.iter().try_for_each(|(unit, _)| self.output.check_unit(unit.as_str()))?;
         let bar = Bar::counting("units done", units.len());
@@ -275,27 +277,26 @@ impl Batch<'_> {
         cuts.sort();
         cuts.dedup();
         let names = units.into_iter().map(|(unit, _)| unit.to_string());
-        let (refused, failed) =
-            close(self.title, &names.zip(came).collect::<Vec<_>>(), self.output.page(), self.output.json)?;
-        self.end(refused, failed, cuts)
-    }
-
-    /// Ends with what was refused, unless that is no failure, with the units that came to nothing, or with what is cut short.
-    fn end(&self, refused: Vec<String>, failed: Vec<String>, cuts: Vec<String>) -> Result<(), Error> {
-        let mut reasons = if self.accept_partial { Vec::new() } else { refused };
-        reasons.extend(failed);
-        Error::end(reasons, cuts)
+        let came = names.zip(came).collect::<Vec<_>>();
+        let page = self.output.page();
+        Error::end(close(self.title, &came, (page, self.output.json), self.accept_partial)?, cuts)
     }
 }
 
+/// What was refused of a unit. A part of the sensors is no failure where that is accepted; all of them are.
+fn refusals<R: UnitReport>(report: &R, accept_partial: bool) -> Vec<String> {
+    let partial = accept_partial && report.rows().iter().any(|row| row.accepted);
+    if partial { Vec::new() } else { report.refusals() }
+}
+
 /// Prints what came of several units, the table that closes them last; `html` is a page of that table, and whether it may replace
-/// another. What was refused comes back, and the units that came to nothing.
+/// another. What was refused comes back, and after that the units that came to nothing.
 pub(super) fn close<R: UnitReport>(
     title: &str,
     units: &[Outcome<R>],
-    html: (Option<&Path>, bool),
-    as_json: bool,
-) -> Result<(Vec<String>, Vec<String>), Error> {
+    (html, as_json): ((Option<&Path>, bool), bool),
+    accept_partial: bool,
+) -> Result<Vec<String>, Error> {
     let mut batch = BatchTable::of::<R>();
     let (mut refused, mut failed, mut reports) = (Vec::new(), Vec::new(), Vec::new());
     for (unit, came) in units {
@@ -307,7 +308,7 @@ pub(super) fn close<R: UnitReport>(
                     print(format!("{}\n", report.to_text()).as_bytes())?;
                 }
                 batch.add(unit, Ok(report.rows()));
-                refused.extend(report.refusals());
+                refused.extend(refusals(report, accept_partial));
             }
             Err(error) => {
                 batch.add(unit, Err(error.to_string()));
@@ -323,5 +324,5 @@ pub(super) fn close<R: UnitReport>(
     } else {
         print(batch.to_text().as_bytes())?;
     }
-    Ok((refused, failed))
+    Ok([refused, failed].concat())
 }

@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use isotherm_log::diff::is_csv;
-use isotherm_log::offline::unit_id;
 use serde_json::json;
 
 use super::above_0;
@@ -13,7 +12,7 @@ use super::batch::{Batch, Named, Names, Unit, Work};
 use super::output::OutputArgs;
 use super::runs::LogArgs;
 use crate::drift::analysis::{Wanted, analyse};
-use crate::drift::columns::{Columns, Kind};
+use crate::drift::columns::{Columns, Kind, unnamed};
 use crate::drift::page::page;
 use crate::drift::parameters::{Parameters, put};
 use crate::drift::pieces::Grid;
@@ -82,12 +81,12 @@ impl DriftArgs {
     /// The units of the logs; corrected ticks are read where they are analysed.
     fn units(&self) -> Result<Vec<Unit>, Error> {
         if self.is_corrected() {
-            let unit = self.log.reading.serial()?.map_or_else(|| unit_id("UNIT"), Ok)?;
+            let unit = self.log.reading.serial()?.map_or_else(unnamed, Ok)?;
             let work = Work::new(None, Vec::new(), Vec::new());
             return Ok(vec![(unit, Ok(work))]);
         }
         let named = Named::together(&self.log.reading, &self.log.log, self.document.as_ref());
-        named.units()
+        Named { unnamed: Some(unnamed()?), ..named }.units()
     }
 
     fn is_corrected(&self) -> bool {

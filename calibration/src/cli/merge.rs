@@ -34,7 +34,7 @@ pub(super) struct MergeArgs {
     /// Write over a file that is there
     #[arg(long)]
     overwrite: bool,
-    /// Date that the new document states (YYYY-MM-DD); that of BASE without it
+    /// Date that the new document states (YYYY-MM-DD; default: today, UTC)
     #[arg(long, value_name = "DATE")]
     created: Option<String>,
     /// Print what was taken from where as one JSON object
@@ -50,11 +50,9 @@ impl MergeArgs {
         let base = named(&self.base)?;
         let parts = self.part.iter().map(|path| named(path)).collect::<Result<Vec<_>, _>>()?;
         let mut merged: Merged = merge(&base, &parts, &self.take)?;
-        if let Some(created) = &self.created {
-            let mut document = merged.written.document.clone();
-            document.created = Some(date(created)?);
-            merged.written = Written::of(&document)?;
-        }
+        let mut document = merged.written.document.clone();
+        document.created = Some(date(self.created.as_deref())?);
+        merged.written = Written::of(&document)?;
         merged.written.save(&self.out, self.overwrite)?;
         let name = name_of(&self.out);
         let text =

@@ -1,9 +1,11 @@
 //! The arguments that say where a fit's document and report go.
 
 use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
 use clap::Args;
 use isotherm_protocol::document::{Created, Document};
+use isotherm_protocol::history::WallTime;
 use serde_json::json;
 use toml::Table;
 
@@ -23,7 +25,7 @@ pub(crate) struct OutputArgs {
     /// Replace documents and reports that are there already
     #[arg(long)]
     overwrite: bool,
-    /// Date that the new document states (YYYY-MM-DD); that of the old one without it
+    /// Date that the new document states (YYYY-MM-DD; default: today, UTC)
     #[arg(long, value_name = "DATE", requires = "out")]
     created: Option<String>,
     /// Write the report with its diagrams as one HTML file; of several units each to FILE-UNIT.html, and the table to FILE
@@ -100,8 +102,7 @@ impl OutputArgs {
     /// Writes what a fit came to; its report is left.
     pub(super) fn keep(&self, fitted: Fitted, work: &Work, names: &Names<'_>) -> Result<FitReport, Error> {
         let Fitted { written, report, about } = fitted;
-        let any_accepted =
-            report.verdicts.is_empty() || report.verdicts.iter().any(|verdict| verdict.accepted);
+        let any_accepted = report.verdicts.iter().any(|verdict| verdict.accepted);
         let document = |report: &FitReport| self.document(written.document, &about, report);
         self.put(any_accepted, document, report, work, names)
     }
@@ -158,20 +159,22 @@ impl OutputArgs {
         Written::of(&document)
     }
 
-    /// Gives a new document its date; without one it keeps the old one's.
+    /// Gives a new document its date.
     pub(super) fn put_date(&self, document: &mut Document) -> Result<(), Error> {
-        document.created = self.date()?.or(document.created);
+        document.created = Some(self.date()?);
         Ok(())
     }
 
     /// The date that the new document is to state.
-    pub(super) fn date(&self) -> Result<Option<Created>, Error> {
-        self.created.as_deref().map(date).transpose()
+    pub(super) fn date(&self) -> Result<Created, Error> {
+        date(self.created.as_deref())
     }
 }
 
-/// The date that a document is to state.
-pub(super) fn date(text: &str) -> Result<Created, Error> {
+/// The date that a document is to state; without one that of today (UTC).
+pub(super) fn date(stated: Option<&str>) -> Result<Created, Error> {
+    let today = WallTime::from(SystemTime::now()).to_string();
+    let text = stated.or_else(|| today.get(..10)).unwrap_or_default();
     let date = text.parse().ok().and_then(Created::new);
     date.ok_or_else(|| Error::Usage(format!("--created is {text:?}, must be a date such as 2026-11-22")))
 }

@@ -35,8 +35,7 @@ pub(crate) struct Reading {
     /// Column mapping of a text log (TOML); ready ones are in config/mappings
     #[arg(long, short, value_name = "FILE")]
     pub(crate) mapping: Option<PathBuf>,
-    /// The unit, where a recording has several, or the serial of a text log's; without it a text log is taken for the document's
-    /// unit
+    /// The unit, where a recording has several; of a text log its serial (default: that of the document)
     #[arg(long, short, value_name = "SERIAL")]
     pub(crate) unit: Option<String>,
     /// Leave out this much of each log's beginning (s); recordings are cut between messages
@@ -101,10 +100,11 @@ impl Reading {
         let name = names(log);
         let files = &unfolded(log)?;
         if !are_recordings(files)? {
-            let unit = match given.as_ref().or(fallback) {
-                Some(unit) => unit.clone(),
-                None => unit_id("UNIT")?,
-            };
+            let unit = given.as_ref().or(fallback).cloned().ok_or_else(|| {
+                Error::Usage(format!(
+                    "{name} is a text log, which does not say of which unit it is: give --unit SERIAL, or --document, which has it"
+                ))
+            })?;
             let mapping = Box::new(self.text_mapping(files)?);
             let text = LogFiles::Text {
                 paths: files.clone(),

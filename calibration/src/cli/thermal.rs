@@ -168,7 +168,7 @@ impl ThermalArgs {
                 return Err(Error::Usage(format!("{name} is {value} s, must be from {low} to {high} s")));
             }
         }
-        let created = self.output.date()?;
+        let created = Some(self.output.date()?);
         Ok(Settings {
             method: match self.method {
                 MethodArg::Sequential => Method::Sequential,

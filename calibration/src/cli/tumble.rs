@@ -118,10 +118,12 @@ impl TumbleArgs {
             let track = Track::of(run, &written.loaded, bar())?;
             Ok(Left::of(&track, &tumble.poses, gravity))
         };
-        let before = left(&Written::of(&before(&base.document, &tumble, work.base.is_some()))?)?;
+        let (before, about_before) = before(&base.document, &tumble, work.base.is_some());
+        let before = left(&Written::of(&before)?)?;
         let written = Written::of(&document)?;
         let after = left(&written)?;
-        let report = report(&document, &tumble, &settings, &run.name, [&before, &after]);
+        let mut report = report(&document, &tumble, &settings, &run.name, [&before, &after]);
+        report.notes.push(about_before.to_owned());
         let about = About {
             method: "tumble: |f| = g over still poses; gyros against the accelerometers",
             key: "tumble",

@@ -81,9 +81,7 @@ impl ValidateArgs {
         };
         if reports.len() > 1 {
             let names = work.iter().map(|work| work.unit.to_string());
-            let (mut reasons, failed) = self.several(&names.zip(reports).collect::<Vec<_>>())?;
-            reasons.extend(failed);
-            return Error::end(reasons, cuts(&work));
+            return Error::end(self.several(&names.zip(reports).collect::<Vec<_>>())?, cuts(&work));
         }
         let report = reports.into_iter().next().unwrap_or_else(|| Err(nothing()))?;
         self.one(&report)?;
@@ -171,11 +169,11 @@ impl ValidateArgs {
         print(text.as_bytes())
     }
 
-    fn several(&self, reports: &[Outcome<FitReport>]) -> Result<(Vec<String>, Vec<String>), Error> {
+    fn several(&self, reports: &[Outcome<FitReport>]) -> Result<Vec<String>, Error> {
         for (unit, report) in reports.iter().filter_map(|(unit, came)| Some((unit, came.as_ref().ok()?))) {
             self.page.write_unit(unit, || report.to_html())?;
         }
-        close("Judgement of several units", reports, self.page.table(), self.json)
+        close("Judgement of several units", reports, (self.page.table(), self.json), false)
     }
 }
 

@@ -75,6 +75,14 @@ pub struct Analysis {
     pub extrapolation: Option<Extrapolation>,
 }
 
+impl Analysis {
+    /// The noise coefficients, where they describe the log: others are not stated.
+    #[must_use]
+    pub fn stated_noise(&self) -> Option<&NoiseFit> {
+        self.noise.as_ref().filter(|noise| noise.describes())
+    }
+}
+
 /// The estimators, in the order of the tables.
 pub const ESTIMATORS: [Estimator; 3] = [Estimator::Plain, Estimator::Overlapping, Estimator::Modified];
 

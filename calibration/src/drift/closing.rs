@@ -41,8 +41,7 @@ impl Report {
     /// What was found of a sensor, in one row.
     fn row(&self, sensor: &Analysis) -> BatchRow {
         let (factor, unit) = stated_in(Term::AngleRandomWalk, self.kind);
-        let noise = sensor.noise.as_ref().filter(|noise| noise.describes());
-        let walk = match noise.map(|noise| noise.of_term(Term::AngleRandomWalk)) {
+        let walk = match sensor.stated_noise().map(|noise| noise.of_term(Term::AngleRandomWalk)) {
             Some(Coefficient::Observed { value, .. }) => format!("{} {unit}", short(value * factor)),
             Some(Coefficient::NotObservable { below }) => format!("< {} {unit}", short(below * factor)),
             None => "–".to_owned(),

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use isotherm_correction::sample::{CorrectedTick, OutputKind, SensorFlags};
 use isotherm_log::diff::CorrectedLog;
-use isotherm_log::offline::Loaded;
+use isotherm_log::offline::{Loaded, unit_id};
 use isotherm_protocol::key::UnitId;
 
 use super::DEG_PER_H_IN_RAD_PER_S;
@@ -44,6 +44,14 @@ pub struct Columns {
     pub frozen: Vec<String>,
     /// What is to be said of the reading.
     pub notes: Vec<String>,
+}
+
+/// What the unit of a log is called that has no serial, where nobody says one and no document is written of it.
+///
+/// # Errors
+/// None: the name is a serial as others are.
+pub fn unnamed() -> Result<UnitId, Error> {
+    Ok(unit_id("unnamed")?)
 }
 
 /// Names of the case axes.
@@ -167,7 +175,7 @@ impl Columns {
         cut: &Cut,
         mut progress: impl FnMut(),
     ) -> Result<Self, Error> {
-        let unnamed = isotherm_log::offline::unit_id("UNIT")?;
+        let unnamed = unnamed()?;
         let units = unit.cloned().into_iter().collect();
         let mut columns: Option<Self> = None;
         for path in paths {

@@ -133,7 +133,7 @@ fn allan(report: &Report) -> Chart {
                 .filter_map(move |row| Some((row.tau_s, row.of[1].as_ref()?.interval[end])));
             curves.push(series("95 % of overlapping".to_owned(), Ink::Faint, Form::Line, limit));
         }
-        if let Some(noise) = &sensor.noise {
+        if let Some(noise) = sensor.stated_noise() {
             let fit = sensor
                 .allan
                 .iter()

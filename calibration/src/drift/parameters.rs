@@ -154,31 +154,23 @@ impl Parameters {
 
 /// N (°/h·√s).
 fn walk(analysis: &Analysis, notes: &mut Vec<String>) -> f64 {
-    match &analysis.noise {
-        Some(noise) if noise.describes() => {
-            let walk = noise.of_term(Term::AngleRandomWalk);
-            if let Coefficient::NotObservable { .. } = walk {
-                notes.push(
-                    "angle random walk is not observable: its upper limit stands in its place".to_owned(),
-                );
-            }
-            walk.value_or_limit()
+    if let Some(noise) = analysis.stated_noise() {
+        let walk = noise.of_term(Term::AngleRandomWalk);
+        if let Coefficient::NotObservable { .. } = walk {
+            notes.push("angle random walk is not observable: its upper limit stands in its place".to_owned());
         }
-        _ => {
-            // What the estimator sees is means over a reference.
-            let far = |tau: f64| libm::log(tau / REFERENCE_S).abs();
-            let overlapping =
-                analysis.allan.iter().filter_map(|row| Some((row.tau_s, row.of[1].as_ref()?.value)));
-            let nearest = overlapping.min_by(|a, b| far(a.0).total_cmp(&far(b.0)));
-            let (tau_s, deviation) = nearest.unwrap_or((1.0, analysis.deviation));
-            notes.push(format!(
-                "the five noise terms do not describe the log: the angle random walk is that of means over {} s, as long as a \
-                 reference",
-                short(tau_s)
-            ));
-            deviation * tau_s.sqrt()
-        }
+        return walk.value_or_limit();
     }
+    // What the estimator sees is means over a reference.
+    let far = |tau: f64| libm::log(tau / REFERENCE_S).abs();
+    let overlapping = analysis.allan.iter().filter_map(|row| Some((row.tau_s, row.of[1].as_ref()?.value)));
+    let nearest = overlapping.min_by(|a, b| far(a.0).total_cmp(&far(b.0)));
+    let (tau_s, deviation) = nearest.unwrap_or((1.0, analysis.deviation));
+    notes.push(format!(
+        "the five noise terms do not describe the log: the angle random walk is that of means over {} s, as long as a reference",
+        short(tau_s)
+    ));
+    deviation * tau_s.sqrt()
 }
 
 /// What the log says of the trend.

@@ -9,7 +9,7 @@ use super::analysis::{Analysis, Deviation};
 use super::columns::Kind;
 use super::figures::{short, stated_in, table, with_interval, within};
 use super::parameters::{Parameters, Trend, markov, trend};
-use crate::allan::{Coefficient, NoiseFit, Term};
+use crate::allan::{Coefficient, Term};
 
 /// What is said of the log as a whole.
 #[derive(Debug, Clone, Serialize)]
@@ -51,11 +51,10 @@ impl Report {
     pub fn sentences(&self) -> Vec<String> {
         let (measure, sensor) = (self.kind.measure(), self.kind.sensor());
         let of = |analysis: &Analysis| {
-            let walk = analysis.noise.as_ref().map(|noise| noise.of_term(Term::AngleRandomWalk));
+            let walk = analysis.stated_noise().map(|noise| noise.of_term(Term::AngleRandomWalk));
             let (factor, unit) = stated_in(Term::AngleRandomWalk, self.kind);
-            let described = analysis.noise.as_ref().is_some_and(NoiseFit::describes);
             let mut words = match walk {
-                Some(_) if !described => "more in it than the five noise terms".to_owned(),
+                None if analysis.noise.is_some() => "more in it than the five noise terms".to_owned(),
                 Some(Coefficient::Observed { value, .. }) => format!("N {} {unit}", short(value * factor)),
                 Some(Coefficient::NotObservable { below }) => {
                     format!("N below {} {unit}", short(below * factor))
@@ -123,7 +122,8 @@ impl Report {
         let row = |term: Term| {
             let (factor, unit) = stated_in(term, self.kind);
             let cells = self.sensors.iter().map(|sensor| {
-                match sensor.noise.as_ref().map(|noise| noise.of_term(term)) {
+                match sensor.stated_noise().map(|noise| noise.of_term(term)) {
+                    None if sensor.noise.is_some() => "not stated".to_owned(),
                     Some(Coefficient::Observed { value, interval }) => {
                         within(value * factor, interval.map(|end| end * factor))
                     }
@@ -205,18 +205,25 @@ impl Report {
         (head, rows.collect())
     }
 
-    /// Sensors whose Allan deviation the five terms do not describe.
+    /// Sensors whose Allan deviation the five terms do not describe, or not within its statistics.
     #[must_use]
     pub fn noise_words(&self) -> Vec<String> {
         let badly = self.sensors.iter().filter_map(|sensor| {
-            let noise = sensor.noise.as_ref().filter(|noise| !noise.describes())?;
-            Some(format!(
-                "{} {}: the five terms do not describe this log (χ² per degree of freedom {}): vibration, motion or a change of \
-                 temperature is in it. Read the diagram, not the coefficients; their uncertainties are widened by √χ².",
-                self.kind.sensor(),
-                sensor.name,
-                short(noise.chi_square_per_degree)
-            ))
+            let noise = sensor.noise.as_ref().filter(|noise| noise.model_error > 0.0)?;
+            let error = format!("{:.0} %", 100.0 * noise.model_error);
+            let of = format!("{} {}", self.kind.sensor(), sensor.name);
+            Some(if noise.describes() {
+                format!(
+                    "{of}: the five terms describe the Allan deviations no better than to {error} each: that is the model error of the \
+                     coefficients."
+                )
+            } else {
+                format!(
+                    "{of}: the five terms do not describe this log, not even with a model error of {error} (χ² per degree of freedom {}): \
+                     vibration, motion or a change of temperature is in it. Read the diagram; coefficients are not stated.",
+                    short(noise.chi_square_per_degree)
+                )
+            })
         });
         badly.collect()
     }
@@ -327,7 +334,7 @@ impl Report {
         let mut noise = serde_json::Map::new();
         for term in Term::ALL {
             let (factor, unit) = stated_in(term, self.kind);
-            let value = match sensor.noise.as_ref().map(|noise| noise.of_term(term)) {
+            let value = match sensor.stated_noise().map(|noise| noise.of_term(term)) {
                 Some(Coefficient::Observed { value, interval }) => {
                     json!({ "value": value * factor, "interval": interval.map(|end| end * factor), "unit": unit })
                 }
@@ -360,6 +367,7 @@ impl Report {
             "allan": allan,
             "noise": noise,
             "noise_chi_square_per_degree": sensor.noise.as_ref().map(|noise| noise.chi_square_per_degree),
+            "noise_model_error": sensor.noise.as_ref().map(|noise| noise.model_error),
             "markov_sigma": fit.and_then(|fit| fit.sigma),
             "markov_correlation_time_h": fit.and_then(|fit| fit.correlation_time_h),
             "autocorrelation_time_h": sensor.autocorrelation.as_ref().and_then(|auto| auto.correlation_time_h),

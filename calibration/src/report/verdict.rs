@@ -87,7 +87,22 @@ impl Verdict {
         let sizes = |values: &[Vec<f64>; 2]| values.each_ref().map(|values| Size::of(values));
         let verdict = Self::new(of, measure, sizes(&inside)).out_of_sample(outside.as_ref().map(sizes));
         let [before, after] = outside.unwrap_or(inside);
-        verdict.unless_worse(&before, &after)
+        verdict.unless_worse(&before, &after).unless_few(before.len())
+    }
+
+    /// Refused where few of so many windows are whole: the others may say something else.
+    fn unless_few(self, all: usize) -> Self {
+        let [Size { count, .. }, _] = self.deciding();
+        #[expect(clippy::cast_precision_loss, reason = "windows of a log are far below 2⁵³")]
+        let few = (count as f64) < LEAST_SHARE * all as f64;
+        if !few {
+            return self;
+        }
+        self.refused(format!(
+            "{count} of {all} windows are whole, at least {:.0} % must be: look for gaps and flags with isotherm-replay correct, and choose \
+             another --window where the log has gaps",
+            100.0 * LEAST_SHARE
+        ))
     }
 
     /// Refused where these values have grown by more than noise.
@@ -172,6 +187,10 @@ impl Verdict {
     }
 }
 
+/// What is said of an axis that temperature does nothing to.
+pub const FLAT: &str = "no temperature dependence above noise";
+/// Share of the windows that a verdict must rest on.
+const LEAST_SHARE: f64 = 0.5;
 /// Share by which a figure may change and still be the same: less than its digits tell.
 pub const SAME_SHARE: f64 = 0.01;
 /// Probability below which it is no accident that what is left follows the change.

@@ -101,6 +101,7 @@ impl History {
         for [from, to] in between_turns(temperature, stands_out) {
             let (index, piece) = (self.ramps.len(), self.ramps.len() * PIECES);
             let part = &temperature[from..to];
+            // Before the first reading there is no temperature.
             let known = || part.iter().copied().filter(|t| t.is_finite());
             let (low, high) =
                 known().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), t| (l.min(t), h.max(t)));
@@ -118,7 +119,7 @@ impl History {
             }
             let steepest = slopes[from..to].iter().copied().filter(|s| s.is_finite());
             let steepest = steepest.fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
-            let ends = [part.first(), part.last()].map(|t| t.copied().unwrap_or(f64::NAN));
+            let ends = [known().next(), known().next_back()].map(|t| t.unwrap_or(f64::NAN));
             self.ramps.push(Ramp { from_to_deg_c: ends, deg_c_per_min: steepest * 60.0 });
         }
     }

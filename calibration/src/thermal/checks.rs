@@ -22,6 +22,10 @@ const TABLE_DEG_PER_S: f64 = 0.5;
 const GRAVITY: [f64; 2] = [0.9, 1.1];
 /// What three gyros at rest hardly stay below together (°/h): one of three axes has more than half of the Earth's rate.
 const QUIETEST_DEG_PER_H: f64 = 1.0;
+/// Largest turn of the specific force of a unit that stays where it is (°), from one side of a window to the other.
+const LARGEST_TURN_DEG: f64 = 2.0;
+/// Windows on either side.
+const BESIDE: usize = 3;
 /// Fewest readings of a tick series for which anything can be said.
 const FEWEST: usize = 100;
 /// Smallest range of temperature that is worth a fit (°C).
@@ -264,6 +268,34 @@ pub fn attitude(samples: &Samples, document: &Document, (rest, stand): (&Rest, &
     found
 }
 
+/// That a unit was turned in the middle of a run: the specific force points somewhere else from one minute to the next. With
+/// temperature it turns slowly, by its biases.
+fn turned(samples: &Samples) -> Option<String> {
+    let [x, y, z] = samples.forces.as_slice() else { return None };
+    let middle = |windows: std::ops::Range<usize>| -> Option<[f64; 3]> {
+        let mut force = [0.0; 3];
+        for (force, values) in force.iter_mut().zip([x, y, z]) {
+            *force = median_if_any(values.get(windows.clone())?)?;
+        }
+        Some(force)
+    };
+    let dot = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let turn = |at: usize| {
+        let (before, after) = (middle(at.checked_sub(BESIDE)?..at)?, middle(at + 1..at + 1 + BESIDE)?);
+        let cosine = dot(before, after) / (dot(before, before) * dot(after, after)).sqrt();
+        Some((at, libm::acos(cosine.clamp(-1.0, 1.0)).to_degrees()))
+    };
+    let turns = (0..samples.time_s.len()).filter_map(turn);
+    let (at, angle) =
+        turns.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, angle)| *angle > LARGEST_TURN_DEG)?;
+    Some(format!(
+        "{}: the unit was turned {:.0} s after the beginning: the specific force turns by {angle:.1} ° there, at most \
+         {LARGEST_TURN_DEG} ° are drift. Give what is before and what is after as two runs, with --start and --duration",
+        samples.name,
+        samples.time_s.get(at).copied().unwrap_or_default()
+    ))
+}
+
 /// Looks at a run that went through the corrector: the accelerometers must feel about one g.
 #[must_use]
 pub fn corrected(samples: &Samples, stand: &Stand, dead: &[(bool, usize, String)]) -> Findings {
@@ -272,6 +304,7 @@ pub fn corrected(samples: &Samples, stand: &Stand, dead: &[(bool, usize, String)
     // A dead accelerometer is refused for itself.
     let alive = dead.iter().all(|(gyro, ..)| *gyro);
     if samples.forces.len() == 3 && alive && stand.turning.is_none() {
+        found.refusals.extend(turned(samples));
         let forces: Option<Vec<f64>> = samples.forces.iter().map(|values| median_if_any(values)).collect();
         if let Some(forces) = forces {
             let size = forces.iter().map(|f| f * f).sum::<f64>().sqrt();

@@ -7,7 +7,9 @@
 
 use std::collections::BTreeMap;
 
-use isotherm_correction::sample::{GyroTick, OutputKind, Sensors, TemperatureReading};
+use isotherm_correction::sample::{
+    CorrectedTick, GyroTick, OutputKind, SensorFlags, Sensors, TemperatureReading,
+};
 use isotherm_correction::unit::UnitSettings;
 use isotherm_correction::units::{AngularRate, Span, Timestamp};
 use isotherm_log::offline::Offline;
@@ -174,33 +176,32 @@ impl Basis {
             };
             sequence += 1;
             unit.handle(&LogEvent::Gyro { output: OutputKind::Mean, tick });
-            for tick in &unit.take() {
-                sums.take(tick.end_time.as_ns(), tick.delta_angle, step.as_s());
-            }
+            unit.take().iter().for_each(|tick| sums.take(tick, step.as_s()));
         }
         unit.finish();
-        for tick in &unit.take() {
-            sums.take(tick.end_time.as_ns(), tick.delta_angle, step.as_s());
-        }
+        unit.take().iter().for_each(|tick| sums.take(tick, step.as_s()));
         Ok(sums.means())
     }
 }
 
-/// Sums over the windows of a run.
+/// Sums over the windows of a run; windows before the first temperature reading have no number.
 struct Windows<'a> {
     run: &'a Samples,
     sums: Vec<([f64; 3], f64)>,
     at: usize,
+    /// The temperature is known: until then the corrector assumes one.
+    known: bool,
 }
 
 impl<'a> Windows<'a> {
     fn new(run: &'a Samples) -> Self {
-        Self { run, sums: vec![([0.0; 3], 0.0); run.time_s.len()], at: 0 }
+        Self { run, sums: vec![([0.0; 3], 0.0); run.time_s.len()], at: 0, known: false }
     }
 
-    fn take(&mut self, end_ns: i64, angle: [f64; 3], length_s: f64) {
+    fn take(&mut self, tick: &CorrectedTick, length_s: f64) {
         #[expect(clippy::cast_precision_loss, reason = "a run is far below 2⁵³ ns")]
-        let middle = end_ns.saturating_sub(self.run.start_ns) as f64 * 1e-9 - 0.5 * length_s;
+        let middle = tick.end_time.as_ns().saturating_sub(self.run.start_ns) as f64 * 1e-9 - 0.5 * length_s;
+        self.known |= tick.gyro_flags.iter().all(|flags| !flags.contains(SensorFlags::STALE_TEMPERATURE));
         let half = 0.5 * self.run.window_s;
         while self.run.time_s.get(self.at).is_some_and(|window| window + half < middle) {
             self.at += 1;
@@ -209,8 +210,8 @@ impl<'a> Windows<'a> {
             (self.run.time_s.get(self.at), self.sums.get_mut(self.at))
             && (window - middle).abs() <= half
         {
-            sums.iter_mut().zip(angle).for_each(|(sum, angle)| *sum -= angle);
-            *length += length_s;
+            sums.iter_mut().zip(tick.delta_angle).for_each(|(sum, angle)| *sum -= angle);
+            *length += if self.known { length_s } else { f64::NAN };
         }
     }
 

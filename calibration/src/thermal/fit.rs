@@ -225,7 +225,11 @@ fn find(
             Ok(found) => {
                 let (left, mean) =
                     (sequential::left(columns, target, &found), sequential::left(columns, target, &[]));
-                Found::sequential(found, left, mean)
+                let flat = target.flat(columns).filter(|_| left > WORTH_IT * mean);
+                flat.map_or_else(
+                    || Found::sequential(found, left, mean),
+                    |level| Found::flat(&level, target.level),
+                )
             }
         });
     }
@@ -247,7 +251,8 @@ fn find(
     let mut choice = target.choose(columns, (degrees, &dynamics), (history, &known.temperature));
     if settings.terms == Terms::All {
         let largest = |tried: &Tried| !tried.spec.trend && tried.spec.scale == target.widest_scale();
-        choice.chosen = choice.tried.iter().rposition(largest);
+        let models = choice.tried.iter().enumerate().filter(|(_, tried)| largest(tried));
+        choice.chosen = models.max_by_key(|(_, tried)| tried.count).map(|(index, _)| index);
     }
     let Some(best) = choice.best().cloned() else {
         return Ok(Found::refused(
@@ -255,6 +260,9 @@ fn find(
         ));
     };
     if settings.terms == Terms::Auto && (choice.mean.is_nan() || best.score > WORTH_IT * choice.mean) {
+        if let Some(level) = target.flat(columns) {
+            return Ok(Found { choice: Some(choice), ..Found::flat(&level, target.level) });
+        }
         let why = format!(
             "nothing beats its mean: the best model, {}, leaves {:.3e} on stretches that it did not see, the mean {:.3e}; the axis \
              follows something else than temperature",

@@ -13,7 +13,7 @@ use super::solve::Solution;
 use super::stand::Stand;
 use crate::error::Error;
 use crate::means::Size;
-use crate::report::{Curve, Figure, Rest, Verdict, judge};
+use crate::report::{Curve, FLAT, Figure, Rest, Verdict, judge};
 use crate::run::{Run, Watch};
 use crate::written::Written;
 
@@ -38,11 +38,24 @@ pub(super) struct Found {
     pub(super) drifts: bool,
     /// Whether the sensor does not work at all.
     pub(super) dead: bool,
+    /// Whether temperature does nothing to it.
+    pub(super) flat: bool,
 }
 
 impl Found {
     pub(super) fn refused(why: &str) -> Self {
         Self { refused: Some(why.to_owned()), ..Self::default() }
+    }
+
+    /// A sensor that temperature does nothing to; where its level is known, that is its bias.
+    pub(super) fn flat(level: &Solution, known: bool) -> Self {
+        let constant = level.coefficients.first().zip(level.sigmas.first()).filter(|_| known);
+        Self {
+            terms: constant.map(|(value, sigma)| (Term::Static(0), *value, *sigma)).into_iter().collect(),
+            words: "constant".to_owned(),
+            flat: true,
+            ..Self::default()
+        }
     }
 
     pub(super) fn sequential(terms: Vec<(Term, f64, f64)>, left: f64, mean: f64) -> Self {
@@ -79,7 +92,7 @@ impl Found {
             refused: None,
             remarks,
             drifts: spec.trend,
-            dead: false,
+            ..Self::default()
         }
     }
 }
@@ -179,6 +192,11 @@ impl Outcome {
             }
             troubles.extend(constant(&curves));
             let verdicts = Curve::verdicts(&curves);
+            if verdicts.is_empty() {
+                let nothing = "no window of any axis is whole: the log has gaps, or its ticks are flagged throughout; look with \
+                               isotherm-replay correct";
+                return Err(Error::Refused([vec![nothing.to_owned()], troubles].concat()));
+            }
             // Every time round there is a sensor less.
             if !self.take_out(&verdicts) {
                 break (document, curves, verdicts, troubles);
@@ -314,12 +332,24 @@ impl Outcome {
         })
     }
 
+    /// Whether a sensor of the document at hand has terms of the kind that is fitted.
+    fn had_terms(&self, sensor: &Sensor) -> bool {
+        let accel = |document: &Document| {
+            document.accel.as_ref().and_then(|accel| accel.sensor.get(sensor.index).cloned())
+        };
+        if sensor.gyro {
+            self.base.gyro.sensor.get(sensor.index) != self.bare.gyro.sensor.get(sensor.index)
+        } else {
+            accel(&self.base) != accel(&self.bare)
+        }
+    }
+
     /// Gives the verdicts their reasons.
     fn say(&self, verdicts: &mut [Verdict]) {
         for verdict in verdicts {
             verdict.figure = Figure::Rms;
             let mine = self.found.iter().find(|(sensor, ..)| axis_name(sensor).as_ref() == Some(&verdict.of));
-            let Some((_, _, found)) = mine else { continue };
+            let Some((sensor, _, found)) = mine else { continue };
             if let Some(why) = &found.refused {
                 *verdict = verdict.clone().refused(why.clone());
                 if found.dead {
@@ -328,7 +358,13 @@ impl Outcome {
                 }
             } else {
                 verdict.accepted = true;
-                *verdict = verdict.clone().remark(found.words.clone());
+                let words = match (found.flat, found.terms.is_empty()) {
+                    (true, true) if self.had_terms(sensor) => format!("{FLAT}; it has no terms any more"),
+                    (true, true) => format!("{FLAT}; left unchanged"),
+                    (true, false) => format!("{FLAT}; constant bias"),
+                    (false, _) => found.words.clone(),
+                };
+                *verdict = verdict.clone().remark(words);
             }
         }
     }

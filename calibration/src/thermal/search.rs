@@ -72,14 +72,10 @@ pub fn ladders(gyro: bool, grid_step_s: f64, history: &History, longest_run_s: f
         ];
         all.push(named("Ṫ±, T̈±", &by_branch));
     }
-    let fit = |ladder: &[f64]| {
-        ladder.iter().map(|tau| tau.max(SHORTEST_GRID_STEPS * grid_step_s)).collect::<Vec<_>>()
-    };
-    all.extend(SINGLE.map(|tau| lags(&fit(&[tau]), 0)));
+    let bounds = bounds(longest_run_s, grid_step_s);
+    all.extend(within(&SINGLE, bounds).into_iter().map(|tau| lags(&[tau], 0)));
     if history.tells_dynamics() {
-        let longest = longest(longest_run_s, grid_step_s);
-        let ladders = LADDERS
-            .map(|ladder| -> Vec<f64> { fit(ladder).into_iter().filter(|tau| *tau <= longest).collect() });
+        let ladders = LADDERS.map(|ladder| within(ladder, bounds));
         if gyro {
             all.extend(ladders.iter().skip(1).map(|ladder| leading(&lags(ladder, 1))));
         }
@@ -104,9 +100,7 @@ pub fn searched(
         return Ok(all);
     }
     let grid_step = columns.basis().filter.grid_step_s;
-    let shortest = (SHORTEST_GRID_STEPS * grid_step).max(2.0);
-    let longest = longest(longest_run_s, grid_step);
-    let grid = ladder([shortest, longest], POINTS);
+    let grid = ladder(bounds(longest_run_s, grid_step), POINTS);
     columns.make(&(0..=DEGREE).map(Term::Static).collect::<Vec<_>>())?;
     columns.make(&grid.iter().map(|tau| Term::Lag(millis(*tau), 0)).collect::<Vec<_>>())?;
     let gains = usize::from(history.tells_dynamics());
@@ -131,10 +125,19 @@ pub fn searched(
     Ok(all)
 }
 
-/// The longest time constant that a log can tell (s).
-fn longest(longest_run_s: f64, grid_step_s: f64) -> f64 {
+/// The shortest and the longest time constant that a log can tell (s).
+fn bounds(longest_run_s: f64, grid_step_s: f64) -> [f64; 2] {
     let shortest = (SHORTEST_GRID_STEPS * grid_step_s).max(2.0);
-    (LONGEST_SHARE * longest_run_s).clamp(4.0 * shortest, LONGEST_S)
+    [shortest, (LONGEST_SHARE * longest_run_s).min(LONGEST_S).max(4.0 * shortest)]
+}
+
+/// What a ladder has between two bounds. Below the shorter one the fastest lag is taken there, once: a part that answers faster than
+/// the grid can tell is fitted by it best.
+fn within(ladder: &[f64], [shortest, longest]: [f64; 2]) -> Vec<f64> {
+    let mut taus: Vec<f64> =
+        ladder.iter().map(|tau| tau.max(shortest)).filter(|tau| *tau <= longest).collect();
+    taus.dedup();
+    taus
 }
 
 /// Sum over the sensors of the logarithm of what is left.

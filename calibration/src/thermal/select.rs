@@ -7,20 +7,20 @@ use super::columns::{Columns, Term};
 use super::model::{Dynamics, Spec};
 use super::scale::{self, Kept};
 use super::solve::{Solution, once, solve};
-use crate::robust::median_if_any;
+use crate::robust::{block_length, is_white, median_if_any};
 
 /// Score of a larger model, as a share of that of a smaller one, above which the smaller one is kept.
 const NO_BETTER: f64 = 0.985;
 /// Likewise for the drift with time, which stays out of the document and must be plain to be believed.
 const PLAIN_DRIFT: f64 = 0.8;
+/// Likewise for T̈, whose gain passes the thermometer's noise on as no other term does: what cross-validation sees is means over
+/// minutes, in which that noise has gone, and a near-tie there costs many times what it gains in single ticks.
+const PLAIN_ACCELERATION: f64 = 0.8;
 /// Largest share of the mean's score with which an axis is accepted.
 pub const WORTH_IT: f64 = 0.9;
 
 /// How many times what is usual a temperature may count.
 const CROWDED: f64 = 3.0;
-/// Windows of a log for each block that a score is averaged over, and the most that a block may have.
-const WINDOWS_PER_BLOCK: usize = 200;
-const LONGEST_BLOCK: usize = 10;
 
 /// One sensor's windows over all runs.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -119,6 +119,12 @@ impl Target {
         }
     }
 
+    /// The level, and nothing else, where what it leaves is no more than noise.
+    #[must_use]
+    pub fn flat(&self, columns: &Columns<'_>) -> Option<Solution> {
+        self.solve(columns, &Spec::default(), true).filter(|level| is_white(&level.residual))
+    }
+
     /// Root mean square of what a model leaves on pieces that were left out one by one, over temperatures that the others have
     /// too. `None` where too little can be judged.
     #[must_use]
@@ -133,7 +139,7 @@ impl Target {
         let all: Vec<&[f64]> = design.iter().map(AsRef::as_ref).collect();
         let pieces = history.piece.iter().max().map_or(0, |last| last + 1);
         // White noise is in every model alike: averaged over some windows it no longer hides which of them is better.
-        let block = (self.values.len() / WINDOWS_PER_BLOCK).clamp(1, LONGEST_BLOCK);
+        let block = block_length(self.values.len());
         let (mut square, mut weight, mut judged) = (0.0, 0.0, 0);
         for left_out in 0..pieces {
             let mut weights = self.weights.clone();
@@ -274,10 +280,18 @@ impl Target {
     }
 }
 
-/// The smallest model that is hardly worse than the best.
+/// The smallest model that is hardly worse than the best; one with T̈ where all without are plainly worse.
 fn smallest(tried: &[Tried]) -> Option<usize> {
-    let best = tried.iter().map(|tried| tried.score).fold(f64::INFINITY, f64::min);
-    let good = tried.iter().enumerate().filter(|(_, tried)| tried.score * NO_BETTER <= best);
+    let has_acceleration =
+        |tried: &Tried| tried.spec.dynamics.terms.iter().any(|term| matches!(term, Term::Acceleration(..)));
+    let least = |acceleration: bool| {
+        let own = tried.iter().filter(|tried| has_acceleration(tried) == acceleration);
+        own.map(|tried| tried.score).fold(f64::INFINITY, f64::min)
+    };
+    let plain = least(true) < PLAIN_ACCELERATION * least(false);
+    let best = least(plain);
+    let among = tried.iter().enumerate().filter(|(_, tried)| plain || !has_acceleration(tried));
+    let good = among.filter(|(_, tried)| tried.score * NO_BETTER <= best);
     good.min_by(|(_, a), (_, b)| {
         (a.count, a.score).partial_cmp(&(b.count, b.score)).unwrap_or(std::cmp::Ordering::Equal)
     })
@@ -311,4 +325,22 @@ pub fn equal_temperature(temperature: &[f64], at_rest: &[bool], [low, high]: [f6
 pub fn terms_of(degrees: &[usize], dynamics: &[Dynamics]) -> Vec<Term> {
     let highest = degrees.iter().copied().max().unwrap_or(0);
     (0..=highest).map(Term::Static).chain(dynamics.iter().flat_map(|d| d.terms.iter().copied())).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::thermal::search::{lags, leading};
+
+    #[test]
+    fn a_gain_on_the_acceleration_must_be_plain() {
+        let lags = lags(&[3.0, 27.0, 250.0], 1);
+        let tried = |dynamics: &Dynamics, score: f64| {
+            let spec = Spec { degree: 3, dynamics: dynamics.clone(), ..Spec::default() };
+            Tried { count: spec.terms(true).len(), spec, score }
+        };
+        let chosen = |score: f64| smallest(&[tried(&lags, 1.0), tried(&leading(&lags), score)]);
+        assert_eq!([0.97, 0.9, 0.7].map(chosen), [Some(0), Some(0), Some(1)]);
+        assert_eq!(smallest(&[tried(&leading(&lags), 1.0)]), Some(0), "there is no other");
+    }
 }

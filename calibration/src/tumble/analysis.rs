@@ -21,6 +21,8 @@ const THINNEST: f64 = 0.05;
 const FACTORS: [f64; 9] = [2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0];
 /// Shortest turn that says something of a gyro (rad).
 const SHORTEST_TURN_RAD: f64 = 0.1;
+/// Angle within which poses are alike (rad): 15°.
+const ALIKE_RAD: f64 = core::f64::consts::PI / 12.0;
 /// Longest transition (s): beyond it the gyros' drift is what is measured.
 const LONGEST_TRANSITION_S: f64 = 60.0;
 const AXES: [&str; 3] = ["x", "y", "z"];
@@ -49,7 +51,7 @@ pub struct Tumble {
     pub accel: AccelFit,
     /// The gyros, or why not.
     pub gyro: Result<GyroFit, String>,
-    /// |f| − g (m/s²) of each pose, by the fit of all others; no number where these have none.
+    /// |f| − g (m/s²) of each pose, by the fit of all that are not within 15° of it; no number where these have none.
     pub held_out: Vec<f64>,
     /// Largest distance of each gyro's output from that at rest (rad/s of the log).
     pub largest_rate: [f64; 3],
@@ -97,7 +99,7 @@ pub fn analyse(track: &Track, settings: &Settings) -> Result<Tumble, Vec<String>
     }
     let Some((factor, poses, accel)) = best else { return Err(reasons) };
     doubts::sound(&poses, &accel)?;
-    let held_out = held_out(&poses, settings.gravity);
+    let held_out = held_out(&poses, &accel);
     let mut warnings = Vec::new();
     let (after, outside) = (Size::of(&accel.residual).rms, Size::of(&held_out).rms);
     if outside > 2.0 * after {
@@ -211,15 +213,26 @@ fn flat(poses: &[Pose]) -> Option<String> {
     ))
 }
 
-/// |f| − g of every pose by the fit of all others.
-fn held_out(poses: &[Pose], gravity: f64) -> Vec<f64> {
+/// |f| − g of every pose by the fit of those that look elsewhere. A unit that is put down by hand is often put down alike: of two
+/// poses next to each other the one knows what the other leaves, and a fit that has either says nothing of poses that are new.
+fn held_out(poses: &[Pose], fit: &AccelFit) -> Vec<f64> {
     let all = outputs(poses);
+    let directions: Vec<[f64; 3]> = all.iter().map(|outputs| unit(fit.force(outputs))).collect();
     let one = |index: usize| {
-        let mut others = all.clone();
-        let held = others.remove(index);
-        accel::fit(&others, gravity).map_or(f64::NAN, |fit| norm(fit.force(&held)) - gravity)
+        let apart = |other: &usize| dot(directions[index], directions[*other]) < libm::cos(ALIKE_RAD);
+        let others: Vec<Vec<f64>> = (0..all.len()).filter(apart).map(|other| all[other].clone()).collect();
+        let fit = accel::fit(&others, fit.gravity);
+        fit.map_or(f64::NAN, |fit| norm(fit.force(&all[index])) - fit.gravity)
     };
     (0..all.len()).map(one).collect()
+}
+
+fn unit(v: [f64; 3]) -> [f64; 3] {
+    v.map(|c| c / norm(v))
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// Mean output of each gyro over all poses.
@@ -258,14 +271,11 @@ fn gyros(track: &Track, poses: &[Pose], accel: &AccelFit, rest: [f64; 3]) -> Res
 /// Turns between neighbouring poses, by the specific force that each has.
 #[must_use]
 pub fn transitions(poses: &[Pose], force: impl Fn(&Pose) -> [f64; 3]) -> Vec<Transition> {
-    let direction = |pose: &Pose| {
-        let force = force(pose);
-        force.map(|c| c / norm(force))
-    };
+    let direction = |pose: &Pose| unit(force(pose));
     let between = |pair: &[Pose]| {
         let [before, after] = pair else { return None };
         let directions = [direction(before), direction(after)];
-        let cosine: f64 = directions[0].iter().zip(directions[1]).map(|(a, b)| a * b).sum();
+        let cosine = dot(directions[0], directions[1]);
         let ticks = [before.interval.end, after.interval.first];
         let length = after.span_s[0] - before.span_s[1];
         let turned = cosine < libm::cos(SHORTEST_TURN_RAD);

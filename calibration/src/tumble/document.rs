@@ -1,7 +1,7 @@
 //! What was found of a tumbled unit, as a document.
 
 use isotherm_correction::units::AngularRate;
-use isotherm_protocol::document::{Curve, Document, Shape};
+use isotherm_protocol::document::{Accel, AccelOutput, Curve, Document, Shape};
 
 use super::accel::AccelFit;
 use super::analysis::Tumble;
@@ -64,12 +64,22 @@ fn gyros(document: &mut Document, found: &GyroFit, temperature: &dyn Fn(Option<&
     document.gyro.orientation.thermal = None;
 }
 
-/// The document that "before" stands for: the one that was given, or else one scale factor and one zero for all accelerometers.
+/// The document that "before" stands for, and what that is in words: the one that was given; readings in m/s² as they are; or else one
+/// scale factor and one zero for all accelerometers, for readings in V or counts alone are no specific force.
 #[must_use]
-pub fn before(base: &Document, tumble: &Tumble, given: bool) -> Document {
+pub fn before(base: &Document, tumble: &Tumble, given: bool) -> (Document, &'static str) {
     let mut document = base.clone();
     let mean = |values: [f64; 3]| tidy(values.iter().sum::<f64>() / 3.0);
-    if let Some(accel) = document.accel.as_mut().filter(|_| !given) {
+    let raw = |accel: &&mut Accel| accel.output == AccelOutput::MetresPerSecondSquared;
+    let words = if given {
+        "Before is the document at hand."
+    } else if document.accel.as_mut().is_some_and(|accel| raw(&accel)) {
+        "Before is raw: the accelerometers' readings as they are, and the gyros' less their mean over all poses."
+    } else {
+        "Before is one scale factor and one zero for all accelerometers, the means of those that were found, and the gyros' readings less \
+         their mean over all poses."
+    };
+    if let Some(accel) = document.accel.as_mut().filter(|accel| !given && !raw(accel)) {
         let (scale_unit, bias_unit) = units(accel.output);
         for sensor in &mut accel.sensor {
             let constant = |value| Shape::Constant { value };
@@ -86,5 +96,5 @@ pub fn before(base: &Document, tumble: &Tumble, given: bool) -> Document {
             sensor.static_bias = Some(Curve::new(Shape::Constant { value: tidy(rest) }));
         }
     }
-    document
+    (document, words)
 }

@@ -78,7 +78,7 @@ pub fn report(
     report.warnings.clone_from(&tumble.warnings);
     report.notes.push(format!(
         "{}, found with {} times the variance of the still start; g = {} m/s². z is the input axis of the third accelerometer, \
-         y lies in the plane of the second and third. Out of sample: each pose by a fit of all others.",
+         y lies in the plane of the second and third. Out of sample: each pose by a fit of all that are more than 15° away from it.",
         counted(tumble.poses.len(), "pose", "poses"),
         tumble.factor,
         six(settings.gravity)

@@ -325,6 +325,41 @@ fn a_unit_on_its_six_faces_only_does_not_state_angles() {
 }
 
 #[test]
+fn poses_that_are_put_down_alike_do_not_vouch_for_each_other() {
+    let instrument = mems_chamber(0).instrument;
+    let bent = |attitudes: &[Matrix3<f64>], seed: u64| -> Track {
+        // Accelerometers that are not straight, beyond what nine parameters hold.
+        let mut track = track(&instrument, attitudes, &how(seed)).0;
+        for (column, share) in track.outputs.iter_mut().zip([2e-4, -3e-4, 2.5e-4]) {
+            for reading in column {
+                *reading += share * *reading * *reading;
+            }
+        }
+        track
+    };
+    for seed in 0..3 {
+        let mut dice = Dice::new(500 + seed);
+        let ways: Vec<Matrix3<f64>> = (0..16).map(|_| stand::any_attitude(&mut dice)).collect();
+        let alike = (0..48).map(|k| {
+            *nalgebra::Rotation3::new(nalgebra::Vector3::from(dice.vector(0.05))).matrix() * ways[k % 16]
+        });
+        let alike: Vec<Matrix3<f64>> = alike.collect();
+        let others: Vec<Matrix3<f64>> = (0..36).map(|_| stand::any_attitude(&mut dice)).collect();
+        let found = analyse(&bent(&alike, 20 + seed), &settings()).unwrap();
+        let new = analyse(&bent(&others, 30 + seed), &settings()).unwrap().poses;
+        let left =
+            |outputs: &[f64]| libm::sqrt(found.accel.force(outputs).iter().map(|f| f * f).sum()) - GRAVITY;
+        let on_others = Size::of(&new.iter().map(|pose| left(&pose.outputs)).collect::<Vec<_>>()).rms;
+        let said = Size::of(&found.held_out).rms;
+        println!(
+            "{seed}: said {said:.5}, on other poses {on_others:.5}, in sample {:.5}",
+            Size::of(&found.accel.residual).rms
+        );
+        assert!(said > 0.5 * on_others, "{said} {on_others}");
+    }
+}
+
+#[test]
 fn poses_that_end_long_before_the_log_are_pointed_out() {
     let (_, good, held) = tumbled(30, &how(12));
     let early =

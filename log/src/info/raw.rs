@@ -22,6 +22,8 @@ pub struct ReadingInfo {
     pub min: f64,
     /// The largest, likewise.
     pub max: f64,
+    /// Their mean, likewise.
+    pub mean: f64,
     /// The first, likewise.
     pub first: f64,
     /// The last, likewise.
@@ -44,6 +46,28 @@ fn is_zero(count: &u64) -> bool {
     *count == 0
 }
 
+impl ReadingInfo {
+    #[expect(clippy::cast_precision_loss, reason = "readings of a log are far below 2⁵³")]
+    fn add(&mut self, value: f64) {
+        if !value.is_finite() {
+            self.missing += 1;
+            return;
+        }
+        if self.readings == 0 {
+            (self.min, self.max, self.first) = (value, value, value);
+        }
+        self.readings += 1;
+        self.mean += (value - self.mean) / self.readings as f64;
+        (self.min, self.max, self.last) = (self.min.min(value), self.max.max(value), value);
+    }
+
+    /// Takes the readings of a tick, one of each sensor.
+    pub(super) fn tick(sensors: &mut Vec<Self>, readings: &[f64]) {
+        sensors.resize(sensors.len().max(readings.len()), Self::default());
+        sensors.iter_mut().zip(readings).for_each(|(sensor, reading)| sensor.add(*reading));
+    }
+}
+
 impl Readings {
     fn add(&mut self, name: &str, value: f64) {
         if !self.by_name.contains_key(name) {
@@ -53,16 +77,9 @@ impl Readings {
             }
             self.by_name.insert(name.to_owned(), ReadingInfo::default());
         }
-        let Some(info) = self.by_name.get_mut(name) else { return };
-        if !value.is_finite() {
-            info.missing += 1;
-            return;
+        if let Some(info) = self.by_name.get_mut(name) {
+            info.add(value);
         }
-        if info.readings == 0 {
-            (info.min, info.max, info.first) = (value, value, value);
-        }
-        info.readings += 1;
-        (info.min, info.max, info.last) = (info.min.min(value), info.max.max(value), value);
     }
 
     /// Whether there is none.

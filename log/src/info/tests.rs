@@ -158,6 +158,24 @@ fn corrected_ticks_show_gaps_flags_and_revisions() {
 }
 
 #[test]
+fn sensors_have_their_range_and_mean() {
+    let mut spoilt = gyro(20, 10, 0);
+    let mut batch: GyroBatch = codec::decode(&spoilt.frame).unwrap();
+    (batch.ticks[3].readings[1], batch.ticks[4].readings[1]) = (-7.0, 12.0);
+    spoilt.frame = codec::encode(&batch).unwrap();
+    // The second message comes twice.
+    let info = info_of(&[gyro(0, 20, 0), spoilt.clone(), spoilt]);
+    let gyros = &info.units["ZLG-0001"].gyros;
+    let figures = |info: &ReadingInfo| (info.readings, info.min, info.max, info.first, info.last);
+    assert_eq!(
+        gyros.iter().map(figures).collect::<Vec<_>>()[..2],
+        [(30, 1.0, 1.0, 1.0, 1.0), (30, -7.0, 12.0, 2.0, 2.0)]
+    );
+    assert!((gyros[1].mean - 61.0 / 30.0).abs() < 1e-12 && (gyros[2].mean - 3.0).abs() < 1e-12);
+    assert!(info.units["ZLG-0001"].accelerometers.is_empty());
+}
+
+#[test]
 fn temperatures_have_their_range_and_what_is_missing() {
     let channels = ["body", "coil"].map(|name| core::ChannelName::from(name).unwrap());
     let ticks = [(0, [20.0, f64::NAN]), (1, [-3.5, 30.0]), (2, [25.0, 31.0])];

@@ -21,6 +21,8 @@ const ACCEL: usize = 1;
 pub(super) struct Parts {
     /// Stamp of the row (ns).
     pub(super) stamp: i64,
+    /// Its sequence number, where rows have one.
+    pub(super) number: Option<u64>,
     /// The gyros, where the row has them.
     pub(super) gyro: Option<(Readings, GyroStates)>,
     /// The accelerometers, where the row has them.
@@ -66,7 +68,7 @@ impl Assembler {
 
     /// Makes events of a row.
     pub(super) fn take(&mut self, parts: Parts, temperatures: &[TemperatureReading], columns: &Columns) {
-        let Parts { stamp, gyro, accel } = parts;
+        let Parts { stamp, gyro, accel, .. } = parts;
         if accel.is_some() {
             self.close(ACCEL, Some(stamp), columns);
         }

@@ -11,7 +11,7 @@ pub struct LogError(pub Box<LogFault>);
 
 /// What is wrong with a log, and where.
 #[derive(Debug, Error)]
-#[error("{file}:{line}:{column}: {}{reason}{}", self.subject(), self.advice())]
+#[error("{file}:{line}:{column}: {}{reason}{}{}", self.subject(), self.cut_words(), self.advice())]
 pub struct LogFault {
     /// The file.
     pub file: String,
@@ -23,6 +23,8 @@ pub struct LogFault {
     pub cell: Option<(usize, Option<String>)>,
     /// The cell as written, shortened.
     pub value: String,
+    /// It is the last line and has no line end: what is wrong with it may be that the log was cut off in it.
+    pub cut: bool,
     /// What is wrong.
     pub reason: Reason,
 }
@@ -32,12 +34,10 @@ pub struct LogFault {
 #[non_exhaustive]
 pub enum Reason {
     /// The row ends before this cell.
-    #[error("is missing, the row has only {cells} cells{}", if *.cut { "; the last line has no line end, so the log was cut off here" } else { "" })]
+    #[error("is missing, the row has only {cells} cells")]
     MissingCell {
         /// How many it has.
         cells: usize,
-        /// It is the last line and has no line end.
-        cut: bool,
     },
     /// The row goes on behind the last column.
     #[error("is too much, {} has only {columns} columns{}", if *.named { "the header" } else { "the first row" }, if *.commas { ": decimal commas between commas cannot be told apart" } else { "" })]
@@ -118,6 +118,16 @@ pub enum Reason {
         /// Name in the mapping.
         name: String,
     },
+    /// A sensor's column is mapped to something else, too.
+    #[error("column {column} is mapped twice, as {first} and as {second}: correct the mapping")]
+    ColumnTwice {
+        /// Which column, from 1.
+        column: usize,
+        /// What it is mapped to.
+        first: String,
+        /// What else it is mapped to.
+        second: String,
+    },
     /// The header line is missing.
     #[error("the file ends before its header")]
     NoHeader,
@@ -139,6 +149,7 @@ impl Reason {
             self,
             Self::NoSuchColumn { .. }
                 | Self::AmbiguousColumn { .. }
+                | Self::ColumnTwice { .. }
                 | Self::NoHeader
                 | Self::Utf16
                 | Self::Io(_)
@@ -157,6 +168,11 @@ impl LogFault {
             _ => format!("{:?} ", self.value),
         };
         format!("column {number}{name}: {value}")
+    }
+
+    /// Why it may be wrong.
+    fn cut_words(&self) -> &'static str {
+        if self.cut { "; the last line has no line end, so the log was cut off here" } else { "" }
     }
 
     /// What to do.

@@ -10,7 +10,7 @@ use super::cells::{Cell, OpenQuote, split};
 use super::error::{LogError, LogFault, Reason};
 use super::input::{LONGEST_LINE, Line, Lines, Source};
 use super::resolve::{Columns, TickCells, resolve};
-use super::row::{Fault, Row};
+use super::row::{Fault, Readings, Row};
 use super::{LogEvent, ReadReport};
 use crate::mapping::{Delimiter, FileMapping, Layout, OnBadRow, TimeMapping};
 
@@ -38,10 +38,10 @@ pub(super) struct FileReader {
     assembler: Assembler,
     /// Temperature readings of the current row.
     readings: Vec<TemperatureReading>,
-    /// Rows read, without the dropped ones.
-    rows: i64,
     /// Stamp of the last good row.
     last_stamp: Option<i64>,
+    /// Its sequence number, where rows have one.
+    last_number: Option<u64>,
     /// Rows since then that could not be read.
     bad_since: u64,
     /// Columns of the header, or of the first row.
@@ -65,8 +65,8 @@ impl FileReader {
             columns: Columns { stamps: None, gyro: None, accel: None, temperatures: Vec::new() },
             assembler: Assembler::new(&mapping.time),
             readings: Vec::new(),
-            rows: 0,
             last_stamp: None,
+            last_number: None,
             bad_since: 0,
             width: None,
             ended: false,
@@ -159,12 +159,12 @@ impl FileReader {
             Ok(true) => self.split().and_then(|()| self.check_width()).and_then(|()| self.parts(&mut stamp)),
             Err(fault) => Err(fault),
         };
-        self.rows += 1;
         match parts {
             Ok(parts) => {
                 self.report.rows += 1;
                 self.report.unterminated_last_line |= !self.lines.terminated();
                 self.last_stamp = Some(parts.stamp);
+                self.last_number = parts.number;
                 self.bad_since = 0;
                 self.assembler.take(parts, &self.readings, &self.columns);
                 Ok(())
@@ -231,14 +231,18 @@ impl FileReader {
         gap.then(|| Reason::Gap { step: step.as_s(), ticks: (step.as_ns() / tick).unsigned_abs() })
     }
 
+    /// Ticks from the last good row to this one in a log without stamps: by their sequence numbers where every row has one and they
+    /// go on, otherwise by rows.
+    fn ticks_to(&self, row: Row<'_>) -> Result<i64, Fault> {
+        let numbered = self.columns.row_number().map(|cell| row.sequence(cell)).transpose()?;
+        let since = numbered.zip(self.last_number).and_then(|(number, last)| number.checked_sub(last));
+        let since = since.filter(|since| *since > 0).unwrap_or(self.bad_since + 1);
+        Ok(i64::try_from(since).unwrap_or(i64::MAX))
+    }
+
     /// Reads all cells of the row that are used; `stamp` is set as soon as it is known to be good.
     fn parts(&mut self, stamp: &mut Option<i64>) -> Result<Parts, Fault> {
-        let row = Row {
-            line: self.lines.line(),
-            cells: &self.cells,
-            decimal_mark: self.layout.decimal_mark,
-            terminated: self.lines.terminated(),
-        };
+        let row = Row { line: self.lines.line(), cells: &self.cells, decimal_mark: self.layout.decimal_mark };
         let now = if let Some(cell) = self.columns.stamps {
             let now = row.time_ns(cell)?.saturating_add(self.time.origin_ns);
             if let Some(previous_ns) = self.last_stamp.filter(|last| now <= *last) {
@@ -248,7 +252,8 @@ impl FileReader {
             now
         } else {
             let tick = self.time.tick.unwrap_or(Span::ZERO).as_ns();
-            self.time.origin_ns.saturating_add(tick.saturating_mul(self.rows + 1))
+            let last = self.last_stamp.unwrap_or(self.time.origin_ns);
+            last.saturating_add(tick.saturating_mul(self.ticks_to(row)?))
         };
         *stamp = Some(now);
         if let (Some(cell), Some(reason)) = (self.columns.stamps, self.gap(now)) {
@@ -279,7 +284,9 @@ impl FileReader {
                 self.readings.push(reading);
             }
         }
-        Ok(Parts { stamp: now, gyro, accel })
+        let sequence = |readings: &Readings| readings.sequence;
+        let number = gyro.as_ref().map(|(readings, _)| readings).or(accel.as_ref()).and_then(sequence);
+        Ok(Parts { stamp: now, number, gyro, accel })
     }
 
     /// What reading came to so far.
@@ -303,6 +310,7 @@ impl FileReader {
             },
             cell: fault.cell.map(|index| (index + 1, self.header.get(index).cloned())),
             value: String::from_utf8_lossy(value).chars().take(40).collect(),
+            cut: fault.cell.is_some() && !self.lines.terminated(),
             reason: fault.reason,
         }))
     }

@@ -98,6 +98,40 @@ pub(super) struct Columns {
     pub(super) temperatures: Vec<TemperatureCell>,
 }
 
+impl Columns {
+    /// Cell of the number that every row has: that of its gyros, in a file without gyros of its accelerometers.
+    pub(super) fn row_number(&self) -> Option<usize> {
+        let gyro = self.gyro.as_ref().map(|gyro| &gyro.ticks);
+        gyro.or(self.accel.as_ref()).filter(|ticks| !ticks.may_be_empty)?.sequence
+    }
+
+    /// Refuses a sensor's column that is something else, too. Two temperature channels may share a thermometer.
+    fn apart(&self) -> Result<(), Reason> {
+        let mut sensors: Vec<(usize, String)> = Vec::new();
+        let mut others: Vec<(usize, String)> = Vec::new();
+        let gyro = self.gyro.as_ref().map(|gyro| &gyro.ticks);
+        for (kind, ticks) in [("gyro", gyro), ("accelerometer", self.accel.as_ref())] {
+            let Some(ticks) = ticks else { continue };
+            let numbered = ticks.sensors.iter().zip(1..);
+            sensors.extend(numbered.map(|((cell, _), number)| (*cell, format!("{kind} {number}"))));
+            others.extend(ticks.sequence.map(|cell| (cell, format!("sequence number of the {kind}s"))));
+            others.extend(ticks.duration.map(|time| (time.cell, format!("duration of the {kind}s"))));
+        }
+        others.extend(self.stamps.map(|time| (time.cell, "time".to_owned())));
+        let channel =
+            |of: &TemperatureCell| (of.cell, format!("temperature channel {:?}", of.channel.as_str()));
+        others.extend(self.temperatures.iter().map(channel));
+        for (at, (column, first)) in sensors.iter().enumerate() {
+            let mut others = sensors.iter().skip(at + 1).chain(&others);
+            if let Some((_, second)) = others.find(|(other, _)| other == column) {
+                let (first, second) = (first.clone(), second.clone());
+                return Err(Reason::ColumnTwice { column: column + 1, first, second });
+            }
+        }
+        Ok(())
+    }
+}
+
 /// Finds every column of a mapping among the names of a header.
 pub(super) fn resolve(mapping: &FileMapping, header: &[String]) -> Result<Columns, Reason> {
     let find = |column: &Column| find(column, header);
@@ -138,7 +172,8 @@ pub(super) fn resolve(mapping: &FileMapping, header: &[String]) -> Result<Column
             since: 0,
         })
     });
-    Ok(Columns { stamps, gyro, accel, temperatures: temperatures.collect::<Result<_, Reason>>()? })
+    let columns = Columns { stamps, gyro, accel, temperatures: temperatures.collect::<Result<_, Reason>>()? };
+    columns.apart().map(|()| columns)
 }
 
 /// Sensors of one kind.

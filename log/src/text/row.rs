@@ -26,8 +26,6 @@ pub(super) struct Row<'a> {
     pub(super) cells: &'a [Cell],
     /// Decimal mark.
     pub(super) decimal_mark: u8,
-    /// The line has its end.
-    pub(super) terminated: bool,
 }
 
 /// Readings of one kind in a row, before they have a time.
@@ -70,10 +68,7 @@ impl<'a> Row<'a> {
     /// The row is too short for a cell.
     #[cold]
     fn missing(&self, cell: usize) -> Fault {
-        Fault {
-            cell: Some(cell),
-            reason: Reason::MissingCell { cells: self.cells.len(), cut: !self.terminated },
-        }
+        Fault { cell: Some(cell), reason: Reason::MissingCell { cells: self.cells.len() } }
     }
 
     /// A number.
@@ -144,12 +139,15 @@ impl<'a> Row<'a> {
                 OutputKind::Mean => (self.float(*cell)? - conversion.mid_scale) * conversion.factor,
             });
         }
-        let sequence = cells.sequence.map(|cell| {
-            let sequence = number::natural(self.filled(cell)?);
-            sequence.ok_or(Fault { cell: Some(cell), reason: Reason::NotASequence })
-        });
+        let sequence = cells.sequence.map(|cell| self.sequence(cell));
         let duration = cells.duration.map(|duration| self.span(duration));
         Ok(Some(Readings { values, sequence: sequence.transpose()?, duration: duration.transpose()? }))
+    }
+
+    /// A sequence number.
+    pub(super) fn sequence(&self, cell: usize) -> Result<u64, Fault> {
+        let sequence = number::natural(self.filled(cell)?);
+        sequence.ok_or(Fault { cell: Some(cell), reason: Reason::NotASequence })
     }
 
     /// Whether all sensors' cells hold nothing.

@@ -3,7 +3,7 @@
 use std::io::Write;
 
 use super::*;
-use crate::mapping::FileMapping;
+use crate::mapping::{Column, FileMapping};
 
 /// A mapping for `t;x;y;z;T` with these keys of the file and of its time.
 fn mapping(file: &str, time: &str) -> Mapping {
@@ -199,7 +199,7 @@ fn a_gap_is_read_where_the_mapping_or_the_log_knows_of_it() {
     assert_eq!((gyro(&events).len(), report.skipped_rows), (2, 12));
     // A log that numbers its ticks tells of its gaps itself.
     let mut numbered = mapping("delimiter = \"comma\"", STAMPS);
-    numbered.files[0].gyro.as_mut().unwrap().ticks.sequence = Some(crate::mapping::Column::Index(3));
+    numbered.files[0].gyro.as_mut().unwrap().ticks.sequence = Some(Column::Index(3));
     numbered.files[0].temperatures.clear();
     let (events, _) = read(&numbered, b"10,1,7,5\n20,2,7,6\n2020,3,7,206\n");
     let sequences: Vec<_> = gyro(&events).iter().map(|tick| tick.0).collect();
@@ -249,6 +249,64 @@ fn stamps_of_the_start_and_gaps_in_time() {
 
     let (events, _) = read(&mapping("delimiter = \"comma\"", "tick_ms = 5"), bytes);
     assert_eq!(gyro(&events), [(0, 5, 5, 1.0), (1, 10, 5, 2.0), (2, 15, 5, 3.0), (3, 20, 5, 4.0)]);
+}
+
+#[test]
+fn sequence_numbers_carry_the_time_where_there_are_no_stamps() {
+    let numbered = "version = 1\n[[file]]\ndelimiter = \"comma\"\non_bad_row = \"skip\"\n[file.time]\ntick_ms = 10\n[file.gyro]\n\
+        output = \"mean\"\nsequence_column = 1\nsensors = [{ column = 2, unit = \"rad_per_s\" }]\n";
+    let mapping = Mapping::parse(numbered, "m.toml").unwrap();
+    // Seven ticks are missing, one row cannot be read, and the counter begins anew.
+    let (events, _) = read(&mapping, b"4,1\n5,2\n13,3\n14,x\n15,4\n0,5\n1,6\n");
+    let expected = [
+        (4, 10, 10, 1.0),
+        (5, 20, 10, 2.0),
+        (13, 100, 10, 3.0),
+        (15, 120, 10, 4.0),
+        (0, 130, 10, 5.0),
+        (1, 140, 10, 6.0),
+    ];
+    assert_eq!(gyro(&events), expected);
+}
+
+#[test]
+fn a_column_is_one_sensors_alone() {
+    let twice = mapping("delimiter = \"comma\"", STAMPS);
+    for (column, as_well) in [(1, "gyro 2"), (3, "temperature channel \"case\""), (0, "time")] {
+        let mut wrong = twice.clone();
+        wrong.files[0].gyro.as_mut().unwrap().ticks.sensors[0].column = Column::Index(column);
+        if column == 1 {
+            wrong.files[0].gyro.as_mut().unwrap().ticks.sensors[1].column = Column::Index(1);
+        }
+        let words = error(&wrong, b"10,1,7,20\n").to_string();
+        let expected = format!("column {} is mapped twice, as gyro 1 and as {as_well}", column + 1);
+        assert!(words.contains(&expected), "{words}");
+    }
+    // By name and by number.
+    let mut named = mapping("delimiter = \"comma\"\nheader = true", STAMPS);
+    named.files[0].temperatures[0].column = Column::Name("x".into());
+    let words = error(&named, b"t,x,y,T\n10,1,7,20\n").to_string();
+    assert!(words.contains("column 2 is mapped twice"), "{words}");
+    // Two channels of one thermometer.
+    let mut shared = twice;
+    let mut second = shared.files[0].temperatures[0].clone();
+    second.channel = "coil".try_into().unwrap();
+    shared.files[0].temperatures.push(second);
+    assert_eq!(read(&shared, b"10,1,7,20\n").0.len(), 3);
+}
+
+#[test]
+fn a_last_row_that_is_cut_off_is_said_to_be() {
+    let mapping = mapping("delimiter = \"comma\"", STAMPS);
+    for cut in ["10", "2", "20,1,-", "20,"] {
+        let words = error(&mapping, format!("10,1,7,20\n{cut}").as_bytes()).to_string();
+        assert!(
+            words.contains("the last line has no line end, so the log was cut off here"),
+            "{cut}: {words}"
+        );
+    }
+    let words = error(&mapping, b"10,1,7,20\n10,1,7,20\n").to_string();
+    assert!(words.contains("time stands still") && !words.contains("cut off"), "{words}");
 }
 
 /// A mapping of one file with modes, increments and half periods.

@@ -2,12 +2,15 @@
 
 use isotherm_calibration::error::Error;
 use isotherm_calibration::run::Run;
-use isotherm_calibration::thermal::{Fitted, Method, Settings, fit};
+use isotherm_calibration::thermal::{Fitted, Method, Settings, Terms, fit};
+use isotherm_calibration::validate::{JudgedLog, Wanted, validate};
 use isotherm_correction::sample::{AccelTick, GyroTick, OutputKind, TemperatureReading};
 use isotherm_correction::units::{Span, Timestamp};
 use isotherm_log::offline::unit_id;
 use isotherm_log::text::LogEvent;
 use isotherm_protocol::document::{Curve, Lag, Origin, Shape};
+
+use crate::drift_generator::Normal;
 
 /// A made-up unit: what one second of it reads.
 struct Second {
@@ -41,6 +44,14 @@ fn usual(second: u32) -> Second {
 }
 
 fn run(seconds: std::ops::Range<u32>, read: impl Fn(u32) -> Second) -> Run {
+    run_of(events(seconds, read))
+}
+
+fn run_of(events: Vec<LogEvent>) -> Run {
+    Run::of_events("made up".to_owned(), unit_id("UNIT").unwrap(), events)
+}
+
+fn events(seconds: std::ops::Range<u32>, read: impl Fn(u32) -> Second) -> Vec<LogEvent> {
     let mut events = Vec::new();
     for (sequence, second) in (0..).zip(seconds) {
         let Second { rates, forces, deg_c } = read(second);
@@ -63,7 +74,17 @@ fn run(seconds: std::ops::Range<u32>, read: impl Fn(u32) -> Second) -> Run {
         };
         events.push(LogEvent::Gyro { output: OutputKind::Mean, tick });
     }
-    Run::of_events("made up".to_owned(), unit_id("UNIT").unwrap(), events)
+    events
+}
+
+/// The same with the temperature readings of some seconds only.
+fn thermometer_at(kept: impl Fn(u32) -> bool) -> Run {
+    let mut events = events(0..5400, usual);
+    events.retain(|event| match event {
+        LogEvent::Temperature(reading) => kept(u32::try_from(reading.time.as_ns() / 1_000_000_000).unwrap()),
+        _ => true,
+    });
+    run_of(events)
 }
 
 fn tried(run: Run, method: Method) -> Result<Fitted, Error> {
@@ -243,6 +264,144 @@ fn one_direction_and_too_few_plateaus_are_told() {
     assert!(
         made.report.verdicts.iter().all(|verdict| !verdict.accepted && verdict.reason.contains("both ways"))
     );
+}
+
+#[test]
+fn readings_every_ten_seconds_are_fitted() {
+    // Time constants of the ladders that the readings cannot carry were all set to the shortest that they can.
+    for method in [Method::Joint, Method::Lag] {
+        let made = tried(thermometer_at(|s| s % 10 == 0), method).unwrap();
+        assert!(made.report.accepted(), "{}", made.report.to_text());
+        for verdict in &made.report.verdicts {
+            assert!(verdict.factor().unwrap() > 5.0, "{}", made.report.to_text());
+        }
+        let models = made.report.validation.as_ref().unwrap().rows.iter().flatten();
+        let twice = models.clone().find(|cell| cell.contains("30, 30"));
+        assert!(twice.is_none() && models.count() > 20, "{twice:?}");
+    }
+}
+
+#[test]
+fn a_first_reading_that_is_late_is_no_temperature_of_its_own() {
+    let made = tried(thermometer_at(|s| s >= 45), Method::Joint).unwrap();
+    assert!(made.report.accepted() && made.report.warnings.is_empty(), "{}", made.report.to_text());
+    let history = "Channel imu: -10.0 to 40.0 °C; ramps 20 to -10 °C at";
+    assert!(made.report.notes.iter().any(|note| note.starts_with(history)), "{:?}", made.report.notes);
+    // From 11.5 °C up.
+    let mut upwards = events(3000..3900, usual);
+    let late = Timestamp::from_ns(3_045_000_000_000);
+    upwards.retain(|event| !matches!(event, LogEvent::Temperature(reading) if reading.time < late));
+    let made = tried(run_of(upwards), Method::Joint).unwrap();
+    let told = made.report.warnings.iter().any(|words| words.contains("one way only"));
+    assert!(told, "{:?}", made.report.warnings);
+    let [low, high] = made.written.document.origin.unwrap().range_deg_c.unwrap();
+    assert!((11.0..12.5).contains(&low) && (39.0..=40.5).contains(&high), "{low} {high}");
+}
+
+#[test]
+fn a_unit_that_was_turned_in_the_middle_is_refused() {
+    for degrees in [5.0_f64, 90.0] {
+        let turned = run(0..5400, |s| {
+            let mut second = usual(s);
+            if s >= 3000 {
+                let (sin, cos) = degrees.to_radians().sin_cos();
+                let [x, y, z] = second.forces;
+                second.forces = [x, y * cos - z * sin, y * sin + z * cos];
+            }
+            second
+        });
+        refused(turned, &["the unit was turned", "s after the beginning", "at most 2 °", "as two runs"]);
+    }
+}
+
+#[test]
+fn an_axis_that_temperature_does_nothing_to_is_a_good_one() {
+    let noise: Vec<f64> = Normal::new(5).white(5400, 1e-5);
+    let flat = || {
+        run(0..5400, |s| {
+            let mut second = usual(s);
+            second.rates[1] = noise[s as usize];
+            second
+        })
+    };
+    for method in [Method::Joint, Method::Lag, Method::Sequential] {
+        let made = tried(flat(), method).unwrap();
+        let verdict = made.report.verdicts.iter().find(|verdict| verdict.of == "gyro y").unwrap();
+        assert!(verdict.accepted, "{method:?}: {}", verdict.words());
+        assert!(
+            verdict.reason == "no temperature dependence above noise; left unchanged",
+            "{method:?}: {}",
+            verdict.words()
+        );
+        assert!(
+            made.written.document.gyro.sensor[1].static_bias.is_none() && made.report.refusals().is_empty()
+        );
+    }
+    // Whoever judges the document says the same.
+    let written = tried(flat(), Method::Joint).unwrap().written;
+    let log = JudgedLog::new(flat(), &written.document).unwrap();
+    let report = validate("flat.toml", &written, &[log], Wanted { window_s: None, place: None }, ()).unwrap();
+    let verdict = report.verdicts.iter().find(|verdict| verdict.of == "gyro y").unwrap();
+    assert!(verdict.accepted, "{}", verdict.words());
+    assert_eq!(verdict.reason, "no temperature dependence above noise; left unchanged");
+    // What moves with something else than temperature is none.
+    let wandering = run(0..5400, |s| {
+        let mut second = usual(s);
+        second.rates[1] = noise[s as usize] + 1e-4 * (f64::from(s) * 0.01).sin();
+        second
+    });
+    let made = tried(wandering, Method::Joint).unwrap();
+    let verdict = made.report.verdicts.iter().find(|verdict| verdict.of == "gyro y").unwrap();
+    assert!(
+        !verdict.accepted && verdict.reason.contains("something else than temperature"),
+        "{}",
+        verdict.words()
+    );
+}
+
+#[test]
+fn all_terms_are_the_largest_model() {
+    let fitted = |terms: Terms| {
+        let settings = Settings { terms, ..Settings::default() };
+        fit(None, (&[run(0..5400, usual)], &[]), &settings, Origin::default(), ()).unwrap()
+    };
+    let made = fitted(Terms::All);
+    let count = |of: &str| made.report.coefficients.iter().filter(|c| c.name.starts_with(of)).count();
+    // Degree 5, and the longest ladder with gains linear in temperature; gyros have T̈ beside it.
+    assert_eq!((count("gyro x"), count("accelerometer x")), (5 + 2 * 5 + 1, 5 + 2 * 5));
+}
+
+#[test]
+fn few_whole_windows_are_no_verdict() {
+    // Every tenth tick is missing but for some of the time.
+    let whole = |second: &u32| (600..1500).contains(second) || (2400..3000).contains(second);
+    let seconds: Vec<u32> = (0..5400).filter(|second| whole(second) || *second % 10 != 9).collect();
+    let words = tried(run_at(&seconds), Method::Joint).expect("it is fitted").report.to_text();
+    assert!(words.contains("windows are whole, at least 50 % must be"), "{words}");
+    let seconds: Vec<u32> = (0..5400).filter(|second| *second % 10 != 9).collect();
+    let words = tried(run_at(&seconds), Method::Joint).expect_err("no window is whole").to_string();
+    assert!(words.contains("no window"), "{words}");
+}
+
+#[test]
+fn ticks_that_no_corrector_takes_are_refused_by_their_length() {
+    let events = |tick_s: u32| {
+        let mut events = Vec::new();
+        for (sequence, second) in (0..).zip((0..36_000).step_by(tick_s as usize)) {
+            let Second { rates, deg_c, .. } = usual(second * 5400 / 36_000);
+            let (time, duration) = (Span::from_s(f64::from(second)), Span::from_s(f64::from(tick_s)));
+            let time = Timestamp::from_ns(time.as_ns());
+            let channel = isotherm_correction::sample::ChannelName::from("imu").unwrap();
+            events.push(LogEvent::Temperature(TemperatureReading { channel, time, raw: deg_c }));
+            let readings = rates.into_iter().collect();
+            let tick =
+                GyroTick { sequence, end_time: time + duration, duration, readings, ..GyroTick::default() };
+            events.push(LogEvent::Gyro { output: OutputKind::Mean, tick });
+        }
+        events
+    };
+    assert!(tried(run_of(events(10)), Method::Joint).is_ok());
+    refused(run_of(events(30)), &["its gyro ticks last 30 s, at most 10 s can be corrected"]);
 }
 
 #[test]

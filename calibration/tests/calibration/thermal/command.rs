@@ -2,10 +2,13 @@
 
 use std::path::Path;
 use std::process::{Command, Output};
+use std::time::SystemTime;
 
+use isotherm_calibration::written::Written;
 use isotherm_correction::units::Span;
 use isotherm_log::part::{LogFiles, Part};
 use isotherm_log::recording::{RecordingOptions, RecordingWriter};
+use isotherm_protocol::history::WallTime;
 
 use super::service::text_log;
 
@@ -36,8 +39,14 @@ fn record(log: &Path, mapping: &isotherm_log::mapping::Mapping, unit: &str, part
     writer.finish().unwrap();
 }
 
+/// The date (UTC).
+fn today() -> String {
+    WallTime::from(SystemTime::now()).to_string()[..10].to_owned()
+}
+
 #[test]
 fn folders_recordings_and_several_units() {
+    let began = today();
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let (log, mapping) = text_log(at);
@@ -55,6 +64,20 @@ fn folders_recordings_and_several_units() {
     let curve = |text: &str| text[text.find("[[gyro.sensor]]").unwrap()..].to_owned();
     assert_eq!(curve(&read("of-folder.toml")), curve(&read("of-file.toml")));
     assert!(read("of-folder.toml").contains("name = \"chamber\""));
+
+    // Nobody has said which unit a text log is of.
+    let (words, code) = said(at, &["log.csv", "--mapping", "mapping.toml", "--out", "of-whom.toml"]);
+    assert!(code == Some(2) && words.contains("give --unit SERIAL, or --document"), "{words}");
+    assert!(!at.join("of-whom.toml").exists());
+    // A document says when it was made: today, or as it is told.
+    let created = |name: &str| Written::read(&at.join(name)).unwrap().document.created.unwrap().to_string();
+    assert!((began.clone()..=today()).contains(&created("of-file.toml")), "{}", created("of-file.toml"));
+    let old = ["log.csv", "--document", "of-file.toml", "--created", "2024-02-29", "--out", "old.toml"];
+    said(at, &with(&old));
+    assert_eq!(created("old.toml"), "2024-02-29");
+    let args = ["log.csv", "--document", "old.toml", "--mapping", "mapping.toml", "--out", "new.toml"];
+    said(at, &args);
+    assert!((began..=today()).contains(&created("new.toml")), "it is a new one");
 
     // So is a folder with a recording in pieces.
     std::fs::create_dir(at.join("pieces")).unwrap();
@@ -109,14 +132,14 @@ fn folders_recordings_and_several_units() {
     assert!(words.contains("cut short") && words.contains("isotherm-replay recover"), "{words}");
     assert!(code == Some(3) && words.contains("finished with data loss"), "{words}");
 
-    // A run that goes one way only: every sensor is refused, with --accept-partial too, and no document says so.
+    // A run that goes one way only: every sensor is refused, which is no part, and no document says so.
     std::fs::write(at.join("b.toml"), read("of-file.toml").replace("\"UNIT\"", "\"B\"")).unwrap();
     let mut one_way =
         vec!["other.mcap", "--duration", "2800", "--method", "sequential", "--document", "b.toml"];
     one_way.extend(["--accept-partial", "--out", "none.toml", "--html", "none.html"]);
     let (words, code) = said(at, &one_way);
     assert!(
-        code == Some(0) && words.contains("every sensor is refused: nothing is written to none.toml"),
+        code == Some(1) && words.contains("every sensor is refused: nothing is written to none.toml"),
         "{words}"
     );
     assert!(!at.join("none.toml").exists() && at.join("none.html").exists());

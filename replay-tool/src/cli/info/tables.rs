@@ -5,7 +5,7 @@ use std::fmt::Write;
 use comfy_table::{CellAlignment, Table, presets};
 use isotherm_correction::units::{Span, Timestamp};
 use isotherm_log::info::{
-    FileInfo, JournalInfo, LogInfo, Readings, Spread, StateInfo, StatusInfo, TopicInfo, UnitInfo,
+    FileInfo, JournalInfo, LogInfo, ReadingInfo, Spread, StateInfo, StatusInfo, TopicInfo, UnitInfo,
 };
 use isotherm_log::source::LogReport;
 
@@ -197,8 +197,16 @@ fn topic_details(text: &mut String, topic: &TopicInfo) {
 }
 
 fn unit_details(text: &mut String, unit: &UnitInfo, begin_ns: i64) {
-    readings(text, "temperature", &unit.temperatures);
-    readings(text, "health", &unit.health);
+    for (what, sensors) in [("gyro", &unit.gyros), ("accelerometer", &unit.accelerometers)] {
+        for (info, number) in sensors.iter().zip(1..) {
+            readings(text, what, &number.to_string(), info);
+        }
+    }
+    for (what, named) in [("temperature", &unit.temperatures), ("health", &unit.health)] {
+        for (name, info) in &named.by_name {
+            readings(text, what, name, info);
+        }
+    }
     if let Some(modes) = &unit.modes {
         let between = modes.between_changes.map_or_else(String::new, |between| {
             format!(", {} from one to the next (median)", seconds(between.p50_ns))
@@ -288,17 +296,13 @@ fn states(text: &mut String, status: &StatusInfo, begin_ns: i64) {
     more(text, status.states.len());
 }
 
-fn readings(text: &mut String, what: &str, readings: &Readings) {
-    for (name, info) in &readings.by_name {
-        let missing = if info.missing > 0 { format!(", {} missing", info.missing) } else { String::new() };
-        line(
-            text,
-            format_args!(
-                "{what} {name}: {} readings, {} to {} as sent{missing}",
-                info.readings, info.min, info.max
-            ),
-        );
-    }
+fn readings(text: &mut String, what: &str, name: &str, info: &ReadingInfo) {
+    let missing = if info.missing > 0 { format!(", {} missing", info.missing) } else { String::new() };
+    let ReadingInfo { readings, min, max, mean, .. } = info;
+    line(
+        text,
+        format_args!("{what} {name}: {readings} readings, {min} to {max}, mean {mean:.6e} as sent{missing}"),
+    );
 }
 
 /// Says that a list is longer than what was printed.
