@@ -4,6 +4,7 @@
 //! A scenario states each where it wants it; a unit without any is the same as ever, to the bit.
 
 use isotherm_correction::sample::Sensors;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::thermal::Interval;
@@ -16,7 +17,7 @@ const INSTANT_S: f64 = 1e-6;
 const PANELS: u8 = 8;
 
 /// Effects of all sensors of a unit; none where a list is empty.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Effects {
     /// One entry per gyro, or none.
@@ -36,7 +37,7 @@ impl Effects {
 }
 
 /// Effects of one gyro.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct GyroEffects {
     /// Drift by the specific force along each case axis (rad/s per m/s²); adds to the input rate [IEEE 528].
@@ -54,7 +55,7 @@ pub struct GyroEffects {
 }
 
 /// Effects of one accelerometer.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct AccelerometerEffects {
     /// Where it sits from the point whose motion is the truth, in case axes (m).
@@ -69,7 +70,7 @@ pub struct AccelerometerEffects {
 ///
 /// p = T at the start, then always the nearest to its last value within T ± w; the error is g·(p − T): −g·w after enough of
 /// heating, +g·w after enough of cooling, and a loop of 2·g·w between.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Play {
     /// Half width w of the slack (K, > 0).
