@@ -149,6 +149,7 @@ fn logged(log: &LogArgs, command: impl Future<Output = Exit>) -> Exit {
     let exit = runtime.block_on(command);
     // A stop that was cut short may have left something hanging: it must not hold the process up.
     runtime.shutdown_background();
+    crate::logging::finish();
     exit
 }
 

@@ -3,6 +3,7 @@
 use std::io::Write;
 use std::net::SocketAddr;
 use std::path::Path;
+use std::time::Duration;
 
 use tokio::signal::unix::{SignalKind, signal};
 
@@ -11,8 +12,11 @@ use crate::cli::ServeArgs;
 use crate::config::Settings;
 use crate::exit::Exit;
 use crate::service::{open_store, start_on};
-use crate::words::{print, say};
+use crate::words::{print_within, say};
 use crate::{ServiceError, Totals};
+
+/// How long the end waits for a stdout that takes nothing.
+const PRINT_LIMIT: Duration = Duration::from_secs(1);
 
 /// SIGXFSZ, sent where a write would make a file longer than the process may (`ulimit -f`, `LimitFSIZE=`).
 const FILE_TOO_LONG: SignalKind = SignalKind::from_raw(25);
@@ -44,7 +48,7 @@ fn failed(error: &ServiceError) -> Exit {
 /// Says what was done.
 fn report(totals: &Totals, json: bool) -> Exit {
     let text = if json { serde_json::to_string(totals).unwrap_or_default() } else { totals.table() };
-    print(&(text + "\n"), totals.exit())
+    print_within(PRINT_LIMIT, text + "\n", totals.exit())
 }
 
 /// The configuration with the command line's options put over it.

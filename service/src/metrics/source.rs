@@ -11,6 +11,7 @@ use serde::Serialize;
 use super::health::{HeldBack, Kind, Reason, Seen, Watch};
 use crate::config::Settings;
 use crate::intake::Intake;
+use crate::logging::dropped_lines;
 use crate::registrar::{Board, Posted};
 use crate::unit::UnitActor;
 
@@ -36,6 +37,8 @@ pub(super) struct Look {
     pub(super) healthy: bool,
     /// Faults that belong to no unit.
     pub(super) faults: Vec<Fault>,
+    /// Log lines dropped so far.
+    pub(super) log_lines_dropped: u64,
     /// What the registrar has posted.
     pub(super) posted: Arc<Posted>,
     /// Whether the state folder can be written; `None` where none is configured.
@@ -122,6 +125,7 @@ impl Source {
             uptime_s: self.started.elapsed().as_secs_f64(),
             healthy: self.reasons(now, watch, stopping).is_empty(),
             faults: self.intake.faults(),
+            log_lines_dropped: dropped_lines(),
             posted: self.board.read(),
             state_folder_writable: self.state_folder(now, watch).map(|tried| tried.is_ok()),
             units,

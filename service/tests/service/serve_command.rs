@@ -1,13 +1,13 @@
 //! `isotherm serve` as a process: readiness, signals, exit codes, totals, log.
 
-use std::io::{BufRead, BufReader, Read};
+use std::io::{BufRead, BufReader, Read, Write};
 use std::process::{Child, ChildStdout, Command, Output, Stdio};
 use std::time::Duration;
 
 use isotherm_bus::{Consumer, Producer, ProducerOptions, SessionOptions, open, presence};
 use isotherm_correction::sample::{GyroTick, OutputKind};
 use isotherm_correction::units::{Span, Timestamp};
-use isotherm_protocol::key::UnitId;
+use isotherm_protocol::key::{self, RawStream, UnitId};
 use serde_json::Value;
 use zenoh::Session;
 
@@ -29,12 +29,23 @@ struct Served {
 impl Served {
     /// Starts it on loopback and waits until it says that it is ready.
     fn start(arguments: &[&str]) -> Self {
+        Self::start_with(arguments, Stdio::piped())
+    }
+
+    fn start_with(arguments: &[&str], stderr: Stdio) -> Self {
         let mut command = isotherm(&["serve", "--announce", "--listen", "tcp/127.0.0.1:0"]);
-        let mut child =
-            command.args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        let mut child = command.args(arguments).stdout(Stdio::piped()).stderr(stderr).spawn().unwrap();
         let mut stdout = BufReader::new(child.stdout.take().unwrap());
-        let mut line = String::new();
-        stdout.read_line(&mut line).unwrap();
+        let (sender, read) = std::sync::mpsc::channel();
+        std::thread::spawn(move || {
+            let mut line = String::new();
+            stdout.read_line(&mut line).unwrap();
+            let _ = sender.send((line, stdout));
+        });
+        let Ok((line, stdout)) = read.recv_timeout(LIMIT) else {
+            child.kill().unwrap();
+            panic!("not ready in time");
+        };
         let ready: Value = serde_json::from_str(&line).unwrap();
         assert_eq!(ready["ready"], true);
         let locators =
@@ -52,7 +63,9 @@ impl Served {
         assert!(sent.success());
         let (mut stdout, mut stderr) = (String::new(), String::new());
         self.stdout.read_to_string(&mut stdout).unwrap();
-        self.child.stderr.take().unwrap().read_to_string(&mut stderr).unwrap();
+        if let Some(mut pipe) = self.child.stderr.take() {
+            pipe.read_to_string(&mut stderr).unwrap();
+        }
         (self.child.wait().unwrap().code(), stdout, stderr)
     }
 }
@@ -130,6 +143,31 @@ async fn a_repeated_fault_is_logged_once_and_the_table_counts_it() {
     let bad = events.iter().filter(|event| event["kind"] == "bad_frames_kind").count();
     assert_eq!(bad, 1, "{stderr}");
     assert!(events.iter().any(|event| event["message"] == "ready"), "{stderr}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_log_that_nobody_reads_costs_no_tick_and_does_not_hold_up_the_end() {
+    // As much as a pipe takes: the first line of the log waits for a reader that never comes.
+    let (unread, mut full) = std::io::pipe().unwrap();
+    full.write_all(&[b'.'; 65_536]).unwrap();
+    let served = Served::start_with(&["--json", "--log-level", "debug"], full.into());
+    let session = served.session().await;
+    let mut consumer = Consumer::declare(&session, None).await.unwrap();
+    presence::wait_for_service(&session, LIMIT).await.unwrap();
+    let units = ["A", "B", "C"].map(|serial| UnitId::new(serial).unwrap());
+    for unit in &units {
+        produce(&session, unit, 200).await;
+        // Each of a kind that is logged.
+        session.put(key::raw(unit, RawStream::Gyro), &[0; 40]).await.unwrap();
+        while consumer.continuity(unit).ticks < 200 {
+            tokio::time::timeout(LIMIT, consumer.next()).await.expect("at its rate").unwrap();
+        }
+        assert!(consumer.continuity(unit).is_whole());
+    }
+    let end = tokio::task::spawn_blocking(|| served.stop("-TERM"));
+    let (code, stdout, _) = tokio::time::timeout(LIMIT, end).await.expect("ends all the same").unwrap();
+    assert_eq!(code, Some(0), "{stdout}");
+    drop(unread);
 }
 
 fn run(arguments: &[&str]) -> Output {
