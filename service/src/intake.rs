@@ -127,7 +127,7 @@ impl Intake {
         let id = UnitId::new(serial)
             .map_err(|error| self.fault(FaultKind::BadSerial, || format!("serial {serial:?} {error}")))
             .ok()?;
-        let calibrated = read(&self.calibrations).get(&id).is_some();
+        let calibrated = read(&self.calibrations).has(&id);
         // Rubbish on a strange serial makes no unit; on a serial with a calibration it is that unit's rubbish.
         if !calibrated && let Err(error) = readable(stream, frame) {
             self.fault(FaultKind::from(&error), || {
@@ -160,6 +160,14 @@ impl Intake {
         let plan = read(&self.calibrations).get(&id).cloned().unwrap_or_default();
         for change in plan.changes() {
             actor.change(change);
+        }
+        for command in &plan.intent {
+            match actor.command(command) {
+                Ok(state) => {
+                    tracing::info!(unit = %id, %state, "{} again, as before the restart", command.name())
+                }
+                Err(refusal) => tracing::warn!(unit = %id, "as before the restart it cannot be: {refusal}"),
+            }
         }
         if let Some(current) = &plan.current {
             tracing::info!(unit = %id, revision = current.revision.counter, "appeared, calibrated");
@@ -242,7 +250,7 @@ impl Intake {
 
     /// Has a unit begin with what it had before the service was restarted.
     pub(crate) fn restore(&self, unit: &UnitId, plan: Plan) {
-        if plan.changes().next().is_none() {
+        if plan.changes().next().is_none() && plan.intent.is_empty() {
             return;
         }
         *self.calibrations.write().unwrap_or_else(PoisonError::into_inner).plan_mut(unit) = plan;

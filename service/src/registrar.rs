@@ -49,7 +49,7 @@ mod work;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::JoinHandle;
 
-pub(crate) use board::{Board, Posted};
+pub(crate) use board::{Board, Posted, UNWRITTEN};
 pub(crate) use desk::{Desk, Notice, PreLaunchEnd};
 
 use desk::Request;

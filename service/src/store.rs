@@ -34,7 +34,7 @@ use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 use isotherm_protocol::digest::Digest;
-use isotherm_protocol::history::{AuditEntry, AuditEvent, GoodSet};
+use isotherm_protocol::history::{AuditEntry, AuditEvent, GoodSet, Intent};
 use isotherm_protocol::key::UnitId;
 
 use index::Index;
@@ -264,7 +264,13 @@ impl Store {
         document.or(overlay).map_or(Ok(()), |digest| Err(StoreError::NotStored { digest }))
     }
 
-    /// Units that were ever given a calibration.
+    /// What an operator wants of a unit, by the commands that were carried out.
+    #[must_use]
+    pub fn intent(&self, unit: &UnitId) -> Option<&Intent> {
+        self.index.intent(unit)
+    }
+
+    /// Units that were ever given a calibration or a command.
     pub fn units(&self) -> impl Iterator<Item = &UnitId> {
         self.index.units()
     }

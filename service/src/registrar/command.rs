@@ -69,6 +69,7 @@ impl Work {
             state_before: before.to_string(),
             state_after: reply.state.to_string(),
             last_sequence,
+            order: Some(order.order.clone()),
         };
         tracing::info!(
             %unit, by = order.by, state = %reply.state, accepted = reply.accepted, reason = reply.reason.as_deref(),
@@ -110,7 +111,7 @@ impl Work {
     }
 
     /// The order as the state machine takes it.
-    fn core_command(&self, order: &Order) -> Result<Command, String> {
+    pub(super) fn core_command(&self, order: &Order) -> Result<Command, String> {
         Ok(match order {
             Order::Standby => Command::Standby,
             Order::SelfTest => Command::SelfTest,

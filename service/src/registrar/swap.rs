@@ -95,10 +95,13 @@ impl Work {
 
     /// Tells and counts that a document is refused because it cannot be written down.
     fn refuse_unwritten(&mut self, unit: &UnitId, name: &str, error: &StoreError) -> Problem {
-        tracing::error!(%unit, "a swap is refused, it cannot be written down: {error}");
         let message = format!("the swap cannot be written down, nothing has changed: {error}");
         let problem = text::whole(name, message);
-        self.count_refusal(&refused(Some(unit.clone()), vec![problem.clone()]));
+        self.folder.note_unwritten(Path::new(name));
+        if !self.retrying {
+            tracing::error!(%unit, "a swap is refused, it cannot be written down: {error}");
+            self.count_refusal(&refused(Some(unit.clone()), vec![problem.clone()]));
+        }
         problem
     }
 

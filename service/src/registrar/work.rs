@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
-use std::time::{Duration, SystemTime};
+use std::time::{Duration, Instant, SystemTime};
 
 use isotherm_correction::prelaunch::PreLaunchSettings;
 use isotherm_protocol::document::Problem;
@@ -43,6 +43,10 @@ pub(crate) struct Work {
     pub(super) group: Option<Vec<Judged>>,
     /// Files whose documents could not be written down, and why.
     pub(super) unwritten: Vec<(String, Problem)>,
+    /// When such a file is tried again.
+    pub(super) next_retry: Instant,
+    /// One is being tried again: that it fails once more is no news.
+    pub(super) retrying: bool,
 }
 
 /// How often the state folder is looked at where nothing is asked for.
@@ -67,6 +71,8 @@ impl Work {
             losses: losses(opened),
             group: None,
             unwritten: Vec::new(),
+            next_retry: Instant::now(),
+            retrying: false,
         }
     }
 
@@ -90,6 +96,7 @@ impl Work {
                 if let Some(request) = request {
                     self.take(request);
                 }
+                self.retry_unwritten(Instant::now());
             });
             if catch_unwind(work).is_err() {
                 tracing::error!(

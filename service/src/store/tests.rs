@@ -60,6 +60,7 @@ fn command(words: &str) -> AuditEvent {
         state_before: "standby".to_owned(),
         state_after: "standby".to_owned(),
         last_sequence: None,
+        order: None,
     })
 }
 
