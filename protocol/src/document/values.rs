@@ -36,7 +36,14 @@ impl Limits {
             }
     }
 
-    fn describe(self) -> String {
+    /// What a value must be that is not allowed.
+    fn describe(self, value: Option<f64>) -> String {
+        if let (Self::Positive | Self::NonZero, Some(value)) = (self, value)
+            && value.is_finite()
+            && value.abs() > HUGE
+        {
+            return format!("a number up to {HUGE:e} in magnitude");
+        }
         match self {
             Self::Any => format!("a finite number up to {HUGE:e} in magnitude"),
             Self::Positive => "a number above 0".into(),
@@ -72,10 +79,11 @@ fn as_number(value: &DeValue<'_>) -> Option<f64> {
 
 /// A value as a number within its limits.
 pub(crate) fn number(reader: &mut Reader<'_>, path: &str, value: &Value<'_>, limits: Limits) -> f64 {
-    match as_number(value.get_ref()) {
+    let found = as_number(value.get_ref());
+    match found {
         Some(number) if limits.allow(number) => number,
         _ => {
-            reader.refuse(path, value, &limits.describe());
+            reader.refuse(path, value, &limits.describe(found));
             limits.stand_in()
         }
     }

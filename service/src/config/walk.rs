@@ -4,9 +4,12 @@ use std::fmt::Display;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use isotherm_protocol::document::Problem;
+use isotherm_protocol::document::{Problem, parse_toml};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
+
+/// Most errors of syntax that are listed.
+const MAX_SYNTAX_ERRORS: usize = 256;
 
 /// Collects problems while a document is walked.
 #[derive(Debug)]
@@ -27,8 +30,9 @@ impl<'t> Walk<'t> {
         text: &str,
         walk: impl FnOnce(&mut Self, Table<'_>) -> T,
     ) -> Option<T> {
-        let (root, errors) = DeTable::parse_recoverable(text);
-        for error in &errors {
+        let (root, errors) = parse_toml(text);
+        // Each is looked up in the text; beyond these nobody reads them.
+        for error in errors.iter().take(MAX_SYNTAX_ERRORS) {
             let offset = error.span().map_or(0, |span| span.start);
             self.report(offset, "", format!("TOML: {}", error.message()));
         }
