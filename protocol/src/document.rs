@@ -62,6 +62,7 @@ pub use types::{
 };
 
 use reader::{Reader, Table};
+pub use text::parse_toml;
 use text::unplaced;
 
 /// Oldest version of the document's form that is still read.

@@ -227,6 +227,7 @@ impl Intent {
             Some(Order::Rest(place)) => self.rest = Some(place),
             Some(Order::EndRest) => self.rest = None,
             // These begin and end in standby, and a change of the calibration changes no state.
+            Some(Order::Forget) => *self = Self::default(),
             Some(Order::SelfTest | Order::PreLaunch(_) | Order::Abort | Order::Rollback { .. }) | None => {}
         }
     }

@@ -25,14 +25,12 @@ mod types;
 
 use std::collections::BTreeMap;
 
-use toml::de::DeTable;
-
 pub use candidate::Candidate;
 pub use types::{GyroOverlay, Overlay, PreLaunchRecord};
 
 use crate::digest::Digest;
 use crate::document::reader::{Reader, Table};
-use crate::document::{MAX_DOCUMENT_BYTES, Problem};
+use crate::document::{MAX_DOCUMENT_BYTES, Problem, parse_toml};
 
 /// The version of the overlay's form; the policy is that of [`crate::document::MIN_SCHEMA`].
 pub const OVERLAY_SCHEMA: u32 = 1;
@@ -62,7 +60,7 @@ pub fn overlay_schema() -> serde_json::Value {
 /// A text that is no TOML is judged by what of it can be read.
 #[must_use]
 pub fn is_overlay(text: &str) -> bool {
-    text.len() <= MAX_DOCUMENT_BYTES && DeTable::parse_recoverable(text).0.get_ref().contains_key(OVERLAY_OF)
+    text.len() <= MAX_DOCUMENT_BYTES && parse_toml(text).0.get_ref().contains_key(OVERLAY_OF)
 }
 
 impl Overlay {

@@ -126,6 +126,11 @@ impl Calibrations {
         self.by_unit.entry(unit.clone()).or_default()
     }
 
+    /// Forgets what one unit was to be given.
+    pub fn remove(&mut self, unit: &UnitId) {
+        self.by_unit.remove(unit);
+    }
+
     /// The plan of one unit.
     #[must_use]
     pub fn get(&self, unit: &UnitId) -> Option<&Plan> {

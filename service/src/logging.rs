@@ -36,10 +36,14 @@ pub(crate) fn dropped_lines() -> u64 {
     QUEUE.get().map_or(0, Queue::dropped)
 }
 
-/// Waits until the log is written, unless nobody takes it.
-pub(crate) fn finish() {
-    if let Some(queue) = QUEUE.get() {
-        queue.drain(PATIENCE);
+/// Waits when it is dropped until the log is written, unless nobody takes it.
+pub(crate) struct FinishLog;
+
+impl Drop for FinishLog {
+    fn drop(&mut self) {
+        if let Some(queue) = QUEUE.get() {
+            queue.drain(PATIENCE);
+        }
     }
 }
 
@@ -74,7 +78,7 @@ struct Lines;
 
 impl Write for Lines {
     fn write(&mut self, event: &[u8]) -> io::Result<usize> {
-        let text = String::from_utf8_lossy(event);
+        let text = plain(&String::from_utf8_lossy(event));
         let (text, end) = text.strip_suffix('\n').map_or((&*text, ""), |line| (line, "\n"));
         // An event comes as a whole; of its line breaks only the last is its own.
         let line = coloured(text).replace('\n', "\\n").replace('\t', "\\t") + end;
@@ -85,6 +89,18 @@ impl Write for Lines {
     fn flush(&mut self) -> io::Result<()> {
         Ok(())
     }
+}
+
+/// What Zenoh says of every connection that it cannot accept, whatever the reason.
+const WRONG_HINT: &str = " Hint: increase the system open file limit.";
+/// What the system says where that is the reason: too many open files, of the process and of the system.
+const OPEN_FILES: [&str; 2] = ["os error 24", "os error 23"];
+
+/// An event without what only the developers of a library understand: places in its source, a hint that does not fit.
+fn plain(event: &str) -> String {
+    let text = isotherm_bus::without_places(event);
+    let fits = OPEN_FILES.iter().any(|words| text.contains(words));
+    if fits { text } else { text.replace(WRONG_HINT, "") }
 }
 
 /// How the log is written.
@@ -147,5 +163,20 @@ impl LogArgs {
             LogFormat::Json => builder.json().flatten_event(true).try_init(),
         };
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_library_says_to_its_developers_is_left_out() {
+        let refused = "WARN invalid peer certificate: UnknownIssuer at /r/zenoh-link-tls/src/unicast.rs:583.. Hint: increase the \
+                       system open file limit.\n";
+        assert_eq!(plain(refused), "WARN invalid peer certificate: UnknownIssuer..\n");
+        let full = "Too many open files (os error 24). Hint: increase the system open file limit.\n";
+        assert_eq!(plain(full), full);
+        assert_eq!(plain("INFO ready at noon\n"), "INFO ready at noon\n");
     }
 }

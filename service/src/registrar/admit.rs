@@ -2,7 +2,7 @@
 
 use isotherm_correction::operation::State;
 use isotherm_protocol::control::Difference;
-use isotherm_protocol::document::Problem;
+use isotherm_protocol::document::{Problem, parse_toml};
 use isotherm_protocol::key::UnitId;
 use isotherm_protocol::overlay::{Candidate, Overlay, is_overlay};
 use isotherm_protocol::signature::{self, TrustedKeys};
@@ -120,7 +120,7 @@ pub(super) fn refused(unit: Option<UnitId>, problems: Vec<Problem>) -> Verdict {
 
 /// The unit that a text names, whatever else is wrong with it.
 pub(super) fn unit_of(text: &str) -> Option<UnitId> {
-    let (root, _) = toml::de::DeTable::parse_recoverable(text);
+    let (root, _) = parse_toml(text);
     UnitId::new(root.get_ref().get("unit")?.get_ref().as_str()?).ok()
 }
 

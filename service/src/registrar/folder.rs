@@ -107,6 +107,11 @@ impl Folder {
         self.naming.get(unit).into_iter().flatten().cloned().collect()
     }
 
+    /// The first file whose document names a unit.
+    pub(super) fn first_naming(&self, unit: &UnitId) -> Option<&Path> {
+        self.naming.get(unit)?.first().map(PathBuf::as_path)
+    }
+
     /// Enters a file that cannot be read.
     pub(super) fn unreadable(&mut self, path: &Path, problem: Problem) {
         let file = self.files.entry(path.to_owned()).or_default();
@@ -320,6 +325,14 @@ impl Work {
             }
             // Something is becoming of it, and the watcher is going to tell what.
             Err(error) => tracing::warn!("{} cannot be read: {error}", path.display()),
+        }
+    }
+
+    /// Judges the documents again that are not taken: what spoke against them may have passed.
+    pub(super) fn judge_bad_again(&mut self) {
+        let bad: Vec<_> = self.folder.bad().map(|(path, _)| path.to_owned()).collect();
+        for path in bad {
+            self.take_again(&path);
         }
     }
 

@@ -56,6 +56,7 @@ impl Work {
                 unit: verdict.unit.as_ref().map(ToString::to_string).unwrap_or_default(),
                 revision: active.map_or(0, |active| active.revision),
                 digest: written.map(|written| written.digest.to_string()).unwrap_or_default(),
+                proposed: None,
                 schedule: order.options.schedule,
                 slew_s: slew.as_s(),
                 problems: verdict.problems,
@@ -78,8 +79,8 @@ impl Work {
             return reply(self, SwapOutcome::Unchanged, verdict);
         }
         if order.options.dry_run {
-            let would = candidate.digest.to_string();
-            return SwapReply { digest: would, ..reply(self, SwapOutcome::WouldBeAccepted, verdict) };
+            let proposed = Some(candidate.digest.to_string());
+            return SwapReply { proposed, ..reply(self, SwapOutcome::WouldBeAccepted, verdict) };
         }
         match self.accept(order, unit, candidate, &verdict, slew) {
             Ok(()) => {

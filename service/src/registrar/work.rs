@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant, SystemTime};
 
 use isotherm_correction::prelaunch::PreLaunchSettings;
@@ -14,6 +13,7 @@ use isotherm_protocol::key::UnitId;
 use super::board::Board;
 use super::desk::Request;
 use super::folder::Folder;
+use super::queue::{Queue, Taken};
 use super::record::Record;
 use super::refusals::Refusals;
 use super::swap::Judged;
@@ -78,17 +78,20 @@ impl Work {
 
     /// What the service's own status shows of the registrar.
     pub(crate) fn board(&self) -> Arc<Board> {
+        // Whoever looks finds something, however late the thread begins.
+        self.show();
         Arc::clone(&self.board)
     }
 
     /// Works until it is told to stop, and then finishes what units still have to tell.
-    pub(super) fn run(mut self, requests: Receiver<Request>) {
+    pub(super) fn run(mut self, queue: &Queue) {
         self.show();
         loop {
-            let request = match requests.recv_timeout(LOOK_INTERVAL) {
-                Ok(Request::Stop) | Err(RecvTimeoutError::Disconnected) => break,
-                Ok(request) => Some(request),
-                Err(RecvTimeoutError::Timeout) => None,
+            queue.know(self.records.keys());
+            let request = match queue.take(LOOK_INTERVAL) {
+                Taken::Stop => break,
+                Taken::Request(request) => Some(request),
+                Taken::Nothing => None,
             };
             // Unwind safety: what is kept is changed only after everything that could go wrong has gone well.
             let work = AssertUnwindSafe(|| {
@@ -106,7 +109,7 @@ impl Work {
             self.show();
         }
         // Nobody waits for a registrar that has ended.
-        drop(requests);
+        queue.end();
         let untold = self.intake.each_unit(|actor| (actor.id().clone(), actor.take_untold()));
         for (unit, notices) in untold {
             for notice in notices {
@@ -156,7 +159,7 @@ impl Work {
             Request::Command(query) => self.answer_command(&query),
             Request::History(query) => self.answer_history(&query),
             Request::Notice(unit, notice) => self.note(&unit, notice),
-            Request::Stop => {}
+            Request::JudgeAgain => self.judge_bad_again(),
         }
     }
 

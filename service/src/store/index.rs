@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
+use isotherm_protocol::control::Order;
 use isotherm_protocol::digest::Digest;
 use isotherm_protocol::history::{
     AuditEntry, AuditEvent, CarriedFile, CarriedUnit, GoodSet, Intent, MAX_CARRIED, Source,
@@ -105,7 +106,14 @@ impl Index {
             }
             AuditEvent::Command(record) => {
                 let Some(unit) = unit.filter(|_| record.accepted) else { return };
-                self.units.entry(unit).or_default().intent.note(record);
+                if record.order == Some(Order::Forget) {
+                    self.files.retain(|_, seen| seen.unit.as_ref() != Some(&unit));
+                    let of_unit = self.units.entry(unit).or_default();
+                    // Its numbers are not given again.
+                    *of_unit = OfUnit { highest_revision: of_unit.highest_revision, ..OfUnit::default() };
+                } else {
+                    self.units.entry(unit).or_default().intent.note(record);
+                }
             }
             AuditEvent::CarriedFile(carried) => {
                 if let Some(unit) = unit.clone().filter(|_| !carried.refused) {
@@ -152,7 +160,14 @@ impl Index {
 
     /// The units that were ever given a calibration or a command.
     pub(super) fn units(&self) -> impl Iterator<Item = &UnitId> {
-        self.units.keys()
+        let forgotten = |of_unit: &OfUnit| of_unit.sets.is_empty() && of_unit.intent.is_empty();
+        self.units.iter().filter(move |(_, of_unit)| !forgotten(of_unit)).map(|(unit, _)| unit)
+    }
+
+    /// Documents and overlays of every revision that can be gone back to.
+    pub(super) fn digests(&self) -> impl Iterator<Item = Digest> {
+        let sets = self.units.values().flat_map(|of_unit| &of_unit.sets);
+        sets.flat_map(|set| [Some(set.digest), set.overlay]).flatten()
     }
 
     /// Good sets of a unit, the newest last.

@@ -11,6 +11,8 @@ use isotherm_protocol::key::{self, RawStream, UnitId};
 use serde_json::Value;
 use zenoh::Session;
 
+use super::metrics::client::get;
+
 const LIMIT: Duration = Duration::from_secs(30);
 
 fn isotherm(arguments: &[&str]) -> Command {
@@ -59,8 +61,7 @@ impl Served {
 
     /// Sends a signal and waits for the end: exit code, rest of stdout, stderr.
     fn stop(mut self, signal: &str) -> (Option<i32>, String, String) {
-        let sent = Command::new("kill").args([signal, &self.child.id().to_string()]).status().unwrap();
-        assert!(sent.success());
+        kill(signal, &self.child);
         let (mut stdout, mut stderr) = (String::new(), String::new());
         self.stdout.read_to_string(&mut stdout).unwrap();
         if let Some(mut pipe) = self.child.stderr.take() {
@@ -168,6 +169,72 @@ async fn a_log_that_nobody_reads_costs_no_tick_and_does_not_hold_up_the_end() {
     let (code, stdout, _) = tokio::time::timeout(LIMIT, end).await.expect("ends all the same").unwrap();
     assert_eq!(code, Some(0), "{stdout}");
     drop(unread);
+}
+
+/// Sends a signal.
+fn kill(signal: &str, child: &Child) {
+    assert!(Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success());
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_hangup_has_a_daemon_read_its_documents_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = include_str!("../../../config/calibration/example-full.toml");
+    let (file, config) = (folder.path().join("a.toml"), folder.path().join("service.conf"));
+    std::fs::write(&file, text).unwrap();
+    std::fs::write(&config, "calibrations = \".\"\n").unwrap();
+    let served = Served::start(&["--config", config.to_str().unwrap()]);
+    let session = served.session().await;
+    let changed = text.to_owned() + "# changed\n";
+    std::fs::write(&file, &changed).unwrap();
+    let deadline = std::time::Instant::now() + LIMIT;
+    loop {
+        kill("-HUP", &served.child);
+        let replies = session.get("imu/EXAMPLE-0001/calibration").await.unwrap();
+        if let Ok(reply) = replies.recv_async().await
+            && let Ok(sample) = reply.into_result()
+            && sample.payload().to_bytes() == changed.as_bytes()
+        {
+            break;
+        }
+        assert!(std::time::Instant::now() < deadline, "not read again");
+        tokio::time::sleep(Duration::from_millis(50)).await;
+    }
+    let (code, _, stderr) = served.stop("-TERM");
+    assert_eq!(code, Some(0), "{stderr}");
+    assert!(stderr.contains("read again"), "{stderr}");
+}
+
+#[test]
+fn a_client_without_its_router_says_what_it_waits_for_and_can_be_stopped() {
+    let nobody = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let zenoh = folder.path().join("client.json5");
+    let shipped = include_str!("../../../config/zenoh/client.json5");
+    std::fs::write(&zenoh, shipped.replace("127.0.0.1:7447", &nobody.to_string())).unwrap();
+    let mut command =
+        isotherm(&["serve", "--metrics", "127.0.0.1:0", "--zenoh-config", zenoh.to_str().unwrap()]);
+    let mut child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    let lines = BufReader::new(child.stderr.take().unwrap()).lines();
+    let (sender, said) = std::sync::mpsc::channel();
+    std::thread::spawn(move || lines.map_while(Result::ok).for_each(|line| drop(sender.send(line))));
+    let mut address = None;
+    loop {
+        let line = said.recv_timeout(LIMIT).expect("a line that says what it waits for");
+        if let Some((_, rest)) = line.split_once("metrics on http://") {
+            address = rest.split_once('/').map(|(address, _)| address.parse().unwrap());
+        }
+        if line.contains("waiting for") {
+            assert!(line.contains(&format!("tcp/{nobody}")), "{line}");
+            break;
+        }
+    }
+    let address = address.expect("metrics come first");
+    assert_eq!(get(address, "/livez").status, 200);
+    let answer = get(address, "/readyz");
+    assert!(answer.status == 503 && answer.body.contains(&nobody.to_string()), "{answer:?}");
+    kill("-TERM", &child);
+    assert_eq!(child.wait().unwrap().code(), Some(0));
 }
 
 fn run(arguments: &[&str]) -> Output {

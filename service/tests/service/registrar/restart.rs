@@ -201,7 +201,8 @@ async fn without_a_state_folder_swaps_work_until_the_end() {
 async fn what_an_operator_wanted_of_a_unit_holds_after_a_restart() {
     let folders = Folders::new();
     let mut stand = Stand::start(folders.settings()).await;
-    let drift = "drift = { sigma_deg_per_h = 0.0035, correlation_time_h = 9.0, initial_sigma_deg_per_h = 0.05, \
+    let drift = "drift = { sigma_deg_per_h = 0.0035, correlation_time_h = 9.0, trend_sigma_deg_per_h2 = 0.00012, \
+                 trend_correlation_time_h = 48.0, initial_sigma_deg_per_h = 0.05, \
                  angle_random_walk_deg_per_sqrt_h = 0.006 }\n";
     let text = document(UNIT, 1.0).replace("name = \"x\"\n", &format!("name = \"x\"\n{drift}"));
     assert_accepted(&stand.swap(UNIT, &text, &plain()).await, 1);
