@@ -101,7 +101,7 @@ mod tests {
     fn a_text_with_more_errors_than_are_listed_is_not_read_to_its_end() {
         let broken = "=\n".repeat(MAX_DOCUMENT_BYTES / 2);
         let (_, errors) = parse_toml(&broken);
-        assert!(errors.len() > MAX_PROBLEMS && errors.len() <= FIRST_PART, "{}", errors.len());
+        assert!(errors.len() > MAX_PROBLEMS && errors.len() < broken.len() / 100, "{}", errors.len());
         let late = "# fine\n".repeat(20_000) + &broken;
         let (_, errors) = parse_toml(&late);
         assert!(errors.len() < broken.len() / 2, "{}", errors.len());
@@ -114,6 +114,6 @@ mod tests {
         let (root, errors) = parse_toml(&text);
         assert!(errors.is_empty() && root.get_ref().contains_key("b"), "{errors:?}");
         let late = text + "=\n";
-        assert_eq!(parse_toml(&late).1.len(), 1);
+        assert!((1..MAX_PROBLEMS).contains(&parse_toml(&late).1.len()));
     }
 }

@@ -80,7 +80,7 @@ impl Look {
     /// That of a service which is not at work yet.
     pub(super) fn starting(uptime: Duration) -> Self {
         Self {
-            instance: String::new(),
+            instance: "starting".to_owned(),
             uptime_s: uptime.as_secs_f64(),
             healthy: false,
             faults: Vec::new(),
