@@ -140,9 +140,14 @@ pub enum BusError {
 /// What Zenoh says, without the places in Zenoh's own source that it names in between.
 #[must_use]
 pub fn words(error: &zenoh::Error) -> String {
-    let text = error.to_string();
+    without_places(&error.to_string())
+}
+
+/// A text of Zenoh's without the places in its source: "no luck at /a/b.rs:388." is "no luck.".
+#[must_use]
+pub fn without_places(text: &str) -> String {
     let mut kept = String::with_capacity(text.len());
-    let mut rest = text.as_str();
+    let mut rest = text;
     while let Some((before, place)) = rest.split_once(" at ") {
         kept.push_str(before);
         let end = place.find(char::is_whitespace).unwrap_or(place.len());

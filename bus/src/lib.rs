@@ -30,7 +30,7 @@ pub mod session;
 
 pub use consumer::Consumer;
 pub use continuity::Continuity;
-pub use error::{BusError, words};
+pub use error::{BusError, without_places, words};
 pub use outlet::{Outlet, OutletOptions};
 pub use producer::{Producer, ProducerOptions};
 pub use routes::DeclaredKeys;

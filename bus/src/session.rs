@@ -14,6 +14,11 @@ const LOOPBACK: &str = "tcp/127.0.0.1:0";
 /// How long an endpoint given as an option may stay unreachable before opening fails (ms).
 const CONNECT_TIMEOUT_MS: u32 = 10_000;
 
+/// How long a connection may say nothing before it is let go (ms), and how many may be about to say something: Zenoh's own 10 s and
+/// 100 let a few hundred idle connections keep every client out.
+const ACCEPT_TIMEOUT_MS: u32 = 2000;
+const ACCEPT_PENDING: u32 = 1000;
+
 /// How to open a session.
 ///
 /// Without a configuration file a session is a peer that listens on loopback only, on a port of the system's choice,
@@ -57,6 +62,32 @@ impl SessionOptions {
         }
         Ok(config)
     }
+
+    /// What an opening session may have to wait for, in words: "a router or peer at tcp/127.0.0.1:7447".
+    ///
+    /// # Errors
+    /// As [`Self::to_config`].
+    pub fn awaited(&self) -> Result<String, BusError> {
+        let config = self.to_config()?;
+        let endpoints = config.get_json("connect/endpoints").unwrap_or_default();
+        let endpoints: Value = serde_json::from_str(&endpoints).unwrap_or_default();
+        let mut endpoints = texts(&endpoints);
+        endpoints.dedup();
+        Ok(match *endpoints {
+            [] => "a router or peer that scouting finds (no endpoint to connect to is configured)".to_owned(),
+            _ => format!("a router or peer at {}", endpoints.join(" or ")),
+        })
+    }
+}
+
+/// Every text of a JSON value.
+fn texts(value: &Value) -> Vec<&str> {
+    match value {
+        Value::String(text) => vec![text],
+        Value::Array(items) => items.iter().flat_map(texts).collect(),
+        Value::Object(entries) => entries.values().flat_map(texts).collect(),
+        _ => Vec::new(),
+    }
 }
 
 /// The configuration without a file; `config/zenoh/peer.json5` says the same, with the reasons.
@@ -68,6 +99,8 @@ fn loopback() -> Result<Config, BusError> {
     set(&mut config, "connect/exit_on_failure", true)?;
     set(&mut config, "scouting/multicast/enabled", false)?;
     set(&mut config, "scouting/gossip/enabled", false)?;
+    set(&mut config, "transport/unicast/accept_timeout", ACCEPT_TIMEOUT_MS)?;
+    set(&mut config, "transport/unicast/accept_pending", ACCEPT_PENDING)?;
     set(&mut config, "transport/link/tx/queue/batching/time_limit", 0)?;
     set(&mut config, "transport/link/tx/queue/size/real_time", 16)?;
     Ok(config)

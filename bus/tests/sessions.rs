@@ -269,3 +269,15 @@ async fn sites_in_different_namespaces_do_not_hear_each_other() {
     let error = presence::wait_for_service(&other, Duration::from_millis(50)).await.unwrap_err();
     assert!(matches!(error, BusError::NoService { .. }), "{error}");
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn connections_that_say_nothing_keep_no_client_out() {
+    let session = open(&SessionOptions::default()).await.unwrap();
+    let locators = locators(&session);
+    let address = locators[0].strip_prefix("tcp/").unwrap().to_owned();
+    let idle: Vec<_> = (0..500).map(|_| std::net::TcpStream::connect(&address).unwrap()).collect();
+    let options = SessionOptions { connect: locators, ..SessionOptions::default() };
+    let client = tokio::time::timeout(Duration::from_secs(8), open(&options)).await;
+    client.expect("in time").unwrap();
+    drop(idle);
+}

@@ -19,6 +19,7 @@ use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use crate::stated::Shown;
 use crate::units::{Angle, AngularRate, STANDARD_GRAVITY_M_PER_S2};
 
 /// Rate of rotation of the Earth relative to the stars, WGS 84.
@@ -54,7 +55,7 @@ pub struct Place {
 
 /// A stated angle that is no number or outside its range.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
-#[error("{name} is {got}°, must be from {low}° to {high}°")]
+#[error("{name} is {}°, must be from {low}° to {high}°", Shown(*got))]
 pub struct PlaceError {
     /// Which angle.
     pub name: &'static str,

@@ -1,6 +1,20 @@
 //! Numbers as somebody states them, and the ranges that they have to be in.
 
+use core::fmt;
+
 use thiserror::Error;
+
+/// A number in words to people: with an exponent where it would be a row of zeros. Read back, it is the same number.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Shown(pub f64);
+
+impl fmt::Display for Shown {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self(value) = self;
+        let is_plain = *value == 0.0 || !value.is_finite() || (1e-4..1e16).contains(&value.abs());
+        if is_plain { write!(f, "{value}") } else { write!(f, "{value:e}") }
+    }
+}
 
 /// A stated number that is outside its range, or not a number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
@@ -22,4 +36,22 @@ pub(crate) fn outside<T: PartialOrd + Copy, const N: usize>(
 ) -> impl Iterator<Item = OutOfRange<T>> {
     let wrong = stated.into_iter().filter(|(_, got, [min, max])| !(min..=max).contains(&got));
     wrong.map(|(name, got, [min, max])| OutOfRange { name, got, min, max })
+}
+
+#[cfg(test)]
+mod tests {
+    use alloc::string::ToString;
+
+    use super::Shown;
+
+    #[test]
+    fn a_number_is_shown_without_a_row_of_zeros_and_is_the_same_when_it_is_read() {
+        for (value, shown) in
+            [(5e-324, "5e-324"), (1e300, "1e300"), (0.0001, "0.0001"), (3.6e7, "36000000"), (-25.0, "-25")]
+        {
+            assert_eq!(Shown(value).to_string(), shown);
+            assert_eq!(shown.parse(), Ok(value));
+        }
+        assert_eq!([0.0, f64::NAN].map(|value| Shown(value).to_string()), ["0", "NaN"]);
+    }
 }

@@ -50,4 +50,4 @@ mod walk;
 pub use problem::{Problem, listed};
 pub use reader::{Reader, element, join, parse};
 pub use schema::{Form, published};
-pub use text::{MAX_BYTES, unplaced, utf8};
+pub use text::{MAX_BYTES, parse_toml, unplaced, utf8};

@@ -18,7 +18,7 @@ use crate::schema::Form;
 use crate::walk::Walk;
 
 /// Most problems that are listed; a document with more is not worth reading to its end.
-const MAX_PROBLEMS: usize = 256;
+pub(crate) const MAX_PROBLEMS: usize = 256;
 /// Longest key that is shown in full.
 const LONGEST_KEY: usize = 64;
 

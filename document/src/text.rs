@@ -4,7 +4,7 @@ use toml::Spanned;
 use toml::de::DeTable;
 
 use crate::problem::{Lines, Problem};
-use crate::reader::Reader;
+use crate::reader::{MAX_PROBLEMS, Reader};
 use crate::schema::Form;
 
 /// Longest text that is read, in bytes.
@@ -12,6 +12,29 @@ pub const MAX_BYTES: usize = 1 << 20;
 
 /// What the TOML parser says of a key that is given twice.
 const DUPLICATE_KEY: &str = "duplicate key";
+
+/// Length up to which a text is read in one go (bytes).
+const FIRST_PART: usize = 1 << 12;
+
+/// The root of a TOML text, and what is wrong with it.
+///
+/// A text with more errors than are listed is not read to its end: a megabyte of broken TOML has a million of them. What was read
+/// of it up to there counts.
+pub fn parse_toml(text: &str) -> (Spanned<DeTable<'_>>, Vec<toml::de::Error>) {
+    let mut length = FIRST_PART;
+    while length < text.len() {
+        // Within a line it would be an error of ours; one within an array of several lines is one of many.
+        let part = text.get(..text.floor_char_boundary(length)).and_then(|part| part.rsplit_once('\n'));
+        if let Some((part, _)) = part {
+            let (root, errors) = DeTable::parse_recoverable(part);
+            if errors.len() > MAX_PROBLEMS {
+                return (root, errors);
+            }
+        }
+        length *= 4;
+    }
+    DeTable::parse_recoverable(text)
+}
 
 /// Bytes as text.
 ///
@@ -42,7 +65,7 @@ impl<'t> Reader<'t> {
             self.report_at(0, "", format!("is {} bytes long, may have {MAX_BYTES}", text.len()));
             return None;
         }
-        let (root, errors) = DeTable::parse_recoverable(text);
+        let (root, errors) = parse_toml(text);
         for error in &errors {
             let span = error.span().unwrap_or(0..0);
             let message = match error.message() {
@@ -72,5 +95,30 @@ impl<'t> Reader<'t> {
             self.report_at(value.span().start, key, message);
         }
         foreign
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_text_with_more_errors_than_are_listed_is_not_read_to_its_end() {
+        let broken = "=\n".repeat(MAX_BYTES / 2);
+        let (_, errors) = parse_toml(&broken);
+        assert!(errors.len() > MAX_PROBLEMS && errors.len() < broken.len() / 100, "{}", errors.len());
+        let late = "# fine\n".repeat(20_000) + &broken;
+        let (_, errors) = parse_toml(&late);
+        assert!(errors.len() < broken.len() / 2, "{}", errors.len());
+    }
+
+    #[test]
+    fn a_long_text_is_read_whole() {
+        // Its one array does not end within the first part.
+        let text = format!("a = [\n{}]\nb = 2\n", "1,\n".repeat(200_000));
+        let (root, errors) = parse_toml(&text);
+        assert!(errors.is_empty() && root.get_ref().contains_key("b"), "{errors:?}");
+        let late = text + "=\n";
+        assert!((1..MAX_PROBLEMS).contains(&parse_toml(&late).1.len()));
     }
 }

@@ -46,7 +46,7 @@ pub use curve::{
     Curve, Frequency, LagGain, OutputBias, Quantity, RateBias, Relative, ScaleFactor, Shape,
     ThermalAcceleration, ThermalRate,
 };
-pub use difference::difference;
+pub use difference::{difference, lost_sections};
 pub use measure::{Argument, Unit};
 pub use types::{
     Accel, AccelLag, AccelOrientation, AccelOutput, AccelParity, AccelSensor, Branches, Channel, Created,

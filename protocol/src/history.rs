@@ -13,7 +13,7 @@ pub use time::WallTime;
 
 use serde::{Deserialize, Serialize};
 
-use crate::control::Schedule;
+use crate::control::{Order, PlaceOrder, Schedule};
 
 /// Most lines that [`Acceptance::changed`] keeps; one more says how many there were beyond.
 pub const MAX_CHANGED: usize = 32;
@@ -23,7 +23,7 @@ pub const MAX_PROBLEMS: usize = 16;
 pub const MAX_CARRIED: usize = 8;
 
 /// One line of the audit file.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct AuditEntry {
     /// Consecutive from 1 over all units and files.
     pub number: u64,
@@ -41,7 +41,7 @@ pub struct AuditEntry {
 }
 
 /// What happened.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "event", rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum AuditEvent {
@@ -176,7 +176,7 @@ pub struct Refusal {
 }
 
 /// A command and what became of it.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CommandRecord {
     /// The command in words.
     pub command: String,
@@ -192,15 +192,68 @@ pub struct CommandRecord {
     /// Sequence number of the last tick before it; `None` before the first.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub last_sequence: Option<u64>,
+    /// The order itself; `None` for what no operator asked for, and in the files of older versions.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub order: Option<Order>,
+}
+
+/// What an operator wants of a unit, by the commands that were carried out: what a restart begins with.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Intent {
+    /// The last of standby and run.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub state: Option<Order>,
+    /// Where the unit rests, if it does.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub rest: Option<PlaceOrder>,
+}
+
+impl Intent {
+    /// Takes in a command that was carried out.
+    pub fn note(&mut self, record: &CommandRecord) {
+        if !record.accepted {
+            return;
+        }
+        // Older versions wrote the words alone.
+        let order = record.order.clone().or_else(|| match record.command.as_str() {
+            "standby" => Some(Order::Standby),
+            "run" => Some(Order::Run { reversal: None }),
+            "run with mode reversal" => Some(Order::Run { reversal: Some(true) }),
+            "run without mode reversal" => Some(Order::Run { reversal: Some(false) }),
+            _ => None,
+        });
+        match order {
+            Some(state @ (Order::Standby | Order::Run { .. })) => self.state = Some(state),
+            Some(Order::Rest(place)) => self.rest = Some(place),
+            Some(Order::EndRest) => self.rest = None,
+            // These begin and end in standby, and a change of the calibration changes no state.
+            Some(Order::Forget) => *self = Self::default(),
+            Some(Order::SelfTest | Order::PreLaunch(_) | Order::Abort | Order::Rollback { .. }) | None => {}
+        }
+    }
+
+    /// Whether nothing was asked for.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.state.is_none() && self.rest.is_none()
+    }
+
+    /// The orders that lead to it.
+    pub fn orders(&self) -> impl Iterator<Item = Order> {
+        self.state.iter().cloned().chain(self.rest.map(Order::Rest))
+    }
 }
 
 /// What holds for a unit when a new audit file begins.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CarriedUnit {
     /// Highest revision counter that the unit was ever given.
     pub highest_revision: u64,
     /// Its last good sets, the newest last: at most [`MAX_CARRIED`].
     pub sets: Vec<GoodSet>,
+    /// What an operator wants of it.
+    #[serde(skip_serializing_if = "Intent::is_empty", default)]
+    pub intent: Intent,
 }
 
 /// What was last seen in a file of the watched folder.

@@ -26,8 +26,7 @@ mod types;
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
-use isotherm_document::{Form, Reader, published};
-use toml::de::DeTable;
+use isotherm_document::{Form, Reader, parse_toml, published};
 
 pub use candidate::Candidate;
 pub use types::{GyroOverlay, Overlay, PreLaunchRecord};
@@ -65,7 +64,7 @@ pub fn overlay_schema() -> serde_json::Value {
 /// A text that is no TOML is judged by what of it can be read.
 #[must_use]
 pub fn is_overlay(text: &str) -> bool {
-    text.len() <= MAX_DOCUMENT_BYTES && DeTable::parse_recoverable(text).0.get_ref().contains_key(OVERLAY_OF)
+    text.len() <= MAX_DOCUMENT_BYTES && parse_toml(text).0.get_ref().contains_key(OVERLAY_OF)
 }
 
 impl Overlay {

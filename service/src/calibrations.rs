@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use isotherm_correction::calibration::Calibration;
+use isotherm_correction::operation::Command;
 use isotherm_correction::units::Span;
 use isotherm_protocol::control::Schedule;
 use isotherm_protocol::corrected::Revision;
@@ -69,6 +70,8 @@ pub struct Plan {
     pub current: Option<Arc<Installable>>,
     /// To follow at its tick.
     pub pending: Option<Change>,
+    /// Commands that a unit which appears is given: what an operator wanted of it before the service was restarted.
+    pub intent: Vec<Command>,
 }
 
 impl Plan {
@@ -115,12 +118,17 @@ impl Calibrations {
     pub fn insert(&mut self, unit: UnitId, calibration: Arc<Calibration>, digest: [u8; 8]) {
         let revision = Revision { counter: 1, digest };
         let current = Arc::new(Installable::plain(revision, calibration));
-        self.by_unit.insert(unit, Plan { current: Some(current), pending: None });
+        self.by_unit.insert(unit, Plan { current: Some(current), ..Plan::default() });
     }
 
     /// The plan of one unit, to be changed; an empty one is made where there is none.
     pub fn plan_mut(&mut self, unit: &UnitId) -> &mut Plan {
         self.by_unit.entry(unit.clone()).or_default()
+    }
+
+    /// Forgets what one unit was to be given.
+    pub fn remove(&mut self, unit: &UnitId) {
+        self.by_unit.remove(unit);
     }
 
     /// The plan of one unit.
@@ -129,9 +137,15 @@ impl Calibrations {
         self.by_unit.get(unit)
     }
 
-    /// The units that have one.
+    /// The units that have a calibration, or are to be given one at its tick.
     pub fn units(&self) -> impl Iterator<Item = &UnitId> {
-        self.by_unit.keys()
+        self.by_unit.keys().filter(|unit| self.has(unit))
+    }
+
+    /// Whether a unit has a calibration, or is to be given one at its tick.
+    #[must_use]
+    pub fn has(&self, unit: &UnitId) -> bool {
+        self.get(unit).is_some_and(|plan| plan.changes().next().is_some())
     }
 
     /// Units and their plans.

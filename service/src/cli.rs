@@ -9,7 +9,7 @@ use crate::check::CheckArgs;
 use crate::console::{self, CommandArgs, Console, HistoryArgs, RollbackArgs, StatusArgs, SwapArgs, TopArgs};
 use crate::demo::DemoArgs;
 use crate::exit::Exit;
-use crate::logging::LogArgs;
+use crate::logging::{FinishLog, LogArgs};
 use crate::signing::{KeygenArgs, SignArgs};
 use crate::words::{print, say};
 
@@ -135,6 +135,8 @@ fn operate(console: Console) -> Exit {
 
 /// Runs a command that logs and needs a runtime.
 fn logged(log: &LogArgs, command: impl Future<Output = Exit>) -> Exit {
+    // However this ends, by a panic too.
+    let _finish = FinishLog;
     if let Err(words) = log.start() {
         say(format_args!("isotherm: {words}"));
         return Exit::Usage;

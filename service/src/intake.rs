@@ -11,7 +11,7 @@ use isotherm_protocol::codec::{self, CodecError};
 use isotherm_protocol::control::Schedule;
 use isotherm_protocol::key::{self, RawStream, UnitId};
 use isotherm_protocol::raw::{AccelBatch, GyroBatch, HealthBatch, TemperatureBatch};
-use isotherm_protocol::status::{Fault, Status};
+use isotherm_protocol::status::{Fault, Output, Status};
 
 use crate::calibrations::{Calibrations, Change, Plan};
 use crate::config::Settings;
@@ -34,7 +34,13 @@ pub struct Intake {
     journal: Option<Journal>,
     units: RwLock<Units>,
     faults: Mutex<FaultLog>,
+    looked_for_room: Mutex<Option<Instant>>,
 }
+
+/// How long a unit without a calibration is silent before another may have its place.
+const STRANGER_KEPT: Duration = Duration::from_secs(60);
+/// Shortest distance of two looks for such a unit.
+const ROOM_INTERVAL: Duration = Duration::from_millis(100);
 
 impl std::fmt::Debug for Intake {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
@@ -58,6 +64,7 @@ impl Intake {
             journal: None,
             units: RwLock::default(),
             faults: Mutex::default(),
+            looked_for_room: Mutex::default(),
         }
     }
 
@@ -98,7 +105,7 @@ impl Intake {
             return false;
         };
         let known = self.unit(serial);
-        let Some(unit) = known.or_else(|| self.appear(serial, stream, frame)) else { return false };
+        let Some(unit) = known.or_else(|| self.appear(serial, stream, frame, arrival)) else { return false };
         let mut actor = lock(&unit);
         guarded(&mut actor, |actor| actor.receive(stream, frame, arrival));
         actor.is_status_due()
@@ -123,11 +130,11 @@ impl Intake {
     }
 
     /// Makes the unit of a message that is its first, unless the message is bad or there are too many.
-    fn appear(&self, serial: &str, stream: RawStream, frame: &[u8]) -> Option<Unit> {
+    fn appear(&self, serial: &str, stream: RawStream, frame: &[u8], now: Instant) -> Option<Unit> {
         let id = UnitId::new(serial)
             .map_err(|error| self.fault(FaultKind::BadSerial, || format!("serial {serial:?} {error}")))
             .ok()?;
-        let calibrated = read(&self.calibrations).get(&id).is_some();
+        let calibrated = read(&self.calibrations).has(&id);
         // Rubbish on a strange serial makes no unit; on a serial with a calibration it is that unit's rubbish.
         if !calibrated && let Err(error) = readable(stream, frame) {
             self.fault(FaultKind::from(&error), || {
@@ -137,7 +144,7 @@ impl Intake {
         }
         // Looked at without the right to write first: a flood of strange serials must not hold the others up.
         if !self.has_place(&read(&self.units), calibrated) {
-            return self.refuse(&id);
+            self.make_room(now);
         }
         let mut units = self.units.write().unwrap_or_else(PoisonError::into_inner);
         if let Some(unit) = units.get(serial) {
@@ -160,6 +167,14 @@ impl Intake {
         let plan = read(&self.calibrations).get(&id).cloned().unwrap_or_default();
         for change in plan.changes() {
             actor.change(change);
+        }
+        for command in &plan.intent {
+            match actor.command(command) {
+                Ok(state) => {
+                    tracing::info!(unit = %id, %state, "{} again, as before the restart", command.name())
+                }
+                Err(refusal) => tracing::warn!(unit = %id, "as before the restart it cannot be: {refusal}"),
+            }
         }
         if let Some(current) = &plan.current {
             tracing::info!(unit = %id, revision = current.revision.counter, "appeared, calibrated");
@@ -194,6 +209,46 @@ impl Intake {
         let limit = self.settings.max_units;
         // Most of the time there is room for all of them, whoever has appeared.
         units.len() < limit && (calibrated || units.len() + waiting(&read(&self.calibrations)) < limit)
+    }
+
+    /// Forgets the unit without a calibration that has been silent longest, if that is long enough: anybody can make one appear, and
+    /// it must not hold its place for ever. Looked for now and then, for a flood of strange serials is not to cost more.
+    fn make_room(&self, now: Instant) {
+        {
+            let mut looked = lock(&self.looked_for_room);
+            if looked.is_some_and(|looked| now.saturating_duration_since(looked) < ROOM_INTERVAL) {
+                return;
+            }
+            *looked = Some(now);
+        }
+        let units = read(&self.units).in_order();
+        let silent = units.iter().filter_map(|(id, unit)| {
+            // Whoever is at work on it hears of it.
+            let actor = unit.try_lock().ok()?;
+            (actor.doing().1 != Output::Calibrated).then(|| (actor.silence(now), id.clone()))
+        });
+        if let Some((silence, id)) = silent.max().filter(|(silence, _)| *silence >= STRANGER_KEPT) {
+            tracing::info!(unit = %id, "forgotten: silent for {} s, and its place is needed", silence.as_secs());
+            self.forget(&id);
+        }
+    }
+
+    /// Knows nothing more of a unit; it appears anew with its next message.
+    pub(crate) fn forget(&self, unit: &UnitId) {
+        self.calibrations.write().unwrap_or_else(PoisonError::into_inner).remove(unit);
+        self.outlets.drop_prepared(unit);
+        let gone = self.units.write().unwrap_or_else(PoisonError::into_inner).remove(unit);
+        if let Some(unit) = gone {
+            guarded(&mut lock(&unit), |actor| {
+                actor.flush();
+                actor.end();
+            });
+        }
+    }
+
+    /// Whether a unit has appeared.
+    pub(crate) fn has(&self, unit: &UnitId) -> bool {
+        read(&self.units).get(unit.as_str()).is_some()
     }
 
     fn refuse<T>(&self, id: &UnitId) -> Option<T> {
@@ -242,7 +297,7 @@ impl Intake {
 
     /// Has a unit begin with what it had before the service was restarted.
     pub(crate) fn restore(&self, unit: &UnitId, plan: Plan) {
-        if plan.changes().next().is_none() {
+        if plan.changes().next().is_none() && plan.intent.is_empty() {
             return;
         }
         *self.calibrations.write().unwrap_or_else(PoisonError::into_inner).plan_mut(unit) = plan;

@@ -180,6 +180,7 @@ impl Work {
             actor.take_status_due();
             true
         });
+        self.outlets.keep(|unit| self.intake.has(unit));
         self.publish_own(true);
     }
 

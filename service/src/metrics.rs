@@ -1,4 +1,7 @@
-//! Metrics for Prometheus and a verdict on the service's health, over HTTP on an address of the operator's choice.
+//! Metrics for Prometheus and verdicts on the service's health, over HTTP on an address of the operator's choice.
+//!
+//! `/livez`: the process answers. `/readyz`: it receives and corrects. `/healthz`: everything that speaks against its health, as JSON.
+//! All of them answer from the moment on at which the address is taken, which is before the Zenoh session is open.
 //!
 //! | module | holds |
 //! |---|---|
@@ -24,9 +27,9 @@ mod state_folder;
 
 use std::io;
 use std::net::SocketAddr;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+use std::sync::{Arc, OnceLock};
+use std::time::{Duration, Instant};
 
 use tokio::net::TcpListener;
 use tokio::sync::Mutex;
@@ -36,7 +39,7 @@ use crate::ServiceError;
 use crate::config::MetricsSettings;
 pub(crate) use source::Source;
 
-use health::Watch;
+use health::{STOPPING, Watch};
 
 /// How long a request, or what hinders it, may take.
 #[derive(Debug, Clone, Copy)]
@@ -62,59 +65,7 @@ impl Default for Limits {
     }
 }
 
-/// An address that is taken and not served yet, so that a port in use is told before anything else is done.
-#[derive(Debug)]
-pub(crate) struct Taken(TcpListener);
-
-impl Taken {
-    /// Takes the configured address; `None` where none is configured.
-    ///
-    /// # Errors
-    /// [`ServiceError::Metrics`] where others could reach it and that is not allowed, or it cannot be had.
-    pub(crate) async fn bind(settings: &MetricsSettings) -> Result<Option<Self>, ServiceError> {
-        let Some(address) = settings.listen else { return Ok(None) };
-        let refused = |source| ServiceError::Metrics { address, source };
-        if !settings.admits(address) {
-            let words =
-                "other machines could reach it; take 127.0.0.1, or set allow_remote = true in [metrics]";
-            return Err(refused(io::Error::other(words)));
-        }
-        TcpListener::bind(address).await.map(|listener| Some(Self(listener))).map_err(refused)
-    }
-
-    /// Serves it.
-    ///
-    /// # Errors
-    /// Where the system does not say which address it is.
-    pub(crate) fn serve(self, source: Source) -> io::Result<Endpoint> {
-        self.serve_within(source, Watch::default(), Limits::default())
-    }
-
-    fn serve_within(self, source: Source, watch: Watch, limits: Limits) -> io::Result<Endpoint> {
-        let address = self.0.local_addr()?;
-        let watch = Arc::new(Mutex::new(watch));
-        let desk = Arc::new(Desk { source, watch, stopping: AtomicBool::new(false), limits });
-        let tasks = [
-            tokio::spawn(http::serve(self.0, Arc::clone(&desk))),
-            tokio::spawn(look_now_and_then(Arc::clone(&desk))),
-        ];
-        tracing::info!("metrics on http://{address}/metrics, health on http://{address}/healthz");
-        Ok(Endpoint { address, desk, tasks })
-    }
-}
-
-/// Looks at the units again and again, so that what has gone on for a while is known as such when somebody asks.
-async fn look_now_and_then(desk: Arc<Desk>) {
-    let mut interval = tokio::time::interval(desk.limits.interval);
-    interval.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
-    loop {
-        interval.tick().await;
-        // A look that takes too long is told to whoever asks for one.
-        let _ = desk.look(Source::watch_units).await;
-    }
-}
-
-/// The running endpoint; it ends soon after it is dropped.
+/// The endpoint at work; it ends soon after it is dropped.
 #[derive(Debug)]
 pub(crate) struct Endpoint {
     address: SocketAddr,
@@ -123,6 +74,55 @@ pub(crate) struct Endpoint {
 }
 
 impl Endpoint {
+    /// Takes the configured address and answers on it, as a service that waits for `waits_for` until [`Self::open`]; `None` where none
+    /// is configured.
+    ///
+    /// # Errors
+    /// [`ServiceError::Metrics`] where others could reach it and that is not allowed, or it cannot be had.
+    pub(crate) async fn start(
+        settings: &MetricsSettings,
+        waits_for: String,
+    ) -> Result<Option<Self>, ServiceError> {
+        Self::start_within(settings, waits_for, Watch::default(), Limits::default()).await
+    }
+
+    async fn start_within(
+        settings: &MetricsSettings,
+        waits_for: String,
+        watch: Watch,
+        limits: Limits,
+    ) -> Result<Option<Self>, ServiceError> {
+        let Some(address) = settings.listen else { return Ok(None) };
+        let refused = |source| ServiceError::Metrics { address, source };
+        if !settings.admits(address) {
+            let words =
+                "other machines could reach it; take 127.0.0.1, or set allow_remote = true in [metrics]";
+            return Err(refused(io::Error::other(words)));
+        }
+        let listener = TcpListener::bind(address).await.map_err(refused)?;
+        let address = listener.local_addr().map_err(refused)?;
+        let desk = Arc::new(Desk {
+            source: OnceLock::new(),
+            waits_for,
+            started: Instant::now(),
+            watch: Arc::new(Mutex::new(watch)),
+            stopping: AtomicBool::new(false),
+            limits,
+        });
+        let tasks = [
+            tokio::spawn(http::serve(listener, Arc::clone(&desk))),
+            tokio::spawn(look_now_and_then(Arc::clone(&desk))),
+        ];
+        tracing::info!("metrics on http://{address}/metrics, health on http://{address}/healthz");
+        Ok(Some(Self { address, desk, tasks }))
+    }
+
+    /// The service is at work: answers are made from this from here on.
+    pub(crate) fn open(&self, source: Source) {
+        // Opened once.
+        let _ = self.desk.source.set(source);
+    }
+
     /// Where it is.
     pub(crate) fn address(&self) -> SocketAddr {
         self.address
@@ -143,6 +143,17 @@ impl Endpoint {
     }
 }
 
+/// Looks at the units again and again, so that what has gone on for a while is known as such when somebody asks.
+async fn look_now_and_then(desk: Arc<Desk>) {
+    let mut interval = tokio::time::interval(desk.limits.interval);
+    interval.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
+    loop {
+        interval.tick().await;
+        // A look that takes too long is told to whoever asks for one.
+        let _ = desk.look(Source::watch_units).await;
+    }
+}
+
 impl Drop for Endpoint {
     fn drop(&mut self) {
         self.tasks.iter().for_each(JoinHandle::abort);
@@ -152,25 +163,53 @@ impl Drop for Endpoint {
 /// What requests are answered from.
 #[derive(Debug)]
 struct Desk {
-    source: Source,
+    /// Set when the service is at work.
+    source: OnceLock<Source>,
+    /// What it waits for until then.
+    waits_for: String,
+    started: Instant,
     watch: Arc<Mutex<Watch>>,
     stopping: AtomicBool,
     limits: Limits,
 }
 
+/// Why no look was taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum NoLook {
+    /// The service is not at work yet.
+    Starting,
+    /// Something holds the units up.
+    TooSlow,
+}
+
 impl Desk {
-    /// Has a look taken; `None` where it takes too long.
+    /// Has a look taken.
     async fn look<T: Send + 'static>(
         self: &Arc<Self>,
         look: impl FnOnce(&Source, &mut Watch) -> T + Send + 'static,
-    ) -> Option<T> {
+    ) -> Result<T, NoLook> {
         let desk = Arc::clone(self);
         let looked = async move {
             // Goes with the work, not with the request: however often somebody asks, one thread looks.
             let mut watch = Arc::clone(&desk.watch).lock_owned().await;
-            tokio::task::spawn_blocking(move || look(&desk.source, &mut watch)).await
+            tokio::task::spawn_blocking(move || desk.source.get().map(|source| look(source, &mut watch)))
+                .await
         };
-        tokio::time::timeout(self.limits.look, looked).await.ok()?.ok()
+        match tokio::time::timeout(self.limits.look, looked).await {
+            Ok(Ok(looked)) => looked.ok_or(NoLook::Starting),
+            Ok(Err(_)) | Err(_) => Err(NoLook::TooSlow),
+        }
+    }
+
+    /// Why the service does not receive; `None` where it does.
+    fn not_ready(&self) -> Option<String> {
+        if self.stopping.load(Ordering::Relaxed) {
+            return Some(STOPPING.to_owned());
+        }
+        self.source
+            .get()
+            .is_none()
+            .then(|| format!("the service is starting: it waits for {}", self.waits_for))
     }
 }
 

@@ -7,6 +7,7 @@
 //! | module | holds |
 //! |---|---|
 //! | `desk` | how to ask, without waiting |
+//! | `queue` | requests that wait, unit by unit |
 //! | `work` | the thread |
 //! | `order` | what a swap is asked for with |
 //! | `reading` | a document that was read and holds |
@@ -38,6 +39,7 @@ mod notice;
 mod order;
 mod policy;
 mod pre_launch;
+mod queue;
 mod reading;
 mod record;
 mod refusals;
@@ -46,43 +48,36 @@ mod start;
 mod swap;
 mod work;
 
-use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::Arc;
 use std::thread::JoinHandle;
 
-pub(crate) use board::{Board, Posted};
+pub(crate) use board::{Board, Posted, UNWRITTEN};
 pub(crate) use desk::{Desk, Notice, PreLaunchEnd};
 
-use desk::Request;
+use queue::Queue;
 pub(crate) use start::Found;
 pub(crate) use work::Work;
 
-/// Requests that may wait for the registrar.
-const WAITING_REQUESTS: usize = 256;
-
 /// The way to a registrar that has not started yet, so that units can be told of it before.
 #[derive(Debug)]
-pub(crate) struct Opening {
-    requests: SyncSender<Request>,
-    receiver: Receiver<Request>,
-}
+pub(crate) struct Opening(Arc<Queue>);
 
 impl Opening {
     /// A way with nothing on it.
     pub(crate) fn new() -> Self {
-        let (requests, receiver) = sync_channel(WAITING_REQUESTS);
-        Self { requests, receiver }
+        Self(Arc::default())
     }
 
     /// Where to ask.
     pub(crate) fn desk(&self) -> Desk {
-        Desk::new(self.requests.clone())
+        Desk::new(Arc::clone(&self.0))
     }
 }
 
 /// The running registrar. Dropped without [`Registrar::stop`] it ends by itself after what waits.
 #[derive(Debug)]
 pub(crate) struct Registrar {
-    requests: SyncSender<Request>,
+    queue: Arc<Queue>,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -91,19 +86,19 @@ impl Registrar {
     ///
     /// # Errors
     /// Where the system gives no thread.
-    pub(crate) fn start(opening: Opening, work: Work) -> std::io::Result<Self> {
-        let Opening { requests, receiver } = opening;
+    pub(crate) fn start(Opening(queue): Opening, work: Work) -> std::io::Result<Self> {
+        let requests = Arc::clone(&queue);
         let thread = std::thread::Builder::new().name("isotherm-registrar".to_owned()).spawn(move || {
             yield_to_ticks();
-            work.run(receiver);
+            work.run(&requests);
         })?;
-        Ok(Self { requests, thread: Some(thread) })
+        Ok(Self { queue, thread: Some(thread) })
     }
 
     /// Has it finish what waits and ends it; whether it ended in order.
     pub(crate) fn stop(mut self) -> bool {
-        let asked = self.requests.send(Request::Stop).is_ok();
-        asked & self.thread.take().is_some_and(|thread| thread.join().is_ok())
+        self.queue.stop();
+        self.thread.take().is_some_and(|thread| thread.join().is_ok())
     }
 }
 
@@ -121,9 +116,7 @@ fn yield_to_ticks() {
 
 impl Drop for Registrar {
     fn drop(&mut self) {
-        if self.thread.is_some() {
-            // Units hold a way to it for as long as it holds them: nothing else would ever end it.
-            let _ = self.requests.try_send(Request::Stop);
-        }
+        // Units hold a way to it for as long as it holds them: nothing else would ever end it.
+        self.queue.stop();
     }
 }

@@ -1,18 +1,29 @@
 //! The `serve` command: from arguments to a running service, and from a signal to its end.
 
-use std::io::Write;
+use std::io::{IsTerminal, Write};
 use std::net::SocketAddr;
 use std::path::Path;
+use std::time::{Duration, Instant};
 
+use isotherm_bus::SessionOptions;
 use tokio::signal::unix::{SignalKind, signal};
+use zenoh::Session;
 
 use crate::calibrations::Calibrations;
 use crate::cli::ServeArgs;
 use crate::config::Settings;
 use crate::exit::Exit;
+use crate::metrics::Endpoint;
 use crate::service::{open_store, start_on};
-use crate::words::{print, say};
+use crate::words::{print_within, say};
 use crate::{ServiceError, Totals};
+
+/// How long the end waits for a stdout that takes nothing.
+const PRINT_LIMIT: Duration = Duration::from_secs(1);
+
+/// How long a session may take to open before it is said what it waits for, and how often it is said again.
+const FIRST_WORD: Duration = Duration::from_secs(2);
+const FURTHER_WORDS: Duration = Duration::from_secs(60);
 
 /// SIGXFSZ, sent where a write would make a file longer than the process may (`ulimit -f`, `LimitFSIZE=`).
 const FILE_TOO_LONG: SignalKind = SignalKind::from_raw(25);
@@ -44,7 +55,7 @@ fn failed(error: &ServiceError) -> Exit {
 /// Says what was done.
 fn report(totals: &Totals, json: bool) -> Exit {
     let text = if json { serde_json::to_string(totals).unwrap_or_default() } else { totals.table() };
-    print(&(text + "\n"), totals.exit())
+    print_within(PRINT_LIMIT, text + "\n", totals.exit())
 }
 
 /// The configuration with the command line's options put over it.
@@ -85,29 +96,59 @@ async fn serve(args: ServeArgs) -> Result<Option<Totals>, ServiceError> {
     let mut terminate = signal(SignalKind::terminate()).map_err(ServiceError::Thread)?;
     // Caught, it no longer ends the process: the write fails, and is told as on a full disk.
     let _file_too_long = signal(FILE_TOO_LONG).map_err(ServiceError::Thread)?;
+    let mut hangup = signal(SignalKind::hangup()).map_err(ServiceError::Thread)?;
+    let mut reload = signal(SignalKind::hangup()).map_err(ServiceError::Thread)?;
+    // A terminal that is closed ends what runs in it; a daemon is asked to read its documents again.
+    let in_terminal = std::io::stdin().is_terminal();
     let mut stop_asked = async || {
         tokio::select! {
             _ = interrupt.recv() => "SIGINT",
             _ = terminate.recv() => "SIGTERM",
+            _ = hangup.recv(), if in_terminal => "SIGHUP",
         }
     };
 
     let state = open_store(settings.state.as_deref())?;
+    let awaited = settings.session.awaited()?;
+    let metrics = Endpoint::start(&settings.metrics, awaited.clone()).await?;
     let session = tokio::select! {
-        session = isotherm_bus::open(&settings.session) => session?,
-        // Still looking for a router, perhaps: there is nothing to flush.
+        session = open_session(settings.session.clone(), &awaited) => session?,
+        // There is nothing to flush.
         _ = stop_asked() => return Ok(Some(Totals { stopped_in_time: true, ..Totals::default() })),
     };
     let locators = isotherm_bus::locators(&session);
-    let service = start_on(settings, Calibrations::default(), state, session).await?;
+    let service = start_on(settings, Calibrations::default(), state, metrics, session).await?;
     tracing::info!(version = env!("CARGO_PKG_VERSION"), locators = locators.join(" "), "ready");
     announce(&args, &locators, service.metrics())?;
 
-    let name = stop_asked().await;
+    let name = loop {
+        tokio::select! {
+            name = stop_asked() => break name,
+            _ = reload.recv(), if !in_terminal => service.reload(),
+        }
+    };
     tracing::info!(signal = name, "stopping");
     tokio::select! {
         totals = service.stop() => Ok(Some(totals)),
         _ = stop_asked() => Ok(None),
+    }
+}
+
+/// Opens the session, and says what it waits for where that takes long.
+async fn open_session(options: SessionOptions, awaited: &str) -> Result<Session, ServiceError> {
+    // A task of its own: opening may hold its thread.
+    let mut opening = tokio::spawn(async move { isotherm_bus::open(&options).await });
+    let (mut pause, start) = (FIRST_WORD, Instant::now());
+    loop {
+        match tokio::time::timeout(pause, &mut opening).await {
+            Ok(Ok(opened)) => return Ok(opened?),
+            Ok(Err(join)) => return Err(ServiceError::Thread(std::io::Error::other(join))),
+            Err(_) => {
+                let waited_s = start.elapsed().as_secs();
+                tracing::warn!(waited_s, "nothing is corrected yet: waiting for {awaited}");
+                pause = FURTHER_WORDS;
+            }
+        }
     }
 }
 

@@ -17,8 +17,8 @@ use crate::calibrations::Calibrations;
 use crate::config::Settings;
 use crate::intake::Intake;
 use crate::keeper::Keeper;
-use crate::metrics::{Endpoint, Source, Taken};
-use crate::registrar::{Found, Opening, Registrar, Work};
+use crate::metrics::{Endpoint, Source};
+use crate::registrar::{Desk, Found, Opening, Registrar, Work};
 use crate::signing::read_trusted_keys;
 use crate::store::{Opened, Store};
 use crate::totals::Totals;
@@ -39,6 +39,7 @@ pub struct RunningService {
     declared: Declared,
     keeper: Keeper,
     registrar: Registrar,
+    desk: Desk,
     metrics: Option<Endpoint>,
 }
 
@@ -65,18 +66,19 @@ pub async fn start_with(
     session: Session,
 ) -> Result<RunningService, ServiceError> {
     let state = open_store(settings.state.as_deref())?;
-    start_on(settings, calibrations, state, session).await
+    let metrics = Endpoint::start(&settings.metrics, "its units".to_owned()).await?;
+    start_on(settings, calibrations, state, metrics, session).await
 }
 
-/// Starts the service with a state folder that is open already, and what it was found like.
+/// Starts the service with a state folder that is open already, what it was found like, and an endpoint that answers already.
 pub(crate) async fn start_on(
     settings: Settings,
     calibrations: Calibrations,
     (store, opened): (Store, Opened),
+    metrics: Option<Endpoint>,
     session: Session,
 ) -> Result<RunningService, ServiceError> {
     tell_keys(&settings);
-    let metrics = Taken::bind(&settings.metrics).await?;
     let opening = Opening::new();
     let desk = opening.desk();
     let outlets = declare::outlets(session.clone(), settings.congestion);
@@ -104,8 +106,10 @@ pub(crate) async fn start_on(
         None => None,
     };
     let declared = Declared::new(&session, &intake, &keeper.bell(), &desk).await?;
-    let metrics = metrics.map(|taken| taken.serve(source)).transpose().map_err(ServiceError::Thread)?;
-    Ok(RunningService { session, settings, intake, watcher, declared, keeper, registrar, metrics })
+    if let Some(metrics) = &metrics {
+        metrics.open(source);
+    }
+    Ok(RunningService { session, settings, intake, watcher, declared, keeper, registrar, desk, metrics })
 }
 
 /// Opens the state folder, or its stand-in.
@@ -174,7 +178,7 @@ impl RunningService {
     ///
     /// The session given to [`start`] is closed for whoever else holds it.
     pub async fn stop(self) -> Totals {
-        let Self { session, settings, intake, watcher, declared, keeper, registrar, metrics } = self;
+        let Self { session, settings, intake, watcher, declared, keeper, registrar, desk: _, metrics } = self;
         metrics.iter().for_each(Endpoint::stopping);
         let deadline = Instant::now() + settings.stop_timeout;
         let left = |deadline: Instant| deadline.saturating_duration_since(Instant::now());
@@ -208,6 +212,13 @@ impl RunningService {
             metrics.end().await;
         }
         Totals { stopped_in_time: flushed && taken.is_ok() && closed.is_ok(), ..intake.totals() }
+    }
+
+    /// Has the documents of the folder read again, and those judged again that are not taken.
+    pub fn reload(&self) {
+        tracing::info!("the documents of the folder are read again");
+        self.watcher.iter().for_each(Watcher::reread);
+        self.desk.judge_again();
     }
 
     /// The session that it runs on.

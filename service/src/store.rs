@@ -9,6 +9,7 @@
 //! | `documents/<sha256>.toml` | every calibration document that was accepted |
 //! | `overlays/<sha256>.toml` | every result of a pre-launch calibration |
 //! | `revisions.json` | a number that no revision goes beyond, should the audit file be lost |
+//! | `last-entry` | the number of the last entry, should the end of the audit file be lost |
 //!
 //! What a function has written is on the disk when it returns; a crash at whatever moment leaves whole documents and whole
 //! lines. Everything here waits for the disk, so that it must never be called from a receive thread. A service without a
@@ -23,18 +24,19 @@ mod lock;
 mod log;
 mod mark;
 mod opened;
+mod retention;
 mod scan;
 mod shelf;
 
 pub use error::StoreError;
-pub use opened::{Damage, Emptied, LostRevision, Opened, Torn};
+pub use opened::{Cut, Damage, Emptied, Gap, LostRevision, Opened, Torn};
 
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 use isotherm_protocol::digest::Digest;
-use isotherm_protocol::history::{AuditEntry, AuditEvent, GoodSet};
+use isotherm_protocol::history::{AuditEntry, AuditEvent, GoodSet, Intent};
 use isotherm_protocol::key::UnitId;
 
 use index::Index;
@@ -63,6 +65,10 @@ pub struct Store {
     full_bytes: u64,
     /// No new file could be begun; told once.
     stuck: bool,
+    /// What may go is to be taken away.
+    prune_due: bool,
+    /// Lines of the audit file were lost.
+    is_damaged: bool,
 }
 
 /// Where the entries go.
@@ -112,6 +118,11 @@ impl Store {
             mark.lose(folder).map_err(unmarked)?;
             let (folder, floor) = (folder.to_owned(), mark.floor);
             opened.emptied = Some(Emptied { folder, documents: kept, has_older, floor });
+        // The last line alone may be missing after a crash in mid-write.
+        } else if let Some(written) = Mark::last_entry(folder).filter(|written| *written > next_number) {
+            mark.lose(folder).map_err(unmarked)?;
+            opened.cut = Some(Cut { last: next_number - 1, written, floor: mark.floor });
+            next_number = written.saturating_add(1);
         } else if index.highest() > 0 {
             mark.reserve(folder, index.highest()).map_err(unmarked)?;
         }
@@ -127,7 +138,20 @@ impl Store {
         }
         let journal = Journal::Folder { path: folder.to_owned(), log, lock, mark };
         let full_bytes = FULL_BYTES;
-        Ok((Self { journal, documents, overlays, index, next_number, full_bytes, stuck: false }, opened))
+        let is_damaged = opened.losses().next().is_some() || opened.damaged > 0 || !opened.gaps.is_empty();
+        let (stuck, prune_due) = (false, true);
+        let store = Self {
+            journal,
+            documents,
+            overlays,
+            index,
+            next_number,
+            full_bytes,
+            stuck,
+            prune_due,
+            is_damaged,
+        };
+        Ok((store, opened))
     }
 
     /// A store that is gone with the process: of documents the newest 64 MiB are kept, of entries the newest 1000.
@@ -141,6 +165,8 @@ impl Store {
             next_number: 1,
             full_bytes: FULL_BYTES,
             stuck: false,
+            prune_due: false,
+            is_damaged: false,
         }
     }
 
@@ -253,6 +279,9 @@ impl Store {
             self.index.apply(entry);
         }
         self.next_number = self.next_number.saturating_add(entries.len() as u64);
+        if let Journal::Folder { path, .. } = &self.journal {
+            Mark::note_entry(path, self.next_number.saturating_sub(1));
+        }
         Ok(self.next_number.saturating_sub(1))
     }
 
@@ -264,7 +293,13 @@ impl Store {
         document.or(overlay).map_or(Ok(()), |digest| Err(StoreError::NotStored { digest }))
     }
 
-    /// Units that were ever given a calibration.
+    /// What an operator wants of a unit, by the commands that were carried out.
+    #[must_use]
+    pub fn intent(&self, unit: &UnitId) -> Option<&Intent> {
+        self.index.intent(unit)
+    }
+
+    /// Units that were ever given a calibration or a command.
     pub fn units(&self) -> impl Iterator<Item = &UnitId> {
         self.index.units()
     }

@@ -12,6 +12,16 @@ pub(crate) fn read_bounded(file: &Path) -> std::io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
+/// Refuses a pipe or a device under the name of a file: to open or read it might wait for ever. What is not there is no problem here.
+pub(crate) fn check_regular(file: &Path) -> std::io::Result<()> {
+    match std::fs::metadata(file) {
+        Ok(found) if !found.is_file() => {
+            Err(std::io::Error::other("it is not a file, but a folder, pipe or device"))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// A problem of a file as a whole.
 pub(crate) fn whole(file: &str, message: String) -> Problem {
     Problem { file: Some(file.to_owned()), line: 1, column: 1, key: String::new(), message }

@@ -42,7 +42,7 @@ const REFUSALS: [&str; 5] =
     ["gyro_late", "gyro_implausible", "wrong_sensor_count", "wrong_output_kind", "bad_duration"];
 /// How long a self-test may take by the clock: one that gets no ticks ends with what it has seen.
 const LONGEST_SELF_TEST: Duration = Duration::from_secs(14);
-/// How long the gyro topic may be silent before a pre-launch calibration gets no more ticks.
+/// How long a unit may be silent before it counts as one that sends no more; a pre-launch calibration ends then.
 const LONGEST_SILENCE: Duration = Duration::from_secs(10);
 
 /// One unit: frames in, frames out, everything counted. Knows nothing of sessions and threads.
@@ -57,6 +57,8 @@ pub struct UnitActor {
     teller: Teller,
     scribe: Scribe,
     account: SwapAccount,
+    /// When a frame last came that was one.
+    heard: Instant,
     /// When a self-test began by the clock.
     self_test_since: Option<Instant>,
     /// Counters of streams that were given up after an alarm.
@@ -88,6 +90,7 @@ impl UnitActor {
             teller: Teller::default(),
             scribe: Scribe::default(),
             account: SwapAccount::default(),
+            heard: Instant::now(),
             self_test_since: None,
             before_reset: Vec::new(),
             status_due: true,
@@ -164,6 +167,7 @@ impl UnitActor {
             self.fault(FaultKind::from(&error), 1, || format!("{topic}: {error}"));
             return;
         }
+        self.heard = arrival;
         let first_output = self.latency.total() == 0;
         if self.publish() {
             self.latency.record(u64::try_from(arrival.elapsed().as_nanos()).unwrap_or(u64::MAX));
@@ -323,6 +327,18 @@ impl UnitActor {
             (None, Uncalibrated::Hold) => Output::Held,
         };
         (unit.state().into(), output)
+    }
+
+    /// How long no good frame has come.
+    #[must_use]
+    pub fn silence(&self, now: Instant) -> Duration {
+        now.saturating_duration_since(self.heard)
+    }
+
+    /// Whether frames come.
+    #[must_use]
+    pub fn is_heard(&self, now: Instant) -> bool {
+        self.silence(now) < LONGEST_SILENCE
     }
 
     /// Whether something goes on whose progress should be seen more often than once a status interval.

@@ -181,6 +181,11 @@ impl Watcher {
         Ok(Self { signals })
     }
 
+    /// Has every file read and compared with what was told of it, soon.
+    pub fn reread(&self) {
+        self.signals.reread();
+    }
+
     /// Whether the thread is at work. It ends before [`Watcher::stop`] only where the sink panics.
     #[must_use]
     pub fn is_running(&self) -> bool {

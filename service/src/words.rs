@@ -2,10 +2,13 @@
 
 use std::fmt::Display;
 use std::io::{self, ErrorKind, Write};
+use std::sync::mpsc::sync_channel;
+use std::time::Duration;
 
 use isotherm_protocol::escape::{escaped, escaped_lines};
 
 use crate::exit::Exit;
+use crate::logging::to_stderr;
 
 /// What begins a change of colour, and ends it: "ESC [ 1;31 m".
 const COLOUR: (&str, char) = ("\u{1b}[", 'm');
@@ -30,14 +33,23 @@ pub(crate) fn coloured(text: &str) -> String {
     shown
 }
 
-/// Says a line on stderr; where stderr is gone or full, the exit code tells the rest.
+/// Says a line on stderr.
 pub(crate) fn say(line: impl Display) {
-    let _ = writeln!(io::stderr(), "{}", escaped(&line.to_string()));
+    to_stderr(format!("{}\n", escaped(&line.to_string())));
 }
 
 /// Says several lines on stderr.
 pub(crate) fn say_lines(lines: impl Display) {
-    let _ = writeln!(io::stderr(), "{}", escaped_lines(&lines.to_string()));
+    to_stderr(format!("{}\n", escaped_lines(&lines.to_string())));
+}
+
+/// Prints a result as [`print`] does, and goes on without it where stdout takes nothing for so long: a terminal that is
+/// stopped or a full pipe must not hold up the end of a service.
+pub(crate) fn print_within(limit: Duration, text: String, exit: Exit) -> Exit {
+    let (sender, printed) = sync_channel(1);
+    let thread = std::thread::Builder::new().spawn(move || sender.send(print(&text, exit)));
+    let printed = thread.ok().and_then(|_| printed.recv_timeout(limit).ok());
+    printed.unwrap_or(if exit == Exit::Ok { Exit::Failed } else { exit })
 }
 
 /// Prints a result on stdout and gives the exit code: `exit`, or [`Exit::Failed`] where it cannot be written.

@@ -424,3 +424,23 @@ fn a_file_name_forges_no_line_and_turns_no_text_round() {
         }
     }
 }
+
+#[test]
+fn an_overlay_is_signed_as_a_document_is() {
+    let place = Place::with_signer("bench");
+    let overlay = format!(
+        "schema = 1\noverlay_of = \"{}\"\nunit = \"ZLG-0001\"\n\n[[gyro]]\nname = \"x\"\n\
+         static_bias_change_deg_per_h = 0.031\nstatic_bias_sigma_deg_per_h = 0.004\n",
+        "27fb".repeat(16)
+    );
+    place.write("overlay.toml", &overlay);
+    let output = place.run(&["sign", "overlay.toml", "--key", "bench.key"]);
+    assert_eq!(output.status.code(), Some(0), "{output:?}");
+    let signed = place.text("overlay.toml");
+    assert!(signed.starts_with(&overlay) && signed.contains(MARK), "{signed}");
+    let checked = place.run(&["check", "overlay.toml", "--trusted-keys", "trusted", "--json"]);
+    assert_eq!(checked.status.code(), Some(0), "{checked:?}");
+
+    place.write("bad.toml", &overlay.replace("name = \"x\"", "nam = \"x\""));
+    assert_eq!(place.run(&["sign", "bad.toml", "--key", "bench.key"]).status.code(), Some(78));
+}

@@ -238,3 +238,76 @@ fn crc32(bytes: &[u8]) -> u32 {
         (0..8).fold(crc ^ u32::from(*byte), |crc, _| (crc >> 1) ^ (0xedb8_8320 & (crc & 1).wrapping_neg()))
     })
 }
+
+/// The audit file's lines.
+fn lines(folder: &Path) -> Vec<String> {
+    let text = fs::read_to_string(folder.join("audit.jsonl")).unwrap();
+    text.split_inclusive('\n').map(ToOwned::to_owned).collect()
+}
+
+#[test]
+fn lines_that_are_missing_in_the_middle_are_told_with_their_numbers() {
+    let folder = filled(6);
+    let mut kept = lines(folder.path());
+    kept.drain(2..4);
+    fs::write(folder.path().join("audit.jsonl"), kept.concat()).unwrap();
+    let (_, opened) = Store::open(folder.path()).unwrap();
+    let [gap] = &*opened.gaps else { panic!("{opened:?}") };
+    assert_eq!((gap.line, gap.first, gap.last), (3, 3, 4));
+    assert_eq!((opened.entries, opened.damaged, opened.warnings().count()), (4, 0, 1));
+    assert_eq!((opened.losses().count(), opened.cut.is_none()), (0, true));
+}
+
+#[test]
+fn lines_that_are_missing_at_the_end_are_counted_and_no_revision_is_given_twice() {
+    for torn in [0, 20] {
+        let folder = filled(7);
+        let all = lines(folder.path());
+        let rest = all[4][..torn].to_owned();
+        fs::write(folder.path().join("audit.jsonl"), all[..4].concat() + &rest).unwrap();
+        let (mut store, opened) = Store::open(folder.path()).unwrap();
+        let cut = opened.cut.clone().unwrap();
+        assert_eq!((cut.last, cut.written, opened.torn.is_some()), (4, 7, torn > 0));
+        assert!(opened.losses().any(|words| words.contains("the last 3 entries are missing")));
+        assert_eq!(store.last_good(&unit()).unwrap().revision, 4);
+        assert!(store.highest_revision(&unit()) >= 7);
+        fill(&mut store, 1);
+        assert_eq!(numbers(&store), [1, 2, 3, 4, 8]);
+        drop(store);
+        let (_, opened) = Store::open(folder.path()).unwrap();
+        assert_eq!((opened.cut, opened.gaps.len()), (None, 1), "from now on it is a gap");
+    }
+}
+
+#[test]
+fn a_line_that_a_crash_cut_in_mid_write_is_no_loss() {
+    let folder = filled(3);
+    let mut text = lines(folder.path()).concat();
+    text.push_str(&lines(folder.path())[2][..30]);
+    fs::write(folder.path().join("audit.jsonl"), text).unwrap();
+    let (store, opened) = Store::open(folder.path()).unwrap();
+    assert!(opened.torn.is_some() && opened.cut.is_none() && opened.gaps.is_empty(), "{opened:?}");
+    assert_eq!(store.highest_revision(&unit()), 3);
+}
+
+#[test]
+fn a_pipe_in_the_place_of_a_file_is_told_and_not_waited_for() {
+    for name in ["audit.jsonl", "audit-5.jsonl", "revisions.json", "last-entry"] {
+        let folder = TempDir::new().unwrap();
+        let pipe = folder.path().join(name);
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        match Store::open(folder.path()) {
+            Err(error) => {
+                assert!(error.to_string().contains(name) && error.to_string().contains("pipe"), "{error}")
+            }
+            Ok((mut store, _)) => fill(&mut store, 2),
+        }
+    }
+    let folder = filled(1);
+    let (store, _) = Store::open(folder.path()).unwrap();
+    let digest = store.last_good(&unit()).unwrap().digest;
+    let file = folder.path().join(format!("documents/{digest}.toml"));
+    fs::remove_file(&file).unwrap();
+    assert!(std::process::Command::new("mkfifo").arg(&file).status().unwrap().success());
+    assert!(matches!(store.document(&digest), Err(StoreError::Read { .. })));
+}

@@ -6,7 +6,7 @@ use crate::curve::CurveError;
 use crate::orientation::OrientationError;
 use crate::reversal::ReversalError;
 use crate::servo::ServoError;
-use crate::stated;
+use crate::stated::{self, Shown};
 
 /// Part of the calibration in which a defect lies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -53,7 +53,7 @@ pub struct Defect {
 #[non_exhaustive]
 pub enum DefectKind {
     /// Not a finite number, or outside its limits.
-    #[error("is {value}, must be {low} to {high}")]
+    #[error("is {}, must be {} to {}", Shown(*value), Shown(*low), Shown(*high))]
     OutOfRange {
         /// The value.
         value: f64,
@@ -73,7 +73,7 @@ pub enum DefectKind {
         high: usize,
     },
     /// Lower limit at or above the upper one.
-    #[error("runs from {low} to {high}: the first must be below the second")]
+    #[error("runs from {} to {}: the first must be below the second", Shown(*low), Shown(*high))]
     InvertedRange {
         /// Lower end.
         low: f64,

@@ -47,6 +47,9 @@ pub enum Order {
         #[serde(default)]
         dry_run: bool,
     },
+    /// Know nothing more of the unit: no calibration, no history to go back to, no place among the units. Its revision numbers are
+    /// not given again.
+    Forget,
 }
 
 /// Where the unit stands and how.

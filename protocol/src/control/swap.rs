@@ -193,6 +193,9 @@ pub struct SwapReply {
     pub revision: u64,
     /// SHA-256 of the document's text in hexadecimal digits: the new one's where accepted, else that of the one in force.
     pub digest: String,
+    /// SHA-256 of the text that would be accepted, where it was only asked for.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub proposed: Option<String>,
     /// When it takes effect.
     pub schedule: Schedule,
     /// Time over which the change is made (s).

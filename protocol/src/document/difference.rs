@@ -31,6 +31,57 @@ pub fn difference(before: &Document, after: &Document) -> Vec<DocumentChange> {
     changes
 }
 
+/// Sections of `before` that `after` does not have: tables, and entries of lists of tables where there are fewer; curves, and what is
+/// only for readers, left out. Each as its header stands in a document, such as `[accel]` or `[[gyro.sensor]] "z"`.
+///
+/// A document of which only the beginning was written may be a whole one by itself, for a unit of gyros only: what it lost is
+/// the sign of it.
+#[must_use]
+pub fn lost_sections(before: &Document, after: &Document) -> Vec<String> {
+    let mut lost = Vec::new();
+    lost_tables("", &tree::of(before), &tree::of(after), &mut lost);
+    lost
+}
+
+fn lost_tables(path: &str, before: &Table, after: &Table, lost: &mut Vec<String>) {
+    for (key, node) in before {
+        let path = super::reader::join(path, key);
+        let other = after.iter().find(|(name, _)| name == key).map(|(_, node)| node);
+        match (node, other) {
+            (Node::Table(old), _) if ABOUT.contains(&&*path) || is_curve(old) => {}
+            (Node::Table(old), Some(Node::Table(new))) => lost_tables(&path, old, new, lost),
+            (Node::Table(_), _) => lost.push(format!("[{path}]")),
+            (Node::List(old), Some(Node::List(new))) => lost_entries(&path, old, new, lost),
+            (Node::List(old), _) => lost_entries(&path, old, &[], lost),
+            (Node::Leaf(_), _) => {}
+        }
+    }
+}
+
+/// Sections of a list of tables that another one does not have: entries that are missing, and what is missing in the others.
+fn lost_entries(path: &str, before: &[Node], after: &[Node], lost: &mut Vec<String>) {
+    let names = tree::names(before).zip(tree::names(after));
+    for (index, node) in before.iter().enumerate() {
+        let Node::Table(old) = node else { continue };
+        let name = names.as_ref().and_then(|(names, _)| names.get(index));
+        let place = match (&names, name) {
+            (Some((_, others)), Some(name)) => others.iter().position(|other| other == name),
+            _ => Some(index),
+        };
+        match place.and_then(|place| after.get(place)) {
+            Some(Node::Table(new)) => lost_tables(path, old, new, lost),
+            // Where there are as many as before it has another name, no more.
+            _ if after.len() >= before.len() => {}
+            _ => lost.push(name.map_or_else(|| format!("[[{path}]]"), |name| format!("[[{path}]] {name}"))),
+        }
+    }
+}
+
+/// Whether a table states a curve, which is an entry and no section.
+fn is_curve(table: &Table) -> bool {
+    table.iter().any(|(key, _)| key == "kind")
+}
+
 /// Compares two tables: the keys of the later one in its order, then those that are gone.
 fn tables(path: &str, before: &Table, after: &Table, changes: &mut Vec<DocumentChange>) {
     let path_of = |key: &str| isotherm_document::join(path, key);

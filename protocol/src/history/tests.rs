@@ -63,8 +63,9 @@ fn each_kind() -> Vec<AuditEvent> {
             state_before: "self-test".to_owned(),
             state_after: "self-test".to_owned(),
             last_sequence: Some(9),
+            order: Some(Order::Run { reversal: Some(true) }),
         }),
-        AuditEvent::CarriedUnit(CarriedUnit { highest_revision: 9, sets: vec![set] }),
+        AuditEvent::CarriedUnit(CarriedUnit { highest_revision: 9, sets: vec![set], intent: resting() }),
         AuditEvent::CarriedFile(CarriedFile {
             path: "a\"b\\c°.toml".to_owned(),
             digest: Digest::of(b"x"),
@@ -162,6 +163,7 @@ fn the_longest_entries_fit_in_a_line_and_carry_no_control_characters() {
             state_before: long(),
             state_after: long(),
             last_sequence: None,
+            order: None,
         }),
         AuditEvent::CarriedUnit(CarriedUnit {
             highest_revision: 1,
@@ -173,6 +175,7 @@ fn the_longest_entries_fit_in_a_line_and_carry_no_control_characters() {
                     )
                 })
                 .collect(),
+            intent: Intent::default(),
         }),
         AuditEvent::CarriedFile(CarriedFile { path: long(), digest: Digest::of(b"x"), refused: true }),
     ];
@@ -251,4 +254,36 @@ fn entries_in_words_say_what_an_operator_asks() {
         words[6],
         format!("{start}command run refused, self-test as before: is testing itself (by ann)")
     );
+}
+
+/// In standby, at rest at a place.
+fn resting() -> Intent {
+    let rest = PlaceOrder { latitude_deg: 55.7, heading_deg: 30.0, pitch_roll_deg: Some([0.1, -0.2]) };
+    Intent { state: Some(Order::Standby), rest: Some(rest) }
+}
+
+#[test]
+fn what_an_operator_wants_follows_from_the_commands_that_were_carried_out() {
+    let record = |command: &str, order: Option<Order>, accepted| CommandRecord {
+        command: command.to_owned(),
+        accepted,
+        reason: None,
+        state_before: String::new(),
+        state_after: String::new(),
+        last_sequence: None,
+        order,
+    };
+    let mut intent = Intent::default();
+    let run = Order::Run { reversal: Some(false) };
+    let wanted = resting();
+    intent.note(&record("", Some(run.clone()), true));
+    intent.note(&record("", Some(Order::Standby), false));
+    assert_eq!(intent.orders().collect::<Vec<_>>(), [run], "what was refused was not done");
+    intent.note(&record("standby", None, true));
+    intent.note(&record("", wanted.rest.map(Order::Rest), true));
+    intent.note(&record("", Some(Order::SelfTest), true));
+    intent.note(&record("pre-launch ended", None, true));
+    assert_eq!(intent, wanted);
+    intent.note(&record("", Some(Order::EndRest), true));
+    assert_eq!(intent.orders().collect::<Vec<_>>(), [Order::Standby]);
 }

@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
+use isotherm_document::parse_toml;
 use isotherm_protocol::digest::Digest;
 use isotherm_protocol::document::{Channel, Document, Parsed, Problem};
 use isotherm_protocol::overlay::{Overlay, ParsedOverlay, is_overlay};
 use isotherm_protocol::signature::TrustedKeys;
-use toml::de::DeTable;
 
 use super::signer::{Signer, signer};
 use super::{FileKind, Finding, Summary};
@@ -70,7 +70,7 @@ fn recognise(path: &Path, bytes: &[u8]) -> Option<FileKind> {
         return Some(FileKind::Overlay);
     }
     // What has errors of syntax is recognised by what could be read nevertheless.
-    let (root, errors) = DeTable::parse_recoverable(&text);
+    let (root, errors) = parse_toml(&text);
     let root = root.get_ref();
     if CALIBRATION_KEYS.iter().any(|key| root.contains_key(*key)) {
         Some(FileKind::Calibration)

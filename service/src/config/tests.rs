@@ -222,3 +222,10 @@ fn syntax_errors_stand_alone() {
     let problems = parse("max_units = 1\nmax_units = 0").unwrap_err();
     assert_eq!(problems, ["service.toml:2:1: TOML: duplicate key `max_units`: remove one"]);
 }
+
+#[test]
+fn a_configuration_of_nothing_but_errors_is_refused_at_once() {
+    let broken = "=\n".repeat(1 << 19);
+    let problems = Settings::parse(&broken, Path::new("s.toml")).unwrap_err();
+    assert!(!problems.is_empty() && problems.len() <= 257, "{}", problems.len());
+}

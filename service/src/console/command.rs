@@ -83,6 +83,8 @@ pub enum Action {
     },
     /// The unit is no longer at rest
     EndRest,
+    /// Forget a unit that sends no more: calibration, status and place; its revision numbers are not given again
+    Forget,
 }
 
 /// Where a unit stands and how.
@@ -134,6 +136,7 @@ impl Action {
             Self::Abort => Order::Abort,
             Self::Rest { place } => Order::Rest(place.order()),
             Self::EndRest => Order::EndRest,
+            Self::Forget => Order::Forget,
         }
     }
 }

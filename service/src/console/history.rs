@@ -47,6 +47,13 @@ pub(super) async fn run(args: &HistoryArgs) -> Result<Exit, ConsoleError> {
     // Calibrations stand among the other entries, how far apart nobody knows.
     let parameters = format!("limit={}", if args.all { args.limit } else { MOST_ENTRIES });
     let mut entries: Vec<AuditEntry> = client.json(&key::history(&unit), &parameters, None).await?;
+    if entries.is_empty() {
+        let statuses = client.statuses().await?;
+        if !statuses.iter().any(|status| status.unit == unit.as_str()) {
+            let units = statuses.into_iter().map(|status| status.unit).collect();
+            return Err(ConsoleError::NoUnit { unit: unit.to_string(), units });
+        }
+    }
     client.close().await;
     entries.sort_by_key(|entry| std::cmp::Reverse(entry.number));
     entries.retain(|entry| args.all || matches!(entry.event, AuditEvent::Accepted(_)));

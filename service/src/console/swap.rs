@@ -201,7 +201,8 @@ fn result(reply: &SwapReply, json: bool) -> Exit {
     if json {
         return print(&(serde_json::to_string_pretty(reply).unwrap_or_default() + "\n"), exit);
     }
-    let digest: String = reply.digest.chars().take(12).collect();
+    // A service before 0.2 says the proposed digest in the place of the one in force.
+    let digest: String = reply.proposed.as_ref().unwrap_or(&reply.digest).chars().take(12).collect();
     let line = match reply.outcome {
         SwapOutcome::Refused => format!(
             "{}: refused with {}; revision {} stays in force\n",

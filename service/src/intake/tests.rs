@@ -118,3 +118,46 @@ fn a_panic_costs_one_unit_its_memory_and_nothing_else() {
     let status = intake.status(&UnitId::new("A").unwrap(), "test").unwrap();
     assert!(status.last_fault.unwrap().contains("on purpose"));
 }
+
+#[test]
+fn a_silent_unit_without_a_calibration_makes_room_for_another() {
+    let intake = intake(3, &["KEPT"]);
+    let start = Instant::now();
+    let at = |s: u64| start + Duration::from_secs(s);
+    let gyro = |unit: &str, sequence, now| {
+        intake.receive(&format!("imu/{unit}/raw/gyro"), Some(&gyro_frame(sequence)), now);
+    };
+    gyro("JUNK", 0, at(0));
+    gyro("LIVE", 0, at(0));
+    // Rubbish is no sign of life.
+    intake.receive("imu/JUNK/raw/gyro", Some(&[0; 40]), at(59));
+    gyro("LIVE", 1, at(30));
+    gyro("NEW", 0, at(59));
+    assert_eq!(units(&intake), ["JUNK", "LIVE"], "not long enough, and one place is kept");
+    gyro("NEW", 0, at(60));
+    assert_eq!(units(&intake), ["LIVE", "NEW"]);
+    gyro("KEPT", 0, at(61));
+    gyro("ANOTHER", 0, at(90));
+    assert_eq!(units(&intake), ["ANOTHER", "KEPT", "NEW"], "the one with a calibration stays");
+}
+
+#[test]
+fn a_forgotten_unit_gives_out_what_it_held_and_begins_anew() {
+    let given = Arc::new(Mutex::new(0));
+    let out = Arc::clone(&given);
+    let outlets: OutletMaker = Box::new(move |_| {
+        let out = Arc::clone(&out);
+        Ok(Box::new(move |_| {
+            *lock(&out) += 1;
+            Ok(())
+        }))
+    });
+    let intake = with_outlets(2, &[], outlets);
+    intake.receive("imu/U/raw/gyro", Some(&gyro_frame(0)), Instant::now());
+    let unit = UnitId::new("U").unwrap();
+    assert_eq!((*lock(&given), intake.has(&unit)), (0, true), "it waits for its accelerometers");
+    intake.forget(&unit);
+    assert_eq!((*lock(&given), intake.has(&unit)), (1, false));
+    intake.receive("imu/U/raw/gyro", Some(&gyro_frame(7)), Instant::now());
+    assert_eq!(intake.totals().unit(&unit).gaps, 0);
+}

@@ -42,6 +42,12 @@ impl Units {
         self.by_serial.insert(id, Arc::clone(unit));
     }
 
+    /// Takes one out.
+    pub(super) fn remove(&mut self, id: &UnitId) -> Option<Unit> {
+        Arc::make_mut(&mut self.in_order).retain(|(other, _)| other != id);
+        self.by_serial.remove(id)
+    }
+
     /// All of them as they are now, in the order of their serials.
     pub(super) fn in_order(&self) -> Arc<Vec<(UnitId, Unit)>> {
         Arc::clone(&self.in_order)
@@ -67,6 +73,12 @@ impl Outlets {
         let outlet = (self.make)(unit)?;
         lock(&self.made).insert(unit.clone(), outlet);
         Ok(())
+    }
+
+    /// Gives up the outlet of a unit that is not to appear any more.
+    pub(super) fn drop_prepared(&self, unit: &UnitId) {
+        // Undeclared when it is no longer locked.
+        let _gone = lock(&self.made).remove(unit);
     }
 
     /// The outlet of a unit that appears.

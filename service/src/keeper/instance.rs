@@ -10,6 +10,7 @@ use zenoh::Session;
 
 use crate::fault::standing;
 use crate::intake::Intake;
+use crate::logging::dropped_lines;
 use crate::registrar::{Board, Posted};
 
 /// When the service's status is asked for.
@@ -89,6 +90,11 @@ impl Instance {
         let mut faults: Vec<_> =
             posted.problems.iter().map(|it| standing(it.kind, it.count, it.words.clone())).collect();
         faults.extend(intake.faults());
+        let dropped = dropped_lines();
+        if dropped > 0 {
+            let words = "log lines were dropped: stderr took none (a stopped terminal, a full pipe)";
+            faults.push(standing("log_lines_dropped", dropped, words.to_owned()));
+        }
         faults.truncate(MAX_FAULTS);
         // Time and faults go on all the time: no news by themselves.
         Some(ServiceStatus { uptime_s: self.started.0.elapsed().as_secs_f64(), faults, ..news })

@@ -42,6 +42,11 @@ impl Outlets {
         outlet.status.put(codec::encode(status)?).wait()
     }
 
+    /// Gives up the topics of the units that are not there any more, and the tokens of their life with them.
+    pub(super) fn keep(&mut self, is_there: impl Fn(&UnitId) -> bool) {
+        self.units.retain(|unit, _| is_there(unit));
+    }
+
     /// Publishes the service's own status.
     pub(super) fn service(&mut self, status: &ServiceStatus) -> Result<(), zenoh::Error> {
         if self.service.is_none() {

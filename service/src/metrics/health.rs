@@ -12,6 +12,9 @@ const LONGEST_STALL: Duration = Duration::from_secs(10);
 /// How long after an alarm the service does not count as healthy.
 const ALARM_LASTS: Duration = Duration::from_secs(60);
 
+/// Why a service that is about to end is neither ready nor healthy.
+pub(super) const STOPPING: &str = "the service is stopping";
+
 /// Kind of a reason against the service's health.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -22,6 +25,10 @@ pub(super) enum Kind {
     NoOutput,
     /// The state folder cannot be written.
     StateFolder,
+    /// A document of the folder is good, and could not be written down.
+    UnwrittenDocument,
+    /// The service is not at work yet.
+    Starting,
     /// The service is about to end.
     Stopping,
     /// Units could not be looked at in time.
@@ -92,6 +99,11 @@ impl Default for Watch {
 impl Watch {
     pub(super) fn new(stall: Duration, alarm: Duration) -> Self {
         Self { stall, alarm, units: BTreeMap::new(), state_folder: StateFolder::default() }
+    }
+
+    /// Forgets the units that are not there any more, or not watched.
+    pub(super) fn keep(&mut self, is_watched: impl Fn(&str) -> bool) {
+        self.units.retain(|unit, _| is_watched(unit));
     }
 
     /// Takes in what is seen of a unit.

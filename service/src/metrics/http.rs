@@ -1,8 +1,9 @@
 //! Connections, requests and their limits: HTTP/1.1, one request on each connection.
 
+use std::collections::VecDeque;
 use std::convert::Infallible;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use http_body_util::Full;
@@ -16,14 +17,14 @@ use hyper::service::service_fn;
 use hyper::{Method, Request, Response, StatusCode};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use tokio::net::{TcpListener, TcpStream};
-use tokio::sync::Semaphore;
-use tokio::task::JoinSet;
+use tokio::task::{AbortHandle, JoinSet};
 
-use super::Desk;
 use super::page::{pack, page};
+use super::source::{Look, Verdict};
+use super::{Desk, NoLook};
 
-/// Most connections at a time; further ones wait until one of these is over.
-pub(super) const MAX_CONNECTIONS: usize = 16;
+/// Most connections at a time; a further one takes the place of the oldest that has not asked for anything yet.
+pub(super) const MAX_CONNECTIONS: usize = 64;
 /// Longest head of a request: a scraper needs a few hundred bytes.
 pub(super) const MAX_HEAD_BYTES: usize = 8192;
 /// Most header fields of a request.
@@ -40,33 +41,52 @@ const PLAIN: &str = "text/plain; charset=utf-8";
 
 type Answer = Response<Full<Bytes>>;
 
+/// A connection that is being served.
+struct Open {
+    /// Whether the head of a request has come.
+    asked: Arc<AtomicBool>,
+    task: AbortHandle,
+}
+
 /// Takes connections until it is dropped, and with it every connection.
+///
+/// Whoever says nothing holds a place only as long as nobody needs it: a request comes with the first packet.
 pub(super) async fn serve(listener: TcpListener, desk: Arc<Desk>) {
-    let places = Arc::new(Semaphore::new(MAX_CONNECTIONS));
     let mut connections = JoinSet::new();
+    let mut open: VecDeque<Open> = VecDeque::new();
     let mut told = false;
-    while let Ok(place) = Arc::clone(&places).acquire_owned().await {
-        while connections.try_join_next().is_some() {}
-        match listener.accept().await {
-            Ok((stream, _)) => {
-                let desk = Arc::clone(&desk);
-                connections.spawn(async move {
-                    connection(stream, &desk).await;
-                    drop(place);
-                });
-            }
+    loop {
+        let stream = match listener.accept().await {
+            Ok((stream, _)) => stream,
             Err(error) => {
                 if !std::mem::replace(&mut told, true) {
                     tracing::warn!("metrics: cannot accept a connection: {error}; further ones are not told");
                 }
                 tokio::time::sleep(PAUSE).await;
+                continue;
+            }
+        };
+        while connections.try_join_next().is_some() {}
+        open.retain(|connection| !connection.task.is_finished());
+        while open.len() >= MAX_CONNECTIONS {
+            let silent = open.iter().position(|connection| !connection.asked.load(Ordering::Relaxed));
+            if let Some(silent) = silent.and_then(|silent| open.remove(silent)) {
+                silent.task.abort();
+            } else {
+                // All of them wait for the same look.
+                connections.join_next().await;
+                open.retain(|connection| !connection.task.is_finished());
             }
         }
+        let asked = Arc::new(AtomicBool::new(false));
+        let (desk, mark) = (Arc::clone(&desk), Arc::clone(&asked));
+        let task = connections.spawn(async move { connection(stream, &desk, &mark).await });
+        open.push_back(Open { asked, task });
     }
 }
 
 /// Answers one request within its time.
-async fn connection(stream: TcpStream, desk: &Arc<Desk>) {
+async fn connection(stream: TcpStream, desk: &Arc<Desk>, asked: &AtomicBool) {
     let answering = http1::Builder::new()
         .timer(TokioTimer::new())
         .header_read_timeout(desk.limits.head)
@@ -75,7 +95,13 @@ async fn connection(stream: TcpStream, desk: &Arc<Desk>) {
         .keep_alive(false)
         // Who has said everything may still be listening.
         .half_close(true)
-        .serve_connection(TokioIo::new(stream), service_fn(|request| answer(request, desk)));
+        .serve_connection(
+            TokioIo::new(stream),
+            service_fn(|request| {
+                asked.store(true, Ordering::Relaxed);
+                answer(request, desk)
+            }),
+        );
     // Whoever went away or was too slow need not be told of.
     let _ = tokio::time::timeout(desk.limits.connection, answering).await;
 }
@@ -86,12 +112,18 @@ async fn answer(request: Request<Incoming>, desk: &Arc<Desk>) -> Result<Answer, 
     let answer = match request.uri().path() {
         "/metrics" if reads => metrics(&request, desk).await,
         "/healthz" if reads => healthz(desk).await,
-        "/metrics" | "/healthz" => {
+        "/livez" if reads => text(StatusCode::OK, PLAIN, "alive\n"),
+        "/readyz" if reads => readyz(desk),
+        "/metrics" | "/healthz" | "/livez" | "/readyz" => {
             let mut answer = text(StatusCode::METHOD_NOT_ALLOWED, PLAIN, "only GET and HEAD\n");
             answer.headers_mut().insert(ALLOW, HeaderValue::from_static("GET, HEAD"));
             answer
         }
-        _ => text(StatusCode::NOT_FOUND, PLAIN, "not found; there are /metrics and /healthz\n"),
+        _ => text(
+            StatusCode::NOT_FOUND,
+            PLAIN,
+            "not found; there are /metrics, /livez, /readyz and /healthz\n",
+        ),
     };
     Ok(answer)
 }
@@ -100,28 +132,46 @@ async fn metrics(request: &Request<Incoming>, desk: &Arc<Desk>) -> Answer {
     let open = takes(request.headers(), &ACCEPT, "application/openmetrics-text");
     let packed = takes(request.headers(), &ACCEPT_ENCODING, "gzip");
     let stopping = desk.stopping.load(Ordering::Relaxed);
-    // Text is made, and packed, on the same thread: it takes longer than the look.
-    let made = desk.look(move |source, watch| {
-        let page = page(source.look(watch, stopping))?;
+    let write = move |look: Look| {
+        let page = page(look)?;
         if packed { pack(&page).map(Bytes::from) } else { Ok(Bytes::from(page)) }
-    });
-    match made.await {
-        Some(Ok(page)) => {
+    };
+    // Text is made, and packed, on the same thread: it takes longer than the look.
+    let made = match desk.look(move |source, watch| write(source.look(watch, stopping))).await {
+        Err(NoLook::Starting) => write(Look::starting(desk.started.elapsed())),
+        Err(NoLook::TooSlow) => {
+            return text(StatusCode::SERVICE_UNAVAILABLE, PLAIN, "units could not be looked at in time\n");
+        }
+        Ok(made) => made,
+    };
+    match made {
+        Ok(page) => {
             let mut answer = text(StatusCode::OK, if open { OPEN_METRICS } else { PROMETHEUS }, page);
             if packed {
                 answer.headers_mut().insert(CONTENT_ENCODING, HeaderValue::from_static("gzip"));
             }
             answer
         }
-        Some(Err(error)) => text(StatusCode::INTERNAL_SERVER_ERROR, PLAIN, format!("{error}\n")),
-        None => text(StatusCode::SERVICE_UNAVAILABLE, PLAIN, "units could not be looked at in time\n"),
+        Err(error) => text(StatusCode::INTERNAL_SERVER_ERROR, PLAIN, format!("{error}\n")),
+    }
+}
+
+/// Whether the service receives. Nothing is looked at: a unit that is held up takes nothing of it.
+fn readyz(desk: &Desk) -> Answer {
+    match desk.not_ready() {
+        None => text(StatusCode::OK, PLAIN, "ready\n"),
+        Some(words) => text(StatusCode::SERVICE_UNAVAILABLE, PLAIN, words + "\n"),
     }
 }
 
 async fn healthz(desk: &Arc<Desk>) -> Answer {
     let stopping = desk.stopping.load(Ordering::Relaxed);
-    let verdict = desk.look(move |source, watch| source.judge(watch, stopping)).await;
-    let verdict = verdict.unwrap_or_else(|| desk.source.too_busy(desk.limits.look));
+    let uptime = desk.started.elapsed();
+    let verdict = match desk.look(move |source, watch| source.judge(watch, stopping)).await {
+        Ok(verdict) => verdict,
+        Err(NoLook::TooSlow) => Verdict::too_busy(uptime, desk.limits.look),
+        Err(NoLook::Starting) => Verdict::starting(uptime, desk.not_ready().unwrap_or_default()),
+    };
     let status = if verdict.is_healthy() { StatusCode::OK } else { StatusCode::SERVICE_UNAVAILABLE };
     match serde_json::to_string(&verdict) {
         Ok(json) => text(status, JSON, json + "\n"),

@@ -1,5 +1,6 @@
 //! What is looked at: one look at every unit, and at what the service knows of itself.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -8,10 +9,11 @@ use isotherm_protocol::service_status::UnitSummary;
 use isotherm_protocol::status::{Fault, Output, State, Status};
 use serde::Serialize;
 
-use super::health::{HeldBack, Kind, Reason, Seen, Watch};
+use super::health::{HeldBack, Kind, Reason, STOPPING, Seen, Watch};
 use crate::config::Settings;
 use crate::intake::Intake;
-use crate::registrar::{Board, Posted};
+use crate::logging::dropped_lines;
+use crate::registrar::{Board, Posted, UNWRITTEN};
 use crate::unit::UnitActor;
 
 /// Where a look is taken from.
@@ -36,6 +38,8 @@ pub(super) struct Look {
     pub(super) healthy: bool,
     /// Faults that belong to no unit.
     pub(super) faults: Vec<Fault>,
+    /// Log lines dropped so far.
+    pub(super) log_lines_dropped: u64,
     /// What the registrar has posted.
     pub(super) posted: Arc<Posted>,
     /// Whether the state folder can be written; `None` where none is configured.
@@ -62,7 +66,7 @@ pub(super) struct Verdict {
     pub(super) status: &'static str,
     /// What speaks against its health.
     pub(super) reasons: Vec<Reason>,
-    /// The service's name for itself.
+    /// The service's name for itself; empty before it is at work.
     pub(super) instance: String,
     /// Its version.
     pub(super) version: &'static str,
@@ -72,7 +76,48 @@ pub(super) struct Verdict {
     pub(super) units: Vec<UnitSummary>,
 }
 
+impl Look {
+    /// That of a service which is not at work yet.
+    pub(super) fn starting(uptime: Duration) -> Self {
+        Self {
+            instance: "starting".to_owned(),
+            uptime_s: uptime.as_secs_f64(),
+            healthy: false,
+            faults: Vec::new(),
+            log_lines_dropped: dropped_lines(),
+            posted: Arc::default(),
+            state_folder_writable: None,
+            units: Vec::new(),
+        }
+    }
+}
+
 impl Verdict {
+    fn new(uptime: Duration, reasons: Vec<Reason>) -> Self {
+        Self {
+            status: if reasons.is_empty() { "ok" } else { "unhealthy" },
+            reasons,
+            instance: String::new(),
+            version: env!("CARGO_PKG_VERSION"),
+            uptime_s: uptime.as_secs_f64(),
+            units: Vec::new(),
+        }
+    }
+
+    /// That of a service which is not at work yet.
+    pub(super) fn starting(uptime: Duration, words: String) -> Self {
+        Self::new(uptime, vec![Reason { kind: Kind::Starting, unit: None, words }])
+    }
+
+    /// Where the units could not be looked at in time.
+    pub(super) fn too_busy(uptime: Duration, limit: Duration) -> Self {
+        let limit_s = limit.as_secs_f64();
+        let words = format!(
+            "units or state folder could not be looked at within {limit_s} s: something holds them up"
+        );
+        Self::new(uptime, vec![Reason { kind: Kind::Busy, unit: None, words }])
+    }
+
     /// Whether nothing speaks against the service's health.
     pub(super) fn is_healthy(&self) -> bool {
         self.reasons.is_empty()
@@ -98,11 +143,13 @@ impl Source {
 
     /// Looks at the units for stalls and alarms.
     pub(super) fn watch_units(&self, watch: &mut Watch) {
-        let units = self.intake.each_unit(|actor| (actor.id().clone(), seen(actor)));
+        let units = self.intake.each_unit(|actor| Some((actor.id().clone(), seen(actor)?)));
+        let units: BTreeMap<_, _> = units.into_iter().flatten().collect();
         let now = Instant::now();
         for (unit, seen) in &units {
             watch.see(now, unit.as_str(), *seen);
         }
+        watch.keep(|unit| units.contains_key(unit));
     }
 
     /// Looks at everything.
@@ -112,7 +159,9 @@ impl Source {
             .each_unit(|actor| (seen(actor), actor.status(&self.instance), actor.latency_sum_ns()));
         let now = Instant::now();
         let units = units.into_iter().map(|(seen, status, latency_sum_ns)| {
-            watch.see(now, &status.unit, seen);
+            if let Some(seen) = seen {
+                watch.see(now, &status.unit, seen);
+            }
             let stalled = watch.stall(now, &status.unit, self.held_back).is_some();
             UnitLook { status, latency_sum_ns, stalled }
         });
@@ -122,6 +171,7 @@ impl Source {
             uptime_s: self.started.elapsed().as_secs_f64(),
             healthy: self.reasons(now, watch, stopping).is_empty(),
             faults: self.intake.faults(),
+            log_lines_dropped: dropped_lines(),
             posted: self.board.read(),
             state_folder_writable: self.state_folder(now, watch).map(|tried| tried.is_ok()),
             units,
@@ -135,35 +185,20 @@ impl Source {
             let (state, output) = actor.doing();
             UnitSummary { unit: actor.id().to_string(), state, output }
         });
-        self.verdict(self.reasons(Instant::now(), watch, stopping), units)
-    }
-
-    /// The verdict where the units could not be looked at in time.
-    pub(super) fn too_busy(&self, limit: Duration) -> Verdict {
-        let limit_s = limit.as_secs_f64();
-        let words = format!(
-            "units or state folder could not be looked at within {limit_s} s: something holds them up"
-        );
-        self.verdict(vec![Reason { kind: Kind::Busy, unit: None, words }], Vec::new())
-    }
-
-    fn verdict(&self, reasons: Vec<Reason>, units: Vec<UnitSummary>) -> Verdict {
-        Verdict {
-            status: if reasons.is_empty() { "ok" } else { "unhealthy" },
-            reasons,
-            instance: self.instance.clone(),
-            version: env!("CARGO_PKG_VERSION"),
-            uptime_s: self.started.elapsed().as_secs_f64(),
-            units,
-        }
+        let reasons = self.reasons(Instant::now(), watch, stopping);
+        Verdict { instance: self.instance.clone(), units, ..Verdict::new(self.started.elapsed(), reasons) }
     }
 
     /// What speaks against the service's health.
     fn reasons(&self, now: Instant, watch: &mut Watch, stopping: bool) -> Vec<Reason> {
-        let words = "the service is stopping".to_owned();
-        let stopping = stopping.then_some(Reason { kind: Kind::Stopping, unit: None, words });
+        let of_service = |kind, words: &str| Reason { kind, unit: None, words: words.to_owned() };
+        let stopping = stopping.then(|| of_service(Kind::Stopping, STOPPING));
         let state_folder = self.state_folder(now, watch).and_then(Result::err);
-        stopping.into_iter().chain(state_folder).chain(watch.reasons(now, self.held_back)).collect()
+        let posted = self.board.read();
+        let unwritten = posted.problems.iter().find(|problem| problem.kind == UNWRITTEN);
+        let unwritten = unwritten.map(|problem| of_service(Kind::UnwrittenDocument, &problem.words));
+        let of_units = watch.reasons(now, self.held_back);
+        [stopping, state_folder, unwritten].into_iter().flatten().chain(of_units).collect()
     }
 
     /// Whether the state folder can be written; `None` where none is configured.
@@ -180,15 +215,18 @@ impl Source {
     }
 }
 
-/// What the watch is told of a unit.
-fn seen(actor: &UnitActor) -> Seen {
-    let totals = actor.totals();
+/// What the watch is told of a unit; nothing of one without a calibration: anybody can make such a unit appear.
+fn seen(actor: &UnitActor) -> Option<Seen> {
     let (state, output) = actor.doing();
+    if output != Output::Calibrated {
+        return None;
+    }
+    let totals = actor.totals();
     let runs = matches!(state, State::RunningWithReversal | State::RunningWithoutReversal);
-    Seen {
+    Some(Seen {
         came: totals.ticks_in + totals.bad,
         went: totals.ticks_out.saturating_sub(totals.unpublished),
         alarms: totals.alarms,
-        runs: runs && output != Output::Held,
-    }
+        runs,
+    })
 }

@@ -1,6 +1,7 @@
 //! Text in, verdict out: everything that is wrong with a document, and everything that is doubtful, at once.
 
 use isotherm_correction::operation::State;
+use isotherm_document::parse_toml;
 use isotherm_protocol::control::Difference;
 use isotherm_protocol::document::Problem;
 use isotherm_protocol::key::UnitId;
@@ -79,14 +80,15 @@ impl Work {
         warnings.extend(present.as_ref().and_then(|present| interrupts(order, present.state)));
         let waiting = self.intake.waiting(&unit).map(|(revision, _)| revision);
         let active = record.and_then(|record| record.in_force(waiting));
+        let compared = active.and_then(|active| compare(active, &candidate, present.as_ref()));
+        let (difference, lost) = compared.map_or((None, Vec::new()), |(found, lost)| (Some(found), lost));
         let judged =
             policy::judge(&self.swap, &candidate, active, present.as_ref(), std::time::SystemTime::now());
-        for doubt in judged {
+        for doubt in judged.into_iter().chain(policy::loss(&lost)) {
             let lenient = order.is_own() || order.options.force;
             let problem = policy::at_key(text, order.name, doubt.key, doubt.message(lenient));
             if doubt.refuses && !lenient { problems.push(problem) } else { warnings.push(problem) }
         }
-        let difference = active.and_then(|active| compare(active, &candidate, present.as_ref()));
         Verdict { unit: Some(unit), candidate: Some(candidate), problems, warnings, difference }
     }
 }
@@ -119,7 +121,7 @@ pub(super) fn refused(unit: Option<UnitId>, problems: Vec<Problem>) -> Verdict {
 
 /// The unit that a text names, whatever else is wrong with it.
 pub(super) fn unit_of(text: &str) -> Option<UnitId> {
-    let (root, _) = toml::de::DeTable::parse_recoverable(text);
+    let (root, _) = parse_toml(text);
     UnitId::new(root.get_ref().get("unit")?.get_ref().as_str()?).ok()
 }
 

@@ -10,6 +10,9 @@ use isotherm_protocol::service_status::{
 use super::start::first_of;
 use super::work::Work;
 
+/// Kind of the standing problem of documents that are good and could not be written down.
+pub(crate) const UNWRITTEN: &str = "unwritten_documents";
+
 /// The present state of folder, store and swaps.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub(crate) struct Posted {
@@ -108,6 +111,15 @@ impl Work {
                 first_of(untrusted.into_iter())
             ),
         });
-        lost.chain(losses).chain(untrusted).collect()
+        let unwritten = self.folder.unwritten();
+        let unwritten = unwritten.first().map(|first| Standing {
+            kind: UNWRITTEN,
+            count: unwritten.len() as u64,
+            words: format!(
+                "{} could not be written down and is not in force, it is tried again: make room on the disk of the state folder",
+                first.display()
+            ),
+        });
+        lost.chain(losses).chain(untrusted).chain(unwritten).collect()
     }
 }

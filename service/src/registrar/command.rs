@@ -1,6 +1,7 @@
 //! Commands: an order in, the unit's answer out, both written down.
 
 use std::fmt::Display;
+use std::time::Instant;
 
 use isotherm_correction::earth::Place;
 use isotherm_correction::operation::{Command, State};
@@ -27,12 +28,14 @@ pub(super) struct PreLaunchRun {
 impl Work {
     /// Carries a command out; `None` for a unit that has not appeared and that the command cannot reach.
     pub(super) fn command(&mut self, unit: &UnitId, order: &CommandOrder) -> Option<CommandReply> {
+        if order.order == Order::Forget {
+            return self.forget(unit, &order.by);
+        }
         let present = self.intake.present(unit);
         if present.is_none() && !matches!(order.order, Order::Rollback { .. }) {
             return None;
         }
-        let at_start = if self.in_standby { State::Standby } else { State::RunningWithoutReversal };
-        let before = present.map_or(at_start, |present| present.state);
+        let before = present.map_or(self.at_start(), |present| present.state);
         let last_sequence = self.intake.with(unit, |actor| actor.last_sequence()).flatten();
         let mut reply = CommandReply {
             accepted: true,
@@ -69,6 +72,7 @@ impl Work {
             state_before: before.to_string(),
             state_after: reply.state.to_string(),
             last_sequence,
+            order: Some(order.order.clone()),
         };
         tracing::info!(
             %unit, by = order.by, state = %reply.state, accepted = reply.accepted, reason = reply.reason.as_deref(),
@@ -80,6 +84,51 @@ impl Work {
             reply.reason = Some(reply.reason.map_or(words.clone(), |reason| format!("{reason}; {words}")));
         }
         Some(reply)
+    }
+
+    /// What a unit begins in.
+    fn at_start(&self) -> State {
+        if self.in_standby { State::Standby } else { State::RunningWithoutReversal }
+    }
+
+    /// Forgets a unit; `None` for one of which nothing is known.
+    fn forget(&mut self, unit: &UnitId, by: &str) -> Option<CommandReply> {
+        let present = self.intake.present(unit);
+        let is_known =
+            present.is_some() || self.records.contains_key(unit) || self.store.last_good(unit).is_some();
+        is_known.then_some(())?;
+        let before = present.map_or(self.at_start(), |present| present.state);
+        let is_heard = self.intake.with(unit, |actor| actor.is_heard(Instant::now())) == Some(true);
+        let file = self.folder.first_naming(unit);
+        let mut reason = match file {
+            _ if is_heard => Some("the unit is still sending: stop its producer first".to_owned()),
+            Some(file) => Some(format!("{} names the unit: remove the file first", file.display())),
+            None => None,
+        };
+        if reason.is_none() {
+            let record = CommandRecord {
+                command: words(&Order::Forget),
+                accepted: true,
+                reason: None,
+                state_before: before.to_string(),
+                state_after: "forgotten".to_owned(),
+                last_sequence: self.intake.with(unit, |actor| actor.last_sequence()).flatten(),
+                order: Some(Order::Forget),
+            };
+            // Written down first: what is forgotten must not come back with a restart.
+            reason =
+                self.append(Some(unit), by, AuditEvent::Command(record)).err().map(|error| error.to_string());
+        }
+        let accepted = reason.is_none();
+        if accepted {
+            self.records.remove(unit);
+            self.losses.retain(|(concerned, _)| concerned.as_ref() != Some(unit));
+            self.intake.forget(unit);
+            tracing::info!(%unit, by, "forgotten");
+        }
+        let allowed = before.allowed().iter().map(|name| (*name).to_owned()).collect();
+        let reason = reason.or_else(|| Some("forgotten".to_owned()));
+        Some(CommandReply { accepted, unit: unit.to_string(), state: before, reason, allowed, swap: None })
     }
 
     /// Hands a command to the unit.
@@ -110,7 +159,7 @@ impl Work {
     }
 
     /// The order as the state machine takes it.
-    fn core_command(&self, order: &Order) -> Result<Command, String> {
+    pub(super) fn core_command(&self, order: &Order) -> Result<Command, String> {
         Ok(match order {
             Order::Standby => Command::Standby,
             Order::SelfTest => Command::SelfTest,
@@ -119,7 +168,9 @@ impl Work {
             Order::Run { reversal } => Command::Run { reversal: *reversal },
             Order::Rest(order) => Command::Rest(place(order)?),
             Order::EndRest => Command::EndRest,
-            Order::Rollback { .. } => return Err("rollback is no command of the state machine".to_owned()),
+            Order::Rollback { .. } | Order::Forget => {
+                return Err("this is no command of the state machine".to_owned());
+            }
         })
     }
 
@@ -165,6 +216,7 @@ fn words(order: &Order) -> String {
         Order::Run { reversal: Some(false) } => "run without mode reversal".to_owned(),
         Order::Rest(place) => format!("rest at {}", at(place)),
         Order::EndRest => "end-rest".to_owned(),
+        Order::Forget => "forget".to_owned(),
         Order::Rollback { revision, .. } => {
             optional("rollback", revision.as_ref().map(|revision| revision as &dyn Display))
         }

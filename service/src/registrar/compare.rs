@@ -7,10 +7,15 @@ use super::reading::{Reading, document_in};
 use super::record::Active;
 use crate::unit::Present;
 
-/// The difference between what was accepted last and a candidate; `None` where the former never was a document.
+/// The difference between what was accepted last and a candidate, and the sections that the candidate does not have any more;
+/// `None` where the former never was a document.
 ///
 /// Temperatures and mode are those of the unit; of one that has not appeared the correction is not compared.
-pub(super) fn compare(active: &Active, candidate: &Reading, present: Option<&Present>) -> Option<Difference> {
+pub(super) fn compare(
+    active: &Active,
+    candidate: &Reading,
+    present: Option<&Present>,
+) -> Option<(Difference, Vec<String>)> {
     let written = active.written.as_ref()?;
     let (old, new) = (document_in(&written.text)?, candidate.document()?);
     let document = document::difference(&old, &new);
@@ -20,5 +25,5 @@ pub(super) fn compare(active: &Active, candidate: &Reading, present: Option<&Pre
         let thermal = |name: &_| present.thermal(name);
         (document::correction_change(before, after, thermal, present.mode), present.words())
     });
-    Some(Difference { document, correction, temperatures })
+    Some((Difference { document, correction, temperatures }, document::lost_sections(&old, &new)))
 }

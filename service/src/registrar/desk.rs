@@ -1,15 +1,15 @@
 //! How the registrar is asked.
 
-use std::sync::mpsc::{SyncSender, TrySendError};
+use std::sync::Arc;
 
 use isotherm_correction::prelaunch::Outcome;
-use isotherm_protocol::key::UnitId;
+use isotherm_protocol::key::{self, UnitId};
 use isotherm_protocol::stream::InForce;
 use zenoh::Wait;
 use zenoh::query::Query;
 use zenoh::sample::Sample;
 
-use super::WAITING_REQUESTS;
+use super::queue::{Queue, Refused};
 use crate::watch::FolderEvent;
 
 /// What the registrar is asked for, or told.
@@ -27,8 +27,8 @@ pub(super) enum Request {
     History(Query),
     /// A unit has something to tell.
     Notice(UnitId, Notice),
-    /// Finish and end.
-    Stop,
+    /// Judge the documents of the folder again that are not taken.
+    JudgeAgain,
 }
 
 /// What a unit has to tell.
@@ -57,60 +57,81 @@ pub(crate) struct PreLaunchEnd {
 
 /// Asks the registrar; never waits, except where it says so.
 #[derive(Debug, Clone)]
-pub(crate) struct Desk(SyncSender<Request>);
+pub(crate) struct Desk(Arc<Queue>);
 
 impl Desk {
-    pub(super) fn new(requests: SyncSender<Request>) -> Self {
-        Self(requests)
+    pub(super) fn new(queue: Arc<Queue>) -> Self {
+        Self(queue)
     }
 
     /// Hands a query on `imu/*/calibration` over.
     pub(crate) fn calibration(&self, query: Query) {
-        self.ask(Request::Calibration(query));
+        let (unit, bytes) = (unit_of(&query, key::parse_calibration), length(&query));
+        self.ask(unit, Request::Calibration(query), bytes);
     }
 
     /// Hands a put on `imu/*/calibration` over.
     pub(crate) fn put(&self, sample: Sample) {
-        self.ask(Request::Put(sample));
+        let serial = key::parse_calibration(sample.key_expr().as_str());
+        let unit = serial.and_then(|serial| UnitId::new(serial).ok());
+        let bytes = sample.payload().len();
+        self.ask(unit, Request::Put(sample), bytes);
     }
 
     /// Hands a query on `imu/*/command` over.
     pub(crate) fn command(&self, query: Query) {
-        self.ask(Request::Command(query));
+        let (unit, bytes) = (unit_of(&query, key::parse_command), length(&query));
+        self.ask(unit, Request::Command(query), bytes);
     }
 
     /// Hands a query on `imu/*/history` over.
     pub(crate) fn history(&self, query: Query) {
-        self.ask(Request::History(query));
+        let (unit, bytes) = (unit_of(&query, key::parse_history), length(&query));
+        self.ask(unit, Request::History(query), bytes);
     }
 
     /// Hands an event of the folder over; waits for its turn, on the watcher's own thread.
     pub(crate) fn folder(&self, event: FolderEvent) {
-        // Fails where the registrar has ended: then nobody wants it.
-        let _ = self.0.send(Request::Folder(event));
+        self.0.tell_in_turn(Request::Folder(event));
+    }
+
+    /// Has every document of the folder that is not taken judged again.
+    pub(crate) fn judge_again(&self) {
+        // Where there is no room the documents are judged with what is there.
+        let _ = self.0.tell(Request::JudgeAgain);
     }
 
     /// Hands a unit's notice over; gives it back where too much is waiting.
     pub(crate) fn notice(&self, unit: &UnitId, notice: Notice) -> Result<(), Notice> {
-        match self.0.try_send(Request::Notice(unit.clone(), notice)) {
-            Err(TrySendError::Full(Request::Notice(_, notice))) => Err(notice),
+        match self.0.tell(Request::Notice(unit.clone(), notice)) {
+            Err((Request::Notice(_, notice), Refused::Full)) => Err(notice),
             // Where the registrar has ended nobody wants it.
             _ => Ok(()),
         }
     }
 
-    /// Hands a request over, or tells its asker that too much is waiting.
-    fn ask(&self, request: Request) {
-        let (request, why) = match self.0.try_send(request) {
-            Ok(()) => return,
-            Err(TrySendError::Full(request)) => (request, format!("{WAITING_REQUESTS} requests are waiting")),
-            Err(TrySendError::Disconnected(request)) => (request, "the service is ending".to_owned()),
+    /// Hands a request over, or tells its asker why it is not taken.
+    fn ask(&self, unit: Option<UnitId>, request: Request, bytes: usize) {
+        let shown = unit.as_ref().map(ToString::to_string).unwrap_or_default();
+        let Err((request, why)) = self.0.push(unit, request, bytes) else { return };
+        let why = match why {
+            Refused::Full => "too many requests for this unit, or for all, are waiting",
+            Refused::Ended => "the service is ending",
         };
-        tracing::warn!("a swap, command or question is refused: {why}");
+        tracing::warn!(unit = shown, "a swap, command or question is refused: {why}");
         if let Request::Calibration(query) | Request::Command(query) | Request::History(query) = request {
             let words = format!("refused: {why}; nothing has changed, try again");
             // The asker may have gone.
             let _ = query.reply_err(words).wait();
         }
     }
+}
+
+/// The unit that a query names.
+fn unit_of(query: &Query, parse: fn(&str) -> Option<&str>) -> Option<UnitId> {
+    parse(query.key_expr().as_str()).and_then(|serial| UnitId::new(serial).ok())
+}
+
+fn length(query: &Query) -> usize {
+    query.payload().map_or(0, zenoh::bytes::ZBytes::len)
 }

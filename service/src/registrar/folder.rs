@@ -12,6 +12,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 use isotherm_protocol::control::{SwapOptions, SwapOutcome};
 use isotherm_protocol::digest::Digest;
@@ -26,6 +27,9 @@ use super::order::Order;
 use super::work::Work;
 use crate::text;
 use crate::watch::{FolderEvent, read_document};
+
+/// Distance of the attempts to write down what could not be.
+const RETRY_INTERVAL: Duration = Duration::from_secs(2);
 
 /// What is known of the folder.
 #[derive(Debug, Default)]
@@ -51,6 +55,8 @@ struct File {
     problems: Vec<Problem>,
     /// Whether that is only because of a rival.
     rival: bool,
+    /// Whether that is only because it could not be written down: it is tried again.
+    unwritten: bool,
 }
 
 impl Folder {
@@ -83,15 +89,33 @@ impl Folder {
         bad.map(|(path, file)| (&**path, &*file.problems))
     }
 
+    /// Files whose documents are good and could not be written down.
+    pub(super) fn unwritten(&self) -> Vec<PathBuf> {
+        let unwritten = self.files.iter().filter(|(_, file)| file.unwritten);
+        unwritten.map(|(path, _)| path.clone()).collect()
+    }
+
+    /// Enters that the document of a file could not be written down; of a name that is no file's, nothing.
+    pub(super) fn note_unwritten(&mut self, path: &Path) {
+        if let Some(file) = self.files.get_mut(path) {
+            file.unwritten = true;
+        }
+    }
+
     /// Files whose documents name a unit.
     fn naming(&self, unit: &UnitId) -> Vec<PathBuf> {
         self.naming.get(unit).into_iter().flatten().cloned().collect()
     }
 
+    /// The first file whose document names a unit.
+    pub(super) fn first_naming(&self, unit: &UnitId) -> Option<&Path> {
+        self.naming.get(unit)?.first().map(PathBuf::as_path)
+    }
+
     /// Enters a file that cannot be read.
     pub(super) fn unreadable(&mut self, path: &Path, problem: Problem) {
         let file = self.files.entry(path.to_owned()).or_default();
-        (file.problems, file.digest) = (vec![problem], None);
+        (file.problems, file.digest, file.unwritten) = (vec![problem], None, false);
     }
 
     /// The folder cannot be read.
@@ -175,7 +199,11 @@ impl Work {
 
     /// Takes a file that was entered; `at_start` where the service has just started. Whether it is in order.
     pub(super) fn take_file(&mut self, path: &Path, read: &Read, at_start: bool) -> bool {
-        let unit = self.folder.files.get(path).and_then(|file| file.unit.clone());
+        let file = self.folder.files.get_mut(path);
+        let unit = file.and_then(|file| {
+            file.unwritten = false;
+            file.unit.clone()
+        });
         let naming = unit.map(|unit| (self.folder.naming(&unit), unit));
         if let Some((files, unit)) = naming.filter(|(files, _)| files.len() > 1) {
             self.refuse_rivals(&unit, &files, at_start);
@@ -284,6 +312,11 @@ impl Work {
         if !self.folder.files.get(path).is_some_and(|file| file.rival) {
             return;
         }
+        self.take_again(path);
+    }
+
+    /// Takes a file that is known, as it is now.
+    fn take_again(&mut self, path: &Path) {
         match read_document(path) {
             Ok(bytes) => {
                 let read = Read::of(path, &bytes);
@@ -293,6 +326,27 @@ impl Work {
             // Something is becoming of it, and the watcher is going to tell what.
             Err(error) => tracing::warn!("{} cannot be read: {error}", path.display()),
         }
+    }
+
+    /// Judges the documents again that are not taken: what spoke against them may have passed.
+    pub(super) fn judge_bad_again(&mut self) {
+        let bad: Vec<_> = self.folder.bad().map(|(path, _)| path.to_owned()).collect();
+        for path in bad {
+            self.take_again(&path);
+        }
+    }
+
+    /// Tries the documents again that could not be written down, now and then: a disk that was full may have room again.
+    pub(super) fn retry_unwritten(&mut self, now: Instant) {
+        if now < self.next_retry {
+            return;
+        }
+        self.next_retry = now + RETRY_INTERVAL;
+        self.retrying = true;
+        for path in self.folder.unwritten() {
+            self.take_again(&path);
+        }
+        self.retrying = false;
     }
 }
 

@@ -88,6 +88,17 @@ fn stream(candidate: &Reading, active: &Active) -> Option<Doubt> {
     (!same).then(|| Doubt::new("", Severity::Refuse, "", words.to_owned()))
 }
 
+/// A document that has lost a section against the one in force may be the beginning of one that is still being written.
+pub(super) fn loss(lost: &[String]) -> Option<Doubt> {
+    let words = || {
+        format!(
+            "does not have {} any more, which the document in force has, as if only its beginning had been written",
+            lost.join(", ")
+        )
+    };
+    (!lost.is_empty()).then(|| Doubt::new("", Severity::Refuse, "", words()))
+}
+
 fn age(settings: &SwapSettings, candidate: &Reading, now: SystemTime) -> Option<Doubt> {
     let limit_s = i64::try_from(settings.max_age?.as_secs()).unwrap_or(i64::MAX);
     let limit_days = limit_s / DAY_S;

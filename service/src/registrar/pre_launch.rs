@@ -69,6 +69,7 @@ impl Work {
             state_before: State::PreLaunchCalibration.to_string(),
             state_after: state_after.to_string(),
             last_sequence: self.intake.with(unit, |actor| actor.last_sequence()).flatten(),
+            order: None,
         };
         if let Err(error) = self.append(Some(unit), by, AuditEvent::Command(record)) {
             tracing::error!(%unit, "the pre-launch calibration is not in the audit file: {error}");

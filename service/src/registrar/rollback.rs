@@ -76,6 +76,7 @@ impl Work {
             unit: unit.to_string(),
             revision: active.map_or(0, |active| active.revision),
             digest: written.map(|written| written.digest.to_string()).unwrap_or_default(),
+            proposed: None,
             schedule: Schedule::NextTick,
             slew_s: 0.0,
             // No matter of a file.

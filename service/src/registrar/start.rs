@@ -8,7 +8,7 @@ use isotherm_correction::units::Span;
 use isotherm_protocol::control::Schedule;
 use isotherm_protocol::digest::Digest;
 use isotherm_protocol::document::{Document, Problem};
-use isotherm_protocol::history::GoodSet;
+use isotherm_protocol::history::{GoodSet, Intent};
 use isotherm_protocol::key::UnitId;
 use isotherm_protocol::overlay::Overlay;
 use isotherm_protocol::stream::Label;
@@ -50,7 +50,10 @@ impl Work {
         let units: Vec<_> = self.store.units().cloned().collect();
         for unit in units {
             let mut record = Record { counter: self.store.highest_revision(&unit), ..Record::default() };
-            let mut plan = Plan::default();
+            let orders = self.store.intent(&unit).into_iter().flat_map(Intent::orders);
+            // What was carried out once is understood.
+            let intent = orders.filter_map(|order| self.core_command(&order).ok()).collect();
+            let mut plan = Plan { intent, ..Plan::default() };
             let sets: Vec<_> = self.store.good_sets(&unit).cloned().collect();
             for set in sets {
                 let written = match written(&self.store, &set) {

@@ -56,6 +56,7 @@ impl Work {
                 unit: verdict.unit.as_ref().map(ToString::to_string).unwrap_or_default(),
                 revision: active.map_or(0, |active| active.revision),
                 digest: written.map(|written| written.digest.to_string()).unwrap_or_default(),
+                proposed: None,
                 schedule: order.options.schedule,
                 slew_s: slew.as_s(),
                 problems: verdict.problems,
@@ -78,8 +79,8 @@ impl Work {
             return reply(self, SwapOutcome::Unchanged, verdict);
         }
         if order.options.dry_run {
-            let would = candidate.digest.to_string();
-            return SwapReply { digest: would, ..reply(self, SwapOutcome::WouldBeAccepted, verdict) };
+            let proposed = Some(candidate.digest.to_string());
+            return SwapReply { proposed, ..reply(self, SwapOutcome::WouldBeAccepted, verdict) };
         }
         match self.accept(order, unit, candidate, &verdict, slew) {
             Ok(()) => {
@@ -95,10 +96,13 @@ impl Work {
 
     /// Tells and counts that a document is refused because it cannot be written down.
     fn refuse_unwritten(&mut self, unit: &UnitId, name: &str, error: &StoreError) -> Problem {
-        tracing::error!(%unit, "a swap is refused, it cannot be written down: {error}");
         let message = format!("the swap cannot be written down, nothing has changed: {error}");
         let problem = text::whole(name, message);
-        self.count_refusal(&refused(Some(unit.clone()), vec![problem.clone()]));
+        self.folder.note_unwritten(Path::new(name));
+        if !self.retrying {
+            tracing::error!(%unit, "a swap is refused, it cannot be written down: {error}");
+            self.count_refusal(&refused(Some(unit.clone()), vec![problem.clone()]));
+        }
         problem
     }
 

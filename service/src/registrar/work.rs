@@ -3,8 +3,7 @@
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, RecvTimeoutError};
-use std::time::{Duration, SystemTime};
+use std::time::{Duration, Instant, SystemTime};
 
 use isotherm_correction::prelaunch::PreLaunchSettings;
 use isotherm_protocol::document::Problem;
@@ -14,6 +13,7 @@ use isotherm_protocol::key::UnitId;
 use super::board::Board;
 use super::desk::Request;
 use super::folder::Folder;
+use super::queue::{Queue, Taken};
 use super::record::Record;
 use super::refusals::Refusals;
 use super::swap::Judged;
@@ -43,6 +43,10 @@ pub(crate) struct Work {
     pub(super) group: Option<Vec<Judged>>,
     /// Files whose documents could not be written down, and why.
     pub(super) unwritten: Vec<(String, Problem)>,
+    /// When such a file is tried again.
+    pub(super) next_retry: Instant,
+    /// One is being tried again: that it fails once more is no news.
+    pub(super) retrying: bool,
 }
 
 /// How often the state folder is looked at where nothing is asked for.
@@ -67,22 +71,27 @@ impl Work {
             losses: losses(opened),
             group: None,
             unwritten: Vec::new(),
+            next_retry: Instant::now(),
+            retrying: false,
         }
     }
 
     /// What the service's own status shows of the registrar.
     pub(crate) fn board(&self) -> Arc<Board> {
+        // Whoever looks finds something, however late the thread begins.
+        self.show();
         Arc::clone(&self.board)
     }
 
     /// Works until it is told to stop, and then finishes what units still have to tell.
-    pub(super) fn run(mut self, requests: Receiver<Request>) {
+    pub(super) fn run(mut self, queue: &Queue) {
         self.show();
         loop {
-            let request = match requests.recv_timeout(LOOK_INTERVAL) {
-                Ok(Request::Stop) | Err(RecvTimeoutError::Disconnected) => break,
-                Ok(request) => Some(request),
-                Err(RecvTimeoutError::Timeout) => None,
+            queue.know(self.records.keys());
+            let request = match queue.take(LOOK_INTERVAL) {
+                Taken::Stop => break,
+                Taken::Request(request) => Some(request),
+                Taken::Nothing => None,
             };
             // Unwind safety: what is kept is changed only after everything that could go wrong has gone well.
             let work = AssertUnwindSafe(|| {
@@ -90,6 +99,7 @@ impl Work {
                 if let Some(request) = request {
                     self.take(request);
                 }
+                self.retry_unwritten(Instant::now());
             });
             if catch_unwind(work).is_err() {
                 tracing::error!(
@@ -99,7 +109,7 @@ impl Work {
             self.show();
         }
         // Nobody waits for a registrar that has ended.
-        drop(requests);
+        queue.end();
         let untold = self.intake.each_unit(|actor| (actor.id().clone(), actor.take_untold()));
         for (unit, notices) in untold {
             for notice in notices {
@@ -149,7 +159,7 @@ impl Work {
             Request::Command(query) => self.answer_command(&query),
             Request::History(query) => self.answer_history(&query),
             Request::Notice(unit, notice) => self.note(&unit, notice),
-            Request::Stop => {}
+            Request::JudgeAgain => self.judge_bad_again(),
         }
     }
 

@@ -3,7 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use isotherm_protocol::digest::Digest;
 use isotherm_protocol::document::{Document, Problem};
+use isotherm_protocol::overlay::{Overlay, is_overlay};
 use isotherm_protocol::signature::{self, Existing, KeyId, PrivateKey, Wrong};
 use serde::Serialize;
 
@@ -24,7 +26,7 @@ A document is validated first. If one of several is bad, none is signed. The sig
 the document's digest, and with it the revision that outputs name, is another one than before.
 Exit codes: 0 all signed, 78 a document or the key is bad, 1 a file is signed already, or cannot be read or written.")]
 pub struct SignArgs {
-    /// Calibration documents to sign
+    /// Calibration documents and overlays to sign
     #[arg(required = true, value_name = "FILE")]
     pub files: Vec<PathBuf>,
     /// The private key, as `isotherm keygen` or `openssl genpkey -algorithm ed25519` writes it
@@ -131,16 +133,24 @@ fn prepare(file: &Path, output: &Path, key: &PrivateKey, existing: Existing) -> 
         }
     };
     // As it will be read: the line of the signature counts towards the longest length.
-    match Document::parse(signed.as_deref().unwrap_or(text), Some(&outcome.file)) {
-        Ok(parsed) => {
-            outcome.warnings = parsed.warnings;
-            outcome.unit = Some(parsed.document.unit);
-            outcome.digest = signed.as_ref().map(|_| hex(&parsed.digest));
+    match unit_and_warnings(signed.as_deref().unwrap_or(text), &outcome.file) {
+        Ok((unit, warnings)) => {
+            outcome.warnings = warnings;
+            outcome.unit = Some(unit);
+            outcome.digest = signed.as_ref().map(|signed| Digest::of(signed.as_bytes()).to_string());
         }
         Err(problems) => outcome.problems.extend(problems),
     }
     let is_good = outcome.problems.is_empty();
     (outcome, signed.filter(|_| is_good))
+}
+
+/// Unit and warnings of a document, or of an overlay. Whether an overlay fits its document is seen where both are.
+fn unit_and_warnings(text: &str, file: &str) -> Result<(String, Vec<Problem>), Vec<Problem>> {
+    if is_overlay(text) {
+        return Overlay::parse(text, Some(file)).map(|parsed| (parsed.overlay.unit, Vec::new()));
+    }
+    Document::parse(text, Some(file)).map(|parsed| (parsed.document.unit, parsed.warnings))
 }
 
 fn write(outcome: &mut Outcome, text: &str) {
@@ -194,8 +204,4 @@ fn verdict(outcomes: &[Outcome]) -> Exit {
     } else {
         Exit::Failed
     }
-}
-
-fn hex(digest: &[u8]) -> String {
-    digest.iter().fold(String::new(), |text, byte| text + &format!("{byte:02x}"))
 }

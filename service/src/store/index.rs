@@ -2,9 +2,10 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
+use isotherm_protocol::control::Order;
 use isotherm_protocol::digest::Digest;
 use isotherm_protocol::history::{
-    AuditEntry, AuditEvent, CarriedFile, CarriedUnit, GoodSet, MAX_CARRIED, Source,
+    AuditEntry, AuditEvent, CarriedFile, CarriedUnit, GoodSet, Intent, MAX_CARRIED, Source,
 };
 use isotherm_protocol::key::UnitId;
 
@@ -43,6 +44,8 @@ struct OfUnit {
     sets: VecDeque<GoodSet>,
     /// What the watched folder said for it last and was taken.
     folder: Option<Digest>,
+    /// What an operator wants of it.
+    intent: Intent,
     /// Highest revision that was given and whose acceptance cannot be read.
     lost: Option<u64>,
 }
@@ -101,6 +104,17 @@ impl Index {
                 let Some(unit) = unit else { return };
                 self.units.entry(unit).or_default().carry(carried);
             }
+            AuditEvent::Command(record) => {
+                let Some(unit) = unit.filter(|_| record.accepted) else { return };
+                if record.order == Some(Order::Forget) {
+                    self.files.retain(|_, seen| seen.unit.as_ref() != Some(&unit));
+                    let of_unit = self.units.entry(unit).or_default();
+                    // Its numbers are not given again.
+                    *of_unit = OfUnit { highest_revision: of_unit.highest_revision, ..OfUnit::default() };
+                } else {
+                    self.units.entry(unit).or_default().intent.note(record);
+                }
+            }
             AuditEvent::CarriedFile(carried) => {
                 if let Some(unit) = unit.clone().filter(|_| !carried.refused) {
                     self.units.entry(unit).or_default().folder = Some(carried.digest);
@@ -139,9 +153,21 @@ impl Index {
         self.units.is_empty() && self.files.is_empty()
     }
 
-    /// The units that were ever given a calibration.
+    /// What an operator wants of a unit.
+    pub(super) fn intent(&self, unit: &UnitId) -> Option<&Intent> {
+        self.units.get(unit).map(|of_unit| &of_unit.intent)
+    }
+
+    /// The units that were ever given a calibration or a command.
     pub(super) fn units(&self) -> impl Iterator<Item = &UnitId> {
-        self.units.keys()
+        let forgotten = |of_unit: &OfUnit| of_unit.sets.is_empty() && of_unit.intent.is_empty();
+        self.units.iter().filter(move |(_, of_unit)| !forgotten(of_unit)).map(|(unit, _)| unit)
+    }
+
+    /// Documents and overlays of every revision that can be gone back to.
+    pub(super) fn digests(&self) -> impl Iterator<Item = Digest> {
+        let sets = self.units.values().flat_map(|of_unit| &of_unit.sets);
+        sets.flat_map(|set| [Some(set.digest), set.overlay]).flatten()
     }
 
     /// Good sets of a unit, the newest last.
@@ -203,7 +229,8 @@ impl Index {
         let units = self.units.iter().map(|(unit, of_unit)| {
             let beyond = of_unit.sets.len().saturating_sub(MAX_CARRIED);
             let sets = of_unit.sets.iter().skip(beyond).cloned().collect();
-            let carried = CarriedUnit { highest_revision: of_unit.highest_revision, sets };
+            let (highest_revision, intent) = (of_unit.highest_revision, of_unit.intent.clone());
+            let carried = CarriedUnit { highest_revision, sets, intent };
             (Some(unit), AuditEvent::CarriedUnit(carried))
         });
         // The newest last: it is what the folder says for its unit.
@@ -233,6 +260,9 @@ impl OfUnit {
         let from_folder = carried.sets.iter().rfind(|set| set.source.file().is_some());
         self.folder = from_folder.map(|set| set.digest).or(self.folder);
         self.lost = None;
+        if !carried.intent.is_empty() {
+            self.intent = carried.intent.clone();
+        }
     }
 
     fn lose(&mut self, revision: u64) {

@@ -35,7 +35,10 @@ impl Store {
         overlays: impl IntoIterator<Item: AsRef<[u8]>>,
     ) -> Result<bool, StoreError> {
         let lost = match self.check_held() {
-            Ok(()) => return Ok(false),
+            Ok(()) => {
+                self.prune_if_due(time);
+                return Ok(false);
+            }
             Err(lost) => lost,
         };
         let Journal::Folder { path, mark, .. } = &self.journal else { return Ok(false) };
@@ -87,7 +90,7 @@ impl Store {
         match log.begin_anew(self.next_number.saturating_sub(1), &lines) {
             Ok(()) => {
                 self.next_number = number;
-                self.stuck = false;
+                (self.stuck, self.prune_due) = (false, true);
                 Ok(())
             }
             // A full file goes on being written to, rather than refuse what it still has room for.

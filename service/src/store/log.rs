@@ -8,8 +8,9 @@ use std::path::{Path, PathBuf};
 use isotherm_protocol::history::{AuditEntry, LineError};
 use isotherm_protocol::key::UnitId;
 
-use super::opened::{Damage, Opened, Torn};
+use super::opened::{Damage, Gap, Opened, Torn};
 use super::{StoreError, durable, scan};
+use crate::text::check_regular;
 
 /// Name of the file that is written to.
 const NAME: &str = "audit.jsonl";
@@ -191,7 +192,8 @@ impl Log {
 
 /// Opens a file to append to it; a new one where there is none.
 fn append_to(path: &Path) -> Result<File, StoreError> {
-    File::options().append(true).read(true).create(true).open(path).map_err(StoreError::write(path))
+    let open = || File::options().append(true).read(true).create(true).open(path);
+    check_regular(path).and_then(|()| open()).map_err(StoreError::write(path))
 }
 
 /// The first of these that is no file yet.
@@ -201,16 +203,22 @@ fn free(mut paths: impl Iterator<Item = PathBuf>) -> Option<PathBuf> {
 
 /// The file that was put aside last.
 fn last_full_file(folder: &Path) -> Result<Option<PathBuf>, StoreError> {
-    let mut last = None;
+    Ok(full_files(folder)?.pop())
+}
+
+/// The files that were put aside, the oldest first.
+pub(super) fn full_files(folder: &Path) -> Result<Vec<PathBuf>, StoreError> {
+    let mut files = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(StoreError::read(folder))? {
         let entry = entry.map_err(StoreError::read(folder))?;
         let name = entry.file_name().to_string_lossy().into_owned();
         let number = name.strip_prefix("audit-").and_then(|name| name.strip_suffix(".jsonl"));
         if let Some(number) = number.and_then(|number| number.parse::<u64>().ok()) {
-            last = last.max(Some((number, entry.path())));
+            files.push((number, entry.path()));
         }
     }
-    Ok(last.map(|(_, path)| path))
+    files.sort();
+    Ok(files.into_iter().map(|(_, path)| path).collect())
 }
 
 /// Reads a file: where its lines end, and whether what stands behind the last line feed is a whole entry. Where that
@@ -222,17 +230,24 @@ fn read(
     visit: &mut dyn FnMut(Found),
 ) -> Result<(scan::Extent, bool), StoreError> {
     let mut rest_is_whole = false;
+    // Entries are numbered without a gap: a line that somebody took out is missed by its number.
+    let mut next = None;
     let extent = scan::lines(path, |scan::Line { number: line, bytes, ended }| {
         rest_is_whole = !ended && AuditEntry::is_whole(bytes);
         match AuditEntry::from_line(bytes) {
             Ok(entry) => {
                 opened.entries += 1;
+                if let Some(first) = next.filter(|next| entry.number > *next) {
+                    opened.gaps.push(Gap { file: path.to_owned(), line, first, last: entry.number - 1 });
+                }
+                next = Some(entry.number.saturating_add(1));
                 visit(Found::Entry(Box::new(entry)));
             }
             Err(_) if may_be_torn && !ended && !rest_is_whole => {}
             Err(error) => {
                 opened.damage(Damage { file: path.to_owned(), line, words: error.to_string() });
                 let number = if let LineError::Entry { number, .. } = error { number } else { None };
+                next = number.or(next).map(|number| number.saturating_add(1));
                 visit(Found::Skipped { number, acceptance: acceptance_in(bytes) });
             }
         }

@@ -15,6 +15,10 @@ pub struct Opened {
     pub damaged: u64,
     /// The first of them.
     pub damages: Vec<Damage>,
+    /// Entries that are missing between two lines.
+    pub gaps: Vec<Gap>,
+    /// Entries that are missing at the end.
+    pub cut: Option<Cut>,
     /// What became of a last line that was not written to its end.
     pub torn: Option<Torn>,
     /// Units whose newest acceptance is among the damaged lines.
@@ -44,6 +48,30 @@ pub struct Emptied {
     /// Whether an older audit file is there, so that older sets hold.
     pub has_older: bool,
     /// Revisions up to this one are not given again; 0 where nothing is known of them.
+    pub floor: u64,
+}
+
+/// Entries whose lines are missing in the middle of an audit file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Gap {
+    /// The audit file.
+    pub file: PathBuf,
+    /// The line behind them, from 1.
+    pub line: u64,
+    /// Number of the first missing entry.
+    pub first: u64,
+    /// Number of the last missing entry.
+    pub last: u64,
+}
+
+/// Entries that were written and are missing at the end of the audit file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Cut {
+    /// Number of the last entry that is there; 0 where there is none.
+    pub last: u64,
+    /// Number of the last one that was written.
+    pub written: u64,
+    /// Revisions up to this one are not given again.
     pub floor: u64,
 }
 
@@ -83,7 +111,8 @@ impl Opened {
     /// What was lost, in words: an older calibration may be in force than the operator knows of, or none.
     pub fn losses(&self) -> impl Iterator<Item = String> {
         let lost = self.lost.iter().map(ToString::to_string);
-        lost.chain(self.emptied.iter().map(ToString::to_string))
+        let cut = self.cut.iter().map(ToString::to_string);
+        lost.chain(self.emptied.iter().map(ToString::to_string)).chain(cut)
     }
 
     /// Everything else that an operator should know, a line each; none after a clean stop.
@@ -92,7 +121,8 @@ impl Opened {
         let beyond = self.damaged.saturating_sub(self.damages.len() as u64);
         let more =
             (beyond > 0).then(|| format!("and {beyond} more damaged lines of the audit file, all skipped"));
-        damages.chain(more).chain(self.torn.iter().map(ToString::to_string))
+        let gaps = self.gaps.iter().map(ToString::to_string);
+        damages.chain(more).chain(gaps).chain(self.torn.iter().map(ToString::to_string))
     }
 }
 
@@ -138,6 +168,33 @@ impl fmt::Display for Emptied {
                 floor.saturating_add(1)
             ),
         }
+    }
+}
+
+impl fmt::Display for Gap {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { file, line, first, last } = self;
+        let entries = if first == last {
+            format!("entry {first} is")
+        } else {
+            format!("entries {first} to {last} are")
+        };
+        write!(f, "{}:{line}: {entries} missing before this line; if it was an acceptance", file.display())?;
+        f.write_str(", an older calibration may hold than the operator knows of: look at `isotherm status`")
+    }
+}
+
+impl fmt::Display for Cut {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { last, written, floor } = self;
+        write!(
+            f,
+            "the audit file ends with entry {last}, but entry {written} was written: the last {} entries are missing, and \
+             older calibrations may be in force than before. Look at every unit, and put back what is missing with `isotherm \
+             swap`. Revisions go on from {}, so that no number is given twice",
+            written - last,
+            floor.saturating_add(1)
+        )
     }
 }
 

@@ -6,6 +6,8 @@ use std::path::Path;
 
 use isotherm_protocol::history::MAX_LINE_BYTES;
 
+use crate::text::check_regular;
+
 /// Where the lines of a file end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Extent {
@@ -29,6 +31,7 @@ pub(super) struct Line<'l> {
 
 /// Calls `visit` with each line of a file; what stands behind the last line feed comes last.
 pub(super) fn lines(path: &Path, mut visit: impl FnMut(Line<'_>)) -> io::Result<Extent> {
+    check_regular(path)?;
     let mut reader = BufReader::with_capacity(1 << 16, File::open(path)?);
     let mut extent = Extent { lines: 0, rest: 0 };
     let mut line = Vec::new();

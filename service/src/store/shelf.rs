@@ -3,13 +3,15 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime};
 
 use isotherm_protocol::digest::Digest;
 use isotherm_protocol::document::MAX_DOCUMENT_BYTES;
 
+use super::retention::is_older;
 use super::{StoreError, durable};
 use crate::kept::KeptBytes;
-use crate::text::read_bounded;
+use crate::text::{check_regular, read_bounded};
 
 /// Most bytes of documents that are kept in memory; beyond it the oldest go.
 const MAX_MEMORY_BYTES: usize = 64 * MAX_DOCUMENT_BYTES;
@@ -112,6 +114,16 @@ impl Shelf {
         std::fs::read_dir(folder).map_or(0, |entries| entries.flatten().filter(is_document).count())
     }
 
+    /// Removes the documents that are older than this and go; how many there were.
+    pub(super) fn prune(&self, now: SystemTime, age: Duration, goes: impl Fn(&Digest) -> bool) -> usize {
+        let Self::Folder(folder) = self else { return 0 };
+        let Ok(entries) = std::fs::read_dir(folder) else { return 0 };
+        let digest = |path: &Path| path.file_name()?.to_str()?.strip_suffix(".toml")?.parse().ok();
+        let paths = entries.flatten().map(|entry| entry.path());
+        let old = paths.filter(|path| digest(path).is_some_and(|it| goes(&it)) && is_older(path, now, age));
+        old.filter(|path| std::fs::remove_file(path).is_ok()).count()
+    }
+
     /// Whether a document is kept; its bytes are not looked at.
     pub(super) fn holds(&self, digest: &Digest) -> bool {
         match self {
@@ -144,7 +156,7 @@ fn name(digest: &Digest) -> String {
 
 /// Reads a document's file and checks it.
 fn read(path: &Path, digest: &Digest) -> Result<Option<Vec<u8>>, StoreError> {
-    let bytes = match read_bounded(path) {
+    let bytes = match check_regular(path).and_then(|()| read_bounded(path)) {
         Ok(bytes) => bytes,
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
         Err(source) => return Err(StoreError::Read { path: path.to_owned(), source }),

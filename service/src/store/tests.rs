@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-use isotherm_protocol::control::Schedule;
+use isotherm_protocol::control::{Order, Schedule};
 use isotherm_protocol::history::{
     Acceptance, CommandRecord, FirstTick, Refusal, Source, Withdrawal, Withdrawn,
 };
@@ -60,6 +60,7 @@ fn command(words: &str) -> AuditEvent {
         state_before: "standby".to_owned(),
         state_after: "standby".to_owned(),
         last_sequence: None,
+        order: None,
     })
 }
 
@@ -341,4 +342,66 @@ fn without_a_folder_memory_stays_bounded_and_the_newest_is_kept() {
         store.history(Some(&unit("ZLG-1")), 2).unwrap().iter().map(|entry| entry.number).collect();
     assert_eq!(numbers, [1_997, 1_999]);
     assert_eq!(store.folder(), None);
+}
+
+#[test]
+fn what_is_forgotten_is_gone_and_its_numbers_are_not_given_again() {
+    let folder = TempDir::new().unwrap();
+    let (mut store, _) = Store::open(folder.path()).unwrap();
+    let one = unit("ZLG-1");
+    accept(&mut store, "ZLG-1", 4, "a", Source::Folder { path: "/a.toml".to_owned() });
+    accept(&mut store, "ZLG-2", 1, "b", Source::Bus);
+    let AuditEvent::Command(record) = command("forget") else { unreachable!() };
+    let forget = AuditEvent::Command(CommandRecord { order: Some(Order::Forget), ..record });
+    store.append(at(9), Some(&one), "ann", forget).unwrap();
+    for _ in 0..2 {
+        assert_eq!(store.units().collect::<Vec<_>>(), [&unit("ZLG-2")]);
+        assert_eq!((store.last_good(&one), store.said_by_folder(&one)), (None, None));
+        assert_eq!((store.seen_in_folder("/a.toml"), store.highest_revision(&one)), (None, 4));
+        drop(store);
+        store = Store::open(folder.path()).unwrap().0;
+    }
+}
+
+#[test]
+fn the_wish_of_an_operator_goes_over_to_a_new_audit_file() {
+    let folder = TempDir::new().unwrap();
+    let (mut store, _) = Store::open(folder.path()).unwrap();
+    let one = unit("ZLG-1");
+    store.append(at(1), Some(&one), "ann", command("standby")).unwrap();
+    store.full_bytes = 1;
+    store.append(at(2), Some(&unit("ZLG-2")), "ann", command("run")).unwrap();
+    store.append(at(3), Some(&unit("ZLG-2")), "ann", command("run")).unwrap();
+    drop(store);
+    let (store, _) = Store::open(folder.path()).unwrap();
+    assert_eq!(store.intent(&one).unwrap().orders().collect::<Vec<_>>(), [Order::Standby]);
+}
+
+#[test]
+fn old_audit_files_and_documents_that_nothing_goes_back_to_are_removed() {
+    let folder = TempDir::new().unwrap();
+    let (mut store, _) = Store::open(folder.path()).unwrap();
+    let one = unit("ZLG-1");
+    let in_force = accept(&mut store, "ZLG-1", 1, "in force", Source::Bus);
+    let [old, new] = ["old", "new"].map(|text| store.put_document(text.as_bytes()).unwrap());
+    let day = Duration::from_secs(86_400);
+    for (digest, days) in [(in_force, 200), (old, 91), (new, 89)] {
+        let file = store.document_file(&digest).unwrap();
+        std::fs::File::options().write(true).open(file).unwrap().set_modified(at(0) - day * days).unwrap();
+    }
+    store.full_bytes = 1;
+    for second in 0..40 {
+        store.append(at(second), Some(&one), "", command("run")).unwrap();
+    }
+    let full_files = || log::full_files(folder.path()).unwrap();
+    let newest = full_files().pop();
+    let none = || std::iter::empty::<Vec<u8>>();
+    assert!(full_files().len() > 20);
+    assert!(!store.keep(at(0), none(), none()).unwrap());
+    assert_eq!((full_files().len(), full_files().pop()), (16, newest));
+    let kept = [in_force, old, new].map(|digest| store.document(&digest).unwrap().is_some());
+    assert_eq!(kept, [true, false, true]);
+    drop(store);
+    let (store, opened) = Store::open(folder.path()).unwrap();
+    assert_eq!((store.last_good(&one).unwrap().revision, opened.warnings().count()), (1, 0));
 }

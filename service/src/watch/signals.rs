@@ -23,6 +23,8 @@ pub(super) struct Heard {
     pub(super) stirred: bool,
     /// No further event is going to come from the present watch.
     pub(super) deaf: bool,
+    /// Somebody wants every file read again.
+    pub(super) reread: bool,
     /// The thread is to end. Stays.
     pub(super) stop: bool,
 }
@@ -36,6 +38,11 @@ impl Signals {
     /// The source of events has ended.
     pub(super) fn deafen(&self) {
         self.change(|state| state.heard.deaf = true);
+    }
+
+    /// Every file is to be read again.
+    pub(super) fn reread(&self) {
+        self.change(|state| state.heard.reread = true);
     }
 
     /// The thread is to end.

@@ -28,6 +28,8 @@ pub(super) struct Work<S> {
     deaf: Option<String>,
     /// A look that an event, or the start, asked for.
     asked: Option<Instant>,
+    /// The next look compares every file.
+    reread: bool,
     last_look: Instant,
     next_poll: Instant,
 }
@@ -58,6 +60,7 @@ impl<S: Fn(FolderEvent)> Work<S> {
             outage: None,
             deaf: None,
             asked: Some(now),
+            reread: false,
             last_look: now,
             next_poll: now + settings.poll,
         }
@@ -74,6 +77,10 @@ impl<S: Fn(FolderEvent)> Work<S> {
             }
             if heard.deaf {
                 self.ears.iter_mut().for_each(Ears::deafen);
+            }
+            if heard.reread {
+                self.reread = true;
+                self.asked = Some(Instant::now());
             }
             if heard.deaf || heard.stirred {
                 // Somebody who writes without a pause makes events without number: a few looks see as much.
@@ -116,8 +123,10 @@ impl<S: Fn(FolderEvent)> Work<S> {
                 self.back();
                 self.see(now, files);
                 self.read_settled(now);
-                if polling {
-                    self.compare();
+                if std::mem::take(&mut self.reread) {
+                    self.compare(usize::MAX);
+                } else if polling {
+                    self.compare(COMPARED);
                 }
             }
             Err(error) => self.away(now, error.to_string()),
@@ -188,8 +197,8 @@ impl<S: Fn(FolderEvent)> Work<S> {
 
     /// Looks for changes that no stamp shows, a part of the files at a time. What is found is read again when it has
     /// settled.
-    fn compare(&mut self) {
-        for file in self.ledger.next_to_compare(COMPARED) {
+    fn compare(&mut self, count: usize) {
+        for file in self.ledger.next_to_compare(count) {
             if self.signals.stopping() {
                 return;
             }

@@ -1,7 +1,7 @@
 //! Metrics and health of a running service, over real HTTP connections.
 
 mod checker;
-mod client;
+pub(crate) mod client;
 mod served;
 
 use std::io::{Read, Write};
@@ -189,7 +189,7 @@ async fn every_kind_of_request_gets_the_answer_that_it_should() {
     let refuses = say(address, "GET /metrics HTTP/1.1\r\nHost: x\r\nAccept-Encoding: gzip;q=0\r\n\r\n");
     assert_eq!(refuses.header("content-encoding"), None);
 
-    for path in ["/metrics", "/healthz"] {
+    for path in ["/metrics", "/healthz", "/livez", "/readyz"] {
         let head = say(address, &format!("HEAD {path} HTTP/1.1\r\nHost: x\r\n\r\n"));
         assert_eq!((head.status, head.body.as_str()), (200, ""), "{path}");
         assert!(head.header("content-length").unwrap().parse::<usize>().unwrap() > 0);

@@ -1,15 +1,17 @@
 //! `isotherm serve` as a process: readiness, signals, exit codes, totals, log.
 
-use std::io::{BufRead, BufReader, Read};
+use std::io::{BufRead, BufReader, Read, Write};
 use std::process::{Child, ChildStdout, Command, Output, Stdio};
 use std::time::Duration;
 
 use isotherm_bus::{Consumer, Producer, ProducerOptions, SessionOptions, open, presence};
 use isotherm_correction::sample::{GyroTick, OutputKind};
 use isotherm_correction::units::{Span, Timestamp};
-use isotherm_protocol::key::UnitId;
+use isotherm_protocol::key::{self, RawStream, UnitId};
 use serde_json::Value;
 use zenoh::Session;
+
+use super::metrics::client::get;
 
 const LIMIT: Duration = Duration::from_secs(30);
 
@@ -29,12 +31,23 @@ struct Served {
 impl Served {
     /// Starts it on loopback and waits until it says that it is ready.
     fn start(arguments: &[&str]) -> Self {
+        Self::start_with(arguments, Stdio::piped())
+    }
+
+    fn start_with(arguments: &[&str], stderr: Stdio) -> Self {
         let mut command = isotherm(&["serve", "--announce", "--listen", "tcp/127.0.0.1:0"]);
-        let mut child =
-            command.args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        let mut child = command.args(arguments).stdout(Stdio::piped()).stderr(stderr).spawn().unwrap();
         let mut stdout = BufReader::new(child.stdout.take().unwrap());
-        let mut line = String::new();
-        stdout.read_line(&mut line).unwrap();
+        let (sender, read) = std::sync::mpsc::channel();
+        std::thread::spawn(move || {
+            let mut line = String::new();
+            stdout.read_line(&mut line).unwrap();
+            let _ = sender.send((line, stdout));
+        });
+        let Ok((line, stdout)) = read.recv_timeout(LIMIT) else {
+            child.kill().unwrap();
+            panic!("not ready in time");
+        };
         let ready: Value = serde_json::from_str(&line).unwrap();
         assert_eq!(ready["ready"], true);
         let locators =
@@ -48,11 +61,12 @@ impl Served {
 
     /// Sends a signal and waits for the end: exit code, rest of stdout, stderr.
     fn stop(mut self, signal: &str) -> (Option<i32>, String, String) {
-        let sent = Command::new("kill").args([signal, &self.child.id().to_string()]).status().unwrap();
-        assert!(sent.success());
+        kill(signal, &self.child);
         let (mut stdout, mut stderr) = (String::new(), String::new());
         self.stdout.read_to_string(&mut stdout).unwrap();
-        self.child.stderr.take().unwrap().read_to_string(&mut stderr).unwrap();
+        if let Some(mut pipe) = self.child.stderr.take() {
+            pipe.read_to_string(&mut stderr).unwrap();
+        }
         (self.child.wait().unwrap().code(), stdout, stderr)
     }
 }
@@ -130,6 +144,97 @@ async fn a_repeated_fault_is_logged_once_and_the_table_counts_it() {
     let bad = events.iter().filter(|event| event["kind"] == "bad_frames_kind").count();
     assert_eq!(bad, 1, "{stderr}");
     assert!(events.iter().any(|event| event["message"] == "ready"), "{stderr}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_log_that_nobody_reads_costs_no_tick_and_does_not_hold_up_the_end() {
+    // As much as a pipe takes: the first line of the log waits for a reader that never comes.
+    let (unread, mut full) = std::io::pipe().unwrap();
+    full.write_all(&[b'.'; 65_536]).unwrap();
+    let served = Served::start_with(&["--json", "--log-level", "debug"], full.into());
+    let session = served.session().await;
+    let mut consumer = Consumer::declare(&session, None).await.unwrap();
+    presence::wait_for_service(&session, LIMIT).await.unwrap();
+    let units = ["A", "B", "C"].map(|serial| UnitId::new(serial).unwrap());
+    for unit in &units {
+        produce(&session, unit, 200).await;
+        // Each of a kind that is logged.
+        session.put(key::raw(unit, RawStream::Gyro), &[0; 40]).await.unwrap();
+        while consumer.continuity(unit).ticks < 200 {
+            tokio::time::timeout(LIMIT, consumer.next()).await.expect("at its rate").unwrap();
+        }
+        assert!(consumer.continuity(unit).is_whole());
+    }
+    let end = tokio::task::spawn_blocking(|| served.stop("-TERM"));
+    let (code, stdout, _) = tokio::time::timeout(LIMIT, end).await.expect("ends all the same").unwrap();
+    assert_eq!(code, Some(0), "{stdout}");
+    drop(unread);
+}
+
+/// Sends a signal.
+fn kill(signal: &str, child: &Child) {
+    assert!(Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success());
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_hangup_has_a_daemon_read_its_documents_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = include_str!("../../../config/calibration/example-full.toml");
+    let (file, config) = (folder.path().join("a.toml"), folder.path().join("service.conf"));
+    std::fs::write(&file, text).unwrap();
+    std::fs::write(&config, "calibrations = \".\"\n").unwrap();
+    let served = Served::start(&["--config", config.to_str().unwrap()]);
+    let session = served.session().await;
+    let changed = text.to_owned() + "# changed\n";
+    std::fs::write(&file, &changed).unwrap();
+    let deadline = std::time::Instant::now() + LIMIT;
+    loop {
+        kill("-HUP", &served.child);
+        let replies = session.get("imu/EXAMPLE-0001/calibration").await.unwrap();
+        if let Ok(reply) = replies.recv_async().await
+            && let Ok(sample) = reply.into_result()
+            && sample.payload().to_bytes() == changed.as_bytes()
+        {
+            break;
+        }
+        assert!(std::time::Instant::now() < deadline, "not read again");
+        tokio::time::sleep(Duration::from_millis(50)).await;
+    }
+    let (code, _, stderr) = served.stop("-TERM");
+    assert_eq!(code, Some(0), "{stderr}");
+    assert!(stderr.contains("read again"), "{stderr}");
+}
+
+#[test]
+fn a_client_without_its_router_says_what_it_waits_for_and_can_be_stopped() {
+    let nobody = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let zenoh = folder.path().join("client.json5");
+    let shipped = include_str!("../../../config/zenoh/client.json5");
+    std::fs::write(&zenoh, shipped.replace("127.0.0.1:7447", &nobody.to_string())).unwrap();
+    let mut command =
+        isotherm(&["serve", "--metrics", "127.0.0.1:0", "--zenoh-config", zenoh.to_str().unwrap()]);
+    let mut child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    let lines = BufReader::new(child.stderr.take().unwrap()).lines();
+    let (sender, said) = std::sync::mpsc::channel();
+    std::thread::spawn(move || lines.map_while(Result::ok).for_each(|line| drop(sender.send(line))));
+    let mut address = None;
+    loop {
+        let line = said.recv_timeout(LIMIT).expect("a line that says what it waits for");
+        if let Some((_, rest)) = line.split_once("metrics on http://") {
+            address = rest.split_once('/').map(|(address, _)| address.parse().unwrap());
+        }
+        if line.contains("waiting for") {
+            assert!(line.contains(&format!("tcp/{nobody}")), "{line}");
+            break;
+        }
+    }
+    let address = address.expect("metrics come first");
+    assert_eq!(get(address, "/livez").status, 200);
+    let answer = get(address, "/readyz");
+    assert!(answer.status == 503 && answer.body.contains(&nobody.to_string()), "{answer:?}");
+    kill("-TERM", &child);
+    assert_eq!(child.wait().unwrap().code(), Some(0));
 }
 
 fn run(arguments: &[&str]) -> Output {

@@ -47,6 +47,10 @@ fn the_zenoh_configurations_say_what_their_comments_say() {
         assert_values(&name, &quiet);
         assert_values(&name, &quick);
     }
+    for name in ["peer", "router", "tls", "access-control"] {
+        let idle = ["accept_timeout", "accept_pending"].map(|key| format!("transport/unicast/{key}"));
+        assert_values(&format!("zenoh/{name}.json5"), &[(&idle[0], json!(2000)), (&idle[1], json!(1000))]);
+    }
     assert_values(
         "zenoh/peer.json5",
         &[("mode", json!("peer")), ("listen/endpoints", json!(["tcp/127.0.0.1:7447"]))],

@@ -215,3 +215,28 @@ fn a_change_of_the_correction_is_told_per_sensor_and_in_case_axes() {
     let other = correction_change(side(&before), side(&after), at(25.0), Some(LasingMode::Minus));
     assert!((other[0].before - (1.284 - 3.41 + 0.082 + trend)).abs() < 1e-9, "{:?}", other[0]);
 }
+
+#[test]
+fn a_section_that_is_gone_is_named_and_a_term_is_none() {
+    let full = accept(FULL).document;
+    let lost = |change: &dyn Fn(&mut Document)| {
+        let mut after = full.clone();
+        change(&mut after);
+        lost_sections(&full, &after)
+    };
+    assert!(full.accel.is_some() && full.mode_reversal.is_some() && full.self_test.is_some());
+    assert_eq!(lost(&|_| {}), [""; 0]);
+    assert_eq!(lost(&|it| it.accel = None), ["[accel]"]);
+    assert_eq!(
+        lost(&|it| (it.mode_reversal, it.self_test) = (None, None)),
+        ["[mode_reversal]", "[self_test]"]
+    );
+    let last = full.gyro.sensor.last().unwrap().name.clone();
+    let gone = lost(&|it| drop(it.gyro.sensor.pop()));
+    assert_eq!(gone, [format!("[[gyro.sensor]] \"{last}\"")]);
+    assert_eq!(lost(&|it| it.gyro.sensor[0].name = "renamed".to_owned()), [""; 0]);
+    assert_eq!(lost(&|it| it.gyro.sensor[0].drift = None), ["[gyro.sensor.drift]"]);
+    assert_eq!(lost(&|it| it.gyro.sensor[0].static_bias = None), [""; 0], "a curve");
+    assert_eq!(lost(&|it| (it.origin, it.created, it.note) = (None, None, None)), [""; 0]);
+    assert_eq!(lost_sections(&Document { accel: None, ..full.clone() }, &full), [""; 0], "it gains one");
+}

@@ -12,7 +12,7 @@ use isotherm_protocol::status::{SensorKind, SensorStatus, Status};
 use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 
-use super::figure::{fit, frequency, grouped, width, wrap};
+use super::figure::{fit, frequency, width, wrap};
 use super::remark::{Level, knows_rates};
 use super::{Unit, tone};
 
@@ -172,7 +172,7 @@ fn stream(status: &Status, service: Option<&ServiceStatus>, columns: usize) -> S
     }
     match status.last_tick {
         Some(tick) => {
-            field("last tick", &format!("sequence {}, series {}", grouped(tick.sequence), tick.series));
+            field("last tick", &format!("sequence {}, series {}", tick.sequence, tick.series));
             field("", &format!("ended at {} ns on the producer's clock", tick.end_time_ns));
         }
         None => field("last tick", "none was published yet"),

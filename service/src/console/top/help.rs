@@ -10,7 +10,7 @@ const TEXT: &[(&str, &str)] = &[
     ("↑ ↓ PgUp PgDn", "select a unit, scroll a page; Home and End go to the ends"),
     ("Enter", "everything of the unit; again or Esc: back to the table"),
     ("← →", "on the page of a unit: the unit before, the next one"),
-    ("s S", "sort by serial, state, temperature, latency, gaps; S goes back"),
+    ("s S", "sort by state (worst first), serial, temperature, latency, gaps; S goes back"),
     ("r", "reverse the order"),
     ("/", "filter by serial, state or note; Enter keeps it, Esc ends it"),
     ("Ctrl-L", "draw the screen anew"),

@@ -7,11 +7,11 @@ use crate::console::page::{Unit, channel_in_view, state_word};
 /// What units are sorted by; within it by serial.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) enum Sort {
-    /// Serial.
+    /// What is gravest first, then by state: of hundreds of units the screen shows those that need somebody.
     #[default]
-    Serial,
-    /// What is gravest first, then by state.
     State,
+    /// Serial.
+    Serial,
     /// The hottest first.
     Temperature,
     /// The slowest first.
@@ -21,7 +21,7 @@ pub(super) enum Sort {
 }
 
 impl Sort {
-    const ALL: [Self; 5] = [Self::Serial, Self::State, Self::Temperature, Self::Latency, Self::Gaps];
+    const ALL: [Self; 5] = [Self::State, Self::Serial, Self::Temperature, Self::Latency, Self::Gaps];
 
     /// Its name.
     pub(super) fn name(self) -> &'static str {

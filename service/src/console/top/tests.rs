@@ -103,6 +103,7 @@ fn the_first_screen_has_services_tally_units_and_keys() {
 #[test]
 fn the_selection_scrolls_through_two_hundred_units_and_never_beyond() {
     let mut bench = Bench::new(samples::fleet(200), 80, 24);
+    bench.type_in("s");
     assert!(bench.screen().contains("1–18 of 200"), "{}", bench.screen());
     bench.press([KeyCode::Up]);
     assert_eq!(bench.view.selected_at(), Some(0));
@@ -114,6 +115,18 @@ fn the_selection_scrolls_through_two_hundred_units_and_never_beyond() {
     assert!(bench.line_of("ZLG-0200").contains("ZLG-0200"));
     bench.press([KeyCode::Home]);
     assert!(bench.screen().contains("1–18 of 200"));
+}
+
+#[test]
+fn of_two_hundred_units_the_first_screen_shows_those_that_are_worst() {
+    let mut bench = Bench::new(samples::fleet(200), 80, 24);
+    let screen = bench.screen();
+    let table = screen.lines().skip_while(|line| !line.contains("state"));
+    let units: Vec<_> = table.filter(|line| line.contains("ZLG-")).collect();
+    assert!(
+        !units.is_empty() && units.iter().all(|line| line.contains('!') || line.contains('▲')),
+        "{screen}"
+    );
 }
 
 #[test]
@@ -141,11 +154,11 @@ fn the_selected_unit_stays_selected_wherever_its_numbers_move_it() {
 fn each_order_puts_first_what_it_says() {
     let mut bench = Bench::new(samples::fleet(25), 120, 40);
     for (sort, first) in [
-        (Sort::State, "ZLG-0005"),
+        (Sort::Serial, "ZLG-0001"),
         (Sort::Temperature, "ZLG-0004"),
         (Sort::Latency, "ZLG-0020"),
         (Sort::Gaps, "ZLG-0005"),
-        (Sort::Serial, "ZLG-0001"),
+        (Sort::State, "ZLG-0005"),
     ] {
         bench.type_in("s");
         let screen = bench.screen();
@@ -179,6 +192,7 @@ fn a_filter_looks_at_serial_state_and_note_and_ends_with_escape() {
 #[test]
 fn the_page_of_a_unit_scrolls_turns_and_goes_back() {
     let mut bench = Bench::new(samples::fleet(8), 80, 24);
+    bench.type_in("s");
     bench.press([KeyCode::Down; 4]);
     bench.press([KeyCode::Enter]);
     let screen = bench.screen();

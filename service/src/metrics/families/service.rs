@@ -66,6 +66,14 @@ pub(super) const FAMILIES: &[Family] = &[
         },
     },
     Family {
+        name: "isotherm_log_lines_dropped",
+        unit: "",
+        kind: Type::Counter,
+        labels: &[],
+        help: "Log lines dropped because standard error took none: a stopped terminal, a full pipe",
+        samples: |look, out| out.counter(&[], look.log_lines_dropped),
+    },
+    Family {
         name: "isotherm_calibration_folder_readable",
         unit: "",
         kind: Type::Gauge,

@@ -1,9 +1,13 @@
 //! Documents over the bus: queries and puts on `imu/{unit}/calibration`.
 
+use std::time::Duration;
+
+use isotherm_bus::{SessionOptions, locators, open};
 use isotherm_protocol::control::{SwapOptions, SwapOutcome};
 use isotherm_protocol::digest::Digest;
 use isotherm_protocol::history::{AuditEvent, Source};
 use isotherm_protocol::key;
+use zenoh::qos::CongestionControl;
 
 use super::stand::{Folders, Stand, UNIT, assert_accepted, assert_refused, document, unit_id};
 
@@ -90,6 +94,8 @@ async fn a_dry_run_says_what_would_happen_and_changes_nothing() {
     let dry = SwapOptions { dry_run: true, ..by_ann() };
     let reply = stand.swap(UNIT, &document(UNIT, 2.0), &dry).await;
     assert_eq!((reply.outcome, reply.revision), (SwapOutcome::WouldBeAccepted, 1));
+    let digests = [1.0, 2.0].map(|bias| Digest::of(document(UNIT, bias).as_bytes()).to_string());
+    assert_eq!([reply.digest, reply.proposed.unwrap()], digests, "what is in force, and what would be");
     assert!(!reply.difference.unwrap().correction.is_empty());
     assert_refused(&stand.swap(UNIT, "schema = 1", &dry).await, &["gyro"]);
     assert_eq!(stand.revisions(UNIT, 10).await, [1]);
@@ -180,5 +186,37 @@ async fn a_wrong_serial_is_told_with_everything_else_that_is_wrong() {
     let reply = stand.swap(UNIT, &bad, &by_ann()).await;
     assert_refused(&reply, &[":2:8: unit: ", "ZLG-8", "any_serial"]);
     assert_refused(&reply, &["temperature.assumed_deg_c"]);
+    stand.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_flood_of_broken_documents_for_one_unit_makes_no_other_wait() {
+    let folders = Folders::new();
+    let mut stand = Stand::start(folders.settings()).await;
+    for serial in [UNIT, "OTHER"] {
+        assert_accepted(&stand.swap(serial, &document(serial, 1.0), &by_ann()).await, 1);
+    }
+    stand.revisions("OTHER", 10).await;
+    // A million errors each.
+    let broken = "=\n".repeat(1 << 19);
+    let connect = locators(stand.service.session());
+    let vandal = open(&SessionOptions { connect, ..SessionOptions::default() }).await.unwrap();
+    let flood = tokio::spawn({
+        async move {
+            for n in 0..300 {
+                let serial = if n % 2 == 0 { UNIT.to_owned() } else { format!("INVENTED-{n}") };
+                let put = vandal.put(format!("imu/{serial}/calibration"), broken.clone());
+                put.congestion_control(CongestionControl::Block).await.unwrap();
+            }
+        }
+    });
+    for revision in 2..12 {
+        let bias = f64::from(u32::try_from(revision).unwrap());
+        let start = std::time::Instant::now();
+        assert_accepted(&stand.swap("OTHER", &document("OTHER", bias), &by_ann()).await, revision);
+        assert!(start.elapsed() < Duration::from_secs(5), "{:?}", start.elapsed());
+    }
+    flood.await.unwrap();
+    assert_eq!(stand.revisions("OTHER", 10).await, [11]);
     stand.stop().await;
 }

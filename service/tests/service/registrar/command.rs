@@ -5,7 +5,7 @@ use isotherm_protocol::control::SwapOptions;
 use isotherm_protocol::history::{AuditEvent, CommandRecord};
 use isotherm_service::Settings;
 
-use super::stand::{Folders, Stand, UNIT, assert_accepted, document};
+use super::stand::{Folders, LIMIT, Stand, UNIT, assert_accepted, document};
 
 #[tokio::test(flavor = "multi_thread")]
 async fn commands_move_a_unit_from_state_to_state_and_are_written_down() {
@@ -101,5 +101,31 @@ async fn a_self_test_without_ticks_is_ended_by_the_clock() {
         tokio::time::sleep(std::time::Duration::from_millis(50)).await;
     }
     assert!(!stand.status(UNIT).self_test.unwrap().passed, "no gyro was alive");
+    stand.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_unit_that_sends_no_more_can_be_forgotten() {
+    let folders = Folders::new();
+    let file = folders.put("a.toml", &document(UNIT, 1.0));
+    let stand = Stand::start(folders.settings()).await;
+    let forget = r#"{"command":"forget","by":"ann"}"#;
+    let error = stand.try_command("NOPE", forget).await.unwrap_err();
+    assert!(error.contains("NOPE"), "{error}");
+    let reply = stand.command(UNIT, forget).await;
+    assert!(!reply.accepted && reply.reason.unwrap().contains("a.toml names the unit"));
+    std::fs::remove_file(file).unwrap();
+    let deadline = tokio::time::Instant::now() + LIMIT;
+    while !stand.command(UNIT, forget).await.accepted {
+        assert!(tokio::time::Instant::now() < deadline);
+    }
+    assert!(stand.active(UNIT).await.is_err());
+    stand.stop().await;
+
+    let mut stand = Stand::start(folders.settings()).await;
+    assert_eq!(stand.revisions(UNIT, 10).await, [0], "it does not come back with a restart");
+    let reply = stand.command(UNIT, forget).await;
+    assert!(!reply.accepted && reply.reason.unwrap().contains("still sending"));
+    assert_accepted(&stand.swap(UNIT, &document(UNIT, 2.0), &SwapOptions::default()).await, 2);
     stand.stop().await;
 }

@@ -63,3 +63,16 @@ async fn a_rollback_says_what_there_is_to_go_back_to_and_names_the_stored_file()
     assert!(!stderr.contains("the stored document:"), "{stderr}");
     stand.stop().await;
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_history_of_a_unit_that_nobody_knows_is_an_error() {
+    let folders = Folders::new();
+    let mut stand = Stand::start(folders.settings()).await;
+    stand.revisions(UNIT, 10).await;
+    let output = isotherm(&stand, &["history", "NOPE"]).await;
+    let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!((output.status.code(), stderr.contains("knows no unit NOPE")), (Some(1), true), "{stderr}");
+    let output = isotherm(&stand, &["history", UNIT]).await;
+    assert_eq!(output.status.code(), Some(0), "it has appeared: {output:?}");
+    stand.stop().await;
+}

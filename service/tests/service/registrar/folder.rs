@@ -6,7 +6,7 @@ use isotherm_protocol::control::SwapOptions;
 use isotherm_protocol::history::{AuditEvent, Source};
 use isotherm_protocol::service_status::ServiceStatus;
 
-use super::stand::{Folders, LIMIT, Stand, UNIT, assert_accepted, document};
+use super::stand::{Folders, LIMIT, Stand, UNIT, assert_accepted, assert_refused, document};
 
 /// Waits until the service's own status says something.
 pub(crate) async fn until_service(stand: &Stand, said: impl Fn(&ServiceStatus) -> bool) -> ServiceStatus {
@@ -103,5 +103,53 @@ async fn a_bus_swap_holds_until_the_file_changes_again() {
     folders.put("a.toml", &document(UNIT, 1.5));
     stand.until_accepted(UNIT, 3).await;
     assert_eq!(stand.revisions(UNIT, 20).await, [3]);
+    stand.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_beginning_of_a_document_is_refused_though_it_is_one_by_itself() {
+    let folders = Folders::new();
+    let whole = include_str!("../../../../config/calibration/MEMS-0001.toml");
+    let whole = whole.replace("unit = \"MEMS-0001\"", &format!("unit = \"{UNIT}\""));
+    let (torn, _) = whole.split_once("\n[accel]\n").unwrap();
+    folders.put("a.toml", &whole);
+    let stand = Stand::start(folders.settings()).await;
+    stand.until_accepted(UNIT, 1).await;
+
+    folders.put("a.toml", torn);
+    let status = until_service(&stand, |status| !status.bad_documents.is_empty()).await;
+    assert!(status.bad_documents[0].problem.contains("does not have [accel]"), "{status:#?}");
+    let options = SwapOptions::default();
+    assert_refused(&stand.swap(UNIT, torn, &options).await, &["does not have [accel]", "by force"]);
+    // The rest is written.
+    folders.put("a.toml", &(whole.clone() + "# The rest.\n"));
+    stand.until_accepted(UNIT, 2).await;
+    let forced = SwapOptions { force: true, ..options };
+    assert_accepted(&stand.swap(UNIT, torn, &forced).await, 3);
+    stand.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_document_that_could_not_be_written_down_is_tried_again() {
+    let folders = Folders::new();
+    folders.put("a.toml", &document(UNIT, 1.0));
+    let mut stand = Stand::start(folders.settings()).await;
+    assert_eq!(stand.revisions(UNIT, 20).await, [1]);
+    // As a full disk would have it: the folder of the documents takes no more.
+    let (shelf, aside) = (folders.state.join("documents"), folders.state.join("aside"));
+    std::fs::rename(&shelf, &aside).unwrap();
+    std::fs::write(&shelf, "in the way").unwrap();
+    folders.put("a.toml", &document(UNIT, 2.0));
+    let told = |status: &ServiceStatus| status.faults.iter().any(|fault| fault.kind == "unwritten_documents");
+    let status = until_service(&stand, told).await;
+    assert_eq!((status.bad_documents.len(), status.swaps_refused), (1, 1), "{status:#?}");
+    assert_eq!(stand.revisions(UNIT, 20).await, [1]);
+
+    std::fs::remove_file(&shelf).unwrap();
+    std::fs::rename(&aside, &shelf).unwrap();
+    stand.until_accepted(UNIT, 2).await;
+    let status = until_service(&stand, |status| !told(status)).await;
+    assert_eq!((status.bad_documents.len(), status.swaps_refused), (0, 1), "{status:#?}");
+    assert_eq!(stand.revisions(UNIT, 20).await, [2]);
     stand.stop().await;
 }

@@ -3,11 +3,13 @@
 use std::os::unix::fs::symlink;
 
 use isotherm_bus::open;
+use isotherm_correction::unit::UnitSettings;
 use isotherm_protocol::control::{Schedule, SwapOptions};
 use isotherm_protocol::history::{AuditEvent, Source};
-use isotherm_service::ServiceError;
+use isotherm_protocol::status::State;
+use isotherm_service::{ServiceError, Settings};
 
-use super::stand::{Folders, Stand, UNIT, assert_accepted, assert_refused, audit_file, document};
+use super::stand::{Folders, Stand, UNIT, assert_accepted, assert_refused, audit_file, document, unit_id};
 
 fn plain() -> SwapOptions {
     SwapOptions::default()
@@ -182,7 +184,7 @@ async fn a_swap_that_cannot_be_written_down_is_refused_and_changes_nothing() {
 #[tokio::test(flavor = "multi_thread")]
 async fn without_a_state_folder_swaps_work_until_the_end() {
     let folders = Folders::new();
-    let settings = isotherm_service::Settings { state: None, ..folders.settings() };
+    let settings = Settings { state: None, ..folders.settings() };
     let mut stand = Stand::start(settings.clone()).await;
     assert_accepted(&stand.swap(UNIT, &document(UNIT, 1.0), &plain()).await, 1);
     assert_accepted(&stand.swap(UNIT, &document(UNIT, 2.0), &plain()).await, 2);
@@ -192,5 +194,42 @@ async fn without_a_state_folder_swaps_work_until_the_end() {
     stand.stop().await;
     let mut stand = Stand::start(settings).await;
     assert_eq!(stand.revisions(UNIT, 20).await, [0]);
+    stand.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_an_operator_wanted_of_a_unit_holds_after_a_restart() {
+    let folders = Folders::new();
+    let mut stand = Stand::start(folders.settings()).await;
+    let drift = "drift = { sigma_deg_per_h = 0.0035, correlation_time_h = 9.0, trend_sigma_deg_per_h2 = 0.00012, \
+                 trend_correlation_time_h = 48.0, initial_sigma_deg_per_h = 0.05, \
+                 angle_random_walk_deg_per_sqrt_h = 0.006 }\n";
+    let text = document(UNIT, 1.0).replace("name = \"x\"\n", &format!("name = \"x\"\n{drift}"));
+    assert_accepted(&stand.swap(UNIT, &text, &plain()).await, 1);
+    stand.revisions(UNIT, 20).await;
+    stand.revisions("OTHER", 20).await;
+    let rest = r#"{"command":"rest","latitude_deg":55,"heading_deg":30,"pitch_roll_deg":[0,0]}"#;
+    for command in [rest, r#"{"command":"standby"}"#] {
+        let reply = stand.command(UNIT, command).await;
+        assert!(reply.accepted, "{reply:?}");
+    }
+    // The audit file alone has to say it: as after kill -9, nothing else is written at the end.
+    stand.stop().await;
+
+    let mut stand = Stand::start(folders.settings()).await;
+    stand.send(UNIT, 20).await;
+    assert_eq!(stand.revisions("OTHER", 20).await, [0]);
+    while stand.service.totals().unit(&unit_id(UNIT)).ticks_in < 20 {
+        tokio::task::yield_now().await;
+    }
+    assert_eq!(stand.status(UNIT).state, State::Standby);
+    assert!(stand.command(UNIT, r#"{"command":"end-rest"}"#).await.accepted);
+    assert!(stand.command(UNIT, r#"{"command":"run"}"#).await.accepted);
+    stand.stop().await;
+
+    let settings =
+        Settings { unit: UnitSettings { in_standby: true, ..folders.settings().unit }, ..folders.settings() };
+    let mut stand = Stand::start(settings).await;
+    assert_eq!(stand.revisions(UNIT, 20).await, [1], "though units begin in standby");
     stand.stop().await;
 }
