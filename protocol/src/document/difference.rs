@@ -45,7 +45,7 @@ pub fn lost_sections(before: &Document, after: &Document) -> Vec<String> {
 
 fn lost_tables(path: &str, before: &Table, after: &Table, lost: &mut Vec<String>) {
     for (key, node) in before {
-        let path = super::reader::join(path, key);
+        let path = isotherm_document::join(path, key);
         let other = after.iter().find(|(name, _)| name == key).map(|(_, node)| node);
         match (node, other) {
             (Node::Table(old), _) if ABOUT.contains(&&*path) || is_curve(old) => {}
