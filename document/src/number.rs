@@ -1,7 +1,6 @@
 //! Numbers: what a value states, what a schema allows, and how both are said.
 
-use std::fmt;
-
+use isotherm_correction::stated::Shown;
 use serde_json::Value as Json;
 use toml::de::DeValue;
 
@@ -57,20 +56,6 @@ impl Limits {
             (None, false) => return format!("a finite number up to {HUGE:e} in magnitude"),
         };
         if huge && !high { format!("{limits}, up to {HUGE:e} in magnitude") } else { limits }
-    }
-}
-
-/// A number as people write it: no row of zeros.
-struct Shown(f64);
-
-impl fmt::Display for Shown {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self(value) = self;
-        if *value == 0.0 || (1e-8..1e15).contains(&value.abs()) {
-            write!(f, "{value}")
-        } else {
-            write!(f, "{value:e}")
-        }
     }
 }
 

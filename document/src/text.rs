@@ -20,11 +20,13 @@ const FIRST_PART: usize = 1 << 12;
 ///
 /// A text with more errors than are listed is not read to its end: a megabyte of broken TOML has a million of them. What was read
 /// of it up to there counts.
+#[must_use]
 pub fn parse_toml(text: &str) -> (Spanned<DeTable<'_>>, Vec<toml::de::Error>) {
     let mut length = FIRST_PART;
     while length < text.len() {
         // Within a line it would be an error of ours; one within an array of several lines is one of many.
-        let part = text.get(..text.floor_char_boundary(length)).and_then(|part| part.rsplit_once('\n'));
+        let end = (0..=length).rev().find(|end| text.is_char_boundary(*end)).unwrap_or_default();
+        let part = text.get(..end).and_then(|part| part.rsplit_once('\n'));
         if let Some((part, _)) = part {
             let (root, errors) = DeTable::parse_recoverable(part);
             if errors.len() > MAX_PROBLEMS {

@@ -115,11 +115,7 @@ impl<'r, 't, 's> Walk<'r, 't, 's> {
             },
             Kind::Forms(forms) => match value.get_ref().as_table() {
                 Some(entries) => Ok(self.forms(forms, path, value.span().start, entries)),
-                None => {
-                    let words: Vec<_> = forms.iter().flat_map(words).collect();
-                    let word = text(value, |text| words.contains(&text));
-                    word.ok_or_else(|| if words.is_empty() { "a table".to_owned() } else { format!("a table, or {}", one_of(&words)) })
-                }
+                None => word(forms, value),
             },
             Kind::Either(forms) => match forms.iter().find(|form| self.is_of_type(form, value)) {
                 Some(form) => Ok(self.value(form, path, value)),
@@ -368,6 +364,16 @@ impl<'r, 't, 's> Walk<'r, 't, 's> {
 
 fn properties(node: &Json) -> Option<&Map<String, Json>> {
     node.get("properties").and_then(Json::as_object)
+}
+
+/// A word that stands for a form without keys.
+fn word(forms: &[Json], value: &Value<'_>) -> Result<toml::Value, String> {
+    let words: Vec<_> = forms.iter().flat_map(words).collect();
+    let must_be = || match words.as_slice() {
+        [] => "a table".to_owned(),
+        words => format!("a table, or {}", one_of(words)),
+    };
+    text(value, |text| words.contains(&text)).ok_or_else(must_be)
 }
 
 /// Words that stand for a form without keys.

@@ -215,7 +215,7 @@ impl Intent {
             return;
         }
         // Older versions wrote the words alone.
-        let order = record.order.clone().or_else(|| match record.command.as_str() {
+        let order = record.order.clone().or(match record.command.as_str() {
             "standby" => Some(Order::Standby),
             "run" => Some(Order::Run { reversal: None }),
             "run with mode reversal" => Some(Order::Run { reversal: Some(true) }),

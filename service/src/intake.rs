@@ -171,7 +171,7 @@ impl Intake {
         for command in &plan.intent {
             match actor.command(command) {
                 Ok(state) => {
-                    tracing::info!(unit = %id, %state, "{} again, as before the restart", command.name())
+                    tracing::info!(unit = %id, %state, "{} again, as before the restart", command.name());
                 }
                 Err(refusal) => tracing::warn!(unit = %id, "as before the restart it cannot be: {refusal}"),
             }

@@ -298,7 +298,7 @@ fn a_pipe_in_the_place_of_a_file_is_told_and_not_waited_for() {
         assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
         match Store::open(folder.path()) {
             Err(error) => {
-                assert!(error.to_string().contains(name) && error.to_string().contains("pipe"), "{error}")
+                assert!(error.to_string().contains(name) && error.to_string().contains("pipe"), "{error}");
             }
             Ok((mut store, _)) => fill(&mut store, 2),
         }

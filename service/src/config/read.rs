@@ -80,12 +80,12 @@ fn existing(
     key: &str,
     path: Option<String>,
     folder: &Path,
-    test: fn(&Path) -> bool,
+    is_there: fn(&Path) -> bool,
     what: &str,
 ) -> Option<PathBuf> {
     let text = path?;
     let path = folder.join(&text);
-    if !test(&path) {
+    if !is_there(&path) {
         r.report(key, format!("is {text:?}, must be an existing {what}; looked for {}", path.display()));
     }
     Some(path)

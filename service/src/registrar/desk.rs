@@ -103,8 +103,9 @@ impl Desk {
 
     /// Hands a unit's notice over; gives it back where too much is waiting.
     pub(crate) fn notice(&self, unit: &UnitId, notice: Notice) -> Result<(), Notice> {
-        match self.0.tell(Request::Notice(unit.clone(), notice)) {
-            Err((Request::Notice(_, notice), Refused::Full)) => Err(notice),
+        let Err(not_taken) = self.0.tell(Request::Notice(unit.clone(), notice)) else { return Ok(()) };
+        match *not_taken {
+            (Request::Notice(_, notice), Refused::Full) => Err(notice),
             // Where the registrar has ended nobody wants it.
             _ => Ok(()),
         }
@@ -113,7 +114,8 @@ impl Desk {
     /// Hands a request over, or tells its asker why it is not taken.
     fn ask(&self, unit: Option<UnitId>, request: Request, bytes: usize) {
         let shown = unit.as_ref().map(ToString::to_string).unwrap_or_default();
-        let Err((request, why)) = self.0.push(unit, request, bytes) else { return };
+        let Err(not_taken) = self.0.push(unit, request, bytes) else { return };
+        let (request, why) = *not_taken;
         let why = match why {
             Refused::Full => "too many requests for this unit, or for all, are waiting",
             Refused::Ended => "the service is ending",

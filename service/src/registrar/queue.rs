@@ -45,16 +45,12 @@ pub(super) enum Refused {
     Ended,
 }
 
-/// What a wait has come to.
-#[derive(Debug)]
-pub(super) enum Taken {
-    /// The next request.
-    Request(Request),
-    /// Nothing was asked for.
-    Nothing,
-    /// Nothing waits any more, and nothing is to come.
-    Stop,
-}
+/// Nothing waits any more, and nothing is to come.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Stopped;
+
+/// A request that is not taken, and why.
+type NotTaken = Box<(Request, Refused)>;
 
 /// The lanes.
 #[derive(Debug, Default)]
@@ -86,12 +82,7 @@ impl Queue {
     }
 
     /// Takes a request of `bytes` bytes for a unit, or for several; gives it back with the reason where it is not taken.
-    pub(super) fn push(
-        &self,
-        unit: Option<UnitId>,
-        request: Request,
-        bytes: usize,
-    ) -> Result<(), (Request, Refused)> {
+    pub(super) fn push(&self, unit: Option<UnitId>, request: Request, bytes: usize) -> Result<(), NotTaken> {
         let mut state = self.lock();
         let lane = match unit {
             Some(unit) if state.known.contains(&unit) => Lane::Unit(unit),
@@ -99,10 +90,10 @@ impl Queue {
             None => Lane::Several,
         };
         if state.stopping || state.ended {
-            return Err((request, Refused::Ended));
+            return Err(Box::new((request, Refused::Ended)));
         }
         if !state.has_room(&lane, bytes) {
-            return Err((request, Refused::Full));
+            return Err(Box::new((request, Refused::Full)));
         }
         state.push(lane, request, bytes);
         self.changed.notify_all();
@@ -110,13 +101,13 @@ impl Queue {
     }
 
     /// Takes what the service itself has to tell; gives it back where there is no room.
-    pub(super) fn tell(&self, request: Request) -> Result<(), (Request, Refused)> {
+    pub(super) fn tell(&self, request: Request) -> Result<(), NotTaken> {
         let mut state = self.lock();
         if state.ended {
-            return Err((request, Refused::Ended));
+            return Err(Box::new((request, Refused::Ended)));
         }
         if !state.has_room(&Lane::Own, 0) {
-            return Err((request, Refused::Full));
+            return Err(Box::new((request, Refused::Full)));
         }
         state.push(Lane::Own, request, 0);
         self.changed.notify_all();
@@ -134,18 +125,18 @@ impl Queue {
         }
     }
 
-    /// The next request, of the lane whose turn it is; waits for one.
-    pub(super) fn take(&self, limit: Duration) -> Taken {
+    /// The next request, of the lane whose turn it is; waits for one, and gives `None` where nothing was asked for.
+    pub(super) fn take(&self, limit: Duration) -> Result<Option<Request>, Stopped> {
         let empty = |state: &mut State| state.lanes.is_empty() && !state.stopping;
         let waited = self.changed.wait_timeout_while(self.lock(), limit, empty);
         let (mut state, _) = waited.unwrap_or_else(PoisonError::into_inner);
         match state.pop() {
             Some(request) => {
                 self.changed.notify_all();
-                Taken::Request(request)
+                Ok(Some(request))
             }
-            None if state.stopping => Taken::Stop,
-            None => Taken::Nothing,
+            None if state.stopping => Err(Stopped),
+            None => Ok(None),
         }
     }
 
@@ -217,7 +208,7 @@ mod tests {
     /// Whose requests come out, in their order.
     fn served(queue: &Queue) -> Vec<String> {
         let mut order = Vec::new();
-        while let Taken::Request(Request::Notice(unit, _)) = queue.take(Duration::ZERO) {
+        while let Ok(Some(Request::Notice(unit, _))) = queue.take(Duration::ZERO) {
             order.push(unit.to_string());
         }
         order
@@ -253,7 +244,7 @@ mod tests {
         assert_eq!(queue.push(Some(unit("A")), request("A"), 0).unwrap_err().1, Refused::Ended);
         queue.tell(request("own")).unwrap();
         assert_eq!(served(&queue), ["own", "A"]);
-        assert!(matches!(queue.take(Duration::ZERO), Taken::Stop));
+        assert_eq!(queue.take(Duration::ZERO).unwrap_err(), Stopped);
         queue.end();
         queue.tell_in_turn(request("own"));
         assert!(queue.tell(request("own")).is_err());

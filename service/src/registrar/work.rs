@@ -13,7 +13,7 @@ use isotherm_protocol::key::UnitId;
 use super::board::Board;
 use super::desk::Request;
 use super::folder::Folder;
-use super::queue::{Queue, Taken};
+use super::queue::{Queue, Stopped};
 use super::record::Record;
 use super::refusals::Refusals;
 use super::swap::Judged;
@@ -89,9 +89,8 @@ impl Work {
         loop {
             queue.know(self.records.keys());
             let request = match queue.take(LOOK_INTERVAL) {
-                Taken::Stop => break,
-                Taken::Request(request) => Some(request),
-                Taken::Nothing => None,
+                Ok(request) => request,
+                Err(Stopped) => break,
             };
             // Unwind safety: what is kept is changed only after everything that could go wrong has gone well.
             let work = AssertUnwindSafe(|| {

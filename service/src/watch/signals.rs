@@ -18,6 +18,7 @@ struct State {
 
 /// What has been signalled since the last wait.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a signal of its own")]
 pub(super) struct Heard {
     /// Something has happened in the folder.
     pub(super) stirred: bool,

@@ -150,7 +150,7 @@ async fn a_repeated_fault_is_logged_once_and_the_table_counts_it() {
 async fn a_log_that_nobody_reads_costs_no_tick_and_does_not_hold_up_the_end() {
     // As much as a pipe takes: the first line of the log waits for a reader that never comes.
     let (unread, mut full) = std::io::pipe().unwrap();
-    full.write_all(&[b'.'; 65_536]).unwrap();
+    full.write_all(&vec![b'.'; 65_536]).unwrap();
     let served = Served::start_with(&["--json", "--log-level", "debug"], full.into());
     let session = served.session().await;
     let mut consumer = Consumer::declare(&session, None).await.unwrap();

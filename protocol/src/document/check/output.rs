@@ -59,7 +59,9 @@ pub(super) fn gyro(r: &mut Reader<'_>, path: &str, output: GyroOutput, sensor: &
 pub(super) fn accel(r: &mut Reader<'_>, path: &str, output: AccelOutput, sensor: &AccelSensor) {
     if r.is_damaged("accel.output") {
         // Nobody knows the units of these.
-        ["scale_factor", "bias", "lag"].iter().for_each(|key| r.damage(&join(path, key)));
+        for key in ["scale_factor", "bias", "lag"] {
+            r.damage(&join(path, key));
+        }
         return;
     }
     for (other, name, key, _) in ACCEL_OUTPUTS {

@@ -231,9 +231,9 @@ fn a_section_that_is_gone_is_named_and_a_term_is_none() {
         lost(&|it| (it.mode_reversal, it.self_test) = (None, None)),
         ["[mode_reversal]", "[self_test]"]
     );
-    let last = full.gyro.sensor.last().unwrap().name.clone();
+    let final_gyro = full.gyro.sensor.last().unwrap().name.clone();
     let gone = lost(&|it| drop(it.gyro.sensor.pop()));
-    assert_eq!(gone, [format!("[[gyro.sensor]] \"{last}\"")]);
+    assert_eq!(gone, [format!("[[gyro.sensor]] \"{final_gyro}\"")]);
     assert_eq!(lost(&|it| it.gyro.sensor[0].name = "renamed".to_owned()), [""; 0]);
     assert_eq!(lost(&|it| it.gyro.sensor[0].drift = None), ["[gyro.sensor.drift]"]);
     assert_eq!(lost(&|it| it.gyro.sensor[0].static_bias = None), [""; 0], "a curve");

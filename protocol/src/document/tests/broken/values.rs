@@ -190,7 +190,7 @@ pub(super) const CASES: [Case; 31] = [
         "angle_random_walk_deg_per_sqrt_h = 0.0",
         "sqrt_h = 0.0\n",
         "gyro.sensor[0].drift.angle_random_walk_deg_per_sqrt_h",
-        "is 0.0, must be a number from 0.00000001",
+        "is 0.0, must be a number from 1e-8",
     ),
     (
         "drift without its start",
