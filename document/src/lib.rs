@@ -38,6 +38,7 @@
 //! Lengths of texts count bytes.
 
 pub mod escape;
+mod kind;
 mod number;
 mod problem;
 mod reader;

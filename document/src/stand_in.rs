@@ -4,8 +4,8 @@ use serde_json::Value as Json;
 use toml::value::{Date, Datetime};
 use toml::{Table, Value};
 
+use crate::kind::{Kind, Schema};
 use crate::number::{Limits, whole_limits};
-use crate::walk::{Kind, Schema};
 
 /// A value that a schema allows.
 pub(crate) fn stand_in(schema: Schema<'_>, node: &Json) -> Value {

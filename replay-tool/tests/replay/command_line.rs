@@ -123,7 +123,7 @@ fn every_end_has_its_exit_code() {
 
     fs::write(path.join("bad.toml"), "version = 1\nfiles = 2\n").unwrap();
     let output = replay(path, &["play", "mems.csv", "-m", "bad.toml", "-u", "a"]);
-    check(&output, 78, "bad.toml:2:1: files = 2: unknown key");
+    check(&output, 78, "bad.toml:2:1: files: is not a known key: did you mean `file`?");
     check(&output, 78, "bad.toml:1:1: file: is missing");
     let bad = ["correct", "mems.csv", "-m", "mems.mapping.toml", "-c", "bad.toml"];
     check(&replay(path, &bad), 78, "bad.toml:");

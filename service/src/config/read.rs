@@ -86,7 +86,7 @@ fn existing(
     let text = path?;
     let path = folder.join(&text);
     if !is_there(&path) {
-        r.report(key, format!("is {text:?}, must be an existing {what}; looked for {}", path.display()));
+        r.refuse(key, format!("is {text:?}, must be an existing {what}; looked for {}", path.display()));
     }
     Some(path)
 }

@@ -197,7 +197,7 @@ fn all_problems_come_at_once_in_the_order_of_the_text() {
     assert_eq!(
         places,
         [
-            "service.toml:1:1 é",
+            "service.toml:1:1 \"é\"",
             "service.toml:2:13 max_units",
             "service.toml:4:10 zenoh.listen",
             "service.toml:6:9 navigation.ticks"
