@@ -40,7 +40,7 @@ impl Limits {
 
     /// What a number must be; the largest magnitude where it is beyond that.
     pub(crate) fn must_be(&self, value: Option<f64>) -> String {
-        let huge = value.is_some_and(|value| value.abs().is_nan() || value.abs() > HUGE);
+        let huge = value.is_some_and(|value| value.is_finite() && value.abs() > HUGE);
         let (low, high) = (self.low > -HUGE, self.high < HUGE);
         let limits = match (self.above, self.not_zero) {
             (Some(above), _) if high => {

@@ -9,7 +9,7 @@ use crate::check::CheckArgs;
 use crate::console::{self, CommandArgs, Console, HistoryArgs, RollbackArgs, StatusArgs, SwapArgs, TopArgs};
 use crate::demo::DemoArgs;
 use crate::exit::Exit;
-use crate::logging::{FinishLog, LogArgs};
+use crate::logging::{FinishLog, LogArgs, start_writer};
 use crate::signing::{KeygenArgs, SignArgs};
 use crate::words::{print, say};
 
@@ -102,7 +102,7 @@ pub struct ServeArgs {
 #[must_use]
 pub fn run() -> Exit {
     match Cli::parse().command {
-        Command::Serve(args) => logged(&args.log.clone(), crate::serve::run(args)),
+        Command::Serve(args) => unheld(&args.log.clone(), crate::serve::run(args)),
         Command::Status(args) => operate(Console::Status(args)),
         Command::Top(args) => operate(Console::Top(args)),
         Command::Swap(args) => operate(Console::Swap(args)),
@@ -112,7 +112,7 @@ pub fn run() -> Exit {
         Command::Check(args) => crate::check::run(&args),
         Command::Sign(args) => crate::signing::sign(&args),
         Command::Keygen(args) => crate::signing::keygen(&args),
-        Command::Demo(args) => logged(&LogArgs::quiet(), demo(args)),
+        Command::Demo(args) => unheld(&LogArgs::quiet(), demo(args)),
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), "isotherm", &mut script);
@@ -133,10 +133,19 @@ fn operate(console: Console) -> Exit {
     logged(&LogArgs::silent(), console::run(console))
 }
 
-/// Runs a command that logs and needs a runtime.
-fn logged(log: &LogArgs, command: impl Future<Output = Exit>) -> Exit {
+/// Runs a command that a blocked stderr must not hold up: what it says there goes through a queue.
+fn unheld(log: &LogArgs, command: impl Future<Output = Exit>) -> Exit {
     // However this ends, by a panic too.
     let _finish = FinishLog;
+    if let Err(error) = start_writer() {
+        say(format_args!("isotherm: cannot start the thread of the log: {error}"));
+        return Exit::Failed;
+    }
+    logged(log, command)
+}
+
+/// Runs a command that logs and needs a runtime.
+fn logged(log: &LogArgs, command: impl Future<Output = Exit>) -> Exit {
     if let Err(words) = log.start() {
         say(format_args!("isotherm: {words}"));
         return Exit::Usage;

@@ -47,11 +47,11 @@ impl Drop for FinishLog {
     }
 }
 
-/// Starts the thread that writes the queue.
+/// Has lines for standard error go through a queue, and starts the thread that writes it.
 ///
 /// # Errors
 /// Where the system gives no thread.
-fn start_writer() -> io::Result<()> {
+pub(crate) fn start_writer() -> io::Result<()> {
     if QUEUE.get().is_some() {
         return Ok(());
     }
@@ -139,7 +139,7 @@ impl LogArgs {
     /// Starts logging; a second start in one process changes nothing.
     ///
     /// # Errors
-    /// What is wrong with the filter, in words; or that the system gives no thread.
+    /// What is wrong with the filter, in words.
     pub fn start(&self) -> Result<(), String> {
         // Zenoh reports at "info" what concerns its developers; whoever names it in a filter gets it.
         let directives = if self.log_level.contains("zenoh") {
@@ -150,7 +150,6 @@ impl LogArgs {
         let filter = EnvFilter::try_new(directives).map_err(|error| {
             format!("log filter {:?} (--log-level, ISOTHERM_LOG): {error}", self.log_level)
         })?;
-        start_writer().map_err(|error| format!("cannot start the thread of the log: {error}"))?;
         let builder = tracing_subscriber::fmt()
             .with_env_filter(filter)
             .with_writer(|| Lines)

@@ -85,6 +85,9 @@ impl Life {
         let options = ProducerOptions { batch_ticks: 10, match_timeout: LIMIT, ..ProducerOptions::default() };
         let mut player = Player::declare(self.operator.session(), &scenario(unit, seed), options).await;
         player.play(30).await;
+        // It may have been in standby, for a pre-launch calibration: what an operator wanted last holds after a crash.
+        self.operator.command(unit, json!({"command": "run"})).await.unwrap();
+        player.play(30).await;
         let batch = loop {
             let batch =
                 tokio::time::timeout(LIMIT, self.consumer.next()).await.expect("the unit runs").unwrap();
