@@ -151,7 +151,7 @@ impl ServoMemory {
     /// Δt/2 and `f_i` is half the difference of their rates. The input rate cancels in it, also one beyond the
     /// dither's own; its acceleration r (counts/s²) does not, and comes from this tick and the last good one. Modelled
     /// form: `f_1` is taken the same way from the first tick that has half-period counts, and decays from that
-    /// tick's middle. Fitted form: see [`Decay`].
+    /// tick's middle. Fitted form: the exponential through all ticks since the switch, by least squares.
     pub fn apparent_rate(&mut self, sensor: usize, servo: &Servo, tick: &ServoTick) -> Transient {
         let middle = middle(tick.end_time, tick.duration);
         let mean_hz = tick.half_periods.map_or(f64::NAN, |counts| mean_hz(counts, tick.duration.as_s()));
