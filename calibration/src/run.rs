@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use isotherm_correction::sample::{CorrectedTick, GyroTick};
-use isotherm_correction::unit::{Unit, UnitSettings};
+use isotherm_correction::unit::{MAX_TICK_DURATION, Unit, UnitSettings};
 use isotherm_log::message::{Message, Topic};
 use isotherm_log::offline::{Loaded, Offline};
 use isotherm_log::part::{LogFiles, Part};
@@ -25,9 +25,6 @@ use crate::error::Error;
 use crate::robust::median;
 use crate::series::Series;
 use cut::Cut;
-
-/// Longest tick that the corrector takes (s).
-const LONGEST_TICK_S: f64 = 10.0;
 
 /// What one log has of one unit.
 #[derive(Debug, Clone)]
@@ -153,11 +150,12 @@ impl Run {
             Piece::Message(message) => series.take_message(message),
         })?;
         for (kind, ticks) in [("gyro", &series.gyros), ("accelerometer", &series.accels)] {
-            if median(&ticks.duration_s) > LONGEST_TICK_S {
+            let (usual_s, longest_s) = (median(&ticks.duration_s), MAX_TICK_DURATION.as_s());
+            if usual_s > longest_s {
                 return Err(Error::Refused(vec![format!(
-                    "{}: its {kind} ticks last {} s, at most {LONGEST_TICK_S} s can be corrected: log more often",
+                    "{}: its {kind} ticks last {} s, at most {longest_s} s can be corrected: log more often",
                     self.name,
-                    six(median(&ticks.duration_s))
+                    six(usual_s)
                 )]));
             }
         }

@@ -35,6 +35,7 @@ pub use at_rest::AtRest;
 pub use change::{At, Change};
 pub use correct::Applied;
 pub use counters::Counters;
+pub use gyro_intake::MAX_TICK_DURATION;
 use gyro_intake::{GyroIntake, Left};
 pub use health::SensorHealth;
 pub use operating::PreLaunchView;

@@ -1,6 +1,6 @@
 //! What a part of a schema asks for.
 
-use serde_json::Value as Json;
+use serde_json::{Map, Value as Json};
 
 /// A schema with its definitions.
 #[derive(Debug, Clone, Copy)]
@@ -71,4 +71,24 @@ impl<'s> Kind<'s> {
             _ => Self::Free,
         }
     }
+}
+
+/// Stated keys of a table.
+pub(crate) fn properties(node: &Json) -> Option<&Map<String, Json>> {
+    node.get("properties").and_then(Json::as_object)
+}
+
+/// The same, none where there are none.
+pub(crate) fn properties_of(node: &Json) -> impl Iterator<Item = (&String, &Json)> {
+    properties(node).into_iter().flatten()
+}
+
+/// The words of a list.
+pub(crate) fn texts(list: Option<&Json>) -> impl Iterator<Item = &str> {
+    list.and_then(Json::as_array).into_iter().flatten().filter_map(Json::as_str)
+}
+
+/// Fewest and most items of an array, where they are stated.
+pub(crate) fn counts(node: &Json) -> [Option<usize>; 2] {
+    ["minItems", "maxItems"].map(|key| usize::try_from(node.get(key)?.as_u64()?).ok())
 }

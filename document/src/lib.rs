@@ -52,3 +52,4 @@ pub use problem::{Problem, listed};
 pub use reader::{Reader, element, join, parse};
 pub use schema::{Form, published};
 pub use text::{MAX_BYTES, parse_toml, unplaced, utf8};
+pub use walk::is_complete;

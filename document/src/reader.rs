@@ -15,6 +15,7 @@ use toml::de::DeValue;
 
 use crate::problem::{Lines, Problem};
 use crate::schema::Form;
+use crate::text::unplaced;
 use crate::walk::Walk;
 
 /// Most problems that are listed; a document with more is not worth reading to its end.
@@ -162,15 +163,20 @@ impl<'t> Reader<'t> {
         let mut problems: Vec<_> = self.problems.into_iter().map(|(_, problem)| problem).collect();
         if self.unlisted > 0 {
             let message = format!("and {} more problems that are not listed", self.unlisted);
-            problems.push(Problem {
-                file: self.file.map(Into::into),
-                line: 1,
-                column: 1,
-                key: String::new(),
-                message,
-            });
+            problems.push(unplaced(self.file, message));
         }
         Some(problems)
+    }
+
+    /// What was read, where nothing is wrong with it.
+    ///
+    /// # Errors
+    /// Every problem, in the order of the text.
+    pub fn finish<T>(self, read: Option<T>) -> Result<T, Vec<Problem>> {
+        match (self.into_problems(), read) {
+            (None, Some(read)) => Ok(read),
+            (problems, _) => Err(problems.unwrap_or_default()),
+        }
     }
 
     /// Whether no further problem would be listed.
@@ -221,10 +227,7 @@ impl<'t> Reader<'t> {
 pub fn parse<T: JsonSchema + DeserializeOwned>(text: &str, file: &str) -> Result<T, Vec<Problem>> {
     let mut reader = Reader::new(text, Some(file));
     let read = reader.read(&Form::of::<T>());
-    match (reader.into_problems(), read) {
-        (None, Some(read)) => Ok(read),
-        (problems, _) => Err(problems.unwrap_or_default()),
-    }
+    reader.finish(read)
 }
 
 /// Path of an element of an array.

@@ -4,7 +4,7 @@ use serde_json::Value as Json;
 use toml::value::{Date, Datetime};
 use toml::{Table, Value};
 
-use crate::kind::{Kind, Schema};
+use crate::kind::{Kind, Schema, counts, properties, texts};
 use crate::number::{Limits, whole_limits};
 
 /// A value that a schema allows.
@@ -12,11 +12,8 @@ pub(crate) fn stand_in(schema: Schema<'_>, node: &Json) -> Value {
     let node = schema.resolve(node);
     match Kind::of(node) {
         Kind::Table => {
-            let required =
-                node.get("required").and_then(Json::as_array).into_iter().flatten().filter_map(Json::as_str);
-            let entry =
-                |key: &str| Some((key.to_owned(), stand_in(schema, node.get("properties")?.get(key)?)));
-            Value::Table(required.filter_map(entry).collect())
+            let entry = |key: &str| Some((key.to_owned(), stand_in(schema, properties(node)?.get(key)?)));
+            Value::Table(texts(node.get("required")).filter_map(entry).collect())
         }
         Kind::Forms(forms) => forms.first().map_or(Value::Table(Table::new()), |form| stand_in(schema, form)),
         Kind::Either(forms) => forms.first().map_or(Value::Boolean(false), |form| stand_in(schema, form)),
@@ -38,8 +35,7 @@ pub(crate) fn stand_in(schema: Schema<'_>, node: &Json) -> Value {
 
 /// A list of fixed length, cut or filled up.
 pub(crate) fn fill(schema: Schema<'_>, node: &Json, mut items: Vec<Value>) -> Vec<Value> {
-    let count = |key| node.get(key).and_then(Json::as_u64).and_then(|count| usize::try_from(count).ok());
-    if let (Some(low), Some(high)) = (count("minItems"), count("maxItems"))
+    if let [Some(low), Some(high)] = counts(node)
         && low == high
     {
         let item = node.get("items").map_or(Value::Boolean(false), |item| stand_in(schema, item));

@@ -3,12 +3,13 @@
 use std::cmp::Reverse;
 use std::collections::BTreeSet;
 
+use isotherm_correction::stated::Shown;
 use regex_lite::Regex;
-use serde_json::{Map, Value as Json, json};
+use serde_json::{Value as Json, json};
 use toml::de::{DeTable, DeValue};
 use toml::value::Datetime;
 
-use crate::kind::{Kind, Schema};
+use crate::kind::{Kind, Schema, counts, properties, properties_of, texts};
 use crate::number::{Limits, number, whole, whole_limits};
 use crate::reader::{Reader, Value, element, join};
 use crate::schema::Form;
@@ -130,8 +131,7 @@ impl<'r, 't, 's> Walk<'r, 't, 's> {
     /// What is said of a key that is missing.
     fn missing(&self, property: &'s Json, path: &str, keys: impl Iterator<Item = &'s str>) -> String {
         let property = self.schema.resolve(property);
-        let counts = ["minItems", "maxItems"].map(|key| property.get(key).and_then(Json::as_u64));
-        if let (true, [Some(low), Some(high)]) = (self.is_list_of_tables(property), counts) {
+        if let (true, [Some(low), Some(high)]) = (self.is_list_of_tables(property), counts(property)) {
             return format!("is missing: {} of {low} to {high}", header(path));
         }
         let mut names: Vec<_> = keys.map(|key| format!("`{key}`")).collect();
@@ -226,8 +226,8 @@ impl<'r, 't, 's> Walk<'r, 't, 's> {
                 self.is_list_of_tables(node).then(|| format!("an array of tables: {}", header(path)));
             return Err(tables.unwrap_or_else(|| "an array".to_owned()));
         };
-        let count = |key| node.get(key).and_then(Json::as_u64).and_then(|count| usize::try_from(count).ok());
-        let (low, high) = (count("minItems").unwrap_or(0), count("maxItems").unwrap_or(usize::MAX));
+        let [low, high] = counts(node);
+        let (low, high) = (low.unwrap_or(0), high.unwrap_or(usize::MAX));
         if !(low..=high).contains(&array.len()) {
             let must_have = match (low, high) {
                 (low, high) if low == high => low.to_string(),
@@ -255,8 +255,10 @@ impl<'r, 't, 's> Walk<'r, 't, 's> {
         let [low, high] =
             [pair.first(), pair.get(1)].map(|end| end.and_then(toml::Value::as_float).unwrap_or(0.0));
         if low >= high {
-            self.reader
-                .refuse(path, format!("runs from {low} to {high}: the first must be below the second"));
+            self.reader.refuse(
+                path,
+                format!("runs from {} to {}: the first must be below the second", Shown(low), Shown(high)),
+            );
         }
         if self.reader.is_damaged(path) { [0.0, 1.0].map(toml::Value::Float).to_vec() } else { pair }
     }
@@ -292,10 +294,6 @@ impl<'r, 't, 's> Walk<'r, 't, 's> {
     }
 }
 
-fn properties(node: &Json) -> Option<&Map<String, Json>> {
-    node.get("properties").and_then(Json::as_object)
-}
-
 /// A word that stands for a form without keys.
 fn word(forms: &[Json], value: &Value<'_>) -> Result<toml::Value, String> {
     let words: Vec<_> = forms.iter().flat_map(words).collect();
@@ -309,14 +307,6 @@ fn word(forms: &[Json], value: &Value<'_>) -> Result<toml::Value, String> {
 /// Words that stand for a form without keys.
 fn words(form: &Json) -> impl Iterator<Item = &str> {
     form.get("const").and_then(Json::as_str).into_iter().chain(texts(form.get("enum")))
-}
-
-fn properties_of(node: &Json) -> impl Iterator<Item = (&String, &Json)> {
-    properties(node).into_iter().flatten()
-}
-
-fn texts(list: Option<&Json>) -> impl Iterator<Item = &str> {
-    list.and_then(Json::as_array).into_iter().flatten().filter_map(Json::as_str)
 }
 
 fn one_of(names: &[&str]) -> String {
@@ -365,9 +355,14 @@ fn text_must_be(node: &Json) -> String {
     }
 }
 
+/// Whether it is a date, or a date and time with offset.
+#[must_use]
+pub fn is_complete(datetime: &Datetime) -> bool {
+    datetime.date.is_some() && datetime.time.is_some() == datetime.offset.is_some()
+}
+
 /// A date, or a date and time with offset.
 fn date(value: &Value<'_>) -> Option<Datetime> {
     let DeValue::Datetime(datetime) = value.get_ref() else { return None };
-    let complete = datetime.date.is_some() && datetime.time.is_some() == datetime.offset.is_some();
-    complete.then_some(*datetime)
+    is_complete(datetime).then_some(*datetime)
 }

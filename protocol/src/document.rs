@@ -99,7 +99,7 @@ impl Document {
     pub fn parse(text: &str, file: Option<&str>) -> Result<Parsed, Vec<Problem>> {
         let mut reader = Reader::new(text, file);
         let Some(mut document) = reader.read::<Self>(&FORM) else {
-            return Err(reader.into_problems().unwrap_or_default());
+            return reader.finish(None);
         };
         if let Some(origin) = &mut document.origin {
             origin.details = reader.free_table("origin.details");

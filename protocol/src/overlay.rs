@@ -74,20 +74,14 @@ impl Overlay {
     /// Every [`Problem`], in the order of the text.
     pub fn parse(text: &str, file: Option<&str>) -> Result<ParsedOverlay, Vec<Problem>> {
         let mut reader = Reader::new(text, file);
-        let Some(overlay) = reader.read::<Self>(&FORM) else {
-            return Err(reader.into_problems().unwrap_or_default());
-        };
-        check::check(&mut reader, &overlay);
-        let places = reader.positions();
-        match reader.into_problems() {
-            Some(problems) => Err(problems),
-            None => Ok(ParsedOverlay {
-                overlay,
-                digest: Digest::of(text.as_bytes()).0,
-                places,
-                file: file.map(Into::into),
-            }),
+        let overlay: Option<Self> = reader.read(&FORM);
+        if let Some(overlay) = &overlay {
+            check::check(&mut reader, overlay);
         }
+        let places = reader.positions();
+        let overlay = reader.finish(overlay)?;
+        let digest = Digest::of(text.as_bytes()).0;
+        Ok(ParsedOverlay { overlay, digest, places, file: file.map(Into::into) })
     }
 
     /// Writes the overlay as text that [`Overlay::parse`] reads back as an equal overlay.

@@ -103,10 +103,7 @@ impl Settings {
         let file = path.display().to_string();
         let mut reader = Reader::new(text, Some(&file));
         let settings = read::settings(&mut reader, path.parent().unwrap_or(Path::new("")));
-        match (reader.into_problems(), settings) {
-            (None, Some(settings)) => Ok(settings),
-            (problems, _) => Err(problems.unwrap_or_default()),
-        }
+        reader.finish(settings)
     }
 }
 

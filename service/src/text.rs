@@ -3,6 +3,7 @@
 use std::io::Read;
 use std::path::Path;
 
+use isotherm_document::unplaced;
 use isotherm_protocol::document::{MAX_DOCUMENT_BYTES, Problem};
 
 /// Reads a file up to one byte more than a document may have, so that a wrong file cannot fill the memory.
@@ -24,7 +25,7 @@ pub(crate) fn check_regular(file: &Path) -> std::io::Result<()> {
 
 /// A problem of a file as a whole.
 pub(crate) fn whole(file: &str, message: String) -> Problem {
-    Problem { file: Some(file.to_owned()), line: 1, column: 1, key: String::new(), message }
+    unplaced(Some(file), message)
 }
 
 /// What was read by [`read_bounded`], as text.

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use isotherm_correction::earth::Place;
+use isotherm_correction::reversal::MAX_TRANSITION_TICKS;
 
 use super::bar::Bar;
 use super::batch::{Batch, Named, Work};
@@ -45,7 +46,7 @@ pub(super) struct ModesArgs {
     #[arg(long, value_name = "ORDER", value_parser = clap::value_parser!(u8).range(0..=1))]
     meander_order: Option<u8>,
     /// Ticks that a switch loses, 1 to 32; found in the log without it
-    #[arg(long, value_name = "TICKS", value_parser = clap::value_parser!(u8).range(1..=32))]
+    #[arg(long, value_name = "TICKS", value_parser = clap::value_parser!(u8).range(1..=i64::from(MAX_TRANSITION_TICKS)))]
     transition_ticks: Option<u8>,
     /// Leave out this much behind every switch (s); without it, as long as the servo's transient lasts
     #[arg(long, value_name = "SECONDS")]

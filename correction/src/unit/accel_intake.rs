@@ -5,7 +5,7 @@ use alloc::collections::VecDeque;
 use serde::{Deserialize, Serialize};
 
 use super::counters::Counters;
-use super::gyro_intake::{LONGEST_KEPT, MAX_DURATION, is_possible};
+use super::gyro_intake::{LONGEST_KEPT, MAX_TICK_DURATION, is_possible};
 use crate::lanes::{Lanes, of_readings};
 use crate::sample::{AccelTick, GyroTick, OutputKind};
 use crate::units::{Span, Timestamp};
@@ -144,7 +144,7 @@ impl AccelIntake {
             return;
         }
         let near = |tick: &PendingAccel| {
-            tick.end_time + MAX_DURATION > end_time && tick.end_time < end_time + MAX_DURATION
+            tick.end_time + MAX_TICK_DURATION > end_time && tick.end_time < end_time + MAX_TICK_DURATION
         };
         let before = self.pending.len();
         self.pending.retain(near);

@@ -17,7 +17,7 @@ const MAX_PENDING: usize = 8192;
 /// Longest queue whose room is kept once it is empty, in ticks: what a burst has needed beyond it goes.
 pub(super) const LONGEST_KEPT: usize = 256;
 /// Longest tick (10 s).
-pub(super) const MAX_DURATION: Span = Span::from_ns(10_000_000_000);
+pub const MAX_TICK_DURATION: Span = Span::from_ns(10_000_000_000);
 /// A step of time larger than this, and than twice the ticks it claims to span, is not believed at once (1 h).
 const MAX_STEP: Span = Span::from_ns(3_600_000_000_000);
 /// So many consistent ticks in a row make a jump of sequence or time believed.
@@ -340,7 +340,7 @@ impl GyroIntake {
 
 /// Whether a tick can have lasted so long.
 pub(super) fn is_possible(duration: Span) -> bool {
-    (1..=MAX_DURATION.as_ns()).contains(&duration.as_ns())
+    (1..=MAX_TICK_DURATION.as_ns()).contains(&duration.as_ns())
 }
 
 /// Whether a later sequence number and its time fit the newest tick.

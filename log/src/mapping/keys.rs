@@ -58,7 +58,7 @@ pub(super) struct FileKeys {
     /// The gyros.
     pub(super) gyro: Option<GyroKeys>,
     /// The accelerometers.
-    pub(super) accel: Option<AccelKeys>,
+    pub(super) accel: Option<TickKeys<AccelUnit>>,
     /// Temperature channels.
     #[serde(default)]
     pub(super) temperature: Vec<TemperatureKeys>,
@@ -115,15 +115,15 @@ pub(super) enum DurationRule {
     Nominal,
 }
 
-/// The gyros of a file.
+/// The sensors of one kind.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields)]
-pub(super) struct GyroKeys {
+pub(super) struct TickKeys<U> {
     /// What the readings stand for.
     pub(super) output: Output,
-    /// One to eight gyros, in the order of the calibration document.
+    /// One to eight sensors, in the order of the calibration document.
     #[schemars(length(min = 1, max = 8))]
-    pub(super) sensors: Vec<SensorKeys<GyroUnit>>,
+    pub(super) sensors: Vec<SensorKeys<U>>,
     /// Column of sequence numbers.
     pub(super) sequence_column: Option<Column>,
     /// Column of durations.
@@ -133,6 +133,14 @@ pub(super) struct GyroKeys {
     /// A row whose cells of these sensors are all empty has no tick of them.
     #[serde(default)]
     pub(super) may_be_empty: bool,
+}
+
+/// The gyros of a file.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub(super) struct GyroKeys {
+    #[serde(flatten)]
+    pub(super) ticks: TickKeys<GyroUnit>,
     /// Lasing mode.
     pub(super) mode: Option<ModeMapping>,
     /// Switch commands.
@@ -141,26 +149,6 @@ pub(super) struct GyroKeys {
     pub(super) meander: Option<ModeMapping>,
     /// Half-period counts, one pair per gyro.
     pub(super) half_periods: Option<Vec<HalfPeriodKeys>>,
-}
-
-/// The accelerometers of a file.
-#[derive(Debug, Deserialize, JsonSchema)]
-#[schemars(deny_unknown_fields)]
-pub(super) struct AccelKeys {
-    /// What the readings stand for.
-    pub(super) output: Output,
-    /// One to eight accelerometers, in the order of the calibration document.
-    #[schemars(length(min = 1, max = 8))]
-    pub(super) sensors: Vec<SensorKeys<AccelUnit>>,
-    /// Column of sequence numbers.
-    pub(super) sequence_column: Option<Column>,
-    /// Column of durations.
-    pub(super) duration_column: Option<Column>,
-    /// Its unit.
-    pub(super) duration_unit: Option<TimeUnit>,
-    /// A row whose cells of these sensors are all empty has no tick of them.
-    #[serde(default)]
-    pub(super) may_be_empty: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]

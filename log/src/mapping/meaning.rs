@@ -8,8 +8,8 @@ use isotherm_correction::units::{Angle, AngularRate, Span, SpecificForce};
 use isotherm_document::{Form, Problem, Reader, element, join};
 
 use super::keys::{
-    AccelKeys, AccelUnit, DecimalMark, DurationRule, FileKeys, GyroKeys, GyroUnit, MappingKeys, SensorKeys,
-    SwitchKeys, TemperatureKeys, TemperatureUnit, TimeKeys,
+    AccelUnit, DecimalMark, DurationRule, FileKeys, GyroKeys, GyroUnit, MappingKeys, SensorKeys, SwitchKeys,
+    TemperatureKeys, TemperatureUnit, TickKeys, TimeKeys,
 };
 use super::{
     Column, Conversion, Delimiter, FileMapping, GyroMapping, Layout, Mapping, Marks, ModeMapping,
@@ -26,10 +26,7 @@ const LONGEST_TICK_NS: f64 = 3.6e12;
 pub(super) fn parse(text: &str, file: &str) -> Result<Mapping, Vec<Problem>> {
     let mut reader = Reader::new(text, Some(file));
     let mapping = reader.read(&FORM).map(|keys| mapping(&mut reader, keys));
-    match (reader.into_problems(), mapping) {
-        (None, Some(mapping)) => Ok(mapping),
-        (problems, _) => Err(problems.unwrap_or_default()),
-    }
+    reader.finish(mapping)
 }
 
 fn mapping(r: &mut Reader<'_>, keys: MappingKeys) -> Mapping {
@@ -66,14 +63,14 @@ fn file(r: &mut Reader<'_>, path: &str, keys: FileKeys) -> FileMapping {
         let what = "is missing: the file must have a [file.gyro], a [file.accel] or a [[file.temperature]]";
         r.report(&join(path, "gyro"), what);
     }
-    let own_durations = keys.gyro.as_ref().is_none_or(|gyro| gyro.duration_column.is_some())
+    let own_durations = keys.gyro.as_ref().is_none_or(|gyro| gyro.ticks.duration_column.is_some())
         && keys.accel.as_ref().is_none_or(|accel| accel.duration_column.is_some());
     let file = FileMapping {
         name,
         layout,
         time: time(r, &join(path, "time"), keys.time, own_durations),
         gyro: keys.gyro.map(|keys| gyro(r, &join(path, "gyro"), keys)),
-        accel: keys.accel.map(|keys| accel(r, &join(path, "accel"), keys)),
+        accel: keys.accel.map(|keys| ticks(r, &join(path, "accel"), keys)),
         temperatures: keys.temperature.into_iter().map(temperature).collect(),
     };
     if let Some(name) = file.columns().find_map(Column::name).filter(|_| !header) {
@@ -147,9 +144,9 @@ fn nominal(r: &mut Reader<'_>, path: &str, keys: &TimeKeys) -> Option<Span> {
 
 fn gyro(r: &mut Reader<'_>, path: &str, keys: GyroKeys) -> GyroMapping {
     if let Some(halves) = &keys.half_periods
-        && halves.len() != keys.sensors.len()
+        && halves.len() != keys.ticks.sensors.len()
     {
-        let (pairs, sensors) = (halves.len(), keys.sensors.len());
+        let (pairs, sensors) = (halves.len(), keys.ticks.sensors.len());
         let message = format!("has {pairs} pairs, must have one for each of the {sensors} sensors");
         r.report(&join(path, "half_periods"), message);
     }
@@ -163,16 +160,8 @@ fn gyro(r: &mut Reader<'_>, path: &str, keys: GyroKeys) -> GyroMapping {
         }
         mode
     });
-    let output = keys.output.into();
-    let duration = duration(r, path, keys.duration_column, keys.duration_unit);
     GyroMapping {
-        ticks: TickMapping {
-            output,
-            sensors: sensors(r, path, output, keys.sensors),
-            sequence: keys.sequence_column,
-            duration,
-            may_be_empty: keys.may_be_empty,
-        },
+        ticks: ticks(r, path, keys.ticks),
         mode,
         switch,
         meander,
@@ -185,7 +174,7 @@ fn gyro(r: &mut Reader<'_>, path: &str, keys: GyroKeys) -> GyroMapping {
     }
 }
 
-fn accel(r: &mut Reader<'_>, path: &str, keys: AccelKeys) -> TickMapping {
+fn ticks<U: SensorUnit>(r: &mut Reader<'_>, path: &str, keys: TickKeys<U>) -> TickMapping {
     let output = keys.output.into();
     TickMapping {
         output,

@@ -73,10 +73,10 @@ struct State {
 
 impl Queue {
     /// Has these units have a lane of their own; the others share one.
-    pub(super) fn know<'u>(&self, units: impl ExactSizeIterator<Item = &'u UnitId>) {
+    pub(super) fn know<'u>(&self, units: impl Iterator<Item = &'u UnitId> + Clone) {
         let mut state = self.lock();
-        // They come one by one, and few go.
-        if state.known.len() != units.len() {
+        // Mostly nothing has changed.
+        if !state.known.iter().eq(units.clone()) {
             state.known = units.cloned().collect();
         }
     }
@@ -89,27 +89,32 @@ impl Queue {
             Some(_) => Lane::Strangers,
             None => Lane::Several,
         };
-        if state.stopping || state.ended {
+        let closed = state.stopping || state.ended;
+        self.enter(&mut state, closed, lane, request, bytes)
+    }
+
+    /// Takes what the service itself has to tell; gives it back where there is no room.
+    pub(super) fn tell(&self, request: Request) -> Result<(), NotTaken> {
+        let mut state = self.lock();
+        let closed = state.ended;
+        self.enter(&mut state, closed, Lane::Own, request, 0)
+    }
+
+    fn enter(
+        &self,
+        state: &mut State,
+        closed: bool,
+        lane: Lane,
+        request: Request,
+        bytes: usize,
+    ) -> Result<(), NotTaken> {
+        if closed {
             return Err(Box::new((request, Refused::Ended)));
         }
         if !state.has_room(&lane, bytes) {
             return Err(Box::new((request, Refused::Full)));
         }
         state.push(lane, request, bytes);
-        self.changed.notify_all();
-        Ok(())
-    }
-
-    /// Takes what the service itself has to tell; gives it back where there is no room.
-    pub(super) fn tell(&self, request: Request) -> Result<(), NotTaken> {
-        let mut state = self.lock();
-        if state.ended {
-            return Err(Box::new((request, Refused::Ended)));
-        }
-        if !state.has_room(&Lane::Own, 0) {
-            return Err(Box::new((request, Refused::Full)));
-        }
-        state.push(Lane::Own, request, 0);
         self.changed.notify_all();
         Ok(())
     }

@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt;
 
+use isotherm_document::is_complete;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 use toml::value::Datetime;
@@ -112,8 +113,7 @@ impl Created {
     /// Accepts a date, or a date and time with offset.
     #[must_use]
     pub fn new(datetime: Datetime) -> Option<Self> {
-        let complete = datetime.date.is_some() && datetime.time.is_some() == datetime.offset.is_some();
-        complete.then_some(Self(datetime))
+        is_complete(&datetime).then_some(Self(datetime))
     }
 
     /// The date and time.
