@@ -24,7 +24,8 @@ use serde::{Deserialize, Serialize};
 pub use check::MAX_SELF_TEST_READINGS;
 pub use defect::{Defect, DefectKind, Section};
 pub use parts::{
-    AccelParts, BranchArgument, BranchedParts, CalibrationParts, GyroParts, LagParts, TrendParts,
+    AccelParts, BranchArgument, BranchedParts, CalibrationParts, CoefficientParts, GyroParts, TermParts,
+    TrendParts,
 };
 pub use steady::{Jump, Steady};
 
@@ -35,7 +36,7 @@ use crate::operation::SelfTestParts;
 use crate::orientation::Orientation;
 use crate::reversal::Reversal;
 use crate::sample::OutputKind;
-use crate::thermal::{AccelModel, GyroModel, Trends};
+use crate::thermal::{AccelModel, GyroModel, Motion, Trends};
 
 /// A validated coefficient set; immutable, shared by pointer.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -58,6 +59,8 @@ pub struct Calibration {
     /// Input limits, a lane for each sensor; infinite where there is none, so that what is not read is never beyond.
     pub(crate) gyro_limits: Lanes,
     pub(crate) accel_limits: Lanes,
+    /// `None` where nothing follows the unit's motion.
+    pub(crate) motion: Option<Box<Motion>>,
     /// `None` where no gyro has a trend.
     pub(crate) trends: Option<Box<Trends>>,
     /// The longest time that a gyro's perimeter servo takes to settle (s); `None` where no gyro has one.

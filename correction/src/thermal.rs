@@ -7,11 +7,15 @@ mod accel;
 mod bank;
 mod gyro;
 mod lag;
+mod motion;
 mod ramp;
+mod terms;
 
 pub use accel::AccelModel;
-pub(crate) use bank::{Bank, Paces, Shares};
+pub(crate) use bank::{Bank, MotionBanks, Paces, Shares};
 pub use gyro::{GyroModel, GyroTerms, TrendModel};
 pub(crate) use gyro::{TermError, Trends};
 pub use lag::MAX_LAGS;
+pub(crate) use motion::{Motion, MotionTerms};
 pub(crate) use ramp::{Pace, Ramp};
+pub use terms::{ACCEL_TERMS, Feature, GYRO_TERMS, Term};

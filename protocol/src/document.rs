@@ -28,6 +28,7 @@ mod defects;
 mod difference;
 mod measure;
 mod nominal;
+mod terms;
 #[cfg(test)]
 mod tests;
 mod types;
@@ -43,15 +44,15 @@ use sha2::{Digest, Sha256};
 
 pub use correction_change::{Side, correction_change};
 pub use curve::{
-    Curve, Frequency, LagGain, OutputBias, Quantity, RateBias, Relative, ScaleFactor, Shape,
-    ThermalAcceleration, ThermalRate,
+    Curve, CurveForm, DriftByForce, Frequency, LagGain, OutputBias, Quantity, RateBias, Relative,
+    RelativeOverRate, ScaleFactor, SecondOrder, Shape, ThermalAcceleration, ThermalRate,
 };
 pub use difference::{difference, lost_sections};
 pub use measure::{Argument, Unit};
 pub use types::{
-    Accel, AccelLag, AccelOrientation, AccelOutput, AccelParity, AccelSensor, Branches, Channel, Created,
-    Document, Drift, Filter, FitWindow, Gyro, GyroOrientation, GyroOutput, GyroParity, GyroSensor, Lag, Log,
-    Measure, ModeReversal, Orientation, OrientationThermal, Origin, Residual, Sample, SelfTest,
+    Accel, AccelLag, AccelOrientation, AccelOutput, AccelParity, AccelSensor, AlongAxes, Branches, Channel,
+    Created, Document, Drift, Filter, FitWindow, Gyro, GyroOrientation, GyroOutput, GyroParity, GyroSensor,
+    Lag, Log, Measure, ModeReversal, Orientation, OrientationThermal, Origin, Residual, Sample, SelfTest,
     SelfTestCounter, SelfTestVoltage, Servo, ServoKind, Temperature, Trend,
 };
 

@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use isotherm_correction::calibration::{AccelParts, Calibration, CalibrationParts, GyroParts};
+use isotherm_correction::calibration::{
+    AccelParts, BranchedParts, Calibration, CalibrationParts, GyroParts, TermParts,
+};
 use isotherm_correction::channel::{ChannelParts, ThermalFilterParts};
 use isotherm_correction::curve::CurveParts;
 use isotherm_correction::drift::DriftParts;
@@ -10,6 +12,7 @@ use isotherm_correction::operation::SelfTestParts;
 use isotherm_correction::orientation::OrientationParts;
 use isotherm_correction::reversal::ReversalParts;
 use isotherm_correction::sample::{ChannelName, OutputKind};
+pub use isotherm_correction::thermal::Feature;
 
 /// A constant over −60…100 °C.
 #[must_use]
@@ -23,20 +26,42 @@ pub fn polynomial(coefficients: &[f64]) -> CurveParts {
     CurveParts::Polynomial { reference: 20.0, coefficients: coefficients.to_vec(), range: [-60.0, 100.0] }
 }
 
+/// Terms of a sensor that a test puts there, each in the place of what there was of its feature.
+pub trait PutTerms {
+    /// A coefficient over temperature.
+    fn curve(&mut self, feature: Feature, coefficient: CurveParts);
+    /// A coefficient by thermal branch.
+    fn branched(&mut self, feature: Feature, coefficient: BranchedParts);
+    /// All lags: time constant (s) and gain of each.
+    fn lags(&mut self, lags: impl IntoIterator<Item = (f64, CurveParts)>);
+}
+
+impl PutTerms for Vec<TermParts> {
+    fn curve(&mut self, feature: Feature, coefficient: CurveParts) {
+        self.retain(|term| term.feature != feature);
+        self.push(TermParts::new(feature, coefficient));
+    }
+
+    fn branched(&mut self, feature: Feature, coefficient: BranchedParts) {
+        self.retain(|term| term.feature != feature);
+        self.push(TermParts::branched(feature, coefficient));
+    }
+
+    fn lags(&mut self, lags: impl IntoIterator<Item = (f64, CurveParts)>) {
+        self.retain(|term| term.feature != Feature::Lag);
+        self.extend(lags.into_iter().map(|(time_constant_s, gain)| TermParts::lag(time_constant_s, gain)));
+    }
+}
+
 /// A gyro with mean output (rad/s) that is right as it stands.
 #[must_use]
 pub fn plain_gyro() -> GyroParts {
     GyroParts {
         channel: Some(0),
         increment_weight: 1.0,
-        increment_weight_error: None,
         input_limit: 1e6,
-        static_bias: None,
-        magnetic_bias: None,
-        slow_meander: None,
-        thermal_rate: None,
-        thermal_acceleration: None,
-        lags: Vec::new(),
+        terms: Vec::new(),
+        increment_weight_over_rate: None,
         trend: None,
         servo: None,
         drift: None,
@@ -50,9 +75,9 @@ pub fn plain_accel() -> AccelParts {
         channel: Some(0),
         board_channel: None,
         scale_factor: constant(1.0),
-        bias: None,
-        lags: Vec::new(),
+        terms: Vec::new(),
         board_ratio: None,
+        position_m: [0.0; 3],
         input_limit: 1e6,
     }
 }
@@ -123,7 +148,7 @@ pub fn mode_reversed(reversal: ReversalParts) -> CalibrationParts {
     parts.accel_orientation_channels.clear();
     parts.reversal = Some(reversal);
     for (i, gyro) in parts.gyros.iter_mut().enumerate() {
-        gyro.magnetic_bias = Some(constant(MAGNETIC_BIAS_RAD_PER_S * [1.0, -0.5, 2.0][i]));
+        gyro.terms.curve(Feature::LasingMode, constant(MAGNETIC_BIAS_RAD_PER_S * [1.0, -0.5, 2.0][i]));
     }
     parts
 }

@@ -2,8 +2,10 @@
 
 use std::sync::Arc;
 
-use crate::calibrations::{compile, constant, identity, lively_drift, orientation, polynomial};
-use isotherm_correction::calibration::{BranchArgument, BranchedParts, Calibration, LagParts};
+use crate::calibrations::{
+    Feature, PutTerms, compile, constant, identity, lively_drift, orientation, polynomial,
+};
+use isotherm_correction::calibration::{BranchArgument, BranchedParts, Calibration};
 use isotherm_correction::earth::Place;
 use isotherm_correction::navigation::NavigationStep;
 use isotherm_correction::operation::{Command, State};
@@ -51,16 +53,15 @@ pub fn skewed(tweak: f64) -> Arc<Calibration> {
     };
     parts.gyros = vec![parts.gyros[0].clone(); 6];
     for (i, gyro) in (0..6).zip(&mut parts.gyros) {
-        gyro.static_bias = Some(polynomial(&[1e-4 * (1.0 + tweak), 1e-5 * f64::from(i)]));
+        gyro.terms.curve(Feature::One, polynomial(&[1e-4 * (1.0 + tweak), 1e-5 * f64::from(i)]));
         let branched = BranchedParts {
             argument: BranchArgument::Temperature,
             run_up: constant(1e-4),
             braking: constant(2e-4),
         };
-        gyro.thermal_rate = Some(branched.clone());
-        gyro.thermal_acceleration = Some(branched);
-        gyro.lags =
-            [2.0, 7.0].map(|time_constant_s| LagParts { time_constant_s, gain: constant(1e-4) }).into();
+        gyro.terms.branched(Feature::ThermalRate, branched.clone());
+        gyro.terms.branched(Feature::ThermalAcceleration, branched);
+        gyro.terms.lags([2.0, 7.0].map(|time_constant_s| (time_constant_s, constant(1e-4))));
         gyro.drift = Some(lively_drift());
     }
     compile(&parts)

@@ -2,7 +2,7 @@
 
 #![expect(clippy::expect_used, reason = "what does not hold ends the test")]
 
-use isotherm_correction::calibration::{BranchArgument, BranchedParts, LagParts};
+use isotherm_correction::calibration::{BranchArgument, BranchedParts};
 use isotherm_correction::drift::Reference;
 use isotherm_correction::earth::Place;
 use isotherm_correction::navigation::NavigationStep;
@@ -12,7 +12,9 @@ use isotherm_correction::reversal::ReversalParts;
 use isotherm_correction::sample::{GyroTick, LasingMode, OutputKind};
 use isotherm_correction::unit::{Event, Unit, UnitSettings};
 use isotherm_correction::units::Span;
-use isotherm_tests::calibrations::{channel, compile, constant, identity, lively_drift, polynomial};
+use isotherm_tests::calibrations::{
+    Feature, PutTerms, channel, compile, constant, identity, lively_drift, polynomial,
+};
 use isotherm_tests::streams::{accel, end_of, gyro, temperature};
 
 #[global_allocator]
@@ -58,11 +60,11 @@ fn blocks_of_a_hundred_thousand_ticks(watched: Watched) -> (u64, u64) {
             run_up: constant(1e-4),
             braking: constant(2e-4),
         };
-        gyro.static_bias = Some(polynomial(&[1e-4, 1e-5]));
-        gyro.magnetic_bias = Some(constant(1e-5));
-        gyro.thermal_rate = Some(branched.clone());
-        gyro.thermal_acceleration = Some(branched);
-        gyro.lags = vec![LagParts { time_constant_s: 30.0, gain: constant(1e-5) }];
+        gyro.terms.curve(Feature::One, polynomial(&[1e-4, 1e-5]));
+        gyro.terms.curve(Feature::LasingMode, constant(1e-5));
+        gyro.terms.branched(Feature::ThermalRate, branched.clone());
+        gyro.terms.branched(Feature::ThermalAcceleration, branched);
+        gyro.terms.lags([(30.0, constant(1e-5))]);
         gyro.drift = matches!(watched, Watched::AtRest).then(lively_drift);
     }
     let settings = UnitSettings {

@@ -11,21 +11,6 @@ use toml::{Table, Value};
 use crate::drift::figures::{six, superscript};
 use crate::error::Error;
 
-/// Units that a key may end with.
-const UNITS: [Unit; 11] = [
-    Unit::DegPerH,
-    Unit::DegPerHPerDegCPerS,
-    Unit::DegPerHPerDegCPerS2,
-    Unit::Ppm,
-    Unit::Hz,
-    Unit::CountsPerSPerMPerS2,
-    Unit::VPerMPerS2,
-    Unit::MPerS2PerMPerS2,
-    Unit::CountsPerS,
-    Unit::V,
-    Unit::MPerS2,
-];
-
 /// One curve of one sensor, in the document's units.
 #[derive(Debug, Clone)]
 pub struct Term {
@@ -115,10 +100,11 @@ fn term((kind, sensor): (&'static str, &str), name: &str, table: &Table) -> Opti
     let argument_of = |suffix: &str| match suffix {
         _ if suffix.ends_with(Argument::DegCPerS2.suffix()) => Argument::DegCPerS2,
         _ if suffix.ends_with(Argument::DegCPerS.suffix()) => Argument::DegCPerS,
+        _ if suffix.ends_with(Argument::DegPerS.suffix()) => Argument::DegPerS,
         _ => Argument::DegC,
     };
     let symbol = |suffix: &str| {
-        let known = UNITS.into_iter().find(|unit| unit.suffix() == suffix);
+        let known = Unit::ALL.into_iter().find(|unit| unit.suffix() == suffix);
         known.map_or_else(|| suffix.replace("_per_", "/").replace('_', " "), |unit| unit.symbol().to_owned())
     };
     let (unit, argument, range, words, parts);
@@ -179,6 +165,7 @@ fn polynomial(coefficients: &[f64], reference: f64, argument: Argument) -> Strin
         Argument::DegC => "T",
         Argument::DegCPerS => "Ṫ",
         Argument::DegCPerS2 => "T̈",
+        Argument::DegPerS => "ω",
     };
     let of = if reference == 0.0 {
         symbol.to_owned()

@@ -16,7 +16,7 @@ use crate::lanes::Lanes;
 use crate::reversal::{Reversal, ReversalError};
 use crate::sample::{MAX_SENSORS, MIN_SENSORS};
 use crate::servo::Servo;
-use crate::thermal::Trends;
+use crate::thermal::{Motion, MotionTerms, Trends};
 
 use checker::{Checker, HUGE};
 pub use self_test::MAX_SELF_TEST_READINGS;
@@ -35,6 +35,13 @@ pub(super) fn compile(parts: &CalibrationParts) -> Result<Calibration, Vec<Defec
     let gyros = parts.gyros.iter().enumerate();
     let models: Vec<_> =
         gyros.clone().filter_map(|(i, gyro)| gyro_model(checker, i, gyro, &filter, parts)).collect();
+    let gyros_in_motion: Vec<_> = gyros
+        .clone()
+        .filter_map(|(i, gyro)| {
+            let checker = checker.at(Section::Gyro(i));
+            MotionTerms::of_gyro(gyro, &filter, &mut |key, error| checker.push(key, error))
+        })
+        .collect();
     let drifts = gyros.map(|(i, gyro)| {
         let drift = gyro.drift.as_ref().map(DriftModel::new)?;
         checker.at(Section::Gyro(i)).compiled(drift, |error| error.name)
@@ -51,6 +58,13 @@ pub(super) fn compile(parts: &CalibrationParts) -> Result<Calibration, Vec<Defec
         checker.at(Section::Accels).count("sensors", parts.accels.len(), MIN_SENSORS, MAX_SENSORS);
     }
     let accels = parts.accels.iter().enumerate();
+    let accels_in_motion: Vec<_> = accels
+        .clone()
+        .filter_map(|(i, accel)| {
+            let checker = checker.at(Section::Accel(i));
+            MotionTerms::of_accel(accel, &filter, &mut |key, error| checker.push(key, error))
+        })
+        .collect();
     let accels: Vec<_> =
         accels.filter_map(|(i, accel)| accel_model(checker, i, accel, &filter, parts)).collect();
     checker.at(Section::AccelOrientation);
@@ -72,6 +86,11 @@ pub(super) fn compile(parts: &CalibrationParts) -> Result<Calibration, Vec<Defec
             gyro_output: parts.gyro_output,
             gyro_limits: limits(models.iter().map(|gyro| gyro.input_limit)),
             accel_limits: limits(accels.iter().map(|accel| accel.input_limit)),
+            motion: Motion::of(
+                gyros_in_motion,
+                accels_in_motion,
+                parts.accels.iter().map(|accel| accel.position_m),
+            ),
             trends: Trends::of(&models).map(Box::new),
             servos_settle_s: servos.map(Servo::settle_time_s).reduce(f64::max),
             gyros: models,

@@ -12,6 +12,7 @@ use crate::orientation::OrientationParts;
 use crate::reversal::ReversalParts;
 use crate::sample::OutputKind;
 use crate::servo::ServoParts;
+use crate::thermal::Feature;
 
 /// All parts of one unit's calibration.
 #[derive(Debug, Clone, PartialEq)]
@@ -50,22 +51,12 @@ pub struct GyroParts {
     /// `K_0`: angle that one count stands for (rad per count), or dimensionless (rad per rad) for a mean-rate output;
     /// the raw reading is multiplied by it. Non-zero; negative where the input axis is mounted reversed.
     pub increment_weight: f64,
-    /// `κ(T) = K(T)/K_0 − 1` over temperature (dimensionless over °C).
-    pub increment_weight_error: Option<CurveParts>,
     /// Readings of this magnitude and above are flagged overrange (counts per tick, or rad/s).
     pub input_limit: f64,
-    /// Non-magnetic (static) bias over temperature (rad/s over °C).
-    pub static_bias: Option<CurveParts>,
-    /// Magnetic bias over temperature, entering with the sign of the lasing mode (rad/s over °C).
-    pub magnetic_bias: Option<CurveParts>,
-    /// Slow-meander term over temperature (rad/s over °C).
-    pub slow_meander: Option<CurveParts>,
-    /// K1±: thermal-rate term, rad/s per °C/s.
-    pub thermal_rate: Option<BranchedParts>,
-    /// K2±: thermal-acceleration term, rad/s per °C/s².
-    pub thermal_acceleration: Option<BranchedParts>,
-    /// Thermal lags; at most [`crate::thermal::MAX_LAGS`].
-    pub lags: Vec<LagParts>,
+    /// Terms over temperature: see [`GYRO_TERMS`](crate::thermal::GYRO_TERMS).
+    pub terms: Vec<TermParts>,
+    /// `K(ω)/K(T) − 1` over the rate ω that the gyro reads (dimensionless over rad/s).
+    pub increment_weight_over_rate: Option<CurveParts>,
     /// Trend since turn-on.
     pub trend: Option<TrendParts>,
     /// Perimeter-servo transient after a mode switch.
@@ -94,13 +85,48 @@ pub struct BranchedParts {
     pub braking: CurveParts,
 }
 
-/// One thermal lag (models §2, §8) of a gyro's or an accelerometer's bias: `g(T)·(T − L_τ[T])/τ`.
+/// A coefficient of a term.
 #[derive(Debug, Clone, PartialEq)]
-pub struct LagParts {
-    /// τ (s), at least the filter's grid step.
+pub enum CoefficientParts {
+    /// Over the sensor's temperature (°C).
+    Curve(CurveParts),
+    /// By thermal branch.
+    Branched(BranchedParts),
+}
+
+/// One term of a sensor (models §2, §3).
+///
+/// The unit of a gyro's coefficients is rad/s per unit of the [`Feature`], of an accelerometer's output units per unit of it; where
+/// the feature is what the sensor reads, or its magnitude, they are dimensionless, and s²/m where it is the square of a force.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TermParts {
+    /// What the coefficient is multiplied by. Only [`Feature::Lag`] may stand more than once, at most [`crate::thermal::MAX_LAGS`]
+    /// times.
+    pub feature: Feature,
+    /// τ of a lag (s), at least the filter's grid step; no other feature looks at it.
     pub time_constant_s: f64,
-    /// g over temperature (a gyro's: rad/s per °C/s, that is rad/°C; an accelerometer's: output units per °C/s).
-    pub gain: CurveParts,
+    /// The coefficient.
+    pub coefficient: CoefficientParts,
+}
+
+impl TermParts {
+    /// A term with a coefficient over temperature.
+    #[must_use]
+    pub fn new(feature: Feature, coefficient: CurveParts) -> Self {
+        Self { feature, time_constant_s: 0.0, coefficient: CoefficientParts::Curve(coefficient) }
+    }
+
+    /// A term with a coefficient by thermal branch.
+    #[must_use]
+    pub fn branched(feature: Feature, coefficient: BranchedParts) -> Self {
+        Self { feature, time_constant_s: 0.0, coefficient: CoefficientParts::Branched(coefficient) }
+    }
+
+    /// A thermal lag `g(T)·(T − L_τ[T])/τ` (models §2, §8); τ in s.
+    #[must_use]
+    pub fn lag(time_constant_s: f64, gain: CurveParts) -> Self {
+        Self { time_constant_s, ..Self::new(Feature::Lag, gain) }
+    }
 }
 
 /// Polynomial of the time since turn-on, held constant outside its interval.
@@ -121,12 +147,12 @@ pub struct AccelParts {
     pub board_channel: Option<usize>,
     /// K over temperature: output per m/s² (V, counts/s or m/s² per m/s²); divides. Never zero over its range.
     pub scale_factor: CurveParts,
-    /// S over temperature, in output units (V, counts/s or m/s²).
-    pub bias: Option<CurveParts>,
-    /// Thermal lags of the bias, their gains in output units per °C/s; at most [`crate::thermal::MAX_LAGS`].
-    pub lags: Vec<LagParts>,
+    /// Terms over temperature: see [`ACCEL_TERMS`](crate::thermal::ACCEL_TERMS).
+    pub terms: Vec<TermParts>,
     /// r over the board's temperature (dimensionless); 1 at the calibration temperature.
     pub board_ratio: Option<CurveParts>,
+    /// Where it sits, from the point whose specific force is published, in case axes (m).
+    pub position_m: [f64; 3],
     /// Outputs of this magnitude and above are flagged overrange (counts per tick, or output units).
     pub input_limit: f64,
 }

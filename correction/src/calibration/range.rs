@@ -2,7 +2,7 @@
 
 use super::Calibration;
 use crate::curve::Curve;
-use crate::thermal::{AccelModel, GyroModel};
+use crate::thermal::AccelModel;
 
 /// A range that reaches further on both sides is that of a constant, which was fitted to no temperature at all (°C).
 const NO_TEMPERATURE_DEG_C: f64 = 1e6;
@@ -18,9 +18,12 @@ impl Calibration {
         let gyros = self.gyros.iter().filter(|gyro| gyro.channel == Some(channel));
         let accels = self.accels.iter().filter(|accel| accel.channel == Some(channel));
         let boards = self.accels.iter().filter(|accel| accel.board_channel == Some(channel));
-        let curves = (gyros.flat_map(GyroModel::curves_over_temperature))
+        let in_motion = self.motion.iter().flat_map(|motion| motion.gyros.iter().chain(&motion.accels));
+        let in_motion = in_motion.filter(|sensor| sensor.channel == Some(channel));
+        let curves = (gyros.flat_map(|gyro| gyro.terms.curves_over_temperature()))
             .chain(accels.flat_map(AccelModel::curves_over_temperature))
-            .chain(boards.map(|accel| &accel.board_ratio));
+            .chain(boards.map(|accel| &accel.board_ratio))
+            .chain(in_motion.flat_map(|sensor| sensor.terms.curves_over_temperature()));
         let axes = [
             (Some(&self.gyro_orientation), &self.gyro_orientation_channels),
             (self.accel_orientation.as_ref(), &self.accel_orientation_channels),

@@ -7,7 +7,7 @@ use crate::channel::ThermalState;
 use crate::earth::EARTH_RATE;
 use crate::orientation::{Inverse, Orientation, SensorMask};
 use crate::sample::{ChannelName, LasingMode, OutputKind, Sensors};
-use crate::thermal::TrendModel;
+use crate::thermal::{Motion, MotionTerms, TrendModel};
 use crate::units::STANDARD_GRAVITY_M_PER_S2;
 
 /// What a calibration does to a unit that has been on for long and whose temperatures move steadily.
@@ -24,6 +24,10 @@ pub struct Steady {
     pub gyro_axes: Sensors<[f64; 3]>,
     /// `C⁺·Ω`: the rate that the biases take away, in case axes (rad/s).
     pub gyro_rate_in_case: [f64; 3],
+    /// Drift of each gyro by the specific force along each case axis (rad/s per m/s²); subtracted. No part of `gyro_bias`.
+    pub gyro_drift_by_force: Sensors<[f64; 3]>,
+    /// K2: second-order term of each accelerometer (s²/m). No part of `accel_bias`.
+    pub accel_second_order: Sensors<f64>,
     /// `S·r/K`: bias of each accelerometer as a specific force (m/s²); subtracted.
     pub accel_bias: Sensors<f64>,
     /// `K/r`: output of each accelerometer per specific force, its board included (V, counts/s or m/s² per m/s²);
@@ -89,6 +93,13 @@ impl Calibration {
             (bias / scale, scale)
         });
         let (accel_bias, accel_scale): (Sensors<_>, Sensors<_>) = accels.unzip();
+        let in_motion = |sensors: fn(&Motion) -> &Vec<MotionTerms>| {
+            let sensors = self.motion.as_deref().map_or(&[][..], |motion| sensors(motion));
+            let lines = move |sensor: &MotionTerms| sensor.at(&state(sensor.channel), &self.filter);
+            sensors.iter().map(lines).collect::<Sensors<[f64; 4]>>()
+        };
+        let gyros_in_motion = in_motion(|motion| &motion.gyros);
+        let accels_in_motion = in_motion(|motion| &motion.accels);
         let gyro_temperature = mean(&self.gyro_orientation_channels);
         let accel_temperature = mean(&self.accel_orientation_channels);
         let accel_orientation = self.accel_orientation.as_ref();
@@ -108,6 +119,8 @@ impl Calibration {
             accel_force_in_case: in_case(&accel_inverse, &accel_bias),
             outside: outside.map(|(channel, _)| channel).collect(),
             outputs: (self.gyro_output, self.accel_output),
+            gyro_drift_by_force: gyros_in_motion.iter().map(|[x, y, z, _]| [*x, *y, *z]).collect(),
+            accel_second_order: accels_in_motion.iter().map(|[square, ..]| *square).collect(),
             gyro_bias,
             gyro_weight,
             accel_bias,
@@ -130,20 +143,26 @@ impl Steady {
             return None;
         }
         let gyro_ratios = next.gyro_weight.iter().zip(&self.gyro_weight).map(|(new, old)| new / old);
-        let angular_rate = step(
+        let gyro_ratios = gyro_ratios.collect::<Sensors<f64>>();
+        let gyro_inverse = next.gyro_inverse.as_ref()?;
+        let mut angular_rate = step(
             (&self.gyro_axes, &self.gyro_bias),
-            (next.gyro_inverse.as_ref()?, &next.gyro_bias),
-            &gyro_ratios.collect::<Sensors<f64>>(),
+            (gyro_inverse, &next.gyro_bias),
+            &gyro_ratios,
             EARTH_RATE.as_rad_per_s(),
         );
+        let drifts = (&self.gyro_drift_by_force[..], &next.gyro_drift_by_force[..]);
+        widen(&mut angular_rate, by_force(gyro_inverse, &gyro_ratios, drifts));
         let accel_ratios = self.accel_scale.iter().zip(&next.accel_scale).map(|(old, new)| old / new);
         let specific_force = match &next.accel_inverse {
-            Some(inverse) => step(
-                (&self.accel_axes, &self.accel_bias),
-                (inverse, &next.accel_bias),
-                &accel_ratios.collect::<Sensors<f64>>(),
-                STANDARD_GRAVITY_M_PER_S2,
-            ),
+            Some(inverse) => {
+                let ratios = accel_ratios.collect::<Sensors<f64>>();
+                let (axes, next_bias) = ((&self.accel_axes[..], &self.accel_bias[..]), &next.accel_bias);
+                let mut step = step(axes, (inverse, next_bias), &ratios, STANDARD_GRAVITY_M_PER_S2);
+                let squares = (&self.accel_second_order[..], &next.accel_second_order[..]);
+                widen(&mut step, by_square(inverse, ratios.len(), squares));
+                step
+            }
             None if next.accel_bias.is_empty() => [0.0; 3],
             None => return None,
         };
@@ -175,6 +194,36 @@ fn step(
         *step += libm::copysign(libm::sqrt(square) * size, *step);
     }
     step
+}
+
+/// Makes a step larger in its own direction.
+fn widen(step: &mut [f64; 3], by: [f64; 3]) {
+    step.iter_mut().zip(by).for_each(|(step, by)| *step += libm::copysign(by, *step));
+}
+
+/// Most that the difference of two sets of drifts with force does at 1 g, whatever its direction (rad/s).
+fn by_force(inverse: &Inverse, ratios: &[f64], (old, new): (&[[f64; 3]], &[[f64; 3]])) -> [f64; 3] {
+    let columns = [0, 1, 2].map(|axis| {
+        let along = |drifts: &[[f64; 3]], gyro: usize| drifts.get(gyro).map_or(0.0, |drift| drift[axis]);
+        let steps = ratios.iter().enumerate().map(|(i, ratio)| ratio * along(old, i) - along(new, i));
+        inverse.apply(&steps.collect::<Sensors<f64>>())
+    });
+    [0, 1, 2].map(|axis| {
+        let square: f64 = columns.iter().map(|column| column[axis] * column[axis]).sum();
+        libm::sqrt(square) * STANDARD_GRAVITY_M_PER_S2
+    })
+}
+
+/// Most that the difference of two sets of second-order terms does at 1 g along every input axis (m/s²).
+fn by_square(inverse: &Inverse, sensors: usize, (old, new): (&[f64], &[f64])) -> [f64; 3] {
+    let mut most = [0.0; 3];
+    for sensor in 0..sensors {
+        let of = |terms: &[f64]| terms.get(sensor).copied().unwrap_or_default();
+        let step = (of(old) - of(new)) * STANDARD_GRAVITY_M_PER_S2 * STANDARD_GRAVITY_M_PER_S2;
+        let alone: Sensors<f64> = (0..sensors).map(|i| if i == sensor { step } else { 0.0 }).collect();
+        most.iter_mut().zip(inverse.apply(&alone)).for_each(|(most, step)| *most += step.abs());
+    }
+    most
 }
 
 /// C⁺ of all sensors.

@@ -12,6 +12,7 @@ use crate::operation::{SelfTestCounter, SelfTestVoltage};
 use crate::orientation::OrientationParts;
 use crate::reversal::ReversalParts;
 use crate::sample::{AccelTick, ChannelName, CorrectedTick, GyroTick, LasingMode, TemperatureReading};
+use crate::thermal::Feature;
 use crate::unit::{Event, Unit, UnitSettings};
 use crate::units::{AngularRate, STANDARD_GRAVITY_M_PER_S2, Span, Timestamp};
 
@@ -52,18 +53,26 @@ fn parts() -> CalibrationParts {
     let gyro = |c0: f64| GyroParts {
         channel: Some(0),
         increment_weight: 1.001,
-        increment_weight_error: Some(polynomial(&[0.0, 2e-6], [-40.0, 70.0])),
         input_limit: 10.0,
-        static_bias: Some(polynomial(&[deg_per_h(c0), deg_per_h(0.02)], [-50.0, 60.0])),
-        magnetic_bias: Some(polynomial(&[deg_per_h(3.0), deg_per_h(0.01)], [-45.0, 80.0])),
-        slow_meander: Some(polynomial(&[deg_per_h(0.1)], [-60.0, 90.0])),
-        thermal_rate: Some(BranchedParts {
-            argument: BranchArgument::Derivative,
-            run_up: polynomial(&[deg_per_h(100.0)], [-1.0, 1.0]),
-            braking: polynomial(&[deg_per_h(80.0)], [-1.0, 1.0]),
-        }),
-        thermal_acceleration: None,
-        lags: vec![LagParts { time_constant_s: 30.0, gain: polynomial(&[deg_per_h(40.0)], [-60.0, 90.0]) }],
+        terms: vec![
+            TermParts::new(Feature::Reading, polynomial(&[0.0, 2e-6], [-40.0, 70.0])),
+            TermParts::new(Feature::One, polynomial(&[deg_per_h(c0), deg_per_h(0.02)], [-50.0, 60.0])),
+            TermParts::new(
+                Feature::LasingMode,
+                polynomial(&[deg_per_h(3.0), deg_per_h(0.01)], [-45.0, 80.0]),
+            ),
+            TermParts::new(Feature::Meander, polynomial(&[deg_per_h(0.1)], [-60.0, 90.0])),
+            TermParts::branched(
+                Feature::ThermalRate,
+                BranchedParts {
+                    argument: BranchArgument::Derivative,
+                    run_up: polynomial(&[deg_per_h(100.0)], [-1.0, 1.0]),
+                    braking: polynomial(&[deg_per_h(80.0)], [-1.0, 1.0]),
+                },
+            ),
+            TermParts::lag(30.0, polynomial(&[deg_per_h(40.0)], [-60.0, 90.0])),
+        ],
+        increment_weight_over_rate: None,
         trend: Some(TrendParts { coefficients: vec![deg_per_h(0.5), 1e-10], interval_s: [0.0, 10.0] }),
         servo: None,
         drift: None,
@@ -72,9 +81,9 @@ fn parts() -> CalibrationParts {
         channel: Some(1),
         board_channel: Some(2),
         scale_factor: polynomial(&[2.0, 1e-4], [-40.0, 65.0]),
-        bias: Some(polynomial(&[bias, 1e-4], [-35.0, 70.0])),
-        lags: Vec::new(),
+        terms: vec![TermParts::new(Feature::One, polynomial(&[bias, 1e-4], [-35.0, 70.0]))],
         board_ratio: Some(polynomial(&[1.0, 2e-5], [-30.0, 85.0])),
+        position_m: [0.0; 3],
         input_limit: 1e3,
     };
     CalibrationParts {
@@ -186,10 +195,10 @@ fn a_jump_bounds_the_step_of_the_output_at_every_attitude_and_is_met_at_one() {
     let before = parts();
     let mut after = before.clone();
     after.gyros[0].increment_weight *= 1.0 + 3e-3;
-    after.gyros[1].static_bias = Some(polynomial(&[deg_per_h(-1.99)], [-50.0, 60.0]));
+    after.gyros[1].terms[1] = TermParts::new(Feature::One, polynomial(&[deg_per_h(-1.99)], [-50.0, 60.0]));
     after.gyro_orientation.rows[2] = [0.0, 1e-3, 0.999_999_5];
     after.accels[0].scale_factor = polynomial(&[2.004, 1e-4], [-40.0, 65.0]);
-    after.accels[2].bias = Some(polynomial(&[0.0101, 1e-4], [-35.0, 70.0]));
+    after.accels[2].terms[0] = TermParts::new(Feature::One, polynomial(&[0.0101, 1e-4], [-35.0, 70.0]));
     let (before, after) = (compile(&before), compile(&after));
     let (_, states) = settled(&before, [0.0; 3], [0.0; 3], 0.0);
     let (old, new) = (steady(&before, &states), steady(&after, &states));
@@ -271,15 +280,10 @@ fn the_range_of_a_channel_is_what_all_its_curves_have_in_common() {
     let mut constant = parts();
     for gyro in &mut constant.gyros {
         *gyro = GyroParts {
-            static_bias: Some(CurveParts::Polynomial {
-                reference: 0.0,
-                coefficients: vec![1e-6],
-                range: [-1e9, 1e9],
-            }),
-            increment_weight_error: None,
-            magnetic_bias: None,
-            slow_meander: None,
-            lags: Vec::new(),
+            terms: vec![TermParts::new(
+                Feature::One,
+                CurveParts::Polynomial { reference: 0.0, coefficients: vec![1e-6], range: [-1e9, 1e9] },
+            )],
             ..gyro.clone()
         };
     }

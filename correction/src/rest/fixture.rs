@@ -30,14 +30,9 @@ pub(crate) fn calibration(output: OutputKind, count: f64, accels: bool) -> Calib
     let gyro = GyroParts {
         channel: None,
         increment_weight: count,
-        increment_weight_error: None,
         input_limit: 1e6,
-        static_bias: None,
-        magnetic_bias: None,
-        slow_meander: None,
-        thermal_rate: None,
-        thermal_acceleration: None,
-        lags: Vec::new(),
+        terms: Vec::new(),
+        increment_weight_over_rate: None,
         trend: None,
         servo: None,
         drift: None,
@@ -50,9 +45,9 @@ pub(crate) fn calibration(output: OutputKind, count: f64, accels: bool) -> Calib
             coefficients: vec![1.0 / count],
             range: [-40.0, 80.0],
         },
-        bias: None,
-        lags: Vec::new(),
+        terms: Vec::new(),
         board_ratio: None,
+        position_m: [0.0; 3],
         input_limit: 1e9,
     };
     let parts = CalibrationParts {

@@ -1,11 +1,10 @@
 //! An accelerometer's terms (models §3): `f = (U − S(T) − Σ g(T)·(T − L_τ[T])/τ)·r(T_board)/K(T)`.
 
-use alloc::vec::Vec;
-
 use serde::{Deserialize, Serialize};
 
 use super::bank::Follows;
 use super::lag::{Lag, MAX_LAGS, settled};
+use super::terms::{ACCEL_TERMS, Terms};
 use crate::calibration::AccelParts;
 use crate::channel::{ThermalFilter, ThermalState};
 use crate::curve::{Curve, CurveError, CurveParts};
@@ -16,8 +15,8 @@ pub struct AccelModel {
     pub(crate) channel: Option<usize>,
     pub(crate) board_channel: Option<usize>,
     pub(crate) scale_factor: Curve,
-    pub(crate) bias: Curve,
-    pub(crate) lags: Vec<Lag>,
+    /// Of the bias.
+    pub(crate) terms: Terms,
     pub(crate) board_ratio: Curve,
     pub(crate) input_limit: f64,
 }
@@ -38,18 +37,13 @@ impl AccelModel {
             }
         };
         let scale_factor = curve("scale_factor", Some(&parts.scale_factor), 1.0);
-        let bias = curve("bias", parts.bias.as_ref(), 0.0);
         let board_ratio = curve("board_ratio", parts.board_ratio.as_ref(), 1.0);
-        let mut lags = Vec::with_capacity(parts.lags.len());
-        for lag in &parts.lags {
-            lags.push(Lag::new(lag.time_constant_s, curve("lags", Some(&lag.gain), 0.0)?, filter));
-        }
+        let terms = Terms::new(&ACCEL_TERMS, &parts.terms, false, filter, report);
         Some(Self {
             channel: parts.channel,
             board_channel: parts.board_channel,
             scale_factor: scale_factor?,
-            bias: bias?,
-            lags,
+            terms: terms?,
             board_ratio: board_ratio?,
             input_limit: parts.input_limit,
         })
@@ -57,14 +51,14 @@ impl AccelModel {
 
     /// S (output units) and K on a ramp that has lasted for long, so that every lag has settled on it.
     pub(crate) fn steady(&self, thermal: &ThermalState, filter: &ThermalFilter) -> (f64, f64) {
-        let lagged = settled(&self.lags, thermal, filter);
+        let lagged = settled(self.terms.lags(), thermal, filter);
         let ([bias, _], _) = Follows::<2>::terms(self, thermal, &lagged, filter);
         (bias, self.scale_factor.at(thermal.temperature).value)
     }
 
     /// Every curve over the sensor's own temperature.
     pub(crate) fn curves_over_temperature(&self) -> impl Iterator<Item = &Curve> {
-        [&self.scale_factor, &self.bias].into_iter().chain(self.lags.iter().map(|lag| &lag.gain))
+        core::iter::once(&self.scale_factor).chain(self.terms.curves_over_temperature())
     }
 }
 
@@ -75,20 +69,18 @@ impl Follows<2> for AccelModel {
     }
 
     fn lags(&self) -> &[Lag] {
-        &self.lags
+        self.terms.lags()
     }
 
-    fn terms(&self, thermal: &ThermalState, lagged: &[f64; MAX_LAGS], _: &ThermalFilter) -> ([f64; 2], bool) {
-        let temperature = thermal.temperature;
-        let (bias, scale_factor) = (self.bias.at(temperature), self.scale_factor.at(temperature));
-        let mut sum = bias.value;
-        let mut clamped = bias.clamped || scale_factor.clamped;
-        for (lag, lagged) in self.lags.iter().zip(lagged) {
-            let gain = lag.gain.at(temperature);
-            sum += gain.value * (temperature - lagged) * lag.per_second;
-            clamped |= gain.clamped;
-        }
-        ([sum, 1.0 / scale_factor.value], clamped)
+    fn terms(
+        &self,
+        thermal: &ThermalState,
+        lagged: &[f64; MAX_LAGS],
+        filter: &ThermalFilter,
+    ) -> ([f64; 2], bool) {
+        let ([_, bias], clamped) = self.terms.lines(thermal, lagged, filter);
+        let scale_factor = self.scale_factor.at(thermal.temperature);
+        ([bias, 1.0 / scale_factor.value], clamped || scale_factor.clamped)
     }
 }
 

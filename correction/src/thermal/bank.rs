@@ -117,6 +117,13 @@ pub(crate) struct Bank<const T: usize> {
     lagged: Vec<[f64; MAX_LAGS]>,
 }
 
+/// What of a unit's terms follows motion: force along the case axes and asymmetry of the gyros, squares of the accelerometers.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(crate) struct MotionBanks {
+    pub(crate) gyros: Bank<4>,
+    pub(crate) accels: Bank<1>,
+}
+
 impl<const T: usize> Bank<T> {
     /// Starts with the terms as they are at the assumed temperature.
     pub(crate) fn new<S: Follows<T>>(sensors: &[S], filter: &ThermalFilter, paces: &mut Paces) -> Self {
@@ -229,7 +236,8 @@ impl<const T: usize> Bank<T> {
     }
 
     /// The terms so far along, term by term.
-    #[inline]
+    #[expect(clippy::inline_always, reason = "once per tick: lanes that stay in registers")]
+    #[inline(always)]
     pub(crate) fn at<const N: usize>(&self, shares: &Shares) -> [[f64; N]; T] {
         let share = match shares {
             Shares::Together(share) => [*share; N],

@@ -1,7 +1,5 @@
 //! A gyro's terms (models §2): θ = K(T)·P − Ω·Δt with Ω a sum of named terms.
 
-use alloc::boxed::Box;
-use alloc::vec::Vec;
 use core::array;
 
 use arrayvec::ArrayVec;
@@ -9,9 +7,10 @@ use serde::{Deserialize, Serialize};
 
 use super::bank::Follows;
 use super::lag::{Lag, MAX_LAGS, settled};
-use crate::calibration::{BranchArgument, GyroParts};
+use super::terms::{GYRO_TERMS, Terms};
+use crate::calibration::GyroParts;
 use crate::channel::{ThermalFilter, ThermalState};
-use crate::curve::{Curve, CurveError};
+use crate::curve::CurveError;
 use crate::lanes::Lanes;
 use crate::sample::MAX_SENSORS;
 use crate::servo::{Servo, ServoError};
@@ -21,15 +20,8 @@ use crate::servo::{Servo, ServoError};
 pub struct GyroModel {
     pub(crate) channel: Option<usize>,
     pub(crate) increment_weight: f64,
-    pub(crate) increment_weight_error: Curve,
     pub(crate) input_limit: f64,
-    pub(crate) static_bias: Curve,
-    // What few gyros have, in room of its own.
-    pub(crate) magnetic_bias: Option<Box<Curve>>,
-    pub(crate) slow_meander: Option<Box<Curve>>,
-    pub(crate) thermal_rate: Option<Box<Branched>>,
-    pub(crate) thermal_acceleration: Option<Box<Branched>>,
-    pub(crate) lags: Vec<Lag>,
+    pub(crate) terms: Terms,
     pub(crate) trend: Option<TrendModel>,
     pub(crate) servo: Option<Servo>,
 }
@@ -47,39 +39,10 @@ impl GyroModel {
         filter: &ThermalFilter,
         report: &mut dyn FnMut(&'static str, TermError),
     ) -> Option<Self> {
+        let terms = Terms::new(&GYRO_TERMS, &parts.terms, false, filter, &mut |key, error| {
+            report(key, TermError::Curve(error));
+        });
         let mut sound = true;
-        let mut curve = |field, parts: Option<&crate::curve::CurveParts>| match parts.map(Curve::new) {
-            None => None,
-            Some(Ok(curve)) => Some(curve),
-            Some(Err(error)) => {
-                sound = false;
-                report(field, TermError::Curve(error));
-                None
-            }
-        };
-        let increment_weight_error = curve("increment_weight_error", parts.increment_weight_error.as_ref());
-        let static_bias = curve("static_bias", parts.static_bias.as_ref());
-        let magnetic_bias = curve("magnetic_bias", parts.magnetic_bias.as_ref());
-        let slow_meander = curve("slow_meander", parts.slow_meander.as_ref());
-        let mut branched = |run_up, braking, parts: Option<&crate::calibration::BranchedParts>| {
-            let parts = parts?;
-            let (run_up, braking) =
-                (curve(run_up, Some(&parts.run_up)), curve(braking, Some(&parts.braking)));
-            Some(Box::new(Branched { argument: parts.argument, run_up: run_up?, braking: braking? }))
-        };
-        let thermal_rate =
-            branched("thermal_rate.run_up", "thermal_rate.braking", parts.thermal_rate.as_ref());
-        let thermal_acceleration = branched(
-            "thermal_acceleration.run_up",
-            "thermal_acceleration.braking",
-            parts.thermal_acceleration.as_ref(),
-        );
-        let mut lags = Vec::with_capacity(parts.lags.len());
-        for lag in &parts.lags {
-            lags.extend(
-                curve("lags", Some(&lag.gain)).map(|gain| Lag::new(lag.time_constant_s, gain, filter)),
-            );
-        }
         let servo = match parts.servo.as_ref().map(Servo::new) {
             None => None,
             Some(Ok(servo)) => Some(servo),
@@ -91,17 +54,12 @@ impl GyroModel {
                 None
             }
         };
-        sound.then(|| Self {
+        let terms = terms.filter(|_| sound)?;
+        Some(Self {
             channel: parts.channel,
             increment_weight: parts.increment_weight,
-            increment_weight_error: increment_weight_error.unwrap_or_else(|| Curve::constant(0.0)),
             input_limit: parts.input_limit,
-            static_bias: static_bias.unwrap_or_else(|| Curve::constant(0.0)),
-            magnetic_bias: magnetic_bias.map(Box::new),
-            slow_meander: slow_meander.map(Box::new),
-            thermal_rate,
-            thermal_acceleration,
-            lags,
+            terms,
             trend: parts.trend.as_ref().map(|trend| TrendModel {
                 coefficients: trend.coefficients.iter().copied().take(3).collect(),
                 interval_s: trend.interval_s,
@@ -114,50 +72,9 @@ impl GyroModel {
 impl GyroModel {
     /// The terms on a ramp that has lasted for long, so that every lag has settled on it.
     pub(crate) fn steady(&self, thermal: &ThermalState, filter: &ThermalFilter) -> GyroTerms {
-        let lagged = settled(&self.lags, thermal, filter);
-        let ([increment_weight, bias, magnetic, meander], _) = self.terms(thermal, &lagged, filter);
+        let lagged = settled(self.terms.lags(), thermal, filter);
+        let ([increment_weight, bias, magnetic, meander], _) = Follows::terms(self, thermal, &lagged, filter);
         GyroTerms { increment_weight, bias, magnetic, meander }
-    }
-
-    /// Every curve whose argument is temperature and which flags the gyro outside its fitted range.
-    pub(crate) fn curves_over_temperature(&self) -> impl Iterator<Item = &Curve> {
-        let branched = [&self.thermal_rate, &self.thermal_acceleration].into_iter().flatten();
-        [&self.increment_weight_error, &self.static_bias]
-            .into_iter()
-            .chain(self.magnetic_bias.as_deref())
-            .chain(self.slow_meander.as_deref())
-            .chain(self.lags.iter().map(|lag| &lag.gain))
-            .chain(
-                branched
-                    .filter(|branched| branched.argument == BranchArgument::Temperature)
-                    .flat_map(|branched| [&branched.run_up, &branched.braking]),
-            )
-    }
-}
-
-/// A coefficient with one curve per thermal branch.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Branched {
-    argument: BranchArgument,
-    run_up: Curve,
-    braking: Curve,
-}
-
-impl Branched {
-    /// Coefficient at a thermal state, and whether its argument was clamped.
-    ///
-    /// The sign of Ṫ·T̈ chatters where either is near zero; over the dead band the two curves are blended with a
-    /// weight that is continuous in the product, so that no branch change makes a step.
-    fn at(&self, thermal: &ThermalState, derivative: f64, dead_band: f64) -> (f64, bool) {
-        let argument = match self.argument {
-            BranchArgument::Temperature => thermal.temperature,
-            BranchArgument::Derivative => derivative,
-        };
-        let product = thermal.rate * thermal.acceleration;
-        let weight = 0.5 + 0.5 * (product / dead_band).clamp(-1.0, 1.0);
-        let (up, down) = (self.run_up.at(argument), self.braking.at(argument));
-        let value = weight * up.value + (1.0 - weight) * down.value;
-        (value, (up.clamped && weight > 0.0) || (down.clamped && weight < 1.0))
     }
 }
 
@@ -239,7 +156,7 @@ impl Follows<4> for GyroModel {
     }
 
     fn lags(&self) -> &[Lag] {
-        &self.lags
+        self.terms.lags()
     }
 
     /// In the order of [`GyroTerms`].
@@ -249,28 +166,7 @@ impl Follows<4> for GyroModel {
         lagged: &[f64; MAX_LAGS],
         filter: &ThermalFilter,
     ) -> ([f64; 4], bool) {
-        let mut clamped = false;
-        let mut eval = |curve: &Curve| {
-            let evaluated = curve.at(thermal.temperature);
-            clamped |= evaluated.clamped;
-            evaluated.value
-        };
-        let weight = self.increment_weight * (1.0 + eval(&self.increment_weight_error));
-        let mut bias = eval(&self.static_bias);
-        let magnetic = self.magnetic_bias.as_deref().map_or(0.0, &mut eval);
-        let meander = self.slow_meander.as_deref().map_or(0.0, &mut eval);
-        for (lag, lagged) in self.lags.iter().zip(lagged) {
-            bias += eval(&lag.gain) * (thermal.temperature - lagged) * lag.per_second;
-        }
-        for (term, derivative) in
-            [(&self.thermal_rate, thermal.rate), (&self.thermal_acceleration, thermal.acceleration)]
-        {
-            if let Some(branched) = term {
-                let (coefficient, outside) = branched.at(thermal, derivative, filter.branch_dead_band);
-                bias += coefficient * derivative;
-                clamped |= outside;
-            }
-        }
-        ([weight, bias, magnetic, meander], clamped)
+        let ([error, bias, magnetic, meander], clamped) = self.terms.lines(thermal, lagged, filter);
+        ([self.increment_weight * (1.0 + error), bias, magnetic, meander], clamped)
     }
 }

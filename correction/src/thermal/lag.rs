@@ -3,25 +3,23 @@
 use serde::{Deserialize, Serialize};
 
 use crate::channel::{ThermalFilter, ThermalState};
-use crate::curve::Curve;
 
 /// Most thermal lags of one sensor.
 pub const MAX_LAGS: usize = 8;
 
-/// One thermal lag, compiled for the filter's grid step.
+/// A lag's time constant, compiled for the filter's grid step.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Lag {
     /// e^(−step/τ).
     pub(super) decay: f64,
     /// 1/τ (1/s).
     pub(super) per_second: f64,
-    pub(crate) gain: Curve,
 }
 
 impl Lag {
-    pub(super) fn new(time_constant_s: f64, gain: Curve, filter: &ThermalFilter) -> Self {
+    pub(super) fn new(time_constant_s: f64, filter: &ThermalFilter) -> Self {
         let decay = libm::exp(-filter.grid_step.as_s() / time_constant_s);
-        Self { decay, per_second: 1.0 / time_constant_s, gain }
+        Self { decay, per_second: 1.0 / time_constant_s }
     }
 }
 

@@ -7,6 +7,7 @@
 
 mod accels;
 mod gyros;
+mod motion;
 mod patch;
 
 use alloc::boxed::Box;
@@ -30,6 +31,9 @@ use crate::sample::{CorrectedTick, GyroTick, MAX_SENSORS, SensorFlags, Sensors, 
 use crate::servo::ServoMemory;
 use crate::units::{Span, Timestamp};
 
+pub(super) use motion::MotionInUse;
+use motion::MotionMemory;
+
 /// What is presently subtracted from a unit's readings, in case axes.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Applied {
@@ -47,6 +51,7 @@ pub(super) struct Corrector {
     pub(super) gyro_health: Health,
     pub(super) accel_health: Health,
     thermal: ThermalMemory,
+    motion: MotionMemory,
     substitution: Substitution,
     servo: ServoMemory,
     /// Last good rate of each gyro (rad/s), standing in for a reading that is no number.
@@ -56,6 +61,8 @@ pub(super) struct Corrector {
     /// The swap that is being made over a time, and the share of what was before it at the present tick.
     slew: Option<Box<Slew>>,
     slew_share: f64,
+    /// Whether anything follows motion at the present tick.
+    moves: bool,
 }
 
 /// When a corrector begins, as seen from the one before it.
@@ -97,12 +104,14 @@ impl Corrector {
             gyro_health: Health::new(gyros),
             accel_health: Health::new(accels),
             thermal,
+            motion: MotionMemory::default(),
             substitution: Substitution::new(),
             servo: ServoMemory::new(),
             last_rates: [0.0; MAX_SENSORS],
             last_forces: [0.0; MAX_SENSORS],
             slew: None,
             slew_share: 0.0,
+            moves: false,
         };
         let Some((old_calibration, old)) =
             before.filter(|(old, _)| old.gyro_count() == gyros && old.accel_count() == accels)
@@ -140,6 +149,7 @@ impl Corrector {
             gyros: self.gyro_terms(calibration, &shares, since_turn_on_s),
             accels,
             boards,
+            motion: self.motion_in_use(calibration, &shares),
             gyro_axes: on_its_way(self.thermal.gyro_axes.in_use(now), old.and_then(|slew| slew.gyro_axes)),
             accel_axes: on_its_way(
                 self.thermal.accel_axes.as_ref().and_then(|axes| axes.in_use(now)),
@@ -167,6 +177,7 @@ impl Corrector {
         if restart {
             self.thermal.restart(calibration);
             self.servo.reset();
+            self.motion.interrupt();
             self.slew = None;
         }
         if waiting.is_due(time, delay) {
@@ -179,6 +190,8 @@ impl Corrector {
         if self.slew_share <= 0.0 {
             self.slew = None;
         }
+        let slewing = self.slew.as_ref().is_some_and(|slew| slew.motion.is_some());
+        self.moves = calibration.motion.is_some() | slewing;
         // Four lanes fill two registers of every x86-64, and suffice for most units.
         if calibration.gyros.len().max(calibration.accels.len()) <= 4 {
             self.correct_lanes::<4>(calibration, tick, counters, out);
@@ -206,6 +219,9 @@ impl Corrector {
         out.accel_parity.clear();
         out.flags = if self.thermal.warming_up { TickFlags::WARM_UP } else { TickFlags::empty() };
         let shares = self.thermal.paces.shares(raw.end_time);
+        if self.moves {
+            self.note_force::<N>(calibration, tick, &shares);
+        }
         self.gyros::<N>(calibration, tick, &shares, counters, out);
         self.accels::<N>(calibration, tick, &shares, counters, out);
 

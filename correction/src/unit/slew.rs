@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::correct::MotionInUse;
 use crate::lanes::{Lanes, narrow};
 use crate::orientation::{Inverse, SensorMask};
 use crate::units::{Span, Timestamp};
@@ -18,6 +19,8 @@ pub(super) struct Slew {
     /// Terms of the accelerometers, and of their boards.
     pub(super) accels: [Lanes; 2],
     pub(super) boards: [Lanes; 1],
+    /// What followed motion; `None` where nothing did.
+    pub(super) motion: Option<MotionInUse>,
     /// Sensors and inverse that gave case axes from the gyros.
     pub(super) gyro_axes: Option<(SensorMask, Inverse)>,
     /// Likewise from the accelerometers.
@@ -70,6 +73,6 @@ impl Slewing<'_> {
 }
 
 /// `new` where `share` of the old is 0, `old` where it is 1.
-fn between(new: f64, old: f64, share: f64) -> f64 {
+pub(super) fn between(new: f64, old: f64, share: f64) -> f64 {
     new + (old - new) * share
 }

@@ -1,5 +1,6 @@
 //! Temperatures in use: channels, the terms that follow them, and readings that wait to take effect.
 
+use alloc::boxed::Box;
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;
 
@@ -11,7 +12,7 @@ use crate::calibration::Calibration;
 use crate::channel::{ChannelMemory, ThermalState, Verdict};
 use crate::lanes::Lanes;
 use crate::sample::{ChannelName, MAX_SENSORS, SensorFlags, TemperatureReading};
-use crate::thermal::{AccelModel, Bank, Pace, Paces};
+use crate::thermal::{AccelModel, Bank, MotionBanks, Pace, Paces};
 use crate::units::{Span, Timestamp};
 
 /// Most readings that wait to take effect: two messages of 4096 times with 16 channels each, since a producer sends a
@@ -123,6 +124,8 @@ pub(super) struct ThermalMemory {
     pub(super) accels: Bank<2>,
     /// r, which follows the board's channel.
     pub(super) boards: Bank<1>,
+    /// `None` where nothing follows motion.
+    pub(super) motion: Option<Box<MotionBanks>>,
     pub(super) gyro_axes: Axes,
     pub(super) accel_axes: Option<Axes>,
     pub(super) gyro_footing: Footing,
@@ -154,6 +157,12 @@ impl ThermalMemory {
             gyros: Bank::new(&calibration.gyros, filter, &mut paces),
             accels: Bank::new(&calibration.accels, filter, &mut paces),
             boards: Bank::new(&calibration.accels, filter, &mut paces),
+            motion: calibration.motion.as_deref().map(|motion| {
+                Box::new(MotionBanks {
+                    gyros: Bank::new(&motion.gyros, filter, &mut paces),
+                    accels: Bank::new(&motion.accels, filter, &mut paces),
+                })
+            }),
             gyro_axes: axes(&calibration.gyro_orientation),
             accel_axes: calibration.accel_orientation.as_ref().map(axes),
             gyro_footing: Footing::default(),
@@ -205,6 +214,9 @@ impl ThermalMemory {
                 self.accels.carry(&old_memory.accels, lane);
                 self.boards.carry(&old_memory.boards, lane);
             }
+        }
+        if calibration.motion == old.motion {
+            self.motion.clone_from(&old_memory.motion);
         }
         if calibration.gyro_orientation == old.gyro_orientation
             && calibration.gyro_orientation_channels == old.gyro_orientation_channels
@@ -287,6 +299,10 @@ impl ThermalMemory {
         self.gyros.update(&calibration.gyros, to, filter, way);
         self.accels.update(&calibration.accels, to, filter, way);
         self.boards.update(&calibration.accels, to, filter, way);
+        if let (Some(banks), Some(motion)) = (&mut self.motion, &calibration.motion) {
+            banks.gyros.update(&motion.gyros, to, filter, way);
+            banks.accels.update(&motion.accels, to, filter, way);
+        }
         self.paces.set(channel, Pace::new(start, over));
         let channels = &self.channels;
         let follow = |axes: &mut Axes, orientation, following: &[usize]| {
@@ -309,6 +325,10 @@ impl ThermalMemory {
         self.gyros.settle();
         self.accels.settle();
         self.boards.settle();
+        if let Some(banks) = &mut self.motion {
+            banks.gyros.settle();
+            banks.accels.settle();
+        }
         self.gyro_axes.settle();
         self.accel_axes.iter_mut().for_each(Axes::settle);
         self.note_footing(calibration);
@@ -328,13 +348,16 @@ impl ThermalMemory {
         let mut gyros = Footing::default();
         let axes = &self.gyro_axes;
         for (lane, model) in calibration.gyros.iter().enumerate() {
-            let clamped = self.gyros.clamped(lane) || axes.clamped();
+            let in_motion = self.motion.as_ref().is_some_and(|banks| banks.gyros.clamped(lane));
+            let clamped = self.gyros.clamped(lane) || in_motion || axes.clamped();
             gyros.note(lane, (temperature(model.channel), fresh_until(model.channel)), clamped, axes);
         }
         let mut accels = Footing::default();
         for (lane, model) in calibration.accels.iter().enumerate() {
             let Some(axes) = &self.accel_axes else { break };
-            let clamped = self.accels.clamped(lane) || self.boards.clamped(lane) || axes.clamped();
+            let in_motion = self.motion.as_ref().is_some_and(|banks| banks.accels.clamped(lane));
+            let clamped =
+                self.accels.clamped(lane) || self.boards.clamped(lane) || in_motion || axes.clamped();
             let fresh_until = fresh_until(model.channel).min(fresh_until(model.board_channel));
             accels.note(lane, (temperature(model.channel), fresh_until), clamped, axes);
         }

@@ -10,8 +10,9 @@ use std::collections::BTreeMap;
 use isotherm_correction::curve::{Curve as CoreCurve, CurveError};
 use isotherm_correction::orientation::ROW_NORM_TOLERANCE;
 
-use super::curve::{Curve, Quantity};
-use super::types::{AccelSensor, Branches, Document, Filter, GyroSensor, Orientation, SelfTest};
+use super::curve::CurveForm;
+use super::terms::StatedTerm;
+use super::types::{AccelSensor, Document, Filter, GyroSensor, Orientation, SelfTest};
 use isotherm_document::{Reader, element, join};
 
 /// Checks everything between keys.
@@ -22,8 +23,11 @@ pub(super) fn check(r: &mut Reader<'_>, document: &Document) {
     for (i, sensor) in document.gyro.sensor.iter().enumerate() {
         output::gyro(r, &element("gyro.sensor", i), document.gyro.output, sensor);
         gyro(r, &element("gyro.sensor", i), sensor, channels);
-        let taus = sensor.lag.iter().map(|lag| (lag.time_constant_s, &lag.gain));
-        lags(r, &element("gyro.sensor", i), taus, document.temperature.filter.as_ref());
+        if sensor.acceleration_sensitive_drift.is_some() && document.accel.is_none() {
+            let path = join(&element("gyro.sensor", i), "acceleration_sensitive_drift");
+            r.refuse(&path, "needs the specific force, but there is no [accel]: add it, or leave this out");
+        }
+        terms(r, &element("gyro.sensor", i), &sensor.terms(), document.temperature.filter.as_ref());
     }
     orientation(r, "gyro", &document.gyro.orientation, document.gyro.sensor.len(), channels);
     filter(r, document);
@@ -32,8 +36,7 @@ pub(super) fn check(r: &mut Reader<'_>, document: &Document) {
         for (i, sensor) in section.sensor.iter().enumerate() {
             output::accel(r, &element("accel.sensor", i), section.output, sensor);
             accel(r, &element("accel.sensor", i), sensor, channels);
-            let taus = sensor.lag.iter().map(|lag| (lag.time_constant_s, &lag.gain));
-            lags(r, &element("accel.sensor", i), taus, document.temperature.filter.as_ref());
+            terms(r, &element("accel.sensor", i), &sensor.terms(), document.temperature.filter.as_ref());
         }
         orientation(r, "accel", &section.orientation, section.sensor.len(), channels);
     }
@@ -96,31 +99,29 @@ fn channel(r: &mut Reader<'_>, path: &str, name: Option<&str>, channels: Option<
 
 fn gyro(r: &mut Reader<'_>, path: &str, sensor: &GyroSensor, channels: Option<&[&str]>) {
     channel(r, &join(path, "channel"), sensor.channel.as_deref(), channels);
-    curve(r, &join(path, "increment_weight_error"), sensor.increment_weight_error.as_ref());
-    curve(r, &join(path, "static_bias"), sensor.static_bias.as_ref());
-    curve(r, &join(path, "magnetic_bias"), sensor.magnetic_bias.as_ref());
-    curve(r, &join(path, "slow_meander"), sensor.slow_meander.as_ref());
-    branches(r, &join(path, "thermal_rate"), sensor.thermal_rate.as_ref());
-    branches(r, &join(path, "thermal_acceleration"), sensor.thermal_acceleration.as_ref());
+    let over_rate = sensor.increment_weight_over_rate.as_deref();
+    curve(r, &join(path, "increment_weight_over_rate"), over_rate);
     curve(
         r,
         &join_dotted(path, "servo.rest_frequency"),
-        sensor.servo.as_ref().map(|servo| &servo.rest_frequency),
+        sensor.servo.as_ref().map(|servo| &*servo.rest_frequency),
     );
 }
 
-fn lags<'l, Q: Quantity>(
-    r: &mut Reader<'_>,
-    path: &str,
-    lags: impl Iterator<Item = (f64, &'l Curve<Q>)>,
-    filter: Option<&Filter>,
-) {
-    for (i, (tau, gain)) in lags.enumerate() {
-        let path = element(&join(path, "lag"), i);
-        curve(r, &join(&path, "gain"), Some(gain));
-        let Some(Filter { grid_step_s, .. }) = filter else { continue };
+/// Curves of every term; both curves of a branched coefficient over one argument; lags no shorter than the grid's step.
+fn terms(r: &mut Reader<'_>, path: &str, terms: &[StatedTerm<'_>], filter: Option<&Filter>) {
+    for term in terms {
+        let curves = term.curves();
+        for (key, form) in &curves {
+            curve(r, &format!("{path}.{key}"), Some(form));
+        }
+        if let [(run_up, first), (braking, second)] = &curves[..] {
+            let path = |key: &str| format!("{path}.{key}");
+            one_argument(r, (&path(run_up), first), (&path(braking), second));
+        }
+        let (Some(tau), Some(Filter { grid_step_s, .. })) = (term.time_constant_s, filter) else { continue };
         if tau < *grid_step_s && !r.is_damaged("temperature.filter.grid_step_s") {
-            let path = join(&path, "time_constant_s");
+            let path = format!("{path}.{}.time_constant_s", term.key);
             r.refuse(
                 &path,
                 format!("is {tau} s, must be at least temperature.filter.grid_step_s, {grid_step_s} s"),
@@ -132,13 +133,12 @@ fn lags<'l, Q: Quantity>(
 fn accel(r: &mut Reader<'_>, path: &str, sensor: &AccelSensor, channels: Option<&[&str]>) {
     channel(r, &join(path, "channel"), sensor.channel.as_deref(), channels);
     channel(r, &join(path, "board_channel"), sensor.board_channel.as_deref(), channels);
-    curve(r, &join(path, "scale_factor"), Some(&sensor.scale_factor));
-    curve(r, &join(path, "bias"), sensor.bias.as_ref());
-    curve(r, &join(path, "board_ratio_error"), sensor.board_ratio_error.as_ref());
+    curve(r, &join(path, "scale_factor"), Some(&*sensor.scale_factor));
+    curve(r, &join(path, "board_ratio_error"), sensor.board_ratio_error.as_deref());
 }
 
 /// A curve that the core must be able to compile.
-fn curve<Q: Quantity>(r: &mut Reader<'_>, path: &str, curve: Option<&Curve<Q>>) {
+fn curve(r: &mut Reader<'_>, path: &str, curve: Option<&CurveForm>) {
     let Some(curve) = curve else { return };
     if r.is_damaged(path) {
         return;
@@ -154,18 +154,18 @@ fn curve<Q: Quantity>(r: &mut Reader<'_>, path: &str, curve: Option<&Curve<Q>>) 
 }
 
 /// Both curves of a branched coefficient have one argument.
-fn branches<Q: Quantity>(r: &mut Reader<'_>, path: &str, branches: Option<&Branches<Curve<Q>>>) {
-    let Some(Branches { run_up, braking }) = branches else { return };
-    let (run_up_path, braking_path) = (join(path, "run_up"), join(path, "braking"));
-    curve(r, &run_up_path, Some(run_up));
-    curve(r, &braking_path, Some(braking));
+fn one_argument(
+    r: &mut Reader<'_>,
+    (run_up_path, run_up): (&str, &CurveForm),
+    (braking_path, braking): (&str, &CurveForm),
+) {
     if let (Some(first), Some(second)) = (run_up.argument(), braking.argument())
         && first != second
-        && !r.is_damaged(&run_up_path)
+        && !r.is_damaged(run_up_path)
     {
         let (first, second) = (first.symbol(), second.symbol());
         r.refuse(
-            &braking_path,
+            braking_path,
             format!("is over {second}, but run_up is over {first}: both must have one argument"),
         );
     }
@@ -184,8 +184,7 @@ fn filter(r: &mut Reader<'_>, document: &Document) {
         return;
     };
     let mut sensors = document.gyro.sensor.iter();
-    let branched =
-        |sensor: &GyroSensor| sensor.thermal_rate.is_some() || sensor.thermal_acceleration.is_some();
+    let branched = |sensor: &GyroSensor| sensor.terms().iter().any(|term| term.curves().len() > 1);
     let Some(i) = sensors.position(branched) else { return };
     if filter.branch_dead_band_deg_c2_per_s3.is_none() {
         let why = "run-up and braking curves of";

@@ -1,8 +1,6 @@
 //! Document → the core's parts: names become indices, the file's units become SI.
 
-use isotherm_correction::calibration::{
-    AccelParts, BranchArgument, BranchedParts, CalibrationParts, GyroParts, LagParts, TrendParts,
-};
+use isotherm_correction::calibration::{AccelParts, CalibrationParts, GyroParts, TrendParts};
 use isotherm_correction::channel::{ChannelParts, ThermalFilterParts};
 use isotherm_correction::drift::DriftParts;
 use isotherm_correction::operation::{SelfTestCounter, SelfTestParts, SelfTestVoltage};
@@ -11,11 +9,11 @@ use isotherm_correction::reversal::{FitWindow as CoreFitWindow, ReversalParts};
 use isotherm_correction::sample::{ChannelName, MAX_CHANNEL_NAME, OutputKind};
 use isotherm_correction::servo::{ServoForm, ServoParts};
 
-use super::curve::{Curve, Quantity};
-use super::measure::{ARCSEC, Argument, DEG_PER_H, DEG_PER_S, DEG_PER_SQRT_H, HOUR};
+use super::measure::{ARCSEC, DEG_PER_H, DEG_PER_S, DEG_PER_SQRT_H, HOUR};
+use super::terms::StatedTerm;
 use super::types::{
-    AccelLag, AccelOutput, AccelSensor, Branches, Channel, Document, Drift, FitWindow, GyroOutput,
-    GyroSensor, Lag, ModeReversal, Orientation, SelfTest, Servo, ServoKind, Temperature, Trend,
+    AccelOutput, AccelSensor, Channel, Document, Drift, FitWindow, GyroOutput, GyroSensor, ModeReversal,
+    Orientation, SelfTest, Servo, ServoKind, Temperature, Trend,
 };
 
 /// Temperature range of an orientation that does not depend on temperature (°C): nothing lies outside.
@@ -103,14 +101,12 @@ impl Document {
         GyroParts {
             channel: sensor.channel.as_ref().map(|name| self.channel_index(name)),
             increment_weight: increment_weight.unwrap_or(f64::NAN),
-            increment_weight_error: sensor.increment_weight_error.as_ref().map(|curve| curve.to_parts(0.0)),
             input_limit: input_limit.unwrap_or(NO_LIMIT),
-            static_bias: sensor.static_bias.as_ref().map(|curve| curve.to_parts(0.0)),
-            magnetic_bias: sensor.magnetic_bias.as_ref().map(|curve| curve.to_parts(0.0)),
-            slow_meander: sensor.slow_meander.as_ref().map(|curve| curve.to_parts(0.0)),
-            thermal_rate: sensor.thermal_rate.as_ref().map(branched),
-            thermal_acceleration: sensor.thermal_acceleration.as_ref().map(branched),
-            lags: sensor.lag.iter().map(lag).collect(),
+            terms: sensor.terms().iter().map(StatedTerm::to_parts).collect(),
+            increment_weight_over_rate: sensor
+                .increment_weight_over_rate
+                .as_ref()
+                .map(|curve| curve.to_parts(0.0)),
             trend: sensor.trend.as_ref().map(trend),
             servo: sensor.servo.as_ref().map(servo),
             drift: sensor.drift.as_ref().map(drift),
@@ -127,8 +123,8 @@ impl Document {
             channel: sensor.channel.as_ref().map(|name| self.channel_index(name)),
             board_channel: sensor.board_channel.as_ref().map(|name| self.channel_index(name)),
             scale_factor: sensor.scale_factor.to_parts(0.0),
-            bias: sensor.bias.as_ref().map(|curve| curve.to_parts(0.0)),
-            lags: sensor.lag.iter().map(accel_lag).collect(),
+            terms: sensor.terms().iter().map(StatedTerm::to_parts).collect(),
+            position_m: sensor.position_m.unwrap_or_default(),
             board_ratio: sensor.board_ratio_error.as_ref().map(|curve| curve.to_parts(1.0)),
             input_limit: input_limit.unwrap_or(NO_LIMIT),
         }
@@ -183,26 +179,6 @@ fn orientation<P>(orientation: &Orientation<P>, parity: Option<(f64, u32)>) -> O
         parity_limit: parity.map(|(limit, _)| limit),
         parity_confirm_ticks: parity.map_or(1, |(_, ticks)| ticks),
     }
-}
-
-fn branched<Q: Quantity>(branches: &Branches<Curve<Q>>) -> BranchedParts {
-    let argument = branches.run_up.argument().or(branches.braking.argument());
-    BranchedParts {
-        argument: match argument {
-            None | Some(Argument::DegC) => BranchArgument::Temperature,
-            Some(Argument::DegCPerS | Argument::DegCPerS2) => BranchArgument::Derivative,
-        },
-        run_up: branches.run_up.to_parts(0.0),
-        braking: branches.braking.to_parts(0.0),
-    }
-}
-
-fn lag(lag: &Lag) -> LagParts {
-    LagParts { time_constant_s: lag.time_constant_s, gain: lag.gain.to_parts(0.0) }
-}
-
-fn accel_lag(lag: &AccelLag) -> LagParts {
-    LagParts { time_constant_s: lag.time_constant_s, gain: lag.gain.to_parts(0.0) }
 }
 
 fn trend(trend: &Trend) -> TrendParts {

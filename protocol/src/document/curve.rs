@@ -3,6 +3,7 @@
 mod schema;
 
 use std::marker::PhantomData;
+use std::ops::Deref;
 
 use isotherm_correction::curve::{Curve as CoreCurve, CurveParts};
 use serde::de::{Deserialize, Deserializer, Error as _};
@@ -45,6 +46,12 @@ quantities! {
     ThermalAcceleration: [DegPerHPerDegCPerS2] over [DegC, DegCPerS2];
     /// Gain of a thermal lag.
     LagGain: [DegPerHPerDegCPerS] over [DegC];
+    /// Drift of a gyro by specific force.
+    DriftByForce: [DegPerHPerG] over [DegC];
+    /// Relative deviation from one over the rate of a gyro.
+    RelativeOverRate: [Ppm] over [DegPerS];
+    /// Second-order term of an accelerometer.
+    SecondOrder: [MicroGPerG2] over [DegC];
     /// Rest frequency of the dither.
     Frequency: [Hz] over [DegC];
     /// Scale factor of an accelerometer.
@@ -55,13 +62,27 @@ quantities! {
     OutputLagGain: [CountsPerSPerDegCPerS, VPerDegCPerS, MPerS2PerDegCPerS] over [DegC];
 }
 
-/// A curve of one quantity over temperature or one of its derivatives, in the units of its keys.
+/// A curve of one quantity, in the units of its keys.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve<Q> {
+    form: CurveForm,
+    quantity: PhantomData<Q>,
+}
+
+/// A curve of any quantity over temperature, one of its derivatives or the rate, in the units of its keys.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CurveForm {
     unit: Unit,
     argument: Argument,
     shape: Shape,
-    quantity: PhantomData<Q>,
+}
+
+impl<Q> Deref for Curve<Q> {
+    type Target = CurveForm;
+
+    fn deref(&self) -> &CurveForm {
+        &self.form
+    }
 }
 
 /// Form of a curve.
@@ -110,14 +131,14 @@ impl Shape {
     pub fn at(&self, argument: f64) -> Option<f64> {
         match self {
             Self::Constant { value } => Some(*value),
-            _ => CoreCurve::new(&self.to_parts(1.0, 0.0)).ok().map(|curve| curve.at(argument).value),
+            _ => CoreCurve::new(&self.to_parts(1.0, 1.0, 0.0)).ok().map(|curve| curve.at(argument).value),
         }
     }
 
-    /// The core's parts, values times `factor`, `plus` a constant.
-    fn to_parts(&self, factor: f64, plus: f64) -> CurveParts {
+    /// The core's parts, arguments times `over`, values times `factor`, `plus` a constant.
+    fn to_parts(&self, over: f64, factor: f64, plus: f64) -> CurveParts {
         let convert =
-            |knots: &[[f64; 2]]| knots.iter().map(|[x, value]| [*x, value * factor + plus]).collect();
+            |knots: &[[f64; 2]]| knots.iter().map(|[x, value]| [x * over, value * factor + plus]).collect();
         match self {
             Self::Constant { value } => CurveParts::Polynomial {
                 reference: 0.0,
@@ -125,11 +146,17 @@ impl Shape {
                 range: EVERYWHERE,
             },
             Self::Polynomial { reference, coefficients, range } => {
-                let mut coefficients: Vec<f64> = coefficients.iter().map(|c| c * factor).collect();
+                let factors = std::iter::successors(Some(factor), |factor| Some(factor / over));
+                let mut coefficients: Vec<f64> =
+                    coefficients.iter().zip(factors).map(|(c, f)| c * f).collect();
                 if let Some(first) = coefficients.first_mut() {
                     *first += plus;
                 }
-                CurveParts::Polynomial { reference: *reference, coefficients, range: *range }
+                CurveParts::Polynomial {
+                    reference: *reference * over,
+                    coefficients,
+                    range: range.map(|end| end * over),
+                }
             }
             Self::PiecewiseLinear { knots } => CurveParts::PiecewiseLinear { knots: convert(knots) },
             Self::Spline { knots } => CurveParts::Spline { knots: convert(knots) },
@@ -148,23 +175,58 @@ impl<Q: Quantity> Curve<Q> {
             ([unit, ..], [argument, ..]) => (*unit, *argument),
             _ => (Unit::Ppm, Argument::DegC),
         };
-        Self { unit, argument, shape, quantity: PhantomData }
+        Self { form: CurveForm { unit, argument, shape }, quantity: PhantomData }
     }
 
     /// The same curve with its values in another unit; one that the quantity does not allow changes nothing.
     #[must_use]
-    pub fn in_unit(self, unit: Unit) -> Self {
-        if Q::UNITS.contains(&unit) { Self { unit, ..self } } else { self }
+    pub fn in_unit(mut self, unit: Unit) -> Self {
+        if Q::UNITS.contains(&unit) {
+            self.form.unit = unit;
+        }
+        self
     }
 
     /// The same curve over another argument; one that the quantity does not allow changes nothing, and so does
     /// any for a constant.
     #[must_use]
-    pub fn over(self, argument: Argument) -> Self {
-        let applies = Q::ARGUMENTS.contains(&argument) && !matches!(self.shape, Shape::Constant { .. });
-        if applies { Self { argument, ..self } } else { self }
+    pub fn over(mut self, argument: Argument) -> Self {
+        if Q::ARGUMENTS.contains(&argument) && !matches!(self.shape, Shape::Constant { .. }) {
+            self.form.argument = argument;
+        }
+        self
     }
 
+    /// The same curve with a constant (in the unit of its values) added to all of it.
+    #[must_use]
+    pub fn plus(&self, change: f64) -> Self {
+        let mut curve = self.clone();
+        match &mut curve.form.shape {
+            Shape::Constant { value } => *value += change,
+            Shape::Polynomial { coefficients, .. } => match coefficients.first_mut() {
+                Some(first) => *first += change,
+                None => coefficients.push(change),
+            },
+            Shape::PiecewiseLinear { knots } | Shape::Spline { knots } => {
+                for [_, value] in knots {
+                    *value += change;
+                }
+            }
+        }
+        curve
+    }
+
+    /// The same curve held at its value at one argument; one that does not hold stays as it is.
+    #[must_use]
+    pub fn held_at(&self, argument: f64) -> Self {
+        match self.shape.at(argument) {
+            Some(value) => Self::new(Shape::Constant { value }).in_unit(self.unit),
+            None => self.clone(),
+        }
+    }
+}
+
+impl CurveForm {
     /// Unit of the values.
     #[must_use]
     pub fn unit(&self) -> Unit {
@@ -195,37 +257,9 @@ impl<Q: Quantity> Curve<Q> {
         }
     }
 
-    /// The same curve with a constant (in the unit of its values) added to all of it.
-    #[must_use]
-    pub fn plus(&self, change: f64) -> Self {
-        let mut curve = self.clone();
-        match &mut curve.shape {
-            Shape::Constant { value } => *value += change,
-            Shape::Polynomial { coefficients, .. } => match coefficients.first_mut() {
-                Some(first) => *first += change,
-                None => coefficients.push(change),
-            },
-            Shape::PiecewiseLinear { knots } | Shape::Spline { knots } => {
-                for [_, value] in knots {
-                    *value += change;
-                }
-            }
-        }
-        curve
-    }
-
-    /// The same curve held at its value at one argument; one that does not hold stays as it is.
-    #[must_use]
-    pub fn held_at(&self, argument: f64) -> Self {
-        match self.shape.at(argument) {
-            Some(value) => Self::new(Shape::Constant { value }).in_unit(self.unit),
-            None => self.clone(),
-        }
-    }
-
     /// The core's parts, `plus` a constant in its units.
     pub(super) fn to_parts(&self, plus: f64) -> CurveParts {
-        self.shape.to_parts(self.unit.in_core_units(), plus)
+        self.shape.to_parts(self.argument.in_core_units(), self.unit.in_core_units(), plus)
     }
 
     /// Keys of the numbers of this curve.

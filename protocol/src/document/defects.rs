@@ -63,7 +63,7 @@ fn key(document: &Document, defect: &Defect) -> &'static str {
         (Section::Gyro(_), "increment_weight") => "increment_weight_rad_per_rad",
         (Section::Gyro(_), "input_limit") if counts => "input_limit_counts_per_tick",
         (Section::Gyro(_), "input_limit") => "input_limit_deg_per_s",
-        (Section::Gyro(_) | Section::Accel(_), "lags" | "lags.time_constant_s") => "lag",
+        (Section::Gyro(_) | Section::Accel(_), "lag.time_constant_s") => "lag",
         (Section::GyroOrientation | Section::AccelOrientation, "row") => "rows",
         (Section::GyroOrientation | Section::AccelOrientation, "weight") => "weights",
         (Section::Gyro(_), "trend.coefficients") => "trend.coefficients_deg_per_h",

@@ -1,6 +1,6 @@
 //! Units of measure as the document's keys spell them, and their size in SI.
 
-use isotherm_correction::units::{Angle, AngularRate};
+use isotherm_correction::units::{Angle, AngularRate, STANDARD_GRAVITY_M_PER_S2};
 
 /// rad/s in one °/h.
 pub(super) const DEG_PER_H: f64 = AngularRate::from_deg_per_h(1.0).as_rad_per_s();
@@ -46,9 +46,33 @@ pub enum Unit {
     VPerDegCPerS,
     /// (m/s²)/(°C/s).
     MPerS2PerDegCPerS,
+    /// (°/h)/g, g the standard gravity.
+    DegPerHPerG,
+    /// µg/g².
+    MicroGPerG2,
 }
 
 impl Unit {
+    /// All of them.
+    pub const ALL: [Self; 16] = [
+        Self::DegPerH,
+        Self::DegPerHPerDegCPerS,
+        Self::DegPerHPerDegCPerS2,
+        Self::Ppm,
+        Self::Hz,
+        Self::CountsPerSPerMPerS2,
+        Self::VPerMPerS2,
+        Self::MPerS2PerMPerS2,
+        Self::CountsPerS,
+        Self::V,
+        Self::MPerS2,
+        Self::CountsPerSPerDegCPerS,
+        Self::VPerDegCPerS,
+        Self::MPerS2PerDegCPerS,
+        Self::DegPerHPerG,
+        Self::MicroGPerG2,
+    ];
+
     /// Spelling in keys.
     #[must_use]
     pub const fn suffix(self) -> &'static str {
@@ -67,6 +91,8 @@ impl Unit {
             Self::CountsPerSPerDegCPerS => "counts_per_s_per_deg_c_per_s",
             Self::VPerDegCPerS => "v_per_deg_c_per_s",
             Self::MPerS2PerDegCPerS => "m_per_s2_per_deg_c_per_s",
+            Self::DegPerHPerG => "deg_per_h_per_g",
+            Self::MicroGPerG2 => "micro_g_per_g2",
         }
     }
 
@@ -88,15 +114,19 @@ impl Unit {
             Self::CountsPerSPerDegCPerS => "(counts/s)/(°C/s)",
             Self::VPerDegCPerS => "V/(°C/s)",
             Self::MPerS2PerDegCPerS => "(m/s²)/(°C/s)",
+            Self::DegPerHPerG => "(°/h)/g",
+            Self::MicroGPerG2 => "µg/g²",
         }
     }
 
-    /// How much of the core's unit it is (rad/s, 1, Hz, counts/s, V or m/s²; per °C/s or °C/s² where it says so).
+    /// How much of the core's unit it is (rad/s, 1, Hz, counts/s, V, m/s² or s²/m; per °C/s, °C/s² or m/s² where it says so).
     #[must_use]
     pub const fn in_core_units(self) -> f64 {
         match self {
             Self::DegPerH | Self::DegPerHPerDegCPerS | Self::DegPerHPerDegCPerS2 => DEG_PER_H,
             Self::Ppm => PPM,
+            Self::DegPerHPerG => DEG_PER_H / STANDARD_GRAVITY_M_PER_S2,
+            Self::MicroGPerG2 => 1e-6 / STANDARD_GRAVITY_M_PER_S2,
             _ => 1.0,
         }
     }
@@ -111,6 +141,8 @@ pub enum Argument {
     DegCPerS,
     /// Its acceleration, °C/s².
     DegCPerS2,
+    /// Angular rate, °/s.
+    DegPerS,
 }
 
 impl Argument {
@@ -121,6 +153,16 @@ impl Argument {
             Self::DegC => "deg_c",
             Self::DegCPerS => "deg_c_per_s",
             Self::DegCPerS2 => "deg_c_per_s2",
+            Self::DegPerS => "deg_per_s",
+        }
+    }
+
+    /// How much of the core's unit it is (°C, °C/s, °C/s² or rad/s).
+    #[must_use]
+    pub const fn in_core_units(self) -> f64 {
+        match self {
+            Self::DegC | Self::DegCPerS | Self::DegCPerS2 => 1.0,
+            Self::DegPerS => DEG_PER_S,
         }
     }
 
@@ -131,13 +173,14 @@ impl Argument {
             Self::DegC => "°C",
             Self::DegCPerS => "°C/s",
             Self::DegCPerS2 => "°C/s²",
+            Self::DegPerS => "°/s",
         }
     }
 }
 
 /// Spellings at the end of a key that state its unit, the longest first, with the symbol for readers.
 #[cfg(test)]
-const KEY_UNITS: [(&str, &str); 25] = [
+const KEY_UNITS: [(&str, &str); 26] = [
     ("_arcsec_per_deg_c", "″/°C"),
     ("_arcsec_per_count", "″/count"),
     ("_counts_per_tick", "counts/tick"),
@@ -161,6 +204,7 @@ const KEY_UNITS: [(&str, &str); 25] = [
     ("_h", "h"),
     ("_ns", "ns"),
     ("_s", "s"),
+    ("_m", "m"),
     ("_v", "V"),
     ("_hz", "Hz"),
 ];

@@ -6,7 +6,9 @@ mod published;
 mod reference;
 mod robust;
 
+use isotherm_correction::calibration::{CoefficientParts, TermParts};
 use isotherm_correction::curve::{Curve, CurveParts};
+use isotherm_correction::thermal::Feature;
 use isotherm_correction::units::STANDARD_GRAVITY_M_PER_S2;
 
 use super::{Document, Parsed, Problem};
@@ -77,6 +79,15 @@ fn what_is_written_is_read_back() {
     }
 }
 
+/// The curve of a term.
+fn term(terms: &[TermParts], feature: Feature) -> &CurveParts {
+    let term = terms.iter().find(|term| term.feature == feature).unwrap();
+    match &term.coefficient {
+        CoefficientParts::Curve(curve) => curve,
+        other @ CoefficientParts::Branched(_) => panic!("{other:?}"),
+    }
+}
+
 #[test]
 fn units_become_si() {
     let parts = accept(FULL).document.to_parts();
@@ -89,7 +100,7 @@ fn units_become_si() {
     close(trend.interval_s[1], 21600.0);
     close(parts.gyro_orientation.slopes_per_deg_c[0][1], (0.12_f64 / 3600.0).to_radians());
     close(parts.gyro_orientation.parity_limit.unwrap(), rad_per_s(20.0));
-    match x.increment_weight_error.as_ref().unwrap() {
+    match term(&x.terms, Feature::Reading) {
         CurveParts::Polynomial { coefficients, .. } => {
             close(coefficients[1], 0.42e-6);
         }
@@ -167,7 +178,7 @@ fn correcting_the_board_before_the_bias_would_differ_by_eight_micrograms_at_most
     let mut largest = 0.0_f64;
     for accel in &parts.accels {
         let curve = |parts: &CurveParts| Curve::new(parts).unwrap();
-        let (scale, bias) = (curve(&accel.scale_factor), curve(accel.bias.as_ref().unwrap()));
+        let (scale, bias) = (curve(&accel.scale_factor), curve(term(&accel.terms, Feature::One)));
         let ratio = curve(accel.board_ratio.as_ref().unwrap());
         for (sensor, board) in (-40..=70).flat_map(|sensor| (-40..=85).map(move |board| (sensor, board))) {
             let [sensor, board] = [sensor, board].map(f64::from);

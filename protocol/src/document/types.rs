@@ -13,7 +13,8 @@ mod self_test;
 pub use accel::{Accel, AccelLag, AccelOrientation, AccelOutput, AccelParity, AccelSensor};
 pub use drift::Drift;
 pub use gyro::{
-    Branches, Gyro, GyroOrientation, GyroOutput, GyroParity, GyroSensor, Lag, Servo, ServoKind, Trend,
+    AlongAxes, Branches, Gyro, GyroOrientation, GyroOutput, GyroParity, GyroSensor, Lag, Servo, ServoKind,
+    Trend,
 };
 pub use origin::{Created, Log, Measure, Origin, Residual, Sample};
 pub use self_test::{SelfTest, SelfTestCounter, SelfTestVoltage};

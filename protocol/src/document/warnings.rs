@@ -1,7 +1,8 @@
 //! What is doubtful about a document that is valid.
 
-use super::curve::{Curve, Quantity};
+use super::curve::CurveForm;
 use super::measure::Argument;
+use super::terms::StatedTerm;
 use super::types::{Document, Filter, GyroSensor, Orientation, Temperature};
 use isotherm_document::Problem;
 use isotherm_document::{Reader, element, join};
@@ -17,16 +18,7 @@ pub(super) fn warnings(r: &Reader<'_>, document: &Document) -> Vec<Problem> {
     for (i, sensor) in document.gyro.sensor.iter().enumerate() {
         let path = element("gyro.sensor", i);
         let channel = sensor.channel.as_deref();
-        ranges.compare(
-            &path,
-            "increment_weight_error",
-            channel,
-            sensor.increment_weight_error.as_ref(),
-            &mut found,
-        );
-        ranges.compare(&path, "static_bias", channel, sensor.static_bias.as_ref(), &mut found);
-        ranges.compare(&path, "magnetic_bias", channel, sensor.magnetic_bias.as_ref(), &mut found);
-        ranges.compare(&path, "slow_meander", channel, sensor.slow_meander.as_ref(), &mut found);
+        ranges.compare_terms(&path, channel, &sensor.terms(), &mut found);
         without_channel(r, &path, sensor, &mut found);
         if sensor.magnetic_bias.is_some() && document.mode_reversal.is_none() {
             let why = "changes its sign with the lasing mode, but there is no [mode_reversal]: switches are not bridged";
@@ -37,16 +29,12 @@ pub(super) fn warnings(r: &Reader<'_>, document: &Document) -> Vec<Problem> {
     if let Some(accel) = &document.accel {
         for (i, sensor) in accel.sensor.iter().enumerate() {
             let path = element("accel.sensor", i);
-            ranges.compare(
-                &path,
-                "scale_factor",
-                sensor.channel.as_deref(),
-                Some(&sensor.scale_factor),
-                &mut found,
-            );
-            ranges.compare(&path, "bias", sensor.channel.as_deref(), sensor.bias.as_ref(), &mut found);
+            let channel = sensor.channel.as_deref();
+            ranges.compare(&path, "scale_factor", channel, Some(&*sensor.scale_factor), &mut found);
+            ranges.compare_terms(&path, channel, &sensor.terms(), &mut found);
             let board = sensor.board_channel.as_deref();
-            ranges.compare(&path, "board_ratio_error", board, sensor.board_ratio_error.as_ref(), &mut found);
+            let ratio = sensor.board_ratio_error.as_deref();
+            ranges.compare(&path, "board_ratio_error", board, ratio, &mut found);
         }
         parity(r, "accel", &accel.orientation, &mut found);
     }
@@ -113,12 +101,24 @@ struct Ranges<'a, 't> {
 }
 
 impl Ranges<'_, '_> {
-    fn compare<Q: Quantity>(
+    fn compare_terms(
+        &self,
+        sensor: &str,
+        channel: Option<&str>,
+        terms: &[StatedTerm<'_>],
+        found: &mut Vec<Problem>,
+    ) {
+        for (key, curve) in terms.iter().flat_map(StatedTerm::curves) {
+            self.compare(sensor, &key, channel, Some(curve), found);
+        }
+    }
+
+    fn compare(
         &self,
         sensor: &str,
         key: &str,
         channel: Option<&str>,
-        curve: Option<&Curve<Q>>,
+        curve: Option<&CurveForm>,
         found: &mut Vec<Problem>,
     ) {
         let Some(curve) = curve.filter(|curve| curve.argument() == Some(Argument::DegC)) else { return };
@@ -132,7 +132,7 @@ impl Ranges<'_, '_> {
                 "is fitted from {low} to {high} °C, but channel {:?} rejects readings outside {coldest} to {hottest} °C",
                 channel.name
             );
-            found.push(self.r.warning(&join(sensor, key), message));
+            found.push(self.r.warning(&format!("{sensor}.{key}"), message));
         }
     }
 }

@@ -1,6 +1,7 @@
 //! The shipped calibration documents: each is valid, and each does what it says of itself.
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
+mod effects;
 mod fibre_optic;
 mod mems;
 mod real_logs;

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use isotherm_correction::calibration::{
-    BranchArgument, BranchedParts, Calibration, CalibrationParts, LagParts, TrendParts,
+    BranchArgument, BranchedParts, Calibration, CalibrationParts, TrendParts,
 };
 use isotherm_correction::curve::CurveParts;
 use isotherm_correction::orientation::OrientationParts;
@@ -11,7 +11,7 @@ use isotherm_correction::reversal::ReversalParts;
 use isotherm_correction::sample::OutputKind;
 use isotherm_correction::unit::UnitSettings;
 use isotherm_tests::calibrations::{
-    channel, compile, constant, identity, lively_drift, orientation, polynomial,
+    Feature, PutTerms, channel, compile, constant, identity, lively_drift, orientation, polynomial,
 };
 use isotherm_tests::script::{Scenario, Script};
 
@@ -34,35 +34,39 @@ pub(crate) fn rich_parts(tweak: f64) -> CalibrationParts {
     parts.reversal = Some(ReversalParts::default());
     for (i, gyro) in (0..3).zip(&mut parts.gyros) {
         gyro.increment_weight = 1.0 + 1e-3 * f64::from(i);
-        gyro.increment_weight_error = Some(polynomial(&[1e-5 * (1.0 + tweak), 2e-6]));
-        gyro.static_bias = Some(polynomial(&[1e-4 * (1.0 + tweak), 1e-5, -1e-6 * f64::from(i)]));
-        gyro.magnetic_bias = Some(polynomial(&[2e-4, 3e-6]));
-        gyro.slow_meander = Some(polynomial(&[4e-5, 1e-6]));
+        gyro.terms.curve(Feature::Reading, polynomial(&[1e-5 * (1.0 + tweak), 2e-6]));
+        gyro.terms.curve(Feature::One, polynomial(&[1e-4 * (1.0 + tweak), 1e-5, -1e-6 * f64::from(i)]));
+        gyro.terms.curve(Feature::LasingMode, polynomial(&[2e-4, 3e-6]));
+        gyro.terms.curve(Feature::Meander, polynomial(&[4e-5, 1e-6]));
         gyro.trend = Some(TrendParts { coefficients: vec![1e-5, 2e-6, -1e-6], interval_s: [0.5, 4.0] });
-        gyro.thermal_rate = Some(BranchedParts {
-            argument: if i == 0 { BranchArgument::Derivative } else { BranchArgument::Temperature },
-            run_up: polynomial(&[1e-4, 1e-6]),
-            braking: polynomial(&[-2e-4, 3e-6]),
-        });
-        gyro.thermal_acceleration = Some(BranchedParts {
-            argument: if i == 1 { BranchArgument::Derivative } else { BranchArgument::Temperature },
-            run_up: CurveParts::PiecewiseLinear {
-                knots: [[-60.0, 1e-5], [24.1, 4e-5], [100.0, 2e-5]].into(),
+        gyro.terms.branched(
+            Feature::ThermalRate,
+            BranchedParts {
+                argument: if i == 0 { BranchArgument::Derivative } else { BranchArgument::Temperature },
+                run_up: polynomial(&[1e-4, 1e-6]),
+                braking: polynomial(&[-2e-4, 3e-6]),
             },
-            braking: CurveParts::Spline {
-                knots: [[-60.0, 1e-5], [24.0, -4e-5], [30.0, 2e-5], [99.0, 0.0]].into(),
+        );
+        gyro.terms.branched(
+            Feature::ThermalAcceleration,
+            BranchedParts {
+                argument: if i == 1 { BranchArgument::Derivative } else { BranchArgument::Temperature },
+                run_up: CurveParts::PiecewiseLinear {
+                    knots: [[-60.0, 1e-5], [24.1, 4e-5], [100.0, 2e-5]].into(),
+                },
+                braking: CurveParts::Spline {
+                    knots: [[-60.0, 1e-5], [24.0, -4e-5], [30.0, 2e-5], [99.0, 0.0]].into(),
+                },
             },
-        });
-        gyro.lags = [0.3, 2.0]
-            .map(|time_constant_s| LagParts { time_constant_s, gain: polynomial(&[1e-4, 1e-6]) })
-            .into();
+        );
+        gyro.terms.lags([0.3, 2.0].map(|time_constant_s| (time_constant_s, polynomial(&[1e-4, 1e-6]))));
     }
     for (i, accel) in (0..3).zip(&mut parts.accels) {
         accel.scale_factor = polynomial(&[1.01, 1e-4 * f64::from(i)]);
-        accel.bias = Some(polynomial(&[0.01 * (1.0 + tweak), 1e-4]));
+        accel.terms.curve(Feature::One, polynomial(&[0.01 * (1.0 + tweak), 1e-4]));
         accel.board_channel = Some(1);
         accel.board_ratio = Some(polynomial(&[1.0, 2e-5]));
-        accel.lags = vec![LagParts { time_constant_s: 0.4, gain: constant(1e-3) }];
+        accel.terms.lags([(0.4, constant(1e-3))]);
     }
     parts.gyro_orientation.slopes_per_deg_c = vec![[1e-6, -2e-6, 3e-6]; 3];
     parts.accel_orientation.as_mut().unwrap().slopes_per_deg_c = vec![[-1e-6, 1e-6, 2e-6]; 3];
@@ -97,7 +101,7 @@ pub(crate) fn with_outputs(
         sensor.input_limit = if counts { 980.0 } else { 200.0 };
         if counts {
             sensor.scale_factor = polynomial(&[1020.0, 0.1]);
-            sensor.bias = Some(polynomial(&[30.0, 0.2]));
+            sensor.terms.curve(Feature::One, polynomial(&[30.0, 0.2]));
         }
     }
     parts
@@ -144,7 +148,7 @@ pub(crate) fn redundant(sensors: u8, confirm_ticks: u32) -> Arc<Calibration> {
     parts.gyros = vec![parts.gyros[0].clone(); rows.len()];
     parts.accels = vec![parts.accels[0].clone(); rows.len()];
     for (i, gyro) in (0..sensors).zip(&mut parts.gyros) {
-        gyro.static_bias = Some(polynomial(&[1e-5 * f64::from(i), 1e-7]));
+        gyro.terms.curve(Feature::One, polynomial(&[1e-5 * f64::from(i), 1e-7]));
         gyro.drift = (i % 2 == 0).then(lively_drift);
     }
     (parts.gyro_orientation, parts.accel_orientation) = (watched(0.05), Some(watched(0.5)));

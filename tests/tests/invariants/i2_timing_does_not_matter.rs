@@ -3,12 +3,14 @@
 
 use std::sync::Arc;
 
-use isotherm_correction::calibration::{BranchArgument, BranchedParts, Calibration, LagParts};
+use isotherm_correction::calibration::{BranchArgument, BranchedParts, Calibration};
 use isotherm_correction::drift::Reference;
 use isotherm_correction::sample::{AccelTick, CorrectedTick, GyroTick, TickFlags};
 use isotherm_correction::unit::{Unit, UnitSettings};
 use isotherm_correction::units::{Span, Timestamp};
-use isotherm_tests::calibrations::{compile, constant, identity, lively_drift, polynomial};
+use isotherm_tests::calibrations::{
+    Feature, PutTerms, compile, constant, identity, lively_drift, polynomial,
+};
 use isotherm_tests::drive::{self, Owned};
 use isotherm_tests::streams::{accel, end_of, gyro, temperature};
 use proptest::prelude::*;
@@ -22,18 +24,18 @@ fn thermal() -> Arc<Calibration> {
     parts.filter.smoothing_s = 0.3;
     parts.filter.derivative_step_s = 0.2;
     for gyro in &mut parts.gyros {
-        gyro.static_bias = Some(polynomial(&[1e-4, 1e-5, 1e-7]));
-        gyro.increment_weight_error = Some(polynomial(&[0.0, 1e-5]));
+        gyro.terms.curve(Feature::One, polynomial(&[1e-4, 1e-5, 1e-7]));
+        gyro.terms.curve(Feature::Reading, polynomial(&[0.0, 1e-5]));
         let branched = BranchedParts {
             argument: BranchArgument::Temperature,
             run_up: constant(1e-4),
             braking: constant(2e-4),
         };
-        gyro.thermal_rate = Some(branched.clone());
-        gyro.thermal_acceleration = Some(branched);
-        gyro.lags = vec![LagParts { time_constant_s: 2.0, gain: constant(1e-4) }];
+        gyro.terms.branched(Feature::ThermalRate, branched.clone());
+        gyro.terms.branched(Feature::ThermalAcceleration, branched);
+        gyro.terms.lags([(2.0, constant(1e-4))]);
     }
-    parts.accels[0].bias = Some(polynomial(&[0.01, 0.001]));
+    parts.accels[0].terms.curve(Feature::One, polynomial(&[0.01, 0.001]));
     compile(&parts)
 }
 

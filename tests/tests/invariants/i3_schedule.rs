@@ -4,7 +4,7 @@ use isotherm_correction::calibration::CalibrationParts;
 use isotherm_correction::sample::{CorrectedTick, OutputKind, TickFlags};
 use isotherm_correction::unit::{At, Change, Event, Unit};
 use isotherm_correction::units::Span;
-use isotherm_tests::calibrations::{compile, identity, polynomial};
+use isotherm_tests::calibrations::{Feature, PutTerms, compile, identity, polynomial};
 use isotherm_tests::drive::{self, Owned};
 use isotherm_tests::streams::{accel, end_of, gyro, temperature};
 
@@ -13,7 +13,7 @@ const TICKS: u64 = 2000;
 fn with_bias(bias: f64) -> CalibrationParts {
     let mut parts = identity();
     for gyro in &mut parts.gyros {
-        gyro.static_bias = Some(polynomial(&[bias, 1e-5]));
+        gyro.terms.curve(Feature::One, polynomial(&[bias, 1e-5]));
     }
     parts
 }

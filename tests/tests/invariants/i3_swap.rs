@@ -1,9 +1,11 @@
 //! I3: a calibration takes effect at a tick boundary; every output names the revision that made it; no tick is lost,
 //! doubled or delayed by a swap.
 
-use isotherm_correction::calibration::{CalibrationParts, LagParts};
+use isotherm_correction::calibration::CalibrationParts;
 use isotherm_correction::sample::{ChannelName, CorrectedTick, OutputKind, TemperatureReading};
-use isotherm_tests::calibrations::{ALONG_CASE_AXES, channel, compile, constant, identity, polynomial};
+use isotherm_tests::calibrations::{
+    ALONG_CASE_AXES, Feature, PutTerms, channel, compile, constant, identity, polynomial,
+};
 use isotherm_tests::drive::{self, Owned};
 use isotherm_tests::streams::{accel, gyro, temperature};
 
@@ -12,8 +14,8 @@ const TICKS: u64 = 4000;
 fn thermal(bias: f64) -> CalibrationParts {
     let mut parts = identity();
     for gyro in &mut parts.gyros {
-        gyro.static_bias = Some(polynomial(&[bias, 1e-5]));
-        gyro.lags = vec![LagParts { time_constant_s: 20.0, gain: constant(1e-4) }];
+        gyro.terms.curve(Feature::One, polynomial(&[bias, 1e-5]));
+        gyro.terms.lags([(20.0, constant(1e-4))]);
     }
     parts
 }

@@ -7,7 +7,7 @@ use isotherm_correction::unit::{Counters, Event, UnitSettings};
 use isotherm_correction::units::{Span, Timestamp};
 use isotherm_protocol::key::{RawStream, UnitId};
 use isotherm_protocol::stream::UnitStream;
-use isotherm_tests::calibrations::{compile, identity, polynomial};
+use isotherm_tests::calibrations::{Feature, PutTerms, compile, identity, polynomial};
 use isotherm_tests::drive::{self, Owned};
 use isotherm_tests::streams::{accel, end_of, gyro, temperature};
 use proptest::prelude::*;
@@ -124,8 +124,8 @@ fn i7_a_broken_time_in_a_batch_does_not_hold_up_the_ticks_beside_it() {
 fn i7_a_clock_that_steps_back_takes_no_term_back_with_it() {
     let mut parts = identity();
     parts.filter.stale_after_s = 1000.0;
-    parts.gyros[0].static_bias = Some(polynomial(&[0.0, 1e-3]));
-    parts.accels[0].bias = Some(polynomial(&[0.0, 1e-3]));
+    parts.gyros[0].terms.curve(Feature::One, polynomial(&[0.0, 1e-3]));
+    parts.accels[0].terms.curve(Feature::One, polynomial(&[0.0, 1e-3]));
     parts.gyro_orientation.slopes_per_deg_c = vec![[0.0; 3], [0.0, 0.0, 1e-4], [0.0; 3]];
     let mut unit = drive::unit(&compile(&parts));
     let mut out = Vec::new();

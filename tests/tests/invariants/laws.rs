@@ -4,7 +4,7 @@ use isotherm_correction::calibration::{BranchArgument, BranchedParts, Calibratio
 use isotherm_correction::curve::CurveParts;
 use isotherm_correction::sample::CorrectedTick;
 use isotherm_tests::calibrations::{
-    compile, constant, identity, orientation, plain_accel, plain_gyro, polynomial,
+    Feature, PutTerms, compile, constant, identity, orientation, plain_accel, plain_gyro, polynomial,
 };
 use isotherm_tests::drive::{self, Owned};
 use isotherm_tests::streams::{accel, gyro, temperature};
@@ -84,8 +84,8 @@ proptest! {
         for (axis, &(weight, weight_slope, b0, b1, b2)) in gyro_axes.iter().zip(&gyro_terms) {
             let mut sensor = plain_gyro();
             sensor.increment_weight = weight;
-            sensor.increment_weight_error = Some(polynomial(&[0.0, weight_slope]));
-            sensor.static_bias = Some(polynomial(&[b0, b1, b2]));
+            sensor.terms.curve(Feature::Reading, polynomial(&[0.0, weight_slope]));
+            sensor.terms.curve(Feature::One, polynomial(&[b0, b1, b2]));
             parts.gyros.push(sensor);
             let along = Vector3::from(*axis).dot(&Vector3::from(rate));
             let bias = b0 + b1 * tau + b2 * tau * tau;
@@ -95,7 +95,7 @@ proptest! {
         for (axis, &(scale, scale_slope, b0, b1, b2)) in accel_axes.iter().zip(&accel_terms) {
             let mut sensor = plain_accel();
             sensor.scale_factor = polynomial(&[scale, scale * scale_slope]);
-            sensor.bias = Some(polynomial(&[b0, b1, b2]));
+            sensor.terms.curve(Feature::One, polynomial(&[b0, b1, b2]));
             parts.accels.push(sensor);
             let along = Vector3::from(*axis).dot(&Vector3::from(force));
             outputs.push(along * scale * (1.0 + scale_slope * tau) + b0 + b1 * tau + b2 * tau * tau);
@@ -115,7 +115,7 @@ proptest! {
             parts.gyros = order.iter().map(|&i| {
                 let mut sensor = plain_gyro();
                 sensor.increment_weight = terms[i].0;
-                sensor.static_bias = Some(constant(terms[i].2));
+                sensor.terms.curve(Feature::One, constant(terms[i].2));
                 sensor
             }).collect();
             let rows: Vec<[f64; 3]> = order.iter().map(|&i| {
@@ -149,11 +149,11 @@ proptest! {
         parts.accel_orientation_channels.clear();
         let knots = vec![[-60.0, 1e-4], [20.0, -1e-4], [100.0, 3e-4]];
         for sensor in &mut parts.gyros {
-            sensor.static_bias = Some(CurveParts::PiecewiseLinear { knots: knots.clone() });
+            sensor.terms.curve(Feature::One, CurveParts::PiecewiseLinear { knots: knots.clone() });
             let branched =
                 BranchedParts { argument: BranchArgument::Derivative, run_up: constant(run_up), braking: constant(braking) };
-            sensor.thermal_rate = Some(branched.clone());
-            sensor.thermal_acceleration = Some(branched);
+            sensor.terms.branched(Feature::ThermalRate, branched.clone());
+            sensor.terms.branched(Feature::ThermalAcceleration, branched);
         }
         let mut unit = drive::unit(&compile(&parts));
         let mut out = Vec::new();

@@ -16,3 +16,4 @@ mod i5_mode_switch;
 mod i7_broken_input;
 mod laws;
 mod states;
+mod terms;

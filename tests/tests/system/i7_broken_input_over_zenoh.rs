@@ -9,7 +9,7 @@ use isotherm_protocol::corrected::CorrectedTick;
 use isotherm_protocol::key::UnitId;
 use isotherm_protocol::raw::{AccelBatch, GyroBatch};
 use isotherm_tests::bench::{Bench, LIMIT};
-use isotherm_tests::calibrations::{compile, identity, polynomial};
+use isotherm_tests::calibrations::{Feature, PutTerms, compile, identity, polynomial};
 use isotherm_tests::streams::{accel, gyro, temperature};
 use zenoh::Session;
 use zenoh::qos::CongestionControl;
@@ -71,7 +71,7 @@ fn broken() -> Vec<(&'static str, Vec<u8>)> {
 /// Feeds two healthy units, and between their ticks whatever `garbage` holds; what the two gave out.
 async fn run(garbage: &[(&'static str, Vec<u8>)]) -> [Vec<CorrectedTick>; 2] {
     let mut parts = identity();
-    parts.gyros[0].static_bias = Some(polynomial(&[1e-4, 1e-6]));
+    parts.gyros[0].terms.curve(Feature::One, polynomial(&[1e-4, 1e-6]));
     let calibration = compile(&parts);
     let names = ["HEALTHY-1", "HEALTHY-2"];
     let set = [names[0], names[1], VICTIM].map(|name| (name, calibration.clone()));

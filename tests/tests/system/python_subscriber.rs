@@ -14,7 +14,7 @@ use isotherm_protocol::corrected::CorrectedBatch;
 use isotherm_protocol::key::UnitId;
 use isotherm_service::fault::FaultKind;
 use isotherm_tests::bench::{Bench, LIMIT};
-use isotherm_tests::calibrations::{compile, identity, mode_reversed, polynomial};
+use isotherm_tests::calibrations::{Feature, PutTerms, compile, identity, mode_reversed, polynomial};
 use isotherm_tests::data::root;
 use isotherm_tests::streams::{accel, gyro, temperature};
 use serde_json::{Value, json};
@@ -189,7 +189,7 @@ async fn the_python_subscriber_gets_every_increment_to_the_bit() {
         return;
     };
     let mut parts = identity();
-    parts.gyros[0].static_bias = Some(polynomial(&[1e-4, 1e-6]));
+    parts.gyros[0].terms.curve(Feature::One, polynomial(&[1e-4, 1e-6]));
     let calibrations =
         [(THERMAL, compile(&parts)), (REVERSED, compile(&mode_reversed(ReversalParts::default())))];
     let mut bench = Bench::start(&calibrations).await;

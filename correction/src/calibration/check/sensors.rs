@@ -1,13 +1,16 @@
 //! Checks and compiles gyros, accelerometers and their orientations.
 
 use super::super::defect::{DefectKind, Section};
-use super::super::parts::{AccelParts, CalibrationParts, GyroParts, LagParts, TrendParts};
+use super::super::parts::{AccelParts, CalibrationParts, GyroParts, TermParts, TrendParts};
 use super::checker::Checker;
 use crate::channel::ThermalFilter;
 use crate::curve::Curve;
 use crate::orientation::{Orientation, OrientationError, OrientationParts};
 use crate::sample::OutputKind;
-use crate::thermal::{AccelModel, GyroModel, MAX_LAGS, TermError};
+use crate::thermal::{ACCEL_TERMS, AccelModel, Feature, GYRO_TERMS, GyroModel, MAX_LAGS, Term, TermError};
+
+/// Farthest that an accelerometer may sit from the reference point along an axis (m).
+const MOST_POSITION_M: f64 = 100.0;
 
 pub(super) fn gyro_model(
     checker: &mut Checker,
@@ -19,7 +22,7 @@ pub(super) fn gyro_model(
     checker.at(Section::Gyro(index)).channel("channel", gyro.channel);
     checker.positive("increment_weight", gyro.increment_weight.abs());
     checker.positive("input_limit", gyro.input_limit);
-    lags(checker, &gyro.lags, parts);
+    terms(checker, &gyro.terms, &GYRO_TERMS, parts);
     if let Some(TrendParts { coefficients, interval_s }) = &gyro.trend {
         checker.coefficients("trend.coefficients", coefficients, 3);
         checker.range("trend.interval_s", *interval_s, 0.0, 1e9);
@@ -50,8 +53,11 @@ pub(super) fn accel_model(
     if accel.board_channel.is_none() && accel.board_ratio.is_some() {
         checker.push("board_channel", DefectKind::Missing { needed_by: "board_ratio" });
     }
+    for metres in accel.position_m {
+        checker.within("position_m", metres, -MOST_POSITION_M, MOST_POSITION_M);
+    }
     checker.positive("input_limit", accel.input_limit);
-    lags(checker, &accel.lags, parts);
+    terms(checker, &accel.terms, &ACCEL_TERMS, parts);
     let model = AccelModel::new(accel, filter, &mut |field, error| checker.push(field, error))?;
     if let Some(at) = sign_change(&model.scale_factor) {
         checker.push("scale_factor", DefectKind::Zero { at });
@@ -59,11 +65,14 @@ pub(super) fn accel_model(
     Some(model)
 }
 
-/// Number and time constants of a sensor's lags.
-fn lags(checker: &mut Checker, lags: &[LagParts], parts: &CalibrationParts) {
-    checker.count("lags", lags.len(), 0, MAX_LAGS);
-    for LagParts { time_constant_s, .. } in lags {
-        checker.within("lags.time_constant_s", *time_constant_s, parts.filter.grid_step_s, 1e7);
+/// Number of a sensor's terms of each feature, and the lags' time constants.
+fn terms(checker: &mut Checker, terms: &[TermParts], declared: &[Term], parts: &CalibrationParts) {
+    for Term { feature, key } in declared {
+        let stated = terms.iter().filter(|term| term.feature == *feature);
+        checker.count(key, stated.count(), 0, if *feature == Feature::Lag { MAX_LAGS } else { 1 });
+    }
+    for TermParts { time_constant_s, .. } in terms.iter().filter(|term| term.feature == Feature::Lag) {
+        checker.within("lag.time_constant_s", *time_constant_s, parts.filter.grid_step_s, 1e7);
     }
 }
 

@@ -10,9 +10,30 @@ use crate::sample::{CorrectedTick, MAX_SENSORS, MIN_SENSORS, OutputKind, SensorF
 use crate::thermal::Shares;
 use crate::unit::counters::Counters;
 
+/// Terms of the accelerometers at a tick: S and 1/K, and r of their boards.
+pub(super) type AccelTerms<const N: usize> = ([[f64; N]; 2], [[f64; N]; 1]);
+
+/// Specific force along the input axis of one accelerometer (m/s²) that reads this over a tick (models §3).
+#[inline]
+pub(super) fn felt<const N: usize>(
+    ([bias, per_scale_factor], [ratio]): &AccelTerms<N>,
+    output: OutputKind,
+    lane: usize,
+    reading: f64,
+    duration_s: f64,
+) -> f64 {
+    let output = match output {
+        OutputKind::Counts => reading / duration_s,
+        OutputKind::Mean => reading,
+    };
+    (output - bias[lane]) * ratio[lane] * per_scale_factor[lane]
+}
+
 impl Corrector {
     /// The terms of the accelerometers in use: S and 1/K, and r of their boards.
-    pub(super) fn accel_terms<const N: usize>(&self, shares: &Shares) -> ([[f64; N]; 2], [[f64; N]; 1]) {
+    #[expect(clippy::inline_always, reason = "once per tick: lanes that stay in registers")]
+    #[inline(always)]
+    pub(super) fn accel_terms<const N: usize>(&self, shares: &Shares) -> AccelTerms<N> {
         let (mut terms, mut board) =
             (self.thermal.accels.at::<N>(shares), self.thermal.boards.at::<N>(shares));
         if let Some(slewing) = self.slewing() {
@@ -48,15 +69,10 @@ impl Corrector {
         };
         // The corrected tick has the gyro tick's time.
         let (time, duration_s) = (out.end_time, raw.duration.as_s());
-        let ([bias, per_scale_factor], [ratio]) = self.accel_terms::<N>(shares);
+        let terms = self.accel_terms::<N>(shares);
         let readings = narrow::<N>(&raw.readings);
-        let corrected = |lane: usize, reading: f64| {
-            let output = match calibration.accel_output {
-                OutputKind::Counts => reading / duration_s,
-                OutputKind::Mean => reading,
-            };
-            (output - bias[lane]) * ratio[lane] * per_scale_factor[lane]
-        };
+        let corrected =
+            |lane: usize, reading: f64| felt(&terms, calibration.accel_output, lane, reading, duration_s);
         let mut forces: [f64; N] = array::from_fn(|i| corrected(i, readings[i]));
 
         let mut usable = axes.included();
@@ -84,6 +100,9 @@ impl Corrector {
         seen.reading = raw.readings;
         seen.flags = flags;
         out.accel_flags = of_sensors(flags, count);
+        if self.moves {
+            self.accels_in_motion(calibration, (shares, tick.released.missed), out, &mut forces);
+        }
 
         let Some(axes) = &mut self.thermal.accel_axes else { return };
         let excluded = orientation.sensors() > MIN_SENSORS

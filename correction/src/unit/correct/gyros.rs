@@ -8,7 +8,9 @@ use crate::calibration::Calibration;
 use crate::lanes::{narrow, of_readings, put};
 use crate::orientation::SensorMask;
 use crate::reversal::{Substitution, TickInput};
-use crate::sample::{CorrectedTick, GyroTick, LasingMode, MIN_SENSORS, OutputKind, SensorFlags, TickFlags};
+use crate::sample::{
+    CorrectedTick, GyroTick, LasingMode, MAX_SENSORS, MIN_SENSORS, OutputKind, SensorFlags, TickFlags,
+};
 use crate::servo::{ServoTick, Transient};
 use crate::thermal::Shares;
 use crate::unit::counters::Counters;
@@ -63,6 +65,18 @@ impl Corrector {
         let (mode_sign, meander_sign) = (sign(raw.mode), sign(raw.meander));
         let mut bias: [f64; N] =
             array::from_fn(|i| bias[i] + mode_sign * magnetic[i] + meander_sign * meander[i]);
+        let readings: [f64; N] = of_readings(&raw.readings);
+        let scaled = |lane: usize, reading: f64| match calibration.gyro_output {
+            OutputKind::Counts => weight[lane] * reading,
+            OutputKind::Mean => weight[lane] * (reading * duration_s),
+        };
+        let mut clamped = SensorMask::NONE;
+        if self.moves {
+            let limits = narrow::<N>(&calibration.gyro_limits);
+            let within = |lane: usize| readings[lane].max(-limits[lane]).min(limits[lane]);
+            let rates = array::from_fn(|lane| scaled(lane, within(lane)) / duration_s);
+            clamped = self.gyros_in_motion::<N>(calibration, shares, &rates, &mut bias);
+        }
         self.servo.advance(lost, time, raw.duration);
         if let Some(settles_s) = calibration.servos_settle_s.filter(|_| !lost)
             && !self.servo.pass_settled(settles_s, (time, raw.duration), &raw.half_periods)
@@ -75,18 +89,15 @@ impl Corrector {
             [0.0; N]
         };
         let subtrahend: [f64; N] = array::from_fn(|i| bias[i] + drift[i]);
-        let readings: [f64; N] = of_readings(&raw.readings);
-        let scaled = |lane: usize, reading: f64| match calibration.gyro_output {
-            OutputKind::Counts => weight[lane] * reading,
-            OutputKind::Mean => weight[lane] * (reading * duration_s),
-        };
         let corrected = |lane: usize, reading| scaled(lane, reading) - subtrahend[lane] * duration_s;
         let mut increments: [f64; N] = array::from_fn(|i| corrected(i, readings[i]));
 
         let mut usable = self.thermal.gyro_axes.included();
         let footing = &self.thermal.gyro_footing;
-        let sound = !lost & footing.is_sound(time) & within(&readings, narrow(&calibration.gyro_limits));
-        let flags = if sound {
+        let outside = clamped != SensorMask::NONE;
+        let sound =
+            !(lost | outside) & footing.is_sound(time) & within(&readings, narrow(&calibration.gyro_limits));
+        let mut flags = if sound {
             SOUND
         } else {
             let limits = &calibration.gyro_limits;
@@ -104,6 +115,9 @@ impl Corrector {
                 })
             }
         };
+        if clamped != SensorMask::NONE {
+            mark_clamped(&mut flags, clamped);
+        }
         // Before the substitution: the angle that it restores is a lump, not a rate.
         let rates: [f64; N] = increments.map(|increment| increment / duration_s);
         if sound {
@@ -228,6 +242,13 @@ fn input(released: &Released<'_>) -> TickInput {
 /// Sign of a lasing mode or of the meander's phase; +1 where the instrument has none.
 fn sign(phase: Option<LasingMode>) -> f64 {
     phase.map_or(1.0, LasingMode::sign)
+}
+
+/// Marks gyros whose rate is outside the range that its curve was fitted to.
+#[cold]
+fn mark_clamped(flags: &mut [SensorFlags; MAX_SENSORS], clamped: SensorMask) {
+    let lanes = flags.iter_mut().enumerate().filter(|(lane, _)| clamped.contains(*lane));
+    lanes.for_each(|(_, flags)| *flags |= SensorFlags::CLAMPED_TEMPERATURE);
 }
 
 /// Counts what the substitution did.

@@ -63,7 +63,7 @@ fn the_keys_of_every_curve_have_the_form_that_the_page_states() {
     let (units, arguments) = (suffixes("value_"), suffixes("reference_"));
     assert_eq!(
         arguments.iter().map(String::as_str).collect::<Vec<_>>(),
-        ["deg_c", "deg_c_per_s", "deg_c_per_s2"]
+        ["deg_c", "deg_c_per_s", "deg_c_per_s2", "deg_per_s"]
     );
     for form in forms {
         let keys: Vec<_> = keys_of(form).map(|(key, _)| key).collect();

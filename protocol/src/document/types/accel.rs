@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::super::curve::{Curve, OutputBias, OutputLagGain, Relative, ScaleFactor};
+use super::super::curve::{Curve, OutputBias, OutputLagGain, Relative, ScaleFactor, SecondOrder};
 use super::Orientation;
 
 /// The accelerometers of the unit: `f = (U − S(T) − lags)·r(T_board)/K(T)`.
@@ -73,6 +73,13 @@ pub struct AccelSensor {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 8))]
     pub lag: Vec<AccelLag>,
+    /// K2: what it feels beyond f per f², f along its input axis. Source: models §3, IEEE 528.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub second_order: Option<Curve<SecondOrder>>,
+    /// Where it sits in case axes, from the point whose specific force is published; default: there. Source: models §3.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(inner(range(min = -100.0, max = 100.0)))]
+    pub position_m: Option<[f64; 3]>,
     /// `r(T_board) − 1`, r the board's scale factor at the calibration temperature over that at `T_board`.
     /// Source: models §3, 001 (y1…y3).
     #[serde(skip_serializing_if = "Option::is_none")]

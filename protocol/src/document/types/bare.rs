@@ -21,6 +21,9 @@ impl GyroSensor {
             thermal_rate: None,
             thermal_acceleration: None,
             lag: Vec::new(),
+            acceleration_sensitive_drift: None,
+            increment_weight_asymmetry: None,
+            increment_weight_over_rate: None,
             trend: None,
             servo: None,
             drift: None,
@@ -42,6 +45,8 @@ impl AccelSensor {
             scale_factor,
             bias: None,
             lag: Vec::new(),
+            second_order: None,
+            position_m: None,
             board_ratio_error: None,
         }
     }

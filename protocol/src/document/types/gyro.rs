@@ -4,7 +4,10 @@ use isotherm_correction::servo::DEFAULT_SETTLE_TIME_CONSTANTS;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::super::curve::{Curve, Frequency, LagGain, RateBias, Relative, ThermalAcceleration, ThermalRate};
+use super::super::curve::{
+    Curve, DriftByForce, Frequency, LagGain, RateBias, Relative, RelativeOverRate, ThermalAcceleration,
+    ThermalRate,
+};
 use super::{Drift, Orientation};
 
 /// The gyros of the unit: `θ = K(T)·P − Ω·Δt`.
@@ -83,6 +86,15 @@ pub struct GyroSensor {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 8))]
     pub lag: Vec<Lag>,
+    /// Drift by specific force along the case axes; needs `[accel]`. Source: models §2, IEEE 528.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub acceleration_sensitive_drift: Option<AlongAxes<Curve<DriftByForce>>>,
+    /// Half the difference of K between positive and negative rates, over their mean. Source: models §2, IEEE 528.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub increment_weight_asymmetry: Option<Curve<Relative>>,
+    /// K(ω)/K(T) − 1, ω the rate that the gyro reads. Source: models §2, IEEE 528.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub increment_weight_over_rate: Option<Curve<RelativeOverRate>>,
     /// Polynomial of the time since turn-on. Source: 002.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub trend: Option<Trend>,
@@ -103,6 +115,21 @@ pub struct Branches<C> {
     pub run_up: C,
     /// "−" curve, over the same argument: Ṫ·T̈ < 0. Source: 000.
     pub braking: C,
+}
+
+/// One curve per case axis; default of each: 0.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub struct AlongAxes<C> {
+    /// Along x.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub x: Option<C>,
+    /// Along y.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub y: Option<C>,
+    /// Along z.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub z: Option<C>,
 }
 
 /// One thermal lag.

@@ -1,5 +1,6 @@
 //! Places where one step more or less makes another decision.
 
+use isotherm_correction::calibration::{BranchArgument, BranchedParts};
 use isotherm_correction::curve::CurveParts;
 use isotherm_correction::operation::Command;
 use isotherm_correction::reversal::{ReversalParts, Transition};
@@ -7,7 +8,7 @@ use isotherm_correction::sample::OutputKind;
 use isotherm_correction::unit::{At, Uncalibrated, UnitSettings};
 use isotherm_correction::units::Span;
 use isotherm_protocol::key::{Input, RawStream};
-use isotherm_tests::calibrations::{compile, identity, polynomial};
+use isotherm_tests::calibrations::{Feature, PutTerms, compile, identity, polynomial};
 use isotherm_tests::lives::{FULL_CHANNELS, full};
 use isotherm_tests::script::{Accels, Kind, Odd, Scenario, Script, Step};
 
@@ -31,10 +32,12 @@ pub(crate) fn edge_of_an_orientation_s_range() -> Scenario {
 pub(crate) fn edge_of_a_branch_s_range() -> Scenario {
     let mut parts = rich_parts(0.0);
     let narrow = |range| CurveParts::Polynomial { reference: 0.0, coefficients: vec![1e-4, 1e-5], range };
-    let rate = parts.gyros[0].thermal_rate.as_mut().unwrap();
-    (rate.run_up, rate.braking) = (narrow([-1e-3, 1e-3]), narrow([-50.0, 50.0]));
-    let acceleration = parts.gyros[1].thermal_acceleration.as_mut().unwrap();
-    (acceleration.run_up, acceleration.braking) = (narrow([-500.0, 500.0]), narrow([-1e-3, 1e-3]));
+    // As they are, over the derivative.
+    let argument = BranchArgument::Derivative;
+    let (run_up, braking) = (narrow([-1e-3, 1e-3]), narrow([-50.0, 50.0]));
+    parts.gyros[0].terms.branched(Feature::ThermalRate, BranchedParts { argument, run_up, braking });
+    let (run_up, braking) = (narrow([-500.0, 500.0]), narrow([-1e-3, 1e-3]));
+    parts.gyros[1].terms.branched(Feature::ThermalAcceleration, BranchedParts { argument, run_up, braking });
     let mut script = Script::new(152, &compile(&parts), &RICH_CHANNELS);
     (script.batch, script.warming) = (1, 0.1);
     script.ticks(300);
@@ -325,7 +328,7 @@ pub(crate) fn edge_of_other_outputs() -> Scenario {
 /// Ticks that were never corrected are missing to what comes later, a restart among them.
 pub(crate) fn edge_of_a_calibration_that_comes_late() -> Scenario {
     let mut parts = identity();
-    parts.gyros[1].static_bias = Some(polynomial(&[1e-4]));
+    parts.gyros[1].terms.curve(Feature::One, polynomial(&[1e-4]));
     let mut script = Script::new(168, &compile(&parts), &[("t", 24.0)]);
     let first = script.steps.remove(0);
     script.batch = 1;

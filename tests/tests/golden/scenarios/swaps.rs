@@ -2,11 +2,10 @@
 
 use std::sync::Arc;
 
-use isotherm_correction::calibration::LagParts;
 use isotherm_correction::sample::OutputKind;
 use isotherm_correction::unit::{At, UnitSettings};
 use isotherm_correction::units::{Span, Timestamp};
-use isotherm_tests::calibrations::{compile, constant, polynomial};
+use isotherm_tests::calibrations::{Feature, PutTerms, compile, constant, polynomial};
 use isotherm_tests::lives::{FULL_CHANNELS, full, skewed};
 use isotherm_tests::script::{Scenario, Script};
 
@@ -69,8 +68,8 @@ pub(crate) fn swaps_with_other_terms_and_channels() -> Scenario {
     (script.batch, script.warming) = (5, 0.1);
     let base = rich_parts(0.0);
     let mut other_lags = base.clone();
-    other_lags.gyros[0].lags = vec![LagParts { time_constant_s: 2.0, gain: constant(3e-4) }];
-    other_lags.accels[1].lags[0].gain = constant(2e-3);
+    other_lags.gyros[0].terms.lags([(2.0, constant(3e-4))]);
+    other_lags.accels[1].terms.lags([(0.4, constant(2e-3))]);
     let mut other_filter = base.clone();
     other_filter.filter.smoothing_s = 0.3;
     let mut other_channel = base.clone();
@@ -79,7 +78,7 @@ pub(crate) fn swaps_with_other_terms_and_channels() -> Scenario {
     following_the_board.gyros[1].channel = Some(1);
     following_the_board.gyro_orientation_channels = vec![0, 1];
     let mut one_gyro = base.clone();
-    one_gyro.gyros[2].static_bias = Some(polynomial(&[3e-4]));
+    one_gyro.gyros[2].terms.curve(Feature::One, polynomial(&[3e-4]));
     let mut stiff = base.clone();
     stiff.gyro_orientation.slopes_per_deg_c.clear();
     for parts in

@@ -1,0 +1,116 @@
+//! What few units have: terms whose features follow the unit's motion (models §2, §3; IEEE 528).
+
+use alloc::boxed::Box;
+use alloc::vec::Vec;
+
+use serde::{Deserialize, Serialize};
+
+use super::bank::Follows;
+use super::lag::{Lag, MAX_LAGS};
+use super::terms::{ACCEL_TERMS, GYRO_TERMS, Terms};
+use crate::calibration::{AccelParts, GyroParts};
+use crate::channel::{ThermalFilter, ThermalState};
+use crate::curve::{Curve, CurveError};
+use crate::lanes::Lanes;
+use crate::sample::MAX_SENSORS;
+
+/// A sensor's terms that follow motion, compiled.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct MotionTerms {
+    pub(crate) channel: Option<usize>,
+    pub(crate) terms: Terms,
+    /// K(ω)/K(T) − 1 of a gyro over the rate that it reads.
+    pub(crate) over_rate: Option<Curve>,
+}
+
+impl MotionTerms {
+    /// Compiles those of a gyro; `report` hears of every one that is wrong, by its key.
+    pub(crate) fn of_gyro(
+        parts: &GyroParts,
+        filter: &ThermalFilter,
+        report: &mut dyn FnMut(&'static str, CurveError),
+    ) -> Option<Self> {
+        let terms = Terms::new(&GYRO_TERMS, &parts.terms, true, filter, report);
+        let over_rate = match parts.increment_weight_over_rate.as_ref().map(Curve::new) {
+            None => None,
+            Some(Ok(curve)) => Some(curve),
+            Some(Err(error)) => {
+                report("increment_weight_over_rate", error);
+                return None;
+            }
+        };
+        Some(Self { channel: parts.channel, terms: terms?, over_rate })
+    }
+
+    /// Compiles those of an accelerometer; `report` hears of every one that is wrong, by its key.
+    pub(crate) fn of_accel(
+        parts: &AccelParts,
+        filter: &ThermalFilter,
+        report: &mut dyn FnMut(&'static str, CurveError),
+    ) -> Option<Self> {
+        let terms = Terms::new(&ACCEL_TERMS, &parts.terms, true, filter, report);
+        Some(Self { channel: parts.channel, terms: terms?, over_rate: None })
+    }
+
+    /// Its lines at a thermal state.
+    pub(crate) fn at(&self, thermal: &ThermalState, filter: &ThermalFilter) -> [f64; 4] {
+        self.terms.lines(thermal, &[0.0; MAX_LAGS], filter).0
+    }
+
+    fn is_empty(&self) -> bool {
+        self.terms.is_empty() && self.over_rate.is_none()
+    }
+}
+
+impl<const T: usize> Follows<T> for MotionTerms {
+    fn channel(&self) -> Option<usize> {
+        self.channel
+    }
+
+    fn lags(&self) -> &[Lag] {
+        &[]
+    }
+
+    fn terms(
+        &self,
+        thermal: &ThermalState,
+        lagged: &[f64; MAX_LAGS],
+        filter: &ThermalFilter,
+    ) -> ([f64; T], bool) {
+        self.terms.lines(thermal, lagged, filter)
+    }
+}
+
+/// Everything of a unit that follows motion.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Motion {
+    pub(crate) gyros: Vec<MotionTerms>,
+    pub(crate) accels: Vec<MotionTerms>,
+    /// Where the accelerometers sit, axis by axis (m).
+    pub(crate) positions_m: [Lanes; 3],
+}
+
+impl Motion {
+    /// `None` for a unit that has nothing of the kind.
+    pub(crate) fn of(
+        gyros: Vec<MotionTerms>,
+        accels: Vec<MotionTerms>,
+        positions_m: impl Iterator<Item = [f64; 3]>,
+    ) -> Option<Box<Self>> {
+        let mut lanes = [[0.0; MAX_SENSORS]; 3];
+        for (lane, position) in positions_m.take(MAX_SENSORS).enumerate() {
+            lanes.iter_mut().zip(position).for_each(|(axis, metres)| axis[lane] = metres);
+        }
+        let motion = Self { gyros, accels, positions_m: lanes };
+        (!motion.is_empty()).then(|| Box::new(motion))
+    }
+
+    fn is_empty(&self) -> bool {
+        self.gyros.iter().chain(&self.accels).all(MotionTerms::is_empty) && !self.has_positions()
+    }
+
+    /// Whether an accelerometer sits elsewhere than at the reference point.
+    pub(crate) fn has_positions(&self) -> bool {
+        self.positions_m.iter().flatten().any(|metres| *metres != 0.0)
+    }
+}

@@ -1,0 +1,241 @@
+//! What follows the unit's motion: drift with acceleration, weights that depend on the rate, squares of forces, and accelerometers
+//! away from the reference point (models §2, §3).
+
+use core::array;
+
+use serde::{Deserialize, Serialize};
+
+use super::accels::felt;
+use super::patch::within;
+use super::{Corrector, OnItsWay};
+use crate::calibration::Calibration;
+use crate::lanes::{Lanes, narrow};
+use crate::orientation::SensorMask;
+use crate::sample::{CorrectedTick, TickFlags};
+use crate::thermal::{Motion, MotionBanks, Shares};
+use crate::unit::slew::between;
+use crate::units::{Span, Timestamp};
+use crate::vector::{cross, minus, plus};
+
+/// What was in use when a swap took effect, for a slew away from it.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(in crate::unit) struct MotionInUse {
+    pub(super) motion: Motion,
+    gyros: [Lanes; 4],
+    accels: [Lanes; 1],
+}
+
+/// Motion of the last ticks, in case axes.
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
+pub(super) struct MotionMemory {
+    /// Last specific force to be trusted (m/s²).
+    force: [f64; 3],
+    /// Angular rates of the last two ticks without a gap (rad/s), the latest first, with the middles of the ticks.
+    rates: [Option<([f64; 3], Timestamp)>; 2],
+}
+
+impl MotionMemory {
+    /// Angular acceleration at the middle of the tick (rad/s²), from its rate and those of up to two ticks before it: the slope of the
+    /// parabola through the three, of the line through two, zero without.
+    ///
+    /// With equal ticks it is (3ω₀ − 4ω₁ + ω₂)/2Δt: white noise of the rate of standard deviation σ gives it √26/2 ≈ 2.55 σ/Δt.
+    fn acceleration(&self, rate: [f64; 3], middle: Timestamp) -> [f64; 3] {
+        let slope = |(later, at): ([f64; 3], Timestamp), (earlier, before): ([f64; 3], Timestamp)| {
+            let over_s = at.seconds_from(before);
+            (minus(later, earlier).map(|step| step / over_s), over_s)
+        };
+        let Some(last) = self.rates[0] else { return [0.0; 3] };
+        let (here, over_s) = slope((rate, middle), last);
+        let Some(earlier) = self.rates[1] else { return here };
+        let (there, before_s) = slope(last, earlier);
+        plus(here, minus(here, there).map(|bend| bend * over_s / (over_s + before_s)))
+    }
+
+    /// Puts a tick's rate before the others.
+    fn push(&mut self, rate: [f64; 3], middle: Timestamp) {
+        self.rates = [Some((rate, middle)), self.rates[0]];
+    }
+
+    /// Forgets rates: what comes next does not follow them without a gap.
+    pub(super) fn interrupt(&mut self) {
+        self.rates = [None; 2];
+    }
+}
+
+impl MotionInUse {
+    /// Nothing that follows motion.
+    const NONE: ([Lanes; 4], [Lanes; 1]) = ([[0.0; 8]; 4], [[0.0; 8]; 1]);
+}
+
+impl Corrector {
+    /// What is in use, for a slew away from it; `None` where it is nothing.
+    pub(super) fn motion_in_use(&self, calibration: &Calibration, shares: &Shares) -> Option<MotionInUse> {
+        let motion = calibration.motion.as_deref().or(self.slew_from_motion().map(|old| &old.motion))?;
+        let (gyros, accels) = (self.gyro_motion(shares), self.accel_motion(shares));
+        Some(MotionInUse { motion: motion.clone(), gyros, accels })
+    }
+
+    fn slew_from_motion(&self) -> Option<&MotionInUse> {
+        self.slewing().and_then(|slewing| slewing.from.motion.as_ref())
+    }
+
+    /// Coefficients of the gyros' terms that follow motion.
+    fn gyro_motion<const N: usize>(&self, shares: &Shares) -> [[f64; N]; 4] {
+        let banks = self.thermal.motion.as_deref();
+        let mut terms = banks.map_or([[0.0; N]; 4], |MotionBanks { gyros, .. }| gyros.at(shares));
+        if let Some(slewing) = self.slewing() {
+            let old = slewing.from.motion.as_ref().map_or(&MotionInUse::NONE.0, |old| &old.gyros);
+            slewing.terms(&mut terms, old);
+        }
+        terms
+    }
+
+    /// Coefficients of the accelerometers' terms that follow motion.
+    fn accel_motion<const N: usize>(&self, shares: &Shares) -> [[f64; N]; 1] {
+        let banks = self.thermal.motion.as_deref();
+        let mut terms = banks.map_or([[0.0; N]; 1], |MotionBanks { accels, .. }| accels.at(shares));
+        if let Some(slewing) = self.slewing() {
+            let old = slewing.from.motion.as_ref().map_or(&MotionInUse::NONE.1, |old| &old.accels);
+            slewing.terms(&mut terms, old);
+        }
+        terms
+    }
+
+    /// Whether an accelerometer sits, or sat before a swap that is on its way, elsewhere than at the reference point.
+    fn has_positions(&self, calibration: &Calibration) -> bool {
+        let old = self.slew_from_motion().map(|old| &old.motion);
+        calibration.motion.as_deref().into_iter().chain(old).any(Motion::has_positions)
+    }
+
+    /// Adds to the gyros' biases (rad/s) what follows motion; `rates` are those that the gyros read (rad/s), before any bias is
+    /// subtracted. Gives the gyros whose rate is outside the range of its curve.
+    #[cold]
+    pub(super) fn gyros_in_motion<const N: usize>(
+        &self,
+        calibration: &Calibration,
+        shares: &Shares,
+        rates: &[f64; N],
+        bias: &mut [f64; N],
+    ) -> SensorMask {
+        let [x, y, z, asymmetry] = self.gyro_motion::<N>(shares);
+        let force = self.motion.force;
+        let mut clamped = SensorMask::NONE;
+        for lane in 0..calibration.gyros.len().min(N) {
+            let rate = rates[lane];
+            let over_rate = |motion: Option<&Motion>| {
+                motion?.gyros.get(lane)?.over_rate.as_ref().map(|curve| curve.at(rate))
+            };
+            let here = over_rate(calibration.motion.as_deref());
+            clamped = clamped.set(lane, here.is_some_and(|error| error.clamped));
+            let error = here.map_or(0.0, |error| error.value);
+            let error = self.slewing().map_or(error, |slewing| {
+                let old = over_rate(slewing.from.motion.as_ref().map(|old| &old.motion));
+                between(error, old.map_or(0.0, |error| error.value), slewing.share)
+            });
+            let by_force = x[lane] * force[0] + y[lane] * force[1] + z[lane] * force[2];
+            bias[lane] += by_force - asymmetry[lane] * rate.abs() - error * rate;
+        }
+        clamped
+    }
+
+    /// Notes the specific force of a tick in case axes, before the gyros are corrected by it; where it is not to be had, the last one
+    /// stands.
+    #[cold]
+    pub(super) fn note_force<const N: usize>(
+        &mut self,
+        calibration: &Calibration,
+        tick: &OnItsWay<'_>,
+        shares: &Shares,
+    ) {
+        let Some(raw) = tick.accel else { return };
+        let readings = narrow::<N>(&raw.readings);
+        if !within(readings, narrow(&calibration.accel_limits)) {
+            return;
+        }
+        let (terms, duration_s) = (self.accel_terms::<N>(shares), raw.duration.as_s());
+        let along = |lane| felt(&terms, calibration.accel_output, lane, readings[lane], duration_s);
+        let mut forces: [f64; N] = array::from_fn(along);
+        self.remove_squares(shares, &mut forces);
+        let (Some(orientation), Some(axes)) = (&calibration.accel_orientation, &mut self.thermal.accel_axes)
+        else {
+            return;
+        };
+        let time = tick.released.tick.end_time;
+        let (force, trusted) = axes.resolve(orientation, axes.included(), &forces, time);
+        if trusted {
+            self.motion.force = force;
+        }
+    }
+
+    /// Takes out of the forces that the accelerometers feel (m/s²) what follows motion.
+    #[cold]
+    pub(super) fn accels_in_motion<const N: usize>(
+        &mut self,
+        calibration: &Calibration,
+        (shares, missed): (&Shares, u64),
+        out: &CorrectedTick,
+        forces: &mut [f64; N],
+    ) {
+        self.remove_squares(shares, forces);
+        if self.has_positions(calibration) {
+            self.remove_size_effect(calibration, missed, out, forces);
+        }
+    }
+
+    /// m = f + K2·f² has the solution f = 2m/(1 + √(1 + 4·K2·m)) next to m.
+    fn remove_squares<const N: usize>(&self, shares: &Shares, forces: &mut [f64; N]) {
+        let [second_order] = self.accel_motion::<N>(shares);
+        *forces = array::from_fn(|lane| {
+            let root = libm::sqrt((1.0 + 4.0 * second_order[lane] * forces[lane]).max(0.0));
+            2.0 * forces[lane] / (1.0 + root)
+        });
+    }
+
+    /// Takes out what accelerometers feel for sitting elsewhere: ω × (ω × r) + α × r along the input axis.
+    fn remove_size_effect<const N: usize>(
+        &mut self,
+        calibration: &Calibration,
+        missed: u64,
+        out: &CorrectedTick,
+        forces: &mut [f64; N],
+    ) {
+        let new = calibration.motion.as_deref().map(|motion| &motion.positions_m);
+        let old = self.slewing().and_then(|slewing| {
+            let old = slewing.from.motion.as_ref()?;
+            Some((old.motion.positions_m, slewing.share))
+        });
+        let (rate, acceleration) = self.turning(missed, out);
+        let (Some(orientation), Some(axes)) = (&calibration.accel_orientation, &self.thermal.accel_axes)
+        else {
+            return;
+        };
+        let temperature = axes.temperature_deg_c(out.end_time);
+        for lane in 0..calibration.accels.len().min(N) {
+            let position: [f64; 3] = array::from_fn(|axis| {
+                let here = new.map_or(0.0, |positions| positions[axis][lane]);
+                old.map_or(here, |(old, share)| between(here, narrow::<N>(&old[axis])[lane], share))
+            });
+            let felt = plus(cross(rate, cross(rate, position)), cross(acceleration, position));
+            forces[lane] -= orientation.forward(temperature, felt).get(lane).copied().unwrap_or_default();
+        }
+    }
+
+    /// Angular rate (rad/s) and acceleration (rad/s²) of a tick, in case axes. A tick that carries the restored angle of a mode switch
+    /// turns as the one before it.
+    fn turning(&mut self, missed: u64, out: &CorrectedTick) -> ([f64; 3], [f64; 3]) {
+        let middle = out.end_time - Span::from_ns(out.duration.as_ns() / 2);
+        if missed > 0 {
+            self.motion.interrupt();
+        }
+        if out.flags.intersects(TickFlags::ANGLE_RESTORED | TickFlags::ANGLE_INVALID) {
+            let rate = self.motion.rates[0].map_or([0.0; 3], |(rate, _)| rate);
+            self.motion.interrupt();
+            return (rate, [0.0; 3]);
+        }
+        let per_second = 1.0 / out.duration.as_s();
+        let rate = out.delta_angle.map(|angle| angle * per_second);
+        let acceleration = self.motion.acceleration(rate, middle);
+        self.motion.push(rate, middle);
+        (rate, acceleration)
+    }
+}

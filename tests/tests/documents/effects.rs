@@ -1,0 +1,195 @@
+//! What sensors do with the unit's motion: simulated as physics, taken out by the terms of a document.
+
+use isotherm_protocol::document::{AlongAxes, Curve, Document, Shape};
+use isotherm_simulator::Scenario;
+use isotherm_simulator::chamber::Profile;
+use isotherm_simulator::effects::{AccelerometerEffects, Effects, GyroEffects};
+use isotherm_simulator::instrument::Gyros;
+use isotherm_simulator::motion::{Motion, Path};
+use isotherm_simulator::noise::GyroNoise;
+use isotherm_simulator::presets::mems_chamber;
+use isotherm_tests::simulated::{Size, run};
+
+use crate::{compile, parsed};
+
+const G: f64 = 9.806_65;
+const DEG_PER_H: f64 = std::f64::consts::PI / 180.0 / 3600.0;
+/// Tumbling: every axis feels gravity from both sides.
+const TUMBLE: Path = Path::ConstantRate { axis: [1.0, 2.0, -0.5], rate_deg_per_s: 40.0 };
+
+/// MEMS-0001 without noise, on a path, while the chamber warms from 20 °C by 2 °C/min.
+fn scenario(path: Path, effects: Effects) -> Scenario {
+    let mut scenario = mems_chamber(41);
+    scenario.chamber = Profile::constant(20.0).ramp(40.0, 2.0);
+    scenario.motion = Motion { heading_deg: 30.0, ..Motion::rest(55.75) }.along(path);
+    scenario.duration_s = 120.0;
+    if let Gyros::Mems(gyros) = &mut scenario.instrument.gyros {
+        for gyro in gyros {
+            gyro.noise = GyroNoise::default();
+        }
+    }
+    let accelerometers = scenario.instrument.accelerometers.iter_mut().flat_map(|all| &mut all.sensors);
+    accelerometers.for_each(|sensor| sensor.velocity_random_walk_m_per_s_per_sqrt_s = 0.0);
+    scenario.instrument.effects = effects;
+    scenario
+}
+
+/// Root mean square error of the rate (°/h) and of the specific force (mg), of single ticks after the filters have settled, worst axis.
+fn errors(document: &Document, scenario: &Scenario) -> (f64, f64) {
+    let mut errors = [const { Vec::new() }; 6];
+    let mut ticks = 0;
+    run(&compile(document), scenario, |step, tick| {
+        ticks += 1;
+        if ticks < 2000 {
+            return;
+        }
+        let duration_s = tick.duration.as_s();
+        for axis in 0..3 {
+            let angle = tick.delta_angle[axis] - step.truth.delta_angle[axis];
+            let velocity = tick.delta_velocity[axis] - step.truth.delta_velocity[axis];
+            errors[axis].push(angle / duration_s / DEG_PER_H);
+            errors[3 + axis].push(velocity / duration_s / G * 1e3);
+        }
+    })
+    .unwrap();
+    let worst = |errors: &[Vec<f64>]| {
+        errors.iter().map(|errors| Size::of(errors.iter().copied()).rms).fold(0.0, f64::max)
+    };
+    (worst(&errors[..3]), worst(&errors[3..]))
+}
+
+fn document() -> Document {
+    parsed("MEMS-0001.toml").document
+}
+
+fn constant(value: f64) -> Shape {
+    Shape::Constant { value }
+}
+
+/// The error that an effect makes, and what is left of it with the terms that `state` puts into the document; both beside an instrument
+/// without the effect.
+fn judged(
+    scenario: &Scenario,
+    state: impl FnOnce(&mut Document),
+    error: impl Fn(&Document, &Scenario) -> f64,
+) -> [f64; 3] {
+    let mut without_effect = scenario.clone();
+    without_effect.instrument.effects = Effects::default();
+    let plain = document();
+    let mut with_term = document();
+    state(&mut with_term);
+    let found = [error(&plain, &without_effect), error(&plain, scenario), error(&with_term, scenario)];
+    println!("without the effect {:.4}, with it {:.4}, with its term {:.4}", found[0], found[1], found[2]);
+    found
+}
+
+#[test]
+fn drift_with_acceleration_is_removed_over_temperature() {
+    let coefficients = [[12.0, -7.0, 4.0], [3.0, 15.0, -6.0], [-8.0, 2.0, 9.0]];
+    let per_k = [0.05, -0.02, 0.03];
+    let gyros = coefficients.map(|row| GyroEffects {
+        acceleration_rad_per_s_per_m_per_s2: row.map(|c| c * DEG_PER_H / G),
+        acceleration_per_k: per_k.map(|c| c * DEG_PER_H / G),
+        reference_deg_c: 25.0,
+        ..GyroEffects::default()
+    });
+    let scenario = scenario(TUMBLE, Effects { gyros: gyros.to_vec(), accelerometers: Vec::new() });
+    let [floor, with, left] = judged(
+        &scenario,
+        |document| {
+            for (sensor, row) in document.gyro.sensor.iter_mut().zip(coefficients) {
+                let [x, y, z] = [0, 1, 2].map(|axis: usize| {
+                    let coefficients = vec![row[axis], per_k[axis]];
+                    Some(Curve::new(Shape::Polynomial {
+                        reference: 25.0,
+                        coefficients,
+                        range: [-40.0, 80.0],
+                    }))
+                });
+                sensor.acceleration_sensitive_drift = Some(AlongAxes { x, y, z });
+            }
+        },
+        |document, scenario| errors(document, scenario).0,
+    );
+    assert!(with > 5.0 && left < floor + 0.01 * with, "{with} {left} {floor}");
+}
+
+#[test]
+fn a_scale_that_depends_on_the_rate_is_removed() {
+    let (asymmetry, curvature) = (150e-6, 40e-6);
+    let gyros = [1.0, -1.0, 0.5].map(|sense| GyroEffects {
+        scale_asymmetry: asymmetry * sense,
+        scale_curvature_s2_per_rad2: curvature * sense,
+        ..GyroEffects::default()
+    });
+    let sine = Path::Sine { axis: [1.0, -0.8, 0.6], amplitude_deg: 30.0, frequency_hz: 0.5, phase_deg: 0.0 };
+    let scenario = scenario(sine, Effects { gyros: gyros.to_vec(), accelerometers: Vec::new() });
+    let [floor, with, left] = judged(
+        &scenario,
+        |document| {
+            for (sensor, sense) in document.gyro.sensor.iter_mut().zip([1.0, -1.0, 0.5]) {
+                // The gyro senses 1 + a of a positive rate: its weight is less there.
+                sensor.increment_weight_asymmetry = Some(Curve::new(constant(-asymmetry * sense * 1e6)));
+                let knot = |step: i32| {
+                    let deg_per_s = f64::from(step) * 10.0;
+                    let rate = deg_per_s.to_radians();
+                    [deg_per_s, (1.0 / (1.0 + curvature * sense * rate * rate) - 1.0) * 1e6]
+                };
+                let knots = (-12..=12).map(knot).collect();
+                sensor.increment_weight_over_rate = Some(Curve::new(Shape::Spline { knots }));
+            }
+        },
+        |document, scenario| errors(document, scenario).0,
+    );
+    assert!(with > 20.0 && left < floor + 0.01 * with, "{with} {left} {floor}");
+}
+
+#[test]
+fn what_accelerometers_feel_for_sitting_elsewhere_is_removed() {
+    let positions = [[0.03, 0.0, -0.01], [-0.01, 0.025, 0.0], [0.0, -0.02, 0.03]];
+    let accelerometers =
+        positions.map(|position_m| AccelerometerEffects { position_m, ..AccelerometerEffects::default() });
+    let sine = Path::Sine { axis: [1.0, -0.8, 0.6], amplitude_deg: 10.0, frequency_hz: 1.0, phase_deg: 0.0 };
+    let effects = Effects { gyros: Vec::new(), accelerometers: accelerometers.to_vec() };
+    let scenario = scenario(sine, effects);
+    let [floor, with, left] = judged(
+        &scenario,
+        |document| {
+            let sensors = document.accel.as_mut().unwrap().sensor.iter_mut();
+            sensors.zip(positions).for_each(|(sensor, position_m)| sensor.position_m = Some(position_m));
+        },
+        |document, scenario| errors(document, scenario).1,
+    );
+    // The acceleration is that of a parabola through three ticks: at 100 ticks a turn it is off by some (2π/100)²/3.
+    assert!(with > 5.0 && left < floor + 0.01 * with, "{with} {left} {floor}");
+}
+
+#[test]
+fn a_square_in_the_force_is_removed() {
+    let second_order = [40.0, -25.0, 60.0];
+    let accelerometers = second_order.map(|micro_g_per_g2| AccelerometerEffects {
+        second_order_s2_per_m: micro_g_per_g2 * 1e-6 / G,
+        ..AccelerometerEffects::default()
+    });
+    let vibration = Path::Sculling {
+        axis: [0.0, 1.0, 0.0],
+        amplitude_deg: 0.5,
+        frequency_hz: 1.0,
+        vibration_axis: [1.0, -1.0, 1.0],
+        vibration_m_per_s2: 40.0,
+        vibration_phase_deg: 20.0,
+    };
+    let effects = Effects { gyros: Vec::new(), accelerometers: accelerometers.to_vec() };
+    let scenario = scenario(vibration, effects);
+    let [floor, with, left] = judged(
+        &scenario,
+        |document| {
+            let sensors = document.accel.as_mut().unwrap().sensor.iter_mut();
+            for (sensor, value) in sensors.zip(second_order) {
+                sensor.second_order = Some(Curve::new(constant(value)));
+            }
+        },
+        |document, scenario| errors(document, scenario).1,
+    );
+    assert!(with > 0.2 && left < floor + 0.01 * with, "{with} {left} {floor}");
+}
