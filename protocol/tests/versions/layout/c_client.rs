@@ -1,0 +1,194 @@
+//! `clients/c/isotherm.h` with the compilers of this machine: no warning, the frozen vectors, the cases of continuity, and a short fuzz.
+
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use isotherm_protocol::codec::CodecError;
+use serde_json::Value;
+
+use super::super::page::{Vector, all_vectors};
+use super::super::decode_as;
+use super::c_printer::printer;
+use super::file::Layout;
+use super::path;
+
+const STRICT: &[&str] = &["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-O1", "-g"];
+const SANITIZERS: &[&str] = &["-fsanitize=address,undefined", "-fno-sanitize-recover=all"];
+
+/// A folder of the test's own, with the printers.
+fn folder(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    std::fs::create_dir_all(&folder).expect("a folder");
+    std::fs::write(folder.join("print.h"), printer(&Layout::load())).expect("it can be written");
+    folder
+}
+
+/// Compilers on the PATH; `cc` must be there.
+fn compilers() -> impl Iterator<Item = &'static str> {
+    let is_there = |compiler: &str| {
+        let version = Command::new(compiler).arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status();
+        version.is_ok_and(|status| status.success())
+    };
+    assert!(is_there("cc"), "no C compiler: install gcc or clang");
+    ["gcc", "clang"].into_iter().filter(move |compiler| is_there(compiler)).chain(["cc"])
+}
+
+/// Compiles a program of `clients/c`; the compiler's complaint where it does not.
+fn compile(compiler: &str, source: &str, to: &Path, options: &[&str]) -> Result<(), String> {
+    let folder = to.parent().expect("in a folder");
+    let mut command = Command::new(compiler);
+    command.args(STRICT).args(options).arg("-I").arg(folder).arg("-o").arg(to).arg(path("clients/c").join(source));
+    let output = command.output().expect("the compiler runs");
+    if output.status.success() { Ok(()) } else { Err(String::from_utf8_lossy(&output.stderr).into_owned()) }
+}
+
+/// What a program says to what it is told.
+fn run(program: &Path, arguments: &[&str], input: &str) -> String {
+    let mut command = Command::new(program);
+    command.args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped());
+    let mut child = command.spawn().expect("it runs");
+    let mut stdin = child.stdin.take().expect("piped");
+    std::thread::scope(|scope| {
+        scope.spawn(move || stdin.write_all(input.as_bytes()).expect("it reads"));
+        let output = child.wait_with_output().expect("it ends");
+        assert!(output.status.success(), "{}: {}", program.display(), output.status);
+        String::from_utf8(output.stdout).expect("text")
+    })
+}
+
+/// Sanitizers, where this compiler has their libraries.
+fn sanitizers(compiler: &str, folder: &Path) -> &'static [&'static str] {
+    let probe = compile(compiler, "tests/accounts.c", &folder.join("probe"), SANITIZERS);
+    if probe.is_err() {
+        println!("skipped: {compiler} has no address and undefined-behaviour sanitizers here");
+    }
+    if probe.is_ok() { SANITIZERS } else { &[] }
+}
+
+fn hex(frame: &[u8]) -> String {
+    frame.iter().fold(String::new(), |text, byte| text + &format!("{byte:02x}"))
+}
+
+/// Whether two messages are equal; the header's program gives the bits of numbers, rounded to those of a `float` where `float`.
+fn equal(got: &Value, expected: &Value, float: bool) -> bool {
+    match (got, expected) {
+        (Value::Object(got), Value::Object(expected)) => {
+            let alike = |(name, value)| expected.get(name).is_some_and(|other| equal(value, other, float));
+            got.len() == expected.len() && got.iter().all(alike)
+        }
+        (Value::Array(got), Value::Array(expected)) => {
+            got.len() == expected.len() && got.iter().zip(expected).all(|(got, expected)| equal(got, expected, float))
+        }
+        (Value::String(bits), Value::Number(number)) => {
+            let exact = number.as_f64().expect("a number");
+            #[expect(clippy::cast_possible_truncation, reason = "this is what the header does")]
+            let rounded = if float { f64::from(exact as f32) } else { exact };
+            *bits == format!("{:016x}", rounded.to_bits())
+        }
+        _ => got == expected,
+    }
+}
+
+/// What the header's result says of the codec's.
+fn result_of(error: &CodecError) -> i32 {
+    match error {
+        CodecError::Length { .. } => 1,
+        CodecError::Kind { .. } => 2,
+        CodecError::Version { .. } => 3,
+        CodecError::Checksum { .. } => 4,
+        CodecError::Trailing { .. } => 6,
+        // The header counts a number of ticks beyond the limit as a body that does not decode.
+        CodecError::Malformed | CodecError::Ticks { .. } => 5,
+        _ => 7,
+    }
+}
+
+fn check_vectors(compiler: &str, float: bool) {
+    let folder = folder(&format!("c-vectors-{compiler}-{float}"));
+    let mut options = sanitizers(compiler, &folder).to_vec();
+    if float {
+        options.push("-DISOTHERM_FLOAT");
+    }
+    let program = folder.join("vectors");
+    compile(compiler, "tests/vectors.c", &program, &options).unwrap_or_else(|complaint| panic!("{compiler}: {complaint}"));
+    let vectors = all_vectors();
+    let mut input = String::new();
+    for Vector { refused_as, frame, .. } in &vectors {
+        let kind = refused_as.unwrap_or(frame[0]);
+        writeln!(input, "{kind} {}", hex(frame)).expect("memory");
+    }
+    let said = run(&program, &[], &input);
+    let mut lines = said.lines();
+    for Vector { name, refused_as, frame, .. } in &vectors {
+        let line = lines.next().expect("an answer");
+        if let Some(kind) = refused_as {
+            let code: i32 = line.strip_prefix("refused ").and_then(|code| code.parse().ok()).unwrap_or_else(|| panic!("{name}: {line}"));
+            let error = decode_as(*kind, frame).expect_err("refused");
+            let same = code == result_of(&error) || (code == 5 && matches!(error, CodecError::Value { .. }));
+            assert!(same, "{compiler}: {name}: {code} for {error}");
+            continue;
+        }
+        let got: Value = serde_json::from_str(line).unwrap_or_else(|error| panic!("{compiler}: {name}: {error}: {line}"));
+        let expected = decode_as(frame[0], frame).expect("it decodes");
+        assert!(equal(&got, &expected, float), "{compiler}: {name}: {got}");
+        let written = lines.next().expect("what is written");
+        if !written.is_empty() && !float {
+            assert_eq!(written, hex(frame), "{compiler}: {name}");
+        }
+        assert_eq!(written.is_empty(), ![1, 2, 3, 6, 8].contains(&frame[0]), "{name}: raw messages are written");
+    }
+    assert_eq!(lines.next(), None);
+}
+
+#[test]
+fn the_header_reads_and_writes_the_frozen_frames_and_refuses_the_others() {
+    for compiler in compilers() {
+        check_vectors(compiler, false);
+        check_vectors(compiler, true);
+    }
+}
+
+#[test]
+fn the_header_accounts_for_ticks_as_the_cases_say() {
+    let cases = std::fs::read_to_string(path("clients/cases.txt")).expect("the cases");
+    let names = cases.lines().filter_map(|line| line.strip_prefix("= ")?.split(' ').next());
+    let verdicts = cases.lines().filter_map(|line| line.strip_prefix("> "));
+    let expected: Vec<_> = names.zip(verdicts).map(|(name, verdict)| format!("{name} {verdict}")).collect();
+    let program = folder("c-accounts").join("accounts");
+    compile("cc", "tests/accounts.c", &program, &[]).unwrap_or_else(|complaint| panic!("{complaint}"));
+    let said = run(&program, &[], &cases);
+    assert_eq!(said.lines().collect::<Vec<_>>(), expected);
+    assert!(expected.len() > 10);
+}
+
+/// The long run: `just fuzz-c`.
+#[test]
+fn no_frame_leads_the_header_beyond_its_end() {
+    let folder = folder("c-fuzz");
+    let options = sanitizers("cc", &folder);
+    let program = folder.join("fuzz");
+    compile("cc", "tests/fuzz.c", &program, options).unwrap_or_else(|complaint| panic!("{complaint}"));
+    let seeds = all_vectors().into_iter().fold(String::new(), |text, Vector { refused_as, frame, .. }| {
+        text + &format!("{} {}\n", refused_as.unwrap_or(frame[0]), hex(&frame))
+    });
+    std::fs::write(folder.join("seeds"), &seeds).expect("it can be written");
+    let count = std::env::var("ISOTHERM_FUZZ").unwrap_or_else(|_| "200000".to_owned());
+    let said = run(&program, &[&count, "1"], &seeds);
+    println!("{said}");
+    let count = |index: usize| said.split(' ').nth(index).and_then(|count| count.parse::<u64>().ok()).unwrap_or_default();
+    assert!(count(0) > 1000 && count(2) > 1000, "{said}");
+}
+
+/// What of the examples needs no Zenoh is compiled; the rest stands behind `ISOTHERM_ZENOH`.
+#[test]
+fn the_examples_and_the_bench_compile_without_a_warning() {
+    let folder = folder("c-examples");
+    for compiler in compilers() {
+        for source in ["examples/zenoh_c.c", "examples/zenoh_pico.c", "bench.c"] {
+            let to = folder.join("program");
+            compile(compiler, source, &to, &["-O2"]).unwrap_or_else(|complaint| panic!("{compiler}: {complaint}"));
+        }
+    }
+}
