@@ -87,6 +87,10 @@ fn equal(got: &Value, expected: &Value, float: bool) -> bool {
             let rounded = if float { f64::from(exact as f32) } else { exact };
             *bits == format!("{:016x}", rounded.to_bits())
         }
+        // Beyond the largest `float`.
+        (Value::Null, Value::Number(number)) => {
+            float && number.as_f64().is_some_and(|exact| exact.abs() > f64::from(f32::MAX))
+        }
         _ => got == expected,
     }
 }
@@ -130,9 +134,14 @@ fn check_vectors(compiler: &str, float: bool) {
             assert!(same, "{compiler}: {name}: {code} for {error}");
             continue;
         }
+        // A reference's rate must be finite, also as a `float`.
+        if float && *name == "reference-edges" {
+            assert_eq!(line, "refused 7");
+            continue;
+        }
         let got: Value = serde_json::from_str(line).unwrap_or_else(|error| panic!("{compiler}: {name}: {error}: {line}"));
         let expected = decode_as(frame[0], frame).expect("it decodes");
-        assert!(equal(&got, &expected, float), "{compiler}: {name}: {got}");
+        assert!(equal(&got, &expected, float), "{compiler}, float {float}: {name}: {got}");
         let written = lines.next().expect("what is written");
         if !written.is_empty() && !float {
             assert_eq!(written, hex(frame), "{compiler}: {name}");
