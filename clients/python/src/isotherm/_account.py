@@ -97,11 +97,33 @@ class FirstWins:
 
     def choose(self, ticks: Array) -> Array:
         """The outputs to use, of those that arrive now."""
-        if len(ticks) > 0 and self._goes_on(ticks):
+        stale = self._stale(ticks)
+        self.dropped += stale
+        ticks = ticks[stale:]
+        if len(ticks) == 0:
+            return ticks
+        if self._goes_on(ticks):
             self._current = _Run(int(ticks["sequence"][-1]), int(ticks["end_time_ns"][-1]))
             return ticks
         wins = np.fromiter((self._wins(tick) for tick in ticks), bool, len(ticks))
         return ticks if wins.all() else ticks[wins]
+
+    def _stale(self, ticks: Array) -> int:
+        """How many ticks at the front have been used: what `_wins` finds of each, for all at once."""
+        run = self._current
+        if run is None or len(ticks) == 0 or _first(ticks[0]) > run.sequence or not run.has(ticks[0]):
+            return 0
+        sequence, end = ticks["sequence"], ticks["end_time_ns"]
+        if max(int(sequence.max()), run.sequence, int(end.max()), -int(end.min()), abs(run.end_time_ns)) >= 1 << 62:
+            return 0
+        number = np.maximum(ticks["ticks"], 1).astype(np.int64)
+        steps = sequence.astype(np.int64) - run.sequence
+        duration = np.minimum(ticks["duration_ns"] // number.astype(np.uint64), np.uint64(_LONGEST_NS)).astype(np.int64)
+        near = np.abs(steps) <= _MOST_STEPS
+        line = np.where(near, steps, 0) * duration
+        apart = np.abs(end - run.end_time_ns - line)
+        used = near & (apart <= duration // 2 + np.abs(line) // 8) & (steps - (number - 1) <= 0)
+        return len(ticks) if used.all() else int(used.argmin())
 
     def _goes_on(self, ticks: Array) -> bool:
         """Whether every tick plainly follows what was used: what `_wins` finds of each, for all at once."""

@@ -197,8 +197,27 @@ def _option(form: Any) -> tuple[Reader, Writer]:
     return read, write
 
 
+def _reals_after(first: tuple[str, Reader, Writer], names: list[str]) -> tuple[Reader, Writer]:
+    """A struct of a field and numbers, which are read at once: each batch has one for each channel."""
+    name, read_first, write_first = first
+    reals = struct.Struct(f"<{len(names)}d")
+
+    def read(data: bytes, at: int) -> tuple[Any, int]:
+        value, at = read_first(data, at)
+        end = take(data, at, reals.size)
+        return {name: value, **dict(zip(names, reals.unpack_from(data, at)))}, end
+
+    def write(out: bytearray, value: Any) -> None:
+        write_first(out, value[name])
+        out += reals.pack(*(value[other] for other in names))
+
+    return read, write
+
+
 def _struct(name: str) -> tuple[Reader, Writer]:
     fields = [(field, *codec(form)) for field, form in layout.STRUCTS[name]]
+    if all(form == "f64" for _, form in layout.STRUCTS[name][1:]):
+        return _reals_after(fields[0], [field for field, *_ in fields[1:]])
 
     def read(data: bytes, at: int) -> tuple[Any, int]:
         message = {}
