@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import pathlib
+import shutil
 import subprocess
 import tempfile
 import unittest
@@ -41,6 +42,19 @@ class Files(unittest.TestCase):
     def table(self, name: str) -> "list[dict[str, str]]":
         with open(self.folder / name, newline="", encoding="utf-8") as file:
             return list(csv.DictReader(file))
+
+    def frames(self) -> "list[bytes]":
+        return list(isotherm.read_wire(self.folder / "corrected.wire"))
+
+    def small_frames(self) -> "list[bytes]":
+        """The same ticks in batches of 50."""
+        small = []
+        for frame in self.frames():
+            message = isotherm.decode(frame, isotherm.CORRECTED)
+            ticks = message["ticks"]
+            parts = [{**message, "ticks": ticks[at : at + 50]} for at in range(0, len(ticks), 50)]
+            small += [isotherm.encode(part, isotherm.CORRECTED) for part in parts]
+        return small
 
     def check(self, ticks: "isotherm._arrays.Array") -> None:
         rows = self.table("corrected.csv")
@@ -105,7 +119,7 @@ class Files(unittest.TestCase):
     def test_a_damaged_frame_of_a_recording_is_named_and_the_rest_is_read(self) -> None:
         from mcap.writer import CompressionType, Writer
 
-        frames = list(isotherm.read_wire(self.folder / "corrected.wire"))
+        frames = self.small_frames()
         middle = len(frames) // 2
         damaged = bytearray(frames[middle])
         damaged[10] ^= 1
@@ -123,6 +137,45 @@ class Files(unittest.TestCase):
         self.assertRegex(recording.refused[0], f"imu/{UNIT}/corrected: the checksum is")
         lost = len(isotherm.CorrectedDecoder().decode(frames[middle]).ticks)
         self.assertEqual(recording.accounts[UNIT].lost, lost)
+
+    @unittest.skipUnless(shutil.which("octave-cli"), "octave-cli not found (Debian: apt install octave)")
+    def test_octave_reads_the_same_to_the_bit(self) -> None:
+        frames = self.small_frames()
+        damaged = bytearray(frames[3])
+        damaged[20] ^= 1
+        broken = frames[:3] + [bytes(damaged), frames[3][:40], b""] + frames[4:]
+        (self.folder / "broken.wire").write_bytes(b"".join(len(frame).to_bytes(4, "little") + frame for frame in broken))
+        paths = ["corrected.wire", "broken.wire", *(["corrected.mcap"] if shutil.which("zstd") else [])]
+        script = """
+            for name = {%s}
+              u = isotherm(name{1});
+              printf('%%s %%s %%d\\n', name{1}, u.unit, numel(u.sequence));
+              for k = 1:numel(u.sequence)
+                printf('%%s %%s %%s %%s ', num2str(u.sequence(k)), num2str(u.end_time_ns(k)), num2str(u.duration_ns(k)), num2str(u.flags(k)));
+                printf('%%d ', u.mode(k), u.gyros(k), u.gyro_flags(k, 1:3), u.revision(k));
+                printf('%%.17g ', u.delta_angle_rad(k, :), u.delta_velocity_m_per_s(k, :));
+                printf('\\n');
+              end
+            end
+        """ % ", ".join(f"'{path}'" for path in paths)
+        place = str(ROOT / "clients/matlab")
+        command = ["octave-cli", "--quiet", "--no-gui", "--path", place, "--eval", script]
+        done = subprocess.run(command, cwd=self.folder, capture_output=True, text=True, timeout=LIMIT_S)
+        lines = done.stdout.splitlines()
+        decoder = isotherm.CorrectedDecoder()
+        for path in paths:
+            kept = frames[:3] + frames[4:] if path.startswith("broken") else self.frames()
+            batches = [decoder.decode(frame) for frame in kept]
+            ticks = np.concatenate([batch.ticks for batch in batches])
+            self.assertEqual(lines.pop(0), f"{path} {UNIT} {len(ticks)}", done.stderr)
+            for tick in ticks:
+                words = lines.pop(0).split()
+                whole = [tick[name] for name in ("sequence", "end_time_ns", "duration_ns", "flags", "mode", "gyros")]
+                whole += [*tick["gyro_flags"][:3], batches[0].revision]
+                self.assertEqual(words[:10], [str(int(value)) for value in whole])
+                numbers = [*tick["delta_angle_rad"], *tick["delta_velocity_m_per_s"]]
+                self.assertEqual([float(word) for word in words[10:]], [float(value) for value in numbers])
+        self.assertRegex(done.stderr, "broken.wire: 3 of .* frames cannot be read")
 
     def test_a_plot_shows_both_quantities(self) -> None:
         import matplotlib
