@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.resources
 import math
 import random
 import unittest
@@ -64,6 +65,15 @@ class Frames(unittest.TestCase):
             for decode in (lambda data: isotherm.decode(data, isotherm.CORRECTED), isotherm.CorrectedDecoder().decode):
                 with self.assertRaisesRegex(isotherm.Refused, words):
                     decode(broken)
+
+
+class Package(unittest.TestCase):
+    def test_it_is_typed_and_says_everything_it_has(self) -> None:
+        self.assertTrue((importlib.resources.files("isotherm") / "py.typed").is_file())
+        for name in isotherm.__all__:
+            self.assertTrue(hasattr(isotherm, name), name)
+        self.assertEqual(isotherm.TickFlag.ANGLE_INVALID, 1 << 10)
+        self.assertEqual(isotherm.SensorFlag.EXCLUDED, 1 << 5)
 
 
 class Arrays(unittest.TestCase):

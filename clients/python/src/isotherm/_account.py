@@ -18,10 +18,10 @@ _MOST_STEPS = 1 << 20
 
 def _follows(ticks: Array) -> bool:
     """Whether the ticks of a batch follow one another, nothing missing and no restart."""
-    sequence = ticks["sequence"]
-    if (ticks["flags"] & _RESTART).any() or ticks["missed"].any() or not ticks["ticks"].all():
-        return False
-    return bool((sequence[1:] - ticks["ticks"][1:] == sequence[:-1]).all()) and int(sequence[0]) < _MOST - (1 << 32)
+    sequence, number = ticks["sequence"], ticks["ticks"]
+    plain = ((ticks["flags"] & _RESTART) == 0) & (ticks["missed"] == 0) & (number != 0)
+    plain[1:] &= sequence[1:] - number[1:] == sequence[:-1]
+    return bool(plain.all()) and int(sequence[0]) < _MOST - (1 << 32)
 
 
 def _first(tick: Any) -> int:
@@ -134,7 +134,7 @@ class FirstWins:
         duration = np.minimum(ticks["duration_ns"][1:], np.uint64(number.max(initial=1) * _LONGEST_NS)).astype(np.int64) // number
         line = number * duration
         apart = np.abs(ticks["end_time_ns"][1:] - ticks["end_time_ns"][:-1] - line)
-        return bool((duration <= _LONGEST_NS).all() and (apart <= duration // 2 + line // 8).all())
+        return bool(((duration <= _LONGEST_NS) & (apart <= duration // 2 + line // 8)).all())
 
     def _wins(self, tick: Any) -> bool:
         current = self._current

@@ -8,8 +8,8 @@ use isotherm_protocol::key::MAX_UNIT_ID;
 use isotherm_protocol::{journal, raw, service_status, status, version};
 use serde_json::Value;
 
-use super::super::page::{Vector, all_vectors};
 use super::super::decode_as;
+use super::super::page::{Vector, all_vectors};
 use super::decode::decode;
 use super::file::Layout;
 
@@ -80,12 +80,11 @@ fn frozen_frames_have_the_fields_that_the_layout_says() {
     let layout = Layout::load();
     for Vector { name, refused_as, frame, json } in all_vectors() {
         let said = decode(&layout, refused_as.unwrap_or(frame[0]), &frame);
-        match refused_as {
-            Some(_) => assert!(said.is_err(), "{name} is refused"),
-            None => {
-                let json: Value = serde_json::from_str(&json).expect("JSON");
-                assert_eq!(said, Ok(json), "{name}");
-            }
+        if refused_as.is_some() {
+            assert!(said.is_err(), "{name} is refused");
+        } else {
+            let json: Value = serde_json::from_str(&json).expect("JSON");
+            assert_eq!(said, Ok(json), "{name}");
         }
     }
 }
@@ -107,7 +106,8 @@ fn frames_that_differ_in_one_byte_are_read_or_refused_alike() {
             (ours, said) => panic!("{ours:?} but {said:?}: {frame:02x?}"),
         }
     };
-    for Vector { refused_as, frame, .. } in all_vectors().into_iter().filter(|vector| vector.frame.len() >= 6) {
+    for Vector { refused_as, frame, .. } in all_vectors().into_iter().filter(|vector| vector.frame.len() >= 6)
+    {
         let kind = refused_as.unwrap_or(frame[0]);
         let covered = &frame[..frame.len() - 4];
         for at in 0..covered.len() {

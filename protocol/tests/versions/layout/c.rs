@@ -1,17 +1,14 @@
-//! The layout as C: constants, structures, and the functions that read and write them.
+//! The layout as C: constants, structures, and the functions that read them.
 
 use std::fmt::Write;
 
+use super::c_writer::writers;
 use super::file::{Form, Layout, Type};
 
 /// Most elements of a list that stands in its structure; longer ones are walked.
 const MOST_IN_PLACE: usize = 16;
 /// Most values of an element of such a list.
 const MOST_VALUES: usize = 3;
-/// Types that a producer writes.
-const WRITTEN: &[&str] =
-    &["gyro_tick", "accelerometer_tick", "temperature_tick", "health_reading", "rate_reference"];
-
 /// How a value stands in C.
 #[derive(PartialEq)]
 pub(super) enum Place {
@@ -51,7 +48,8 @@ pub(super) fn place(layout: &Layout, form: &Form) -> Place {
 
 /// Whether a list may hold it in place.
 fn small(layout: &Layout, form: &Form) -> bool {
-    let plain = |form: &Form| matches!(place(layout, form), Place::Scalar(_)) || matches!(form, Form::Text(_));
+    let plain =
+        |form: &Form| matches!(place(layout, form), Place::Scalar(_)) || matches!(form, Form::Text(_));
     match form {
         Form::Named(index) => {
             let fields = layout.types[*index].fields();
@@ -66,7 +64,7 @@ pub(super) fn identifier(name: &str) -> String {
     name.to_lowercase().replace(['-', ' '], "_")
 }
 
-fn constant(name: &str) -> String {
+pub(super) fn constant(name: &str) -> String {
     identifier(name).to_uppercase()
 }
 
@@ -79,7 +77,8 @@ pub(super) fn is_plain(named: &Type) -> bool {
 pub(super) fn members(named: &Type) -> Vec<(String, &Form)> {
     let fields = named.fields().into_iter().map(|(name, form)| (identifier(name), form));
     let variants = named.variants().iter();
-    let contents = variants.filter_map(|variant| Some((identifier(&variant.name), variant.content.as_ref()?)));
+    let contents =
+        variants.filter_map(|variant| Some((identifier(&variant.name), variant.content.as_ref()?)));
     fields.chain(contents).collect()
 }
 
@@ -89,7 +88,9 @@ pub(super) fn ordered(layout: &Layout) -> Vec<usize> {
         match form {
             Form::Array(item, _) | Form::List { item, .. } | Form::Option(item) => visit(layout, item, order),
             Form::Named(index) if !order.contains(index) => {
-                members(&layout.types[*index]).iter().for_each(|(_, form)| visit(layout, form, order));
+                for (_, form) in members(&layout.types[*index]) {
+                    visit(layout, form, order);
+                }
                 order.push(*index);
             }
             _ => {}
@@ -115,11 +116,14 @@ pub(super) fn types(layout: &Layout) -> String {
         text.push('\n');
         for (bit, [name, meaning]) in flags.bits.iter().enumerate() {
             let prefix = constant(&flags.name);
-            writeln!(text, "/* {meaning} */\n#define ISOTHERM_{prefix}_{name} (1u << {bit})").expect("memory");
+            writeln!(text, "/* {meaning} */\n#define ISOTHERM_{prefix}_{name} (1u << {bit})")
+                .expect("memory");
         }
     }
     let order = ordered(layout);
-    order.iter().for_each(|&index| structure(layout, &layout.types[index], &mut text));
+    for &index in &order {
+        structure(layout, &layout.types[index], &mut text);
+    }
     for &index in &order {
         reader(layout, &layout.types[index], &mut text);
         let is_walked = |form: &Form| matches!(form, Form::List { item, .. } if **item == Form::Named(index));
@@ -128,23 +132,8 @@ pub(super) fn types(layout: &Layout) -> String {
             next(&layout.types[index].name, &mut text);
         }
     }
-    let mut written = Vec::new();
-    WRITTEN.iter().for_each(|name| add_with_parts(layout, layout.named(name), &mut written));
-    order.iter().filter(|index| written.contains(*index)).for_each(|&index| writer(layout, &layout.types[index], &mut text));
+    text.push_str(&writers(layout, &order));
     text
-}
-
-fn add_with_parts(layout: &Layout, index: usize, written: &mut Vec<usize>) {
-    written.push(index);
-    for (_, form) in members(&layout.types[index]) {
-        let mut form = form;
-        while let Form::Array(item, _) | Form::List { item, .. } | Form::Option(item) = form {
-            form = item;
-        }
-        if let Form::Named(part) = form {
-            add_with_parts(layout, *part, written);
-        }
-    }
 }
 
 /// Type of a value in C.
@@ -163,7 +152,9 @@ fn c_type(layout: &Layout, form: &Form) -> String {
 fn declare(layout: &Layout, name: &str, form: &Form, text: &mut String) {
     match (place(layout, form), form) {
         (Place::Digest(count), _) => writeln!(text, "    uint8_t {name}[{count}];"),
-        (Place::Array(count), Form::Array(item, _)) => writeln!(text, "    {} {name}[{count}];", c_type(layout, item)),
+        (Place::Array(count), Form::Array(item, _)) => {
+            writeln!(text, "    {} {name}[{count}];", c_type(layout, item))
+        }
         (Place::List(most), Form::List { item, .. }) => {
             writeln!(text, "    uint32_t {name}_count;\n    {} {name}[{most}];", c_type(layout, item))
         }
@@ -207,7 +198,10 @@ fn read(layout: &Layout, to: &str, form: &Form, text: &mut String) {
     let each = |item: &Form, count: &str| {
         let mut inner = String::new();
         read(layout, &format!("{to}[i]"), item, &mut inner);
-        format!("    for (uint32_t i = 0; i < {count}; ++i) {{\n    {}    }}\n", inner.replace("\n    ", "\n        "))
+        format!(
+            "    for (uint32_t i = 0; i < {count}; ++i) {{\n    {}    }}\n",
+            inner.replace("\n    ", "\n        ")
+        )
     };
     match (place(layout, form), form) {
         (Place::Scalar(name), _) => text.push_str(&get(format!("isotherm_get_{name}(c, &{to})"))),
@@ -240,16 +234,24 @@ fn read(layout: &Layout, to: &str, form: &Form, text: &mut String) {
             text.push_str(&get(format!("isotherm_get_bool(c, &{has})")));
             let mut inner = String::new();
             read(layout, to, item, &mut inner);
-            writeln!(text, "    if ({has}) {{\n    {}\n    }}", inner.trim_end().replace("\n    ", "\n        ")).expect("memory");
+            writeln!(
+                text,
+                "    if ({has}) {{\n    {}\n    }}",
+                inner.trim_end().replace("\n    ", "\n        ")
+            )
+            .expect("memory");
         }
-        (Place::Named(index), _) => text.push_str(&get(format!("isotherm_read_{}(c, &{to})", layout.types[index].name))),
+        (Place::Named(index), _) => {
+            text.push_str(&get(format!("isotherm_read_{}(c, &{to})", layout.types[index].name)));
+        }
         _ => unreachable!("{form:?}"),
     }
 }
 
 fn reader(layout: &Layout, named: &Type, text: &mut String) {
     let name = &named.name;
-    writeln!(text, "\nstatic inline bool isotherm_read_{name}(isotherm_cursor *c, isotherm_{name} *o) {{").expect("memory");
+    writeln!(text, "\nstatic inline bool isotherm_read_{name}(isotherm_cursor *c, isotherm_{name} *o) {{")
+        .expect("memory");
     let variants = named.variants();
     if !variants.is_empty() {
         let count = variants.len();
@@ -270,7 +272,12 @@ fn reader(layout: &Layout, named: &Type, text: &mut String) {
             let Some(form) = &variant.content else { continue };
             let mut inner = String::new();
             read(layout, &format!("o->{}", identifier(&variant.name)), form, &mut inner);
-            writeln!(text, "    if (variant == {number}u) {{\n    {}\n    }}", inner.trim_end().replace("\n    ", "\n        ")).expect("memory");
+            writeln!(
+                text,
+                "    if (variant == {number}u) {{\n    {}\n    }}",
+                inner.trim_end().replace("\n    ", "\n        ")
+            )
+            .expect("memory");
         }
     }
     text.push_str("    return true;\n}\n");
@@ -286,83 +293,4 @@ fn next(name: &str, text: &mut String) {
          list->at = c.at;\n    --list->count;\n    return true;\n}}"
     )
     .expect("memory");
-}
-
-/// Statements that write a value.
-fn write(layout: &Layout, from: &str, form: &Form, text: &mut String) {
-    let each = |item: &Form, count: &str| {
-        let mut inner = String::new();
-        write(layout, &format!("{from}[i]"), item, &mut inner);
-        format!("    for (uint32_t i = 0; i < {count}; ++i) {{\n    {}    }}\n", inner.replace("\n    ", "\n        "))
-    };
-    match (place(layout, form), form) {
-        (Place::Scalar(name), _) => writeln!(text, "    isotherm_put_{name}(w, {from});").expect("memory"),
-        (Place::Array(count), Form::Array(item, _)) => text.push_str(&each(item, &count.to_string())),
-        (Place::View, Form::Text(most)) => {
-            let most = most.unwrap_or(layout.limits["frame_bytes"]);
-            writeln!(text, "    isotherm_put_text(w, {most}u, {from});").expect("memory");
-        }
-        (Place::List(most), Form::List { item, .. }) => {
-            writeln!(text, "    isotherm_put_count(w, {most}u, {from}_count);").expect("memory");
-            text.push_str(&each(item, &format!("{from}_count && w->ok")));
-        }
-        (Place::Option, Form::Option(item)) => {
-            let has = from.replacen("->", "->has_", 1);
-            let mut inner = String::new();
-            write(layout, from, item, &mut inner);
-            writeln!(text, "    isotherm_put_bool(w, {has});\n    if ({has}) {{\n    {inner}    }}").expect("memory");
-        }
-        (Place::Named(index), _) => writeln!(text, "    isotherm_write_{}(w, &{from});", layout.types[index].name).expect("memory"),
-        _ => unreachable!("{form:?} is not written"),
-    }
-}
-
-fn writer(layout: &Layout, named: &Type, text: &mut String) {
-    let name = &named.name;
-    writeln!(text, "\nstatic inline void isotherm_write_{name}(isotherm_writer *w, const isotherm_{name} *v) {{").expect("memory");
-    if is_plain(named) {
-        writeln!(text, "    isotherm_put_variant(w, {}u, (uint32_t)*v);\n}}", named.variants().len()).expect("memory");
-        return;
-    }
-    if !named.variants().is_empty() {
-        writeln!(text, "    isotherm_put_variant(w, {}u, (uint32_t)v->variant);", named.variants().len()).expect("memory");
-    }
-    for (field, form) in named.fields() {
-        write(layout, &format!("v->{}", identifier(field)), form, text);
-    }
-    for (number, variant) in named.variants().iter().enumerate() {
-        let Some(form) = &variant.content else { continue };
-        let mut inner = String::new();
-        write(layout, &format!("v->{}", identifier(&variant.name)), form, &mut inner);
-        writeln!(text, "    if ((uint32_t)v->variant == {number}u) {{\n    {}\n    }}", inner.trim_end().replace("\n    ", "\n        ")).expect("memory");
-    }
-    text.push_str("}\n");
-}
-
-/// One function for each version of each kind, which reads a frame.
-pub(super) fn frames(layout: &Layout) -> String {
-    let mut text = String::new();
-    for kind in &layout.kinds {
-        for (version, body) in (1..).zip(&kind.bodies) {
-            let rules = kind.rules.iter().map(|rule| {
-                format!("    if (!isotherm_rule_{rule}_{body}(o)) return ISOTHERM_RULE;\n")
-            });
-            writeln!(
-                text,
-                "\n/* Version {version} of kind {}; what `o` holds after an error means nothing. */\n\
-                 static inline isotherm_result isotherm_decode_{body}(const uint8_t *frame, size_t length, isotherm_{body} *o) {{\n    \
-                 isotherm_cursor c;\n    \
-                 const isotherm_result opened = isotherm_open(frame, length, ISOTHERM_KIND_{}, {version}u, &c);\n    \
-                 if (opened != ISOTHERM_OK) return opened;\n    \
-                 if (!isotherm_read_{body}(&c, o)) return ISOTHERM_BODY;\n    \
-                 if (c.at != c.end) return ISOTHERM_LEFT_OVER;\n{}    \
-                 return ISOTHERM_OK;\n}}",
-                kind.number,
-                constant(&kind.name),
-                rules.collect::<String>()
-            )
-            .expect("memory");
-        }
-    }
-    text.trim_start().to_owned()
 }

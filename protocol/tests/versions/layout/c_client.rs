@@ -8,8 +8,8 @@ use std::process::{Command, Stdio};
 use isotherm_protocol::codec::CodecError;
 use serde_json::Value;
 
-use super::super::page::{Vector, all_vectors};
 use super::super::decode_as;
+use super::super::page::{Vector, all_vectors};
 use super::c_printer::printer;
 use super::file::Layout;
 use super::path;
@@ -25,33 +25,43 @@ fn folder(name: &str) -> PathBuf {
     folder
 }
 
-/// Compilers on the PATH; `cc` must be there.
-fn compilers() -> impl Iterator<Item = &'static str> {
-    let is_there = |compiler: &str| {
-        let version = Command::new(compiler).arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status();
-        version.is_ok_and(|status| status.success())
-    };
+/// Whether a program is on the PATH.
+fn is_there(program: &str) -> bool {
+    let version = Command::new(program).arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status();
+    version.is_ok_and(|status| status.success())
+}
+
+/// Compilers on the PATH: both, or whatever `cc` is.
+fn compilers() -> Vec<&'static str> {
     assert!(is_there("cc"), "no C compiler: install gcc or clang");
-    ["gcc", "clang"].into_iter().filter(move |compiler| is_there(compiler)).chain(["cc"])
+    let named: Vec<_> = ["gcc", "clang"].into_iter().filter(|compiler| is_there(compiler)).collect();
+    if named.is_empty() { vec!["cc"] } else { named }
 }
 
 /// Compiles a program of `clients/c`; the compiler's complaint where it does not.
 fn compile(compiler: &str, source: &str, to: &Path, options: &[&str]) -> Result<(), String> {
     let folder = to.parent().expect("in a folder");
     let mut command = Command::new(compiler);
-    command.args(STRICT).args(options).arg("-I").arg(folder).arg("-o").arg(to).arg(path("clients/c").join(source));
+    command
+        .args(STRICT)
+        .args(options)
+        .arg("-I")
+        .arg(folder)
+        .arg("-o")
+        .arg(to)
+        .arg(path("clients/c").join(source));
     let output = command.output().expect("the compiler runs");
     if output.status.success() { Ok(()) } else { Err(String::from_utf8_lossy(&output.stderr).into_owned()) }
 }
 
 /// What a program says to what it is told.
-fn run(program: &Path, arguments: &[&str], input: &str) -> String {
+fn run(program: &Path, arguments: &[&str], input: &[u8]) -> String {
     let mut command = Command::new(program);
     command.args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped());
     let mut child = command.spawn().expect("it runs");
     let mut stdin = child.stdin.take().expect("piped");
     std::thread::scope(|scope| {
-        scope.spawn(move || stdin.write_all(input.as_bytes()).expect("it reads"));
+        scope.spawn(move || stdin.write_all(input).expect("it reads"));
         let output = child.wait_with_output().expect("it ends");
         assert!(output.status.success(), "{}: {}", program.display(), output.status);
         String::from_utf8(output.stdout).expect("text")
@@ -79,7 +89,8 @@ fn equal(got: &Value, expected: &Value, float: bool) -> bool {
             got.len() == expected.len() && got.iter().all(alike)
         }
         (Value::Array(got), Value::Array(expected)) => {
-            got.len() == expected.len() && got.iter().zip(expected).all(|(got, expected)| equal(got, expected, float))
+            got.len() == expected.len()
+                && got.iter().zip(expected).all(|(got, expected)| equal(got, expected, float))
         }
         (Value::String(bits), Value::Number(number)) => {
             let exact = number.as_f64().expect("a number");
@@ -109,26 +120,35 @@ fn result_of(error: &CodecError) -> i32 {
     }
 }
 
-fn check_vectors(compiler: &str, float: bool) {
+/// Judges the header by the frozen frames; `emulator` runs what a compiler for another machine makes.
+fn check_vectors(compiler: &str, float: bool, emulator: Option<&str>) {
     let folder = folder(&format!("c-vectors-{compiler}-{float}"));
-    let mut options = sanitizers(compiler, &folder).to_vec();
+    let mut options =
+        if emulator.is_some() { vec!["-static"] } else { sanitizers(compiler, &folder).to_vec() };
     if float {
         options.push("-DISOTHERM_FLOAT");
     }
     let program = folder.join("vectors");
-    compile(compiler, "tests/vectors.c", &program, &options).unwrap_or_else(|complaint| panic!("{compiler}: {complaint}"));
+    compile(compiler, "tests/vectors.c", &program, &options)
+        .unwrap_or_else(|complaint| panic!("{compiler}: {complaint}"));
     let vectors = all_vectors();
     let mut input = String::new();
     for Vector { refused_as, frame, .. } in &vectors {
         let kind = refused_as.unwrap_or(frame[0]);
         writeln!(input, "{kind} {}", hex(frame)).expect("memory");
     }
-    let said = run(&program, &[], &input);
+    let said = match emulator {
+        None => run(&program, &[], input.as_bytes()),
+        Some(emulator) => run(emulator.as_ref(), &[program.to_str().expect("text")], input.as_bytes()),
+    };
     let mut lines = said.lines();
     for Vector { name, refused_as, frame, .. } in &vectors {
         let line = lines.next().expect("an answer");
         if let Some(kind) = refused_as {
-            let code: i32 = line.strip_prefix("refused ").and_then(|code| code.parse().ok()).unwrap_or_else(|| panic!("{name}: {line}"));
+            let code: i32 = line
+                .strip_prefix("refused ")
+                .and_then(|code| code.parse().ok())
+                .unwrap_or_else(|| panic!("{name}: {line}"));
             let error = decode_as(*kind, frame).expect_err("refused");
             let same = code == result_of(&error) || (code == 5 && matches!(error, CodecError::Value { .. }));
             assert!(same, "{compiler}: {name}: {code} for {error}");
@@ -139,14 +159,19 @@ fn check_vectors(compiler: &str, float: bool) {
             assert_eq!(line, "refused 7");
             continue;
         }
-        let got: Value = serde_json::from_str(line).unwrap_or_else(|error| panic!("{compiler}: {name}: {error}: {line}"));
+        let got: Value =
+            serde_json::from_str(line).unwrap_or_else(|error| panic!("{compiler}: {name}: {error}: {line}"));
         let expected = decode_as(frame[0], frame).expect("it decodes");
         assert!(equal(&got, &expected, float), "{compiler}, float {float}: {name}: {got}");
         let written = lines.next().expect("what is written");
         if !written.is_empty() && !float {
             assert_eq!(written, hex(frame), "{compiler}: {name}");
         }
-        assert_eq!(written.is_empty(), ![1, 2, 3, 6, 8].contains(&frame[0]), "{name}: raw messages are written");
+        assert_eq!(
+            written.is_empty(),
+            ![1, 2, 3, 6, 8].contains(&frame[0]),
+            "{name}: raw messages are written"
+        );
     }
     assert_eq!(lines.next(), None);
 }
@@ -154,8 +179,18 @@ fn check_vectors(compiler: &str, float: bool) {
 #[test]
 fn the_header_reads_and_writes_the_frozen_frames_and_refuses_the_others() {
     for compiler in compilers() {
-        check_vectors(compiler, false);
-        check_vectors(compiler, true);
+        check_vectors(compiler, false, None);
+        check_vectors(compiler, true, None);
+    }
+    // A machine of the other order of bytes.
+    let (compiler, emulator) = ("powerpc-linux-gnu-gcc", "qemu-ppc-static");
+    if is_there(compiler) && is_there(emulator) {
+        check_vectors(compiler, false, Some(emulator));
+        check_vectors(compiler, true, Some(emulator));
+    } else {
+        println!(
+            "skipped: no {compiler} and {emulator} (Debian: apt install gcc-powerpc-linux-gnu qemu-user-static)"
+        );
     }
 }
 
@@ -167,7 +202,7 @@ fn the_header_accounts_for_ticks_as_the_cases_say() {
     let expected: Vec<_> = names.zip(verdicts).map(|(name, verdict)| format!("{name} {verdict}")).collect();
     let program = folder("c-accounts").join("accounts");
     compile("cc", "tests/accounts.c", &program, &[]).unwrap_or_else(|complaint| panic!("{complaint}"));
-    let said = run(&program, &[], &cases);
+    let said = run(&program, &[], cases.as_bytes());
     assert_eq!(said.lines().collect::<Vec<_>>(), expected);
     assert!(expected.len() > 10);
 }
@@ -184,20 +219,32 @@ fn no_frame_leads_the_header_beyond_its_end() {
     });
     std::fs::write(folder.join("seeds"), &seeds).expect("it can be written");
     let count = std::env::var("ISOTHERM_FUZZ").unwrap_or_else(|_| "200000".to_owned());
-    let said = run(&program, &[&count, "1"], &seeds);
+    let said = run(&program, &[&count, "1"], seeds.as_bytes());
     println!("{said}");
-    let count = |index: usize| said.split(' ').nth(index).and_then(|count| count.parse::<u64>().ok()).unwrap_or_default();
+    let count = |index: usize| {
+        said.split(' ').nth(index).and_then(|count| count.parse::<u64>().ok()).unwrap_or_default()
+    };
     assert!(count(0) > 1000 && count(2) > 1000, "{said}");
 }
 
-/// What of the examples needs no Zenoh is compiled; the rest stands behind `ISOTHERM_ZENOH`.
+/// What of the examples needs no Zenoh is compiled, and reads a file of frames; the rest stands behind `ISOTHERM_ZENOH`.
 #[test]
-fn the_examples_and_the_bench_compile_without_a_warning() {
+fn the_examples_read_a_file_of_frames_and_the_bench_compiles() {
     let folder = folder("c-examples");
+    let mut file = Vec::new();
+    for Vector { frame, .. } in all_vectors().iter().filter(|vector| vector.frame.first() == Some(&4)) {
+        file.extend(u32::try_from(frame.len()).expect("short").to_le_bytes());
+        file.extend(frame);
+    }
     for compiler in compilers() {
         for source in ["examples/zenoh_c.c", "examples/zenoh_pico.c", "bench.c"] {
             let to = folder.join("program");
-            compile(compiler, source, &to, &["-O2"]).unwrap_or_else(|complaint| panic!("{compiler}: {complaint}"));
+            compile(compiler, source, &to, &["-O2"])
+                .unwrap_or_else(|complaint| panic!("{compiler}: {complaint}"));
+            if source.starts_with("examples") {
+                let said = run(&to, &[], &file);
+                assert!(said.contains("1000 3.5e-07 -1.25e-05 2e-06 rad\n"), "{compiler}: {source}: {said}");
+            }
         }
     }
 }

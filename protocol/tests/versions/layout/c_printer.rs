@@ -8,8 +8,12 @@ use super::file::{Form, Layout, Type};
 /// The printers of all types, and `print_frame`, which decodes and prints.
 pub(super) fn printer(layout: &Layout) -> String {
     let mut text = String::new();
-    ordered(layout).iter().for_each(|&index| named(layout, &layout.types[index], &mut text));
-    text.push_str("\nstatic isotherm_result print_frame(unsigned kind, const uint8_t *frame, size_t length) {\n");
+    for index in ordered(layout) {
+        named(layout, &layout.types[index], &mut text);
+    }
+    text.push_str(
+        "\nstatic isotherm_result print_frame(unsigned kind, const uint8_t *frame, size_t length) {\n",
+    );
     text.push_str("    const unsigned version = isotherm_version(frame, length);\n");
     for kind in &layout.kinds {
         for (version, body) in (1..).zip(&kind.bodies) {
@@ -91,9 +95,12 @@ fn value(layout: &Layout, from: &str, form: &Form, text: &mut String) {
             let mut inner = String::new();
             value(layout, from, item, &mut inner);
             let has = from.replacen("->", "->has_", 1);
-            writeln!(text, "    if ({has}) {{\n{inner}    }} else {{\n    printf(\"null\");\n    }}").expect("memory");
+            writeln!(text, "    if ({has}) {{\n{inner}    }} else {{\n    printf(\"null\");\n    }}")
+                .expect("memory");
         }
-        (Place::Named(index), _) => writeln!(text, "    print_{}(&{from});", layout.types[index].name).expect("memory"),
+        (Place::Named(index), _) => {
+            writeln!(text, "    print_{}(&{from});", layout.types[index].name).expect("memory");
+        }
         _ => unreachable!("{form:?}"),
     }
 }

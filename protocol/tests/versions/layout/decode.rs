@@ -17,7 +17,8 @@ pub(super) fn decode(layout: &Layout, kind: u8, frame: &[u8]) -> Result<Value, R
     if covered[0] != kind.number {
         return Err("kind".into());
     }
-    let body = usize::from(covered[1]).checked_sub(1).and_then(|index| kind.bodies.get(index)).ok_or("version")?;
+    let body =
+        usize::from(covered[1]).checked_sub(1).and_then(|index| kind.bodies.get(index)).ok_or("version")?;
     if crc32fast::hash(covered).to_le_bytes() != checksum {
         return Err("checksum".into());
     }
@@ -62,11 +63,14 @@ fn length(value: &Value) -> usize {
 
 fn alike(ticks: &Value) -> bool {
     let shape = |tick: &Value| {
-        let (variant, values) = tick["readings"].as_object().and_then(|readings| readings.iter().next()).expect("one");
+        let (variant, values) =
+            tick["readings"].as_object().and_then(|readings| readings.iter().next()).expect("one");
         (variant.clone(), length(values))
     };
     let first = shape(&ticks[0]);
-    list(ticks).iter().all(|tick| shape(tick) == first && [0, first.1].contains(&length(&tick["half_periods"])))
+    list(ticks)
+        .iter()
+        .all(|tick| shape(tick) == first && [0, first.1].contains(&length(&tick["half_periods"])))
 }
 
 struct Reader<'a> {
@@ -91,7 +95,11 @@ impl Reader<'_> {
             let byte = self.byte()?;
             value |= u128::from(byte & 0x7f) << (7 * index);
             if byte < 0x80 {
-                return if value >> bits == 0 { Ok(u64::try_from(value).expect("64 bits")) } else { Err("too large".into()) };
+                return if value >> bits == 0 {
+                    Ok(u64::try_from(value).expect("64 bits"))
+                } else {
+                    Err("too large".into())
+                };
             }
         }
         Err("too long".into())
@@ -123,7 +131,9 @@ impl Reader<'_> {
                 let count = self.count(0, most.unwrap_or(usize::MAX))?;
                 json!(std::str::from_utf8(self.take(count)?).map_err(|_| "not UTF-8")?)
             }
-            Form::Digest(count) => json!(self.take(*count)?.iter().fold(String::new(), |text, byte| text + &format!("{byte:02x}"))),
+            Form::Digest(count) => json!(
+                self.take(*count)?.iter().fold(String::new(), |text, byte| text + &format!("{byte:02x}"))
+            ),
             Form::Array(item, count) => self.values(item, *count)?,
             Form::List { item, least, most } => {
                 let count = self.count(*least, *most)?;

@@ -109,10 +109,7 @@ impl Type {
     /// Every field with its form; none of an enum.
     pub(super) fn fields(&self) -> Vec<(&str, &Form)> {
         let Content::Struct(lines) = &self.content else { return Vec::new() };
-        lines
-            .iter()
-            .flat_map(|line| line.names.iter().map(move |name| (name.as_str(), &line.form)))
-            .collect()
+        lines.iter().flat_map(|line| line.names.iter().map(move |name| (name.as_str(), &line.form))).collect()
     }
 
     /// Its variants; none of a struct.
@@ -163,7 +160,9 @@ impl Reader<'_> {
     fn read(&self, written: &WrittenType) -> Type {
         let content = match (&written.fields, &written.variants) {
             (Some(fields), None) => Content::Struct(fields.iter().map(|field| self.line(field)).collect()),
-            (None, Some(variants)) => Content::Enum(variants.iter().map(|variant| self.variant(variant)).collect()),
+            (None, Some(variants)) => {
+                Content::Enum(variants.iter().map(|variant| self.variant(variant)).collect())
+            }
             _ => panic!("layout.toml: {} must have fields or variants", written.name),
         };
         let WrittenType { name, page, meaning, inline, .. } = written;
@@ -181,7 +180,10 @@ impl Reader<'_> {
     }
 
     fn limit(&self, text: &str) -> usize {
-        text.parse().ok().or_else(|| self.limits.get(text).copied()).unwrap_or_else(|| panic!("layout.toml: no limit {text}"))
+        text.parse()
+            .ok()
+            .or_else(|| self.limits.get(text).copied())
+            .unwrap_or_else(|| panic!("layout.toml: no limit {text}"))
     }
 
     fn form(&self, text: &str) -> Form {
@@ -192,7 +194,9 @@ impl Reader<'_> {
         if let Some((item, count)) = text.rsplit_once('*') {
             return Form::Array(Box::new(self.form(item)), self.limit(count));
         }
-        if let Some((item, range)) = text.strip_prefix('[').and_then(|text| text.strip_suffix(']')?.rsplit_once("; ")) {
+        if let Some((item, range)) =
+            text.strip_prefix('[').and_then(|text| text.strip_suffix(']')?.rsplit_once("; "))
+        {
             let (least, most) = range.split_once("..").unwrap_or(("0", range));
             let (least, most) = (self.limit(least), self.limit(most));
             return Form::List { item: Box::new(self.form(item)), least, most };
@@ -207,10 +211,13 @@ impl Reader<'_> {
             "i64" => Form::Signed(64),
             "f64" => Form::F64,
             "string" => Form::Text(None),
-            _ => argument("string(").map(|most| Form::Text(Some(most))).or_else(|| argument("digest(").map(Form::Digest)).unwrap_or_else(|| {
-                let named = self.names.iter().position(|name| name == text);
-                Form::Named(named.unwrap_or_else(|| panic!("layout.toml: there is no type {text}")))
-            }),
+            _ => argument("string(")
+                .map(|most| Form::Text(Some(most)))
+                .or_else(|| argument("digest(").map(Form::Digest))
+                .unwrap_or_else(|| {
+                    let named = self.names.iter().position(|name| name == text);
+                    Form::Named(named.unwrap_or_else(|| panic!("layout.toml: there is no type {text}")))
+                }),
         }
     }
 }

@@ -4,6 +4,7 @@ mod agree;
 mod c;
 mod c_client;
 mod c_printer;
+mod c_writer;
 mod decode;
 mod file;
 mod page;
@@ -27,7 +28,10 @@ fn compare(file: &str, expected: &str) {
         std::fs::write(&path, expected).expect("it can be written");
     }
     let committed = std::fs::read_to_string(&path).unwrap_or_default();
-    assert!(committed == expected, "{file} is not what protocol/layout.toml gives: run the test with ISOTHERM_BLESS=1");
+    assert!(
+        committed == expected,
+        "{file} is not what protocol/layout.toml gives: run the test with ISOTHERM_BLESS=1"
+    );
 }
 
 /// Replaces the text between the lines `begin` and `end` of each region.
@@ -51,11 +55,9 @@ fn the_tables_of_the_page_are_those_of_the_layout() {
 #[test]
 fn the_header_is_that_of_the_layout() {
     let layout = Layout::load();
-    let regions = [("types", c::types(&layout)), ("frames", c::frames(&layout))];
+    let regions = [("types", c::types(&layout)), ("frames", c_writer::frames(&layout))];
     let regions = regions.map(|(region, text)| (region.to_owned(), text));
-    compare_regions("clients/c/isotherm.h", &regions, |region| {
-        format!("/* generated: {region} */\n")
-    });
+    compare_regions("clients/c/isotherm.h", &regions, |region| format!("/* generated: {region} */\n"));
 }
 
 #[test]

@@ -17,8 +17,9 @@ pub(super) fn regions(layout: &Layout) -> Vec<(String, String)> {
         }
     }
     for flags in &layout.flags {
-        let list = flags.bits.iter().enumerate();
-        let list = list.map(|(bit, [name, meaning])| format!("- {bit} `{name}`: {meaning}\n")).collect();
+        let list = flags.bits.iter().enumerate().fold(String::new(), |text, (bit, [name, meaning])| {
+            text + &format!("- {bit} `{name}`: {meaning}\n")
+        });
         regions.push((flags.page.clone(), list));
     }
     regions
@@ -48,7 +49,8 @@ fn tables(layout: &Layout, page: &str) -> String {
         for row in rows(layout, named) {
             let [name, form, meaning] = row;
             let [first, second] = COLUMNS;
-            writeln!(text, "{}", format!("  {name:first$} {form:second$} {meaning}").trim_end()).expect("memory");
+            writeln!(text, "{}", format!("  {name:first$} {form:second$} {meaning}").trim_end())
+                .expect("memory");
         }
     }
     text + "```\n"
@@ -98,18 +100,24 @@ fn shown(layout: &Layout, form: &Form) -> (String, String) {
         Form::List { item, least, most } => plain(format!("[{}] {least}…{most}", shown(layout, item).0)),
         Form::Option(item) => {
             let (item, variants) = shown(layout, item);
-            (if item.contains('×') && !item.starts_with('(') { format!("({item})?") } else { item + "?" }, variants)
+            (
+                if item.contains('×') && !item.starts_with('(') { format!("({item})?") } else { item + "?" },
+                variants,
+            )
         }
         Form::Named(index) => {
             let named = &layout.types[*index];
             match &named.content {
                 Content::Struct(lines) if named.inline => {
-                    let fields = lines.iter().map(|line| format!("{} {}", line.names.join(", "), shown(layout, &line.form).0));
+                    let fields = lines
+                        .iter()
+                        .map(|line| format!("{} {}", line.names.join(", "), shown(layout, &line.form).0));
                     plain(format!("({})", fields.collect::<Vec<_>>().join(", ")))
                 }
                 Content::Enum(variants) if named.inline => {
                     let variant = |(number, variant): (usize, &super::file::Variant)| {
-                        let content = variant.content.as_ref().map(|form| format!(" {}", shown(layout, form).0));
+                        let content =
+                            variant.content.as_ref().map(|form| format!(" {}", shown(layout, form).0));
                         format!("{number} \"{}\"{}", variant.name, content.unwrap_or_default())
                     };
                     ("enum".into(), variants.iter().enumerate().map(variant).collect::<Vec<_>>().join(" "))

@@ -16,8 +16,10 @@ pub(super) fn module(layout: &Layout) -> String {
     for kind in &layout.kinds {
         writeln!(text, "{} = {}", kind.name.to_uppercase(), kind.number).expect("memory");
     }
-    text.push_str("\n# Kind: key, types of its versions from 1, rules.\n\
-                   KINDS: dict[int, tuple[str, tuple[str, ...], tuple[str, ...]]] = {\n");
+    text.push_str(
+        "\n# Kind: key, types of its versions from 1, rules.\n\
+                   KINDS: dict[int, tuple[str, tuple[str, ...], tuple[str, ...]]] = {\n",
+    );
     for kind in &layout.kinds {
         let (bodies, rules) = (tuple(&kind.bodies), tuple(&kind.rules));
         writeln!(text, "    {}: ({:?}, {bodies}, {rules}),", kind.number, kind.key).expect("memory");
@@ -31,10 +33,14 @@ pub(super) fn module(layout: &Layout) -> String {
         }
         text.push_str("}\n");
     }
-    text.push_str("\n# Type: fields (name, form) of a struct, or variants (name, form or None) of an enum.\n");
+    text.push_str(
+        "\n# Type: fields (name, form) of a struct, or variants (name, form or None) of an enum.\n",
+    );
     for (word, is_struct) in [("STRUCTS", true), ("ENUMS", false)] {
         writeln!(text, "{word}: dict[str, tuple[tuple[str, Any], ...]] = {{").expect("memory");
-        for named in layout.types.iter().filter(|named| matches!(named.content, Content::Struct(_)) == is_struct) {
+        for named in
+            layout.types.iter().filter(|named| matches!(named.content, Content::Struct(_)) == is_struct)
+        {
             writeln!(text, "    {:?}: (", named.name).expect("memory");
             for (name, form) in named.fields() {
                 writeln!(text, "        ({name:?}, {}),", python(layout, form)).expect("memory");
@@ -73,9 +79,11 @@ fn python(layout: &Layout, form: &Form) -> String {
 
 /// `clients/typescript/isotherm.ts`: what `isotherm status --json` and a console show.
 pub(super) fn typescript(layout: &Layout) -> String {
-    let mut text = "// Messages as JSON: numbers that are not finite are null, digests are hexadecimal digits.\n\
+    let mut text =
+        "// Messages as JSON: numbers that are not finite are null, digests are hexadecimal digits. JSON.parse rounds whole numbers\n\
+                    // beyond 2^53.\n\
                     // Generated from protocol/layout.toml; change that file, not this one.\n"
-        .to_owned();
+            .to_owned();
     for flags in &layout.flags {
         writeln!(text, "\nexport const {}Flags = {{", flags.name).expect("memory");
         for (bit, [name, meaning]) in flags.bits.iter().enumerate() {
@@ -103,7 +111,8 @@ pub(super) fn typescript(layout: &Layout) -> String {
                     None => format!("{:?}", variant.name),
                     Some(form) => format!("{{ {:?}: {} }}", variant.name, script(layout, form)),
                 });
-                writeln!(text, "\nexport type {name} = {};", variants.collect::<Vec<_>>().join(" | ")).expect("memory");
+                writeln!(text, "\nexport type {name} = {};", variants.collect::<Vec<_>>().join(" | "))
+                    .expect("memory");
             }
         }
     }
