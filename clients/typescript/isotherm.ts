@@ -1,4 +1,5 @@
-// Messages as JSON: numbers that are not finite are null, digests are hexadecimal digits.
+// Messages as JSON: numbers that are not finite are null, digests are hexadecimal digits. JSON.parse rounds whole numbers
+// beyond 2^53.
 // Generated from protocol/layout.toml; change that file, not this one.
 
 export const tickFlags = {
@@ -185,7 +186,6 @@ export interface CorrectedTick {
 }
 
 export interface Status {
-  /** of the service */
   unit: string;
   /** of the service */
   instance: string;

@@ -87,7 +87,10 @@ class _Run:
 
 
 class FirstWins:
-    """Of two services that correct one unit, each tick is used from the one that sends it first."""
+    """Of two services that correct one unit, each tick is used from the one that sends it first.
+
+    What is late is dropped: a tick that one service's message lost is not filled in from the other after a later one was used.
+    """
 
     def __init__(self) -> None:
         self._current: _Run | None = None
