@@ -49,6 +49,10 @@ class Account:
         """Enters outputs in their order of arrival; of type `TICK`."""
         if len(ticks) == 0:
             return
+        if len(ticks) == 1:
+            # Arrays cost more than they save.
+            self._enter(ticks[0])
+            return
         if self.last_sequence is not None and _first(ticks[0]) == self.last_sequence + 1 and _follows(ticks):
             self.ticks += int(ticks["ticks"].sum(dtype=np.uint64))
             self.last_sequence = int(ticks["sequence"][-1])
@@ -100,6 +104,8 @@ class FirstWins:
 
     def choose(self, ticks: Array) -> Array:
         """The outputs to use, of those that arrive now."""
+        if len(ticks) == 1:
+            return ticks if self._wins(ticks[0]) else ticks[:0]
         stale = self._stale(ticks)
         self.dropped += stale
         ticks = ticks[stale:]
