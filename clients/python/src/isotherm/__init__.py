@@ -29,7 +29,8 @@ from ._layout import CORRECTED, JOURNAL, RAW_ACCEL, RAW_GYRO, RAW_HEALTH, RAW_TE
 from ._plot import plot
 from ._producer import Producer
 from ._stream import CorrectedStream, StatusStream
-from ._wire import Refused, decode, encode
+from ._rules import Refused
+from ._wire import decode, encode
 
 __version__ = "0.1.0"
 

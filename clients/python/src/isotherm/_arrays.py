@@ -13,7 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _layout as layout
-from ._wire import Refused, body_of, codec, read_count, read_varint, take
+from ._rules import Refused
+from ._wire import body_of, codec, read_count, read_varint, take
 
 Array = npt.NDArray[Any]
 

@@ -13,8 +13,9 @@ from . import _layout as layout
 from ._arrays import CorrectedBatch
 from ._match import wait_until_matched
 from ._producer import Producer
+from ._rules import Message, Refused
 from ._stream import CorrectedStream, StatusStream
-from ._wire import Message, Refused, decode, encode
+from ._wire import decode, encode
 
 #: Where a service listens by default.
 ENDPOINT = "tcp/127.0.0.1:7447"

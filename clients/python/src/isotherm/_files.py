@@ -11,7 +11,8 @@ import numpy as np
 from . import _layout as layout
 from ._account import Account
 from ._arrays import TICK, Array, CorrectedDecoder
-from ._wire import Message, Refused, decode
+from ._rules import Message, Refused
+from ._wire import decode
 
 Path = Union[str, "os.PathLike[str]"]
 

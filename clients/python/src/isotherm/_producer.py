@@ -13,7 +13,8 @@ import zenoh
 from . import _layout as layout
 from ._arrays import CorrectedBatch, CorrectedDecoder
 from ._match import wait_until_matched
-from ._wire import Message, Refused, encode
+from ._rules import Message, Refused
+from ._wire import encode
 
 _MODES: dict[Any, Any] = {None: None, 0: None, 1: "Plus", -1: "Minus", "Plus": "Plus", "Minus": "Minus"}
 _LEAST_IN_FLIGHT = 256

@@ -12,7 +12,8 @@ import zenoh
 from . import _layout as layout
 from ._account import Account, FirstWins
 from ._arrays import CorrectedBatch, CorrectedDecoder
-from ._wire import Message, Refused, decode
+from ._rules import Message, Refused
+from ._wire import decode
 
 M = TypeVar("M")
 

@@ -5,24 +5,19 @@ A message is a dict with the field names of docs/wire.md; an enum is its name, o
 
 from __future__ import annotations
 
-import math
 import struct
 import zlib
-from typing import Any, Callable, Dict, Tuple
+from typing import Any, Callable, Tuple
 
 from . import _layout as layout
+from ._rules import RULES, Message, Refused
 
-Message = Dict[str, Any]
 # Reads a value at a place; the value and the place after it.
 Reader = Callable[[bytes, int], Tuple[Any, int]]
 # Appends a value.
 Writer = Callable[[bytearray, Any], None]
 
 _F64 = struct.Struct("<d")
-
-
-class Refused(ValueError):
-    """A frame that cannot be read, or a message that cannot be written; nothing of it is to be used."""
 
 
 def read_varint(data: bytes, at: int, bits: int) -> tuple[int, int]:
@@ -287,41 +282,6 @@ def _make(form: Any) -> tuple[Reader, Writer]:
     return _struct(name) if name in layout.STRUCTS else _enum(name)
 
 
-def _alike(message: Message) -> None:
-    shape = None
-    for index, tick in enumerate(message["ticks"]):
-        ((variant, readings),) = tick["readings"].items()
-        shape = shape or (variant, len(readings))
-        if (variant, len(readings)) != shape:
-            raise Refused(f"tick {index} of the batch has other readings than the first")
-        if len(tick.get("half_periods", ())) not in (0, len(readings)):
-            raise Refused(f"tick {index} has half-period counts of {len(tick['half_periods'])} gyros of {len(readings)}")
-
-
-def _per_channel(message: Message) -> None:
-    channels = len(message["channels"])
-    for index, tick in enumerate(message["ticks"]):
-        if len(tick["raw"]) != channels:
-            raise Refused(f"tick {index} has {len(tick['raw'])} readings of {channels} channels")
-
-
-def _span(message: Message) -> None:
-    if message["end_ns"] <= message["start_ns"]:
-        raise Refused("end_ns must be later than start_ns")
-    if not all(math.isfinite(rate) for rate in message["angular_rate_rad_per_s"]):
-        raise Refused("angular_rate_rad_per_s must be finite")
-    if not (math.isfinite(message["sigma_rad_per_s"]) and message["sigma_rad_per_s"] >= 0):
-        raise Refused("sigma_rad_per_s must be finite and not negative")
-
-
-def _part(message: Message) -> None:
-    if not message["part"] < message["parts"] <= layout.PARTS:
-        raise Refused(f"part {message['part']} of {message['parts']}, at most {layout.PARTS}")
-
-
-_RULES: dict[str, Callable[[Message], None]] = {"alike": _alike, "per_channel": _per_channel, "span": _span, "part": _part}
-
-
 def body_of(frame: bytes, kind: int) -> tuple[str, bytes]:
     """Type and bytes of the body of a sound frame on a key of `kind`; raises `Refused`."""
     if not layout.FRAME_BYTES_LEAST <= len(frame) <= layout.FRAME_BYTES:
@@ -349,7 +309,7 @@ def decode(frame: bytes, kind: int) -> Message:
     if end != len(body):
         raise Refused(f"{len(body) - end} bytes are left over after the body")
     for rule in layout.KINDS[kind][2]:
-        _RULES[rule](message)
+        RULES[rule](message)
     return dict(message)
 
 
@@ -360,7 +320,7 @@ def encode(message: Message, kind: int, version: int | None = None) -> bytes:
     frame = bytearray([kind, version])
     codec(("named", bodies[version - 1]))[1](frame, message)
     for rule in rules:
-        _RULES[rule](message)
+        RULES[rule](message)
     frame += zlib.crc32(frame).to_bytes(4, "little")
     if len(frame) > layout.FRAME_BYTES:
         raise Refused(f"the frame has {len(frame)} bytes, at most {layout.FRAME_BYTES} are allowed")
