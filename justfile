@@ -31,9 +31,17 @@ configs:
 purity:
     .ci/run purity
 
-# Check the Python subscriber, and recordings with what others read in them, against the Rust side
+# Build the Python package's wheel and test it against the service; check recordings with what others read in them
 python:
     .ci/run python
+
+# Decode 10⁸ changed frames with the C header under the sanitizers of cc (some minutes)
+fuzz-c:
+    ISOTHERM_FUZZ=100000000 cargo test --release --locked -p isotherm-protocol --test versions no_frame_leads -- --nocapture
+
+# Measure how fast the clients decode: Python, and C with cc (after `just python`)
+bench-clients:
+    bash clients/bench.sh
 
 # Count instructions per tick and compare them with the committed figures (needs valgrind)
 instructions:

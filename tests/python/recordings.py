@@ -16,11 +16,10 @@ import pathlib
 import sys
 
 import duckdb
+import isotherm
 from mcap.reader import make_reader
 from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-
-import wire
 
 AXES = "xyz"
 ACCELEROMETER_MISSING, UNCALIBRATED, ANGLE_INVALID, VELOCITY_INVALID = 1 << 2, 1 << 4, 1 << 10, 1 << 11
@@ -142,11 +141,11 @@ def flats(ticks):
 
 
 SIGNS = {None: None, "Plus": 1, "Minus": -1}
-RAW_KINDS = {"gyro": wire.RAW_GYRO, "accel": wire.RAW_ACCEL, "temp": wire.RAW_TEMPERATURE}
+RAW_KINDS = {"gyro": isotherm.RAW_GYRO, "accel": isotherm.RAW_ACCEL, "temp": isotherm.RAW_TEMPERATURE}
 
 
 def check_mcap(path, units):
-    """The recording by the mcap package, its frames by docs/wire.md."""
+    """The recording by the mcap package, its frames by the package isotherm."""
     gyro, accel, temperature, corrected, status = ({unit: [] for unit in units} for _ in range(5))
     with open(path, "rb") as file:
         reader = make_reader(file)
@@ -159,7 +158,7 @@ def check_mcap(path, units):
             _, unit, *topic = channel.topic.split("/")
             same("the channel's unit", channel.metadata["unit"], unit)
             if topic == ["corrected"]:
-                batch = wire.decode(message.data, wire.CORRECTED)
+                batch = isotherm.decode(message.data, isotherm.CORRECTED)
                 same("unit", batch["unit"], unit)
                 same("publish time", message.publish_time, batch["ticks"][-1]["end_time_ns"])
                 for tick in batch["ticks"]:
@@ -167,9 +166,9 @@ def check_mcap(path, units):
                     kept["mode"] = SIGNS[tick["mode"]]
                     corrected[unit].append({**kept, "revision": batch["revision"]["counter"]})
             elif topic == ["status"]:
-                status[unit].append(wire.decode(message.data, wire.STATUS))
+                status[unit].append(isotherm.decode(message.data, isotherm.STATUS))
             else:
-                batch = wire.decode(message.data, RAW_KINDS[topic[1]])
+                batch = isotherm.decode(message.data, RAW_KINDS[topic[1]])
                 last = batch["ticks"][-1]
                 same("publish time", message.publish_time, last.get("end_time_ns", last.get("time_ns")))
                 if topic[1] == "temp":

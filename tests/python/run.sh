@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
-# The Python subscriber against docs/wire-vectors.txt and against the Rust side; recordings, ROS 2 bags and Parquet files of
-# `isotherm-replay convert` against what programs of others read in them.
+# The Python package: its wheel is built, installed into a clean environment, and tested there against the frozen frames and the
+# service. Recordings, ROS 2 bags and Parquet files of `isotherm-replay convert` against what programs of others read in them.
 #
-# Makes a virtual environment under target/ for it. Skipped, in plain words, where Python or its venv module is missing.
+# Makes a virtual environment under target/. ISOTHERM_BIN is the service's program (default: it is built here). Skipped, in plain words,
+# where Python or its venv module is missing.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 
@@ -21,10 +22,22 @@ fi
 
 venv=${CARGO_TARGET_DIR:-target}/python-venv
 case "$venv" in /*) ;; *) venv=$PWD/$venv ;; esac
-[ -x "$venv/bin/pip" ] || python3 -m venv "$venv"
-"$venv/bin/pip" install --quiet --disable-pip-version-check --requirement tests/python/requirements.txt
+python3 -m venv --clear "$venv"
+pip() { "$venv/bin/pip" --quiet --disable-pip-version-check "$@"; }
+pip wheel --no-deps --wheel-dir "$venv/wheel" clients/python
+wheel=$(echo "$venv"/wheel/isotherm-*.whl)
+pip install "$wheel[recordings,parquet,plot]" --requirement tests/python/requirements.txt
 
-"$venv/bin/python" -B tests/python/subscriber.py --vectors docs/wire-vectors.txt
+if [ -z "${ISOTHERM_BIN:-}" ]; then
+    cargo build --release --locked --bin isotherm --bin isotherm-replay
+    ISOTHERM_BIN=${CARGO_TARGET_DIR:-$PWD/target}/release/isotherm
+fi
+export ISOTHERM_BIN
+"$venv/bin/python" -B -m unittest discover --start-directory clients/python/tests
+if [ -x "$venv/bin/mypy" ]; then
+    (cd clients/python && "$venv/bin/mypy" --package isotherm --cache-dir "$venv/mypy")
+fi
+"$venv/bin/python" -B clients/python/bench.py 1
 ISOTHERM_PYTHON=$venv/bin/python cargo test --release --locked --workspace --test system python_subscriber -- --nocapture
 
 if ! "$venv/bin/python" -c 'import sys; sys.exit(sys.version_info < (3, 11))'; then

@@ -3,6 +3,7 @@
 
 mod form;
 mod laws;
+mod layout;
 mod page;
 mod v1;
 mod v2;

@@ -1,16 +1,15 @@
-//! `docs/wire.md` names every field, flag and counter, and its examples of control messages are understood;
+//! `docs/wire.md` names every counter, command and option (its tables: `layout`), and its examples of control messages are understood;
 //! `docs/wire-vectors.txt` holds the frozen vectors, which decode to the JSON beside them.
 
 use std::collections::BTreeSet;
 
 use isotherm_correction::drift::ReferenceCounters;
 use isotherm_correction::operation::State;
-use isotherm_correction::sample::{SensorFlags, TickFlags};
 use isotherm_correction::unit::Counters;
-use isotherm_protocol::codec::{self, Kind};
+use isotherm_protocol::codec;
 use isotherm_protocol::control::{CommandOrder, CommandReply, Order, SwapReply};
 use isotherm_protocol::history::{AuditEntry, AuditEvent};
-use isotherm_protocol::{journal, key, raw, service_status, status, version};
+use isotherm_protocol::key;
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -22,16 +21,16 @@ const VECTORS: &str = include_str!("../../../docs/wire-vectors.txt");
 
 /// One test vector of the file.
 #[derive(Default)]
-struct Vector {
-    name: &'static str,
+pub(super) struct Vector {
+    pub(super) name: &'static str,
     /// Kind of the key on which the frame must be refused; none for a good frame.
-    refused_as: Option<u8>,
-    frame: Vec<u8>,
-    json: String,
+    pub(super) refused_as: Option<u8>,
+    pub(super) frame: Vec<u8>,
+    pub(super) json: String,
 }
 
 /// Every vector of `docs/wire-vectors.txt`, whose head describes its form.
-fn all_vectors() -> Vec<Vector> {
+pub(super) fn all_vectors() -> Vec<Vector> {
     let mut vectors: Vec<Vector> = Vec::new();
     for line in VECTORS.lines().filter(|line| !line.is_empty() && !line.starts_with('#')) {
         let (directive, rest) = line.split_once(' ').unwrap_or_else(|| panic!("no directive: {line}"));
@@ -129,15 +128,6 @@ fn the_page_names_every_option_of_a_swap_and_every_command() {
 }
 
 #[test]
-fn the_page_names_every_flag_with_its_bit() {
-    let tick = TickFlags::all().iter_names().map(|(name, flag)| (name, flag.bits().trailing_zeros()));
-    let sensor = SensorFlags::all().iter_names().map(|(name, flag)| (name, flag.bits().trailing_zeros()));
-    for (name, bit) in tick.chain(sensor) {
-        assert!(PAGE.contains(&format!("\n- {bit} `{name}`: ")), "bit {bit}, {name}");
-    }
-}
-
-#[test]
 fn the_page_names_every_counter_of_the_core() {
     for (name, _) in Counters::default().iter() {
         assert!(PAGE.contains(&format!("\n- `{name}`: ")), "{name}");
@@ -148,25 +138,6 @@ fn the_page_names_every_counter_of_the_core() {
 fn the_page_names_every_counter_of_the_references() {
     for (name, _) in ReferenceCounters::default().iter() {
         assert!(PAGE.contains(&format!("\n- `references_{name}`: ")), "{name}");
-    }
-}
-
-#[test]
-fn the_page_states_the_versions_of_every_kind() {
-    for (kind, versions) in [
-        (Kind::RawGyro, version::RAW_GYRO),
-        (Kind::RawAccel, version::RAW_ACCEL),
-        (Kind::RawTemperature, version::RAW_TEMPERATURE),
-        (Kind::Corrected, version::CORRECTED),
-        (Kind::Status, version::STATUS),
-        (Kind::RawHealth, version::RAW_HEALTH),
-        (Kind::ServiceStatus, version::SERVICE_STATUS),
-        (Kind::Reference, version::REFERENCE),
-        (Kind::Journal, version::JOURNAL),
-    ] {
-        let (start, end) = (format!("| {} | ", kind as u8), format!(" | {versions} |"));
-        let rows = PAGE.lines().filter(|line| line.starts_with(&start) && line.ends_with(&end));
-        assert_eq!(rows.count(), 1, "{kind:?}: a row with {versions}");
     }
 }
 
@@ -188,14 +159,6 @@ fn the_page_states_keys_and_limits() {
         format!("`{}`", key::receipt("{session}")),
         format!("1…{} characters", key::MAX_UNIT_ID),
         format!("at most {} bytes", codec::MAX_FRAME),
-        format!("1…{} ticks", codec::MAX_TICKS),
-        format!("0…{} channels", raw::MAX_CHANNELS),
-        format!("0…{} per tick", raw::MAX_HEALTH),
-        format!("0…{} kinds", status::MAX_FAULTS),
-        format!("0…{} units", service_status::MAX_UNITS),
-        format!("0…{} documents", service_status::MAX_BAD_DOCUMENTS),
-        format!("1…{} parts", journal::MAX_PARTS),
-        format!("1…{} bytes of the entry", journal::MAX_PART_BYTES),
     ] {
         assert!(page.contains(&text), "{text}");
     }

@@ -1,0 +1,272 @@
+"""The session with a service or router: streams, producers, and what operators ask."""
+
+from __future__ import annotations
+
+import json
+import pathlib
+from types import TracebackType
+from typing import Any, Callable
+
+import zenoh
+
+from . import _layout as layout
+from ._arrays import CorrectedBatch
+from ._match import wait_until_matched
+from ._producer import Producer
+from ._rules import Message, Refused
+from ._stream import CorrectedStream, StatusStream
+from ._wire import decode, encode
+
+#: Where a service listens by default.
+ENDPOINT = "tcp/127.0.0.1:7447"
+_ESCAPED = {character: f"%{ord(character):02X}" for character in ";=%?#&|"}
+
+
+class BusError(RuntimeError):
+    """Nobody answers, or the answer is that it cannot be done."""
+
+
+class NotAccepted(BusError):
+    """A service refused a calibration or a command; `reply` is its whole answer."""
+
+    def __init__(self, words: str, reply: Message) -> None:
+        super().__init__(words)
+        self.reply = reply
+
+
+def connect(
+    *endpoints: str, namespace: str | None = None, config: zenoh.Config | None = None, timeout_s: float = 10.0
+) -> Bus:
+    """Opens a session with the service or router at an endpoint (default: `ENDPOINT`), or with each of several; use it in a `with`
+    statement.
+
+    Nothing is searched for on the network. `config` replaces the configuration altogether. Raises `BusError` if nobody is there
+    within `timeout_s`.
+    """
+    endpoints = endpoints or (ENDPOINT,)
+    if config is None:
+        config = zenoh.Config()
+        options: dict[str, Any] = {
+            # A client has one connection.
+            "mode": "client" if len(endpoints) == 1 else "peer",
+            "listen/endpoints": [] if len(endpoints) == 1 else ["tcp/127.0.0.1:0"],
+            "connect/endpoints": list(endpoints),
+            "connect/timeout_ms": int(timeout_s * 1000),
+            "connect/exit_on_failure": True,
+            "scouting/multicast/enabled": False,
+            "scouting/gossip/enabled": False,
+            "transport/link/tx/queue/batching/time_limit": 0,
+        }
+        if namespace is not None:
+            options["namespace"] = namespace
+        for name, value in options.items():
+            config.insert_json5(name, json.dumps(value))
+    try:
+        return Bus(zenoh.open(config), timeout_s)
+    except zenoh.ZError as error:
+        words = " or ".join(endpoints)
+        raise BusError(f"{words}: no service or router answers within {timeout_s:g} s; is it running there? ({error})") from None
+
+
+class Bus:
+    """A session. Closing it ends its streams and producers."""
+
+    def __init__(self, session: zenoh.Session, timeout_s: float = 10.0) -> None:
+        #: The Zenoh session, for anything else.
+        self.session = session
+        self.timeout_s = timeout_s
+        self._streams: list[CorrectedStream | StatusStream] = []
+        # A service that stops asks whether all has arrived; ending its query without a reply says so.
+        self._receipt = session.declare_queryable(f"isotherm/{session.zid()}/receipt", lambda query: query.drop())
+
+    def __enter__(self) -> Bus:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Ends all streams and the session."""
+        for stream in self._streams:
+            stream.close()
+        self.session.close()
+
+    def corrected(
+        self,
+        unit: str = "*",
+        *,
+        first_wins: bool = True,
+        callback: Callable[[CorrectedBatch], Any] | None = None,
+        most_waiting: int | None = None,
+        timeout_s: float | None = None,
+    ) -> CorrectedStream:
+        """Corrected batches of a unit, or of all: iterate over it, or give a `callback`, which is called on a thread of its own.
+
+        From the return on nothing is missed: it waits until the service has answered (`BusError` otherwise). Of two services of a
+        unit, `first_wins` uses each tick once. At most `most_waiting` messages wait (default: as many as fit memory); then the oldest
+        is dropped, counted in `messages_dropped`, and its ticks show as lost. After `timeout_s` without a message the iteration raises
+        `TimeoutError`.
+        """
+        stream = CorrectedStream(self.session, f"imu/{unit}/corrected", first_wins, callback, most_waiting, timeout_s)
+        self._streams.append(stream)
+        self._wait_for_service()
+        return stream
+
+    def status_stream(self, unit: str = "*", *, timeout_s: float | None = None) -> StatusStream:
+        """Status messages as they are published: on every change and once a second."""
+        stream = StatusStream(self.session, f"imu/{unit}/status", timeout_s)
+        self._streams.append(stream)
+        return stream
+
+    def producer(
+        self,
+        unit: str,
+        *,
+        batch_ticks: int = 1,
+        max_in_flight: int | None = None,
+        series: int | None = None,
+    ) -> Producer:
+        """Publishes the raw ticks of a unit; see `Producer`."""
+        return Producer(self.session, unit, batch_ticks, max_in_flight, series, self.timeout_s)
+
+    def reference(self, unit: str, start_ns: int, end_ns: int, rate_rad_per_s: list[float], sigma_rad_per_s: float) -> None:
+        """Publishes the true mean rate of a unit over a span, for its drift estimator."""
+        message = {
+            "start_ns": start_ns,
+            "end_ns": end_ns,
+            "angular_rate_rad_per_s": [float(rate) for rate in rate_rad_per_s],
+            "sigma_rad_per_s": float(sigma_rad_per_s),
+        }
+        frame = encode(message, layout.REFERENCE)
+        congestion, priority = zenoh.CongestionControl.BLOCK, zenoh.Priority.REAL_TIME
+        self.session.put(f"imu/{unit}/reference", frame, congestion_control=congestion, priority=priority)
+
+    def status(self, unit: str = "*") -> dict[str, Message]:
+        """Status of a unit, or of all, by serial; with the field names of docs/wire.md. `BusError` for a unit nobody knows."""
+        found = {}
+        for payload in self._ask(f"imu/{unit}/status"):
+            message = decode(payload, layout.STATUS)
+            found[message["unit"]] = message
+        if not found and unit != "*":
+            raise BusError(f"{unit}: no service knows this unit")
+        return found
+
+    def services(self) -> dict[str, Message]:
+        """Status of every service, by instance."""
+        messages = [decode(payload, layout.SERVICE_STATUS) for payload in self._ask("isotherm/*/status")]
+        return {message["instance"]: message for message in messages}
+
+    def calibration(self, unit: str) -> str:
+        """Text of the calibration document in force."""
+        return self._one(f"imu/{unit}/calibration", None).decode("utf-8")
+
+    def swap(
+        self,
+        unit: str,
+        document: str | pathlib.Path,
+        *,
+        by: str | None = None,
+        dry_run: bool = False,
+        at_sequence: int | None = None,
+        at_time_ns: int | None = None,
+        slew_s: float | None = None,
+        any_serial: bool = False,
+        force: bool = False,
+    ) -> Message:
+        """Gives a unit a calibration document or overlay: its text, or the path of its file. The swap reply of docs/wire.md.
+
+        Raises `NotAccepted` with every problem if the service refuses it.
+        """
+        text = document.read_text(encoding="utf-8") if isinstance(document, pathlib.Path) else document
+        given: dict[str, Any] = {"by": by, "at_sequence": at_sequence, "at_time_ns": at_time_ns, "slew_s": slew_s}
+        options = {name: str(value) for name, value in given.items() if value is not None}
+        switches = {"dry_run": dry_run, "any_serial": any_serial, "force": force}
+        options.update({name: "true" for name, on in switches.items() if on})
+        escaped = {name: "".join(_ESCAPED.get(c, c) for c in value) for name, value in options.items()}
+        parameters = ";".join(f"{name}={value}" for name, value in escaped.items())
+        reply = self._json(f"imu/{unit}/calibration?{parameters}" if parameters else f"imu/{unit}/calibration", text)
+        if reply["outcome"] == "refused":
+            problems = [f"{problem.get('key') or 'document'}: {problem['message']}" for problem in reply["problems"]]
+            raise NotAccepted(f"{unit}: the calibration is refused: {'; '.join(problems) or 'no reason given'}", reply)
+        return reply
+
+    def command(self, unit: str, command: str, *, by: str | None = None, **fields: Any) -> Message:
+        """Gives a unit a command with its fields, e.g. `command("ZLG-0001", "run", reversal=True)`. The command reply.
+
+        Raises `NotAccepted` if the service refuses it.
+        """
+        order = {"command": command, **({} if by is None else {"by": by}), **fields}
+        reply = self._json(f"imu/{unit}/command", json.dumps(order))
+        if not reply["accepted"]:
+            raise NotAccepted(f"{unit}: {reply.get('reason') or reply}", reply)
+        return reply
+
+    def history(self, unit: str, limit: int = 20) -> list[Message]:
+        """What was done to a unit, newest last."""
+        entries = json.loads(self._one(f"imu/{unit}/history?limit={limit}", None))
+        return list(entries)
+
+    def wait_for_receipts(self, timeout_s: float | None = None) -> None:
+        """Waits until every subscriber that gives receipts has taken what this session has published. Raises `BusError`."""
+        limit = self.timeout_s if timeout_s is None else timeout_s
+        wait_for_receipts(self.session, limit)
+
+    def _ask(self, selector: str, payload: str | None = None, priority: zenoh.Priority | None = None) -> list[bytes]:
+        """Every answer to a query; `BusError` for one that is an error."""
+        replies = self.session.get(
+            selector,
+            target=zenoh.QueryTarget.ALL,
+            consolidation=zenoh.ConsolidationMode.NONE,
+            timeout=self.timeout_s,
+            payload=payload,
+            priority=priority,
+        )
+        answers = []
+        for reply in replies:
+            if reply.ok is None:
+                words = "nobody answers" if reply.err is None else reply.err.payload.to_string()
+                raise BusError(f"{selector}: {words}")
+            answers.append(reply.ok.payload.to_bytes())
+        return answers
+
+    def _one(self, selector: str, payload: str | None) -> bytes:
+        answers = self._ask(selector, payload)
+        if not answers:
+            raise BusError(f"{selector}: no service answers; does one know the unit? (isotherm status)")
+        return answers[0]
+
+    def _json(self, selector: str, payload: str) -> Message:
+        reply = json.loads(self._one(selector, payload))
+        if not isinstance(reply, dict):
+            raise Refused(f"{selector}: the reply is no JSON object")
+        return reply
+
+    def _wait_for_service(self) -> None:
+        """After the service has answered a query it knows of every subscription that was made before."""
+        querier = self.session.declare_querier(
+            "imu/*/status",
+            target=zenoh.QueryTarget.ALL,
+            consolidation=zenoh.ConsolidationMode.NONE,
+            timeout=self.timeout_s,
+        )
+        if not wait_until_matched(querier, self.timeout_s):
+            raise BusError(f"no service answers on imu/*/status within {self.timeout_s:g} s; is one connected here?")
+        for _ in querier.get():
+            pass  # Status of the units that there are already; the end of the replies is the answer.
+        querier.undeclare()
+
+
+def wait_for_receipts(session: zenoh.Session, timeout_s: float) -> None:
+    """See `Bus.wait_for_receipts`."""
+    replies = session.get(
+        "isotherm/*/receipt",
+        target=zenoh.QueryTarget.ALL,
+        consolidation=zenoh.ConsolidationMode.NONE,
+        timeout=timeout_s,
+        congestion_control=zenoh.CongestionControl.BLOCK,
+        priority=zenoh.Priority.REAL_TIME,
+        allowed_destination=zenoh.Locality.REMOTE,
+    )
+    # It ends once everybody has let it go; Zenoh replies with an error for those who have not in time.
+    if any(reply.ok is None for reply in replies):
+        raise BusError(f"not every subscriber has taken what was published within {timeout_s:g} s")
