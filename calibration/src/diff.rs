@@ -4,6 +4,7 @@
 //! the case axes, beside the uncertainty of the two calibrations. Biases and scale factors are compared over the range of
 //! temperature that both were fitted over; then comes every entry that differs.
 
+pub mod series;
 mod sheet;
 #[cfg(test)]
 mod tests;

@@ -5,6 +5,8 @@ use std::path::Path;
 
 use thiserror::Error;
 
+use crate::finding::Finding;
+
 /// Why a command ended early.
 #[derive(Debug, Error)]
 #[non_exhaustive]
@@ -15,6 +17,9 @@ pub enum Error {
     /// The data do not allow what was asked for: every reason, one per line, each with what to do.
     #[error("{}", .0.join("\n"))]
     Refused(Vec<String>),
+    /// The same, by kind and place.
+    #[error("{}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))]
+    Found(Vec<Finding>),
     /// A document that was made is refused by its own reader; every problem, one per line.
     #[error("the document that was made does not hold:\n{}", .0.join("\n"))]
     Document(Vec<String>),
@@ -48,6 +53,7 @@ impl Error {
                 reasons.extend(cuts.iter().filter(|words| !all.contains(*words)).cloned());
                 Self::Refused(reasons)
             }
+            Self::Found(found) => Self::Refused(found.iter().map(ToString::to_string).collect()).beside(cuts),
             other => other,
         }
     }

@@ -4,7 +4,7 @@ use isotherm_log::offline::unit_id;
 use isotherm_log::text::LogEvent;
 use isotherm_simulator::{Scenario, Simulation, Step};
 
-use crate::run::Run;
+use crate::runs::Run;
 
 /// White noise of standard deviation 1, nearly normal, the same every time.
 #[expect(clippy::cast_precision_loss, reason = "53 bits")]

@@ -7,11 +7,13 @@
 //! | [`logged`] | a drift out of a log |
 //! | [`scenario`] | calibration, then hours on its own: a drift in, errors of heading and position out |
 //! | [`monte_carlo`] | many seeded drifts of a stated size |
+//! | [`over_starts`] | how the constant differs from start to start |
 //! | [`report`] | table, JSON, page |
 
 pub mod estimate;
 pub mod ins;
 pub mod logged;
 pub mod monte_carlo;
+pub mod over_starts;
 pub mod report;
 pub mod scenario;

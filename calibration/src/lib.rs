@@ -5,8 +5,7 @@
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`run`] | what a log has of one unit, to be corrected again and again |
-//! | [`series`], [`means`] | a run as columns: raw readings; corrected outputs averaged over windows |
+//! | [`runs`] | what a log has of one unit, to be corrected again and again; as columns, raw and corrected |
 //! | [`written`], [`provenance`] | a document: on its way to a file, where its numbers come from |
 //! | [`drift`], [`allan`], [`spectrum`] | noise and drift of a static log |
 //! | [`report`] | what a fit says: verdicts, before and after, coefficients; text, JSON and page |
@@ -14,13 +13,15 @@
 //! | [`diff`] | what has changed between two documents |
 //! | [`merge`] | parts of a calibration in one document |
 //! | [`show`] | a document in words and curves |
-//! | [`robust`] | middle and scatter of numbers among which some may be wrong |
+//! | [`lsq`] | least squares: coefficients, covariance, cross-validation |
+//! | [`robust`], [`size`] | middle and scatter of numbers among which some may be wrong; mean, rms, deviation |
 //! | [`swapped`] | columns that look swapped |
 //! | [`validate`] | a document judged on other logs |
 //! | [`positions`], [`tumble`] | accelerometers on a stand; a unit tumbled by hand |
 //! | [`modes`] | drift polynomials and switch parameters of a mode-reversed laser gyro |
 //! | [`rates`] | scale factor, asymmetry, linearity and axes from a rate table |
 //! | [`thermal`] | bias over temperature from runs at rest |
+//! | [`finding`] | what can be wrong or is worth telling, and its words |
 //! | [`error`], [`cli`] | what can go wrong; the command line |
 
 pub mod allan;
@@ -28,10 +29,11 @@ pub mod cli;
 pub mod diff;
 pub mod drift;
 pub mod error;
+pub mod finding;
 #[cfg(test)]
 mod fixture;
 pub mod impact;
-pub mod means;
+pub mod lsq;
 pub mod merge;
 pub mod modes;
 pub mod positions;
@@ -39,9 +41,9 @@ pub mod provenance;
 pub mod rates;
 pub mod report;
 pub mod robust;
-pub mod run;
-pub mod series;
+pub mod runs;
 pub mod show;
+pub mod size;
 pub mod spectrum;
 pub mod swapped;
 pub mod thermal;

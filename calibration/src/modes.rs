@@ -5,7 +5,6 @@
 //! | [`switches`] | the raw ticks about the mode switches: lost ticks, dither |
 //! | [`servo`], [`dither`] | time constant of the perimeter servo; rest frequency over temperature |
 //! | [`cells`] | means between the switches beside the corrector's own columns |
-//! | [`noise`] | white noise, whole counts and Markov drift of the means; least squares under it |
 //! | [`orders`], [`fit`] | orders by cross-validation; one gyro's coefficients |
 //! | `seen`, `units`, `steps`, `temperatures` | what a log shows of dead gyros, other units of measure, motion, thermometers |
 //! | [`checks`] | what a log must have |
@@ -19,8 +18,6 @@ pub mod document;
 pub mod fit;
 pub mod judge;
 pub mod make;
-mod minimum;
-pub mod noise;
 pub mod orders;
 mod prepare;
 mod report;

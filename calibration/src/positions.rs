@@ -11,7 +11,6 @@
 //! | [`analysis`], [`document`], [`provenance`], [`judged`], [`report`], [`charts`] | from runs to a result; as a document, with where it comes from; what it leaves; in words and diagrams |
 //! | [`budget`] | what a planned calibration will come to |
 //! | `sense` | which way sensors point beside what is stated |
-//! | [`solve`] | nonlinear least squares with covariance |
 
 pub mod analysis;
 pub mod bare;
@@ -31,7 +30,6 @@ pub mod pose;
 pub mod provenance;
 pub mod report;
 pub(crate) mod sense;
-pub mod solve;
 pub mod still;
 pub mod temperature;
 pub mod times;

@@ -1,9 +1,11 @@
 //! Columns that look swapped: at rest, in a stated attitude, gravity and the Earth's rate tell the axes.
 
+use std::fmt::{self, Display, Formatter};
+
 use isotherm_correction::earth::{Place, Tilt};
 
 use crate::drift::figures::fixed;
-use crate::means::Size;
+use crate::size::Size;
 
 /// Orders of three axes: the swaps of two first, which need the fewest mistakes.
 pub const ORDERS: [[usize; 3]; 5] = [[1, 0, 2], [2, 1, 0], [0, 2, 1], [1, 2, 0], [2, 0, 1]];
@@ -16,11 +18,11 @@ const LEFT: f64 = 0.25;
 
 /// What three sensors show in the mean beside what they must.
 #[derive(Debug, Clone, Copy)]
-pub struct Shown<'a> {
+pub struct Shown {
     /// Of what kind they are, as in "gyros".
-    pub kind: &'a str,
+    pub kind: &'static str,
     /// Symbol of the unit of measure.
-    pub measure: &'a str,
+    pub measure: &'static str,
     /// Means of the sensors.
     pub mean: [f64; 3],
     /// What each would show without error, in the stated attitude.
@@ -29,17 +31,17 @@ pub struct Shown<'a> {
     pub deviation: f64,
 }
 
-impl<'a> Shown<'a> {
+impl Shown {
     /// Of sensors of a kind, with the symbol of their unit of measure.
     #[must_use]
-    pub fn of([kind, measure]: [&'a str; 2], sizes: [Size; 3], stated: [f64; 3]) -> Self {
+    pub fn of([kind, measure]: [&'static str; 2], sizes: [Size; 3], stated: [f64; 3]) -> Self {
         let deviation = sizes.iter().map(|size| size.deviation).fold(0.0, f64::hypot);
         Self { kind, measure, mean: sizes.map(|size| size.mean), stated, deviation }
     }
 
-    /// Which axes look swapped, in words: another order fits by far better than that of the log; `None` where none does.
+    /// Which axes look swapped: another order fits by far better than that of the log; `None` where none does.
     #[must_use]
-    pub fn swapped(&self) -> Option<String> {
+    pub fn swapped(&self) -> Option<Looks> {
         let off = |order: [usize; 3]| size([0, 1, 2].map(|axis| self.mean[order[axis]] - self.stated[axis]));
         let (as_logged, size) = (self.off(), size(self.stated));
         if !self.is_away() {
@@ -49,24 +51,18 @@ impl<'a> Shown<'a> {
         let best = ORDERS.into_iter().filter(fits).reduce(|best, order| {
             if off(order) < 0.5 * off(best) && off(best) > 0.05 * size { order } else { best }
         })?;
-        Some(format!(
-            "{} {} look swapped: {}; check the columns in the mapping, and the attitude",
-            self.kind,
-            moved(best),
-            self.means()
-        ))
+        Some(self.looks(Some(best)))
     }
 
-    /// That the means are far from what they must be though no order looks right, in words; `None` where they are near.
+    /// That the means are far from what they must be though no order looks right; `None` where they are near.
     #[must_use]
-    pub fn far(&self) -> Option<String> {
-        (self.is_away() && self.swapped().is_none()).then(|| {
-            format!(
-                "the {} do not fit the attitude: {}; is the attitude that of another log, a sign the other one, or the unit of measure wrong?",
-                self.kind,
-                self.means()
-            )
-        })
+    pub fn far(&self) -> Option<Looks> {
+        (self.is_away() && self.swapped().is_none()).then(|| self.looks(None))
+    }
+
+    fn looks(&self, order: Option<[usize; 3]>) -> Looks {
+        let Self { kind, measure, mean, stated, .. } = *self;
+        Looks { kind, measure, order, mean, stated }
     }
 
     /// How far the means are from what they must be.
@@ -79,20 +75,48 @@ impl<'a> Shown<'a> {
         let off = self.off();
         off > AWAY * size(self.stated) && off > AWAY_DEVIATIONS * self.deviation
     }
+}
 
-    /// Both in words.
-    fn means(&self) -> String {
+/// Sensors that do not show what they must in the stated attitude.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Looks {
+    /// Of what kind they are, as in "gyros".
+    pub kind: &'static str,
+    /// Symbol of the unit of measure.
+    pub measure: &'static str,
+    /// The order in which they fit; `None` where they fit in none.
+    pub order: Option<[usize; 3]>,
+    /// Their means.
+    pub mean: [f64; 3],
+    /// What they would be.
+    pub stated: [f64; 3],
+}
+
+impl Display for Looks {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let Self { kind, measure, order, mean, stated } = self;
         // As many places as the largest of them needs for three digits: what is next to nothing is zero.
-        let largest = self.mean.iter().chain(&self.stated).map(|part| part.abs()).fold(0.0, f64::max);
+        let largest = mean.iter().chain(stated).map(|part| part.abs()).fold(0.0, f64::max);
         let places =
             (0..6_u8).find(|places| largest * libm::pow(10.0, f64::from(*places)) >= 100.0).unwrap_or(6);
         let list = |v: [f64; 3]| v.map(|part| fixed(part, usize::from(places))).join(", ");
-        format!(
-            "their means are {} {}, in the stated attitude they would be {}",
-            list(self.mean),
-            self.measure,
-            list(self.stated)
-        )
+        let means = format!(
+            "their means are {} {measure}, in the stated attitude they would be {}",
+            list(*mean),
+            list(*stated)
+        );
+        match order {
+            Some(order) => write!(
+                f,
+                "{kind} {} look swapped: {means}; check the columns in the mapping, and the attitude",
+                moved(*order)
+            ),
+            None => write!(
+                f,
+                "the {kind} do not fit the attitude: {means}; is the attitude that of another log, a sign the other one, or the unit of \
+                 measure wrong?"
+            ),
+        }
     }
 }
 
@@ -123,8 +147,11 @@ pub fn up(place: &Place) -> Option<[f64; 3]> {
 mod tests {
     use super::*;
 
-    fn words(kind: &str, mean: [f64; 3], stated: [f64; 3], deviation: f64) -> String {
-        Shown { kind, measure: "m/s²", mean, stated, deviation }.swapped().unwrap_or_default()
+    fn words(kind: &'static str, mean: [f64; 3], stated: [f64; 3], deviation: f64) -> String {
+        Shown { kind, measure: "m/s²", mean, stated, deviation }
+            .swapped()
+            .map(|looks| looks.to_string())
+            .unwrap_or_default()
     }
 
     #[test]
@@ -151,7 +178,7 @@ mod tests {
             stated: [0.1, -0.2, -9.8],
             deviation: 0.01,
         };
-        let upside_down = of([0.1, -0.2, 9.8]).far().unwrap();
+        let upside_down = of([0.1, -0.2, 9.8]).far().unwrap().to_string();
         assert!(
             upside_down.contains("9.80 m/s²") && upside_down.contains("attitude that of another log"),
             "{upside_down}"

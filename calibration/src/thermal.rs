@@ -13,7 +13,6 @@
 //! | [`thermometer`] | the noise of thermometers, taken out of what a fit is made with |
 //! | [`columns`] | what one unit of each term subtracts, from the corrector |
 //! | [`branches`] | plateaus, ramps, and the pieces that cross-validation leaves out |
-//! | [`solve`] | weighted, regularised, robust linear least squares |
 //! | [`model`] | which terms a sensor has, and their place in the document |
 //! | [`scale`] | what gravity or a rate table tells of the scale factors |
 //! | [`passes`] | whether passes through the same temperatures show the same |
@@ -36,7 +35,6 @@ pub mod search;
 pub mod select;
 pub mod sequential;
 pub mod settings;
-pub mod solve;
 pub mod stand;
 mod target;
 pub mod thermometer;

@@ -14,10 +14,11 @@ use isotherm_protocol::document::{Document, Sample};
 
 use crate::drift::figures::short;
 use crate::error::Error;
-use crate::means::{Means, Size, is_one_g, usual_window_s};
 use crate::report::{Curve, FLAT, Figure, FitReport, Rest, SAME_SHARE, Verdict};
 use crate::robust::is_white;
-use crate::run::Watch;
+use crate::runs::Watch;
+use crate::runs::table::{Rows, Table, Takes, is_one_g, usual_window_s};
+use crate::size::Size;
 use crate::swapped::{Shown, up};
 use crate::thermal::Stand;
 use crate::thermal::checks::judging;
@@ -59,7 +60,7 @@ pub fn validate(
     mut watch: impl Watch,
 ) -> Result<FitReport, Error> {
     let document = &written.document;
-    let bare = Written::of(&document.nominal())?;
+    let bare = Written::compiled(&document.nominal())?;
     let mut report = FitReport::new(format!("Judgement of {name}"), document.unit.clone());
     let mut coverage = Coverage::of(written);
     let mut readings = Vec::new();
@@ -78,7 +79,11 @@ pub fn validate(
     let window_s = wanted.window_s.unwrap_or_else(|| usual_window_s(longest_s, WINDOW_S));
     for (log, (faults, _)) in logs.iter().zip(readings) {
         let run = &log.run;
-        let after = Means::of(run, &written.loaded, window_s, &mut watch)?;
+        let rows = Rows { length_s: window_s, takes: Takes::Valid };
+        let documents = [written.loaded.clone(), bare.clone()];
+        let mut tables = Table::together(run, &documents, rows, &mut watch)?.into_iter();
+        let mut next = || tables.next().unwrap_or_default().whole(0.999);
+        let (after, nominal) = (next(), next());
         if (0..3).all(|axis| Size::of(after.rate(axis)).count == 0) {
             let nothing = format!(
                 "{}: {name} makes no valid rate of any of its gyro ticks: is it the document of this unit, and the mapping right?",
@@ -86,7 +91,6 @@ pub fn validate(
             );
             return Err(Error::Refused([vec![nothing], after.troubles, faults].concat()));
         }
-        let nominal = Means::of(run, &bare.loaded, window_s, &mut watch)?;
         coverage.count(run, written, &mut watch)?;
         if let Some(reason) = at_rest(&run.name, &after) {
             return Err(Error::Refused([vec![reason], faults].concat()));
@@ -94,7 +98,7 @@ pub fn validate(
         report.warnings.extend(faults);
         let rest = rest(&run.name, &after, wanted.place.as_ref())?;
         let sample = if log.known { Sample::In } else { Sample::Out };
-        let curves = Curve::of_means(&run.name, sample, [&nominal, &after], document, &rest);
+        let curves = Curve::of_tables(&run.name, sample, [&nominal, &after], document, &rest);
         report.warnings.extend(doubts(&run.name, &curves, &after));
         report.warnings.extend(looks_swapped(&run.name, &nominal, (&rest, wanted.place.as_ref())));
         report.residuals.extend(curves);
@@ -140,7 +144,7 @@ pub fn validate(
 }
 
 /// What a run's curves show of sensors that do not work, and of gaps.
-fn doubts(name: &str, curves: &[Curve], means: &Means) -> Vec<String> {
+fn doubts(name: &str, curves: &[Curve], means: &Table) -> Vec<String> {
     let mut doubts = Vec::new();
     let force = [0, 1, 2].map(|axis| Size::of(means.force(axis)));
     if force.iter().all(|size| size.count > 0) {
@@ -169,9 +173,10 @@ fn doubts(name: &str, curves: &[Curve], means: &Means) -> Vec<String> {
 }
 
 /// Columns that look swapped, where the attitude is known.
-fn looks_swapped(name: &str, means: &Means, (rest, place): (&Rest, Option<&Place>)) -> Vec<String> {
-    let looks =
-        |of: [&str; 2], sizes: [Size; 3], stated: Option<[f64; 3]>| Shown::of(of, sizes, stated?).swapped();
+fn looks_swapped(name: &str, means: &Table, (rest, place): (&Rest, Option<&Place>)) -> Vec<String> {
+    let looks = |of: [&'static str; 2], sizes: [Size; 3], stated: Option<[f64; 3]>| {
+        Shown::of(of, sizes, stated?).swapped()
+    };
     let force = place.and_then(up).map(|up| up.map(|part| part * STANDARD_GRAVITY_M_PER_S2));
     let words = [
         looks(["gyros", "°/h"], [0, 1, 2].map(|axis| Size::of(means.rate(axis))), rest.rate_deg_per_h),
@@ -181,7 +186,7 @@ fn looks_swapped(name: &str, means: &Means, (rest, place): (&Rest, Option<&Place
 }
 
 /// Why a run cannot judge in which the unit was moved: what is left would be its motion.
-fn at_rest(name: &str, means: &Means) -> Option<String> {
+fn at_rest(name: &str, means: &Table) -> Option<String> {
     let refuse = |what: String| {
         Some(format!(
             "{name}: the unit was not at rest: {what}. Cut the log to where it was, with --start and --duration"
@@ -213,7 +218,7 @@ fn at_rest(name: &str, means: &Means) -> Option<String> {
 }
 
 /// What the unit would put out without error.
-fn rest(name: &str, means: &Means, place: Option<&Place>) -> Result<Rest, Error> {
+fn rest(name: &str, means: &Table, place: Option<&Place>) -> Result<Rest, Error> {
     let Some(place) = place else { return Ok(Rest::default()) };
     let force = [0, 1, 2].map(|axis| Size::of(means.force(axis)));
     let known = force.iter().all(|size| size.count > 0);

@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use isotherm_correction::calibration::{Calibration, Defect};
 use isotherm_log::file::{read_small_text, write_whole};
 use isotherm_log::offline::{Loaded, unit_id};
 use isotherm_protocol::document::{Document, Parsed, Problem};
@@ -35,6 +36,22 @@ impl Written {
         let text = format!("{SCHEMA_LINE}{body}");
         let parsed = Document::parse(&text, None).map_err(|found| Error::Document(words(&found)))?;
         Self::from_parts(text, parsed)
+    }
+
+    /// The calibration of a document that is only worked with, and never written.
+    ///
+    /// # Errors
+    /// [`Error::Document`] with everything that is wrong with it.
+    pub fn compiled(document: &Document) -> Result<Loaded, Error> {
+        let defects =
+            |found: Vec<Defect>| Error::Document(found.iter().map(|defect| format!("{defect:?}")).collect());
+        let calibration = Calibration::new(&document.to_parts()).map_err(defects)?;
+        Ok(Loaded {
+            calibration: Arc::new(calibration),
+            digest: [0; 8],
+            unit: unit_id(&document.unit)?,
+            warnings: Vec::new(),
+        })
     }
 
     /// Reads a document from a file.

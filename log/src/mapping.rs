@@ -44,6 +44,8 @@ pub struct FileMapping {
     pub accel: Option<TickMapping>,
     /// Temperature channels; may be empty.
     pub temperatures: Vec<TemperatureMapping>,
+    /// What says of each row whether it holds, where the file has that.
+    pub status: Option<StatusMapping>,
 }
 
 /// What stands between two cells.
@@ -115,19 +117,9 @@ pub enum TimeUnit {
     /// Seconds.
     #[serde(rename = "s")]
     Seconds,
-}
-
-impl TimeUnit {
-    /// n where the unit is 10ⁿ ns.
-    #[must_use]
-    pub const fn exponent(self) -> i32 {
-        match self {
-            Self::Nanoseconds => 0,
-            Self::Microseconds => 3,
-            Self::Milliseconds => 6,
-            Self::Seconds => 9,
-        }
-    }
+    /// None: date and time of ISO 8601, in UTC where they name no offset.
+    #[serde(rename = "iso")]
+    DateTime,
 }
 
 /// A column that holds a time or a duration.
@@ -217,6 +209,20 @@ pub struct ModeMapping {
     /// An empty cell is no state at all.
     #[serde(default)]
     pub may_be_empty: bool,
+}
+
+/// A column that says whether the row's readings hold. A row of which it says otherwise is passed over; its tick becomes a gap.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub struct StatusMapping {
+    /// Which column.
+    pub column: Column,
+    /// Cells of rows that hold.
+    #[serde(default)]
+    pub good: Vec<String>,
+    /// Bits of the status word of which none is set in a row that holds.
+    #[schemars(range(min = 1))]
+    pub bad_bits: Option<u64>,
 }
 
 /// Where mode-switch commands come from.
@@ -352,6 +358,7 @@ impl FileMapping {
         let halves = gyro.into_iter().flat_map(|gyro| gyro.half_periods.iter().flat_map(|(a, b)| [a, b]));
         let stamps = self.time.stamps.as_ref().map(|stamps| &stamps.column);
         let temperatures = self.temperatures.iter().map(|temperature| &temperature.column);
+        let status = self.status.iter().map(|status| &status.column);
         stamps
             .into_iter()
             .chain(sensors)
@@ -360,5 +367,6 @@ impl FileMapping {
             .chain(switch)
             .chain(halves)
             .chain(temperatures)
+            .chain(status)
     }
 }

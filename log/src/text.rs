@@ -85,7 +85,9 @@ pub struct ReadReport {
     pub dropped_rows: u64,
     /// Rows that could not be read and were passed over.
     pub skipped_rows: u64,
-    /// Why the first of them could not be read.
+    /// Rows that were passed over because of their status.
+    pub bad_status_rows: u64,
+    /// Why the first of the rows that could not be read could not be.
     pub first_skipped: Option<String>,
     /// A file's last line has no line end: its last cell may be cut.
     pub unterminated_last_line: bool,
@@ -105,6 +107,7 @@ impl ReadReport {
         self.rows += other.rows;
         self.dropped_rows += other.dropped_rows;
         self.skipped_rows += other.skipped_rows;
+        self.bad_status_rows += other.bad_status_rows;
         self.first_skipped = self.first_skipped.take().or_else(|| other.first_skipped.clone());
         self.unterminated_last_line |= other.unterminated_last_line;
         self.cut_short |= other.cut_short;

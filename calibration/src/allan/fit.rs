@@ -16,6 +16,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::confidence::{Mixture, PowerLaw, degrees_of_freedom};
 use super::deviation::{Estimator, Variance};
+use crate::lsq::linear::{self, SINGULAR, Weak};
 
 /// One coefficient.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -274,26 +275,18 @@ impl<'a> Problem<'a> {
         for row in 0..count {
             covariance[(row, row)] += floor(row);
         }
-        // Scaled to unit diagonal first: the variances may span many powers of ten.
-        let scale = DVector::from_fn(count, |row, _| covariance[(row, row)].sqrt());
+        // Rounding may leave no covariance: its rows are then taken to hang together a little less.
         let mut shrink = 1.0;
-        let factor = loop {
-            let unit = DMatrix::from_fn(count, count, |a, b| {
-                let share = covariance[(a, b)] / (scale[a] * scale[b]);
-                if a == b { 1.0 } else { share * shrink }
-            });
-            match unit.cholesky() {
-                Some(factor) => break factor,
+        let white = loop {
+            let near =
+                DMatrix::from_fn(count, count, |a, b| covariance[(a, b)] * if a == b { 1.0 } else { shrink });
+            match linear::whitening(&near) {
+                Some(white) => break white,
                 None if shrink > 0.1 => shrink *= 0.9,
                 None => return None,
             }
         };
-        let inverse = |matrix: DMatrix<f64>| factor.l().solve_lower_triangular(&matrix);
-        let by_row =
-            |matrix: &DMatrix<f64>| DMatrix::from_fn(count, matrix.ncols(), |r, c| matrix[(r, c)] / scale[r]);
-        let design = inverse(by_row(&self.design))?;
-        let values = inverse(by_row(&DMatrix::from_column_slice(count, 1, self.values.as_slice())))?;
-        Some(Whitened { design, values: values.column(0).into_owned() })
+        Some(Whitened { design: &white * &self.design, values: white * &self.values })
     }
 }
 
@@ -309,27 +302,10 @@ impl Whitened {
         if terms.is_empty() {
             return Some((Vec::new(), self.values.norm_squared(), Vec::new()));
         }
-        if terms.len() > self.values.len() {
-            return None;
-        }
-        let chosen = self.design.select_columns(terms);
-        // Columns of one length: the squares differ by many powers of ten.
-        let lengths: Vec<f64> = chosen.column_iter().map(|column| column.norm()).collect();
-        if lengths.iter().any(|length| *length <= 0.0 || !length.is_finite()) {
-            return None;
-        }
-        let mut columns = chosen;
-        for (mut column, length) in columns.column_iter_mut().zip(&lengths) {
-            column /= *length;
-        }
-        let qr = columns.clone().qr();
-        let right = qr.q().transpose() * &self.values;
-        let inverse = qr.r().solve_upper_triangular(&DMatrix::identity(terms.len(), terms.len()))?;
-        let solution = &inverse * right;
-        let cost = (&self.values - columns * &solution).norm_squared();
-        let squares = solution.iter().zip(&lengths).map(|(value, length)| value / length).collect();
-        let sigmas = inverse.row_iter().zip(&lengths).map(|(row, length)| row.norm() / length).collect();
-        Some((squares, cost, sigmas))
+        let columns = self.design.select_columns(terms);
+        let found = linear::solve(&columns, &self.values, Weak::Refuse(SINGULAR)).ok()?;
+        let sigmas = (0..terms.len()).map(|index| found.sigma(index)).collect();
+        Some((found.coefficients.iter().copied().collect(), found.chi_square(), sigmas))
     }
 
     /// The best squares among these terms of which none is below zero, and which of them are above.

@@ -5,7 +5,7 @@ use std::io::{self, IsTerminal};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use isotherm_log::progress::Progress;
 
-use crate::run::Watch;
+use crate::runs::Watch;
 
 /// Steps between two looks at the progress.
 const STRIDE: u32 = 64;

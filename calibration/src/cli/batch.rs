@@ -12,8 +12,8 @@ use super::print;
 use super::runs::Reading;
 use crate::error::Error;
 use crate::report::{BatchTable, UnitReport, in_parallel, of_unit};
-use crate::run::Run;
-use crate::run::cut::Cut;
+use crate::runs::Run;
+use crate::runs::cut::Cut;
 use crate::written::{Written, write_file};
 
 /// What a command has to work on of one unit.

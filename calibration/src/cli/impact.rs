@@ -1,6 +1,7 @@
 //! `isotherm-calibrate impact`.
 
 use std::path::{Path, PathBuf};
+use std::slice;
 
 use clap::{Args, ValueEnum};
 use isotherm_correction::drift::DriftParts;
@@ -16,14 +17,16 @@ use super::print;
 use super::runs::{LogArgs, Reading};
 use crate::drift::HOUR_S;
 use crate::drift::columns::{Columns, Kind};
+use crate::drift::figures::short;
 use crate::error::Error;
 use crate::impact::ins::{GREATEST_LATITUDE_DEG, TURN_RATIO};
 use crate::impact::logged;
 use crate::impact::monte_carlo::{Voyages, sail_all};
+use crate::impact::over_starts;
 use crate::impact::report::{Report, Row};
 use crate::impact::scenario::{CARES, Drift, Voyage};
-use crate::run::Watch;
-use crate::run::cut::Cut;
+use crate::runs::Watch;
+use crate::runs::cut::Cut;
 
 /// Seeds where nobody says.
 const SEEDS: u32 = 50;
@@ -37,7 +40,8 @@ const SIZES_DEG_H: [f64; 6] = [0.0034, 9.5, 0.000_08, 140.0, 0.05, 0.0002];
 #[command(after_help = "Examples:\n  \
     isotherm-calibrate impact --trend 0.00008 --html impact.html\n  \
     isotherm-calibrate impact --document unit-drift.toml --seeds 100\n  \
-    isotherm-calibrate impact corrected.mcap --calibration-hours 21\n\n\
+    isotherm-calibrate impact corrected.mcap --calibration-hours 21\n  \
+    isotherm-calibrate impact --document unit-drift.toml --start-log monday.mcap --start-log tuesday.mcap --start-log friday.mcap\n\n\
     The system is calibrated, then goes on alone; its level platform turns about the vertical at four times the Earth's rate. \
     Each drift is sailed three times: held at its last value, and with the service's own drift estimator without and with \
     the state of the trend.")]
@@ -68,6 +72,9 @@ pub(super) struct ImpactArgs {
     /// Sail many times with drifts from as many seeds, of the size that the document states; --trend comes on top
     #[arg(long, value_name = "NUMBER", conflicts_with = "log", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     seeds: Option<u32>,
+    /// Log at rest of one start, read as LOG is; with two or more, their means give the sigma of the constant over starts; repeatable
+    #[arg(long, value_name = "LOG")]
+    start_log: Vec<PathBuf>,
     /// The first seed
     #[arg(long, value_name = "SEED", default_value_t = 1)]
     seed: u64,
@@ -121,12 +128,15 @@ impl ImpactArgs {
     /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
         let mut voyage = self.voyage()?;
-        let parts = self.parts()?;
+        let mut parts = self.parts()?;
         let cut = Cut::default();
-        let report = if !self.log.is_empty() {
+        let starts = self.starts(&mut parts, &cut)?;
+        let mut report = if !self.log.is_empty() {
             self.sail_log(&mut voyage, &parts, &cut)?
         } else if self.seeds.is_some()
-            || (self.trend.is_none() && self.constant.is_none() && self.document.is_some())
+            || (self.trend.is_none()
+                && self.constant.is_none()
+                && (self.document.is_some() || !self.start_log.is_empty()))
         {
             self.sail_seeds(&voyage, &parts)?
         } else if self.trend.is_some() || self.constant.is_some() {
@@ -135,6 +145,7 @@ impl ImpactArgs {
             let words = "say which drift: a LOG, --document DOC, --trend DEG_PER_H2 or --constant DEG_PER_H";
             return Err(Error::Usage(words.to_owned()));
         };
+        report.notes.extend(starts);
         self.page.write(|| report.to_html())?;
         if self.json {
             print(format!("{}\n", report.to_json()).as_bytes())?;
@@ -169,7 +180,8 @@ impl ImpactArgs {
             let words = "--gyro each sails each gyro by itself, the drifts of --seeds are of all: give x, y, z or all";
             return Err(Error::Usage(words.to_owned()));
         }
-        let inputs: Vec<&Path> = self.log.iter().chain(&self.document).map(PathBuf::as_path).collect();
+        let inputs: Vec<&Path> =
+            self.log.iter().chain(&self.start_log).chain(&self.document).map(PathBuf::as_path).collect();
         self.page.check(&inputs)?;
         Ok(Voyage {
             latitude_deg: self.latitude,
@@ -205,6 +217,33 @@ impl ImpactArgs {
                 "{path} states a drift for {count} gyros, the platform has three: {advice}"
             )])
         })
+    }
+
+    /// Takes the sigma of the constant over starts from the logs that were given of them; what was found is said in a sentence.
+    fn starts(&self, parts: &mut [DriftParts; 3], cut: &Cut) -> Result<Option<String>, Error> {
+        if self.start_log.is_empty() {
+            return Ok(None);
+        }
+        let means = |path: &PathBuf| Ok(over_starts::means(&self.columns(slice::from_ref(path), cut)?));
+        let means: Vec<[f64; 3]> = self.start_log.iter().map(means).collect::<Result<_, Error>>()?;
+        let found = over_starts::sigmas(&means).ok_or_else(|| {
+            Error::Usage(
+                "--start-log: the sigma over starts needs two logs at least: give it once for each start"
+                    .to_owned(),
+            )
+        })?;
+        for (parts, found) in parts.iter_mut().zip(&found) {
+            parts.initial_sigma_rad_per_s = AngularRate::from_deg_per_h(found.sigma).as_rad_per_s();
+        }
+        let of = |found: &over_starts::Found| {
+            let [low, high] = found.interval;
+            format!("{} ({}…{})", short(found.sigma), short(low), short(high))
+        };
+        Ok(Some(format!(
+            "Sigma of the constant over {} starts, with its 95 % interval, gyros x, y, z: {} °/h. It stands in place of initial_sigma.",
+            means.len(),
+            found.iter().map(of).collect::<Vec<_>>().join(", ")
+        )))
     }
 
     fn cases(&self) -> Vec<Case> {
@@ -296,7 +335,7 @@ impl ImpactArgs {
     }
 
     fn sail_log(&self, voyage: &mut Voyage, parts: &[DriftParts; 3], cut: &Cut) -> Result<Report, Error> {
-        let mut columns = self.columns(cut)?;
+        let mut columns = self.columns(&self.log, cut)?;
         let words: Vec<String> = cut.words().map(str::to_owned).into_iter().collect();
         let (drift, mut notes) = logged::drift(&mut columns, voyage, &self.otherwise(parts))
             .map_err(|error| error.beside(&words))?;
@@ -337,13 +376,13 @@ impl ImpactArgs {
         }
     }
 
-    fn columns(&self, cut: &Cut) -> Result<Columns, Error> {
-        let args = LogArgs { log: self.log.clone(), reading: self.reading.clone() };
+    fn columns(&self, logs: &[PathBuf], cut: &Cut) -> Result<Columns, Error> {
+        let args = LogArgs { log: logs.to_vec(), reading: self.reading.clone() };
         let unit = self.reading.serial()?;
         let raw = self.reading.mapping.is_some();
-        if !raw && (self.log.iter().all(|path| is_csv(path)) || self.document.is_none()) {
+        if !raw && (logs.iter().all(|path| is_csv(path)) || self.document.is_none()) {
             let mut bar = Bar::at_work("reading");
-            let columns = Columns::of_corrected(&self.log, unit.as_ref(), Kind::Rate, cut, || bar.step());
+            let columns = Columns::of_corrected(logs, unit.as_ref(), Kind::Rate, cut, || bar.step());
             bar.finish();
             return columns;
         }

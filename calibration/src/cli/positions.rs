@@ -26,7 +26,7 @@ use crate::positions::provenance::{before, details, sigmas};
 use crate::positions::report::{Set, report};
 use crate::positions::still::StillLimits;
 use crate::positions::times::Times;
-use crate::run::Run;
+use crate::runs::Run;
 use crate::written::Written;
 use planned::PlannedArgs;
 use steps::{first_document, judged, tracks};

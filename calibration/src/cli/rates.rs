@@ -16,7 +16,7 @@ use crate::error::Error;
 use crate::rates::document::{details, nominal, sigmas};
 use crate::rates::make::{Wanted, make};
 use crate::rates::steps::{Step, listed, read};
-use crate::run::Run;
+use crate::runs::Run;
 
 /// Scale factor, asymmetry, linearity, input axes and bias of gyros from runs on a rate table
 #[derive(Debug, Args)]

@@ -14,7 +14,7 @@ use isotherm_protocol::key::UnitId;
 use super::bar::Bar;
 use crate::error::Error;
 use crate::provenance::recordings_in;
-use crate::run::{Run, units_of};
+use crate::runs::{Run, units_of};
 
 /// Gyro ticks in a batch of a text log.
 const BATCH_TICKS: usize = 512;

@@ -16,7 +16,7 @@ use crate::error::Error;
 use crate::positions::bare::bare;
 use crate::positions::still::StillLimits;
 use crate::positions::track::Track;
-use crate::run::Run;
+use crate::runs::Run;
 use crate::tumble::analysis::{Settings, analyse};
 use crate::tumble::document::{before, complete};
 use crate::tumble::report::{Left, details, report, sigmas};

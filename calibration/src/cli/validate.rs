@@ -14,7 +14,7 @@ use super::print;
 use super::runs::Reading;
 use crate::error::Error;
 use crate::report::{FitReport, in_parallel};
-use crate::run::{Run, Watch};
+use crate::runs::{Run, Watch};
 use crate::validate::{JudgedLog, Wanted, validate};
 use crate::written::Written;
 

@@ -10,9 +10,9 @@ use isotherm_protocol::key::UnitId;
 use super::DEG_PER_H_IN_RAD_PER_S;
 use super::pieces::checks;
 use crate::error::Error;
-use crate::run::cut::Cut;
-use crate::run::{Run, Watch};
-use crate::series::{Series, Ticks};
+use crate::runs::cut::Cut;
+use crate::runs::series::{Series, Ticks};
+use crate::runs::{Run, Watch};
 
 /// What a column measures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -10,9 +10,10 @@
 
 mod likelihood;
 
-use nalgebra::{DMatrix, Matrix2};
+use nalgebra::{DMatrix, DVector};
 
 use super::slow::Slow;
+use crate::lsq::linear;
 use likelihood::{Problem, Solution, noise};
 
 /// Fewest bins.
@@ -224,13 +225,10 @@ impl Fit {
         let first = self.beside.degree as usize + 1;
         let of = |(index, period): (usize, &u32)| {
             let at = first + 2 * index;
-            let wave = self.beta.get(at..at + 2)?;
-            let block = self.covariance.view((at, at), (2, 2));
-            let inverse =
-                Matrix2::new(block[(0, 0)], block[(0, 1)], block[(1, 0)], block[(1, 1)]).try_inverse()?;
-            let vector = nalgebra::Vector2::new(wave[0], wave[1]);
-            let chi_square = vector.dot(&(inverse * vector));
-            Some(DailyLine { period_h: *period, amplitude: vector.norm(), chi_square })
+            let wave = DVector::from_column_slice(self.beta.get(at..at + 2)?);
+            let block = self.covariance.view((at, at), (2, 2)).into_owned();
+            let chi_square = linear::chi_square(&wave, &block)?;
+            Some(DailyLine { period_h: *period, amplitude: wave.norm(), chi_square })
         };
         self.beside.periods_h.iter().enumerate().filter_map(of).collect()
     }

@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
 use super::slow::Slow;
+use crate::lsq::linear::{self, SINGULAR, Weak};
 
 /// Hours that 002 fits: how long its system is calibrated.
 pub const FIT_H: f64 = 21.0;
@@ -56,10 +57,9 @@ impl Extrapolation {
             2,
             |row, column| if column == 0 { 1.0 } else { times[row] - first },
         );
-        let qr = columns.qr();
-        let right = qr.q().transpose() * DVector::from_column_slice(means);
-        let line = qr.r().solve_upper_triangular(&right)?;
-        let (start, slope) = (line[0], line[1]);
+        let line =
+            linear::solve(&columns, &DVector::from_column_slice(means), Weak::Refuse(SINGULAR)).ok()?;
+        let (start, slope) = (line.coefficients[0], line.coefficients[1]);
         let errors: Vec<f64> =
             later.iter().zip(rest).map(|(time, mean)| mean - start - slope * (time - first)).collect();
         let mean = |values: &[f64]| {

@@ -6,14 +6,13 @@
 mod knife;
 
 use isotherm_correction::sample::TickFlags;
-use isotherm_correction::unit::Unit;
 use isotherm_log::offline::Loaded;
 use isotherm_protocol::document::{Curve, Document, Orientation, OrientationThermal, Shape};
 
 use knife::Knife;
 
 use crate::error::Error;
-use crate::run::{Run, Troubles, Watch};
+use crate::runs::{Run, Troubles, Watch};
 use crate::written::Written;
 
 /// Largest power of temperature that is tried.
@@ -106,7 +105,7 @@ pub(crate) fn along_input_axes(document: &Document, group: [usize; 3]) -> Docume
 /// Documents of a gathering: bare, and one for each power of temperature.
 fn documents(bare: &Document, group: [usize; 3], reference: f64) -> Result<Vec<Loaded>, Error> {
     let bare = along_input_axes(bare, group);
-    let mut loaded = vec![Written::of(&bare)?.loaded];
+    let mut loaded = vec![Written::compiled(&bare)?];
     for power in 1..=MAX_POWER {
         let mut document = bare.clone();
         for sensor in &mut document.gyro.sensor {
@@ -115,7 +114,7 @@ fn documents(bare: &Document, group: [usize; 3], reference: f64) -> Result<Vec<L
             sensor.static_bias =
                 Some(Curve::new(Shape::Polynomial { reference, coefficients, range: ANY_DEG_C }));
         }
-        loaded.push(Written::of(&document)?.loaded);
+        loaded.push(Written::compiled(&document)?);
     }
     Ok(loaded)
 }
@@ -151,18 +150,16 @@ pub fn gather<W: Watch>(
             knife.take(raw, ticks, unit, &mut gathered);
         })?;
         knife.close(&mut gathered);
-        gathered.troubles.extend(troubles);
+        gathered.troubles.extend(troubles.into_iter().next().unwrap_or_default());
     }
     gathered.force = (force_s > 0.0).then(|| velocity.map(|sum| sum / force_s));
     Ok(gathered)
 }
 
-/// Mean of the channels that the orientation follows, as they are applied now (°C).
-pub(crate) fn temperature(thermal: &OrientationThermal, unit: &Unit) -> f64 {
-    let states = unit.channels().filter(|channel| thermal.channels.iter().any(|name| *name == *channel.name));
-    let (sum, count) = states
-        .filter_map(|channel| channel.state)
-        .fold((0.0, 0.0), |(sum, count), state| (sum + state.temperature, count + 1.0));
+/// Mean of the channels that an orientation follows (°C), each by its name; no number where none has one.
+pub(crate) fn temperature(thermal: &OrientationThermal, of: impl Fn(&str) -> Option<f64>) -> f64 {
+    let known = thermal.channels.iter().filter_map(|name| of(name)).filter(|deg_c| deg_c.is_finite());
+    let (sum, count) = known.fold((0.0, 0.0), |(sum, count), deg_c| (sum + deg_c, count + 1.0));
     let [low, high] = thermal.range_deg_c;
     if count > 0.0 { (sum / count).clamp(low, high) } else { f64::NAN }
 }

@@ -10,8 +10,8 @@ use super::seen::Stay;
 use super::switches::{Switches, real};
 use super::{steps, units};
 use crate::drift::figures::{counted, short, six};
-use crate::means::Size;
 use crate::robust::{median, scatter_of_steps};
+use crate::size::Size;
 use crate::swapped::Shown;
 
 /// Fewest switches.
@@ -204,7 +204,7 @@ pub(super) fn lacks_temperatures(gathered: &Gathered) -> bool {
 #[must_use]
 pub fn attitude(seconds: &[Second], earth: Option<[f64; 3]>, up: Option<[f64; 3]>) -> Vec<String> {
     let parts = || seconds.chunks(seconds.len().div_ceil(PARTS).max(1));
-    let looks = |of: [&str; 2], triad: fn(&Second) -> [f64; 3], stated: Option<[f64; 3]>| {
+    let looks = |of: [&'static str; 2], triad: fn(&Second) -> [f64; 3], stated: Option<[f64; 3]>| {
         let sizes = [0, 1, 2].map(|axis| {
             let mean = |part: &[Second]| {
                 Size::of(&part.iter().map(|second| triad(second)[axis]).collect::<Vec<f64>>()).mean
@@ -219,7 +219,7 @@ pub fn attitude(seconds: &[Second], earth: Option<[f64; 3]>, up: Option<[f64; 3]
         looks(["gyros", "°/h"], |second| second.rate, earth),
         looks(["accelerometers", "m/s²"], |second| second.force, force),
     ];
-    words.into_iter().flatten().collect()
+    words.into_iter().flatten().map(|looks| looks.to_string()).collect()
 }
 
 /// The first motion of each kind.

@@ -5,9 +5,9 @@
 
 use super::cells::{Cell, MAX_POWER};
 use super::fit::largest_order;
-use super::noise::Data;
 use super::units::LARGEST_HZ;
 use crate::drift::figures::short;
+use crate::lsq::correlated::Data;
 
 /// Squared standard errors that the highest coefficient must be away from zero.
 const BETTER: f64 = 4.0;

@@ -4,8 +4,8 @@ use isotherm_correction::units::AngularRate;
 use nalgebra::DMatrix;
 
 use super::cells::{Cell, MAX_POWER};
-use super::noise::{Data, Noise, real};
 use super::orders::{self, Folds, Model, Score};
+use crate::lsq::correlated::{Data, Noise, real};
 
 /// Temperature that the slow meander's powers are taken about (°C) (003).
 pub const MEANDER_REFERENCE_DEG_C: f64 = 25.0;

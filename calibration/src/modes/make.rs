@@ -16,7 +16,7 @@ use super::{temperatures, units};
 use crate::error::Error;
 use crate::report::{Curve as Residual, FitReport};
 use crate::robust::median;
-use crate::run::{Run, Watch};
+use crate::runs::{Run, Watch};
 use crate::written::Written;
 
 /// About so many cells are made of a fit's runs, none shorter than [`SHORTEST_S`].

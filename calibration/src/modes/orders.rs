@@ -1,10 +1,10 @@
 //! Orders of the polynomials by cross-validation: what was fitted to cooling is judged on heating, and the other way round.
 
-use nalgebra::{DMatrix, DVector};
-
 use super::cells::MAX_POWER;
 use super::fit::{Asked, MEANDER_ORDER, Term};
-use super::noise::{Data, Noise};
+use crate::lsq::blocks::Blocks;
+use crate::lsq::correlated::{Data, Noise};
+use crate::lsq::linear::{SINGULAR, Weak};
 
 /// Share of the range that cooling and heating must each cover to be folds.
 const COVERED: f64 = 0.7;
@@ -108,13 +108,6 @@ impl Folds {
     }
 }
 
-/// Sums of squares and products of one fold.
-struct Sums {
-    xx: DMatrix<f64>,
-    xy: DVector<f64>,
-    yy: f64,
-}
-
 /// Chooses the orders that were not given.
 ///
 /// # Errors
@@ -165,11 +158,11 @@ pub fn choose(
     if let (Some(only), None) = (models().next(), models().nth(1)) {
         return Ok((only, Vec::new()));
     }
-    let count = folds.of.iter().max().map_or(1, |largest| largest + 1);
-    let sums = sums(data, noise, folds, count);
+    let white = data.whitened(noise);
+    let blocks = Blocks::of(&white.columns, &white.value, &folds.of);
     let mut scores: Vec<Score> = models()
         .filter_map(|model| {
-            Some(Score { model, chi_square: score(&sums, &model.columns())?, count: data.len() })
+            Some(Score { model, chi_square: score(&blocks, &model.columns())?, count: data.len() })
         })
         .collect();
     scores.sort_by(|a, b| a.chi_square.total_cmp(&b.chi_square));
@@ -185,43 +178,11 @@ pub fn choose(
     Ok((chosen.unwrap_or(full), scores))
 }
 
-fn sums(data: &Data, noise: Noise, folds: &Folds, count: usize) -> Vec<Sums> {
-    let white = data.whitened(noise);
-    let width = data.columns.len();
-    let mut sums: Vec<Sums> = (0..count)
-        .map(|_| Sums { xx: DMatrix::zeros(width, width), xy: DVector::zeros(width), yy: 0.0 })
-        .collect();
-    for (row, fold) in folds.of.iter().enumerate() {
-        if let Some(sums) = sums.get_mut(*fold) {
-            let x = white.columns.row(row).transpose();
-            let y = white.value[row];
-            sums.xx += &x * x.transpose();
-            sums.xy += &x * y;
-            sums.yy += y * y;
-        }
-    }
-    sums
-}
-
 /// Squared errors with which each fold is predicted from the others.
-fn score(sums: &[Sums], columns: &[usize]) -> Option<f64> {
-    let width = columns.len();
-    let part = |xx: &DMatrix<f64>| DMatrix::from_fn(width, width, |i, j| xx[(columns[i], columns[j])]);
-    let some = |xy: &DVector<f64>| DVector::from_fn(width, |i, _| xy[columns[i]]);
-    let squares = sums.iter().fold(DMatrix::zeros(width, width), |sum, fold| sum + part(&fold.xx));
-    let products = sums.iter().fold(DVector::zeros(width), |sum, fold| sum + some(&fold.xy));
-    let scale = squares.diagonal().map(f64::sqrt);
-    if scale.iter().any(|x| x.is_nan() || *x <= 0.0) {
-        return None;
-    }
-    let mut total = 0.0;
-    for fold in sums.iter().filter(|fold| fold.yy > 0.0) {
-        let (xx, xy) = (part(&fold.xx), some(&fold.xy));
-        let rest =
-            DMatrix::from_fn(width, width, |i, j| (squares[(i, j)] - xx[(i, j)]) / (scale[i] * scale[j]));
-        let solved = rest.cholesky()?.solve(&(&products - &xy).component_div(&scale));
-        let beta = solved.component_div(&scale);
-        total += fold.yy - 2.0 * beta.dot(&xy) + (&xx * &beta).dot(&beta);
-    }
-    total.is_finite().then_some(total)
+fn score(blocks: &Blocks, columns: &[usize]) -> Option<f64> {
+    let of = |fold: usize| {
+        let found = blocks.without(fold, columns, Weak::Refuse(SINGULAR))?;
+        Some(blocks.left_in(fold, columns, &found.coefficients))
+    };
+    (0..blocks.len()).filter(|fold| blocks.rows(*fold) > 0).map(of).sum()
 }

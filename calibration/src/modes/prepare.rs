@@ -9,7 +9,7 @@ use super::servo::Transient;
 use super::switches::Switches;
 use super::{checks, document, temperatures};
 use crate::error::Error;
-use crate::run::Watch;
+use crate::runs::Watch;
 use crate::swapped::up;
 
 /// Length of a window of the residuals, in whole reversal periods (s).

@@ -11,9 +11,9 @@
 
 use nalgebra::DVector;
 
-use super::minimum::golden;
-use super::noise::real;
 use super::switches::Behind;
+use crate::lsq::correlated::real;
+use crate::lsq::search::golden;
 
 /// Fewest ticks behind a switch, and fewest switches.
 const LEAST: [usize; 2] = [24, 8];

@@ -8,7 +8,7 @@ use isotherm_correction::sample::{GyroTick, LasingMode, OutputKind};
 use super::seen::Seen;
 use crate::error::Error;
 use crate::robust::{median, scatter};
-use crate::run::{Run, Watch};
+use crate::runs::{Run, Watch};
 
 /// Ticks before a switch that show what a reading is like.
 const BEFORE: usize = 16;

@@ -9,8 +9,8 @@ use crate::drift::pieces::checks::frozen;
 use crate::error::Error;
 use crate::report::words::grouped;
 use crate::robust::median;
-use crate::run::{Run, Watch};
-use crate::series::Channel;
+use crate::runs::series::Channel;
+use crate::runs::{Run, Watch};
 
 /// What every channel of the document reads in some runs, beside its limits, in one sentence.
 ///

@@ -8,7 +8,7 @@ use isotherm_protocol::document::{
 use isotherm_correction::sample::{MAX_SENSORS, MIN_SENSORS, OutputKind};
 
 use crate::error::Error;
-use crate::series::Series;
+use crate::runs::series::Series;
 
 /// Physical range of a channel whose readings are °C already.
 const RANGE_DEG_C: [f64; 2] = [-70.0, 130.0];

@@ -8,10 +8,11 @@ use super::fit::Fit;
 use super::model::{Degrees, Sensor, Taken};
 use super::plan::Plan;
 use super::sense::{self, Beside};
-use super::solve::NoSolution;
 use super::temperature::Temperatures;
 use super::{budget, faults, measure, model};
 use crate::drift::figures::{counted, short};
+use crate::lsq::linear;
+use crate::lsq::nonlinear::NoSolution;
 
 /// Fewest positions that tell the stand's errors from the axes.
 pub const GOOD_POSITIONS: usize = 9;
@@ -32,9 +33,8 @@ pub(super) fn quadratic_terms(fit: &Fit, plan: &Plan) -> (f64, usize) {
         .flat_map(|sensor| [0, 1].map(|which| model.axis_index(sensor, which, 2)))
         .map(|index| fit.solution.parameters[index] * model::SMALL)
         .collect();
-    let terms = nalgebra::DVector::from_vec(terms);
-    let solved = covariance.cholesky().map(|cholesky| terms.dot(&cholesky.solve(&terms)));
-    (solved.unwrap_or(0.0), terms.len())
+    let count = terms.len();
+    (linear::chi_square(&nalgebra::DVector::from_vec(terms), &covariance).unwrap_or(0.0), count)
 }
 
 /// Probability that χ² is at least so large by accident.

@@ -15,7 +15,8 @@ use nalgebra::{DMatrix, DVector};
 
 use super::model::{Degrees, Guess, Model, SMALL, Sensor, Taken};
 use super::plan::{Attitude, Plan};
-use super::solve::{NoSolution, Solution, known, solve};
+use crate::lsq::linear;
+use crate::lsq::nonlinear::{NoSolution, Solution, known, solve};
 
 /// What is known of the errors beforehand.
 #[derive(Debug, Clone, PartialEq)]
@@ -183,6 +184,5 @@ fn whitening(model: &Model<'_>, start: &[f64], taken: &Taken, weights: &Weights)
         let change = DVector::from_vec(model.outputs_under(start, taken, direction.into())) - &at_rest;
         covariance += &change * change.transpose() * (sigma * sigma);
     }
-    let lower = covariance.cholesky().map(|cholesky| cholesky.l());
-    lower.and_then(DMatrix::try_inverse).unwrap_or_else(|| DMatrix::from_element(count, count, f64::NAN))
+    linear::whitening(&covariance).unwrap_or_else(|| DMatrix::from_element(count, count, f64::NAN))
 }

@@ -9,6 +9,10 @@
 //! fit and the document.
 
 use super::plan::{Plan, StandErrors};
+use crate::lsq::linear::{self, SINGULAR, Weak};
+
+/// Least spread of the directions that a first guess is made of: smallest over largest singular value.
+const LEAST_SPREAD: f64 = 0.05;
 
 /// A position as it was taken.
 #[derive(Debug, Clone, PartialEq)]
@@ -93,12 +97,12 @@ impl Guess {
                     if column < 3 { ups[row][column] } else { 1.0 }
                 },
             );
-        let svd = design.svd(true, true);
-        let smallest = svd.singular_values.min();
-        if ups.len() < 4 || smallest.is_nan() || smallest < 0.05 * svd.singular_values.max() {
+        let spread = linear::spread(&design);
+        if ups.len() < 4 || spread.is_nan() || spread < LEAST_SPREAD {
             return None;
         }
-        let found = svd.solve(&nalgebra::DVector::from_column_slice(outputs), 0.0).ok()?;
+        let outputs = nalgebra::DVector::from_column_slice(outputs);
+        let found = linear::solve(&design, &outputs, Weak::Refuse(SINGULAR)).ok()?.coefficients;
         let scale = found.fixed_rows::<3>(0).norm();
         if !(scale.is_finite() && scale > 0.0) {
             return None;

@@ -1,17 +1,21 @@
 //! A run tick by tick, for finding where the unit stood still: accelerometer outputs, rates along the case axes, temperatures.
 
 use std::collections::BTreeMap;
+use std::slice;
 
 use isotherm_correction::sample::OutputKind;
-use isotherm_correction::units::AngularRate;
 use isotherm_log::offline::Loaded;
 
 use crate::drift::figures::{counted, six};
 use crate::error::Error;
-use crate::run::{Run, Watch};
+use crate::runs::table::{Rows, Table, Takes};
+use crate::runs::{Run, Watch};
 
 /// Share of the ticks, or of the time, that gaps may take.
 const MANY: f64 = 0.01;
+
+/// °/h in one °/s.
+const DEG_PER_H_IN_DEG_PER_S: f64 = 3600.0;
 
 /// Ticks of a run, as columns of equal length.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -52,30 +56,9 @@ impl Track {
                 run.name
             )]));
         }
-        let mut gyro_ns = Vec::new();
-        let mut rates: [Vec<f64>; 3] = Default::default();
-        let mut forces: [Vec<f64>; 3] = Default::default();
-        let mut temperatures: BTreeMap<String, Vec<f64>> = BTreeMap::new();
-        run.correct(loaded, watch, |tick, unit| {
-            let duration_s = tick.duration.as_s();
-            gyro_ns.push(tick.end_time.as_ns());
-            for (column, angle) in rates.iter_mut().zip(tick.delta_angle) {
-                column.push(AngularRate::from_rad_per_s(angle / duration_s).as_deg_per_s());
-            }
-            for (column, velocity) in forces.iter_mut().zip(tick.delta_velocity) {
-                column.push(velocity / duration_s);
-            }
-            for channel in unit.channels() {
-                let column = temperatures.entry(channel.name.to_string()).or_default();
-                column.resize(gyro_ns.len() - 1, f64::NAN);
-                let good = channel.state.filter(|_| !channel.stale);
-                column.push(good.map_or(f64::NAN, |state| state.temperature));
-            }
-        })?;
-        for column in temperatures.values_mut() {
-            column.resize(gyro_ns.len(), f64::NAN);
-        }
-        let at = nearest(&accels.end_ns, &gyro_ns);
+        let rows = Rows { length_s: 0.0, takes: Takes::All };
+        let table = Table::together(run, slice::from_ref(loaded), rows, watch)?.pop().unwrap_or_default();
+        let at = nearest(&accels.end_ns, &table.end_ns);
         let taken = |column: &[f64]| -> Vec<f64> {
             at.iter().map(|index| column.get(*index).copied().unwrap_or(f64::NAN)).collect()
         };
@@ -97,9 +80,13 @@ impl Track {
             counts: accels.output == Some(OutputKind::Counts),
             gyros: gyros.iter().map(of_own).collect(),
             gyro_counts: series.gyros.output == Some(OutputKind::Counts),
-            rate_deg_per_s: rates.each_ref().map(|column| taken(column)),
-            force_m_per_s2: forces.each_ref().map(|column| taken(column)),
-            temperature_deg_c: temperatures
+            rate_deg_per_s: table
+                .rate_deg_per_h
+                .each_ref()
+                .map(|column| taken(column).iter().map(|rate| rate / DEG_PER_H_IN_DEG_PER_S).collect()),
+            force_m_per_s2: table.force_m_per_s2.each_ref().map(|column| taken(column)),
+            temperature_deg_c: table
+                .temperature_deg_c
                 .iter()
                 .map(|(name, column)| (name.clone(), taken(column)))
                 .collect(),

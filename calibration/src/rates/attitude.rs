@@ -10,41 +10,39 @@ use super::earth::carried_along;
 use super::measure::in_case;
 use super::plateaus::Plateau;
 use super::read::Turned;
-use crate::drift::figures::counted;
-use crate::means::Size;
+use crate::finding::{Finding, Kind};
 use crate::robust::median;
-use crate::swapped::{Shown, up};
+use crate::size::Size;
+use crate::swapped::{Looks, Shown, up};
 
 /// Time at the beginning of a run that tells its attitude (s).
 const BEGINNING_S: f64 = 1.0;
 
-/// What the accelerometers of all runs doubt, in words; runs that say the same are named together. `axes` are the gyros' input axes, `gains` what
+/// What the accelerometers of all runs doubt; runs that say the same are named together. `axes` are the gyros' input axes, `gains` what
 /// they show of a rate.
-pub(super) fn doubts(places: &[Place], runs: &[Turned], (axes, gains): (&[[f64; 3]], &[f64])) -> Vec<String> {
-    let mut told: Vec<(String, Vec<usize>)> = Vec::new();
+pub(super) fn doubts(
+    places: &[Place],
+    runs: &[Turned],
+    (axes, gains): (&[[f64; 3]], &[f64]),
+) -> Vec<Finding> {
+    let mut told: Vec<(usize, Looks, Rest, Vec<usize>)> = Vec::new();
     for (number, run) in runs.iter().enumerate() {
         let Some(place) = places.get(number).or(places.first()) else { continue };
-        let Some(words) = of_run(place, run, (axes, gains)) else { continue };
-        // Behind the colon stand the figures of the run.
-        let kind = |words: &str| words.split(':').next().unwrap_or_default().to_owned();
-        match told.iter_mut().find(|(first, _)| kind(first) == kind(&words)) {
-            Some((_, numbers)) => numbers.push(number + 1),
-            None => told.push((words, vec![number + 1])),
+        let Some((looks, rest)) = of_run(place, run, (axes, gains)) else { continue };
+        match told.iter_mut().find(|(_, first, ..)| (first.kind, first.order) == (looks.kind, looks.order)) {
+            Some((.., others)) => others.push(number),
+            None => told.push((number, looks, rest, Vec::new())),
         }
     }
-    let words = |(words, numbers): (String, Vec<usize>)| {
-        let others: Vec<String> = numbers.iter().skip(1).map(ToString::to_string).collect();
-        let others = match others.len() {
-            0 => String::new(),
-            1 => format!(" (log {} shows the same)", others.join(", ")),
-            _ => format!(" (logs {} show the same)", others.join(", ")),
-        };
-        format!("log {}: {words}{others}", numbers.first().copied().unwrap_or_default())
-    };
-    told.into_iter().map(words).collect()
+    let finding =
+        |(log, looks, rest, others)| Kind::Gravity { looks: Box::new(looks), rest, others }.in_log(log);
+    told.into_iter().map(finding).collect()
 }
 
-fn of_run(place: &Place, run: &Turned, (axes, gains): (&[[f64; 3]], &[f64])) -> Option<String> {
+/// The window of a rest (s), and the places where ticks are missing before it.
+type Rest = Option<([f64; 2], usize)>;
+
+fn of_run(place: &Place, run: &Turned, (axes, gains): (&[[f64; 3]], &[f64])) -> Option<(Looks, Rest)> {
     let bins = &run.binned.bins;
     let stated = up(place).map(|up| up.map(|part| part * STANDARD_GRAVITY_M_PER_S2));
     let start = stated.or(run.binned.first_force)?;
@@ -55,8 +53,8 @@ fn of_run(place: &Place, run: &Turned, (axes, gains): (&[[f64; 3]], &[f64])) -> 
         let shown = Shown::of(["accelerometers", "m/s²"], [0, 1, 2].map(size), stated);
         shown.swapped().or_else(|| shown.far()).filter(|_| !forces.is_empty())
     };
-    if let Some(words) = shown(0..beginning, start) {
-        return Some(words);
+    if let Some(looks) = shown(0..beginning, start) {
+        return Some((looks, None));
     }
     // What the gyros show at rest is bias and Earth: gravity does not turn with it.
     let at_rest: Vec<f64> = (0..gains.len())
@@ -68,18 +66,9 @@ fn of_run(place: &Place, run: &Turned, (axes, gains): (&[[f64; 3]], &[f64])) -> 
     });
     run.rests.iter().find_map(|rest: &Plateau| {
         let [from, to] = rest.bins;
-        let words = shown(from..to, *gravity.get(usize::midpoint(from, to))?)?;
+        let looks = shown(from..to, *gravity.get(usize::midpoint(from, to))?)?;
         let broken = bins.get(..to)?.iter().filter(|bin| bin.broken).count();
-        let gaps = if broken == 0 {
-            String::new()
-        } else {
-            format!(
-                "; ticks are missing at {} before it, over which the table is taken to turn on",
-                counted(broken, "place", "places")
-            )
-        };
-        let [begin_s, end_s] = rest.window_s;
-        Some(format!("{words} (in the rest of {begin_s:.1}…{end_s:.1} s, gravity carried there by the gyros' turns{gaps})"))
+        Some((looks, Some((rest.window_s, broken))))
     })
 }
 
@@ -108,31 +97,36 @@ mod tests {
         Turned { binned, matched: Vec::new(), rests, earth_start: None }
     }
 
-    fn words(shown: fn([f64; 3]) -> [f64; 3], tilt_deg: Option<[f64; 2]>) -> String {
+    fn found(shown: fn([f64; 3]) -> [f64; 3], tilt_deg: Option<[f64; 2]>) -> Vec<Finding> {
         let place = Place::new(55.75, 30.0, tilt_deg).unwrap();
-        doubts(&[place], &[run(shown), run(shown)], (&AXES, &[1.0; 3])).join("\n")
+        doubts(&[place], &[run(shown), run(shown)], (&AXES, &[1.0; 3]))
+    }
+
+    /// The order in which the accelerometers fit, of the only finding; it is of the first log, and the second shows the same.
+    fn order(found: &[Finding]) -> Option<[usize; 3]> {
+        let [Finding { place, kind: Kind::Gravity { looks, others, .. } }] = found else {
+            panic!("{found:?}");
+        };
+        assert_eq!((place.log, others.as_slice(), looks.kind), (Some(0), &[1][..], "accelerometers"));
+        looks.order
     }
 
     #[test]
     fn accelerometers_that_do_not_follow_the_turns_are_told() {
-        for tilt in [Some([0.0, 0.0]), None] {
-            assert_eq!(words(|force| force, tilt), "");
-            let swapped = words(|[x, y, z]| [y, x, z], tilt);
-            assert!(swapped.starts_with("log 1: accelerometers x and y look swapped: "), "{swapped}");
-            assert!(
-                swapped.contains("the gyros' turns") && swapped.ends_with("(log 2 shows the same)"),
-                "{swapped}"
-            );
-        }
         let level = Some([0.0, 0.0]);
-        assert!(words(|[x, y, z]| [z, y, x], level).contains("accelerometers x and z look swapped"));
-        let flipped = words(|[x, y, z]| [x, y, -z], level);
-        assert!(
-            flipped.contains("do not fit the attitude: their means are 0.00, 0.00, 9.81 m/s²"),
-            "{flipped}"
-        );
+        for tilt in [level, None] {
+            assert_eq!(found(|force| force, tilt), []);
+            let swapped = found(|[x, y, z]| [y, x, z], tilt);
+            assert_eq!(order(&swapped), Some([1, 0, 2]));
+            // A level unit tells nothing of x and y: the rest behind the turn does.
+            assert!(matches!(swapped[0].kind, Kind::Gravity { rest: Some((_, 0)), .. }), "{swapped:?}");
+        }
+        let at_once = found(|[x, y, z]| [z, y, x], level);
+        assert_eq!(order(&at_once), Some([2, 1, 0]));
+        assert!(matches!(at_once[0].kind, Kind::Gravity { rest: None, .. }), "{at_once:?}");
+        assert_eq!(order(&found(|[x, y, z]| [x, y, -z], level)), None);
         // Levelled by themselves, they turn the wrong way.
-        assert!(words(|[x, y, z]| [x, y, -z], None).contains("do not fit the attitude"));
-        assert!(words(|force| force, Some([0.0, 180.0])).contains("do not fit the attitude"));
+        assert_eq!(order(&found(|[x, y, z]| [x, y, -z], None)), None);
+        assert_eq!(order(&found(|force| force, Some([0.0, 180.0]))), None);
     }
 }

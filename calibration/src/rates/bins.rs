@@ -1,24 +1,18 @@
 //! A run as short means of the rates along the gyros' own input axes, under the document that it starts from.
 
-use isotherm_correction::sample::{SensorFlags, TickFlags};
-use isotherm_correction::units::AngularRate;
+use std::slice;
+
 use isotherm_log::offline::Loaded;
-use isotherm_protocol::document::Document;
+use isotherm_protocol::document::{Document, OrientationThermal};
 
 use crate::error::Error;
 use crate::modes::cells::{along_input_axes, temperature};
-use crate::run::{Run, Troubles, Watch};
+use crate::runs::table::{Rows, Table, Takes};
+use crate::runs::{Run, Troubles, Watch};
 use crate::written::Written;
 
 /// Length of a bin (s).
 pub const BIN_S: f64 = 0.5;
-/// Flags of a tick that carries no reading of its own.
-const NOT_OWN: TickFlags = TickFlags::INTERPOLATED
-    .union(TickFlags::ANGLE_RESTORED)
-    .union(TickFlags::SERVO_TRANSIENT)
-    .union(TickFlags::UNCALIBRATED)
-    .union(TickFlags::SWITCH_UNRESOLVED);
-
 /// Means over a bin.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Bin {
@@ -84,84 +78,50 @@ pub fn binned<W: Watch>(
     Ok(whole)
 }
 
-#[derive(Default)]
-struct Sums {
-    begin_s: f64,
-    length_s: f64,
-    good_s: f64,
-    angle: [f64; 3],
-    velocity: [f64; 3],
-    force_s: f64,
-    broken: bool,
-    overrange: bool,
-}
-
 fn of_group(run: &Run, document: &Document, group: [usize; 3], watch: impl Watch) -> Result<Binned, Error> {
-    let loaded = Written::of(&along_input_axes(document, group))?.loaded;
-    let thermal = document.gyro.orientation.thermal.clone();
-    let mut binned = Binned::default();
-    let mut sums = Sums::default();
-    let mut first = None;
-    let (mut velocity, mut force_s) = ([0.0; 3], 0.0);
-    let (mut of_axes, mut of_all) = (Mean::default(), Mean::default());
-    let troubles = run.of_gyros(group).correct(&loaded, watch, |tick, unit| {
-        let begin = tick.end_time.as_ns().saturating_sub(tick.duration.as_ns());
-        #[expect(clippy::cast_precision_loss, reason = "a run is far below 2⁵³ ns")]
-        let since_s = (begin - *first.get_or_insert(begin)) as f64 * 1e-9;
-        let seconds = tick.duration.as_s();
-        if sums.length_s <= 0.0 {
-            sums.begin_s = since_s;
-        }
-        sums.length_s += seconds;
-        sums.broken |= tick.missed > 0;
-        sums.overrange |= tick.gyro_flags.iter().any(|flags| flags.contains(SensorFlags::OVERRANGE));
-        let valid = tick.gyro_flags.iter().all(|flags| flags.contains(SensorFlags::VALID));
-        if valid && !tick.flags.intersects(NOT_OWN) {
-            sums.good_s += seconds;
-            sums.angle.iter_mut().zip(tick.delta_angle).for_each(|(sum, angle)| *sum += angle);
-        }
-        if !tick.accel_flags.is_empty() && !tick.flags.contains(TickFlags::ACCELEROMETER_MISSING) {
-            sums.velocity.iter_mut().zip(tick.delta_velocity).for_each(|(sum, dv)| *sum += dv);
-            sums.force_s += seconds;
-            if force_s < 1.0 {
-                velocity.iter_mut().zip(tick.delta_velocity).for_each(|(sum, dv)| *sum += dv);
-                force_s += seconds;
-            }
-        }
-        if sums.length_s > BIN_S - 0.5 * seconds {
-            let Sums { begin_s, length_s, good_s, angle, velocity, force_s, broken, overrange } =
-                std::mem::take(&mut sums);
-            let rate = angle.map(|sum| AngularRate::from_rad_per_s(sum / good_s).as_deg_per_h()).to_vec();
-            let force = (force_s > 0.0).then(|| velocity.map(|sum| sum / force_s));
-            binned.bins.push(Bin { begin_s, length_s, good_s, rate, force, broken, overrange });
-            if let Some(thermal) = &thermal {
-                of_axes.add(temperature(thermal, unit));
-            }
-            unit.channels()
-                .filter_map(|channel| channel.state)
-                .for_each(|state| of_all.add(state.temperature));
-        }
-    })?;
-    binned.troubles = troubles;
-    binned.axes_deg_c = of_axes.value();
-    binned.temperature_deg_c = of_all.value();
-    binned.first_force = (force_s > 0.0).then(|| velocity.map(|sum| sum / force_s));
-    Ok(binned)
+    let loaded = Written::compiled(&along_input_axes(document, group))?;
+    let rows = Rows { length_s: BIN_S, takes: Takes::Own };
+    let mut tables = Table::together(&run.of_gyros(group), slice::from_ref(&loaded), rows, watch)?;
+    let table = tables.pop().unwrap_or_default();
+    let [good_s, force_s] = &table.taken_s;
+    let at = |columns: &[Vec<f64>; 3], row: usize| columns.each_ref().map(|column| column[row]);
+    let bin = |row: usize| Bin {
+        begin_s: table.begin_s[row],
+        length_s: table.length_s[row],
+        good_s: good_s[row],
+        rate: at(&table.rate_deg_per_h, row).to_vec(),
+        force: (force_s[row] > 0.0).then(|| at(&table.force_m_per_s2, row)),
+        broken: table.gap_before[row] || table.gap_inside[row],
+        overrange: table.overrange[row],
+    };
+    let bins: Vec<Bin> = (0..table.len()).map(bin).collect();
+    let of_axes = |thermal: &OrientationThermal| {
+        let own = |row: usize| {
+            temperature(thermal, |name| table.temperature_deg_c.get(name).map(|column| column[row]))
+        };
+        mean((0..table.len()).map(own))
+    };
+    let (mut velocity, mut felt_s) = ([0.0; 3], 0.0);
+    for (bin, seconds) in bins.iter().zip(force_s) {
+        let Some(force) = bin.force.filter(|_| felt_s < 1.0) else { continue };
+        velocity.iter_mut().zip(force).for_each(|(sum, force)| *sum += force * seconds);
+        felt_s += seconds;
+    }
+    Ok(Binned {
+        first_force: (felt_s > 0.0).then(|| velocity.map(|sum| sum / felt_s)),
+        axes_deg_c: document.gyro.orientation.thermal.as_ref().and_then(of_axes),
+        temperature_deg_c: mean(table.temperature_deg_c.values().flatten().copied()),
+        troubles: table.troubles,
+        bins,
+    })
 }
 
-#[derive(Default)]
-struct Mean(f64, f64);
-
-impl Mean {
-    fn add(&mut self, value: f64) {
-        if value.is_finite() {
-            *self = Self(self.0 + value, self.1 + 1.0);
-        }
-    }
-
-    fn value(&self) -> Option<f64> {
-        (self.1 > 0.0).then(|| self.0 / self.1)
-    }
+/// Mean of what is a number; `None` without any.
+fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let (sum, count) = values
+        .filter(|value| value.is_finite())
+        .fold((0.0, 0.0), |(sum, count), value| (sum + value, count + 1.0));
+    (count > 0.0).then(|| sum / count)
 }
 
 /// Mean corrected rates in case axes (°/h) over windows of a run (s since its beginning), by the ticks whose middle lies
@@ -175,22 +135,7 @@ pub fn means_within(
     windows: &[[f64; 2]],
     watch: impl Watch,
 ) -> Result<Vec<[f64; 3]>, Error> {
-    let mut sums = vec![([0.0; 3], 0.0); windows.len()];
-    let mut first = None;
-    run.correct(loaded, watch, |tick, _| {
-        let begin = tick.end_time.as_ns().saturating_sub(tick.duration.as_ns());
-        #[expect(clippy::cast_precision_loss, reason = "a run is far below 2⁵³ ns")]
-        let since_s = (begin - *first.get_or_insert(begin)) as f64 * 1e-9;
-        let seconds = tick.duration.as_s();
-        let middle_s = since_s + 0.5 * seconds;
-        for ([from_s, to_s], (sum, time_s)) in windows.iter().zip(&mut sums) {
-            if (*from_s..*to_s).contains(&middle_s) {
-                *time_s += seconds;
-                sum.iter_mut().zip(tick.delta_angle).for_each(|(sum, angle)| *sum += angle);
-            }
-        }
-    })?;
-    let mean =
-        |(sum, time_s): ([f64; 3], f64)| sum.map(|x| AngularRate::from_rad_per_s(x / time_s).as_deg_per_h());
-    Ok(sums.into_iter().map(mean).collect())
+    let rows = Rows { length_s: 0.0, takes: Takes::All };
+    let ticks = Table::together(run, slice::from_ref(loaded), rows, watch)?.pop().unwrap_or_default();
+    Ok(windows.iter().map(|window| ticks.mean_rate_within(*window)).collect())
 }

@@ -8,10 +8,10 @@ use super::measure::in_case;
 use super::plateaus::scatter;
 use super::solve::GyroRates;
 use super::steps::Step;
-use crate::drift::figures::{fixed, short};
-use crate::means::Size;
+use crate::finding::{Instead, Kind};
 use crate::modes::document::{main_axis, row};
 use crate::robust::median;
+use crate::size::Size;
 
 /// Share of a run's fastest step from which on a step shows what the table turned about.
 const FAST: f64 = 0.5;
@@ -36,7 +36,7 @@ pub(super) fn turned_as_stated(
     matched: &[Matched],
     document: &Document,
     scale_known: bool,
-) -> Result<(), String> {
+) -> Result<(), Kind> {
     let sensors = document.gyro.sensor.len();
     let axes: Vec<[f64; 3]> = (0..sensors).map(|sensor| row(document, sensor, f64::NAN)).collect();
     let in_case = in_case(&axes);
@@ -55,36 +55,19 @@ pub(super) fn turned_as_stated(
         if angle_deg <= LARGEST_ANGLE_DEG && right_size {
             continue;
         }
-        let [from, to] = one.plateau.window_s;
         let name = |sensor: usize| document.gyro.sensor.get(sensor).map_or("", |sensor| sensor.name.as_str());
         let along = |sensor: usize| axes.get(sensor).map_or(0.0, |axis| dot(*axis, one.step.axis).abs());
-        let nearest = largest(sensors, along);
-        let liveliest = largest(sensors, |sensor| shown(sensor).abs());
-        let other = if liveliest == nearest {
-            String::new()
-        } else {
-            format!(" and gyro {} {}", name(liveliest), short(shown(liveliest)))
-        };
-        let stated = format!(
-            "log {}: in the step of {from:.1}…{to:.1} s, stated as {rate} °/s about {}, gyro {} shows {} °/s{other}",
-            one.step.run + 1,
-            words(one.step.axis),
-            name(nearest),
-            short(shown(nearest))
-        );
-        return Err(if right_size {
-            format!(
-                "{stated}: the unit turned about {}, {angle_deg:.0}° off the stated axis, {LARGEST_ANGLE_DEG}° are allowed. State axis \
-                 and sign of the rates as they were, or mend the order of the columns in the mapping",
-                words(turned.map(|x| x / size))
-            )
-        } else {
-            format!(
-                "{stated}: that is {} times the stated rate by the document's weights, {} to {LARGEST_FACTOR} times are allowed. State \
-                 axis and rates (°/s) as they were, or mend the columns of the mapping or the weights of the document",
-                short(factor),
-                1.0 / LARGEST_FACTOR
-            )
+        let mut telling = vec![largest(sensors, along), largest(sensors, |sensor| shown(sensor).abs())];
+        telling.dedup();
+        return Err(Kind::TurnedOtherwise {
+            window_s: one.plateau.window_s,
+            stated: (rate, one.step.axis),
+            shown: telling.into_iter().map(|sensor| (name(sensor).to_owned(), shown(sensor))).collect(),
+            instead: Box::new(if right_size {
+                Instead::Axis(turned.map(|x| x / size), [angle_deg, LARGEST_ANGLE_DEG])
+            } else {
+                Instead::Factor([factor, LARGEST_FACTOR])
+            }),
         });
     }
     Ok(())
@@ -94,7 +77,7 @@ pub(super) fn turned_as_stated(
 ///
 /// # Errors
 /// The first that is not, and what to do.
-pub(super) fn steady(matched: &[Matched], bins: &[Bin]) -> Result<(), String> {
+pub(super) fn steady(matched: &[Matched], bins: &[Bin]) -> Result<(), Kind> {
     let sigma = scatter(bins);
     for one in matched {
         let own = bins.get(one.plateau.bins[0]..one.plateau.bins[1]).unwrap_or_default();
@@ -109,18 +92,14 @@ pub(super) fn steady(matched: &[Matched], bins: &[Bin]) -> Result<(), String> {
         let off = rates.iter().filter(|rate| (**rate - usual).abs() > allowed).count();
         #[expect(clippy::cast_precision_loss, reason = "bins of a step")]
         if off > 1 && off as f64 > UNSTEADY_BINS * rates.len() as f64 {
-            let [from, to] = one.plateau.window_s;
             let (low, high) = rates.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), rate| {
                 (low.min(*rate), high.max(*rate))
             });
-            return Err(format!(
-                "log {}: the rate is not steady in the step of {from:.1}…{to:.1} s ({} °/s): it lies between {} and {} °/s. Are the times \
-                 of the steps those of the log? Leave the table's acceleration out of them",
-                one.step.run + 1,
-                one.step.rate_deg_per_s,
-                short(low / 3600.0),
-                short(high / 3600.0)
-            ));
+            return Err(Kind::Unsteady {
+                window_s: one.plateau.window_s,
+                stated: one.step.rate_deg_per_s,
+                range: [low / 3600.0, high / 3600.0],
+            });
         }
     }
     Ok(())
@@ -140,30 +119,17 @@ pub(super) fn dead(bins: &[Bin]) -> Option<usize> {
     })
 }
 
-/// Axes about which the runs turned one way only, in words: scale factor and bias, or an asymmetry, then cannot be told apart.
-pub(super) fn one_way(steps: &[Step]) -> Option<String> {
-    let axes = ["x", "y", "z"].into_iter().enumerate();
+/// Axes about which the runs turned one way only: scale factor and bias, or an asymmetry, then cannot be told apart.
+pub(super) fn one_way(steps: &[Step]) -> Option<Kind> {
     let about = |axis: usize| {
         steps
             .iter()
             .filter(move |step| main_axis(&step.axis) == axis)
             .map(move |step| step.rate_deg_per_s * step.axis[axis])
     };
-    let one_way = axes.filter(|(axis, _)| {
-        let [forth, back] = [about(*axis).any(|rate| rate > 0.0), about(*axis).any(|rate| rate < 0.0)];
-        forth != back
-    });
-    let names: Vec<&str> = one_way.map(|(_, name)| name).collect();
-    let (first, others) = names.split_first()?;
-    let others = if others.is_empty() {
-        String::new()
-    } else {
-        format!(", and so do those about {}", others.join(" and "))
-    };
-    Some(format!(
-        "all steps about {first} turn one way{others}: an asymmetry of the scale factor is taken for scale and bias. Turn both ways, at \
-         equal rates"
-    ))
+    let one_way = |axis: &usize| about(*axis).any(|rate| rate > 0.0) != about(*axis).any(|rate| rate < 0.0);
+    let axes: Vec<usize> = (0..3).filter(one_way).collect();
+    (!axes.is_empty()).then_some(Kind::OneWay { axes })
 }
 
 /// Why what was fitted is no gyro: `rates` are the true rates of the steps (°/h), `axis` its input axis.
@@ -172,28 +138,18 @@ pub(super) fn no_result(
     rates: &[[f64; 3]],
     axis: [f64; 3],
     scale_known: bool,
-) -> Option<String> {
+) -> Option<Kind> {
     let [gain, _] = found.gain;
     let sense = gain.is_finite() && gain > 0.0;
     if !sense || (scale_known && !(1.0 / LARGEST_FACTOR..=LARGEST_FACTOR).contains(&gain)) {
-        return Some(format!(
-            "it shows {} times the rate that the document's weight makes of it, {} to {LARGEST_FACTOR} times are a result: are the \
-             table's axis, the sign and the unit of its rates right, and the document's weight too?",
-            short(gain),
-            1.0 / LARGEST_FACTOR
-        ));
+        return Some(Kind::OtherScale { factor: gain, most: LARGEST_FACTOR });
     }
     let full = rates.iter().map(|rate| dot(*rate, axis).abs()).fold(0.0, f64::max);
     let left = found.left.iter().map(|left| left.abs()).fold(0.0, f64::max);
-    (found.widened && left > LARGEST_LEFT * full).then(|| {
-        format!(
-            "the straight line leaves {} °/s of a step, {} % of the largest rate, at most {} % are a result (χ² {} per degree of \
-             freedom): are the stated rates those of the log?",
-            short(left / 3600.0),
-            short(100.0 * left / full),
-            100.0 * LARGEST_LEFT,
-            short(found.chi_square)
-        )
+    (found.widened && left > LARGEST_LEFT * full).then(|| Kind::NotStraight {
+        left: left / 3600.0,
+        share: [left / full, LARGEST_LEFT],
+        chi_square: found.chi_square,
     })
 }
 
@@ -211,17 +167,6 @@ fn largest(count: usize, value: impl Fn(usize) -> f64) -> usize {
 
 fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-/// An axis by its name where it is near a case axis, else as three numbers.
-fn words(axis: [f64; 3]) -> String {
-    const NEAR: f64 = 0.985;
-    let main = main_axis(&axis);
-    if axis[main].abs() > NEAR {
-        return format!("{}{}", if axis[main] < 0.0 { "-" } else { "" }, ["x", "y", "z"][main]);
-    }
-    let [x, y, z] = axis;
-    [x, y, z].map(|part| fixed(part, 2)).join(",")
 }
 
 #[cfg(test)]
@@ -252,9 +197,12 @@ mod tests {
         let bins = turning(|time_s| if (20.0..60.0).contains(&time_s) { 36.0 } else { 0.0 });
         assert_eq!(steady(&[step(&bins, [22.0, 58.0], 36.0), step(&bins, [65.0, 95.0], 0.0)], &bins), Ok(()));
         let late = steady(&[step(&bins, [32.0, 68.0], 36.0)], &bins).unwrap_err();
-        assert!(late.contains("not steady in the step of 32.0…68.0 s (36 °/s)"), "{late}");
+        assert!(
+            matches!(late, Kind::Unsteady { window_s: [32.0, 68.0], stated: 36.0, range: [low, high] } if low < 0.1 && high > 35.9),
+            "{late:?}"
+        );
         let rest = steady(&[step(&bins, [40.0, 80.0], 0.0)], &bins).unwrap_err();
-        assert!(rest.contains("(0 °/s)"), "{rest}");
+        assert!(matches!(rest, Kind::Unsteady { stated: 0.0, .. }), "{rest:?}");
     }
 
     #[test]
@@ -275,8 +223,7 @@ mod tests {
                 .map(|rate| Step { run: 0, axis: [0.0, 0.0, -1.0], rate_deg_per_s: *rate, window_s: None })
                 .collect()
         };
-        let one = one_way(&steps(&[36.0, 0.0, 108.0])).unwrap();
-        assert!(one.starts_with("all steps about z turn one way"), "{one}");
+        assert_eq!(one_way(&steps(&[36.0, 0.0, 108.0])), Some(Kind::OneWay { axes: vec![2] }));
         assert_eq!(one_way(&steps(&[36.0, -36.0])), None);
         assert_eq!(one_way(&steps(&[0.0])), None);
     }
@@ -299,14 +246,11 @@ mod tests {
         let doubt = |found: &GyroRates, known: bool| no_result(found, &rates, [1.0, 0.0, 0.0], known);
         assert_eq!(doubt(&gyro(1.002, 3000.0, true), true), None, "0.8 % of the largest rate");
         assert_eq!(doubt(&gyro(0.3, 1.0, false), false), None, "counts without a document");
-        for (found, words) in [
-            (gyro(-2e-4, 1.0, false), "-2.00e-4 times the rate"),
-            (gyro(2.1, 1.0, false), "2.10 times the rate"),
-            (gyro(1.0, 36_000.0, true), "leaves 10.0 °/s of a step, 10.0 % of the largest rate, at most 1 %"),
-        ] {
-            let doubt = doubt(&found, true).unwrap();
-            assert!(doubt.contains(words), "{doubt}");
-        }
+        let other = |factor: f64| Some(Kind::OtherScale { factor, most: LARGEST_FACTOR });
+        assert_eq!(doubt(&gyro(-2e-4, 1.0, false), true), other(-2e-4));
+        assert_eq!(doubt(&gyro(2.1, 1.0, false), true), other(2.1));
+        let bent = Kind::NotStraight { left: 10.0, share: [0.1, 0.01], chi_square: 1e9 };
+        assert_eq!(doubt(&gyro(1.0, 36_000.0, true), true), Some(bent));
         assert!(doubt(&gyro(-1.0, 1.0, false), false).is_some(), "the wrong sense is wrong at any scale");
     }
 }

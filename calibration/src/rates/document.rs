@@ -8,6 +8,7 @@ use toml::{Table, Value};
 
 use super::make::Made;
 use super::solve::GyroRates;
+use crate::finding::Kind;
 use crate::report::Sigmas;
 use crate::written::tidy;
 
@@ -19,7 +20,7 @@ const ASSUMED_DEG_C: f64 = 20.0;
 #[must_use]
 pub fn fitted(
     base: &Document,
-    gyros: &[Result<GyroRates, String>],
+    gyros: &[Result<GyroRates, Kind>],
     deg_c: Option<f64>,
     with_bias: bool,
 ) -> Document {
@@ -116,14 +117,14 @@ pub fn details(made: &Made) -> Table {
     table
 }
 
-fn of_gyro(name: &str, found: &Result<GyroRates, String>, walk: f64) -> Table {
+fn of_gyro(name: &str, found: &Result<GyroRates, Kind>, walk: f64) -> Table {
     let numbers =
         |values: &mut dyn Iterator<Item = f64>| Value::Array(values.map(|x| tidy(x).into()).collect());
     let mut table = Table::new();
     table.insert("name".into(), name.into());
     match found {
         Err(reason) => {
-            table.insert("refused".into(), reason.as_str().into());
+            table.insert("refused".into(), reason.to_string().into());
         }
         Ok(found) => {
             table.insert(

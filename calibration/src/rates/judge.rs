@@ -3,9 +3,9 @@
 use super::bins::means_within;
 use super::make::Measured;
 use crate::error::Error;
-use crate::means::Size;
 use crate::report::{Figure, Verdict};
-use crate::run::{Run, Watch};
+use crate::runs::{Run, Watch};
+use crate::size::Size;
 use crate::written::Written;
 
 /// Errors of the corrected rate in the windows of a run's steps, by the service's own code with a document.

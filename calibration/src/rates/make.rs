@@ -12,13 +12,13 @@ use super::measure::{earth_in_bins, first_gains, points, true_rates, white};
 use super::read::{Turned, read, whole_turns};
 use super::solve::{GyroRates, solve};
 use super::steps::Step;
-use crate::drift::figures::counted;
 use crate::error::Error;
+use crate::finding::{Finding, Kind};
 use crate::modes::document::{main_axis, row, widened};
 use crate::report::words::of_logs;
 use crate::report::{FitReport, Verdict};
 use crate::robust::median;
-use crate::run::{Run, Watch};
+use crate::runs::{Run, Watch};
 use crate::written::Written;
 
 /// Rounds in which the Earth's turning and the fit settle.
@@ -62,7 +62,7 @@ pub struct Made {
     /// The document.
     pub written: Written,
     /// What was found of each gyro, or why nothing was.
-    pub gyros: Vec<Result<GyroRates, String>>,
+    pub gyros: Vec<Result<GyroRates, Kind>>,
     /// The steps.
     pub steps: Vec<Measured>,
     /// The steps of the judging runs.
@@ -78,7 +78,7 @@ pub struct Made {
     /// Mean temperature of each run (°C).
     pub temperatures_deg_c: Vec<f64>,
     /// What is to be said.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Finding>,
 }
 
 /// Makes scale, axes and the rest from runs on a rate table.
@@ -86,7 +86,7 @@ pub struct Made {
 /// # Errors
 /// [`Error::Refused`] with every reason; [`Error::Log`], [`Error::Document`].
 pub fn make<W: Watch>(wanted: &Wanted<'_>, mut watch: impl FnMut() -> W) -> Result<Made, Error> {
-    let mut warnings: Vec<String> = one_way(wanted.steps).into_iter().collect();
+    let mut warnings: Vec<Finding> = one_way(wanted.steps).map(Finding::from).into_iter().collect();
     let mut runs = read_all(wanted, &mut watch, &mut warnings)?;
     let judging = runs.split_off(wanted.runs.len());
     let sensors = wanted.base.gyro.sensor.len();
@@ -128,12 +128,10 @@ pub fn make<W: Watch>(wanted: &Wanted<'_>, mut watch: impl FnMut() -> W) -> Resu
         }
     }
     if gyros.iter().all(Result::is_err) {
-        let name = |sensor: usize| &wanted.base.gyro.sensor[sensor].name;
-        let of = gyros
-            .iter()
-            .enumerate()
-            .filter_map(|(n, found)| Some(format!("gyro {}: {}", name(n), found.as_ref().err()?)));
-        return Err(Error::Refused(of.collect()));
+        let named = wanted.base.gyro.sensor.iter().zip(gyros);
+        return Err(Error::Found(
+            named.filter_map(|(sensor, found)| Some(found.err()?.of_gyro(&sensor.name))).collect(),
+        ));
     }
     let temperatures: Vec<f64> = runs.iter().filter_map(|run| run.binned.temperature_deg_c).collect();
     let axes_deg_c = runs.iter().find_map(|run| run.binned.axes_deg_c);
@@ -162,7 +160,7 @@ pub fn make<W: Watch>(wanted: &Wanted<'_>, mut watch: impl FnMut() -> W) -> Resu
 fn read_all<W: Watch>(
     wanted: &Wanted<'_>,
     watch: &mut impl FnMut() -> W,
-    warnings: &mut Vec<String>,
+    warnings: &mut Vec<Finding>,
 ) -> Result<Vec<Turned>, Error> {
     let (mut runs, mut reasons) = (Vec::new(), Vec::new());
     for (number, run) in wanted.runs.iter().chain(wanted.judge).enumerate() {
@@ -172,34 +170,19 @@ fn read_all<W: Watch>(
         }
     }
     if !reasons.is_empty() {
-        return Err(Error::Refused(reasons));
+        return Err(Error::Found(reasons));
     }
     let names = wanted.runs.iter().chain(wanted.judge).map(|run| run.name.as_str());
     let troubles: Vec<(&str, String)> = names
         .zip(&runs)
         .flat_map(|(name, run)| run.binned.troubles.iter().map(move |words| (name, words.clone())))
         .collect();
-    warnings.extend(of_logs(&troubles));
+    warnings.extend(of_logs(&troubles).into_iter().map(|words| Kind::Passed { words }.into()));
     if wanted.place.is_empty() {
-        warnings.push(
-            "the Earth rate is not known: steps are cut to whole turns, and its share along the table's axis is in the bias. Give \
-             --latitude, --heading, --pitch and --roll of the beginning of each log"
-                .to_owned(),
-        );
-        let short: Vec<f64> = runs.iter_mut().flat_map(whole_turns).collect();
-        if !short.is_empty() {
-            let mut rates: Vec<String> = Vec::new();
-            for rate in short.iter().map(ToString::to_string) {
-                if !rates.contains(&rate) {
-                    rates.push(rate);
-                }
-            }
-            warnings.push(format!(
-                "{} of {} °/s {} than a turn: up to the Earth's 15 °/h is left in that; let steps last for whole turns",
-                counted(short.len(), "step", "steps"),
-                rates.join(", "),
-                if short.len() == 1 { "is shorter" } else { "are shorter" }
-            ));
+        warnings.push(Kind::NoAttitude.into());
+        let rates: Vec<f64> = runs.iter_mut().flat_map(whole_turns).collect();
+        if !rates.is_empty() {
+            warnings.push(Kind::ShortSteps { rates }.into());
         }
     }
     Ok(runs)
@@ -221,7 +204,7 @@ impl Made {
         &mut self,
         wanted: &Wanted<'_>,
         axes_deg_c: Option<f64>,
-        doubted: &[(usize, String)],
+        doubted: &[(usize, Kind)],
         watch: &mut impl FnMut() -> W,
     ) -> Result<(), Error> {
         self.judge(wanted, 0, watch)?;
@@ -233,8 +216,7 @@ impl Made {
         if !worse.is_empty() {
             for (main, gyro) in main_axes.iter().zip(&mut self.gyros).filter(|(main, _)| worse.contains(main))
             {
-                let axis = ["x", "y", "z"][*main];
-                *gyro = Err(format!("its weight and axis make the rate about {axis} worse than it was"));
+                *gyro = Err(Kind::Worse { axis: *main });
             }
             self.write(wanted, axes_deg_c, watch)?;
             for (axis, verdict) in verdicts(&self.steps, &self.judged).into_iter().enumerate() {
@@ -245,7 +227,7 @@ impl Made {
         }
         for (sensor, what) in doubted {
             if let Some(verdict) = main_axes.get(*sensor).and_then(|axis| self.verdicts.get_mut(*axis)) {
-                *verdict = verdict.clone().refused(what.clone());
+                *verdict = verdict.clone().refused(what.to_string());
             }
         }
         Ok(())

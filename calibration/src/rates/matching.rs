@@ -3,7 +3,7 @@
 use super::bins::Bin;
 use super::plateaus::{Plateau, within};
 use super::steps::Step;
-use crate::drift::figures::{counted, fixed, short};
+use crate::finding::Kind;
 use crate::robust::median;
 
 /// Share of the smallest stated rate below which a plateau is a rest.
@@ -16,9 +16,6 @@ const RESTS_ALIKE: f64 = 0.05;
 const EARTH_DEG_PER_H: f64 = 45.0;
 /// Share by which a plateau may differ from its step, scale and axes being as good as unknown.
 const MISMATCH: f64 = 0.05;
-
-/// Share of the fastest plateau below which one is not worth telling.
-const SEEN: f64 = 0.01;
 
 /// A step with its plateau.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,70 +31,52 @@ pub struct Matched {
 ///
 /// # Errors
 /// What does not fit, with the plateaus that were found.
-pub fn matched(steps: &[Step], bins: &[Bin], plateaus: &[Plateau]) -> Result<Vec<Matched>, String> {
+pub fn matched(steps: &[Step], bins: &[Bin], plateaus: &[Plateau]) -> Result<Vec<Matched>, Kind> {
     let Some(first) = steps.first() else { return Ok(Vec::new()) };
     if steps.iter().all(|step| step.window_s.is_some()) {
         let of = |step: &Step| {
             let window = step.window_s.unwrap_or_default();
-            let plateau = within(bins, window).ok_or_else(|| {
-                format!("log {} has no ticks from {} s to {} s", step.run + 1, window[0], window[1])
-            })?;
+            let plateau = within(bins, window).ok_or(Kind::NoTicks { window_s: window })?;
             Ok(Matched { step: *step, plateau })
         };
-        if let Some([a, b]) = overlapping(steps) {
-            let words = |[from, to]: [f64; 2]| format!("{from}…{to} s");
-            return Err(format!(
-                "log {}: two steps overlap, {} and {}: a stretch of the log may count once only. Mend begin_s and end_s in --steps",
-                first.run + 1,
-                words(a),
-                words(b)
-            ));
+        if let Some(windows_s) = overlapping(steps) {
+            return Err(Kind::StepsOverlap { windows_s });
         }
         return steps.iter().map(of).collect();
     }
     if steps.iter().any(|step| step.window_s.is_some()) {
-        return Err("either all steps of a log state begin_s and end_s, or none".to_owned());
+        return Err(Kind::SomeTimes);
     }
     let turning: Vec<&Step> = steps.iter().filter(|step| step.rate_deg_per_s != 0.0).collect();
-    let fastest = plateaus.iter().map(size).fold(0.0, f64::max);
+    let fastest = plateaus.iter().map(Plateau::size).fold(0.0, f64::max);
     let (least, most) = turning
         .iter()
         .map(|step| step.rate_deg_per_s.abs())
         .fold((f64::INFINITY, 0.0_f64), |(least, most), rate| (least.min(rate), most.max(rate)));
     let limit = REST * least / most * fastest;
-    let moving: Vec<&Plateau> = plateaus.iter().filter(|plateau| size(plateau) > limit).collect();
+    let moving: Vec<&Plateau> = plateaus.iter().filter(|plateau| plateau.size() > limit).collect();
     if turning.is_empty() || moving.len() != turning.len() {
-        return Err(format!(
-            "log {}: {} of the table {} stated, {} like the slowest of them or faster; found were {}. State all steps in their order, or \
-             their begin_s and end_s with --steps",
-            first.run + 1,
-            counted(turning.len(), "step", "steps"),
-            if turning.len() == 1 { "is" } else { "are" },
-            counted(moving.len(), "plateau turns", "plateaus turn"),
-            listed(plateaus)
-        ));
+        let found = plateaus.to_vec();
+        return Err(Kind::OtherPlateaus { stated: turning.len(), turning: moving.len(), found });
     }
     let mut all: Vec<Matched> = turning
         .into_iter()
         .zip(&moving)
         .map(|(step, plateau)| Matched { step: *step, plateau: (*plateau).clone() })
         .collect();
-    check(&all).map_err(|what| format!("{what} Found were {}", listed(plateaus)))?;
-    let rests: Vec<&Plateau> = plateaus.iter().filter(|plateau| size(plateau) <= limit).collect();
+    check(&all, plateaus)?;
+    let rests: Vec<&Plateau> = plateaus.iter().filter(|plateau| plateau.size() <= limit).collect();
     // The table's rates by the scale of the fastest plateau: weights may be as good as unknown.
     let scale = fastest / (3600.0 * most);
     let of_slowest = |share: f64| (3600.0 * share * least).max(EARTH_DEG_PER_H) * scale;
-    if let Some(turns) = no_rest(&rests, [of_slowest(AT_REST), of_slowest(RESTS_ALIKE)]) {
-        return Err(format!(
-            "log {}: a plateau turns steadily that is none of the {}: {}. A rest shows {} °/s at most and differs from the others by \
-             {} °/s at most. Found were {}. State all steps in their order, or their begin_s and end_s with --steps",
-            first.run + 1,
-            counted(all.len(), "stated step", "stated steps"),
-            words(&[turns]),
-            short(of_slowest(AT_REST) / 3600.0),
-            short(of_slowest(RESTS_ALIKE) / 3600.0),
-            listed(plateaus)
-        ));
+    let allowed = [of_slowest(AT_REST), of_slowest(RESTS_ALIKE)];
+    if let Some(turn) = no_rest(&rests, allowed) {
+        return Err(Kind::UnstatedTurn {
+            stated: all.len(),
+            turn: turn.clone(),
+            allowed: allowed.map(|rate| rate / 3600.0),
+            found: plateaus.to_vec(),
+        });
     }
     all.extend(
         rests.into_iter().map(|plateau| Matched {
@@ -120,7 +99,7 @@ fn overlapping(steps: &[Step]) -> Option<[[f64; 2]; 2]> {
 pub(super) fn slow(steps: &[Step], plateaus: Vec<Plateau>) -> Vec<Plateau> {
     let rates = steps.iter().map(|step| step.rate_deg_per_s.abs()).filter(|rate| *rate > 0.0);
     let most = (3600.0 * AT_REST * rates.fold(f64::INFINITY, f64::min)).max(EARTH_DEG_PER_H);
-    plateaus.into_iter().filter(|plateau| size(plateau) <= most).collect()
+    plateaus.into_iter().filter(|plateau| plateau.size() <= most).collect()
 }
 
 /// The plateau among the rests that is none: it turns, or not as the others do.
@@ -133,16 +112,11 @@ fn no_rest<'a>(rests: &[&'a Plateau], [most, alike]: [f64; 2]) -> Option<&'a Pla
         let squares = rest.rate.iter().zip(&middle).map(|(rate, middle)| (rate - middle).powi(2));
         squares.sum::<f64>().sqrt()
     };
-    rests.iter().copied().find(|rest| size(rest) > most || away(rest) > alike)
-}
-
-/// Length of what the gyros show in a plateau (°/h).
-fn size(plateau: &Plateau) -> f64 {
-    plateau.rate.iter().map(|x| x * x).sum::<f64>().sqrt()
+    rests.iter().copied().find(|rest| rest.size() > most || away(rest) > alike)
 }
 
 /// Plateaus must be in proportion to their steps about each axis.
-fn check(all: &[Matched]) -> Result<(), String> {
+fn check(all: &[Matched], plateaus: &[Plateau]) -> Result<(), Kind> {
     let Some(fastest) =
         all.iter().max_by(|a, b| a.step.rate_deg_per_s.abs().total_cmp(&b.step.rate_deg_per_s.abs()))
     else {
@@ -158,36 +132,14 @@ fn check(all: &[Matched]) -> Result<(), String> {
         let away = (along - one.step.rate_deg_per_s).abs();
         let limit = MISMATCH * one.step.rate_deg_per_s.abs().max(0.1 * fastest.step.rate_deg_per_s.abs());
         if away > limit {
-            return Err(format!(
-                "log {}: the plateau of {:.1}…{:.1} s turns at {} °/s by the scale of the fastest one, its step is stated as {} °/s; {} °/s \
-                 of difference are allowed. Is the order of the rates right?",
-                one.step.run + 1,
-                one.plateau.window_s[0],
-                one.plateau.window_s[1],
-                short(along),
-                one.step.rate_deg_per_s,
-                short(limit)
-            ));
+            return Err(Kind::OutOfProportion {
+                window_s: one.plateau.window_s,
+                shown: along,
+                stated: one.step.rate_deg_per_s,
+                allowed: limit,
+                found: plateaus.to_vec(),
+            });
         }
     }
     Ok(())
-}
-
-/// The plateaus that turn, in words.
-fn listed(plateaus: &[Plateau]) -> String {
-    let fastest = plateaus.iter().map(size).fold(0.0, f64::max);
-    words(&plateaus.iter().filter(|plateau| size(plateau) > SEEN * fastest).collect::<Vec<_>>())
-}
-
-fn words(plateaus: &[&Plateau]) -> String {
-    const MOST: usize = 12;
-    let one = |plateau: &&Plateau| {
-        let rates: Vec<String> = plateau.rate.iter().map(|rate| fixed(rate / 3600.0, 3)).collect();
-        format!("{:.1}…{:.1} s at ({}) °/s", plateau.window_s[0], plateau.window_s[1], rates.join(", "))
-    };
-    let mut list: Vec<String> = plateaus.iter().take(MOST).map(one).collect();
-    if plateaus.len() > MOST {
-        list.push(format!("and {} more", plateaus.len() - MOST));
-    }
-    if list.is_empty() { "none".to_owned() } else { list.join("; ") }
 }

@@ -1,6 +1,7 @@
 //! True rates of the steps, what the gyros showed in them, and with which noise.
 
 use isotherm_protocol::document::{Document, GyroOutput};
+use nalgebra::{DMatrix, DVector};
 
 use super::bins::Bin;
 use super::earth::carried;
@@ -8,6 +9,7 @@ use super::make::Wanted;
 use super::matching::Matched;
 use super::read::Turned;
 use super::solve::Point;
+use crate::lsq::linear::{self, SINGULAR, Weak};
 use crate::modes::document::count_arcsec;
 
 /// White noise of a gyro from second differences of its bins within steps (°/√h), less what the Earth's turning shows along
@@ -52,31 +54,28 @@ pub(super) fn first_gains(runs: &[Turned], axes: &[[f64; 3]]) -> Vec<f64> {
     axes.iter()
         .enumerate()
         .map(|(sensor, axis)| {
-            let (mut xy, mut xx) = (0.0, 0.0);
-            for one in &steps {
-                let along: f64 = axis.iter().zip(one.step.axis).map(|(a, b)| a * b).sum();
-                let x = 3600.0 * one.step.rate_deg_per_s * along;
-                xy += x * one.plateau.rate[sensor];
-                xx += x * x;
-            }
-            if xx > 0.0 && xy != 0.0 { xy / xx } else { 1.0 }
+            let along = |one: &Matched| axis.iter().zip(one.step.axis).map(|(a, b)| a * b).sum::<f64>();
+            let stated = DMatrix::from_fn(steps.len(), 1, |i, _| {
+                3600.0 * steps[i].step.rate_deg_per_s * along(steps[i])
+            });
+            let shown = DVector::from_fn(steps.len(), |i, _| steps[i].plateau.rate[sensor]);
+            let found =
+                linear::solve(&stated, &shown, Weak::Refuse(SINGULAR)).map(|found| found.coefficients[0]);
+            found.ok().filter(|gain| *gain != 0.0).unwrap_or(1.0)
         })
         .collect()
 }
 
 /// What makes a rate in case axes of the rates along input axes, by least squares.
 pub(super) fn in_case(axes: &[[f64; 3]]) -> impl Fn(&dyn Fn(usize) -> f64) -> [f64; 3] + '_ {
-    let sum = axes.iter().fold(nalgebra::Matrix3::zeros(), |sum, axis| {
-        let row = nalgebra::Vector3::from(*axis);
-        sum + row * row.transpose()
-    });
-    let inverse = sum.try_inverse().unwrap_or_else(nalgebra::Matrix3::identity);
+    let design = DMatrix::from_fn(axes.len(), 3, |sensor, axis| axes[sensor][axis]);
+    // Axes of a document span space.
+    let inverse = linear::inverse(&design).unwrap_or_else(|_| DMatrix::identity(3, 3));
+    let solved = inverse * design.transpose();
     move |along| {
-        let mut vector = nalgebra::Vector3::zeros();
-        for (sensor, axis) in axes.iter().enumerate() {
-            vector += nalgebra::Vector3::from(*axis) * along(sensor);
-        }
-        (inverse * vector).into()
+        let rates: Vec<f64> = (0..solved.ncols()).map(along).collect();
+        [0, 1, 2]
+            .map(|axis| rates.iter().enumerate().map(|(sensor, rate)| solved[(axis, sensor)] * rate).sum())
     }
 }
 

@@ -24,6 +24,14 @@ pub struct Plateau {
     pub rate: Vec<f64>,
 }
 
+impl Plateau {
+    /// Length of what the gyros show in it (°/h).
+    #[must_use]
+    pub fn size(&self) -> f64 {
+        self.rate.iter().map(|x| x * x).sum::<f64>().sqrt()
+    }
+}
+
 /// Standard deviation of a bin's rate by gyro (°/h), from the differences of neighbours; most of a run is steady.
 #[must_use]
 pub fn scatter(bins: &[Bin]) -> Vec<f64> {

@@ -6,11 +6,11 @@ use super::make::Wanted;
 use super::matching::{Matched, matched, slow};
 use super::plateaus::{self, Plateau};
 use super::steps::Step;
-use crate::drift::figures::fixed;
 use crate::error::Error;
+use crate::finding::{Finding, Kind};
 use crate::modes::document::count_arcsec;
 use crate::modes::fit::deg_per_h;
-use crate::run::{Run, Watch};
+use crate::runs::{Run, Watch};
 
 /// Share of a step's ticks that may be lost.
 const LOST: f64 = 0.05;
@@ -32,59 +32,46 @@ pub(super) fn read<W: Watch>(
     number: usize,
     run: &Run,
     watch: &mut impl FnMut() -> W,
-) -> Result<Result<Turned, String>, Error> {
+) -> Result<Result<Turned, Finding>, Error> {
     let binned = binned(run, wanted.base, &mut *watch)?;
     let counts: Vec<f64> =
         (0..wanted.base.gyro.sensor.len()).map(|sensor| count_arcsec(wanted.base, sensor) / BIN_S).collect();
     let found = plateaus::find(&binned.bins, &counts);
     let own: Vec<Step> = wanted.steps.iter().filter(|step| step.run == number).copied().collect();
     if own.is_empty() {
-        return Ok(Err(format!(
-            "no step is stated of log {} ({}): name it in --steps, or leave it out",
-            number + 1,
-            run.name
-        )));
+        return Ok(Err(Kind::NoStepStated { log: run.name.clone() }.in_log(number)));
     }
     if let Some(sensor) = dead(&binned.bins) {
-        return Ok(Err(format!(
-            "log {} ({}): gyro {} reads the same all the time: it is dead, or its column is the wrong one; look at the mapping, or \
-             leave the log out",
-            number + 1,
-            run.name,
-            wanted.base.gyro.sensor.get(sensor).map_or("", |sensor| sensor.name.as_str())
-        )));
+        let name = wanted.base.gyro.sensor.get(sensor).map_or("", |sensor| sensor.name.as_str());
+        let mut finding = Kind::Dead { log: run.name.clone() }.of_gyro(name);
+        finding.place.log = Some(number);
+        return Ok(Err(finding));
     }
     let matched = match matched(&own, &binned.bins, &found) {
         Ok(matched) => matched,
-        Err(reason) => {
-            let gaps = gaps(&binned.bins).map_or_else(String::new, |words| format!("; {words}"));
-            return Ok(Err(reason + &gaps));
+        Err(kind) => {
+            return Ok(Err(match gaps(&binned.bins) {
+                None => kind,
+                Some(share) => Kind::BesideGaps { kind: Box::new(kind), share },
+            }
+            .in_log(number)));
         }
     };
     let stated = turned_as_stated(&matched, wanted.base, wanted.scale_known)
         .and_then(|()| steady(&matched, &binned.bins));
-    if let Err(reason) = stated {
-        return Ok(Err(reason));
+    if let Err(kind) = stated {
+        return Ok(Err(kind.in_log(number)));
     }
     for one in &matched {
         let bins = binned.bins.get(one.plateau.bins[0]..one.plateau.bins[1]).unwrap_or_default();
         let [good, all] =
             bins.iter().fold([0.0, 0.0], |[good, all], bin| [good + bin.good_s, all + bin.length_s]);
-        let [from, to] = one.plateau.window_s;
+        let window_s = one.plateau.window_s;
         if good < (1.0 - LOST) * all {
-            return Ok(Err(format!(
-                "log {}: {:.1} % of the step of {from:.1}…{to:.1} s cannot be used, {:.0} % may be lost: cut it with --steps",
-                number + 1,
-                100.0 * (1.0 - good / all),
-                100.0 * LOST
-            )));
+            return Ok(Err(Kind::Lost { window_s, share: [1.0 - good / all, LOST] }.in_log(number)));
         }
         if bins.iter().any(|bin| bin.overrange) {
-            return Ok(Err(format!(
-                "log {}: a gyro is at its input limit in the step of {from:.1}…{to:.1} s ({} °/s): leave the step out, or turn slower",
-                number + 1,
-                one.step.rate_deg_per_s
-            )));
+            return Ok(Err(Kind::AtLimit { window_s, stated: one.step.rate_deg_per_s }.in_log(number)));
         }
     }
     let place = wanted.place.get(number).or(wanted.place.first());
@@ -92,41 +79,19 @@ pub(super) fn read<W: Watch>(
         None => None,
         Some(Some(rate)) => Some(rate.map(deg_per_h)),
         Some(None) => {
-            let force = binned.first_force.map_or_else(
-                || "the document or the log has no accelerometers".to_owned(),
-                |[x, y, z]| {
-                    format!(
-                        "the mean force of its first second is ({}, {}, {}) m/s²; it must be within 2 % of one g, x not vertical",
-                        fixed(x, 3),
-                        fixed(y, 3),
-                        fixed(z, 3)
-                    )
-                },
-            );
-            let troubles =
-                binned.troubles.iter().fold(String::new(), |words, trouble| words + "; " + trouble);
-            return Ok(Err(format!(
-                "log {}: the unit cannot be levelled at its beginning: {force}. Give --pitch and --roll of that moment, or mend the columns \
-                 of the accelerometers in the mapping{troubles}",
-                number + 1
-            )));
+            let Binned { first_force: force, troubles, .. } = binned;
+            return Ok(Err(Kind::NotLevel { force, troubles }.in_log(number)));
         }
     };
     Ok(Ok(Turned { binned, matched, rests: slow(&own, found), earth_start }))
 }
 
-/// Words where ticks are missing in more than a twentieth of the bins: no steady stretch is long enough then.
+/// Share of the bins in which ticks are missing, where it is more than a twentieth: no steady stretch is long enough then.
 #[expect(clippy::cast_precision_loss, reason = "bins of a run")]
-fn gaps(bins: &[Bin]) -> Option<String> {
+fn gaps(bins: &[Bin]) -> Option<f64> {
     let broken = bins.iter().filter(|bin| bin.broken || bin.good_s < (1.0 - LOST) * bin.length_s).count();
     let share = broken as f64 / bins.len().max(1) as f64;
-    (share > LOST).then(|| {
-        format!(
-            "in {:.0} % of the half seconds ticks are missing or cannot be used: the log has gaps, or the tick length or the unit of the time \
-             column in the mapping is not that of the log",
-            100.0 * share
-        )
-    })
+    (share > LOST).then_some(share)
 }
 
 /// Cuts steps to whole turns, so that the Earth's horizontal part averages out. Gives the rates (°/s) of those that are shorter.
@@ -176,6 +141,6 @@ mod tests {
             (0..200).map(bin).collect()
         };
         assert_eq!(gaps(&bins(100)), None);
-        assert!(gaps(&bins(4)).unwrap().starts_with("in 25 % of the half seconds ticks are missing"));
+        assert_eq!(gaps(&bins(4)), Some(0.25));
     }
 }

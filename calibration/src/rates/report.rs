@@ -6,6 +6,7 @@ use isotherm_log::plot::page::{Axis, Chart, Content, Form, Ink, Panel, Samples, 
 use super::make::{Made, Measured};
 use super::solve::GyroRates;
 use crate::drift::figures::{counted, fixed, short};
+use crate::finding::Kind;
 use crate::report::words::{gyros, together};
 use crate::report::{Coefficient, FitReport};
 
@@ -23,7 +24,7 @@ pub(super) fn report(made: &Made) -> FitReport {
         FitReport::new("Rate table: scale factor, asymmetry, linearity, input axes", document.unit.clone())
             .counting("steps");
     report.verdicts.clone_from(&made.verdicts);
-    report.warnings.clone_from(&made.warnings);
+    report.warnings.extend(made.warnings.iter().map(ToString::to_string));
     let turning = made.steps.iter().filter(|step| step.matched.step.rate_deg_per_s != 0.0).count();
     let temperature = made
         .temperature_deg_c()
@@ -214,7 +215,7 @@ fn linearity(made: &Made, index: usize, name: &str, found: &GyroRates, report: &
 }
 
 fn chart(made: &Made) -> Chart {
-    let panel = |(index, found): (usize, &Result<GyroRates, String>)| {
+    let panel = |(index, found): (usize, &Result<GyroRates, Kind>)| {
         let found = found.as_ref().ok()?;
         let sensor = made.written.document.gyro.sensor.get(index)?;
         let axis = made.written.document.gyro.orientation.rows.get(index)?;

@@ -10,9 +10,10 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::drift::figures::counted;
+use crate::finding::Kind;
+use crate::lsq::linear::{self, Linear, Weak};
 
-/// Smallest share of the largest singular value that carries information.
+/// Smallest share of the largest singular value that carries information: steps are hardly exact to more digits.
 const SINGULAR: f64 = 1e-7;
 /// Standard deviations of its estimate by which χ² may be too large before the stated errors grow.
 const ALLOWED: f64 = 3.0;
@@ -55,10 +56,10 @@ pub struct GyroRates {
 ///
 /// # Errors
 /// Why it cannot be.
-pub fn solve(points: &[Point], old: [f64; 3]) -> Result<GyroRates, String> {
+pub fn solve(points: &[Point], old: [f64; 3]) -> Result<GyroRates, Kind> {
     let rank = rank(points);
     if rank == 0 {
-        return Err("no step turns: scale needs rates of the table".to_owned());
+        return Err(Kind::NothingTurns);
     }
     let dot = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let spans = rank == 3;
@@ -70,9 +71,7 @@ pub fn solve(points: &[Point], old: [f64; 3]) -> Result<GyroRates, String> {
     let most = points.iter().map(|point| along(point).abs()).fold(0.0, f64::max);
     let total = points.iter().map(|point| dot(point.rate, point.rate).sqrt()).fold(0.0, f64::max);
     if most < 0.1 * total {
-        return Err(
-            "the input axis is across all axes of the table: turn about an axis nearer to it".to_owned()
-        );
+        return Err(Kind::Across);
     }
     let both =
         [1.0, -1.0].into_iter().all(|sign| points.iter().any(|point| sign * along(point) > 0.2 * most));
@@ -90,14 +89,12 @@ pub fn solve(points: &[Point], old: [f64; 3]) -> Result<GyroRates, String> {
         DMatrix::from_fn(points.len(), width, |i, j| rows[i][j] / points[i].sigma)
     };
     let y = DVector::from_iterator(points.len(), points.iter().map(|point| point.shown / point.sigma));
-    let wide =
-        Some(build(true)).filter(|x| both && x.nrows() > x.ncols()).and_then(|x| least_squares(&x, &y));
+    let found = |x: DMatrix<f64>| linear::solve(&x, &y, Weak::Refuse(SINGULAR)).ok();
+    let wide = Some(build(true)).filter(|x| both && x.nrows() > x.ncols()).and_then(found);
     let asymmetric = wide.is_some();
-    let narrow = || Some(build(false)).filter(|x| x.nrows() >= x.ncols()).and_then(|x| least_squares(&x, &y));
-    let (beta, mut covariance, left) = wide.or_else(narrow).ok_or_else(|| {
-        let steps = counted(points.len(), "step is", "steps are");
-        format!("{steps} too few, or too much alike: use rates of both signs, at least two sizes, and a rest")
-    })?;
+    let narrow = || Some(build(false)).and_then(found);
+    let found = wide.or_else(narrow).ok_or(Kind::FewSteps { steps: points.len() })?;
+    let Linear { coefficients: beta, inverse: mut covariance, residual: left, .. } = found;
     let freedom = points.len() - beta.len();
     #[expect(clippy::cast_precision_loss, reason = "few steps")]
     let (chi_square, limit) = if freedom > 0 {
@@ -153,26 +150,4 @@ fn rank(points: &[Point]) -> usize {
     // Rates of the Earth's size span nothing.
     let least = (1e-4 * largest).max(1e6);
     values.iter().filter(|value| **value > least).count()
-}
-
-/// Coefficients, covariance and what is left; `None` where a column tells nothing.
-fn least_squares(x: &DMatrix<f64>, y: &DVector<f64>) -> Option<(DVector<f64>, DMatrix<f64>, DVector<f64>)> {
-    let norms: Vec<f64> = x.column_iter().map(|column| column.norm()).collect();
-    if norms.iter().any(|norm| norm.is_nan() || *norm <= 0.0) {
-        return None;
-    }
-    let scaled = DMatrix::from_fn(x.nrows(), x.ncols(), |i, j| x[(i, j)] / norms[j]);
-    let svd = scaled.svd(true, true);
-    if svd.singular_values.min() < SINGULAR * svd.singular_values.max() {
-        return None;
-    }
-    let solved = svd.solve(y, 0.0).ok()?;
-    let beta = DVector::from_fn(norms.len(), |j, _| solved[j] / norms[j]);
-    let v = svd.v_t.as_ref()?.transpose();
-    let inverse = DMatrix::from_fn(norms.len(), norms.len(), |i, j| {
-        let sum: f64 = (0..norms.len()).map(|k| v[(i, k)] * v[(j, k)] / svd.singular_values[k].powi(2)).sum();
-        sum / (norms[i] * norms[j])
-    });
-    let left = y - x * &beta;
-    Some((beta, inverse, left))
 }

@@ -14,7 +14,8 @@ use super::document::nominal;
 use super::make::{Made, Wanted, make};
 use super::steps::{Step, listed};
 use crate::error::Error;
-use crate::run::Run;
+use crate::finding::{Finding, Kind};
+use crate::runs::Run;
 
 /// Rates of the table (°/s): whole turns in ten seconds, so that every step begins as the run did.
 const RATES: [f64; 6] = [36.0, -36.0, 72.0, -72.0, 144.0, -144.0];
@@ -184,7 +185,7 @@ fn one_axis_gives_its_own_gyro_s_weight_and_no_other() {
 #[test]
 fn without_a_place_whole_turns_hold_the_earth_off() {
     let made = made(&table(950), &steps(3), &[]).unwrap();
-    assert!(made.warnings.iter().any(|words| words.contains("whole turns")));
+    assert!(made.warnings.iter().any(|found| found.kind == Kind::NoAttitude));
     let gyros = {
         let Gyros::Mems(gyros) = scenario(0).instrument.gyros else { panic!() };
         gyros
@@ -196,20 +197,27 @@ fn without_a_place_whole_turns_hold_the_earth_off() {
     }
 }
 
+/// The only finding that something is refused for.
+fn only(refused: Result<Vec<Finding>, Error>) -> Finding {
+    match refused {
+        Err(Error::Found(mut found)) if found.len() == 1 => found.remove(0),
+        other => panic!("{other:?}"),
+    }
+}
+
 #[test]
 fn steps_that_are_not_those_of_the_log_are_refused() {
     let runs = [run(1, AXES[0], |reading| reading)];
-    let words = |rates: &[f64]| {
+    let found = |rates: &[f64]| {
         let steps = listed(&["x".to_owned()], [rates, &[]], [1, 0]).unwrap();
-        made(&runs, &steps, &place()).map(|made| made.report().to_text()).unwrap_err().to_string()
+        only(made(&runs, &steps, &place()).map(|made| made.warnings))
     };
-    let few = words(&[36.0, -36.0]);
-    assert!(
-        few.contains("2 steps of the table are stated, 3 plateaus") && few.contains("11.0…19.0 s at (35.9"),
-        "{few}"
-    );
-    let swapped = words(&[36.0, -36.0, 144.0, -72.0, 72.0, -144.0]);
-    assert!(swapped.contains("its step is stated as") && swapped.contains("order of the rates"), "{swapped}");
+    let few = found(&[36.0, -36.0]);
+    assert_eq!(few.place.log, Some(0));
+    let Kind::OtherPlateaus { stated: 2, turning: 3.., found: plateaus } = few.kind else { panic!("{few}") };
+    assert!(plateaus.iter().any(|plateau| (plateau.rate[0] / 3600.0 - 36.0).abs() < 0.2), "{plateaus:?}");
+    let swapped = found(&[36.0, -36.0, 144.0, -72.0, 72.0, -144.0]);
+    assert!(matches!(swapped.kind, Kind::OutOfProportion { .. }), "{swapped}");
     assert!(matches!(listed(&["x".to_owned()], [&[1.0], &[]], [2, 0]), Err(Error::Usage(_))));
 }
 
@@ -230,8 +238,8 @@ fn weights_far_from_the_old_ones_and_steps_that_overlap_are_told() {
         window_s: Some([from_s, from_s + 8.0]),
     };
     let twice = [window(36.0, 11.0), window(-36.0, 31.0), window(36.0, 12.0)];
-    let refused = made(&runs, &twice, &place()).map(|made| made.warnings).unwrap_err().to_string();
-    assert!(refused.contains("two steps overlap, 11…19 s and 12…20 s"), "{refused}");
+    let refused = only(made(&runs, &twice, &place()).map(|made| made.warnings));
+    assert_eq!(refused, Kind::StepsOverlap { windows_s: [[11.0, 19.0], [12.0, 20.0]] }.in_log(0));
 }
 
 #[test]

@@ -7,8 +7,9 @@ use isotherm_protocol::document::{AccelOutput, Document, Sample};
 
 use super::verdict::Verdict;
 use crate::error::Error;
-use crate::means::{Means, Size};
-use crate::run::{Run, Troubles, Watch};
+use crate::runs::table::{Rows, Table, Takes};
+use crate::runs::{Run, Troubles, Watch};
+use crate::size::Size;
 
 /// Names of the case axes.
 pub(super) const AXES: [&str; 3] = ["x", "y", "z"];
@@ -65,23 +66,25 @@ pub fn judge(
     (before, after): (&Loaded, &Loaded),
     (document, rest): (&Document, &Rest),
     window_s: f64,
-    mut watch: impl Watch,
+    watch: impl Watch,
 ) -> Result<Judged, Error> {
-    let before = Means::of(run, before, window_s, &mut watch)?;
-    let after = Means::of(run, after, window_s, &mut watch)?;
+    let rows = Rows { length_s: window_s, takes: Takes::Valid };
+    let mut tables = Table::together(run, &[after.clone(), before.clone()], rows, watch)?.into_iter();
+    let mut next = || tables.next().unwrap_or_default().whole(0.999);
+    let (after, before) = (next(), next());
     let mut troubles = after.troubles.clone();
     troubles.extend(before.troubles.iter().filter(|words| !after.troubles.contains(words)).cloned());
-    let curves = Curve::of_means(&run.name, sample, [&before, &after], document, rest);
+    let curves = Curve::of_tables(&run.name, sample, [&before, &after], document, rest);
     Ok(Judged { curves, troubles })
 }
 
 impl Curve {
     /// The curves of two corrections of the same run; the document tells which temperature channel an axis follows.
     #[must_use]
-    pub fn of_means(
+    pub fn of_tables(
         run: &str,
         sample: Sample,
-        [before, after]: [&Means; 2],
+        [before, after]: [&Table; 2],
         document: &Document,
         rest: &Rest,
     ) -> Vec<Self> {

@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use super::verdict::Verdict;
 use super::{Coefficient, Curve, FitReport};
-use crate::means::Size;
+use crate::size::Size;
 
 impl FitReport {
     /// Everything but the curves themselves, of which the sizes are there.

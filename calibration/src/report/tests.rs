@@ -4,7 +4,7 @@ use isotherm_protocol::document::{Document, Sample};
 
 use super::*;
 use crate::fixture::simulated;
-use crate::means::Size;
+use crate::size::Size;
 use crate::written::Written;
 
 fn size(peak_to_peak: f64) -> Size {

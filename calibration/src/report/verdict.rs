@@ -5,7 +5,7 @@ use isotherm_protocol::document::{Measure, Residual, Sample};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::drift::figures::short;
-use crate::means::Size;
+use crate::size::Size;
 
 /// Which figure of a [`Size`] the sentence states.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

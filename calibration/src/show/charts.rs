@@ -6,8 +6,8 @@ use isotherm_log::plot::page::{Axis, Chart, Content, Form, Ink, Panel, Samples, 
 use super::about::ARCSEC;
 use super::terms::Term;
 use super::{RAMPS, lasing_mode, places, ramp_words, spoken, steady};
-use crate::means::Size;
 use crate::report::Sheet;
+use crate::size::Size;
 use crate::written::Written;
 
 /// Points of a curve.

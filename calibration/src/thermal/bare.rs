@@ -8,10 +8,16 @@ use isotherm_protocol::document::{
 
 use super::checks::median_step_s;
 use crate::error::Error;
-use crate::series::Series;
+use crate::runs::{self, series::Series};
 
 /// Names of the sensors of a unit with three.
 const AXES: [&str; 3] = ["x", "y", "z"];
+/// Longest step of a grid that a document may state (s).
+const LONGEST_GRID_STEP_S: f64 = 3600.0;
+/// Grid points between two readings that they can carry: between readings there are only straight lines.
+const FINEST_GRID: f64 = 3.0;
+/// Distances of readings over which a temperature must not become stale.
+const FRESH_READINGS: f64 = 2.0;
 /// Where the readings of a thermometer without a conversion must lie to be °C.
 const DEG_C: [f64; 2] = [-100.0, 200.0];
 
@@ -174,8 +180,9 @@ fn document(
 #[must_use]
 pub fn filter(step_s: f64) -> Filter {
     // Readings about a second apart belong on a grid of a second.
-    let grids = [0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 60.0];
-    let grid = grids.into_iter().find(|step| *step > 0.8 * step_s).unwrap_or(60.0);
+    let grids = [0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0];
+    let minutes = || (60.0 * libm::ceil(step_s / 60.0)).min(LONGEST_GRID_STEP_S);
+    let grid = grids.into_iter().find(|step| *step > 0.8 * step_s).unwrap_or_else(minutes);
     Filter {
         grid_step_s: grid,
         smoothing_s: 10.0 * grid,
@@ -183,6 +190,29 @@ pub fn filter(step_s: f64) -> Filter {
         stale_after_s: 20.0 * grid,
         branch_dead_band_deg_c2_per_s3: None,
     }
+}
+
+/// Has a document carry readings that are so far apart (s): without a grid between them, and with spike limits beyond what a ramp does
+/// from one to the next. Gives the step of the grid that it had, and of the one that it has now; `None` where it can carry them.
+pub fn carry(document: &mut Document, runs: &[&Series], step_s: f64) -> Option<[f64; 2]> {
+    let stated = document.temperature.filter.as_ref()?;
+    let stated_s = stated.grid_step_s;
+    if step_s <= FINEST_GRID * stated_s && FRESH_READINGS * step_s <= stated.stale_after_s {
+        return None;
+    }
+    for channel in &mut document.temperature.channel {
+        let limit = |readings: &runs::series::Channel| {
+            let powers = &channel.conversion_deg_c;
+            let deg_c = |raw: &f64| powers.iter().rev().fold(0.0, |sum, power| sum * raw + power);
+            spike_limit(&readings.raw.iter().map(deg_c).collect::<Vec<f64>>())
+        };
+        let limits = runs.iter().filter_map(|series| series.temperatures.get(&channel.name)).map(limit);
+        channel.spike_limit_deg_c = limits.fold(channel.spike_limit_deg_c, f64::max);
+    }
+    let carried = filter(step_s);
+    let grids = [stated_s, carried.grid_step_s];
+    document.temperature.filter = Some(carried);
+    Some(grids)
 }
 
 /// A spike limit that the log's own slope does not touch.

@@ -9,11 +9,11 @@ use super::stand::Stand;
 use crate::drift::columns::name as sensor_name;
 use crate::drift::figures::{counted, short, six};
 use crate::drift::pieces::checks::moves;
-use crate::means::Size;
 use crate::report::Rest;
 use crate::robust::{median, median_if_any};
-use crate::series::{Series, Ticks};
-use crate::swapped::Shown;
+use crate::runs::series::{Series, Ticks};
+use crate::size::Size;
+use crate::swapped::{Looks, Shown};
 
 /// How far a gyro on a rate table may be from what is stated: share of the rate, and beside it (°/s).
 const TABLE_SHARE: f64 = 0.05;
@@ -177,7 +177,7 @@ fn rates(found: &mut Findings, name: &str, ticks: &Ticks) {
     }
 }
 
-fn thermometer(found: &mut Findings, name: &str, channel: &str, readings: &crate::series::Channel) {
+fn thermometer(found: &mut Findings, name: &str, channel: &str, readings: &crate::runs::series::Channel) {
     let good: Vec<f64> = readings.raw.iter().copied().filter(|raw| raw.is_finite()).collect();
     let bad = readings.raw.len() - good.len();
     if 2 * good.len() < readings.raw.len() || good.len() < 10 {
@@ -261,7 +261,7 @@ pub fn attitude(samples: &Samples, document: &Document, (rest, stand): (&Rest, &
     let forces = sizes(&samples.forces)
         .zip(force)
         .map(|(sizes, force)| Shown::of(["accelerometers", "m/s²"], sizes, force));
-    let named = |words: Option<String>| words.map(|words| format!("{}: {words}", samples.name));
+    let named = |looks: Option<Looks>| looks.map(|looks| format!("{}: {looks}", samples.name));
     found.warnings.extend([gyros, forces].into_iter().flatten().filter_map(|shown| named(shown.swapped())));
     // The bias of a gyro may be many times the Earth's rate; that of an accelerometer is no third of gravity.
     found.refusals.extend(named(forces.and_then(|shown| shown.far())));

@@ -1,16 +1,17 @@
 //! What one unit of each term subtracts, taken from the corrector itself.
 //!
-//! A term is put with the coefficient one into a document that has nothing else, and the run's own temperature readings, without
-//! their noise, are driven through the service's stream with it, together with ticks that read zero. What comes out is the term's
-//! column, with filter, grid, derivative step and the ramps between readings as the service has them. Three terms go in
-//! at a time, one per axis.
+//! A gyro gets the term with the coefficient one and nothing else, and the run's own temperature readings, without their noise, are
+//! driven through the service's stream with it. The bias that the corrector then subtracts is the term's column, with filter, grid,
+//! derivative step and the ramps between readings as the service has them. As many terms go in at a time as a unit has gyros.
 
 use std::collections::BTreeMap;
+use std::iter;
 
+use isotherm_correction::observation::Observation;
 use isotherm_correction::sample::{
-    CorrectedTick, GyroTick, OutputKind, SensorFlags, Sensors, TemperatureReading,
+    GyroTick, MAX_SENSORS, MIN_SENSORS, OutputKind, SensorFlags, Sensors, TemperatureReading,
 };
-use isotherm_correction::unit::UnitSettings;
+use isotherm_correction::unit::{MAX_TICK_DURATION, UnitSettings};
 use isotherm_correction::units::{AngularRate, Span, Timestamp};
 use isotherm_log::offline::Offline;
 use isotherm_log::text::LogEvent;
@@ -97,28 +98,36 @@ impl Basis {
         .over(Argument::DegC)
     }
 
-    /// A document with three gyros on this channel, each with the terms that it is given.
-    fn document(&self, terms: &[Option<Term>; 3]) -> Document {
-        let sensor = |(index, term): (usize, &Option<Term>)| {
+    /// A document of gyros on this channel, each with the term that it is given and nothing else.
+    fn document(&self, terms: &[Term]) -> Document {
+        let sensor = |(index, term): (usize, &Term)| {
             let mut gyro = GyroSensor {
                 channel: Some(self.channel.name.clone()),
                 increment_weight_rad_per_rad: Some(1.0),
                 ..GyroSensor::bare(&index.to_string())
             };
             match *term {
-                None | Some(Term::Scale(_)) => {}
-                Some(Term::Static(power)) => gyro.static_bias = Some(self.power(power, 1.0)),
-                Some(Term::Rate(branch, power)) => gyro.thermal_rate = Some(self.branches(branch, power)),
-                Some(Term::Acceleration(branch, power)) => {
+                Term::Scale(_) => {}
+                Term::Static(power) => gyro.static_bias = Some(self.power(power, 1.0)),
+                Term::Rate(branch, power) => gyro.thermal_rate = Some(self.branches(branch, power)),
+                Term::Acceleration(branch, power) => {
                     gyro.thermal_acceleration = Some(self.branches(branch, power));
                 }
-                Some(Term::Lag(tau, power)) => {
+                Term::Lag(tau, power) => {
                     gyro.lag.push(Lag { time_constant_s: seconds(tau), gain: self.power(power, 1.0) });
                 }
             }
             gyro
         };
+        let sensors: Vec<GyroSensor> = terms.iter().enumerate().map(sensor).collect();
         let dead_band = self.filter.branch_dead_band_deg_c2_per_s3.or(Some(1e-9));
+        // Any axes that span space: what is looked at is not resolved along them.
+        let row = |index: usize| {
+            let mut row = [0.0; 3];
+            row[index % 3] = 1.0;
+            row
+        };
+        let rows = (0..sensors.len()).map(row).collect();
         Document {
             schema: isotherm_protocol::document::CURRENT_SCHEMA,
             unit: "COLUMNS".to_owned(),
@@ -132,8 +141,8 @@ impl Basis {
             },
             gyro: Gyro {
                 output: GyroOutput::Mean,
-                sensor: terms.iter().enumerate().map(sensor).collect(),
-                orientation: Orientation::along_case_axes(),
+                sensor: sensors,
+                orientation: Orientation { rows, weights: None, thermal: None, parity: None },
             },
             accel: None,
             mode_reversal: None,
@@ -146,16 +155,21 @@ impl Basis {
         Branches { run_up: on(branch != Branch::Braking), braking: on(branch != Branch::RunUp) }
     }
 
-    /// What up to three terms subtract over the windows of a run, and Ṫ there.
-    fn drive(&self, run: &Samples, terms: &[Option<Term>; 3]) -> Result<[Vec<f64>; 3], Error> {
-        let written = Written::of(&self.document(terms))?;
-        let mut unit = Offline::new(&written.loaded, UnitSettings::default());
+    /// What up to eight terms subtract over the windows of a run (°/h).
+    fn drive(&self, run: &Samples, terms: &[Term]) -> Result<Vec<Vec<f64>>, Error> {
+        // A unit has three gyros at least.
+        let padding = iter::repeat_n(Term::Static(0), MIN_SENSORS.saturating_sub(terms.len()));
+        let padded: Vec<Term> = terms.iter().copied().chain(padding).collect();
+        let loaded = Written::compiled(&self.document(&padded))?;
+        let mut unit = Offline::new(&loaded, UnitSettings::default());
         let readings: &[TemperatureReading] =
             run.temperatures.get(&self.channel.name).map_or(&[], Vec::as_slice);
-        let step = Span::from_s(0.2 * run.window_s);
-        let mut sums = Windows::new(run);
+        // Some to a window, each no longer than the corrector takes.
+        let step = Span::from_s(run.window_s / libm::ceil(run.window_s / MAX_TICK_DURATION.as_s()).max(5.0));
+        let mut sums = Windows::new(run, terms.len());
         let mut readings = readings.iter().peekable();
-        let (mut sequence, mut end) = (0_u64, run.start_ns);
+        // A unit keeps its first tick until it has seen the next one: it gets one from before the run.
+        let (mut sequence, mut end) = (0_u64, run.start_ns.saturating_sub(step.as_ns()));
         let last = run.time_s.last().map_or(0.0, |middle| middle + run.window_s);
         let last = run.start_ns.saturating_add(Span::from_s(last).as_ns());
         while end < last {
@@ -167,7 +181,7 @@ impl Basis {
                 sequence,
                 end_time: Timestamp::from_ns(end),
                 duration: step,
-                readings: [0.0; 3].into_iter().collect(),
+                readings: padded.iter().map(|_| 0.0).collect(),
                 mode: None,
                 switch_command: false,
                 meander: None,
@@ -175,11 +189,13 @@ impl Basis {
                 series: 0,
             };
             sequence += 1;
+            // Without accelerometers every other tick goes through at once.
             unit.handle(&LogEvent::Gyro { output: OutputKind::Mean, tick });
-            unit.take().iter().for_each(|tick| sums.take(tick, step.as_s()));
+            unit.take();
+            if let Some(seen) = unit.unit().observation() {
+                sums.take(seen, step.as_s());
+            }
         }
-        unit.finish();
-        unit.take().iter().for_each(|tick| sums.take(tick, step.as_s()));
         Ok(sums.means())
     }
 }
@@ -187,21 +203,22 @@ impl Basis {
 /// Sums over the windows of a run; windows before the first temperature reading have no number.
 struct Windows<'a> {
     run: &'a Samples,
-    sums: Vec<([f64; 3], f64)>,
+    /// By window: sums of rate times time (rad) by term, and the time (s).
+    sums: Vec<(Vec<f64>, f64)>,
     at: usize,
     /// The temperature is known: until then the corrector assumes one.
     known: bool,
 }
 
 impl<'a> Windows<'a> {
-    fn new(run: &'a Samples) -> Self {
-        Self { run, sums: vec![([0.0; 3], 0.0); run.time_s.len()], at: 0, known: false }
+    fn new(run: &'a Samples, terms: usize) -> Self {
+        Self { run, sums: vec![(vec![0.0; terms], 0.0); run.time_s.len()], at: 0, known: false }
     }
 
-    fn take(&mut self, tick: &CorrectedTick, length_s: f64) {
+    fn take(&mut self, seen: &Observation, length_s: f64) {
         #[expect(clippy::cast_precision_loss, reason = "a run is far below 2⁵³ ns")]
-        let middle = tick.end_time.as_ns().saturating_sub(self.run.start_ns) as f64 * 1e-9 - 0.5 * length_s;
-        self.known |= tick.gyro_flags.iter().all(|flags| !flags.contains(SensorFlags::STALE_TEMPERATURE));
+        let middle = seen.end_time.as_ns().saturating_sub(self.run.start_ns) as f64 * 1e-9 - 0.5 * length_s;
+        self.known |= seen.gyros.iter().all(|gyro| !gyro.flags.contains(SensorFlags::STALE_TEMPERATURE));
         let half = 0.5 * self.run.window_s;
         while self.run.time_s.get(self.at).is_some_and(|window| window + half < middle) {
             self.at += 1;
@@ -210,23 +227,24 @@ impl<'a> Windows<'a> {
             (self.run.time_s.get(self.at), self.sums.get_mut(self.at))
             && (window - middle).abs() <= half
         {
-            sums.iter_mut().zip(tick.delta_angle).for_each(|(sum, angle)| *sum -= angle);
+            sums.iter_mut().zip(seen.gyros.bias).for_each(|(sum, bias)| *sum += bias * length_s);
             *length += if self.known { length_s } else { f64::NAN };
         }
     }
 
-    fn means(self) -> [Vec<f64>; 3] {
-        let mean = |axis: usize| {
-            let mean = |(sums, length): &([f64; 3], f64)| {
+    fn means(self) -> Vec<Vec<f64>> {
+        let terms = self.sums.first().map_or(0, |(sums, _)| sums.len());
+        let mean = |term: usize| {
+            let mean = |(sums, length): &(Vec<f64>, f64)| {
                 if *length > 0.0 {
-                    AngularRate::from_rad_per_s(sums[axis] / length).as_deg_per_h()
+                    AngularRate::from_rad_per_s(sums[term] / length).as_deg_per_h()
                 } else {
                     f64::NAN
                 }
             };
             self.sums.iter().map(mean).collect()
         };
-        [mean(0), mean(1), mean(2)]
+        (0..terms).map(mean).collect()
     }
 }
 
@@ -252,12 +270,14 @@ impl<'a> Columns<'a> {
         let mut wanted: Vec<Term> = terms.iter().filter(of_all).copied().collect();
         wanted.sort_unstable();
         wanted.dedup();
-        for group in wanted.chunks(3) {
-            let slots = [group.first().copied(), group.get(1).copied(), group.get(2).copied()];
-            let mut whole: [Vec<f64>; 3] = Default::default();
+        for group in wanted.chunks(MAX_SENSORS) {
+            let mut whole = vec![Vec::new(); group.len()];
             for run in self.runs {
-                let columns = self.basis.drive(run, &slots)?;
-                whole.iter_mut().zip(columns).for_each(|(whole, column)| whole.extend(column));
+                let columns = self.basis.drive(run, group)?;
+                whole
+                    .iter_mut()
+                    .zip(columns)
+                    .for_each(|(whole, column): (&mut Vec<f64>, _)| whole.extend(column));
             }
             for (term, column) in group.iter().zip(whole) {
                 self.known.insert(*term, column);

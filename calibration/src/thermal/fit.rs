@@ -2,7 +2,7 @@
 
 use isotherm_protocol::document::{Document, Origin};
 
-use super::bare::{bare, filter, nominal_of};
+use super::bare::{bare, carry, filter, nominal_of};
 use super::checks::{self, Findings};
 use super::columns::Columns;
 use super::filter::{choose_filter, longest_run_s};
@@ -14,10 +14,12 @@ use super::settings::{Method, Settings, Terms};
 use super::stand::Stand;
 use super::target::{rest, target};
 use super::{passes, search, sequential};
+use crate::drift::figures::six;
 use crate::error::Error;
-use crate::means::usual_window_s;
 use crate::report::{FitReport, Rest};
-use crate::run::{Run, Watch};
+use crate::runs::series::Series;
+use crate::runs::table::usual_window_s;
+use crate::runs::{Run, Watch};
 use crate::written::Written;
 
 /// Highest powers of temperature that are tried.
@@ -89,12 +91,21 @@ pub fn fit(
                 .to_owned(),
         ]));
     }
-    let step_s = first
-        .temperatures
-        .values()
-        .map(|channel| checks::median_step_s(&channel.time_ns))
-        .fold(0.0, f64::max);
+    let all: Vec<&Series> = series.iter().chain(judging.iter().map(|(series, _)| series)).collect();
+    let channels = all.iter().flat_map(|series| series.temperatures.values());
+    let step_s = channels.map(|channel| checks::median_step_s(&channel.time_ns)).fold(0.0, f64::max);
+    if let Some(grids_s) = carry(&mut plain, &all, step_s) {
+        let [stated_s, carried_s] = grids_s.map(six);
+        warnings.push(format!(
+            "temperature readings come every {} s: the document's grid of {stated_s} s would hold what they do not say, and is replaced by \
+             one of {carried_s} s",
+            six(step_s)
+        ));
+    }
     let filter = plain.temperature.filter.get_or_insert_with(|| filter(step_s)).clone();
+    // No window is shorter than the readings are apart.
+    let settings =
+        &Settings { fit_window_s: settings.fit_window_s.max(libm::ceil(step_s)), ..settings.clone() };
     let mut samples = Vec::new();
     let mut rests = Vec::new();
     for ((run, series), stand) in runs.iter().zip(&series).zip(&stands) {

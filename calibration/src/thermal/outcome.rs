@@ -9,12 +9,12 @@ use super::fit::{Fitted, Sensor};
 use super::model::{Spec, put_accel, put_gyro};
 use super::select::{Choice, WORTH_IT};
 use super::settings::Settings;
-use super::solve::Solution;
 use super::stand::Stand;
 use crate::error::Error;
-use crate::means::Size;
+use crate::lsq::weighted::Solution;
 use crate::report::{Curve, FLAT, Figure, Rest, Verdict, judge};
-use crate::run::{Run, Watch};
+use crate::runs::{Run, Watch};
+use crate::size::Size;
 use crate::written::Written;
 
 /// Share of the rms in sample that the terms of a sensor which drifts with time may leave by themselves, without a judging run:

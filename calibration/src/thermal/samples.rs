@@ -4,14 +4,15 @@ use std::collections::BTreeMap;
 
 use isotherm_correction::sample::{ChannelName, TemperatureReading};
 use isotherm_correction::units::Timestamp;
+use isotherm_log::offline::Loaded;
 use isotherm_protocol::document::{Curve, Document, Shape};
 
 use super::bare::along_axes;
 use super::thermometer::without_noise;
 use crate::error::Error;
-use crate::means::Means;
-use crate::run::{Run, Troubles, Watch};
-use crate::series::Series;
+use crate::runs::series::Series;
+use crate::runs::table::{Rows, Table, Takes};
+use crate::runs::{Run, Troubles, Watch};
 use crate::written::Written;
 
 /// One run.
@@ -49,66 +50,45 @@ impl Samples {
         series: &Series,
         bare: &Document,
         window_s: f64,
-        mut watch: impl Watch,
+        watch: impl Watch,
     ) -> Result<Self, Error> {
         let gyro_count = bare.gyro.sensor.len();
         let accel_count = bare.accel.as_ref().map_or(0, |accel| accel.sensor.len());
+        // Patterns of turned sensors, then the same with a bias of one on every accelerometer.
         let patterns = gyro_count.max(accel_count).div_ceil(3);
-        let mut pass = |document: &Document| -> Result<Vec<Means>, Error> {
-            (0..patterns)
-                .map(|pattern| {
-                    let written = Written::of(&along_axes(document, pattern))?;
-                    Means::of(run, &written.loaded, window_s, Again(&mut watch))
-                })
-                .collect()
-        };
-        let plain = pass(bare)?;
+        let biased = with_unit_bias(bare);
+        let kinds = if accel_count > 0 { vec![bare, &biased] } else { vec![bare] };
+        let documents =
+            kinds.iter().flat_map(|document| (0..patterns).map(|pattern| along_axes(document, pattern)));
+        let loaded: Vec<Loaded> =
+            documents.map(|document| Written::compiled(&document)).collect::<Result<_, Error>>()?;
+        let rows = Rows { length_s: window_s, takes: Takes::Valid };
+        let tables = Table::together(run, &loaded, rows, watch)?;
+        let tables: Vec<Table> = tables.into_iter().map(|table| table.whole(0.999)).collect();
         let rates: Vec<[&[f64]; 3]> =
-            plain.iter().map(|means| [0, 1, 2].map(|axis| means.rate(axis))).collect();
+            tables.iter().take(patterns).map(|table| [0, 1, 2].map(|axis| table.rate(axis))).collect();
         let forces: Vec<[&[f64]; 3]> =
-            plain.iter().map(|means| [0, 1, 2].map(|axis| means.force(axis))).collect();
-        let of_forces = by_sensor(&forces, accel_count);
-        let mut responses = Vec::new();
-        if accel_count > 0 {
-            let biased = pass(&with_unit_bias(bare))?;
-            let biased: Vec<[&[f64]; 3]> =
-                biased.iter().map(|means| [0, 1, 2].map(|axis| means.force(axis))).collect();
-            let biased = by_sensor(&biased, accel_count);
-            let difference = |(plain, biased): (&Vec<f64>, &Vec<f64>)| {
-                plain.iter().zip(biased).map(|(plain, biased)| plain - biased).collect()
-            };
-            responses = of_forces.iter().zip(&biased).map(difference).collect();
-        }
-        let Means { time_s, troubles, temperature_deg_c, .. } = plain.first().cloned().unwrap_or_default();
+            tables.iter().map(|table| [0, 1, 2].map(|axis| table.force(axis))).collect();
+        let of_forces = by_sensor(forces.get(..patterns).unwrap_or(&[]), accel_count);
+        let biased = by_sensor(forces.get(patterns..).unwrap_or(&[]), accel_count);
+        let difference = |(plain, biased): (&Vec<f64>, &Vec<f64>)| {
+            plain.iter().zip(biased).map(|(plain, biased)| plain - biased).collect()
+        };
+        let responses = of_forces.iter().zip(&biased).map(difference).collect();
+        let gyros = by_sensor(&rates, gyro_count);
+        let Table { time_s, troubles, temperature_deg_c, .. } = tables.into_iter().next().unwrap_or_default();
         Ok(Self {
             name: run.name.clone(),
             start_ns: start_ns(series),
             window_s,
             time_s,
-            gyros: by_sensor(&rates, gyro_count),
+            gyros,
             forces: of_forces,
             responses,
             temperatures: readings(series),
             deg_c: temperature_deg_c,
             troubles,
         })
-    }
-}
-
-/// A watch that is lent.
-struct Again<'a, W: Watch>(&'a mut W);
-
-impl<W: Watch> Watch for Again<'_, W> {
-    fn begin(&mut self, progress: isotherm_log::progress::Progress) {
-        self.0.begin(progress);
-    }
-
-    fn step(&mut self) {
-        self.0.step();
-    }
-
-    fn end(&mut self) {
-        self.0.end();
     }
 }
 
@@ -123,7 +103,7 @@ pub fn start_ns(series: &Series) -> i64 {
 /// The temperature readings of a series by channel, without the noise of the thermometers: see [`without_noise`].
 #[must_use]
 pub fn readings(series: &Series) -> BTreeMap<String, Vec<TemperatureReading>> {
-    let channel = |(name, channel): (&String, &crate::series::Channel)| {
+    let channel = |(name, channel): (&String, &crate::runs::series::Channel)| {
         let known = ChannelName::from(name).ok()?;
         let first = channel.time_ns.first().copied().unwrap_or_default();
         #[expect(clippy::cast_precision_loss, reason = "lengths of logs")]

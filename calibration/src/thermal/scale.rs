@@ -13,8 +13,8 @@ use isotherm_correction::units::STANDARD_GRAVITY_M_PER_S2;
 use isotherm_protocol::document::{Argument, Curve, Quantity, Shape};
 
 use super::columns::Basis;
-use super::solve::once;
 use crate::drift::figures::short;
+use crate::lsq::weighted::once;
 use crate::written::tidy;
 
 /// Highest power of temperature in a scale factor error.

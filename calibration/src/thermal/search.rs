@@ -13,8 +13,9 @@ use super::model::{Dynamics, Spec};
 use super::select::Target;
 use crate::error::Error;
 
-/// Shortest time constant, in grid steps.
+/// Shortest time constant, in grid steps; and where a step is a reading that comes seldom (s), one of them: a coil answers faster.
 const SHORTEST_GRID_STEPS: f64 = 3.0;
+const SELDOM_S: f64 = 6.0;
 /// Longest, as a share of the longest run (a longer one cannot be told from a drift with time), and at all (s).
 const LONGEST_SHARE: f64 = 0.1;
 const LONGEST_S: f64 = 3000.0;
@@ -127,7 +128,8 @@ pub fn searched(
 
 /// The shortest and the longest time constant that a log can tell (s).
 fn bounds(longest_run_s: f64, grid_step_s: f64) -> [f64; 2] {
-    let shortest = (SHORTEST_GRID_STEPS * grid_step_s).max(2.0);
+    let steps = if grid_step_s < SELDOM_S { SHORTEST_GRID_STEPS } else { 1.0 };
+    let shortest = (steps * grid_step_s).max(2.0);
     [shortest, (LONGEST_SHARE * longest_run_s).min(LONGEST_S).max(4.0 * shortest)]
 }
 

@@ -6,7 +6,7 @@ use super::branches::History;
 use super::columns::{Columns, Term};
 use super::model::{Dynamics, Spec};
 use super::scale::{self, Kept};
-use super::solve::{Solution, once, solve};
+use crate::lsq::weighted::{Pieces, Solution, once, solve};
 use crate::robust::{block_length, is_white, median_if_any};
 
 /// Score of a larger model, as a share of that of a smaller one, above which the smaller one is kept.
@@ -141,17 +141,13 @@ impl Target {
         // White noise is in every model alike: averaged over some windows it no longer hides which of them is better.
         let block = block_length(self.values.len());
         let (mut square, mut weight, mut judged) = (0.0, 0.0, 0);
+        let fits = Pieces::of(&all, &self.values, &self.weights, &history.piece);
         for left_out in 0..pieces {
-            let mut weights = self.weights.clone();
-            let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-            for (row, weight) in weights.iter_mut().enumerate() {
-                if history.piece[row] == left_out {
-                    *weight = 0.0;
-                } else if *weight > 0.0 && temperature[row].is_finite() {
-                    low = low.min(temperature[row]);
-                    high = high.max(temperature[row]);
-                }
-            }
+            let others = (0..self.values.len()).filter(|&row| history.piece[row] != left_out);
+            let judging = others.filter(|&row| self.weights[row] > 0.0 && temperature[row].is_finite());
+            let (low, high) = judging.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), row| {
+                (low.min(temperature[row]), high.max(temperature[row]))
+            });
             let rows: Vec<usize> = (0..self.values.len())
                 .filter(|&row| {
                     history.piece[row] == left_out
@@ -163,17 +159,18 @@ impl Target {
             if rows.len() < 3 {
                 continue;
             }
-            let residual = if all.is_empty() {
-                self.values.clone()
-            } else {
-                let Some(solution) = once(&all, &self.values, &weights) else { continue };
-                solution.residual
+            let Some(coefficients) = fits.without(left_out) else { continue };
+            let residual = |row: usize| {
+                let terms = all.iter().zip(&coefficients);
+                terms.fold(self.values[row], |left, (column, c)| left - c * column[row])
             };
             for block in rows.chunks(block) {
-                let good = || block.iter().filter(|&&row| residual[row].is_finite());
-                let share: f64 = good().map(|&row| self.weights[row]).sum();
+                let left = block.iter().map(|&row| (self.weights[row], residual(row)));
+                let (sum, share) = left
+                    .filter(|(_, left)| left.is_finite())
+                    .fold((0.0, 0.0), |(sum, share), (w, left)| (sum + w * left, share + w));
                 if share > 0.0 {
-                    let mean = good().map(|&row| self.weights[row] * residual[row]).sum::<f64>() / share;
+                    let mean = sum / share;
                     square += share * mean * mean;
                     weight += share;
                 }

@@ -6,8 +6,8 @@
 use super::branches::History;
 use super::columns::{Branch, Columns, Term};
 use super::select::Target;
-use super::solve::solve;
 use crate::drift::figures::counted;
+use crate::lsq::weighted::solve;
 
 /// Rounds of rate and acceleration.
 const ROUNDS: usize = 60;

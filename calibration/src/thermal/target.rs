@@ -12,9 +12,10 @@ use super::scale::{Kept, smoothed, told};
 use super::select::{Target, equal_temperature};
 use super::stand::{Site, Stand};
 use crate::error::Error;
-use crate::means::{Means, Size};
 use crate::report::Rest;
-use crate::run::{Run, Watch};
+use crate::runs::table::Table;
+use crate::runs::{Run, Watch};
+use crate::size::Size;
 use crate::written::Written;
 
 /// Shortest windows of a levelling (s).
@@ -27,7 +28,7 @@ pub(super) fn rest(run: &Run, document: &Document, stand: &Stand, watch: impl Wa
     let mean_force = match force_m_per_s2 {
         Some(force) => Some(*force),
         None if document.accel.is_some() => {
-            let means = Means::of(run, &Written::of(document)?.loaded, stand.window_s(LEVELLING_S), watch)?;
+            let means = Table::of(run, &Written::compiled(document)?, stand.window_s(LEVELLING_S), watch)?;
             let mean = |axis: usize| Size::of(means.force(axis)).mean;
             Some([mean(0), mean(1), mean(2)])
         }

@@ -6,8 +6,7 @@
 //! estimate still agrees with those of all shorter ones within the noise [the intersection of confidence intervals, Goldenshluger and
 //! Nemirovski 1997]: long on plateaus and ramps, none at all where a ramp begins.
 
-use nalgebra::{Matrix3, Vector3};
-
+use crate::lsq::local::parabola;
 use crate::robust::{SIGMA_PER_MAD, median, median_if_any};
 
 /// Length of the bins whose means are smoothed (s); one reading where they come more seldom.
@@ -158,21 +157,9 @@ fn polynomial(bins: &[Bin], at: usize, half_width_s: f64) -> Option<(Local, f64)
     if near.len() < FEWEST_BINS || (at - from).min(to - at) * 4 < near.len() {
         return None;
     }
-    let (mut normal, mut right, mut squares) = (Matrix3::zeros(), Vector3::zeros(), Matrix3::zeros());
-    for bin in near {
-        let u = (bin.time_s - middle) / half_width_s;
-        let cube = 1.0 - u.abs() * u * u;
-        let weight = cube * cube * cube;
-        let powers = Vector3::new(1.0, u, u * u);
-        normal += weight * powers * powers.transpose();
-        squares += weight * weight * powers * powers.transpose();
-        right += weight * bin.mean * powers;
-    }
-    let inverse = normal.try_inverse()?;
-    let found = inverse * right;
-    let share = (inverse * squares * inverse)[(0, 0)].max(0.0).sqrt();
-    let coefficients = [found[0], found[1] / half_width_s, found[2] / (half_width_s * half_width_s)];
-    coefficients.iter().all(|c| c.is_finite()).then_some((Local { time_s: middle, coefficients }, share))
+    let points = near.iter().map(|bin| [bin.time_s - middle, bin.mean]);
+    let (coefficients, share) = parabola(points, half_width_s)?;
+    Some((Local { time_s: middle, coefficients }, share))
 }
 
 /// The last bin of a stretch on one side: within its half width, and not behind a gap.

@@ -10,7 +10,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::positions::solve::{NoSolution, Solution, solve};
+use crate::lsq::linear::{self, SINGULAR, Weak};
+use crate::lsq::nonlinear::{NoSolution, Solution, solve};
 
 /// Accelerometers of a unit without a stand.
 pub const SENSORS: usize = 3;
@@ -115,8 +116,9 @@ fn ellipsoid(poses: &[Vec<f64>], gravity: f64) -> Result<([f64; 3], [f64; 3]), N
         let value = (poses[pose].get(i).copied().unwrap_or(f64::NAN) - centre[i]) / half[i];
         if term < 3 { value * value } else { value }
     });
-    let solved = design.svd(true, true).solve(&DVector::repeat(poses.len(), 1.0), 1e-9);
-    let terms = solved.map_err(|words| NoSolution::NoMinimum(words.to_owned()))?;
+    let found = linear::solve(&design, &DVector::repeat(poses.len(), 1.0), Weak::Refuse(SINGULAR));
+    // Without terms the search starts from the range, as below.
+    let terms = found.map_or_else(|_| DVector::repeat(6, f64::NAN), |found| found.coefficients);
     let middle = [0, 1, 2].map(|i| -0.5 * terms[3 + i] / terms[i]);
     let level = 1.0 + (0..3).map(|i| terms[i] * middle[i] * middle[i]).sum::<f64>();
     let scale = [0, 1, 2].map(|i| libm::sqrt(level / terms[i]) * half[i] / gravity);

@@ -4,11 +4,11 @@ pub(super) mod doubts;
 pub(super) mod odd;
 
 use crate::drift::figures::{counted, short};
-use crate::means::Size;
 use crate::positions::faults;
 use crate::positions::pose::Pose;
 use crate::positions::still::{StillLimits, still};
 use crate::positions::track::Track;
+use crate::size::Size;
 
 use super::accel::{self, AccelFit, SENSORS, norm};
 use super::gyro::{self, GyroFit, Transition};

@@ -5,9 +5,9 @@ mod search;
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::means::Size;
-use crate::positions::solve::{NoSolution, solve};
+use crate::lsq::nonlinear::{NoSolution, solve};
 use crate::positions::track::Track;
+use crate::size::Size;
 
 use super::accel::norm;
 use search::Start;

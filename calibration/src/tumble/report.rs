@@ -10,12 +10,12 @@ use super::analysis::{Settings, Tumble, transitions};
 use super::gyro::angle_of;
 use crate::drift::figures::{counted, fixed, short, six};
 use crate::error::Error;
-use crate::means::Size;
 use crate::positions::budget::ARCSEC_PER_RAD;
 use crate::positions::doubts::LARGEST_LEFT_SHARE;
 use crate::positions::pose::Pose;
 use crate::positions::track::Track;
 use crate::report::{Coefficient, Curve, Figure, FitReport, SAME_SHARE, Sigmas, Verdict};
+use crate::size::Size;
 use crate::written::tidy;
 
 const AXES: [&str; 3] = ["x", "y", "z"];

@@ -5,7 +5,7 @@ use isotherm_log::plot::page::Table;
 
 use crate::drift::figures::short;
 use crate::error::Error;
-use crate::run::{Run, Watch};
+use crate::runs::{Run, Watch};
 use crate::written::Written;
 
 /// Share of the fitted range that a judgement should cover.

@@ -8,7 +8,7 @@ use toml::Value;
 
 use crate::error::Error;
 use crate::provenance::{files_of, origin};
-use crate::run::Run;
+use crate::runs::Run;
 
 /// A run, and whether the document was made from it.
 #[derive(Debug, Clone)]

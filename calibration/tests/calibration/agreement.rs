@@ -4,9 +4,9 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use isotherm_calibration::means::Size;
 use isotherm_calibration::positions::budget::ARCSEC_PER_RAD;
 use isotherm_calibration::positions::plan::Plan;
+use isotherm_calibration::size::Size;
 use isotherm_calibration::written::Written;
 use isotherm_correction::sample::CorrectedTick;
 use isotherm_protocol::document::{Document, Residual, Sample};

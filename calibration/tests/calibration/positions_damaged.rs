@@ -3,7 +3,7 @@
 use isotherm_calibration::positions::analysis::{Analysis, Settings, analyse};
 use isotherm_calibration::positions::plan::Plan;
 use isotherm_calibration::positions::track::Track;
-use isotherm_calibration::run::Run;
+use isotherm_calibration::runs::Run;
 use isotherm_calibration::written::Written;
 use isotherm_protocol::document::Document;
 

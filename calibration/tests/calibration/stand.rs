@@ -8,7 +8,7 @@ pub(crate) mod judging;
 use std::collections::BTreeMap;
 
 use isotherm_calibration::positions::plan::{Attitude, Plan};
-use isotherm_calibration::run::Run;
+use isotherm_calibration::runs::Run;
 use isotherm_calibration::written::Written;
 use isotherm_log::offline::unit_id;
 use isotherm_log::text::LogEvent;

@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use isotherm_calibration::means::Size;
 use isotherm_calibration::positions::bare::bare;
 use isotherm_calibration::positions::still::StillLimits;
 use isotherm_calibration::positions::track::Track;
+use isotherm_calibration::size::Size;
 use isotherm_calibration::tumble::analysis::{Settings, Tumble, analyse};
 use isotherm_calibration::tumble::document::complete;
 use isotherm_calibration::written::Written;

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use isotherm_calibration::means::Means;
 use isotherm_calibration::provenance::origin;
-use isotherm_calibration::run::Run;
+use isotherm_calibration::runs::Run;
+use isotherm_calibration::runs::table::Table;
 use isotherm_calibration::written::Written;
 use isotherm_correction::sample::OutputKind;
 use isotherm_log::offline::unit_id;
@@ -161,7 +161,7 @@ fn temperatures_of_a_recording_are_those_of_their_time() {
     }
     let in_memory = Run::of_events("recorded".into(), unit, events);
     let loaded = Written::read(&shipped("FOG-0001.toml")).unwrap().loaded;
-    let [a, b] = [&recorded, &in_memory].map(|run| Means::of(run, &loaded, 10.0, ()).unwrap());
+    let [a, b] = [&recorded, &in_memory].map(|run| Table::of(run, &loaded, 10.0, ()).unwrap());
     assert_eq!(a, b);
 }
 

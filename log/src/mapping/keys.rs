@@ -4,7 +4,7 @@ use isotherm_correction::sample::OutputKind;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::{Column, Delimiter, Marks, ModeMapping, OnBadRow, TimeUnit};
+use super::{Column, Delimiter, Marks, ModeMapping, OnBadRow, StatusMapping, TimeUnit};
 
 /// How a text log is read.
 #[derive(Debug, Deserialize, JsonSchema)]
@@ -62,6 +62,8 @@ pub(super) struct FileKeys {
     /// Temperature channels.
     #[serde(default)]
     pub(super) temperature: Vec<TemperatureKeys>,
+    /// What says of each row whether it holds.
+    pub(super) status: Option<StatusMapping>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize, JsonSchema)]

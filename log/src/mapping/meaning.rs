@@ -13,8 +13,8 @@ use super::keys::{
 };
 use super::{
     Column, Conversion, Delimiter, FileMapping, GyroMapping, Layout, Mapping, Marks, ModeMapping,
-    SensorMapping, SwitchMapping, TemperatureMapping, TickMapping, TimeColumn, TimeMapping, TimeUnit,
-    VERSION,
+    SensorMapping, StatusMapping, SwitchMapping, TemperatureMapping, TickMapping, TimeColumn, TimeMapping,
+    TimeUnit, VERSION,
 };
 
 static FORM: LazyLock<Form> = LazyLock::new(|| Form::of::<MappingKeys>().versions("version", [VERSION; 2]));
@@ -72,6 +72,7 @@ fn file(r: &mut Reader<'_>, path: &str, keys: FileKeys) -> FileMapping {
         gyro: keys.gyro.map(|keys| gyro(r, &join(path, "gyro"), keys)),
         accel: keys.accel.map(|keys| ticks(r, &join(path, "accel"), keys)),
         temperatures: keys.temperature.into_iter().map(temperature).collect(),
+        status: keys.status.map(|keys| status(r, &join(path, "status"), keys)),
     };
     if let Some(name) = file.columns().find_map(Column::name).filter(|_| !header) {
         r.report(path, format!("column {name:?} is given by name, but the file has no header: set header = true, or use numbers from 1"));
@@ -94,7 +95,10 @@ fn time(r: &mut Reader<'_>, path: &str, keys: TimeKeys, own_durations: bool) -> 
     let TimeKeys { column, unit, marks, duration, gap_after_ticks, origin_ns, .. } = keys;
     let stamped = column.is_some() || r.is_damaged(&join(path, "column"));
     if stamped && unit.is_none() {
-        r.report(&join(path, "unit"), "is missing: unit of the stamps, \"ns\", \"us\", \"ms\" or \"s\"");
+        r.report(
+            &join(path, "unit"),
+            "is missing: unit of the stamps, \"ns\", \"us\", \"ms\", \"s\" or \"iso\"",
+        );
     }
     for key in ["unit", "marks", "duration", "gap_after_ticks"] {
         let at = join(path, key);
@@ -196,6 +200,12 @@ fn duration(
         let what = "is missing: unit of the duration column, \"ns\", \"us\", \"ms\" or \"s\"";
         r.report(&join(path, "duration_unit"), what);
     }
+    if unit == Some(TimeUnit::DateTime) {
+        r.report(
+            &join(path, "duration_unit"),
+            "is \"iso\", must be \"ns\", \"us\", \"ms\" or \"s\": a duration has no date",
+        );
+    }
     Some(TimeColumn { column, unit: unit? })
 }
 
@@ -290,6 +300,13 @@ fn switch(r: &mut Reader<'_>, path: &str, keys: SwitchKeys, has_mode: bool) -> O
             None
         }
     }
+}
+
+fn status(r: &mut Reader<'_>, path: &str, keys: StatusMapping) -> StatusMapping {
+    if keys.good.is_empty() == keys.bad_bits.is_none() {
+        r.report(path, "must have either `good = [\"0\"]`, the cells of rows that hold, or `bad_bits = 3`");
+    }
+    StatusMapping { good: keys.good.iter().map(|cell| cell.trim().to_owned()).collect(), ..keys }
 }
 
 fn temperature(keys: TemperatureKeys) -> TemperatureMapping {

@@ -2,14 +2,18 @@
 
 use std::collections::VecDeque;
 
-use isotherm_correction::sample::{AccelTick, GyroTick, LasingMode, OutputKind, TemperatureReading};
-use isotherm_correction::units::Timestamp;
+use isotherm_correction::sample::{AccelTick, GyroTick, LasingMode, OutputKind, Sensors, TemperatureReading};
+use isotherm_correction::unit::MAX_TICK_DURATION;
+use isotherm_correction::units::{Span, Timestamp};
 
 use super::LogEvent;
 use super::resolve::{Columns, SwitchCells, TickCells};
 use super::row::{GyroStates, Readings};
 use super::timeline::{Timeline, Timing};
 use crate::mapping::TimeMapping;
+
+/// Longest nominal tick that stays whole: with five per cent for jitter, the core takes it.
+const LONGEST_WHOLE: Span = Span::from_ns(MAX_TICK_DURATION.as_ns() / 105 * 100);
 
 /// Place of the gyros among the open ticks.
 const GYRO: usize = 0;
@@ -44,6 +48,8 @@ pub(super) struct Assembler {
     queue: VecDeque<LogEvent>,
     /// Events up to this time can be given; later rows have later ones.
     settled: i64,
+    /// Equal parts that every tick is cut into: a slow logger's are longer than the core takes.
+    parts: u32,
 }
 
 impl Assembler {
@@ -57,6 +63,7 @@ impl Assembler {
             open: [None, None],
             queue: VecDeque::new(),
             settled: i64::MIN,
+            parts: parts_of(mapping.tick.unwrap_or(Span::ZERO)),
         }
     }
 
@@ -132,7 +139,7 @@ impl Assembler {
             }
         } else {
             to_means(&mut event, columns);
-            self.enqueue(event);
+            self.enqueue_parts(event);
         }
     }
 
@@ -157,7 +164,33 @@ impl Assembler {
             LogEvent::Temperature(_) => {}
         }
         to_means(&mut event, columns);
-        self.enqueue(event);
+        self.enqueue_parts(event);
+    }
+
+    /// Queues a tick, in equal parts where it is too long. Sequence numbers then count the parts.
+    fn enqueue_parts(&mut self, event: LogEvent) {
+        if self.parts == 1 {
+            return self.enqueue(event);
+        }
+        for number in 0..self.parts {
+            let mut part = event.clone();
+            let of = Part { number, parts: self.parts };
+            match &mut part {
+                LogEvent::Gyro { output, tick } => {
+                    of.cut((&mut tick.sequence, &mut tick.end_time, &mut tick.duration));
+                    of.share(*output, &mut tick.readings);
+                    tick.switch_command &= number == 0;
+                    // Counts of half a period cannot be parted.
+                    tick.half_periods.clear();
+                }
+                LogEvent::Accel { output, tick } => {
+                    of.cut((&mut tick.sequence, &mut tick.end_time, &mut tick.duration));
+                    of.share(*output, &mut tick.readings);
+                }
+                LogEvent::Temperature(_) => {}
+            }
+            self.enqueue(part);
+        }
     }
 
     /// Queues an event at its place in time.
@@ -165,6 +198,38 @@ impl Assembler {
         let order = event.order();
         let place = self.queue.iter().rposition(|earlier| earlier.order() <= order);
         self.queue.insert(place.map_or(0, |at| at + 1), event);
+    }
+}
+
+/// Equal parts that a nominal tick is cut into.
+fn parts_of(tick: Span) -> u32 {
+    let parts = tick.as_ns().max(1).unsigned_abs().div_ceil(LONGEST_WHOLE.as_ns().unsigned_abs());
+    u32::try_from(parts).unwrap_or(u32::MAX)
+}
+
+/// One of the equal parts of a tick.
+#[derive(Clone, Copy)]
+struct Part {
+    /// Which, from 0.
+    number: u32,
+    /// How many there are.
+    parts: u32,
+}
+
+impl Part {
+    fn cut(self, (sequence, end, duration): (&mut u64, &mut Timestamp, &mut Span)) {
+        *sequence = sequence.saturating_mul(self.parts.into()).saturating_add(self.number.into());
+        let begin = *end - *duration;
+        let until =
+            |parts: u32| Span::from_ns(duration.as_ns().saturating_mul(parts.into()) / i64::from(self.parts));
+        *end = begin + until(self.number + 1);
+        *duration = Span::from_ns(until(self.number + 1).as_ns() - until(self.number).as_ns());
+    }
+
+    fn share(self, output: OutputKind, readings: &mut Sensors<f64>) {
+        if output == OutputKind::Counts {
+            readings.iter_mut().for_each(|reading| *reading /= f64::from(self.parts));
+        }
     }
 }
 

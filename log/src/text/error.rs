@@ -67,6 +67,15 @@ pub enum Reason {
     /// Not a time.
     #[error("is not a time that fits 64 bits of nanoseconds")]
     NotATime,
+    /// Neither date nor time.
+    #[error("is no date and time of ISO 8601, such as 2026-11-23T14:05:00.250Z")]
+    NotADateTime,
+    /// A status word that is none.
+    #[error("is no status word, a whole number from 0 (hexadecimal with 0x)")]
+    NotAWord,
+    /// A row that does not hold by its status.
+    #[error("is not the status of a row that holds")]
+    BadStatus,
     /// A duration below zero.
     #[error("is a duration below 0")]
     NegativeDuration,

@@ -62,7 +62,13 @@ impl FileReader {
             header: Vec::new(),
             layout: mapping.layout.clone(),
             time: mapping.time.clone(),
-            columns: Columns { stamps: None, gyro: None, accel: None, temperatures: Vec::new() },
+            columns: Columns {
+                stamps: None,
+                gyro: None,
+                accel: None,
+                temperatures: Vec::new(),
+                status: None,
+            },
             assembler: Assembler::new(&mapping.time),
             readings: Vec::new(),
             last_stamp: None,
@@ -176,6 +182,12 @@ impl FileReader {
     /// Passes over a bad row, where the mapping says so.
     #[cold]
     fn bad_row(&mut self, fault: Fault, stamp: Option<i64>) -> Result<(), LogError> {
+        if matches!(fault.reason, Reason::BadStatus) {
+            self.report.bad_status_rows += 1;
+            self.bad_since += 1;
+            self.assembler.skip(stamp, &self.columns);
+            return Ok(());
+        }
         let cut_short = matches!(fault.reason, Reason::CutShort);
         let a_gap = matches!(fault.reason, Reason::Gap { .. });
         let skippable = cut_short || fault.reason.concerns_one_row();
@@ -258,6 +270,9 @@ impl FileReader {
         *stamp = Some(now);
         if let (Some(cell), Some(reason)) = (self.columns.stamps, self.gap(now)) {
             return Err(Fault { cell: Some(cell.cell), reason });
+        }
+        if let Some((cell, status)) = &self.columns.status {
+            row.check_status(*cell, status)?;
         }
         let gyro = match &self.columns.gyro {
             Some(cells) => match row.readings(&cells.ticks)? {

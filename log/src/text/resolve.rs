@@ -3,15 +3,18 @@
 use isotherm_correction::sample::{ChannelName, OutputKind, Sensors};
 
 use super::error::Reason;
-use crate::mapping::{Column, Conversion, FileMapping, ModeMapping, SwitchMapping, TickMapping, TimeColumn};
+use crate::mapping::{
+    Column, Conversion, FileMapping, ModeMapping, StatusMapping, SwitchMapping, TickMapping, TimeColumn,
+    TimeUnit,
+};
 
 /// A column of times or durations.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct TimeCell {
     /// Which cell.
     pub(super) cell: usize,
-    /// Its unit is 10ⁿ ns.
-    pub(super) exponent: i32,
+    /// Its unit.
+    pub(super) unit: TimeUnit,
 }
 
 /// Sensors of one kind.
@@ -96,6 +99,8 @@ pub(super) struct Columns {
     pub(super) accel: Option<TickCells>,
     /// Temperature channels.
     pub(super) temperatures: Vec<TemperatureCell>,
+    /// What says whether a row holds, and where.
+    pub(super) status: Option<(usize, StatusMapping)>,
 }
 
 impl Columns {
@@ -118,6 +123,7 @@ impl Columns {
             others.extend(ticks.duration.map(|time| (time.cell, format!("duration of the {kind}s"))));
         }
         others.extend(self.stamps.map(|time| (time.cell, "time".to_owned())));
+        others.extend(self.status.as_ref().map(|(cell, _)| (*cell, "status".to_owned())));
         let channel =
             |of: &TemperatureCell| (of.cell, format!("temperature channel {:?}", of.channel.as_str()));
         others.extend(self.temperatures.iter().map(channel));
@@ -172,7 +178,10 @@ pub(super) fn resolve(mapping: &FileMapping, header: &[String]) -> Result<Column
             since: 0,
         })
     });
-    let columns = Columns { stamps, gyro, accel, temperatures: temperatures.collect::<Result<_, Reason>>()? };
+    let temperatures = temperatures.collect::<Result<_, Reason>>()?;
+    let status =
+        mapping.status.as_ref().map(|status| Ok((find(&status.column)?, status.clone()))).transpose()?;
+    let columns = Columns { stamps, gyro, accel, temperatures, status };
     columns.apart().map(|()| columns)
 }
 
@@ -193,7 +202,7 @@ fn ticks(mapping: &TickMapping, header: &[String]) -> Result<TickCells, Reason> 
 
 /// A column of times.
 fn time(mapping: &TimeColumn, header: &[String]) -> Result<TimeCell, Reason> {
-    Ok(TimeCell { cell: find(&mapping.column, header)?, exponent: mapping.unit.exponent() })
+    Ok(TimeCell { cell: find(&mapping.column, header)?, unit: mapping.unit })
 }
 
 /// A column of two states.

@@ -7,6 +7,7 @@ use super::cells::Cell;
 use super::error::Reason;
 use super::number;
 use super::resolve::{GyroCells, StateCell, TickCells, TimeCell};
+use crate::mapping::{StatusMapping, TimeUnit};
 
 /// What is wrong with a row: the cell's index and the reason.
 #[derive(Debug)]
@@ -88,7 +89,18 @@ impl<'a> Row<'a> {
 
     /// A time (ns).
     pub(super) fn time_ns(&self, time: TimeCell) -> Result<i64, Fault> {
-        let ns = number::time_ns(self.filled(time.cell)?, time.exponent, self.decimal_mark);
+        let text = self.filled(time.cell)?;
+        let exponent = match time.unit {
+            TimeUnit::Nanoseconds => 0,
+            TimeUnit::Microseconds => 3,
+            TimeUnit::Milliseconds => 6,
+            TimeUnit::Seconds => 9,
+            TimeUnit::DateTime => {
+                let reason = Reason::NotADateTime;
+                return number::date_time_ns(text).ok_or(Fault { cell: Some(time.cell), reason });
+            }
+        };
+        let ns = number::time_ns(text, exponent, self.decimal_mark);
         ns.ok_or(Fault { cell: Some(time.cell), reason: Reason::NotATime })
     }
 
@@ -142,6 +154,19 @@ impl<'a> Row<'a> {
         let sequence = cells.sequence.map(|cell| self.sequence(cell));
         let duration = cells.duration.map(|duration| self.span(duration));
         Ok(Some(Readings { values, sequence: sequence.transpose()?, duration: duration.transpose()? }))
+    }
+
+    /// Refuses a row that does not hold by its status.
+    pub(super) fn check_status(&self, cell: usize, status: &StatusMapping) -> Result<(), Fault> {
+        let text = self.filled(cell)?;
+        let holds = match status.bad_bits {
+            None => status.good.iter().any(|good| good.as_bytes() == text),
+            Some(bits) => {
+                let word = number::word(text).ok_or(Fault { cell: Some(cell), reason: Reason::NotAWord })?;
+                word & bits == 0
+            }
+        };
+        if holds { Ok(()) } else { Err(Fault { cell: Some(cell), reason: Reason::BadStatus }) }
     }
 
     /// A sequence number.

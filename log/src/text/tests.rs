@@ -149,6 +149,69 @@ fn broken_rows_are_refused_with_line_column_cell_and_value() {
 }
 
 #[test]
+fn date_times_are_stamps_to_the_nanosecond() {
+    let time = "column = 1\nunit = \"iso\"\ntick_ms = 10";
+    let rows = "2026-11-23T14:05:00.010Z;1;2;20\n2026-11-23 15:05:00,021+01:00;3;4;20\n";
+    let (events, _) = read(&mapping("delimiter = \"semicolon\"", time), rows.as_bytes());
+    let found = gyro(&events);
+    assert_eq!(found[1].1 - found[0].1, 11);
+    assert_eq!(found[1].2, 11, "measured");
+    let fault = error(&mapping("delimiter = \"semicolon\"", time), b"23.11.2026 14:05;1;2;20\n");
+    assert!(fault.to_string().contains("is no date and time of ISO 8601"), "{fault}");
+    let text = "version = 1\n[[file]]\ndelimiter = \"comma\"\n[file.time]\ntick_ms = 1\n[file.gyro]\noutput = \"counts\"\n\
+                sensors = [{ column = 2 }]\nduration_column = 1\nduration_unit = \"iso\"\n";
+    let problems = Mapping::parse(text, "m.toml").unwrap_err();
+    assert!(problems[0].to_string().contains("a duration has no date"), "{problems:?}");
+}
+
+#[test]
+fn rows_that_do_not_hold_by_their_status_are_passed_over() {
+    let with = |status: &str| {
+        let text = format!(
+            "version = 1\n[[file]]\ndelimiter = \"comma\"\n[file.time]\n{STAMPS}\n[file.gyro]\noutput = \"mean\"\n\
+             sensors = [{{ column = 2, unit = \"rad_per_s\" }}]\n[file.status]\ncolumn = 3\n{status}\n"
+        );
+        Mapping::parse(&text, "m.toml")
+    };
+    let rows = b"10,1,0\n20,x,4\n30,3,0\n40,4,0x1\n50,5,OK\n";
+    let words = with("good = [\"0\", \"OK\"]").unwrap();
+    let (events, report) = read(&words, rows);
+    assert_eq!(gyro(&events), [(0, 10, 10, 1.0), (2, 30, 10, 3.0), (4, 50, 10, 5.0)]);
+    assert_eq!((report.rows, report.bad_status_rows, report.skipped_rows), (3, 2, 0));
+    assert!(!report.lost_data());
+    let bits = with("bad_bits = 4").unwrap();
+    let (events, _) = read(&bits, b"10,1,0\n20,x,6\n30,3,3\n40,4,0x1\n");
+    assert_eq!(gyro(&events).iter().map(|tick| tick.0).collect::<Vec<_>>(), [0, 2, 3]);
+    assert!(error(&bits, b"10,1,fine\n").to_string().contains("is no status word"));
+    for wrong in ["", "good = [\"0\"]\nbad_bits = 1", "bad_bits = 0"] {
+        assert!(with(wrong).is_err(), "{wrong}");
+    }
+}
+
+#[test]
+fn ticks_of_a_slow_logger_come_in_equal_parts() {
+    let minute = "column = 1\nunit = \"s\"\ntick_s = 60";
+    let (events, _) = read(&mapping("delimiter = \"semicolon\"", minute), b"60;1;2;20\n121;3;4;21\n");
+    let ticks = gyro(&events);
+    assert_eq!(ticks.len(), 14);
+    assert!(ticks.iter().zip(0..).all(|(tick, number)| tick.0 == number), "{ticks:?}");
+    assert!(ticks[..7].iter().all(|tick| (tick.3 - 1.0).abs() < 1e-15));
+    let spans: Vec<i64> = events
+        .iter()
+        .filter_map(|event| match event {
+            LogEvent::Gyro { tick, .. } => Some(tick.duration.as_ns()),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(spans[..7].iter().sum::<i64>(), 60_000_000_000);
+    assert_eq!(spans[7..].iter().sum::<i64>(), 61_000_000_000);
+    assert!(spans.iter().all(|span| *span <= isotherm_correction::unit::MAX_TICK_DURATION.as_ns()));
+    assert_eq!((ticks[6].1, ticks[13].1), (60_000, 121_000));
+    let times: Vec<i64> = events.iter().map(|event| event.time().as_ns()).collect();
+    assert!(times.is_sorted());
+}
+
+#[test]
 fn files_that_are_no_such_log_are_refused() {
     let named = Mapping::parse(
         "version = 1\n[[file]]\ndelimiter = \"comma\"\nheader = true\n[file.time]\ntick_ms = 1\n[file.gyro]\n\

@@ -59,6 +59,10 @@ pub(super) fn reading(report: &ReadReport) -> String {
                 .concat(),
         );
     }
+    if report.bad_status_rows > 0 {
+        let rows = report.bad_status_rows.to_string();
+        text.push_str(&[&rows, " rows were passed over because of their status\n"].concat());
+    }
     if report.cut_short {
         text += "the compressed log ends in the middle; what there was has been used\n";
     }

@@ -10,7 +10,7 @@ use crate::positions::bare::bare;
 use crate::positions::judged::{Judgement, judge};
 use crate::positions::pose::Pose;
 use crate::positions::track::Track;
-use crate::run::Run;
+use crate::runs::Run;
 use crate::written::Written;
 
 /// A document where there is none.

@@ -1,22 +1,16 @@
-//! The restricted likelihood of a drift's noise: readings and columns made independent by a Kalman filter, and the noise that is most
-//! likely.
+//! The restricted likelihood of a drift's noise, and the noise that is most likely.
 
 use nalgebra::{DMatrix, DVector, Matrix2};
 
 use super::{Beside, Noise};
 use crate::drift::slow::Slow;
+use crate::lsq::correlated::{self, Data};
+use crate::lsq::search::compass;
 
 /// Step of the numeric second derivatives, in natural logarithms.
 const DIFFERENCE: f64 = 0.05;
 /// Shortest correlation time (h), a reference of a minute: what is faster is noise to the estimator.
 const SHORTEST_TIME_H: f64 = 1.0 / 60.0;
-/// Rows made independent for one size of the noise.
-struct Rows {
-    values: DVector<f64>,
-    columns: DMatrix<f64>,
-    log_determinant: f64,
-}
-
 /// The solution for one size of the noise, with the Markov part's variance as the unit.
 pub(super) struct Solution {
     pub(super) beta: DVector<f64>,
@@ -55,7 +49,7 @@ impl Solution {
 /// Data and columns of a fit.
 pub(super) struct Problem<'a> {
     pub(super) slow: &'a Slow,
-    columns: DMatrix<f64>,
+    data: Data,
     pub(super) span_h: [f64; 2],
 }
 
@@ -77,66 +71,35 @@ impl<'a> Problem<'a> {
         };
         let rows: Vec<Vec<f64>> = slow.time_h.iter().map(|time| row(*time)).collect();
         let width = rows.first().map_or(0, Vec::len);
-        let columns = DMatrix::from_fn(rows.len(), width, |r, c| rows[r][c]);
-        Self { slow, columns, span_h }
-    }
-
-    fn rows(&self, noise: &Noise) -> Rows {
-        let (count, width) = self.columns.shape();
-        let mut values = DVector::zeros(count);
-        let mut columns = DMatrix::zeros(count, width);
-        // One filter for all columns: gains do not depend on the readings.
-        let mut states = vec![0.0; width + 1];
-        let (mut variance, mut log_determinant) = (1.0, 0.0);
-        let mut before: Option<f64> = None;
-        for (k, (time, mean)) in self.slow.time_h.iter().zip(&self.slow.mean).enumerate() {
-            let white = if noise.markov { noise.white_ratio } else { 1.0 };
-            if !noise.markov {
-                variance = 0.0;
-            } else if let Some(before) = before {
-                let decay = libm::exp(-(time - before) / noise.correlation_time_h);
-                for state in &mut states {
-                    *state *= decay;
-                }
-                variance = decay * decay * variance + (1.0 - decay * decay);
-            }
-            before = Some(*time);
-            let total = variance + white;
-            let (gain, root) = (variance / total, total.sqrt());
-            for (c, state) in states.iter_mut().enumerate() {
-                let reading = if c == width { *mean } else { self.columns[(k, c)] };
-                let innovation = reading - *state;
-                if c == width {
-                    values[k] = innovation / root;
-                } else {
-                    columns[(k, c)] = innovation / root;
-                }
-                *state += gain * innovation;
-            }
-            variance *= white / total;
-            log_determinant += libm::log(total);
-        }
-        Rows { values, columns, log_determinant }
+        let data = Data {
+            value: slow.mean.clone(),
+            columns: (0..width).map(|column| rows.iter().map(|row| row[column]).collect()).collect(),
+            time_s: slow.time_h.clone(),
+            length_s: vec![1.0; rows.len()],
+            joined: vec![false; rows.len()],
+            quantum: 0.0,
+        };
+        Self { slow, data, span_h }
     }
 
     pub(super) fn solve(&self, noise: &Noise) -> Option<Solution> {
-        let Rows { values, columns, mut log_determinant } = self.rows(noise);
-        let own_determinant = log_determinant;
-        let (count, width) = columns.shape();
-        let qr = columns.clone().qr();
-        let inverse_r = qr.r().solve_upper_triangular(&DMatrix::identity(width, width))?;
-        let beta = &inverse_r * (qr.q().transpose() * &values);
-        let squares = (values - columns * &beta).norm_squared();
-        log_determinant += qr.r().diagonal().iter().map(|r| 2.0 * libm::log(r.abs())).sum::<f64>();
+        let noise = if noise.markov {
+            correlated::Noise { white: noise.white_ratio, markov: Some([1.0, noise.correlation_time_h]) }
+        } else {
+            correlated::Noise { white: 1.0, markov: None }
+        };
+        let correlated::Solution {
+            coefficients, covariance, chi_square, log_variance, log_determinant, ..
+        } = self.data.solve(noise)?;
+        let determinant = log_variance + log_determinant;
         #[expect(clippy::cast_precision_loss, reason = "at most some hundred")]
-        let degrees = (count - width) as f64;
-        let inverse = &inverse_r * inverse_r.transpose();
-        (squares > 0.0 && log_determinant.is_finite()).then_some(Solution {
-            beta,
-            inverse,
-            squares,
-            log_determinant,
-            own_determinant,
+        let degrees = (self.data.len() - coefficients.len()) as f64;
+        (chi_square > 0.0 && determinant.is_finite()).then_some(Solution {
+            beta: coefficients,
+            inverse: covariance,
+            squares: chi_square,
+            log_determinant: determinant,
+            own_determinant: log_variance,
             degrees,
         })
     }
@@ -149,35 +112,11 @@ impl<'a> Problem<'a> {
     pub(super) fn best(&self) -> [f64; 2] {
         let shortest = libm::log(self.slow.width_h.max(SHORTEST_TIME_H));
         let longest = libm::log((60.0 * self.span_h[1]).max(2.0 * SHORTEST_TIME_H));
-        let mut best = ([shortest, 0.0], f64::INFINITY);
-        for i in 0..20 {
-            for j in 0..14 {
-                let at = [shortest + (longest - shortest) * f64::from(i) / 19.0, -14.0 + 1.5 * f64::from(j)];
-                let cost = self.cost(at);
-                if cost < best.1 {
-                    best = (at, cost);
-                }
-            }
-        }
-        let mut step = [0.5, 1.0];
-        while step[0] > 1e-4 {
-            let [a, b] = best.0;
-            let around = [[a + step[0], b], [a - step[0], b], [a, b + step[1]], [a, b - step[1]]];
-            let diagonal = [
-                [a + step[0], b + step[1]],
-                [a - step[0], b - step[1]],
-                [a + step[0], b - step[1]],
-                [a - step[0], b + step[1]],
-            ];
-            let inside =
-                |at: &[f64; 2]| (shortest..=longest).contains(&at[0]) && (-18.0..=9.0).contains(&at[1]);
-            let tried = around.into_iter().chain(diagonal).filter(inside).map(|at| (at, self.cost(at)));
-            match tried.min_by(|a, b| a.1.total_cmp(&b.1)) {
-                Some(better) if better.1 < best.1 => best = better,
-                _ => step = step.map(|s| 0.5 * s),
-            }
-        }
-        best.0
+        let place = |i: i32, j: i32| {
+            [shortest + (longest - shortest) * f64::from(i) / 19.0, -14.0 + 1.5 * f64::from(j)]
+        };
+        let starts = (0..20).flat_map(|i| (0..14).map(move |j| place(i, j)));
+        compass(starts, [0.5, 1.0], 1e-4, [[shortest, longest], [-18.0, 9.0]], |at| self.cost(at))
     }
 
     /// Sigmas of ln σ and ln τ from the likelihood's curvature; `None` where it has none.

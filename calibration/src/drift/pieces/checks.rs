@@ -5,9 +5,9 @@ use super::{Spacing, steps};
 use crate::drift::columns::{Columns, Kind, name};
 use crate::drift::figures::{short, six};
 use crate::error::Error;
-use crate::means::is_one_g;
 use crate::robust::{median, middle_and_scatter, scatter_of_steps};
-use crate::series::Ticks;
+use crate::runs::series::Ticks;
+use crate::runs::table::is_one_g;
 
 /// Rate beyond which a unit does not rest, or its unit of measure is wrong (°/s): Earth's rate and the bias of a poor micromechanical
 /// gyro stay below.

@@ -124,7 +124,10 @@ impl Knife {
             }
         }
         if let Some(thermal) = &self.axes {
-            self.axes_deg_c = temperature(thermal, unit);
+            self.axes_deg_c = temperature(thermal, |name| {
+                let channel = unit.channels().find(|channel| *channel.name == *name)?;
+                channel.state.map(|state| state.temperature)
+            });
         }
         let dither = [0, 1, 2].map(|sensor| dither_hz(raw, sensor).unwrap_or(f64::NAN));
         self.second.add(since_s, ticks, dither);

@@ -14,7 +14,7 @@ use isotherm_simulator::{Scenario, Simulation, Step};
 use crate::fixture::simulated;
 use crate::modes::fit::{Asked, Term, deg_per_h};
 use crate::modes::make::{Made, Wanted, make};
-use crate::run::Run;
+use crate::runs::Run;
 use crate::written::Written;
 
 /// −40…60 °C and back.

@@ -11,7 +11,7 @@ use super::fixture::{base, cycle, events, fitted, scenario, wanted, zeeman};
 use crate::error::Error;
 use crate::modes::fit::Term;
 use crate::modes::make::{Made, Wanted, make};
-use crate::run::Run;
+use crate::runs::Run;
 use crate::written::Written;
 
 /// Twenty switches, twenty seconds apart.

@@ -5,10 +5,11 @@ use nalgebra::{DMatrix, DVector, Matrix3};
 
 use super::{AXES, AccelFit, GyroFit};
 use crate::drift::figures::short;
-use crate::means::Size;
+use crate::lsq::linear::{self, SINGULAR, Weak};
+use crate::lsq::nonlinear::NoSolution;
 use crate::positions::pose::{Pose, intensities};
-use crate::positions::solve::NoSolution;
 use crate::positions::track::Track;
+use crate::size::Size;
 use crate::tumble::gyro::LARGEST_LEFT_DEG;
 
 /// Largest standard error of a scale factor that is still a result (relative).
@@ -156,9 +157,8 @@ fn follows_time(poses: &[Pose], fit: &AccelFit, along: impl Fn(&Pose) -> [f64; 3
     let left = DVector::from_column_slice(&fit.residual);
     #[expect(clippy::cast_precision_loss, reason = "poses")]
     let per_degree = |squares: f64, taken: usize| squares / (poses.len() - taken) as f64;
-    let solved = design.clone().svd(true, true).solve(&left, 1e-9);
-    solved.map_or(0.0, |terms| {
-        let more = per_degree((&left - design * terms).norm_squared(), OWN + WITH_TIME);
+    linear::solve(&design, &left, Weak::Refuse(SINGULAR)).map_or(0.0, |found| {
+        let more = per_degree(found.chi_square(), OWN + WITH_TIME);
         1.0 - more / per_degree(left.norm_squared(), OWN)
     })
 }

@@ -5,7 +5,7 @@ use isotherm_calibration::positions::plan::Plan;
 use isotherm_calibration::positions::still::StillLimits;
 use isotherm_calibration::positions::times::Times;
 use isotherm_calibration::positions::track::Track;
-use isotherm_calibration::run::Run;
+use isotherm_calibration::runs::Run;
 use isotherm_calibration::written::Written;
 use isotherm_simulator::instrument::Instrument;
 use nalgebra::{DMatrix, DVector};

@@ -1,7 +1,7 @@
 //! Logs that do not allow what is asked for: every one is refused, or warned of, in words that say what to do.
 
 use isotherm_calibration::error::Error;
-use isotherm_calibration::run::Run;
+use isotherm_calibration::runs::Run;
 use isotherm_calibration::thermal::{Fitted, Method, Settings, Terms, fit};
 use isotherm_calibration::validate::{JudgedLog, Wanted, validate};
 use isotherm_correction::sample::{AccelTick, GyroTick, OutputKind, TemperatureReading};

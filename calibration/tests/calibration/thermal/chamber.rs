@@ -2,8 +2,9 @@
 
 use std::path::PathBuf;
 
-use isotherm_calibration::means::{Means, Size};
-use isotherm_calibration::run::Run;
+use isotherm_calibration::runs::Run;
+use isotherm_calibration::runs::table::Table;
+use isotherm_calibration::size::Size;
 use isotherm_calibration::thermal::{Fitted, Method, Settings, fit};
 use isotherm_calibration::written::Written;
 use isotherm_correction::units::Span;
@@ -44,9 +45,9 @@ fn fitted(path: &std::path::Path, method: Method) -> Fitted {
 /// Rms out of sample about the level of the training part, as the data's README states it, by axis: gyros (°/s), then
 /// accelerometers (m/s²); and the deviation about the own mean.
 fn out_of_sample(path: &std::path::Path, written: &Written) -> [[f64; 2]; 6] {
-    let means = |run: &Run| Means::of(run, &written.loaded, 10.0, ()).unwrap();
+    let means = |run: &Run| Table::of(run, &written.loaded, 10.0, ()).unwrap();
     let (train, judge) = (means(&part(path, 30.0, Some(TURN_S))), means(&part(path, TURN_S, None)));
-    let column = |means: &Means, axis: usize| -> Vec<f64> {
+    let column = |means: &Table, axis: usize| -> Vec<f64> {
         if axis < 3 {
             means.rate(axis).iter().map(|r| r / 3600.0).collect()
         } else {

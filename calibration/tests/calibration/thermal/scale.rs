@@ -1,7 +1,7 @@
 //! Scale factors over temperature: from gravity in two attitudes, and from a rate table.
 
 use isotherm_calibration::report::FitReport;
-use isotherm_calibration::run::Run;
+use isotherm_calibration::runs::Run;
 use isotherm_calibration::thermal::{Fitted, Method, Settings, Site, Stand, Turning, fit};
 use isotherm_correction::sample::OutputKind;
 use isotherm_correction::unit::UnitSettings;

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use isotherm_calibration::run::Run;
+use isotherm_calibration::runs::Run;
 use isotherm_calibration::thermal::{Method, Settings, fit};
 use isotherm_correction::unit::UnitSettings;
 use isotherm_log::mapping::Mapping;

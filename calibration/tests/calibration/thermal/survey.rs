@@ -8,7 +8,7 @@
 
 use std::fmt::Write as _;
 
-use isotherm_calibration::run::Run;
+use isotherm_calibration::runs::Run;
 use isotherm_calibration::thermal::{Method, Settings, fit};
 use isotherm_correction::sample::{ChannelName, GyroTick, OutputKind, TemperatureReading};
 use isotherm_correction::units::{Span, Timestamp};

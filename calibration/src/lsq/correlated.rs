@@ -1,6 +1,6 @@
-//! Noise of the means of a gyro, and what it leaves of columns and readings when it is made white.
+//! Rows whose noise is correlated, and what it leaves of columns and readings when it is made white.
 //!
-//! A cell of the length L has the mean rate
+//! A mean over the length L is
 //!
 //! ```text
 //! y = x·β + m + v/L + q·(e_end − e_begin)/L
@@ -9,11 +9,13 @@
 //! v white (variance N²·L), e the fraction of a count that the counter holds back at an end (variance 1/12, one and the same
 //! for two cells that touch), m a first-order Markov drift. A Kalman filter over (m, e) turns all of that into independent
 //! innovations; what it does to y it does to every column of x. The parameters are the most likely ones beside β
-//! (restricted maximum likelihood), so that fitting β does not make the noise look small.
+//! (restricted maximum likelihood), so that fitting β does not make the noise look small. Times may be in any unit; lengths, times and
+//! the quantum are in the same.
 
 use nalgebra::{DMatrix, DVector};
 
-use super::minimum::{golden, simplex};
+use super::linear::{self, Linear, SINGULAR, Weak};
+use super::search::{golden, simplex};
 
 /// Variance of the fraction of a count.
 const FRACTION_VARIANCE: f64 = 1.0 / 12.0;
@@ -72,6 +74,10 @@ pub struct Solution {
     pub covariance: DMatrix<f64>,
     /// Sum of the squared innovations that are left.
     pub chi_square: f64,
+    /// Logarithm of the determinant of the readings' covariance.
+    pub log_variance: f64,
+    /// Logarithm of the determinant of the inverse of the coefficients' covariance.
+    pub log_determinant: f64,
     /// Logarithm of the restricted likelihood, up to a constant.
     pub likelihood: f64,
 }
@@ -148,38 +154,12 @@ impl Data {
     /// Coefficients under a noise; `None` where the columns do not tell each other apart.
     #[must_use]
     pub fn solve(&self, noise: Noise) -> Option<Solution> {
-        let White { value, mut columns, log_variance } = self.whitened(noise);
-        let scale: Vec<f64> = columns.column_iter().map(|column| column.norm()).collect();
-        if scale.iter().any(|norm| norm.is_nan() || *norm <= 0.0) {
-            return None;
-        }
-        for (mut column, norm) in columns.column_iter_mut().zip(&scale) {
-            column /= *norm;
-        }
-        let qr = columns.clone().qr();
-        let r = qr.r();
-        if r.diagonal().iter().any(|x| x.abs() < 1e-9) {
-            return None;
-        }
-        let inverse = r.clone().try_inverse()?;
-        let scaled = &inverse * (qr.q().transpose() * &value);
-        let chi_square = (&value - &columns * &scaled).norm_squared();
-        let log_determinant: f64 = r
-            .diagonal()
-            .iter()
-            .zip(&scale)
-            .map(|(x, norm)| 2.0 * (libm::log(x.abs()) + libm::log(*norm)))
-            .sum();
-        let covariance = &inverse * inverse.transpose();
-        let norms = DVector::from_column_slice(&scale);
-        Some(Solution {
-            coefficients: scaled.component_div(&norms),
-            covariance: DMatrix::from_fn(scale.len(), scale.len(), |i, j| {
-                covariance[(i, j)] / (scale[i] * scale[j])
-            }),
-            chi_square,
-            likelihood: -0.5 * (log_variance + log_determinant + chi_square),
-        })
+        let White { value, columns, log_variance } = self.whitened(noise);
+        let linear = linear::solve(&columns, &value, Weak::Refuse(SINGULAR)).ok()?;
+        let chi_square = linear.chi_square();
+        let likelihood = -0.5 * (log_variance + linear.log_determinant + chi_square);
+        let Linear { coefficients, inverse: covariance, log_determinant, .. } = linear;
+        Some(Solution { coefficients, covariance, chi_square, log_variance, log_determinant, likelihood })
     }
 
     fn likelihood(&self, noise: Noise) -> f64 {
@@ -281,7 +261,9 @@ impl Data {
     }
 }
 
+/// A count as a number.
+#[must_use]
 #[expect(clippy::cast_precision_loss, reason = "cells of a log are far below 2⁵³")]
-pub(super) fn real(count: usize) -> f64 {
+pub fn real(count: usize) -> f64 {
     count as f64
 }

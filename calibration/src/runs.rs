@@ -1,6 +1,14 @@
 //! A run: what one log has of one unit, to be corrected again and again by the service's own code.
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`series`] | its raw readings as columns, tick by tick |
+//! | [`table`] | its corrected outputs as columns, by windows or tick by tick |
+//! | [`cut`] | where a log was cut short |
 
 pub mod cut;
+pub mod series;
+pub mod table;
 mod together;
 
 use std::borrow::Cow;
@@ -8,6 +16,7 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use isotherm_correction::calibration::Calibration;
 use isotherm_correction::sample::{CorrectedTick, GyroTick};
 use isotherm_correction::unit::{MAX_TICK_DURATION, Unit, UnitSettings};
 use isotherm_log::message::{Message, Topic};
@@ -23,8 +32,8 @@ use isotherm_protocol::raw::{AccelBatch, GyroBatch};
 use crate::drift::figures::six;
 use crate::error::Error;
 use crate::robust::median;
-use crate::series::Series;
 use cut::Cut;
+use series::Series;
 
 /// What one log has of one unit.
 #[derive(Debug, Clone)]
@@ -186,13 +195,9 @@ impl Run {
                 each(tick, unit.unit());
             }
         };
-        let has_accelerometers = loaded.calibration.accel_count() > 0;
-        self.feed(watch, |fed| {
-            // A document of gyros alone is asked about gyros: their log may well have accelerometers.
-            if has_accelerometers || !fed.is_accel() {
-                fed.give(&mut unit);
-                give_out(&mut unit);
-            }
+        self.feed(&loaded.calibration, watch, |fed| {
+            fed.give(&mut unit);
+            give_out(&mut unit);
         })?;
         unit.finish();
         give_out(&mut unit);
@@ -234,7 +239,19 @@ impl Run {
 
     /// Goes through what a correction is fed with, tick by tick: behind a whole frame the unit, and its temperatures, would stand at
     /// the frame's end.
-    fn feed(&self, watch: impl Watch, mut each: impl FnMut(Fed<'_>)) -> Result<(), Error> {
+    fn feed(
+        &self,
+        calibration: &Calibration,
+        watch: impl Watch,
+        mut to_unit: impl FnMut(Fed<'_>),
+    ) -> Result<(), Error> {
+        // A document of gyros alone is asked about gyros: their log may well have accelerometers.
+        let has_accelerometers = calibration.accel_count() > 0;
+        let mut each = |fed: Fed<'_>| {
+            if has_accelerometers || !fed.is_accel() {
+                to_unit(fed);
+            }
+        };
         self.walk(watch, |piece| {
             match piece {
                 Piece::Event(event) => each(Fed::Event(&self.taken(event))),

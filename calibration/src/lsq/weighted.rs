@@ -1,7 +1,9 @@
-//! Weighted, regularised, robust linear least squares.
+//! Rows with weights, and outliers that lose theirs. Columns may have gaps; a ridge holds what the rows leave open.
 
 use nalgebra::{DMatrix, DVector};
 
+use super::blocks::Blocks;
+use super::linear::{self, Weak};
 use crate::robust::median_if_any;
 
 /// Share of a column's own weight that the ridge adds: it only holds what the data leave open.
@@ -59,53 +61,107 @@ pub fn solve(columns: &[&[f64]], target: &[f64], weights: &[f64]) -> Option<Solu
 /// One weighted solution.
 #[must_use]
 pub fn once(columns: &[&[f64]], target: &[f64], weights: &[f64]) -> Option<Solution> {
-    let good: Vec<usize> = (0..target.len())
-        .filter(|&row| {
-            target[row].is_finite()
-                && weights[row] > 0.0
-                && columns.iter().all(|column| column[row].is_finite())
-        })
-        .collect();
-    let (rows, count) = (good.len(), columns.len());
-    if count == 0 || rows < 2 * count + 3 {
+    let rows = Rows::of(columns, target, weights);
+    let count = columns.len();
+    if count == 0 || !is_enough(rows.good.len(), count) {
         return None;
     }
-    let norm = |column: &&[f64]| {
-        let square: f64 = good.iter().map(|&row| weights[row] * column[row] * column[row]).sum();
-        square.sqrt()
-    };
-    let norms: Vec<f64> = columns.iter().map(norm).collect();
-    let all_weight: f64 = good.iter().map(|&row| weights[row]).sum();
-    let nothing = NOTHING * all_weight.sqrt();
-    let scale = |norm: f64| if norm > nothing { 1.0 / norm } else { 0.0 };
-    let ridge = RIDGE.sqrt();
-    let matrix = DMatrix::from_fn(rows + count, count, |i, j| match good.get(i) {
-        Some(&row) => weights[row].sqrt() * columns[j][row] * scale(norms[j]),
-        None => f64::from(u8::from(i - rows == j)) * ridge,
-    });
-    let right = DVector::from_fn(rows + count, |i, _| {
-        good.get(i).map_or(0.0, |&row| weights[row].sqrt() * target[row])
-    });
-    let qr = matrix.qr();
-    let r = qr.r();
-    let projected = qr.q().transpose() * right;
-    let scaled = r.solve_upper_triangular(&projected)?;
-    let coefficients: Vec<f64> = scaled.iter().zip(&norms).map(|(c, norm)| c * scale(*norm)).collect();
+    let found = linear::solve(&rows.design, &rows.values, hold(rows.weight)).ok()?;
     let residual: Vec<f64> = (0..target.len())
         .map(|row| {
-            columns.iter().zip(&coefficients).fold(target[row], |rest, (column, c)| rest - c * column[row])
+            let columns = columns.iter().zip(&found.coefficients);
+            columns.fold(target[row], |rest, (column, c)| rest - c * column[row])
         })
         .collect();
-    let weight: f64 = good.iter().map(|&row| weights[row]).sum();
-    let square: f64 = good.iter().map(|&row| weights[row] * residual[row] * residual[row]).sum();
-    let inverse = r.solve_upper_triangular(&DMatrix::identity(count, count))?;
     #[expect(clippy::cast_precision_loss, reason = "rows of a fit are far below 2⁵³")]
-    let (free, all) = ((rows - count) as f64, rows as f64);
-    let variance = square / weight * all / free * (weight / all) * inflation(&residual, &good);
-    let sigmas =
-        (0..count).map(|j| (variance * inverse.row(j).norm_squared()).sqrt() * scale(norms[j])).collect();
-    let finite = coefficients.iter().all(|c| c.is_finite());
-    finite.then(|| Solution { coefficients, sigmas, residual, rms: (square / weight).sqrt(), outliers: 0 })
+    let free = (rows.good.len() - count) as f64;
+    let variance = found.chi_square() / free * inflation(&residual, &rows.good);
+    let sigmas = (0..count).map(|index| variance.sqrt() * found.sigma(index)).collect();
+    let finite = found.coefficients.iter().all(|c| c.is_finite());
+    finite.then(|| Solution {
+        coefficients: found.coefficients.iter().copied().collect(),
+        sigmas,
+        residual,
+        rms: (found.chi_square() / rows.weight).sqrt(),
+        outliers: 0,
+    })
+}
+
+/// Rows that take part, each multiplied with the root of its weight.
+pub(super) struct Rows {
+    pub(super) good: Vec<usize>,
+    pub(super) design: DMatrix<f64>,
+    pub(super) values: DVector<f64>,
+    /// Sum of the weights.
+    pub(super) weight: f64,
+}
+
+impl Rows {
+    pub(super) fn of(columns: &[&[f64]], target: &[f64], weights: &[f64]) -> Self {
+        let is_good = |&row: &usize| {
+            let finite = target[row].is_finite() && columns.iter().all(|column| column[row].is_finite());
+            finite && weights[row] > 0.0
+        };
+        let good: Vec<usize> = (0..target.len()).filter(is_good).collect();
+        let root = |row: usize| weights[row].sqrt();
+        Self {
+            design: DMatrix::from_fn(good.len(), columns.len(), |i, j| root(good[i]) * columns[j][good[i]]),
+            values: DVector::from_fn(good.len(), |i, _| root(good[i]) * target[good[i]]),
+            weight: good.iter().map(|&row| weights[row]).sum(),
+            good,
+        }
+    }
+}
+
+/// Whether so many rows can bear so many coefficients.
+pub(super) fn is_enough(rows: usize, columns: usize) -> bool {
+    rows >= 2 * columns + 3
+}
+
+/// The ridge of rows whose weights have this sum.
+pub(super) fn hold(weight: f64) -> Weak {
+    Weak::Ridge { share: RIDGE, nothing: NOTHING * weight.sqrt() }
+}
+
+/// Fits to rows with weights, without one piece of them after the other.
+#[derive(Debug)]
+pub struct Pieces {
+    blocks: Blocks,
+    columns: Vec<usize>,
+    weights: Vec<f64>,
+}
+
+impl Pieces {
+    /// Of columns, target and weights as of [`once`]; each row belongs to a piece, numbered from 0.
+    #[must_use]
+    pub fn of(columns: &[&[f64]], target: &[f64], weights: &[f64], piece: &[usize]) -> Self {
+        let rows = Rows::of(columns, target, weights);
+        let mut sums = vec![0.0; piece.iter().max().map_or(0, |last| last + 1)];
+        let own: Vec<usize> = rows.good.iter().map(|&row| piece[row]).collect();
+        own.iter().zip(&rows.good).for_each(|(piece, row)| sums[*piece] += weights[*row]);
+        Self {
+            blocks: Blocks::of(&rows.design, &rows.values, &own),
+            columns: (0..columns.len()).collect(),
+            weights: sums,
+        }
+    }
+
+    /// Coefficients of the fit to all other pieces; `None` where they have too few rows.
+    #[must_use]
+    pub fn without(&self, left_out: usize) -> Option<Vec<f64>> {
+        if self.columns.is_empty() {
+            return Some(Vec::new());
+        }
+        let others = || (0..self.weights.len()).filter(|piece| *piece != left_out);
+        let rows = others().map(|piece| self.blocks.rows(piece)).sum();
+        if !is_enough(rows, self.columns.len()) {
+            return None;
+        }
+        let weight: f64 = others().map(|piece| self.weights[piece]).sum();
+        let found = self.blocks.without(left_out, &self.columns, hold(weight))?;
+        let finite = found.coefficients.iter().all(|c| c.is_finite());
+        finite.then(|| found.coefficients.iter().copied().collect())
+    }
 }
 
 /// By how much the variance of a coefficient grows because neighbouring residuals resemble each other.

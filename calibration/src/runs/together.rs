@@ -39,7 +39,8 @@ impl Run {
     }
 
     /// Corrects the run with several calibrations of the same channels and sensors at once. `each` sees every raw gyro
-    /// tick that was corrected, what each calibration made of it, and the unit of the first as it stands behind it.
+    /// tick that was corrected, what each calibration made of it, and the unit of the first as it stands behind it. What each passed
+    /// over comes back.
     ///
     /// # Errors
     /// As [`Run::correct`].
@@ -48,13 +49,13 @@ impl Run {
         loaded: &[Loaded],
         watch: impl Watch,
         each: impl FnMut(&GyroTick, &[CorrectedTick], &Unit),
-    ) -> Result<Troubles, Error> {
+    ) -> Result<Vec<Troubles>, Error> {
+        let Some(first) = loaded.first() else { return Ok(Vec::new()) };
         let mut units = Together::new(loaded, each);
-        self.feed(watch, |fed| units.take(&fed))?;
+        self.feed(&first.calibration, watch, |fed| units.take(&fed))?;
         units.units.iter_mut().for_each(Offline::finish);
         units.give_out();
-        let troubles = units.units.first().map(Offline::troubles).unwrap_or_default();
-        self.judge_troubles(units.count, troubles)
+        units.units.iter().map(|unit| self.judge_troubles(units.count, unit.troubles())).collect()
     }
 }
 

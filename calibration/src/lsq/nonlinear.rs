@@ -9,10 +9,10 @@ use nalgebra::DMatrix;
 use nalgebra_0_34 as minpack;
 use nalgebra_0_34::{Dyn, storage::Owned};
 
+use super::linear::{self, Undetermined};
+
 /// Step of the differences.
 const STEP: f64 = 1e-6;
-/// A direction of the parameters whose singular value is below this share of the largest is not determined.
-const SINGULAR: f64 = 1e-9;
 
 /// What was found.
 #[derive(Debug, Clone, PartialEq)]
@@ -94,43 +94,11 @@ fn solution<F: Fn(&[f64]) -> Vec<f64>>(problem: &Problem<F>) -> Result<Solution,
     let residuals = (problem.residuals)(&parameters);
     let slopes = problem.slopes();
     let slopes = DMatrix::from_iterator(slopes.nrows(), slopes.ncols(), slopes.iter().copied());
-    let covariance = covariance(&slopes)?;
+    let covariance =
+        linear::inverse(&slopes).map_err(|Undetermined(index)| NoSolution::NotDetermined(index))?;
     let chi_square = residuals.iter().map(|residual| residual * residual).sum();
     let degrees = residuals.len().saturating_sub(parameters.len());
     Ok(Solution { parameters, covariance, residuals, chi_square, degrees })
-}
-
-/// (JᵀJ)⁻¹, through the singular values of J with its columns brought to length one.
-fn covariance(slopes: &DMatrix<f64>) -> Result<DMatrix<f64>, NoSolution> {
-    let lengths: Vec<f64> = slopes.column_iter().map(|column| column.norm()).collect();
-    if let Some(index) = lengths.iter().position(|length| length.is_nan() || *length <= 0.0) {
-        return Err(NoSolution::NotDetermined(index));
-    }
-    let mut scaled = slopes.clone();
-    for (mut column, length) in scaled.column_iter_mut().zip(&lengths) {
-        column /= *length;
-    }
-    let count = lengths.len();
-    let svd = scaled.svd(false, true);
-    let (Some(directions), largest) = (svd.v_t, svd.singular_values.max()) else {
-        return Err(NoSolution::NoMinimum("no singular values".into()));
-    };
-    let mut covariance = DMatrix::zeros(count, count);
-    for (value, direction) in svd.singular_values.iter().zip(directions.row_iter()) {
-        if value.is_nan() || *value <= SINGULAR * largest {
-            return Err(NoSolution::NotDetermined(direction.transpose().icamax()));
-        }
-        covariance += direction.tr_mul(&direction) / (value * value);
-    }
-    if svd.singular_values.len() < count {
-        return Err(NoSolution::NotDetermined(count - 1));
-    }
-    for (index, a) in lengths.iter().enumerate() {
-        for (other, b) in lengths.iter().enumerate() {
-            covariance[(index, other)] /= a * b;
-        }
-    }
-    Ok(covariance)
 }
 
 struct Problem<F> {
