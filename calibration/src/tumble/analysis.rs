@@ -11,6 +11,7 @@ use crate::positions::track::Track;
 use crate::size::Size;
 
 use super::accel::{self, AccelFit, SENSORS, norm};
+use super::acceleration::{self, GyroDrift};
 use super::gyro::{self, GyroFit, Transition};
 
 /// Fewest poses for nine parameters; as many as that leave no residual to judge by.
@@ -51,6 +52,8 @@ pub struct Tumble {
     pub accel: AccelFit,
     /// The gyros, or why not.
     pub gyro: Result<GyroFit, String>,
+    /// Drift with acceleration of each gyro, or why none is stated.
+    pub acceleration: [Result<GyroDrift, String>; 3],
     /// |f| − g (m/s²) of each pose, by the fit of all that are not within 15° of it; no number where these have none.
     pub held_out: Vec<f64>,
     /// Largest distance of each gyro's output from that at rest (rad/s of the log).
@@ -113,6 +116,9 @@ pub fn analyse(track: &Track, settings: &Settings) -> Result<Tumble, Vec<String>
     warnings.extend(doubts::ends_early(track, &poses));
     let rest = at_rest(&poses);
     let gyro = gyros(track, &poses, &accel, rest);
+    let force: Vec<[f64; 3]> = poses.iter().map(|pose| accel.force(&pose.outputs)).collect();
+    let directions: Vec<[f64; 3]> = force.iter().map(|force| unit(*force)).collect();
+    let acceleration = acceleration::judged(&poses, &force, |a, b| !apart(&directions, a, b));
     let largest_rate = [0, 1, 2].map(|gyro| {
         let column = track.gyros.get(gyro).map_or(&[][..], Vec::as_slice);
         column
@@ -121,7 +127,7 @@ pub fn analyse(track: &Track, settings: &Settings) -> Result<Tumble, Vec<String>
             .filter(|away| away.is_finite())
             .fold(0.0, f64::max)
     });
-    Ok(Tumble { poses, factor, accel, gyro, held_out, largest_rate, warnings })
+    Ok(Tumble { poses, factor, accel, gyro, acceleration, held_out, largest_rate, warnings })
 }
 
 /// Mean outputs of poses.
@@ -219,12 +225,17 @@ fn held_out(poses: &[Pose], fit: &AccelFit) -> Vec<f64> {
     let all = outputs(poses);
     let directions: Vec<[f64; 3]> = all.iter().map(|outputs| unit(fit.force(outputs))).collect();
     let one = |index: usize| {
-        let apart = |other: &usize| dot(directions[index], directions[*other]) < libm::cos(ALIKE_RAD);
-        let others: Vec<Vec<f64>> = (0..all.len()).filter(apart).map(|other| all[other].clone()).collect();
+        let others = (0..all.len()).filter(|other| apart(&directions, index, *other));
+        let others: Vec<Vec<f64>> = others.map(|other| all[other].clone()).collect();
         let fit = accel::fit(&others, fit.gravity);
         fit.map_or(f64::NAN, |fit| norm(fit.force(&all[index])) - fit.gravity)
     };
     (0..all.len()).map(one).collect()
+}
+
+/// Whether two poses look at different directions.
+fn apart(directions: &[[f64; 3]], a: usize, b: usize) -> bool {
+    dot(directions[a], directions[b]) < libm::cos(ALIKE_RAD)
 }
 
 fn unit(v: [f64; 3]) -> [f64; 3] {

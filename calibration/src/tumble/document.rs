@@ -1,9 +1,10 @@
 //! What was found of a tumbled unit, as a document.
 
-use isotherm_correction::units::AngularRate;
-use isotherm_protocol::document::{Accel, AccelOutput, Curve, Document, Shape};
+use isotherm_correction::units::{AngularRate, STANDARD_GRAVITY_M_PER_S2};
+use isotherm_protocol::document::{Accel, AccelOutput, AlongAxes, Curve, Document, Shape};
 
 use super::accel::AccelFit;
+use super::acceleration::GyroDrift;
 use super::analysis::Tumble;
 use super::analysis::odd::odd;
 use super::gyro::GyroFit;
@@ -40,19 +41,34 @@ pub fn complete(document: &Document, tumble: &Tumble) -> Result<(Document, Vec<S
         }
     }
     if let Ok(gyro) = &tumble.gyro {
-        gyros(&mut document, gyro, &temperature);
+        gyros(&mut document, gyro, &tumble.acceleration, &temperature);
     }
     Ok((document, warnings))
 }
 
 /// Puts the gyros into the document.
-fn gyros(document: &mut Document, found: &GyroFit, temperature: &dyn Fn(Option<&String>) -> f64) {
+fn gyros(
+    document: &mut Document,
+    found: &GyroFit,
+    acceleration: &[Result<GyroDrift, String>; 3],
+    temperature: &dyn Fn(Option<&String>) -> f64,
+) {
     for (index, sensor) in document.gyro.sensor.iter_mut().enumerate() {
         let deg_c = temperature(sensor.channel.as_ref());
         let error = sensor.increment_weight_error.as_ref().and_then(|curve| curve.shape().at(deg_c));
         let weight = found.weight[index];
         sensor.increment_weight_rad_per_rad = Some(tidy(weight / (1.0 + error.unwrap_or(0.0) * 1e-6)));
-        let rest = AngularRate::from_rad_per_s(weight * found.rest[index]).as_deg_per_h();
+        let deg_per_h = |of_log: f64| AngularRate::from_rad_per_s(weight * of_log).as_deg_per_h();
+        let drift = acceleration[index].as_ref().ok();
+        let rest = deg_per_h(drift.map_or(found.rest[index], |drift| drift.bias));
+        if let Some(drift) = drift {
+            let along = |per_force: f64| {
+                let value = tidy(deg_per_h(per_force * STANDARD_GRAVITY_M_PER_S2));
+                Some(Curve::new(Shape::Constant { value }))
+            };
+            let [x, y, z] = drift.by_force.map(along);
+            sensor.acceleration_sensitive_drift = Some(AlongAxes { x, y, z });
+        }
         let there = sensor.static_bias.take();
         let old = there.as_ref().and_then(|curve| curve.shape().at(deg_c));
         sensor.static_bias = Some(match (there, old) {

@@ -1,13 +1,15 @@
 //! What is said of a tumbled unit.
 
+use isotherm_correction::units::{AngularRate, STANDARD_GRAVITY_M_PER_S2};
 use isotherm_log::plot::page::{Axis, Chart, Content, Form, Ink, Panel, Samples, Series, Table};
 use isotherm_protocol::document::{Document, Sample};
 use serde_json::json;
 use std::sync::Arc;
 
 use super::accel::norm;
+use super::acceleration::GyroDrift;
 use super::analysis::{Settings, Tumble, transitions};
-use super::gyro::angle_of;
+use super::gyro::{GyroFit, angle_of};
 use crate::drift::figures::{counted, fixed, short, six};
 use crate::error::Error;
 use crate::positions::budget::ARCSEC_PER_RAD;
@@ -83,6 +85,7 @@ pub fn report(
         tumble.factor,
         six(settings.gravity)
     ));
+    report.notes.extend(at_rest(tumble));
     report.coefficients = coefficients(document, tumble);
     let time_s: Arc<[f64]> = tumble.poses.iter().map(Pose::middle_s).collect();
     report.residuals.push(Curve {
@@ -168,6 +171,35 @@ fn rows(tumble: &Tumble, after: &Left) -> Table {
     Table { head, rows: poses.map(row).collect() }
 }
 
+/// Reading of a gyro at rest without specific force, or its mean over the poses where that is not known (rad/s of the log).
+fn rest(tumble: &Tumble, gyro: &GyroFit, axis: usize) -> f64 {
+    tumble.acceleration[axis].as_ref().map_or(gyro.rest[axis], |drift| drift.bias)
+}
+
+/// Drift of a gyro by the specific force along a case axis and its standard error ((°/h)/g).
+fn deg_per_h_per_g(tumble: &Tumble, gyro: usize, along: usize) -> Option<[f64; 2]> {
+    let weight = tumble.gyro.as_ref().ok()?.weight[gyro];
+    let drift = tumble.acceleration[gyro].as_ref().ok()?;
+    let per_g = |value: f64| AngularRate::from_rad_per_s(value * STANDARD_GRAVITY_M_PER_S2).as_deg_per_h();
+    Some([per_g(weight * drift.by_force[along]), per_g((weight * drift.sigma[1 + along]).abs())])
+}
+
+/// What the gyros read at rest, about their mean and with what follows acceleration taken off.
+fn at_rest(tumble: &Tumble) -> Option<String> {
+    let gyro = tumble.gyro.as_ref().ok()?;
+    let of = |(axis, drift): (usize, &Result<GyroDrift, String>)| match drift {
+        Ok(drift) => {
+            let [before, after] = drift.sizes.map(|size| {
+                fixed(AngularRate::from_rad_per_s(gyro.weight[axis].abs() * size.rms).as_deg_per_h(), 1)
+            });
+            format!("{} {before} → {after} °/h", AXES[axis])
+        }
+        Err(why) => format!("{} has no acceleration-sensitive drift stated: {why}", AXES[axis]),
+    };
+    let gyros = tumble.acceleration.iter().enumerate().map(of).collect::<Vec<_>>();
+    Some(format!("Gyros at rest, in poses that the fit has not seen: {}.", gyros.join("; ")))
+}
+
 fn coefficients(document: &Document, tumble: &Tumble) -> Vec<Coefficient> {
     let accel = &tumble.accel;
     let output = document.accel.as_ref().map_or("", |accel| match accel.output {
@@ -204,9 +236,15 @@ fn coefficients(document: &Document, tumble: &Tumble) -> Vec<Coefficient> {
         all.push(Coefficient::new(
             format!("gyro {name} at rest"),
             "°/s",
-            (gyro.weight[axis] * gyro.rest[axis]).to_degrees(),
+            (gyro.weight[axis] * rest(tumble, gyro, axis)).to_degrees(),
             None,
         ));
+        let drift = tumble.acceleration[axis].as_ref().ok();
+        for (along, name_of_axis) in drift.into_iter().flat_map(|_| AXES.iter().enumerate()) {
+            let [value, sigma] = deg_per_h_per_g(tumble, axis, along).unwrap_or_default();
+            let name = format!("gyro {name} by force along {name_of_axis}");
+            all.push(Coefficient::new(name, "(°/h)/g", value, Some(sigma)));
+        }
         for (which, column) in gyro.across(axis).into_iter().enumerate() {
             all.push(Coefficient::new(
                 format!("gyro {name} along {}", AXES[column]),
@@ -273,6 +311,12 @@ pub fn sigmas(document: &Document, tumble: &Tumble) -> Sigmas {
     for (axis, sensor) in document.gyro.sensor.iter().enumerate().take(AXES.len()) {
         let ppm = tidy(1e6 * gyro.sigma[axis] / gyro.weight[axis].abs());
         sigmas.put("gyro", &sensor.name, "increment_weight_ppm", vec![ppm]);
+        for (along, name) in AXES.iter().enumerate() {
+            if let Some([_, sigma]) = deg_per_h_per_g(tumble, axis, along) {
+                let key = format!("acceleration_sensitive_drift.{name}");
+                sigmas.put("gyro", &sensor.name, &key, vec![tidy(sigma)]);
+            }
+        }
         let mut row = [0.0; 3];
         for (which, column) in gyro.across(axis).into_iter().enumerate() {
             row[column] = arcsec(gyro.sigma[3 + 2 * axis + which]);

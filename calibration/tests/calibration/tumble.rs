@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 use isotherm_calibration::positions::bare::bare;
 use isotherm_calibration::positions::still::StillLimits;
 use isotherm_calibration::positions::track::Track;
+use isotherm_calibration::runs::Run;
 use isotherm_calibration::size::Size;
+use isotherm_calibration::tumble::acceleration;
 use isotherm_calibration::tumble::analysis::{Settings, Tumble, analyse};
 use isotherm_calibration::tumble::document::complete;
 use isotherm_calibration::written::Written;
@@ -68,8 +70,64 @@ fn the_real_tumble_log_gives_the_known_answers() {
         let per_count = sensor.increment_weight_rad_per_rad.unwrap() / 6258.0;
         assert!((per_count * 4775.0 - 1.0).abs() < 0.01, "{}: 1/{}", sensor.name, 1.0 / per_count);
     }
+    for sensor in &written.document.gyro.sensor {
+        let along = sensor.acceleration_sensitive_drift.as_ref().unwrap();
+        let [x, y, z] = [&along.x, &along.y, &along.z].map(|curve| constant(curve.as_ref().unwrap().shape()));
+        let size = libm::sqrt(x * x + y * y + z * z);
+        assert!((50.0..1000.0).contains(&size), "{}: {size} (°/h)/g", sensor.name);
+    }
     let gyros = report["verdicts"][1]["in_sample"].to_string();
     println!("{gyros}");
+}
+
+/// The real log, fitted as the command does.
+fn real(files: &[PathBuf; 2]) -> Tumble {
+    let mapping = Mapping::load(&root().join("config/mappings/tumble-mems.toml")).unwrap();
+    let unit = unit_id("TUMBLE-0001").unwrap();
+    let files = LogFiles::Text {
+        paths: files.to_vec(),
+        mapping: Box::new(mapping),
+        unit: unit.clone(),
+        batch_ticks: 100,
+    };
+    let run = Run::new("tumbled".to_owned(), unit, files, &Part::default());
+    let document = bare(&run.series(()).unwrap(), AccelOutput::Volts).unwrap();
+    let track = Track::of(&run, &Written::of(&document).unwrap().loaded, ()).unwrap();
+    analyse(&track, &Settings { gravity: 9.81744, ..settings() }).unwrap()
+}
+
+/// What half of the poses say of drift with acceleration holds in the other half.
+#[test]
+fn drift_with_acceleration_of_half_of_the_real_poses_holds_in_the_others() {
+    let Some(data) = data("tumble-mems") else { return };
+    let paths = ["gyro.txt.gz", "acc.txt.gz"].map(|name| data.join(name));
+    let tumble = real(&paths);
+    let force: Vec<[f64; 3]> = tumble.poses.iter().map(|pose| tumble.accel.force(&pose.outputs)).collect();
+    let mut dice = Dice::new(11);
+    for (gyro, most) in [0.45, 0.25, 0.25].into_iter().enumerate() {
+        let reading = |pose: usize| tumble.poses[pose].gyros[gyro];
+        let share = |order: &[usize]| {
+            let (seen, unseen) = order.split_at(order.len() / 2);
+            let fit = acceleration::fit(&tumble.poses, &force, gyro, seen).unwrap();
+            let mean = seen.iter().map(|pose| reading(*pose)).sum::<f64>() / seen.len() as f64;
+            let rms = |of: &dyn Fn(usize) -> f64| {
+                Size::of(&unseen.iter().map(|pose| reading(*pose) - of(*pose)).collect::<Vec<_>>()).rms
+            };
+            rms(&|pose| fit.reading(force[pose])) / rms(&|_| mean)
+        };
+        let mut shares: Vec<f64> = (0..200)
+            .map(|_| {
+                let mut order: Vec<(f64, usize)> =
+                    (0..force.len()).map(|pose| (dice.normal(), pose)).collect();
+                order.sort_by(|a, b| a.0.total_cmp(&b.0));
+                share(&order.iter().map(|(_, pose)| *pose).collect::<Vec<_>>())
+            })
+            .collect();
+        shares.sort_by(f64::total_cmp);
+        let median = 0.5 * (shares[99] + shares[100]);
+        println!("gyro {gyro}: {median:.3} of {} poses", force.len());
+        assert!(median <= most, "gyro {gyro}: {median}");
+    }
 }
 
 /// |f| − g of the poses of a report, from corrected ticks.
