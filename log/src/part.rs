@@ -28,6 +28,13 @@ pub enum LogFiles {
         /// Gyro ticks in one batch (1…4096).
         batch_ticks: usize,
     },
+    /// A CSV of corrected ticks, as `isotherm-replay correct` writes it.
+    Corrected {
+        /// The file.
+        path: PathBuf,
+        /// The unit that it is of.
+        unit: UnitId,
+    },
 }
 
 /// Which part of a log is taken.
@@ -45,7 +52,7 @@ impl LogFiles {
     /// Opens a part of the log.
     ///
     /// A recording's time is that of reception, counted from its first message, and its messages are taken whole; chunks that
-    /// lie before the part are passed over unread. A text log's time is that of its rows, and its ticks are taken one by one: see [`crate::text::Window`].
+    /// lie before the part are passed over unread. Corrected ticks are taken in batches, by the end of the last. A text log's time is that of its rows, and its ticks are taken one by one: see [`crate::text::Window`].
     ///
     /// # Errors
     /// [`Error::File`]; for a text log as [`crate::text::LogReader::open`].
@@ -74,6 +81,11 @@ impl LogFiles {
                         .map(|end| Span::from_ns(end.as_ns().saturating_sub(part.start.as_ns()))),
                 };
                 (Log::text(paths, options)?, None)
+            }
+            Self::Corrected { path, unit } => {
+                let window =
+                    (part.start > Span::ZERO || part.end.is_some()).then_some((part.start, part.end));
+                (Log::corrected(path, unit)?, window)
             }
         };
         Ok(Messages { log, units: part.units.clone(), window, beginning_ns, over: false })

@@ -15,13 +15,14 @@ use crate::cli::show;
 const LISTED: usize = 20;
 
 /// Everything.
-pub(super) fn of(info: &LogInfo) -> String {
+pub(in crate::cli) fn of(info: &LogInfo) -> String {
     let mut text = String::new();
     files(&mut text, info);
     for (unit, of) in &info.units {
         line(&mut text, format_args!("\nUnit {unit}"));
         text += &topics(&of.topics);
         let begin_ns = of.topics.iter().filter_map(|topic| topic.first_ns).min().unwrap_or(0);
+        line(&mut text, format_args!("first tick {}", date(begin_ns.into())));
         unit_details(&mut text, of, begin_ns);
     }
     if !info.other_topics.is_empty() {
@@ -72,7 +73,11 @@ fn files(text: &mut String, info: &LogInfo) {
     if let (Some(first), Some(last)) = (info.first_received_ns, info.last_received_ns) {
         line(
             text,
-            format_args!("received over {}, from {first} ns since 1970", seconds(last.saturating_sub(first))),
+            format_args!(
+                "received over {}, from {}",
+                seconds(last.saturating_sub(first)),
+                date(first.into())
+            ),
         );
     }
     if !info.service_versions.is_empty() {
@@ -197,16 +202,7 @@ fn topic_details(text: &mut String, topic: &TopicInfo) {
 }
 
 fn unit_details(text: &mut String, unit: &UnitInfo, begin_ns: i64) {
-    for (what, sensors) in [("gyro", &unit.gyros), ("accelerometer", &unit.accelerometers)] {
-        for (info, number) in sensors.iter().zip(1..) {
-            readings(text, what, &number.to_string(), info);
-        }
-    }
-    for (what, named) in [("temperature", &unit.temperatures), ("health", &unit.health)] {
-        for (name, info) in &named.by_name {
-            readings(text, what, name, info);
-        }
-    }
+    *text += &readings(unit);
     if let Some(modes) = &unit.modes {
         let between = modes.between_changes.map_or_else(String::new, |between| {
             format!(", {} from one to the next (median)", seconds(between.p50_ns))
@@ -296,13 +292,54 @@ fn states(text: &mut String, status: &StatusInfo, begin_ns: i64) {
     more(text, status.states.len());
 }
 
-fn readings(text: &mut String, what: &str, name: &str, info: &ReadingInfo) {
-    let missing = if info.missing > 0 { format!(", {} missing", info.missing) } else { String::new() };
-    let ReadingInfo { readings, min, max, mean, .. } = info;
-    line(
-        text,
-        format_args!("{what} {name}: {readings} readings, {min} to {max}, mean {mean:.6e} as sent{missing}"),
-    );
+/// Smallest, largest and mean of every sensor, temperature and health reading, as they were sent.
+fn readings(unit: &UnitInfo) -> String {
+    let mut table = Table::new();
+    table.load_preset(presets::NOTHING);
+    table.set_header(["as sent", "readings", "minimum", "maximum", "mean", "missing"]);
+    let mut add = |name: String, info: &ReadingInfo| {
+        let ReadingInfo { readings, missing, min, max, mean, .. } = info;
+        let counts = [readings, missing].map(ToString::to_string);
+        let [readings, missing] = counts;
+        table.add_row([name, readings, figure(*min), figure(*max), figure(*mean), missing]);
+    };
+    for (what, sensors) in [("gyro", &unit.gyros), ("accelerometer", &unit.accelerometers)] {
+        sensors.iter().zip(1..).for_each(|(info, number)| add(format!("{what} {number}"), info));
+    }
+    for (what, named) in [("temperature", &unit.temperatures), ("health", &unit.health)] {
+        named.by_name.iter().for_each(|(name, info)| add(format!("{what} {name}"), info));
+    }
+    if table.row_count() == 0 {
+        return String::new();
+    }
+    table.column_iter_mut().skip(1).for_each(|column| column.set_cell_alignment(CellAlignment::Right));
+    format!("{table}\n")
+}
+
+/// A number in seven digits, without an exponent where it needs none.
+fn figure(number: f64) -> String {
+    match number.abs() {
+        0.0 => "0".to_owned(),
+        1e-3..1e9 => {
+            let shown = format!("{number:.7}");
+            let (whole, fraction) = shown.split_once('.').unwrap_or((&shown, ""));
+            let digits = whole.trim_start_matches(['-', '0']).len();
+            let kept = fraction.get(..7_usize.saturating_sub(digits)).unwrap_or_default();
+            let kept = kept.trim_end_matches('0');
+            if kept.is_empty() { whole.to_owned() } else { format!("{whole}.{kept}") }
+        }
+        _ => format!("{number:.6e}"),
+    }
+}
+
+/// A time since 1970 as date and time of day (UTC); one outside 1990 to 2100 is the count of a clock that began anywhere.
+fn date(ns: i128) -> String {
+    let seconds = u64::try_from(ns / 1_000_000_000).unwrap_or(0);
+    if !(631_152_000..4_102_444_800).contains(&seconds) {
+        return format!("{ns} ns on its own clock");
+    }
+    let time = std::time::UNIX_EPOCH + std::time::Duration::from_secs(seconds);
+    humantime::format_rfc3339_seconds(time).to_string().replace('T', " ").replace('Z', " UTC")
 }
 
 /// Says that a list is longer than what was printed.
@@ -350,5 +387,25 @@ fn bytes_of(bytes: u64) -> String {
         10_000..10_000_000 => format!("{} kB", bytes / 1000),
         10_000_000..10_000_000_000 => format!("{} MB", bytes / 1_000_000),
         _ => format!("{} GB", bytes / 1_000_000_000),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_keep_seven_digits_and_times_are_dates() {
+        for (number, expected) in [
+            (0.0, "0"),
+            (9.806_65, "9.80665"),
+            (-0.012_345_678_9, "-0.0123456"),
+            (123_456_789.0, "123456789"),
+            (1.5e-9, "1.500000e-9"),
+        ] {
+            assert_eq!(figure(number), expected);
+        }
+        assert_eq!(date(1_763_905_807_000_000_000), "2025-11-23 13:50:07 UTC");
+        assert_eq!(date(5_000_000), "5000000 ns on its own clock");
     }
 }
