@@ -90,7 +90,23 @@ impl ClientOptions {
     /// # Errors
     /// [`BusError::Endpoint`], [`BusError::UserFile`], [`BusError::Configuration`] and [`BusError::Option`].
     pub fn way(&self, role: Role) -> Result<Way, BusError> {
-        self.resolved(std::env::var(CONNECT_VARIABLE).ok().as_deref(), user_file().as_deref())?.way(role)
+        let mut options = self.stated()?;
+        if options.config.is_none() && options.connect.is_empty() && options.listen.is_empty() {
+            options.connect = vec![DEFAULT_ENDPOINT.to_owned()];
+        }
+        options.way(role)
+    }
+
+    /// The way for who needs no service: where nothing says where to connect, it is a peer on its own.
+    ///
+    /// # Errors
+    /// As [`Self::way`].
+    pub fn way_if_stated(&self, role: Role) -> Result<Way, BusError> {
+        self.stated()?.way(role)
+    }
+
+    fn stated(&self) -> Result<SessionOptions, BusError> {
+        self.resolved(std::env::var(CONNECT_VARIABLE).ok().as_deref(), user_file().as_deref())
     }
 
     /// What the options, the variable and the user's file say together.
@@ -123,9 +139,6 @@ impl ClientOptions {
                 Some(folder) => folder.join(path),
                 None => path.into(),
             });
-        }
-        if !said(&options) {
-            options.connect = vec![DEFAULT_ENDPOINT.to_owned()];
         }
         Ok(options)
     }
@@ -249,8 +262,10 @@ mod tests {
         assert_eq!(connect(&given, Some("b:2"), Some(&file)), ["tcp/a:1"]);
         assert_eq!(connect(&nothing, Some("b:2, tls/d:4"), Some(&file)), ["tcp/b:2", "tls/d:4"]);
         assert_eq!(connect(&nothing, Some(""), Some(&file)), ["tcp/c:3"]);
-        assert_eq!(connect(&nothing, None, Some(&folder.path().join("none/x"))), [DEFAULT_ENDPOINT]);
-        assert_eq!(connect(&nothing, None, None), [DEFAULT_ENDPOINT]);
+        assert_eq!(connect(&nothing, None, Some(&folder.path().join("none/x"))), Vec::<String>::new());
+        let tried = |way: Result<Way, BusError>| way.unwrap().tried().to_vec();
+        assert_eq!(tried(given.way(Role::Peer)), ["tcp/a:1"]);
+        assert_eq!(tried(given.way_if_stated(Role::Listener)), ["tcp/a:1"]);
         let listens = ClientOptions { listen: vec!["tcp/a:1".to_owned()], ..nothing.clone() };
         assert_eq!(connect(&listens, Some("b:2"), Some(&file)), Vec::<String>::new());
         // The site does not depend on who says where the service is.

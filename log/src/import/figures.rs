@@ -27,7 +27,7 @@ pub(super) struct Column {
     pub(super) minimum: f64,
     pub(super) maximum: f64,
     pub(super) steps: Steps,
-    last: Option<f64>,
+    last: Option<(i64, f64)>,
 }
 
 /// Differences of successive numbers.
@@ -94,8 +94,11 @@ impl Column {
         self.largest = self.largest.max(number.abs());
         self.minimum = self.minimum.min(number);
         self.maximum = self.maximum.max(number);
-        if let Some(last) = self.last.replace(number) {
-            self.steps.take(number - last);
+        let parts = parts(cell, mark).unwrap_or((0, number));
+        if let Some((whole, fraction)) = self.last.replace(parts) {
+            #[expect(clippy::cast_precision_loss, reason = "steps are small")]
+            let step = parts.0.saturating_sub(whole) as f64;
+            self.steps.take(step + (parts.1 - fraction));
         }
     }
 
@@ -109,6 +112,17 @@ impl Column {
         let one = (self.steps.usual - 1.0).abs() < 1e-9;
         self.increases() && self.fractions == 0 && one && self.minimum >= 0.0
     }
+}
+
+/// A plain decimal number as its whole part and its fraction: the difference of two times of this century in ns is exact.
+fn parts(cell: &str, mark: u8) -> Option<(i64, f64)> {
+    let (whole, fraction) = cell.split_once(char::from(mark)).unwrap_or((cell, ""));
+    let digits = |text: &str| text.bytes().all(|byte| byte.is_ascii_digit());
+    if !digits(fraction) || !digits(whole.trim_start_matches(['-', '+'])) {
+        return None;
+    }
+    let size: f64 = format!("0.{fraction}0").parse().ok()?;
+    Some((whole.parse().ok()?, if whole.starts_with('-') { -size } else { size }))
 }
 
 /// What was found of all rows.
@@ -161,10 +175,24 @@ mod tests {
     use super::*;
 
     fn column(numbers: impl IntoIterator<Item = f64>) -> Column {
+        column_of(numbers.into_iter().map(|number| number.to_string()))
+    }
+
+    fn column_of(cells: impl IntoIterator<Item = String>) -> Column {
         let mut column = Column::default();
-        numbers.into_iter().for_each(|number| column.take(&number.to_string(), b'.'));
+        cells.into_iter().for_each(|cell| column.take(&cell, b'.'));
         column.steps.settle();
         column
+    }
+
+    #[test]
+    fn steps_of_long_times_are_exact() {
+        let stamps =
+            column_of((0..100).map(|row| format!("{}", 1_403_636_579_758_555_392_i64 + row * 5_000_000)));
+        assert_eq!(stamps.steps.usual, 5_000_000.0);
+        let seconds =
+            column_of((0..100).map(|row| format!("-{}.{:02}", 1_600_000_000 - row / 4, 75 - row % 4 * 25)));
+        assert_eq!((seconds.steps.usual, seconds.steps.back), (0.25, 0));
     }
 
     #[test]

@@ -13,6 +13,8 @@ use crate::text::{open_decoded, open_raw, parse_float, split_cells};
 const SAMPLE_BYTES: u64 = 1 << 18;
 /// Lines by which a layout is told.
 const SAMPLE_LINES: usize = 600;
+/// Most rows of other figures in front of the data.
+const MOST_ODD: usize = 10;
 /// Prefixes of lines that are no data.
 const COMMENTS: [&str; 5] = ["//", "#", "%", ";", "!"];
 /// Delimiters in the order in which they are preferred, as the mapping spells them.
@@ -195,7 +197,11 @@ fn dressed(lines: &[String], block: Block, encoding: Encoding) -> Found {
         Some(_) => skipped(before.len()) - drop_rows,
         None => skipped(before.len()),
     };
-    let rows = lines.iter().skip(start).filter(|line| !line.trim().is_empty()).cloned().collect();
+    let mut rows: Vec<String> =
+        lines.iter().skip(start).filter(|line| !line.trim().is_empty()).cloned().collect();
+    let odd = if header_at.is_none() { odd_rows(&rows, delimiter, mark) } else { 0 };
+    rows.drain(..odd);
+    let skip_lines = skip_lines + odd;
     Found {
         encoding,
         delimiter: name,
@@ -211,6 +217,27 @@ fn dressed(lines: &[String], block: Block, encoding: Encoding) -> Found {
         preamble,
         rows,
     }
+}
+
+/// Rows of other figures in front of the data: their last is the last of the first rows with a fraction in a column of whole numbers.
+fn odd_rows(rows: &[String], delimiter: Delimiter, mark: u8) -> usize {
+    if rows.len() < 4 * MOST_ODD {
+        return 0;
+    }
+    let whole = |row: &String| -> Vec<bool> {
+        let is_whole = |cell: &String| {
+            parse_float(cell, mark)
+                .is_none_or(|number| number.fract() == 0.0 && !cell.contains(char::from(mark)))
+        };
+        cells(row, delimiter).iter().map(is_whole).collect()
+    };
+    let (front, data) = rows.split_at(MOST_ODD);
+    let mut of_data = vec![true; data.first().map_or(0, |row| whole(row).len())];
+    for row in data {
+        of_data.iter_mut().zip(whole(row)).for_each(|(all, this)| *all &= this);
+    }
+    let odd = |row: &String| whole(row).iter().zip(&of_data).any(|(this, all)| *all && !this);
+    front.iter().rposition(odd).map_or(0, |last| last + 1)
 }
 
 /// The prefix of lines that are passed over: one that a line other than the header has, and the header has not.

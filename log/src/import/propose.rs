@@ -260,7 +260,7 @@ impl<'a> File<'a> {
             tick_ns / 1e6,
             1e9 / tick_ns,
             column.steps.gaps,
-            column.steps.longest * ns / 1e6
+            (column.steps.longest * ns).round() / 1e6
         ));
         Time {
             column: Some(index),

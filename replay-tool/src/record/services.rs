@@ -25,7 +25,10 @@ const FOREVER: Duration = Duration::from_secs(100 * 365 * 86_400);
 /// Opens the session, as a client where it can be one: a peer hears only from those that it is connected to itself, and raw messages
 /// come from producers; to a client the service, or a router, passes them on.
 pub(super) async fn open(options: &RecordOptions, stop: &mut Stop) -> Result<Session, Error> {
-    let way = options.session.way(Role::Listener)?;
+    let way = match options.service {
+        ServiceWait::Without => options.session.way_if_stated(Role::Listener)?,
+        _ => options.session.way(Role::Listener)?,
+    };
     let limit = match options.service {
         ServiceWait::Forever => FOREVER,
         ServiceWait::Within(_) | ServiceWait::Without => options.query_limit,
