@@ -4,11 +4,13 @@
 //! |---|---|
 //! | `layout` | encoding, delimiter, decimal mark, comments, header, row of units |
 //! | `names` | what a column holds, along which axis, in which unit |
+//! | `clock` | units of time, rates |
 //! | `figures` | what the rows say: period, gaps, counters, empty cells |
 //! | `propose` | the mapping, what it rests on, and what cannot be told |
 //!
 //! What is proposed is only ever a mapping: the log is read by the one reader of text logs.
 
+mod clock;
 mod figures;
 mod layout;
 mod names;

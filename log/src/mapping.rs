@@ -3,6 +3,7 @@
 //! A mapping is a small TOML file, described in full by `docs/replay.md` and by the ready ones in
 //! `config/mappings`. Parsing reports every problem at once, each with file, line, column, key and value.
 
+mod encoding;
 mod keys;
 mod meaning;
 #[cfg(test)]
@@ -10,6 +11,7 @@ mod tests;
 
 use std::path::Path;
 
+pub use encoding::Encoding;
 use isotherm_correction::sample::{ChannelName, OutputKind};
 use isotherm_correction::units::Span;
 pub use isotherm_document::Problem;
@@ -67,41 +69,6 @@ pub enum OnBadRow {
     Refuse,
     /// The row is passed over and counted; its tick becomes a gap.
     Skip,
-}
-
-/// Encoding of a text.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
-#[schemars(inline)]
-pub enum Encoding {
-    /// UTF-8.
-    #[default]
-    #[serde(rename = "utf-8")]
-    Utf8,
-    /// UTF-16, the lower byte first.
-    #[serde(rename = "utf-16le")]
-    Utf16Le,
-    /// UTF-16, the higher byte first.
-    #[serde(rename = "utf-16be")]
-    Utf16Be,
-    /// ISO 8859-1, or Windows-1252, which has characters in the place of its control characters.
-    #[serde(rename = "latin-1")]
-    Latin1,
-}
-
-impl Encoding {
-    /// All of them.
-    pub const ALL: [Self; 4] = [Self::Utf8, Self::Utf16Le, Self::Utf16Be, Self::Latin1];
-
-    /// As the mapping spells it.
-    #[must_use]
-    pub const fn word(self) -> &'static str {
-        match self {
-            Self::Utf8 => "utf-8",
-            Self::Utf16Le => "utf-16le",
-            Self::Utf16Be => "utf-16be",
-            Self::Latin1 => "latin-1",
-        }
-    }
 }
 
 /// How bytes become rows and cells.

@@ -18,10 +18,10 @@ use crate::error::Error;
 
 /// Propose a column mapping for a text log of any maker, then show what the log holds
 #[derive(Debug, Args)]
-#[command(after_help = "Examples:\n  \
-    isotherm-replay import MT_0080003DE0.txt\n  \
-    isotherm-replay import log.csv --gyro-unit deg_per_s --out log.mapping.toml\n  \
-    isotherm-replay import counts.txt --columns 'gx [counts],gy [counts],gz [counts],ax [counts],ay [counts],az [counts]' --rate-hz 100\n\n\
+#[command(after_help = "Example, in two steps:\n  \
+    printf 't [s],gx [deg/s],gy,gz\\n0.00,1,2,3\\n0.01,1,2,3\\n0.02,1,2,3\\n' > own.csv\n  \
+    isotherm-replay import own.csv\n\n\
+    Counts without header: isotherm-replay import log.txt --columns 'gx [counts],gy,gz,ax [counts],ay,az' --rate-hz 100\n\n\
     Delimiter, decimal mark, encoding, header, units, period, gaps and counters are found in the log. What cannot be told is\n\
     asked on a terminal; elsewhere the command ends with code 2 and names the options. The mapping says what it rests on.")]
 pub(super) struct ImportArgs {

@@ -1,5 +1,6 @@
 //! `isotherm-replay info`.
 
+mod readings;
 pub(super) mod tables;
 
 use clap::Args;

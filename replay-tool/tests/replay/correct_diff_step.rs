@@ -186,7 +186,7 @@ fn a_recording_of_raw_messages_is_corrected_with_a_document_as_its_text_is() {
     ];
     let output = replay(folder.path(), &[&plot[..], &["both.html", "--beside", "text.csv"]].concat());
     ended(&output, 0);
-    let summary: serde_json::Value = serde_json::from_str(&stdout(&output)).unwrap();
+    let summary: Value = serde_json::from_str(&stdout(&output)).unwrap();
     let difference = &summary["differences"]["log"];
     let ticks = (difference["common_ticks"].as_u64(), difference["differing_ticks"].as_u64());
     assert_eq!(ticks, (Some(2000), Some(0)), "{summary}");

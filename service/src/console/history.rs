@@ -80,8 +80,8 @@ fn table(entries: &[AuditEntry]) -> String {
         let cells = rows.iter().filter_map(|row| row.get(column)).map(|cell| length(cell));
         cells.chain(header.get(column).map(|name| length(name))).max().unwrap_or_default()
     };
-    // A space on either side of each.
-    let taken: usize = (0..header.len() - 1).map(widest).sum::<usize>() + 2 * header.len();
+    // A space on either side of each, and one between them.
+    let taken: usize = (0..header.len() - 1).map(widest).sum::<usize>() + 3 * header.len() + 1;
     let left = WIDTH.saturating_sub(taken).max(SHORTEST_CHANGES);
     for changes in rows.iter_mut().filter_map(|row| row.last_mut()) {
         *changes = show::cut(changes, left);
