@@ -29,7 +29,7 @@ const SMALLEST_QUEUE: u64 = 1 << 20;
     With `isotherm serve` running, the recording alone is enough to correct again what the service\n\
     corrected, to the bit: it holds raw and corrected messages, status, the journal of every unit, the calibration documents,\n\
     the service's configuration and the units' histories. Ctrl-C ends it in order:\n  \
-    isotherm-replay record run.mcap --connect tcp/127.0.0.1:7447\n\n\
+    isotherm-replay record run.mcap\n\n\
     Exit code 3: messages were lost, or the disk was full; the files hold everything up to there."
 )]
 #[expect(clippy::struct_excessive_bools, reason = "each is a switch of the command line")]
