@@ -27,7 +27,7 @@ const AGAIN: Duration = Duration::from_millis(250);
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "clap", derive(clap::Args))]
 pub struct ClientOptions {
-    /// Address of the service or a router, repeatable (default: $ISOTHERM_CONNECT, else isotherm/client.toml in your configuration
+    /// Address of the service or a router, repeatable (default: `ISOTHERM_CONNECT`, else isotherm/client.toml in your configuration
     /// folder, else 127.0.0.1:7447)
     #[cfg_attr(feature = "clap", arg(long, value_name = "HOST:PORT", value_parser = endpoint))]
     pub connect: Vec<String>,

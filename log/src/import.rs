@@ -133,7 +133,7 @@ impl Question {
         };
         match self {
             Self::Columns { .. } => {
-                hints.columns = text.split(',').map(|name| name.trim().to_owned()).collect()
+                hints.columns = text.split(',').map(|name| name.trim().to_owned()).collect();
             }
             Self::GyroUnit { .. } => hints.gyro_unit = one_of(&GYRO_UNITS)?,
             Self::AccelUnit { .. } => hints.accel_unit = one_of(&ACCEL_UNITS)?,

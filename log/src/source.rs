@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 
+use arrayvec::ArrayVec;
 use isotherm_correction::units::Span;
 use isotherm_protocol::codec;
 use isotherm_protocol::corrected::{CorrectedBatch, Revision};
@@ -183,7 +184,7 @@ impl CorrectedCsv {
                         counter: last.tick.revision,
                         digest: last.digest.unwrap_or_default(),
                     },
-                    temperatures: Default::default(),
+                    temperatures: ArrayVec::new(),
                     ticks: same.iter().map(|tick| tick.tick.clone()).collect(),
                 };
                 let frame = codec::encode(&batch)

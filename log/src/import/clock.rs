@@ -14,7 +14,7 @@ pub(super) fn rate_in(lines: &[String]) -> Option<f64> {
         let (head, rest) = line.split_once("rate")?;
         let begins = head.ends_with(|c: char| !c.is_alphabetic()) || head.is_empty();
         let number: String = rest
-            .trim_start_matches(|c: char| matches!(c, ':' | '=' | ' ' | ',' | ';' | '\t' | '(' | ')'))
+            .trim_start_matches([':', '=', ' ', ',', ';', '\t', '(', ')'])
             .trim_start_matches("hz")
             .trim_start_matches(|c: char| !c.is_ascii_digit())
             .chars()

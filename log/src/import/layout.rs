@@ -108,10 +108,13 @@ struct Block {
     width: usize,
 }
 
+/// Where a run of rows begins, its width, its rows, and the sum of their shares of numbers.
+type Run = (usize, usize, usize, usize);
+
 /// The longest run of lines that are rows of numbers of one width.
 fn block(lines: &[String], name: &'static str, delimiter: Delimiter, mark: u8) -> Option<(Score, Block)> {
-    let (mut best, mut run): (Option<(Score, Block)>, Option<(usize, usize, usize, usize)>) = (None, None);
-    let mut close = |run: &mut Option<(usize, usize, usize, usize)>| {
+    let (mut best, mut run): (Option<(Score, Block)>, Option<Run>) = (None, None);
+    let mut close = |run: &mut Option<Run>| {
         let Some((start, width, rows, share)) = run.take() else { return };
         let score = (rows, share / rows.max(1));
         if best.as_ref().is_none_or(|(before, _)| score > *before) {

@@ -41,10 +41,11 @@ pub fn propose(paths: &[impl AsRef<Path>], hints: &Hints) -> Result<Proposal, Er
             "has no columns of three gyros that can be told by their names: say which they are with --columns",
         ));
     }
+    let notes: Vec<_> = proposal.notes.iter().map(|note| format!("#   {note}\n")).collect();
     proposal.mapping = format!(
         "# Proposed by `isotherm-replay import` for {}; look it over.\n{}version = 1\n{}",
         names.join(", "),
-        proposal.notes.iter().map(|note| format!("#   {note}\n")).collect::<String>(),
+        notes.concat(),
         proposal.mapping
     );
     Ok(proposal)
@@ -58,6 +59,9 @@ struct File<'a> {
     figures: &'a Figures,
     hints: &'a Hints,
 }
+
+/// The columns of x, y and z.
+type Axes<'m> = [Option<(usize, &'m Meaning)>; 3];
 
 /// Columns that mean something.
 type Meanings = Vec<(usize, Meaning)>;
@@ -75,7 +79,7 @@ impl<'a> File<'a> {
             self.figures.rows
         ));
         let meanings = self.meanings();
-        let groups = [Kind::Gyro, Kind::Accel].map(|kind| self.group(&meanings, kind));
+        let groups = [Kind::Gyro, Kind::Accel].map(|kind| Self::group(&meanings, kind));
         if groups.iter().all(Option::is_none) {
             proposal.open.push(self.ask_columns());
         }
@@ -107,9 +111,9 @@ impl<'a> File<'a> {
         let names = if given.is_empty() { self.found.header.as_deref().unwrap_or_default() } else { given };
         let unit =
             |index: usize| self.found.units.get(index).map(String::as_str).filter(|_| given.is_empty());
-        let named = names.iter().enumerate().take(self.found.width);
+        let first = names.iter().enumerate().take(self.found.width);
         let mut meanings: Meanings =
-            named.filter_map(|(index, name)| Some((index, meaning(name, unit(index))?))).collect();
+            first.filter_map(|(index, column)| Some((index, meaning(column, unit(index))?))).collect();
         // A column in which no number stands says nothing, whatever its name.
         meanings
             .retain(|(index, _)| self.figures.columns.get(*index).is_some_and(|column| column.numbers > 0));
@@ -130,12 +134,12 @@ impl<'a> File<'a> {
     }
 
     /// The three columns of a kind, x, y and z, of the best of those that the log has.
-    fn group(self, meanings: &Meanings, kind: Kind) -> Option<(Vec<usize>, Meaning)> {
-        let mut groups: BTreeMap<(&str, Option<&str>), [Option<(usize, &Meaning)>; 3]> = BTreeMap::new();
+    fn group(meanings: &Meanings, kind: Kind) -> Option<(Vec<usize>, Meaning)> {
         // Where only the first of three names its unit, the others have it too.
+        let mut groups: BTreeMap<&str, Axes<'_>> = BTreeMap::new();
         for (index, meaning) in meanings.iter().filter(|(_, meaning)| meaning.kind == kind) {
             let Some(axis) = meaning.axis else { continue };
-            groups.entry((&meaning.stem, None)).or_default()[axis].get_or_insert((*index, meaning));
+            groups.entry(&meaning.stem).or_default()[axis].get_or_insert((*index, meaning));
         }
         let whole = groups.into_values().filter_map(|axes| match axes {
             [Some(x), Some(y), Some(z)] => Some([x, y, z]),
@@ -203,31 +207,22 @@ impl<'a> File<'a> {
         clocks.sort_by_key(|(index, meaning)| (meaning.rank, *index));
         let mut found = None;
         for (index, meaning) in clocks {
-            match self.figures.columns.get(*index).filter(|column| column.increases()) {
-                Some(column) => {
-                    found = Some((*index, meaning, column));
-                    break;
-                }
-                None => proposal
-                    .notes
-                    .push(format!("time: {} does not always grow: not used", self.listed(&[*index]))),
+            if let Some(column) = self.figures.columns.get(*index).filter(|column| column.increases()) {
+                found = Some((*index, meaning, column));
+                break;
             }
+            let name = self.listed(&[*index]);
+            proposal.notes.push(format!("time: {name} does not always grow: not used"));
         }
         let stated = self.hints.rate_hz.or_else(|| rate_in(&self.found.preamble));
         let Some((index, meaning, column)) = found else {
-            return match stated {
-                Some(rate) => {
-                    proposal.notes.push(format!(
-                        "time: {rate} rows per second, as {}",
-                        if self.hints.rate_hz.is_some() { "given" } else { "the log's first lines say" }
-                    ));
-                    Time { tick_ns: 1e9 / rate, ..Time::default() }
-                }
-                None => {
-                    proposal.open.push(Question::Rate { file: self.name.to_owned() });
-                    Time { tick_ns: 1e7, ..Time::default() }
-                }
+            let Some(rate) = stated else {
+                proposal.open.push(Question::Rate { file: self.name.to_owned() });
+                return Time { tick_ns: 1e7, ..Time::default() };
             };
+            let by = if self.hints.rate_hz.is_some() { "given" } else { "the log's first lines say" };
+            proposal.notes.push(format!("time: {rate} rows per second, as {by}"));
+            return Time { tick_ns: 1e9 / rate, ..Time::default() };
         };
         let step = column.steps.usual;
         let unit = self

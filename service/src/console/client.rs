@@ -62,7 +62,7 @@ impl Client {
     }
 
     /// Something that could not be declared.
-    pub(super) fn declare(&self, key: &str) -> impl Fn(zenoh::Error) -> ConsoleError + use<> {
+    pub(super) fn declare(key: &str) -> impl Fn(zenoh::Error) -> ConsoleError + use<> {
         let key = key.to_owned();
         move |source| BusError::Declare { key: key.clone(), source }.into()
     }
@@ -79,7 +79,7 @@ impl Client {
         payload: Option<&[u8]>,
     ) -> Result<Vec<Vec<u8>>, ConsoleError> {
         let deadline = Instant::now() + self.timeout;
-        let declare = self.declare(key);
+        let declare = Self::declare(key);
         let querier = self
             .session
             .declare_querier(key.to_owned())
