@@ -28,13 +28,6 @@ pub enum LogFiles {
         /// Gyro ticks in one batch (1…4096).
         batch_ticks: usize,
     },
-    /// A CSV of corrected ticks, as `isotherm-replay correct` writes it.
-    Corrected {
-        /// The file.
-        path: PathBuf,
-        /// The unit that it is of.
-        unit: UnitId,
-    },
 }
 
 /// Which part of a log is taken.
@@ -52,7 +45,7 @@ impl LogFiles {
     /// Opens a part of the log.
     ///
     /// A recording's time is that of reception, counted from its first message, and its messages are taken whole; chunks that
-    /// lie before the part are passed over unread. Corrected ticks are taken in batches, by the end of the last. A text log's time is that of its rows, and its ticks are taken one by one: see [`crate::text::Window`].
+    /// lie before the part are passed over unread. A text log's time is that of its rows, and its ticks are taken one by one: see [`crate::text::Window`].
     ///
     /// # Errors
     /// [`Error::File`]; for a text log as [`crate::text::LogReader::open`].
@@ -82,11 +75,6 @@ impl LogFiles {
                 };
                 (Log::text(paths, options)?, None)
             }
-            Self::Corrected { path, unit } => {
-                let window =
-                    (part.start > Span::ZERO || part.end.is_some()).then_some((part.start, part.end));
-                (Log::corrected(path, unit)?, window)
-            }
         };
         Ok(Messages { log, units: part.units.clone(), window, beginning_ns, over: false })
     }
@@ -104,6 +92,16 @@ pub struct Messages {
 }
 
 impl Messages {
+    /// A part of a CSV of corrected ticks of a unit, as `isotherm-replay correct` writes it, in batches by the end of the last tick.
+    ///
+    /// # Errors
+    /// [`Error::File`].
+    pub fn of_corrected(path: &Path, unit: &UnitId, part: &Part) -> Result<Self, Error> {
+        let window = (part.start > Span::ZERO || part.end.is_some()).then_some((part.start, part.end));
+        let log = Log::corrected(path, unit)?;
+        Ok(Self { log, units: part.units.clone(), window, beginning_ns: None, over: false })
+    }
+
     /// The next message; `None` behind the last.
     ///
     /// # Errors

@@ -162,7 +162,8 @@ pub(super) fn run(args: &ImportArgs) -> Result<Outcome, Error> {
             info: &info,
         })
     } else {
-        let notes: String = proposal.notes.iter().map(|note| format!("  {note}\n")).collect();
+        let notes: Vec<_> = proposal.notes.iter().map(|note| format!("  {note}\n")).collect();
+        let notes = notes.concat();
         let drawn = page.map_or_else(String::new, |page| format!("{page}: a first plot\n"));
         format!("{}\n{}: the mapping\n{notes}{drawn}", info::tables::of(&info), out.display())
     };

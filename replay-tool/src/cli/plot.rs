@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use isotherm_log::diff::is_csv;
 use isotherm_log::file::{read_small_text, refuse_overwriting, write_whole};
-use isotherm_log::part::LogFiles;
+use isotherm_log::part::Messages;
 use isotherm_log::plot::{PlotLog, PlotOptions, PlotSummary, plot};
 use isotherm_log::source::LogReport;
 use isotherm_protocol::key::UnitId;
@@ -109,13 +109,13 @@ pub(super) fn first_plot(log: &LogArgs, out: &Path) -> Result<(), Error> {
 }
 
 /// A CSV that `isotherm-replay correct` wrote, which needs no mapping; it is of the unit that is given, else of `unnamed`.
-fn corrected(log: &LogArgs, unnamed: Option<&UnitId>) -> Result<Option<LogFiles>, Error> {
+fn corrected(log: &LogArgs, unnamed: Option<&UnitId>) -> Result<Option<Messages>, Error> {
     let [path] = log.log.as_slice() else { return Ok(None) };
     if !is_csv(path) {
         return Ok(None);
     }
     let unit = log.units()?.pop_first().or_else(|| unnamed.cloned());
-    Ok(unit.map(|unit| LogFiles::Corrected { path: path.clone(), unit }))
+    unit.map(|unit| Ok(Messages::of_corrected(path, &unit, &log.part()?)?)).transpose()
 }
 
 /// Writes the page; its length, and what it shows.
@@ -135,7 +135,7 @@ fn draw(args: &PlotArgs) -> Result<(usize, PlotSummary), Error> {
     let mut bar = None;
     for log in std::iter::once(&args.log).chain(&other) {
         let messages = match corrected(log, unnamed.as_ref())? {
-            Some(files) => files.open(&log.part()?)?,
+            Some(messages) => messages,
             None => log.messages(BATCH, unnamed.as_ref())?,
         };
         bar.get_or_insert_with(|| Bar::over_log(messages.progress()));

@@ -216,7 +216,7 @@ type Loaded = (Load, ZBytes, Option<(Timestamp, Timestamp)>, bool);
 fn schedule(options: &PlayOptions) -> Schedule {
     match options.files {
         LogFiles::Recordings(_) => Schedule::of_recordings(options.clock),
-        LogFiles::Text { .. } | LogFiles::Corrected { .. } => Schedule::of_text(),
+        LogFiles::Text { .. } => Schedule::of_text(),
     }
 }
 
