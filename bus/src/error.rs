@@ -12,7 +12,7 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum BusError {
     /// The Zenoh configuration file cannot be read or is not valid.
-    #[error("cannot use the Zenoh configuration {path}: {words}", path = path.display(), words = words(source))]
+    #[error("cannot use the Zenoh configuration {path}: {words}; `isotherm check {path}` shows the place", path = path.display(), words = words(source))]
     Configuration {
         /// The file.
         path: PathBuf,
@@ -28,6 +28,33 @@ pub enum BusError {
         value: String,
         /// What Zenoh says.
         source: zenoh::Error,
+    },
+    /// An endpoint is none.
+    #[error("{option} is {value:?}, {reason}")]
+    Endpoint {
+        /// Where it was given.
+        option: &'static str,
+        /// The endpoint.
+        value: String,
+        /// What it must be.
+        reason: String,
+    },
+    /// The user's file is bad, one problem per line.
+    #[error("{}", .0.join("\n"))]
+    UserFile(Vec<String>),
+    /// An endpoint cannot be listened on.
+    #[error("cannot listen on {endpoint}: {reason}")]
+    Listen {
+        /// The endpoint.
+        endpoint: String,
+        /// Why, and what to do.
+        reason: String,
+    },
+    /// No endpoint can be reached.
+    #[error("cannot reach a service at {}", reasons.join("; "))]
+    Unreachable {
+        /// Each endpoint, why, and what to do.
+        reasons: Vec<String>,
     },
     /// The session cannot be opened.
     #[error("cannot open the Zenoh session: {words}", words = words(.0))]
@@ -137,10 +164,60 @@ pub enum BusError {
     Close(#[source] zenoh::Error),
 }
 
-/// What Zenoh says, without the places in Zenoh's own source that it names in between.
+impl BusError {
+    /// Whether a configuration file is to blame, rather than the network or the command line.
+    #[must_use]
+    pub fn is_configuration(&self) -> bool {
+        matches!(self, Self::Configuration { .. } | Self::UserFile(_))
+    }
+
+    /// Whether the command line is.
+    #[must_use]
+    pub fn is_usage(&self) -> bool {
+        matches!(self, Self::Option { .. } | Self::Endpoint { .. } | Self::Range { .. })
+    }
+}
+
+/// What Zenoh says, on one line, without the places in Zenoh's own source that it names in between.
 #[must_use]
 pub fn words(error: &zenoh::Error) -> String {
-    without_places(&error.to_string())
+    Json5Problem::of(error).message
+}
+
+/// What is wrong with a text that Zenoh was given.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Json5Problem {
+    /// Line and column, from 1, where they are known.
+    pub place: Option<(usize, usize)>,
+    /// What is wrong.
+    pub message: String,
+}
+
+impl Json5Problem {
+    /// Reads what Zenoh says: a `Message { msg: "…", location: … }`, or a place with an excerpt of the text below it.
+    #[must_use]
+    pub fn of(error: &zenoh::Error) -> Self {
+        let text = without_places(&error.to_string());
+        let number = |text: &str| {
+            text.trim_start().chars().take_while(char::is_ascii_digit).collect::<String>().parse().ok()
+        };
+        if let Some((_, rest)) = text.split_once("Message { msg: \"") {
+            let (message, location) = rest.split_once("\", location: ").unwrap_or((rest, ""));
+            let column = |rest: &str| rest.split_once("column: ").and_then(|(_, column)| number(column));
+            let place =
+                location.split_once("line: ").and_then(|(_, rest)| Some((number(rest)?, column(rest)?)));
+            let message = message.replace("\\\"", "\"");
+            return Self { place, message: message.trim_end_matches('.').to_owned() };
+        }
+        if let Some((_, rest)) = text.split_once("--> ") {
+            let place = rest.split_once(':').and_then(|(line, rest)| Some((number(line)?, number(rest)?)));
+            // The parser quotes the whole line, however long, and whatever is in it; its own words stand behind the last `=`.
+            let message = rest.rsplit_once("= ").map_or(rest, |(_, message)| message);
+            let message = message.split_whitespace().collect::<Vec<_>>().join(" ");
+            return Self { place, message: message.trim_end_matches('.').to_owned() };
+        }
+        Self { place: None, message: text.split_whitespace().collect::<Vec<_>>().join(" ") }
+    }
 }
 
 /// A text of Zenoh's without the places in its source: "no luck at /a/b.rs:388." is "no luck.".
@@ -167,6 +244,23 @@ pub fn without_places(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_wrong_with_a_text_is_told_without_its_wrapping() {
+        let option = zenoh::Config::default().insert_json5("namespace", "\"a//b\"").unwrap_err();
+        let problem = Json5Problem::of(&option);
+        assert!(problem.message.starts_with("Invalid Key Expr `a//b`"), "{problem:?}");
+        assert!(
+            !problem.message.contains("Json5Err") && !problem.message.contains("Location"),
+            "{problem:?}"
+        );
+        let word = zenoh::Config::from_json5("{\n  mode: \"peerx\" }").unwrap_err();
+        let problem = Json5Problem::of(&word);
+        assert!(problem.message.starts_with("unknown variant `peerx`"), "{problem:?}");
+        let syntax = zenoh::Config::from_json5("{bad: ").unwrap_err();
+        let expected = "expected array, boolean, null, number, object, or string".to_owned();
+        assert_eq!(Json5Problem::of(&syntax), Json5Problem { place: Some((1, 7)), message: expected });
+    }
 
     #[test]
     fn places_in_foreign_source_are_left_out() {

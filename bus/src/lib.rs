@@ -10,6 +10,8 @@
 //! | module | holds |
 //! |---|---|
 //! | [`session`] | options, open, locators, close |
+//! | [`endpoint`](mod@endpoint) | addresses as people write them |
+//! | [`client`] | the one way from a program to a service |
 //! | [`producer`] | raw ticks of a unit out, in batches |
 //! | [`outlet`] | raw frames of a unit out, bounded by what comes back; the account of it |
 //! | [`consumer`] | corrected batches in |
@@ -18,9 +20,12 @@
 //! | [`receipt`] | proof that subscribers have taken what was sent |
 //! | [`routes`] | keys whose routes Zenoh is to remember |
 
+pub mod client;
 pub mod consumer;
 pub mod continuity;
+pub mod endpoint;
 mod error;
+mod obstacle;
 pub mod outlet;
 pub mod presence;
 pub mod producer;
@@ -28,9 +33,11 @@ pub mod receipt;
 pub mod routes;
 pub mod session;
 
+pub use client::{ClientOptions, Role};
 pub use consumer::Consumer;
 pub use continuity::Continuity;
-pub use error::{BusError, without_places, words};
+pub use endpoint::{DEFAULT_ENDPOINT, endpoint};
+pub use error::{BusError, Json5Problem, without_places, words};
 pub use outlet::{Outlet, OutletOptions};
 pub use producer::{Producer, ProducerOptions};
 pub use routes::DeclaredKeys;

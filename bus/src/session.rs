@@ -1,12 +1,13 @@
 //! Opening and closing sessions.
 
 use std::path::PathBuf;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use serde_json::Value;
 use zenoh::{Config, Session, Wait};
 
-use crate::BusError;
+use crate::endpoint::{DEFAULT_ENDPOINT, endpoint};
+use crate::{BusError, obstacle};
 
 /// Where a session listens and connects when neither options nor a configuration say so.
 const LOOPBACK: &str = "tcp/127.0.0.1:0";
@@ -22,20 +23,22 @@ const ACCEPT_PENDING: u32 = 1000;
 /// How to open a session.
 ///
 /// Without a configuration file a session is a peer that listens on loopback only, on a port of the system's choice,
-/// and finds nobody by itself: no multicast, no gossip. The other options replace what a file says.
+/// and finds nobody by itself: no multicast, no gossip. The other options replace what a file says. [`crate::endpoint()`] says how
+/// endpoints may be written.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "clap", derive(clap::Args))]
 pub struct SessionOptions {
-    /// Zenoh configuration file (JSON5); without it: peer on loopback, no scouting
+    /// Zenoh configuration (JSON5) (default: peer on loopback, no scouting)
     #[cfg_attr(feature = "clap", arg(id = "zenoh_config", long = "zenoh-config", value_name = "FILE"))]
     pub config: Option<PathBuf>,
-    /// Endpoint to connect to, e.g. tcp/127.0.0.1:7447; may be given several times
-    #[cfg_attr(feature = "clap", arg(long, value_name = "ENDPOINT"))]
+    /// Address of a router or peer to connect to, repeatable
+    #[cfg_attr(feature = "clap", arg(long, value_name = "HOST:PORT", value_parser = endpoint))]
     pub connect: Vec<String>,
-    /// Endpoint to listen on, e.g. tcp/127.0.0.1:0; may be given several times
-    #[cfg_attr(feature = "clap", arg(long, value_name = "ENDPOINT"))]
+    /// Address to listen on, repeatable; port 0: one of the system's choice (default: 127.0.0.1:7447 unless --connect or a Zenoh
+    /// configuration is given)
+    #[cfg_attr(feature = "clap", arg(long, value_name = "HOST:PORT", value_parser = endpoint))]
     pub listen: Vec<String>,
-    /// Key prefix of the site, e.g. site/a; all keys stand below it
+    /// Key prefix of the site, e.g. site/a
     #[cfg_attr(feature = "clap", arg(long, value_name = "PREFIX"))]
     pub namespace: Option<String>,
 }
@@ -44,7 +47,7 @@ impl SessionOptions {
     /// The configuration that these options stand for.
     ///
     /// # Errors
-    /// [`BusError::Configuration`] and [`BusError::Option`].
+    /// [`BusError::Configuration`], [`BusError::Endpoint`] and [`BusError::Option`].
     pub fn to_config(&self) -> Result<Config, BusError> {
         let mut config = match &self.config {
             Some(path) => Config::from_file(path)
@@ -52,10 +55,10 @@ impl SessionOptions {
             None => loopback()?,
         };
         if !self.connect.is_empty() {
-            set(&mut config, "connect/endpoints", self.connect.clone())?;
+            set(&mut config, "connect/endpoints", read("connect", &self.connect)?)?;
         }
         if !self.listen.is_empty() {
-            set(&mut config, "listen/endpoints", self.listen.clone())?;
+            set(&mut config, "listen/endpoints", read("listen", &self.listen)?)?;
         }
         if let Some(namespace) = &self.namespace {
             set(&mut config, "namespace", namespace.as_str())?;
@@ -63,21 +66,44 @@ impl SessionOptions {
         Ok(config)
     }
 
+    /// Has it listen where clients look for a service, if neither an endpoint nor a configuration is given.
+    pub fn listen_by_default(&mut self) {
+        if self.config.is_none() && self.connect.is_empty() && self.listen.is_empty() {
+            self.listen = vec![DEFAULT_ENDPOINT.to_owned()];
+        }
+    }
+
     /// What an opening session may have to wait for, in words: "a router or peer at tcp/127.0.0.1:7447".
     ///
     /// # Errors
     /// As [`Self::to_config`].
     pub fn awaited(&self) -> Result<String, BusError> {
-        let config = self.to_config()?;
-        let endpoints = config.get_json("connect/endpoints").unwrap_or_default();
-        let endpoints: Value = serde_json::from_str(&endpoints).unwrap_or_default();
-        let mut endpoints = texts(&endpoints);
-        endpoints.dedup();
-        Ok(match *endpoints {
+        let endpoints = endpoints(&self.to_config()?, "connect/endpoints");
+        Ok(match endpoints.as_slice() {
             [] => "a router or peer that scouting finds (no endpoint to connect to is configured)".to_owned(),
             _ => format!("a router or peer at {}", endpoints.join(" or ")),
         })
     }
+}
+
+/// Endpoints as Zenoh takes them.
+fn read(option: &'static str, texts: &[String]) -> Result<Vec<String>, BusError> {
+    let read = |text: &String| {
+        endpoint(text).map_err(|reason| BusError::Endpoint { option, value: text.clone(), reason })
+    };
+    texts.iter().map(read).collect()
+}
+
+/// The endpoints under a key of a configuration, in the mode that it has.
+pub(crate) fn endpoints(config: &Config, key: &str) -> Vec<String> {
+    let json = |key: &str| -> Value {
+        serde_json::from_str(&config.get_json(key).unwrap_or_default()).unwrap_or_default()
+    };
+    let (endpoints, mode) = (json(key), json("mode"));
+    let of_mode = endpoints.get(mode.as_str().unwrap_or("peer")).unwrap_or(&endpoints);
+    let mut endpoints: Vec<_> = texts(of_mode).into_iter().map(ToOwned::to_owned).collect();
+    endpoints.dedup();
+    endpoints
 }
 
 /// Every text of a JSON value.
@@ -107,7 +133,11 @@ fn loopback() -> Result<Config, BusError> {
 }
 
 /// Sets one value of a configuration.
-fn set(config: &mut Config, option: &'static str, value: impl Into<Value>) -> Result<(), BusError> {
+pub(crate) fn set(
+    config: &mut Config,
+    option: &'static str,
+    value: impl Into<Value>,
+) -> Result<(), BusError> {
     let value = value.into().to_string();
     config.insert_json5(option, &value).map_err(|source| BusError::Option { option, value, source })
 }
@@ -117,10 +147,20 @@ fn set(config: &mut Config, option: &'static str, value: impl Into<Value>) -> Re
 /// Zenoh needs tokio's multi-threaded runtime: a test says `#[tokio::test(flavor = "multi_thread")]`.
 ///
 /// # Errors
-/// [`BusError::Configuration`] and [`BusError::Option`] for what the options say, [`BusError::Open`] where a port
-/// cannot be bound or an endpoint not be reached.
+/// [`BusError::Configuration`], [`BusError::Endpoint`] and [`BusError::Option`] for what the options say, [`BusError::Listen`]
+/// where a port cannot be bound, [`BusError::Unreachable`] where no endpoint can be reached, [`BusError::Open`] for anything else.
 pub async fn open(options: &SessionOptions) -> Result<Session, BusError> {
-    zenoh::open(options.to_config()?).await.map_err(BusError::Open)
+    let config = options.to_config()?;
+    obstacle::before(&config)?;
+    let started = Instant::now();
+    match zenoh::open(config.clone()).await {
+        Ok(session) => Ok(session),
+        Err(source) => {
+            let waited = started.elapsed();
+            let known = tokio::task::spawn_blocking(move || obstacle::after(&config, waited)).await;
+            Err(known.ok().flatten().unwrap_or(BusError::Open(source)))
+        }
+    }
 }
 
 /// The endpoints that others can connect to, with the ports that the system has chosen.
@@ -142,5 +182,28 @@ pub async fn close(session: Session, limit: Duration) -> Result<(), BusError> {
         Ok(Ok(closed)) => closed.map_err(BusError::Close),
         Ok(Err(join)) => Err(BusError::Close(join.into())),
         Err(_) => Err(BusError::CloseTimeout(limit)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_service_listens_where_clients_look_for_it_unless_it_is_told_otherwise() {
+        let listens = |options: SessionOptions| {
+            let mut options = options;
+            options.listen_by_default();
+            options.listen
+        };
+        let nothing = SessionOptions::default();
+        assert_eq!(listens(nothing.clone()), [DEFAULT_ENDPOINT]);
+        let router = SessionOptions { connect: vec!["router:7447".to_owned()], ..nothing.clone() };
+        assert_eq!(listens(router), Vec::<String>::new());
+        let own = SessionOptions { listen: vec!["127.0.0.1:0".to_owned()], ..nothing.clone() };
+        assert_eq!(listens(own.clone()), own.listen);
+        let file = SessionOptions { config: Some("peer.json5".into()), ..nothing };
+        assert_eq!(listens(file), Vec::<String>::new());
+        assert_eq!(endpoints(&own.to_config().unwrap(), "listen/endpoints"), ["tcp/127.0.0.1:0"]);
     }
 }

@@ -101,7 +101,7 @@ pub(crate) fn print(text: &[u8]) -> Result<(), Error> {
 /// Runs the program and maps what came of it to its exit code.
 #[must_use]
 pub fn main() -> ExitCode {
-    match run(Cli::parse()) {
+    match run(isotherm_document::advanced::parse()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             let _ = writeln!(io::stderr(), "isotherm-calibrate: {error}");

@@ -30,6 +30,6 @@ done <<'END'
 180.0  90.0   0.0 X up b
 END
 isotherm-calibrate positions "$stand"/1*.csv --mapping "$stand/101.mapping.toml" --unit MEMS-0001 --times "$stand/held.csv" \
-    --document config/calibration/MEMS-0001.toml --gravity 9.8157 --out "$stand/moved.toml" --html "$stand/positions.html"
+    --calibration config/calibration/MEMS-0001.toml --gravity 9.8157 --out "$stand/moved.toml" --html "$stand/positions.html"
 isotherm-calibrate diff config/calibration/MEMS-0001.toml "$stand/moved.toml" --axis-sigma 3.3
 echo "logs, document and page: $stand" >&2

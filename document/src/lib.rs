@@ -37,6 +37,8 @@
 //!
 //! Lengths of texts count bytes.
 
+#[cfg(feature = "clap")]
+pub mod advanced;
 pub mod escape;
 mod kind;
 mod number;

@@ -7,6 +7,7 @@
 //! |---|---|
 //! | [`mapping`] | which column of a text log is what |
 //! | [`text`] | text logs as events in time order |
+//! | [`import`] | a mapping proposed for a text log of any maker |
 //! | [`recording`] | MCAP files with every message as it was on the bus |
 //! | [`message`] | one message and its topic |
 //! | [`source`] | a log of either kind as messages |
@@ -29,6 +30,7 @@ pub mod diff;
 pub mod error;
 pub mod faults;
 pub mod file;
+pub mod import;
 pub mod info;
 pub mod mapping;
 pub mod message;

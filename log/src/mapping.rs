@@ -3,6 +3,7 @@
 //! A mapping is a small TOML file, described in full by `docs/replay.md` and by the ready ones in
 //! `config/mappings`. Parsing reports every problem at once, each with file, line, column, key and value.
 
+mod encoding;
 mod keys;
 mod meaning;
 #[cfg(test)]
@@ -10,6 +11,7 @@ mod tests;
 
 use std::path::Path;
 
+pub use encoding::Encoding;
 use isotherm_correction::sample::{ChannelName, OutputKind};
 use isotherm_correction::units::Span;
 pub use isotherm_document::Problem;
@@ -74,6 +76,8 @@ pub enum OnBadRow {
 /// How bytes become rows and cells.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Layout {
+    /// Encoding of the text.
+    pub encoding: Encoding,
     /// What stands between two cells.
     pub delimiter: Delimiter,
     /// Lines that begin with this are passed over.

@@ -92,6 +92,16 @@ pub struct Messages {
 }
 
 impl Messages {
+    /// A part of a CSV of corrected ticks of a unit, as `isotherm-replay correct` writes it, in batches by the end of the last tick.
+    ///
+    /// # Errors
+    /// [`Error::File`].
+    pub fn of_corrected(path: &Path, unit: &UnitId, part: &Part) -> Result<Self, Error> {
+        let window = (part.start > Span::ZERO || part.end.is_some()).then_some((part.start, part.end));
+        let log = Log::corrected(path, unit)?;
+        Ok(Self { log, units: part.units.clone(), window, beginning_ns: None, over: false })
+    }
+
     /// The next message; `None` behind the last.
     ///
     /// # Errors

@@ -1,14 +1,19 @@
 //! A log of either kind as messages: recordings as they are, text logs put into batches.
 
+use std::collections::{BTreeSet, VecDeque};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 
+use arrayvec::ArrayVec;
 use isotherm_correction::units::Span;
+use isotherm_protocol::codec;
+use isotherm_protocol::corrected::{CorrectedBatch, Revision};
 use isotherm_protocol::key::UnitId;
 use isotherm_protocol::raw::{Batcher, RawFrame};
 use serde::Serialize;
 
+use crate::diff::{CorrectedLog, Ticks};
 use crate::error::Error;
 use crate::file::begins_with;
 use crate::mapping::Mapping;
@@ -49,6 +54,7 @@ pub struct Log {
 enum Source {
     Recording(Box<RecordingReader>),
     Text(Box<TextLog>),
+    Corrected(Box<CorrectedCsv>),
 }
 
 /// What reading a log came to.
@@ -109,6 +115,17 @@ impl Log {
         Ok(Self { source: Source::Text(Box::new(text)), progress })
     }
 
+    /// Opens a CSV of corrected ticks of a unit.
+    ///
+    /// # Errors
+    /// [`Error::File`].
+    pub fn corrected(path: &Path, unit: &UnitId) -> Result<Self, Error> {
+        let ticks = CorrectedLog::open(path, &BTreeSet::new(), unit)?;
+        let progress = ticks.progress();
+        let csv = CorrectedCsv { ticks, ready: VecDeque::new(), rows: 0 };
+        Ok(Self { source: Source::Corrected(Box::new(csv)), progress })
+    }
+
     /// The next message; `None` behind the last.
     ///
     /// # Errors
@@ -117,6 +134,7 @@ impl Log {
         match &mut self.source {
             Source::Recording(reader) => reader.next_message(),
             Source::Text(text) => text.next_message(),
+            Source::Corrected(csv) => csv.next_message(),
         }
     }
 
@@ -132,6 +150,7 @@ impl Log {
         match &self.source {
             Source::Recording(reader) => LogReport::Recording(reader.report().clone()),
             Source::Text(text) => LogReport::Text(text.events.inner().report()),
+            Source::Corrected(csv) => LogReport::Text(ReadReport { rows: csv.rows, ..ReadReport::default() }),
         }
     }
 
@@ -139,8 +158,42 @@ impl Log {
     pub fn recording(&mut self) -> Option<&mut RecordingReader> {
         match &mut self.source {
             Source::Recording(reader) => Some(reader),
-            Source::Text(_) => None,
+            Source::Text(_) | Source::Corrected(_) => None,
         }
+    }
+}
+
+/// Corrected ticks of a CSV, put into batches of one calibration each.
+#[derive(Debug)]
+struct CorrectedCsv {
+    ticks: CorrectedLog,
+    ready: VecDeque<Message>,
+    rows: u64,
+}
+
+impl CorrectedCsv {
+    fn next_message(&mut self) -> Result<Option<Message>, Error> {
+        while self.ready.is_empty() {
+            let Some(Ticks { unit, ticks }) = self.ticks.next_ticks()? else { return Ok(None) };
+            self.rows += ticks.len() as u64;
+            for same in ticks.chunk_by(|a, b| a.tick.revision == b.tick.revision) {
+                let Some(last) = same.last() else { continue };
+                let batch = CorrectedBatch {
+                    unit: unit.to_string(),
+                    revision: Revision {
+                        counter: last.tick.revision,
+                        digest: last.digest.unwrap_or_default(),
+                    },
+                    temperatures: ArrayVec::new(),
+                    ticks: same.iter().map(|tick| tick.tick.clone()).collect(),
+                };
+                let frame = codec::encode(&batch)
+                    .map_err(|error| Error::Usage(format!("a corrected tick is none: {error}")))?;
+                let received_ns = u64::try_from(last.tick.end_time.as_ns()).unwrap_or(0);
+                self.ready.push_back(Message { topic: Topic::Corrected(unit.clone()), received_ns, frame });
+            }
+        }
+        Ok(self.ready.pop_front())
     }
 }
 

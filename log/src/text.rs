@@ -22,12 +22,33 @@ use isotherm_correction::units::Timestamp;
 use serde::Serialize;
 
 use crate::error::Error;
-use crate::mapping::Mapping;
+use crate::mapping::{Delimiter, Encoding, Mapping};
 use crate::progress::Progress;
 use file::FileReader;
 
+pub(crate) use input::open as open_raw;
+
 pub use error::{LogError, LogFault, Reason};
 pub use window::Window;
+
+/// Lines of a file, decompressed and decoded.
+pub(crate) fn open_decoded(path: &Path, encoding: Encoding) -> Result<input::Lines, Error> {
+    let (source, _) = input::open(path, &Arc::default())?;
+    Ok(input::Lines::new(input::decoded(source, encoding)))
+}
+
+/// Cells of a line, unquoted; `None` for a quote that does not end on it.
+pub(crate) fn split_cells(line: &str, delimiter: Delimiter) -> Option<Vec<String>> {
+    let (mut line, mut cells) = (line.as_bytes().to_vec(), Vec::new());
+    cells::split(&mut line, delimiter, &mut cells).ok()?;
+    let text = |cell: &cells::Cell| line.get(cell.start..cell.end).unwrap_or_default();
+    Some(cells.iter().map(|cell| String::from_utf8_lossy(text(cell)).into_owned()).collect())
+}
+
+/// A number as the reader of text logs takes it.
+pub(crate) fn parse_float(cell: &str, decimal_mark: u8) -> Option<f64> {
+    number::float(cell.as_bytes(), decimal_mark)
+}
 
 /// One thing that happened in a log.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,6 +3,7 @@
 mod convert;
 mod correct;
 mod diff;
+mod import;
 mod info;
 mod log_args;
 mod play;
@@ -42,6 +43,7 @@ enum Command {
     Correct(correct::CorrectArgs),
     Diff(diff::DiffArgs),
     Step(step::StepArgs),
+    Import(import::ImportArgs),
     Info(info::InfoArgs),
     Plot(plot::PlotArgs),
     Convert(convert::ConvertArgs),
@@ -82,6 +84,7 @@ fn run(cli: Cli) -> Result<Outcome, Error> {
         Command::Correct(args) => correct::run(&args),
         Command::Diff(args) => diff::run(&args),
         Command::Step(args) => step::run(&args),
+        Command::Import(args) => import::run(&args),
         Command::Info(args) => info::run(&args),
         Command::Plot(args) => plot::run(&args),
         Command::Convert(args) => convert::run(&args),
@@ -107,7 +110,7 @@ fn print(text: &[u8]) -> Result<(), Error> {
 /// Runs the program and maps what came of it to its exit code.
 #[must_use]
 pub fn main() -> ExitCode {
-    match run(Cli::parse()) {
+    match run(isotherm_document::advanced::parse()) {
         Ok(Outcome::Complete) => ExitCode::SUCCESS,
         Ok(Outcome::DataLoss) => ExitCode::from(3),
         Ok(Outcome::Different) => ExitCode::from(1),

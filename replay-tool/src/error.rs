@@ -55,13 +55,15 @@ impl Error {
         isotherm_log::error::Error::file(path, action, source).into()
     }
 
-    /// The program's exit code: 1 failed, 2 usage, 78 bad mapping, calibration document, scenario or Zenoh option.
+    /// The program's exit code: 1 failed, 2 usage, 78 bad mapping, calibration document, scenario or Zenoh configuration.
     #[must_use]
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Log(error) => error.exit_code(),
-            Self::Usage(_) | Self::Bus(BusError::Range { .. }) => 2,
-            Self::Scenario(_) | Self::Bus(BusError::Configuration { .. } | BusError::Option { .. }) => 78,
+            Self::Usage(_) => 2,
+            Self::Bus(error) if error.is_usage() => 2,
+            Self::Bus(error) if error.is_configuration() => 78,
+            Self::Scenario(_) => 78,
             _ => 1,
         }
     }

@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use isotherm_bus::presence::ServiceWatch;
-use isotherm_bus::{BusError, SessionOptions};
+use isotherm_bus::{BusError, ClientOptions, Role};
 use isotherm_log::faults::FaultOptions;
 use isotherm_log::part::{LogFiles, Part};
 use isotherm_log::schedule::Clock;
@@ -59,7 +59,7 @@ pub struct PlayOptions {
     /// What the instruments of a text log are to report of themselves, once a second of event time.
     pub health: Vec<HealthReading>,
     /// How the session is opened.
-    pub session: SessionOptions,
+    pub session: ClientOptions,
     /// How long to wait for service and subscribers, and for what comes back.
     pub wait: Duration,
     /// Whether and how far playing is bounded by what comes back.
@@ -115,10 +115,11 @@ pub async fn play(
 ) -> Result<(PlayReport, LogReport), Error> {
     // From here on a signal ends in order.
     let mut stop = std::pin::pin!(stop_asked()?);
+    let way = options.session.way(Role::Peer)?;
     let opened = tokio::select! {
         biased;
         () = &mut stop => return Err(Error::Stopped),
-        session = isotherm_bus::open(&options.session) => session?,
+        session = way.open_patiently(options.wait, |words| watch.say(words)) => session?,
     };
     let played = {
         let mut player = Player::new(&opened, options, commands, watch)?;

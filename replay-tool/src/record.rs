@@ -21,7 +21,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use isotherm_bus::receipt::Receipt;
-use isotherm_bus::{BusError, SessionOptions};
+use isotherm_bus::{BusError, ClientOptions};
 use isotherm_log::recording::RecordingOptions;
 use isotherm_protocol::key::UnitId;
 use tokio::signal::unix::{Signal, SignalKind, signal};
@@ -73,7 +73,7 @@ pub struct RecordOptions {
     /// Where it is written to; with rotation, `-0001` and so on is added to the name.
     pub out: PathBuf,
     /// How the session is opened.
-    pub session: SessionOptions,
+    pub session: ClientOptions,
     /// Units to record; all where none is given.
     pub units: Vec<UnitId>,
     /// Topics to record; every kind where none is given.

@@ -1,9 +1,12 @@
 //! The commands.
 
+use std::ffi::OsString;
+use std::os::unix::process::CommandExt;
 use std::path::PathBuf;
 
 use clap::{Args, CommandFactory, Parser, Subcommand};
 use clap_complete::Shell;
+use isotherm_document::advanced;
 
 use crate::check::CheckArgs;
 use crate::console::{self, CommandArgs, Console, HistoryArgs, RollbackArgs, StatusArgs, SwapArgs, TopArgs};
@@ -27,7 +30,7 @@ Exit codes:
   1   failed
   2   called wrongly
   3   finished, but data was lost
-  78  a configuration or calibration document is bad";
+  78  a configuration or calibration document is bad or refused";
 
 #[derive(Debug, Subcommand)]
 enum Command {
@@ -54,6 +57,12 @@ enum Command {
     Keygen(KeygenArgs),
     /// Show simulated units being corrected, with a table and a report
     Demo(DemoArgs),
+    /// Record, replay, correct, plot, convert logs: isotherm-replay
+    #[command(disable_help_flag = true)]
+    Log(Sibling),
+    /// Fit and judge calibration documents: isotherm-calibrate
+    #[command(disable_help_flag = true)]
+    Calibrate(Sibling),
     /// Print the completions of a shell
     Completions {
         /// The shell
@@ -61,19 +70,40 @@ enum Command {
     },
 }
 
+/// Arguments for another program.
+#[derive(Debug, Args)]
+struct Sibling {
+    /// Its arguments, as it takes them
+    #[arg(value_name = "ARGUMENT", trailing_var_arg = true, allow_hyphen_values = true)]
+    arguments: Vec<OsString>,
+}
+
+impl Sibling {
+    /// Goes on as the program of this name: the one beside this one, else the one in the path.
+    fn exec(&self, name: &str) -> Exit {
+        let beside = std::env::current_exe().ok().and_then(|own| Some(own.parent()?.join(name)));
+        let program = beside.filter(|path| path.is_file()).unwrap_or_else(|| PathBuf::from(name));
+        let error = std::process::Command::new(&program).args(&self.arguments).exec();
+        say(format_args!("isotherm: cannot run {}: {error}; install it beside isotherm", program.display()));
+        Exit::Failed
+    }
+}
+
 /// Arguments of `serve`.
 #[derive(Debug, Clone, Args)]
 #[command(after_help = "\
 Examples:
   isotherm serve --config config/service.toml
-  isotherm serve --calibrations config/calibration --listen tcp/127.0.0.1:7447
-  isotherm serve --calibrations units --announce | head -1")]
+  isotherm serve --calibration config/calibration
+  isotherm serve --calibration units --listen 127.0.0.1:0 --announce | head -1
+
+Without a configuration it listens where the other commands look for it, on 127.0.0.1:7447.")]
 pub struct ServeArgs {
-    /// Service configuration (TOML); without it the defaults hold
+    /// Service configuration (TOML)
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
     /// Folder of calibration documents; replaces the configured one
-    #[arg(long, value_name = "FOLDER")]
+    #[arg(long = "calibration", alias = "calibrations", value_name = "FOLDER")]
     pub calibrations: Option<PathBuf>,
     /// Folder for the audit file and every accepted document; replaces the configured one
     #[arg(long, value_name = "FOLDER")]
@@ -85,10 +115,10 @@ pub struct ServeArgs {
     #[command(flatten)]
     pub session: isotherm_bus::SessionOptions,
     /// When ready, print one line of JSON on stdout: {"ready":true,"locators":[…],"metrics":"http://…"}
-    #[arg(long)]
+    #[arg(long, hide_short_help = true)]
     pub announce: bool,
     /// When ready, write the same line to this file
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", hide_short_help = true)]
     pub ready_file: Option<PathBuf>,
     /// Print the totals at the end as JSON on stdout instead of a table
     #[arg(long)]
@@ -101,7 +131,9 @@ pub struct ServeArgs {
 /// Runs the command line and says how it ended.
 #[must_use]
 pub fn run() -> Exit {
-    match Cli::parse().command {
+    match advanced::parse::<Cli>().command {
+        Command::Log(sibling) => sibling.exec("isotherm-replay"),
+        Command::Calibrate(sibling) => sibling.exec("isotherm-calibrate"),
         Command::Serve(args) => unheld(&args.log.clone(), crate::serve::run(args)),
         Command::Status(args) => operate(Console::Status(args)),
         Command::Top(args) => operate(Console::Top(args)),

@@ -38,6 +38,18 @@ pub enum ServiceError {
         /// How many.
         count: usize,
     },
+    /// The folder of calibration documents cannot be read, and there is nothing to go on with.
+    #[error(
+        "the folder of calibrations {path} cannot be read: {source}; make it, or correct `calibrations` (no last good set is in `state` \
+         to go on with, or strict_start is set)",
+        path = path.display()
+    )]
+    NoCalibrations {
+        /// The folder.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
     /// The state folder cannot be used.
     #[error(transparent)]
     State(#[from] StoreError),
@@ -70,10 +82,14 @@ impl ServiceError {
     #[must_use]
     pub fn exit(&self) -> Exit {
         match self {
-            Self::Configuration(_)
-            | Self::BadCalibrations { .. }
-            | Self::Metrics { .. }
-            | Self::Bus(BusError::Configuration { .. } | BusError::Option { .. }) => Exit::BadConfiguration,
+            Self::Configuration(_) | Self::BadCalibrations { .. } | Self::NoCalibrations { .. } => {
+                Exit::BadConfiguration
+            }
+            // An address that is not allowed, not one that somebody else has.
+            Self::Metrics { source, .. } if source.kind() == std::io::ErrorKind::Other => {
+                Exit::BadConfiguration
+            }
+            Self::Bus(error) => Exit::of_bus(error),
             _ => Exit::Failed,
         }
     }

@@ -2,6 +2,8 @@
 
 use std::process::ExitCode;
 
+use isotherm_bus::BusError;
+
 /// How a command ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
@@ -10,12 +12,25 @@ pub enum Exit {
     Ok = 0,
     /// It failed; the reason is on stderr.
     Failed = 1,
-    /// It was called wrongly; clap says how.
+    /// It was called wrongly.
     Usage = 2,
     /// It finished, but data was lost on the way.
     DataLoss = 3,
-    /// A configuration or a calibration document is bad.
+    /// A configuration or a calibration document is bad, or refused.
     BadConfiguration = 78,
+}
+
+impl Exit {
+    /// What an error of the session stands for.
+    pub(crate) fn of_bus(error: &BusError) -> Self {
+        if error.is_configuration() {
+            Self::BadConfiguration
+        } else if error.is_usage() {
+            Self::Usage
+        } else {
+            Self::Failed
+        }
+    }
 }
 
 impl From<Exit> for ExitCode {

@@ -86,6 +86,7 @@ fn settings(args: &ServeArgs) -> Result<Settings, ServiceError> {
     if given.namespace.is_some() {
         configured.namespace.clone_from(&given.namespace);
     }
+    configured.listen_by_default();
     Ok(settings)
 }
 

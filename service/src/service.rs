@@ -48,7 +48,7 @@ pub struct RunningService {
 /// Every problem of every bad calibration document is logged.
 ///
 /// # Errors
-/// [`ServiceError::State`] where the state folder cannot be used; with `strict_start` [`ServiceError::Read`] where the
+/// [`ServiceError::State`] where the state folder cannot be used; [`ServiceError::NoCalibrations`] where the
 /// folder of calibrations cannot be read and [`ServiceError::BadCalibrations`] where a document is bad;
 /// [`ServiceError::Metrics`] where the configured address cannot be had; [`ServiceError::Declare`] and
 /// [`ServiceError::Thread`].
@@ -157,9 +157,9 @@ fn read_folder(work: &mut Work, settings: &Settings) -> Result<Found, ServiceErr
     match work.read_folder() {
         Ok((_, bad)) if settings.strict_start && bad > 0 => Err(ServiceError::BadCalibrations { count: bad }),
         Ok((found, _)) => Ok(found),
-        // Without a state folder there is nothing to go on with.
-        Err(source) if settings.strict_start || settings.state.is_none() => {
-            Err(ServiceError::Read { path: folder.clone(), source })
+        // Without last good sets there is nothing to go on with.
+        Err(source) if settings.strict_start || !work.has_units() => {
+            Err(ServiceError::NoCalibrations { path: folder.clone(), source })
         }
         Err(error) => {
             work.miss_folder(&error);

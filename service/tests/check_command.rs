@@ -76,6 +76,25 @@ fn every_problem_of_every_bad_file_goes_to_stderr_with_its_place() {
 }
 
 #[test]
+fn a_folder_of_calibrations_that_is_not_there_is_a_problem_with_state_or_without() {
+    let folder = TempDir::new().unwrap();
+    for state in ["", "state = \"state\"\n"] {
+        let service = write(&folder, "s.toml", &format!("{state}calibrations = \"unis\"\n"));
+        let output = check(&[&service]);
+        assert_eq!(output.status.code(), Some(78));
+        let problems = lines(&output.stderr);
+        assert!(problems.len() == 1 && problems[0].contains("calibrations: "), "{problems:?}");
+        assert!(problems[0].contains("must be an existing folder; looked for"), "{problems:?}");
+        // The service does not start either: there is nothing to go on with.
+        let serve = Command::new(env!("CARGO_BIN_EXE_isotherm"))
+            .args(["serve", "--config", &service, "--listen", "127.0.0.1:0"])
+            .output()
+            .unwrap();
+        assert_eq!(serve.status.code(), Some(78), "{}", String::from_utf8_lossy(&serve.stderr));
+    }
+}
+
+#[test]
 fn a_zenoh_configuration_with_a_strange_key_or_value_is_bad() {
     let folder = TempDir::new().unwrap();
     for (name, text) in

@@ -194,10 +194,10 @@ fn a_signature_is_replaced_only_when_told() {
     let once = place.text("unit.toml");
     let (code, _, err) = said(&place.run(&["sign", "unit.toml", "--key", "bert.key"]));
     assert_eq!(code, Some(1));
-    assert!(err.starts_with("unit.toml: is signed already, by key ") && err.contains("--replace"), "{err}");
+    assert!(err.starts_with("unit.toml: is signed already, by key ") && err.contains("--overwrite"), "{err}");
     assert_eq!(place.text("unit.toml"), once);
 
-    assert_eq!(place.run(&["sign", "--replace", "unit.toml", "--key", "bert.key"]).status.code(), Some(0));
+    assert_eq!(place.run(&["sign", "--overwrite", "unit.toml", "--key", "bert.key"]).status.code(), Some(0));
     assert_eq!(place.text("unit.toml").matches(MARK).count(), 1);
     assert!(
         words(&place.run(&["check", "unit.toml", "--trusted-keys", "trusted"]).stdout)
@@ -208,7 +208,7 @@ fn a_signature_is_replaced_only_when_told() {
 #[test]
 fn the_original_stays_where_an_output_is_named() {
     let place = Place::with_signer("anna");
-    let output = place.run(&["sign", "unit.toml", "--key", "anna.key", "--output", "signed.toml", "--json"]);
+    let output = place.run(&["sign", "unit.toml", "--key", "anna.key", "--out", "signed.toml", "--json"]);
     assert_eq!(output.status.code(), Some(0));
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!((&report["signed"], &report["files"][0]["output"]), (&true.into(), &"signed.toml".into()));
@@ -216,16 +216,12 @@ fn the_original_stays_where_an_output_is_named() {
     assert_eq!(place.text("unit.toml"), document());
     assert!(place.text("signed.toml").contains(MARK));
 
-    let two = ["sign", "unit.toml", "signed.toml", "--key", "anna.key", "--output", "x.toml"];
+    let two = ["sign", "unit.toml", "signed.toml", "--key", "anna.key", "--out", "x.toml"];
     assert_eq!(place.run(&two).status.code(), Some(2), "one output for two documents");
-    let (code, _, err) =
-        said(&place.run(&["sign", "unit.toml", "--key", "anna.key", "--output", "no/x.toml"]));
+    let (code, _, err) = said(&place.run(&["sign", "unit.toml", "--key", "anna.key", "--out", "no/x.toml"]));
     assert_eq!(code, Some(1));
     assert!(err.starts_with("unit.toml: cannot write no/x.toml: its folder does not exist"), "{err}");
-    assert_eq!(
-        place.run(&["sign", "unit.toml", "--key", "anna.key", "--output", "."]).status.code(),
-        Some(1)
-    );
+    assert_eq!(place.run(&["sign", "unit.toml", "--key", "anna.key", "--out", "."]).status.code(), Some(1));
     assert_eq!(place.names(), ["anna.key", "anna.pub", "signed.toml", "trusted", "unit.toml"]);
 }
 

@@ -130,7 +130,7 @@ impl<'a> Named<'a> {
             let mut work = Work::new(Some(base), runs, judges);
             if !others.is_empty() {
                 work.warnings.push(format!(
-                    "the logs have unit {} too, which is left alone: the document is of {unit}. For all of them give --document the \
+                    "the logs have unit {} too, which is left alone: the document is of {unit}. For all of them give --calibration the \
                      folder that has UNIT.toml of each",
                     others.join(", ")
                 ));
@@ -201,7 +201,7 @@ fn of_folder(folder: &Path, unit: &UnitId) -> Result<Written, Error> {
     let path = folder.join(format!("{unit}.toml"));
     if !path.exists() {
         return Err(Error::Refused(vec![format!(
-            "{} is not there: the folder that --document names needs a document of each unit; leave the unit out with --unit",
+            "{} is not there: the folder that --calibration names needs a document of each unit; leave the unit out with --unit",
             path.display()
         )]));
     }

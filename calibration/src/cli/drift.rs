@@ -28,8 +28,8 @@ use crate::written::Written;
 #[command(after_help = "Examples:\n  \
     isotherm-calibrate drift static.mcap --html drift.html\n  \
     isotherm-calibrate drift rlg-static.imu.gz --mapping config/mappings/rlg-static.toml --increment-weight 0.1\n  \
-    isotherm-calibrate drift static.mcap --document unit.toml --out unit-drift.toml\n\n\
-    With --document the log is corrected first, by the service's own code, and what is analysed is what the calibration leaves. \
+    isotherm-calibrate drift static.mcap --calibration unit.toml --out unit-drift.toml\n\n\
+    With --calibration the log is corrected first, by the service's own code, and what is analysed is what the calibration leaves. \
     Rates are in °/h, N in °/√h, K in °/h/√h, R in °/h², Q in ″.")]
 pub(super) struct DriftArgs {
     #[command(flatten)]
@@ -45,7 +45,7 @@ pub(super) struct DriftArgs {
     increment_weight: Option<f64>,
     /// Calibration document (TOML): the log is corrected with it first, and --out is it with what the estimator is to expect of its
     /// gyros; for several units the folder that has UNIT.toml of each
-    #[arg(long, short, value_name = "DOC")]
+    #[arg(long = "calibration", short = 'c', alias = "document", short_alias = 'd', value_name = "FILE")]
     document: Option<PathBuf>,
     /// Sigma of the constant part when the estimator starts (°/h), where you know it from several starts
     #[arg(long, value_name = "DEG_PER_H")]
@@ -141,7 +141,7 @@ impl DriftArgs {
             .try_for_each(|(name, value)| value.map_or(Ok(()), |value| above_0(name, value)))?;
         if self.output.writes() && (self.document.is_none() || self.accelerometers) {
             return Err(Error::Usage(
-                "--out is the document with what the estimator is to expect of its gyros: give it with --document, and leave \
+                "--out is the document with what the estimator is to expect of its gyros: give it with --calibration, and leave \
                  --accelerometers out"
                     .to_owned(),
             ));
@@ -174,7 +174,7 @@ impl DriftArgs {
     /// The unit's document with the parameters in it.
     fn document(&self, work: &Work, report: &Report) -> Result<Written, Error> {
         let Some(base) = &work.base else {
-            return Err(Error::Usage("--out needs --document".to_owned()));
+            return Err(Error::Usage("--out needs --calibration".to_owned()));
         };
         let mut document = base.document.clone();
         // What the document says of the constant part holds, unless something else was stated.

@@ -39,20 +39,20 @@ const SIZES_DEG_H: [f64; 6] = [0.0034, 9.5, 0.000_08, 140.0, 0.05, 0.0002];
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     isotherm-calibrate impact --trend 0.00008 --html impact.html\n  \
-    isotherm-calibrate impact --document unit-drift.toml --seeds 100\n  \
+    isotherm-calibrate impact --calibration unit-drift.toml --seeds 100\n  \
     isotherm-calibrate impact corrected.mcap --calibration-hours 21\n  \
-    isotherm-calibrate impact --document unit-drift.toml --start-log monday.mcap --start-log tuesday.mcap --start-log friday.mcap\n\n\
+    isotherm-calibrate impact --calibration unit-drift.toml --start-log monday.mcap --start-log tuesday.mcap --start-log friday.mcap\n\n\
     The system is calibrated, then goes on alone; its level platform turns about the vertical at four times the Earth's rate. \
     Each drift is sailed three times: held at its last value, and with the service's own drift estimator without and with \
     the state of the trend.")]
 pub(super) struct ImpactArgs {
-    /// A log at rest: corrected ticks (CSV, .mcap), or raw ones with --document
+    /// A log at rest: corrected ticks (CSV, .mcap), or raw ones with --calibration
     #[arg(value_name = "LOG")]
     log: Vec<PathBuf>,
     #[command(flatten)]
     reading: Reading,
     /// Calibration document (TOML) that says what the estimator is to expect; a raw log is corrected with it
-    #[arg(long, short, value_name = "DOC")]
+    #[arg(long = "calibration", short = 'c', alias = "document", short_alias = 'd', value_name = "FILE")]
     document: Option<PathBuf>,
     /// Straight trend from the calibration's beginning (°/h²)
     #[arg(
@@ -142,7 +142,8 @@ impl ImpactArgs {
         } else if self.trend.is_some() || self.constant.is_some() {
             self.sail_stated(&voyage, &parts)?
         } else {
-            let words = "say which drift: a LOG, --document DOC, --trend DEG_PER_H2 or --constant DEG_PER_H";
+            let words =
+                "say which drift: a LOG, --calibration DOC, --trend DEG_PER_H2 or --constant DEG_PER_H";
             return Err(Error::Usage(words.to_owned()));
         };
         report.notes.extend(starts);
@@ -208,7 +209,7 @@ impl ImpactArgs {
         }
         <[DriftParts; 3]>::try_from(stated).map_err(|stated| {
             let advice = if stated.len() < 3 {
-                "isotherm-calibrate drift --document puts them in"
+                "isotherm-calibrate drift --calibration puts them in"
             } else {
                 "leave the document out, or give one that states it for the gyros along x, y and z only"
             };
@@ -366,10 +367,10 @@ impl ImpactArgs {
     /// What can be done where the log is shorter than the calibration.
     fn otherwise(&self, parts: &[DriftParts; 3]) -> String {
         match &self.document {
-            None => "say how large the drift is with --document or --trend instead of the log".to_owned(),
+            None => "say how large the drift is with --calibration or --trend instead of the log".to_owned(),
             Some(path) if *parts == [sizes(); 3] => format!(
                 "say how large the drift is with --trend instead of the log: {} has no [gyro.sensor.drift], which isotherm-calibrate \
-                 drift --document puts in",
+                 drift --calibration puts in",
                 path.display()
             ),
             Some(path) => format!("leave the log out: {} says how large the drift is", path.display()),
@@ -387,7 +388,7 @@ impl ImpactArgs {
             return columns;
         }
         let Some(document) = &self.document else {
-            return Err(Error::Usage("a raw log needs --document, to be corrected with".to_owned()));
+            return Err(Error::Usage("a raw log needs --calibration, to be corrected with".to_owned()));
         };
         let loaded = load_calibration(document)?;
         let run = args.run(Some(&loaded.unit))?;

@@ -19,8 +19,8 @@ use crate::modes::make::{Wanted, make};
 /// Magnetic and non-magnetic drift over temperature, slow meander and switch parameters of a mode-reversed laser gyro
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
-    isotherm-calibrate modes chamber.mcap --document unit.toml --latitude 55.75 --heading 30 --out unit-modes.toml\n  \
-    isotherm-calibrate modes up.mcap down.mcap --judge other.mcap --document unit.toml --latitude 55.75 --heading 30 \
+    isotherm-calibrate modes chamber.mcap --calibration unit.toml --latitude 55.75 --heading 30 --out unit-modes.toml\n  \
+    isotherm-calibrate modes up.mcap down.mcap --judge other.mcap --calibration unit.toml --latitude 55.75 --heading 30 \
     --html modes.html\n\n\
     The runs are of units at rest, with mode reversal on, over the temperatures it is to work at. The document gives scale, axes, \
     temperature channels and filter; its static, magnetic and slow-meander terms are replaced, with the transition ticks and the \
@@ -32,7 +32,7 @@ pub(super) struct ModesArgs {
     #[arg(long, value_name = "LOG")]
     judge: Vec<PathBuf>,
     /// Calibration document (TOML) that the fit starts from; for several units the folder that has UNIT.toml of each
-    #[arg(long, short, value_name = "DOC")]
+    #[arg(long = "calibration", short = 'c', alias = "document", short_alias = 'd', value_name = "FILE")]
     document: Option<PathBuf>,
     #[command(flatten)]
     place: PlaceArgs,
@@ -58,7 +58,7 @@ pub(super) struct ModesArgs {
     output: OutputArgs,
 }
 
-const NO_DOCUMENT: &str = "a mode-reversed gyro counts, and a log does not say what a count is worth: give --document with increment \
+const NO_DOCUMENT: &str = "a mode-reversed gyro counts, and a log does not say what a count is worth: give --calibration with increment \
     weights, input axes, temperature channels and filter";
 
 impl ModesArgs {

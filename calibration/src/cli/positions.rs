@@ -35,7 +35,7 @@ use steps::{first_document, judged, tracks};
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     isotherm-calibrate positions --budget --positioning 5 --run-out 2\n  \
-    isotherm-calibrate positions cold.mcap room.mcap hot.mcap --document unit.toml --latitude 55.75 --out unit-positions.toml --html positions.html\n  \
+    isotherm-calibrate positions cold.mcap room.mcap hot.mcap --calibration unit.toml --latitude 55.75 --out unit-positions.toml --html positions.html\n  \
     isotherm-calibrate positions stand.mcap --plan my-plan.toml --gravity 9.8154 --times held.csv\n\n\
     Still poses are found in the logs and known by the gyros' turns between them. Every set of positions works that shows each axis up \
     and down; nine or more tell the stand's errors from the axes.")]
@@ -58,7 +58,7 @@ pub(super) struct PositionsArgs {
     times: Option<PathBuf>,
     /// Calibration document (TOML) that is completed, without it the accelerometers must stand along the case axes; for several
     /// units the folder that has UNIT.toml of each
-    #[arg(long, short, value_name = "DOC")]
+    #[arg(long = "calibration", short = 'c', alias = "document", short_alias = 'd', value_name = "FILE")]
     document: Option<PathBuf>,
     /// Log that the fit must not see, to judge it by; may be repeated
     #[arg(long, value_name = "LOG")]

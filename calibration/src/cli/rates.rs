@@ -22,8 +22,8 @@ use crate::runs::Run;
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     isotherm-calibrate rates x.mcap y.mcap z.mcap --axis x --axis y --axis z --rates 10,-10,50,-50,100,-100 \
-    --document unit.toml --latitude 55.75 --heading 30 --pitch 0 --roll 0 --out unit-rates.toml\n  \
-    isotherm-calibrate rates table.mcap --steps table.csv --document unit.toml --remove-mean\n\n\
+    --calibration unit.toml --latitude 55.75 --heading 30 --pitch 0 --roll 0 --out unit-rates.toml\n  \
+    isotherm-calibrate rates table.mcap --steps table.csv --calibration unit.toml --remove-mean\n\n\
     Plateaus of steady rate are found in the log, in the order of --rates; rests between them are found too. --steps names a CSV \
     with the columns log, axis, rate_deg_per_s, begin_s, end_s (the first and the last two may be left out), or TOML with a \
     [[step]] of the same keys for each; judging logs are numbered on behind the others, and of several units each counts its own \
@@ -54,7 +54,7 @@ pub(super) struct RatesArgs {
     steps: Option<PathBuf>,
     /// Calibration document (TOML) that the fit starts from, nominal scale and axes without it; for several units the folder that
     /// has UNIT.toml of each
-    #[arg(long, short, value_name = "DOC")]
+    #[arg(long = "calibration", short = 'c', alias = "document", short_alias = 'd', value_name = "FILE")]
     document: Option<PathBuf>,
     #[command(flatten)]
     place: PlaceArgs,
@@ -145,7 +145,7 @@ fn without_document(run: &Run, bar: Bar) -> Result<Document, Error> {
     })?;
     if gyros != 3 {
         return Err(Error::Usage(format!(
-            "{} has {gyros} gyros: only three of them have nominal axes. Give --document",
+            "{} has {gyros} gyros: only three of them have nominal axes. Give --calibration",
             run.name
         )));
     }

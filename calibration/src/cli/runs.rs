@@ -41,9 +41,12 @@ pub(crate) struct Reading {
     /// Leave out this much of each log's beginning (s); recordings are cut between messages
     #[arg(long, value_name = "SECONDS", default_value = "0", value_parser = seconds)]
     pub(crate) start: Span,
-    /// Take this much of each log (s); without it, all
+    /// Take this much of each log (s) (default: all)
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub(crate) duration: Option<Span>,
+    /// Stop this long after each log's beginning (s)
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, conflicts_with = "duration")]
+    pub(crate) end: Option<Span>,
 }
 
 impl LogArgs {
@@ -93,8 +96,13 @@ impl Reading {
         log: &[PathBuf],
         fallback: Option<&UnitId>,
     ) -> Result<BTreeMap<UnitId, Run>, Error> {
-        let end =
-            self.duration.map(|length| Span::from_ns(self.start.as_ns().saturating_add(length.as_ns())));
+        let length = |length: Span| Span::from_ns(self.start.as_ns().saturating_add(length.as_ns()));
+        let end = self.end.or_else(|| self.duration.map(length));
+        if let Some(end) = end.filter(|end| *end < self.start) {
+            let words =
+                format!("--end is {} s, must not be before --start, {} s", end.as_s(), self.start.as_s());
+            return Err(Error::Usage(words));
+        }
         let part = Part { start: self.start, end, ..Part::default() };
         let given = self.serial()?;
         let name = names(log);
@@ -102,7 +110,7 @@ impl Reading {
         if !are_recordings(files)? {
             let unit = given.as_ref().or(fallback).cloned().ok_or_else(|| {
                 Error::Usage(format!(
-                    "{name} is a text log, which does not say of which unit it is: give --unit SERIAL, or --document, which has it"
+                    "{name} is a text log, which does not say of which unit it is: give --unit SERIAL, or --calibration, which has it"
                 ))
             })?;
             let mapping = Box::new(self.text_mapping(files)?);

@@ -19,13 +19,13 @@ use stands::StandArgs;
 /// Bias and scale factor over temperature from chamber runs of units at rest or on a rate table
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
-    isotherm-calibrate thermal train.mcap --judge other.mcap --document unit.toml --out unit-new.toml --html unit.html\n  \
-    isotherm-calibrate thermal train.mcap --method lag --latitude 55.75 --heading 30 --document unit.toml --out unit-new.toml\n  \
+    isotherm-calibrate thermal train.mcap --judge other.mcap --calibration unit.toml --out unit-new.toml --html unit.html\n  \
+    isotherm-calibrate thermal train.mcap --method lag --latitude 55.75 --heading 30 --calibration unit.toml --out unit-new.toml\n  \
     isotherm-calibrate thermal chamber.tsv --mapping config/mappings/chamber-mems.toml --unit CHAMBER-MEMS --method lag \\\n      \
     --duration 3130 --judge chamber.tsv --judge-start 3130 --out chamber-mems.toml\n  \
-    isotherm-calibrate thermal up.mcap down.mcap --document unit.toml --latitude 55.75 --heading 30 --pitch 0 --roll 0 --roll 180 \\\n      \
+    isotherm-calibrate thermal up.mcap down.mcap --calibration unit.toml --latitude 55.75 --heading 30 --pitch 0 --roll 0 --roll 180 \\\n      \
     --out unit-new.toml\n  \
-    isotherm-calibrate thermal still.mcap turned.mcap --document unit.toml --latitude 55.75 --heading 30 --pitch 0 --roll 0 \\\n      \
+    isotherm-calibrate thermal still.mcap turned.mcap --calibration unit.toml --latitude 55.75 --heading 30 --pitch 0 --roll 0 \\\n      \
     --axis z --rate 0 --rate 20 --out unit-new.toml\n\n\
     A refused sensor keeps the terms that it had; the others are written, and the command ends with 1 unless --accept-partial.")]
 pub(super) struct ThermalArgs {
@@ -47,7 +47,7 @@ pub(super) struct ThermalArgs {
     #[arg(long, value_name = "SECONDS", requires = "judge")]
     judge_duration: Option<f64>,
     /// Document that the fit starts from and completes; for several units the folder that has UNIT.toml of each
-    #[arg(long, short, value_name = "BASE")]
+    #[arg(long = "calibration", short = 'c', alias = "document", short_alias = 'd', value_name = "FILE")]
     document: Option<PathBuf>,
     /// End with 0 although a sensor was refused
     #[arg(long)]
@@ -93,6 +93,7 @@ impl ThermalArgs {
         let judging = Reading {
             start: self.judge_start.map_or(Span::ZERO, Span::from_s),
             duration: self.judge_duration.map(Span::from_s),
+            end: None,
             ..self.log.reading.clone()
         };
         let named = Named {

@@ -26,7 +26,7 @@ use crate::written::Written;
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     isotherm-calibrate tumble gyro.txt.gz acc.txt.gz --mapping config/mappings/tumble-mems.toml --unit TUMBLE-0001 --gravity 9.81744 --out tumble.toml --html tumble.html\n  \
-    isotherm-calibrate tumble tumbled.mcap --document unit.toml --latitude 55.75 --out unit-tumbled.toml\n\n\
+    isotherm-calibrate tumble tumbled.mcap --calibration unit.toml --latitude 55.75 --out unit-tumbled.toml\n\n\
     Leave the unit alone for half a minute, then put it down in thirty or more different ways for two seconds each. The case axes \
     are defined by the accelerometers: z is that of the third, y lies in the plane of the second and third.")]
 pub(super) struct TumbleArgs {
@@ -34,7 +34,7 @@ pub(super) struct TumbleArgs {
     log: LogArgs,
     /// Calibration document (TOML) that is completed; without it everything else stands as the log has it; for several units the
     /// folder that has UNIT.toml of each
-    #[arg(long, short, value_name = "DOC")]
+    #[arg(long = "calibration", short = 'c', alias = "document", short_alias = 'd', value_name = "FILE")]
     document: Option<PathBuf>,
     #[command(flatten)]
     gravity: GravityArgs,

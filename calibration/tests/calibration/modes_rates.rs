@@ -129,7 +129,7 @@ fn modes_are_fitted_judged_written_and_reported() {
 
     // What is missing is asked for; what is there already is kept.
     assert!(fails(&["modes", text(&run), "--document", text(&base)], 2).contains("--latitude and --heading"));
-    assert!(fails(&["modes", text(&run), "--remove-mean"], 2).contains("give --document"));
+    assert!(fails(&["modes", text(&run), "--remove-mean"], 2).contains("give --calibration"));
     assert!(fails(&[&fit[..], &["--out", text(&out)]].concat(), 2).contains("--overwrite"));
     let other = ["modes", text(&run), "--document", text(&base), "--remove-mean", "--unit", "NOBODY"];
     assert!(fails(&other, 1).contains("is --unit right?"));

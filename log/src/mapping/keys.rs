@@ -4,7 +4,7 @@ use isotherm_correction::sample::OutputKind;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::{Column, Delimiter, Marks, ModeMapping, OnBadRow, StatusMapping, TimeUnit};
+use super::{Column, Delimiter, Encoding, Marks, ModeMapping, OnBadRow, StatusMapping, TimeUnit};
 
 /// How a text log is read.
 #[derive(Debug, Deserialize, JsonSchema)]
@@ -28,6 +28,9 @@ pub(super) struct MappingKeys {
 pub(super) struct FileKeys {
     /// Its name inside the log's folder, where the log is a folder.
     pub(super) name: Option<String>,
+    /// Encoding of the text.
+    #[serde(default)]
+    pub(super) encoding: Encoding,
     /// What stands between two cells.
     pub(super) delimiter: Delimiter,
     /// Lines that begin with this are passed over.

@@ -52,13 +52,14 @@ fn mapping(r: &mut Reader<'_>, keys: MappingKeys) -> Mapping {
 }
 
 fn file(r: &mut Reader<'_>, path: &str, keys: FileKeys) -> FileMapping {
-    let FileKeys { name, delimiter, comment, skip_lines, header, drop_rows, on_bad_row, .. } = keys;
+    let FileKeys { name, encoding, delimiter, comment, skip_lines, header, drop_rows, on_bad_row, .. } = keys;
     let decimal_mark = if keys.decimal_mark == DecimalMark::Comma { b',' } else { b'.' };
     if delimiter == Delimiter::Character(decimal_mark) {
         let why = "is also the delimiter: cells could not be told apart";
         r.report(&join(path, "decimal_mark"), why);
     }
-    let layout = Layout { delimiter, comment, skip_lines, header, drop_rows, decimal_mark, on_bad_row };
+    let layout =
+        Layout { encoding, delimiter, comment, skip_lines, header, drop_rows, decimal_mark, on_bad_row };
     if keys.gyro.is_none() && keys.accel.is_none() && keys.temperature.is_empty() {
         let what = "is missing: the file must have a [file.gyro], a [file.accel] or a [[file.temperature]]";
         r.report(&join(path, "gyro"), what);

@@ -8,7 +8,7 @@ use isotherm_correction::units::{Span, Timestamp};
 use super::assemble::{Assembler, Parts};
 use super::cells::{Cell, OpenQuote, split};
 use super::error::{LogError, LogFault, Reason};
-use super::input::{LONGEST_LINE, Line, Lines, Source};
+use super::input::{LONGEST_LINE, Line, Lines, Source, decoded};
 use super::resolve::{Columns, TickCells, resolve};
 use super::row::{Fault, Readings, Row};
 use super::{LogEvent, ReadReport};
@@ -57,7 +57,7 @@ impl FileReader {
     pub(super) fn new(path: &Path, source: Source, mapping: &FileMapping) -> Result<Self, LogError> {
         let mut reader = Self {
             name: path.display().to_string(),
-            lines: Lines::new(source),
+            lines: Lines::new(decoded(source, mapping.layout.encoding)),
             cells: Vec::new(),
             header: Vec::new(),
             layout: mapping.layout.clone(),

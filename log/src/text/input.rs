@@ -6,9 +6,11 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use encoding_rs_io::DecodeReaderBytesBuilder;
 use flate2::bufread::MultiGzDecoder;
 
 use crate::error::Error;
+use crate::mapping::Encoding;
 
 /// Longest line (bytes).
 pub(super) const LONGEST_LINE: usize = 1 << 20;
@@ -20,7 +22,7 @@ const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
 const UTF8_MARK: &[u8] = b"\xef\xbb\xbf";
 
 /// Bytes of a log, decompressed.
-pub(super) type Source = Box<dyn Read + Send>;
+pub(crate) type Source = Box<dyn Read + Send>;
 
 /// Counts the bytes that pass.
 #[derive(Debug)]
@@ -40,7 +42,7 @@ impl<R: Read> Read for Counted<R> {
 }
 
 /// Opens a file, decompressing it where it begins like gzip, and tells its size.
-pub(super) fn open(path: &Path, count: &Arc<AtomicU64>) -> Result<(Source, u64), Error> {
+pub(crate) fn open(path: &Path, count: &Arc<AtomicU64>) -> Result<(Source, u64), Error> {
     let failed = |source| Error::file(path, "open the log", source);
     let file = File::open(path).map_err(failed)?;
     let size = file.metadata().map_err(failed)?.len();
@@ -49,6 +51,17 @@ pub(super) fn open(path: &Path, count: &Arc<AtomicU64>) -> Result<(Source, u64),
     let source: Source =
         if start.starts_with(&GZIP_MAGIC) { Box::new(MultiGzDecoder::new(bytes)) } else { Box::new(bytes) };
     Ok((source, size))
+}
+
+/// The text of a source as UTF-8.
+pub(super) fn decoded(source: Source, encoding: Encoding) -> Source {
+    let from = match encoding {
+        Encoding::Utf8 => return source,
+        Encoding::Utf16Le => encoding_rs::UTF_16LE,
+        Encoding::Utf16Be => encoding_rs::UTF_16BE,
+        Encoding::Latin1 => encoding_rs::WINDOWS_1252,
+    };
+    Box::new(DecodeReaderBytesBuilder::new().encoding(Some(from)).bom_override(true).build(source))
 }
 
 /// What came of asking for a line.
@@ -63,7 +76,7 @@ pub(super) enum Line {
 }
 
 /// Lines of a log.
-pub(super) struct Lines {
+pub(crate) struct Lines {
     /// Where they come from.
     reader: BufReader<Source>,
     /// The current one, without its end.
@@ -111,6 +124,15 @@ impl Lines {
             self.line.drain(..UTF8_MARK.len());
         }
         Ok(Line::Read)
+    }
+
+    /// The next line as text; characters that are none are replaced. A line that is too long is an empty one.
+    pub(crate) fn next_line(&mut self) -> io::Result<Option<String>> {
+        Ok(match self.advance()? {
+            Line::End => None,
+            Line::TooLong => Some(String::new()),
+            Line::Read => Some(String::from_utf8_lossy(&self.line).into_owned()),
+        })
     }
 
     /// The current line, without its end.

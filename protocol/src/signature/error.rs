@@ -93,7 +93,7 @@ pub enum Wrong {
     },
     /// The text is to be signed, but has a signature.
     #[error(
-        "is signed already, by key {key_id}: leave it so, or have it replaced (`isotherm sign --replace`)"
+        "is signed already, by key {key_id}: leave it so, or have it replaced (`isotherm sign --overwrite`)"
     )]
     Signed {
         /// The key that the signature names.

@@ -25,7 +25,7 @@ use crate::output::Format;
     A recording is corrected by its own journal, all units at once: each with the calibrations, swaps and commands that it had \
     in the service, at the same ticks: `isotherm-replay correct session.mcap`. Where it has the corrected ticks of the service \
     too, they are compared to the bit.\n\n\
-    Exit code 3: recorder and service did not have the same, corrected and published ticks differ, or a part of the log could \
+    Exit code 3: units without journal were left out, recorder and service did not have the same, corrected and published ticks differ, or a part of the log could \
     not be read.")]
 #[expect(clippy::struct_excessive_bools, reason = "each is a switch of the command line")]
 pub(super) struct CorrectArgs {
@@ -36,39 +36,38 @@ pub(super) struct CorrectArgs {
     #[arg(long, short, value_name = "FILE")]
     calibration: Vec<PathBuf>,
     /// Where the corrected ticks go: a file for one unit, - for standard output; a folder (ending in /) for a file of each unit;
-    /// FILE.mcap for a recording of all units. Without it, only the summary is printed
+    /// FILE.mcap for a recording of all units (default: the summary alone)
     #[arg(long, short, value_name = "PATH")]
     out: Option<PathBuf>,
-    /// How they are written, other than to FILE.mcap; csv without it
-    #[arg(long, value_enum)]
+    /// How they are written, other than to FILE.mcap (default: csv)
+    #[arg(long, value_enum, hide_short_help = true)]
     format: Option<Format>,
-    /// How long a gyro tick waits for its accelerometer tick, in the log's time (ms), as the service's; 50 without it. A
-    /// recording's journal has this and the next three
-    #[arg(long, value_name = "MS")]
+    /// How long a gyro tick waits for its accelerometer tick, in the log's time (ms) (default: 50; recordings: as in the service)
+    #[arg(long, value_name = "MS", hide_short_help = true)]
     pairing_window_ms: Option<u32>,
-    /// A temperature reading takes effect for ticks that end this long after it (ms), as the service's; 50 without it
-    #[arg(long, value_name = "MS")]
+    /// A temperature reading takes effect for ticks that end this long after it (ms) (default: 50; recordings: as in the service)
+    #[arg(long, value_name = "MS", hide_short_help = true)]
     temperature_delay_ms: Option<u32>,
-    /// Ticks that are summed to one navigation step (1…1000), as the service's; 1 without it
-    #[arg(long, value_name = "TICKS")]
+    /// Ticks that are summed to one navigation step (1…1000) (default: 1; recordings: as in the service)
+    #[arg(long, value_name = "TICKS", hide_short_help = true)]
     navigation_ticks: Option<u16>,
-    /// Apply coning and sculling terms to navigation steps, as the service's
-    #[arg(long)]
+    /// Apply coning and sculling terms to navigation steps (recordings: as in the service)
+    #[arg(long, hide_short_help = true)]
     coning_sculling: bool,
     /// Leave out the swaps in a recording's journal: what is in force at the beginning stays
-    #[arg(long)]
+    #[arg(long, hide_short_help = true)]
     ignore_swaps: bool,
     /// Correct a recording as if it had no journal: by --calibration alone
-    #[arg(long, requires = "calibration", conflicts_with = "ignore_swaps")]
+    #[arg(long, requires = "calibration", conflicts_with = "ignore_swaps", hide_short_help = true)]
     ignore_journal: bool,
     /// Compare with the corrected ticks in a recording, though something is other than in the service
-    #[arg(long, conflicts_with = "no_compare")]
+    #[arg(long, conflicts_with = "no_compare", hide_short_help = true)]
     compare: bool,
     /// Do not compare with the corrected ticks in a recording
-    #[arg(long)]
+    #[arg(long, hide_short_help = true)]
     no_compare: bool,
-    /// Threads that correct the units of a recording, beside the one that reads it; 1: one for both. As many as there are cores without it
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    /// Threads that correct the units of a recording, beside the one that reads it; 1: one for both (default: as many as cores)
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), hide_short_help = true)]
     threads: Option<u16>,
     /// Print the summary as one JSON object
     #[arg(long)]

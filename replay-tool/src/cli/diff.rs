@@ -39,7 +39,7 @@ pub(super) struct DiffArgs {
     /// The second log
     #[arg(value_name = "B")]
     b: PathBuf,
-    /// Unit to compare, all without it; of a CSV, the unit that it is of; may be given several times
+    /// Unit serial, repeatable (default: all). CSV: the serial to assign
     #[arg(long, short, value_name = "SERIAL")]
     unit: Vec<String>,
     /// How much an angle increment may differ (rad)
@@ -51,7 +51,7 @@ pub(super) struct DiffArgs {
     /// How much any number that is not whole may differ, as a share of the larger of the two
     #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = not_negative)]
     tolerance_relative: f64,
-    /// Ticks to show before and behind the first difference
+    /// Ticks to show before and after the first difference
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u16).range(0..=1000))]
     around: u16,
     /// Print the result as one JSON object
@@ -175,7 +175,7 @@ fn largest(what: &str, unit_of_measure: &str, as_rate: &str, largest: &[Largest;
     let line = |(axis, largest): (&&str, &Largest)| match largest.increment {
         0.0 => format!("  {what} {axis}: none\n"),
         increment => format!(
-            "  {what} {axis}: {increment:e} {unit_of_measure} ({:e} {as_rate}) at tick {}\n",
+            "  {what} {axis}: {increment:.3e} {unit_of_measure} ({:.3e} {as_rate}) at tick {}\n",
             largest.equivalent, largest.sequence
         ),
     };

@@ -1,6 +1,7 @@
 //! `isotherm-replay info`.
 
-mod tables;
+mod readings;
+pub(super) mod tables;
 
 use clap::Args;
 use isotherm_log::info::{FileInfo, LogInfo, Survey};
@@ -33,10 +34,17 @@ pub(super) struct InfoArgs {
 
 /// Runs the command.
 pub(super) fn run(args: &InfoArgs) -> Result<Outcome, Error> {
-    let recording = args.log.is_recording()?;
+    let info = survey(&args.log)?;
+    print(if args.json { show::json(&info) } else { tables::of(&info) }.as_bytes())?;
+    Ok(outcome(&info))
+}
+
+/// Reads the log to its end.
+pub(super) fn survey(log: &LogArgs) -> Result<LogInfo, Error> {
+    let recording = log.is_recording()?;
     let unnamed = UnitId::new(UNNAMED).ok();
-    let mut messages = args.log.messages(BATCH, unnamed.as_ref())?;
-    let files = args.log.log_files()?;
+    let mut messages = log.messages(BATCH, unnamed.as_ref())?;
+    let files = log.log_files()?;
     let files: Vec<_> = files.iter().map(|path| FileInfo::of(path)).collect::<Result<_, _>>()?;
     let mut survey = Survey::new(recording);
     let mut bar = Bar::over_log(messages.progress());
@@ -50,13 +58,11 @@ pub(super) fn run(args: &InfoArgs) -> Result<Outcome, Error> {
         bar.step(|| format!("{} ticks", survey.ticks()));
     }
     bar.finish();
-    let info = survey.finish(files, messages.report());
-    print(if args.json { show::json(&info) } else { tables::of(&info) }.as_bytes())?;
-    Ok(outcome(&info))
+    Ok(survey.finish(files, messages.report()))
 }
 
 /// How it went.
-fn outcome(info: &LogInfo) -> Outcome {
+pub(super) fn outcome(info: &LogInfo) -> Outcome {
     let cut = |file: &FileInfo| file.recording.as_ref().is_some_and(|recording| !recording.complete);
     if info.reading.lost_data() || info.files.iter().any(cut) { Outcome::DataLoss } else { Outcome::Complete }
 }

@@ -17,19 +17,19 @@ use crate::error::Error;
 /// Which log, and which part of it.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct LogArgs {
-    /// Recordings, read one behind the other; or the files of one text log in the order of its mapping, or the folder that has them
+    /// Recordings, read in sequence; or the files of one text log in the mapping's order, or their folder
     #[arg(required = true, value_name = "LOG")]
     pub(crate) log: Vec<PathBuf>,
-    /// Column mapping of a text log (TOML); ready ones are in config/mappings
+    /// Column mapping of a text log (TOML); `isotherm-replay import` makes one
     #[arg(long, short, value_name = "FILE")]
     pub(crate) mapping: Option<PathBuf>,
-    /// Unit to take from recordings, all without it; of a text log, the unit that it is of; may be given several times
+    /// Unit serial, repeatable (default: all). Text log: the serial to assign
     #[arg(long, short, value_name = "SERIAL")]
     pub(crate) unit: Vec<String>,
     /// Begin this long after the log's beginning (s); recordings are cut between messages
     #[arg(long, value_name = "SECONDS", default_value = "0", value_parser = seconds)]
     pub(crate) start: Span,
-    /// Take this much of the log (s); without it, all
+    /// Take this much of the log (s) (default: all)
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub(crate) duration: Option<Span>,
     /// Stop this long after the log's beginning (s)
@@ -137,7 +137,7 @@ impl LogArgs {
         }
         let log = self.log.first().map(|path| path.display().to_string()).unwrap_or_default();
         Err(Error::Usage(format!(
-            "{log} is no recording, and a text log needs --mapping FILE: ready ones are in config/mappings"
+            "{log} is no recording, and a text log needs --mapping FILE: `isotherm-replay import {log}` makes one, ready ones are in config/mappings"
         )))
     }
 

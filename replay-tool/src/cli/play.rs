@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use clap::Args;
-use isotherm_bus::SessionOptions;
+use isotherm_bus::ClientOptions;
 use isotherm_bus::outlet::least_in_flight;
 use isotherm_correction::sample::ChannelName;
 use isotherm_correction::units::Span;
@@ -31,10 +31,10 @@ const MAX_COPIES: u32 = 999;
 
 /// Play a log to the raw topics of its units
 #[derive(Debug, Args)]
-#[command(after_help = "Example, with `isotherm serve --listen tcp/127.0.0.1:7447` running:\n  \
+#[command(after_help = "Example, with `isotherm serve` running:\n  \
     isotherm-replay simulate --preset mems-chamber --duration 60 --out mems.csv\n  \
-    isotherm-replay play mems.csv --mapping mems.mapping.toml --unit MEMS-0001 --connect tcp/127.0.0.1:7447 --speed max\n  \
-    isotherm-replay play mems.csv -m mems.mapping.toml -u MEMS --connect tcp/127.0.0.1:7447 --speed max --batch 10 \
+    isotherm-replay play mems.csv --mapping mems.mapping.toml --unit MEMS-0001 --speed max\n  \
+    isotherm-replay play mems.csv -m mems.mapping.toml -u MEMS --speed max --batch 10 \
     --copies 20 --seed 1 --loss 0.01 --duplicate 0.01 --reorder 0.01\n\n\
     At any speed, ticks are sent no further ahead of what comes back corrected than --in-flight, so that none is lost.\n\
     Keys, where input and standard error are a terminal: space pauses and goes on; n or → (paused) plays up to the next gyro\n\
@@ -44,55 +44,55 @@ pub(super) struct PlayArgs {
     #[command(flatten)]
     log: LogArgs,
     #[command(flatten)]
-    session: SessionOptions,
+    session: ClientOptions,
     /// Times as fast as recorded, or max: as fast as the service keeps up without losing a tick
     #[arg(long, value_name = "N|max", default_value = "1")]
     speed: Speed,
     /// Whose clock sets the pace of a recording: of its producers, or of its reception [default: receive; text logs: event]
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, hide_short_help = true)]
     clock: Option<ClockArg>,
     /// Play the log again and again, or so many times
-    #[arg(long = "loop", value_name = "N", num_args = 0..=1, require_equals = true, default_missing_value = "0")]
+    #[arg(long = "loop", value_name = "N", num_args = 0..=1, require_equals = true, default_missing_value = "0", hide_short_help = true)]
     passes: Option<u64>,
     /// Take only messages of these keys, e.g. 'imu/*/raw/gyro'; may be given several times
-    #[arg(long, value_name = "KEY", value_parser = key_expression)]
+    #[arg(long, value_name = "KEY", value_parser = key_expression, hide_short_help = true)]
     topic: Vec<OwnedKeyExpr>,
     /// Play a unit of the log under another serial; may be given several times
     #[arg(long = "as", value_name = "OLD=NEW", value_parser = renaming)]
     names: Vec<(UnitId, UnitId)>,
     /// Play each unit as so many: SERIAL-001, SERIAL-002 and so on
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_COPIES)))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_COPIES)), hide_short_help = true)]
     copies: Option<u32>,
     /// Delay messages by up to this (ms of the log's time), keeping their order
-    #[arg(long, value_name = "MS", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=3_600_000))]
+    #[arg(long, value_name = "MS", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=3_600_000), hide_short_help = true)]
     jitter_ms: u32,
     /// Leave out this share of the messages (0 to 1)
-    #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = share)]
+    #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = share, hide_short_help = true)]
     loss: f64,
     /// Send this share of the messages twice (0 to 1)
-    #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = share)]
+    #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = share, hide_short_help = true)]
     duplicate: f64,
     /// Send this share of the messages behind one to four later ones of their key (0 to 1)
-    #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = share)]
+    #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = share, hide_short_help = true)]
     reorder: f64,
     /// Where the chance of the four comes from: the same for the same seed and serial
-    #[arg(long, value_name = "S", default_value_t = 1)]
+    #[arg(long, value_name = "S", default_value_t = 1, hide_short_help = true)]
     seed: u64,
     /// Number of the first series, in place of one that no player had before: for runs that are equal to the byte
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", hide_short_help = true)]
     series: Option<u64>,
     /// Gyro ticks in one message of a text log (1 to 4096) [default: 1]; recordings keep theirs
-    #[arg(long, value_name = "TICKS", value_parser = clap::value_parser!(u16).range(1..=4096))]
+    #[arg(long, value_name = "TICKS", value_parser = clap::value_parser!(u16).range(1..=4096), hide_short_help = true)]
     batch: Option<u16>,
     /// Most gyro ticks of a unit sent and not come back; at least 2 × batch + 256 [default: 16384 shared among the units, at most
     /// 4096 each]
-    #[arg(long, value_name = "TICKS")]
+    #[arg(long, value_name = "TICKS", hide_short_help = true)]
     in_flight: Option<u64>,
     /// Do not wait for anything to come back: for listeners other than the service
-    #[arg(long, conflicts_with = "in_flight")]
+    #[arg(long, conflicts_with = "in_flight", hide_short_help = true)]
     no_acknowledge: bool,
     /// How long to wait for service and subscribers, and for what comes back (s)
-    #[arg(long, value_name = "SECONDS", default_value = "10", value_parser = seconds)]
+    #[arg(long, value_name = "SECONDS", default_value = "10", value_parser = seconds, hide_short_help = true)]
     wait: Span,
     /// What the instrument of a text log reports of itself, once a second: a voltage (V) or counter that the document tests
     #[arg(long, value_name = "NAME=VALUE", value_parser = health_reading)]

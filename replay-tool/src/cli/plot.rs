@@ -1,10 +1,12 @@
 //! `isotherm-replay plot`.
 
 use std::fmt::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
+use isotherm_log::diff::is_csv;
 use isotherm_log::file::{read_small_text, refuse_overwriting, write_whole};
+use isotherm_log::part::Messages;
 use isotherm_log::plot::{PlotLog, PlotOptions, PlotSummary, plot};
 use isotherm_log::source::LogReport;
 use isotherm_protocol::key::UnitId;
@@ -17,6 +19,8 @@ use crate::progress::Bar;
 
 /// Ticks in one batch of a text log.
 const BATCH: usize = 256;
+/// Most bins of a quantity where nobody says.
+const DETAIL: u32 = 32_768;
 /// What a text log's unit is called where nobody says.
 const UNNAMED: &str = "log";
 
@@ -29,14 +33,14 @@ const UNNAMED: &str = "log";
 pub(super) struct PlotArgs {
     #[command(flatten)]
     log: LogArgs,
-    /// Another log, to be drawn over the same time axis with its difference; it is read as the first, may be given several times
-    /// for the files of one log
+    /// Another log, drawn over the same time axis with its difference; repeatable for the files of one log. Also a CSV of
+    /// `isotherm-replay correct`
     #[arg(long, value_name = "LOG")]
     beside: Vec<PathBuf>,
-    /// Column mapping of the other log, where it is a text log; without it, that of the first
+    /// Column mapping of the other log (default: that of the first)
     #[arg(long, value_name = "FILE", requires = "beside")]
     beside_mapping: Option<PathBuf>,
-    /// Unit of the other log; without it, as for the first
+    /// Unit of the other log (default: as for the first)
     #[arg(long, value_name = "SERIAL", requires = "beside")]
     beside_unit: Vec<String>,
     /// Calibration document (TOML): text logs are corrected with it and raw counts scaled; recordings know their own
@@ -46,7 +50,7 @@ pub(super) struct PlotArgs {
     #[arg(long, short, value_name = "FILE")]
     out: PathBuf,
     /// Most bins of each quantity; logs of up to three times as many ticks are drawn tick by tick
-    #[arg(long, value_name = "BINS", default_value_t = 32_768, value_parser = clap::value_parser!(u32).range(64..=1_048_576))]
+    #[arg(long, value_name = "BINS", default_value_t = DETAIL, value_parser = clap::value_parser!(u32).range(64..=1_048_576))]
     detail: u32,
     /// Print the summary as one JSON object
     #[arg(long)]
@@ -70,7 +74,8 @@ impl PlotArgs {
         }
         let mut other = self.log.clone();
         other.log.clone_from(&self.beside);
-        let recording = other.log.first().is_some_and(|path| isotherm_log::source::is_recording(path));
+        let own = |path: &PathBuf| isotherm_log::source::is_recording(path) || is_csv(path);
+        let recording = other.log.first().is_some_and(own);
         other.mapping = self.beside_mapping.clone().or_else(|| other.mapping.filter(|_| !recording));
         if !self.beside_unit.is_empty() {
             other.unit.clone_from(&self.beside_unit);
@@ -81,6 +86,40 @@ impl PlotArgs {
 
 /// Runs the command.
 pub(super) fn run(args: &PlotArgs) -> Result<Outcome, Error> {
+    let (bytes, summary) = draw(args)?;
+    let report = Report { page: args.out.display().to_string(), bytes, summary: &summary };
+    print(if args.json { show::json(&report) } else { human(&report) }.as_bytes())?;
+    let lost = summary.reading.iter().any(LogReport::lost_data);
+    Ok(if lost { Outcome::DataLoss } else { Outcome::Complete })
+}
+
+/// Draws a text log that a mapping reads.
+pub(super) fn first_plot(log: &LogArgs, out: &Path) -> Result<(), Error> {
+    let args = PlotArgs {
+        log: log.clone(),
+        beside: Vec::new(),
+        beside_mapping: None,
+        beside_unit: Vec::new(),
+        calibration: None,
+        out: out.to_owned(),
+        detail: DETAIL,
+        json: false,
+    };
+    draw(&args).map(drop)
+}
+
+/// A CSV that `isotherm-replay correct` wrote, which needs no mapping; it is of the unit that is given, else of `unnamed`.
+fn corrected(log: &LogArgs, unnamed: Option<&UnitId>) -> Result<Option<Messages>, Error> {
+    let [path] = log.log.as_slice() else { return Ok(None) };
+    if !is_csv(path) {
+        return Ok(None);
+    }
+    let unit = log.units()?.pop_first().or_else(|| unnamed.cloned());
+    unit.map(|unit| Ok(Messages::of_corrected(path, &unit, &log.part()?)?)).transpose()
+}
+
+/// Writes the page; its length, and what it shows.
+fn draw(args: &PlotArgs) -> Result<(usize, PlotSummary), Error> {
     let other = args.other();
     let mut inputs = args.log.inputs();
     inputs.extend(other.iter().flat_map(LogArgs::inputs));
@@ -95,7 +134,10 @@ pub(super) fn run(args: &PlotArgs) -> Result<Outcome, Error> {
     let mut logs = Vec::new();
     let mut bar = None;
     for log in std::iter::once(&args.log).chain(&other) {
-        let messages = log.messages(BATCH, unnamed.as_ref())?;
+        let messages = match corrected(log, unnamed.as_ref())? {
+            Some(messages) => messages,
+            None => log.messages(BATCH, unnamed.as_ref())?,
+        };
         bar.get_or_insert_with(|| Bar::over_log(messages.progress()));
         let names: Vec<_> = log.log.iter().filter_map(|path| path.file_name()).collect();
         let name = names.iter().map(|name| name.to_string_lossy()).collect::<Vec<_>>().join(", ");
@@ -118,10 +160,7 @@ pub(super) fn run(args: &PlotArgs) -> Result<Outcome, Error> {
     if let Some(bar) = &bar {
         bar.finish();
     }
-    let report = Report { page: args.out.display().to_string(), bytes: html.len(), summary: &summary };
-    print(if args.json { show::json(&report) } else { human(&report) }.as_bytes())?;
-    let lost = summary.reading.iter().any(LogReport::lost_data);
-    Ok(if lost { Outcome::DataLoss } else { Outcome::Complete })
+    Ok((html.len(), summary))
 }
 
 /// The summary in words.

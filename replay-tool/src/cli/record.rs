@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
-use isotherm_bus::SessionOptions;
+use isotherm_bus::ClientOptions;
 use isotherm_correction::units::Span;
 use isotherm_log::offline::unit_id;
 
@@ -26,10 +26,10 @@ const SMALLEST_QUEUE: u64 = 1 << 20;
 #[command(
     after_help = "Example, of whatever is published on this address for five seconds, with no service to ask:\n  \
     isotherm-replay record run.mcap --listen tcp/127.0.0.1:0 --no-service --duration 5\n\n\
-    With `isotherm serve --listen tcp/127.0.0.1:7447` running, the recording alone is enough to correct again what the service\n\
+    With `isotherm serve` running, the recording alone is enough to correct again what the service\n\
     corrected, to the bit: it holds raw and corrected messages, status, the journal of every unit, the calibration documents,\n\
     the service's configuration and the units' histories. Ctrl-C ends it in order:\n  \
-    isotherm-replay record run.mcap --connect tcp/127.0.0.1:7447\n\n\
+    isotherm-replay record run.mcap\n\n\
     Exit code 3: messages were lost, or the disk was full; the files hold everything up to there."
 )]
 #[expect(clippy::struct_excessive_bools, reason = "each is a switch of the command line")]
@@ -38,12 +38,11 @@ pub(super) struct RecordArgs {
     #[arg(value_name = "OUT")]
     out: PathBuf,
     #[command(flatten)]
-    session: SessionOptions,
-    /// Serial of a unit to record, all without it; may be given several times
+    session: ClientOptions,
+    /// Unit serial, repeatable (default: all)
     #[arg(long, short, value_name = "SERIAL")]
     unit: Vec<String>,
-    /// raw, reference, corrected, status, service, journal, or a key expression; may be given several times; all of these
-    /// without it
+    /// raw, reference, corrected, status, service, journal, or a key expression; repeatable (default: all of these)
     #[arg(long, short, value_name = "TOPIC")]
     topic: Vec<TopicFilter>,
     /// Stop after this long (s)
@@ -53,34 +52,34 @@ pub(super) struct RecordArgs {
     #[arg(long, conflicts_with = "no_service")]
     until_service_stops: bool,
     /// How long to wait for a service, and for its answers (s)
-    #[arg(long, value_name = "SECONDS", default_value = "10", value_parser = seconds)]
+    #[arg(long, value_name = "SECONDS", default_value = "10", value_parser = seconds, hide_short_help = true)]
     timeout: Span,
     /// Wait for a service however long it takes
     #[arg(long, conflicts_with = "no_service")]
     wait: bool,
     /// Record without a service, or without asking it: the log cannot be corrected again to the bit
-    #[arg(long)]
+    #[arg(long, hide_short_help = true)]
     no_service: bool,
     /// How chunks are compressed
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, hide_short_help = true)]
     compression: Compression,
     /// End a chunk after this long at the latest (s): what a kill can cost
-    #[arg(long, value_name = "SECONDS", default_value = "1", value_parser = seconds)]
+    #[arg(long, value_name = "SECONDS", default_value = "1", value_parser = seconds, hide_short_help = true)]
     chunk_seconds: Span,
     /// Begin a new file when one is this long (bytes, or with K, M, G: 1024, 1024², 1024³)
-    #[arg(long, value_name = "BYTES", value_parser = bytes)]
+    #[arg(long, value_name = "BYTES", value_parser = bytes, hide_short_help = true)]
     max_size: Option<u64>,
     /// Begin a new file after this long (s)
-    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, hide_short_help = true)]
     max_duration: Option<Span>,
     /// Keep so many of the newest files and delete older ones of this recording
-    #[arg(long, value_name = "FILES", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "FILES", value_parser = clap::value_parser!(u32).range(1..), hide_short_help = true)]
     keep: Option<u32>,
     /// Write over files of this name
     #[arg(long)]
     overwrite: bool,
     /// What may wait in memory to be written (bytes, or with K, M, G); messages beyond it are counted as lost
-    #[arg(long, value_name = "BYTES", default_value = "256M", value_parser = bytes)]
+    #[arg(long, value_name = "BYTES", default_value = "256M", value_parser = bytes, hide_short_help = true)]
     queue: u64,
     /// Print the summary as one JSON object
     #[arg(long)]

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Duration;
 
-use isotherm_bus::{BusError, SessionOptions, presence};
+use isotherm_bus::{BusError, Role, presence};
 use isotherm_protocol::key;
 use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
 use tokio::task::JoinHandle;
@@ -19,40 +19,24 @@ use crate::error::Error;
 
 /// How long one wait for a service takes where it is repeated.
 const ONE_WAIT: Duration = Duration::from_secs(5);
-/// How long to wait before a session is opened again.
-const OPEN_AGAIN: Duration = Duration::from_millis(500);
+/// A wait that ends by a signal.
+const FOREVER: Duration = Duration::from_secs(100 * 365 * 86_400);
 
-/// Opens the session; tries again where a service is waited for.
+/// Opens the session, as a client where it can be one: a peer hears only from those that it is connected to itself, and raw messages
+/// come from producers; to a client the service, or a router, passes them on.
 pub(super) async fn open(options: &RecordOptions, stop: &mut Stop) -> Result<Session, Error> {
-    loop {
-        let opened = tokio::select! {
-            opened = open_once(&options.session) => opened,
-            () = stop.asked() => return Err(Error::Stopped),
-        };
-        match opened {
-            Err(BusError::Open(_)) if options.service == ServiceWait::Forever => {
-                tokio::select! {
-                    () = tokio::time::sleep(OPEN_AGAIN) => {}
-                    () = stop.asked() => return Err(Error::Stopped),
-                }
-            }
-            opened => return Ok(opened?),
-        }
+    let way = match options.service {
+        ServiceWait::Without => options.session.way_if_stated(Role::Listener)?,
+        _ => options.session.way(Role::Listener)?,
+    };
+    let limit = match options.service {
+        ServiceWait::Forever => FOREVER,
+        ServiceWait::Within(_) | ServiceWait::Without => options.query_limit,
+    };
+    tokio::select! {
+        opened = way.open_patiently(limit, |_| ()) => Ok(opened?),
+        () = stop.asked() => Err(Error::Stopped),
     }
-}
-
-/// Opens the session: as a client where there is one endpoint and nothing else is said. A peer hears only from those that it is
-/// connected to itself, and raw messages come from producers; to a client the service, or a router, passes them on.
-async fn open_once(options: &SessionOptions) -> Result<Session, BusError> {
-    if options.config.is_some() || options.connect.len() != 1 || !options.listen.is_empty() {
-        return isotherm_bus::open(options).await;
-    }
-    let mut config = options.to_config()?;
-    for (option, value) in [("mode", "\"client\""), ("listen/endpoints", "[]")] {
-        let set = config.insert_json5(option, value);
-        set.map_err(|source| BusError::Option { option, value: value.to_owned(), source })?;
-    }
-    zenoh::open(config).await.map_err(BusError::Open)
 }
 
 /// Waits for a service, as the options say.

@@ -111,6 +111,38 @@ fn one_coefficient_changed_in_its_last_digit_is_found_at_the_first_tick_that_it_
 }
 
 #[test]
+fn units_that_nothing_is_known_of_are_left_out_and_the_others_corrected() {
+    let folder = simulated();
+    let text = Mapping::load(&folder.path().join("mems.mapping.toml")).unwrap();
+    let serials: Vec<String> = (0..40).map(|number| format!("BARE-{number}")).collect();
+    let mut writer =
+        RecordingWriter::create(&folder.path().join("many.mcap"), RecordingOptions::default()).unwrap();
+    let units = serials.iter().map(String::as_str).chain(["MEMS-0001"]);
+    for unit in units {
+        let files = LogFiles::Text {
+            paths: vec![folder.path().join("mems.csv")],
+            mapping: Box::new(text.clone()),
+            unit: isotherm_protocol::key::UnitId::new(unit).unwrap(),
+            batch_ticks: 64,
+        };
+        let mut messages = files.open(&Part::default()).unwrap();
+        while let Some(message) = messages.next_message().unwrap() {
+            writer.write(&message).unwrap();
+        }
+    }
+    writer.finish().unwrap();
+    let many = ["correct", "many.mcap", "--calibration", "mems.toml", "--out", "many.csv"];
+    let words = ended(&replay(folder.path(), &many), 3);
+    assert!(words.contains("no journal to correct BARE-0, ") && words.contains(" and 32 more by"), "{words}");
+    assert!(words.len() < 500, "{words}");
+    correct(folder.path(), "mems.toml", "text.csv");
+    ended(&replay(folder.path(), &["diff", "text.csv", "many.csv"]), 0);
+    // One that is asked for by name must be there.
+    let words = ended(&replay(folder.path(), &["correct", "many.mcap", "--unit", "BARE-3"]), 2);
+    assert!(words.contains("no journal to correct BARE-3 by"), "{words}");
+}
+
+#[test]
 fn a_recording_of_raw_messages_is_corrected_with_a_document_as_its_text_is() {
     let folder = simulated();
     correct(folder.path(), "mems.toml", "text.csv");
@@ -128,6 +160,36 @@ fn a_recording_of_raw_messages_is_corrected_with_a_document_as_its_text_is() {
         let output = replay(folder.path(), &["diff", "text.csv", file]);
         ended(&output, 0);
     }
+    // Of a text log too.
+    let log = [
+        "correct",
+        "mems.csv",
+        "--mapping",
+        "mems.mapping.toml",
+        "--calibration",
+        "mems.toml",
+        "--out",
+        "of-text.mcap",
+    ];
+    ended(&replay(folder.path(), &log), 0);
+    ended(&replay(folder.path(), &["diff", "text.csv", "of-text.mcap"]), 0);
+    // Either is drawn beside the log.
+    let plot = [
+        "plot",
+        "mems.csv",
+        "--mapping",
+        "mems.mapping.toml",
+        "--calibration",
+        "mems.toml",
+        "--json",
+        "--out",
+    ];
+    let output = replay(folder.path(), &[&plot[..], &["both.html", "--beside", "text.csv"]].concat());
+    ended(&output, 0);
+    let summary: Value = serde_json::from_str(&stdout(&output)).unwrap();
+    let difference = &summary["differences"]["log"];
+    let ticks = (difference["common_ticks"].as_u64(), difference["differing_ticks"].as_u64());
+    assert_eq!(ticks, (Some(2000), Some(0)), "{summary}");
     let wire = raw(&["--calibration", "mems.toml", "--format", "wire", "--out", "raw.wire"]);
     ended(&wire, 0);
     ended(&replay(folder.path(), &["diff", "made.mcap", "raw.wire"]), 0);

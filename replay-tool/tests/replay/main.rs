@@ -14,6 +14,7 @@ mod common;
 mod conversions;
 mod correct_diff_step;
 mod examples;
+mod imports;
 mod info_plot;
 mod python_recordings;
 mod real_logs;

@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use isotherm_document::parse_toml;
+use isotherm_bus::Json5Problem;
+use isotherm_document::{Reader, parse_toml};
 use isotherm_protocol::digest::Digest;
 use isotherm_protocol::document::{Channel, Document, Parsed, Problem};
 use isotherm_protocol::overlay::{Overlay, ParsedOverlay, is_overlay};
@@ -142,6 +143,14 @@ fn temperatures(channels: &[Channel]) -> String {
 
 fn check_service(text: &str, path: &Path) -> Checked {
     let settings = Settings::parse(text, path)?;
+    if let Some(folder) = settings.calibrations.as_deref().filter(|folder| !folder.is_dir()) {
+        // A service with last good sets goes on without it; whoever checks wants to know.
+        let file = path.display().to_string();
+        let mut reader = Reader::new(text, Some(&file));
+        let words = format!("must be an existing folder; looked for {}", folder.display());
+        reader.report("calibrations", words);
+        return Err(reader.into_problems().unwrap_or_default());
+    }
     // What the service would say of its keys at the start.
     let keys = settings.swap.trusted_keys.as_deref().map(read_trusted_keys).transpose()?;
     let warnings = keys.map_or_else(Vec::new, |(_, warnings)| warnings);
@@ -167,27 +176,11 @@ fn check_zenoh(text: &str, file: &str) -> Checked {
             Ok((Summary { summary: words, unit: None, digest: None, signature: None }, Vec::new()))
         }
         Err(error) => {
-            let message = isotherm_bus::words(&error);
-            let (line, column) = position(&message).unwrap_or((1, 1));
-            let message = message.lines().map(str::trim).collect::<Vec<_>>().join(" ");
-            // The parser quotes the whole line, however long, and whatever is in it.
+            let Json5Problem { place, message } = Json5Problem::of(&error);
+            let (line, column) = place.unwrap_or((1, 1));
             let message: String =
                 message.chars().filter(|c| !c.is_control()).take(MAX_MESSAGE_CHARS).collect();
             Err(vec![Problem { line, column, ..whole(file, message) }])
         }
     }
-}
-
-/// The place in a message of the JSON5 parser: ` --> 3:7`, or `line: 3, column: 7`.
-fn position(message: &str) -> Option<(usize, usize)> {
-    let number = |text: &str| {
-        text.trim_start().chars().take_while(char::is_ascii_digit).collect::<String>().parse().ok()
-    };
-    if let Some((_, place)) = message.split_once("--> ") {
-        let (line, column) = place.split_once(':')?;
-        return Some((number(line)?, number(column)?));
-    }
-    let (_, place) = message.split_once("line: ")?;
-    let (_, column) = place.split_once("column: ")?;
-    Some((number(place)?, number(column)?))
 }

@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::time::Duration;
 
+use isotherm_bus::endpoint::address;
 use isotherm_correction::unit::Uncalibrated;
 use isotherm_correction::units::{AngularRate, Span, SpecificForce};
 use zenoh::qos::CongestionControl;
@@ -96,8 +97,8 @@ impl Settings {
             },
             zenoh: ZenohKeys {
                 config: session.config.as_deref().map(text),
-                connect: session.connect.iter().map(|endpoint| without_options(endpoint)).collect(),
-                listen: session.listen.iter().map(|endpoint| without_options(endpoint)).collect(),
+                connect: session.connect.iter().map(|endpoint| address(endpoint).to_owned()).collect(),
+                listen: session.listen.iter().map(|endpoint| address(endpoint).to_owned()).collect(),
                 namespace: session.namespace.clone(),
             },
         }
@@ -106,11 +107,6 @@ impl Settings {
 
 fn text(path: &Path) -> String {
     path.display().to_string()
-}
-
-/// An endpoint without its metadata and options: those of a link with TLS may be the key itself.
-fn without_options(endpoint: &str) -> String {
-    endpoint.split(['?', '#']).next().unwrap_or_default().to_owned()
 }
 
 fn ms(duration: Duration) -> u32 {

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use clap::Args;
-use isotherm_bus::{BusError, SessionOptions};
+use isotherm_bus::{BusError, ClientOptions, Role};
 use isotherm_protocol::codec::{self, Message};
 use isotherm_protocol::escape::is_unfit;
 use isotherm_protocol::key::{self, UnitId};
@@ -18,17 +18,14 @@ use zenoh::query::{ConsolidationMode, QueryTarget};
 use super::ConsoleError;
 use crate::text::read_bounded;
 
-/// Where the service listens as shipped (`config/zenoh/peer.json5`).
-const SHIPPED_LOCATOR: &str = "tcp/127.0.0.1:7447";
-
 /// How to reach the service.
 #[derive(Debug, Clone, Args)]
 pub struct ClientArgs {
-    /// How to reach the service; without any of these: tcp/127.0.0.1:7447
+    /// How to reach the service
     #[command(flatten)]
-    pub session: SessionOptions,
+    pub session: ClientOptions,
     /// How long to wait for an answer (s)
-    #[arg(long, value_name = "SECONDS", default_value = "5", value_parser = seconds)]
+    #[arg(long, value_name = "SECONDS", default_value = "5", value_parser = seconds, hide_short_help = true)]
     pub timeout: Duration,
 }
 
@@ -47,30 +44,15 @@ fn seconds(text: &str) -> Result<Duration, String> {
 pub(super) struct Client {
     pub(super) session: Session,
     pub(super) timeout: Duration,
-    tried: Vec<String>,
+    tried: String,
 }
 
 impl Client {
     /// Opens the session.
     pub(super) async fn open(args: &ClientArgs) -> Result<Self, ConsoleError> {
-        let mut options = args.session.clone();
-        if options.connect.is_empty() && options.config.is_none() {
-            options.connect = vec![SHIPPED_LOCATOR.to_owned()];
-        }
-        let tried = match (&options.config, options.connect.as_slice()) {
-            (Some(config), []) => vec![config.display().to_string()],
-            (_, connect) => connect.to_vec(),
-        };
-        // A task of its own: opening may hold its thread, and a timeout on the same one would not be heard.
-        let opening = tokio::spawn(async move { isotherm_bus::open(&options).await });
-        match tokio::time::timeout(args.timeout, opening).await {
-            Ok(Ok(Ok(session))) => Ok(Self { session, timeout: args.timeout, tried }),
-            Ok(Ok(Err(source))) => Err(ConsoleError::Bus { source, tried }),
-            Ok(Err(_)) | Err(_) => {
-                let key = key::ALL_STATUS.to_owned();
-                Err(ConsoleError::NoAnswer { key, waited: args.timeout, tried })
-            }
-        }
+        let way = args.session.way(Role::Peer)?;
+        let session = way.open(args.timeout).await?;
+        Ok(Self { session, timeout: args.timeout, tried: way.tried().join(", ") })
     }
 
     /// Ends the session.
@@ -80,12 +62,9 @@ impl Client {
     }
 
     /// Something that could not be declared.
-    pub(super) fn declare(&self, key: &str) -> impl Fn(zenoh::Error) -> ConsoleError + '_ {
+    pub(super) fn declare(key: &str) -> impl Fn(zenoh::Error) -> ConsoleError + use<> {
         let key = key.to_owned();
-        move |source| ConsoleError::Bus {
-            source: BusError::Declare { key: key.clone(), source },
-            tried: self.tried.clone(),
-        }
+        move |source| BusError::Declare { key: key.clone(), source }.into()
     }
 
     fn no_answer(&self, key: &str) -> ConsoleError {
@@ -100,7 +79,7 @@ impl Client {
         payload: Option<&[u8]>,
     ) -> Result<Vec<Vec<u8>>, ConsoleError> {
         let deadline = Instant::now() + self.timeout;
-        let declare = self.declare(key);
+        let declare = Self::declare(key);
         let querier = self
             .session
             .declare_querier(key.to_owned())

@@ -31,7 +31,7 @@ pub struct CommandArgs {
     /// What it is to do
     #[command(subcommand)]
     pub action: Action,
-    /// Who asks, for the audit file; without it the name of the user
+    /// Who asks, for the audit file (default: the name of the user)
     #[arg(long, value_name = "NAME")]
     pub by: Option<String>,
     /// Print the answer as JSON on stdout
@@ -96,7 +96,7 @@ pub struct PlaceArgs {
     /// Heading of the case's x axis from north (°)
     #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = degrees)]
     pub heading: f64,
-    /// Pitch of the case (°); without pitch and roll it is levelled from the accelerometers
+    /// Pitch of the case (°) (default: pitch and roll from the accelerometers)
     #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = degrees, requires = "roll")]
     pub pitch: Option<f64>,
     /// Roll of the case (°)
@@ -181,6 +181,11 @@ fn answer(reply: &CommandReply, json: bool) -> Exit {
     }
     say(format_args!("isotherm: {}", in_words(reply)));
     exit
+}
+
+/// What a self-test and a pre-launch calibration leave behind, and what to do next.
+fn in_standby(unit: &UnitId) -> String {
+    format!("{unit} is in standby and publishes nothing; to run it: isotherm command {unit} run")
 }
 
 /// An answer in words.

@@ -14,17 +14,13 @@ use crate::exit::Exit;
 #[non_exhaustive]
 pub enum ConsoleError {
     /// The session cannot be opened, or something cannot be declared on it.
-    #[error("{source}{hint}", hint = hint(tried))]
-    Bus {
-        /// What the session says.
-        source: BusError,
-        /// Where it was to connect.
-        tried: Vec<String>,
-    },
+    #[error(transparent)]
+    Bus(#[from] BusError),
     /// Nobody answers on a key.
     #[error(
-        "no service answers on {key} within {}.{} s: is it running there, and under the same namespace?{}",
-        waited.as_secs(), waited.subsec_millis() / 100, hint(tried)
+        "no service answers at {tried} within {}.{} s: is one running there, and under the same --namespace? Else say where it is: \
+         --connect HOST:PORT or ISOTHERM_CONNECT (asked on {key})",
+        waited.as_secs(), waited.subsec_millis() / 100
     )]
     NoAnswer {
         /// The key.
@@ -32,7 +28,7 @@ pub enum ConsoleError {
         /// How long it was waited for.
         waited: Duration,
         /// Where it was looked for.
-        tried: Vec<String>,
+        tried: String,
     },
     /// The service is there, the unit is not.
     #[error("the service knows no unit {unit}; it has {}", known(units))]
@@ -96,17 +92,10 @@ impl ConsoleError {
     pub(crate) fn exit(&self) -> Exit {
         match self {
             Self::Serial { .. } | Self::Unasked | Self::NoTerminal => Exit::Usage,
-            Self::Bus { source: BusError::Configuration { .. } | BusError::Option { .. }, .. } => {
-                Exit::BadConfiguration
-            }
+            Self::Bus(error) => Exit::of_bus(error),
             _ => Exit::Failed,
         }
     }
-}
-
-/// What to do where a session does not come about.
-fn hint(tried: &[String]) -> String {
-    format!(" (tried {}; --connect says where the service listens)", tried.join(", "))
 }
 
 fn known(units: &[String]) -> String {

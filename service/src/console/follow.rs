@@ -36,7 +36,7 @@ impl Follow {
                 }
             })
             .await
-            .map_err(client.declare(&key))?;
+            .map_err(Client::declare(&key))?;
         let first = client.status(unit).await?;
         if let Some(status) = first.clone() {
             let _ = asked.send(status);

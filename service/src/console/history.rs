@@ -13,8 +13,11 @@ use crate::words::print;
 /// Most entries that are asked for.
 const MOST_ENTRIES: u32 = 10_000;
 
-/// Longest text in a cell.
-const LONGEST_CELL: usize = 72;
+/// Columns of the terminal that a table fits.
+const WIDTH: usize = 100;
+/// Longest name of who and of what it came from, and shortest room for what changed.
+const LONGEST_NAME: usize = 20;
+const SHORTEST_CHANGES: usize = 16;
 
 /// Arguments of `history`.
 #[derive(Debug, Clone, Args)]
@@ -63,10 +66,27 @@ pub(super) async fn run(args: &HistoryArgs) -> Result<Exit, ConsoleError> {
     } else if entries.is_empty() {
         format!("{unit}: nothing has been done to it\n")
     } else {
-        let header = ["no.", "time (UTC)", "what", "revision", "digest", "by", "from", "changes"];
-        show::table(header, entries.iter().map(row).collect(), header.len()).to_string() + "\n"
+        table(&entries)
     };
     Ok(print(&text, Exit::Ok))
+}
+
+/// The entries, a line each; the JSON has them whole.
+fn table(entries: &[AuditEntry]) -> String {
+    let header = ["no.", "time (UTC)", "what", "rev", "digest", "by", "from", "changes"];
+    let mut rows: Vec<Vec<String>> = entries.iter().map(row).collect();
+    let length = |text: &str| text.chars().count();
+    let widest = |column: usize| {
+        let cells = rows.iter().filter_map(|row| row.get(column)).map(|cell| length(cell));
+        cells.chain(header.get(column).map(|name| length(name))).max().unwrap_or_default()
+    };
+    // A space on either side of each, and one between them.
+    let taken: usize = (0..header.len() - 1).map(widest).sum::<usize>() + 3 * header.len() + 1;
+    let left = WIDTH.saturating_sub(taken).max(SHORTEST_CHANGES);
+    for changes in rows.iter_mut().filter_map(|row| row.last_mut()) {
+        *changes = show::cut(changes, left);
+    }
+    show::table(header, rows, header.len()).to_string() + "\n"
 }
 
 /// One line of the table.
@@ -109,17 +129,8 @@ fn row(entry: &AuditEntry) -> Vec<String> {
     };
     // To the second; the JSON has the rest.
     let time: String = time.to_string().replace('T', " ").chars().take(19).collect();
-    let cut = |text: &str| show::cut(text, LONGEST_CELL);
-    vec![
-        number.to_string(),
-        time,
-        event.name().to_owned(),
-        revision,
-        digest,
-        cut(by),
-        cut(&from),
-        cut(&changes),
-    ]
+    let cut = |text: &str| show::cut(text, LONGEST_NAME);
+    vec![number.to_string(), time, event.name().to_owned(), revision, digest, cut(by), cut(&from), changes]
 }
 
 /// When it took effect and what changed, short.
@@ -137,13 +148,43 @@ fn effect(schedule: Schedule, slew_ms: u64, changed: &[String]) -> String {
     words
 }
 
+/// The last part of a path.
+fn file_name(path: &str) -> String {
+    path.rsplit('/').next().unwrap_or(path).to_owned()
+}
+
 /// Where a calibration came from, in words.
 fn source(source: &Source) -> String {
     match source {
-        Source::Folder { path } => path.clone(),
-        Source::Start { path } => format!("{path} (at start)"),
+        Source::Folder { path } | Source::Start { path } => file_name(path),
         Source::Bus => "bus".to_owned(),
         Source::Rollback { to } => format!("rollback to {to}"),
         Source::PreLaunch => "pre-launch".to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_table_fits_a_hundred_columns() {
+        let accepted = |number: u64, path: &str, changed: &str| -> AuditEntry {
+            let json = serde_json::json!({
+                "number": number, "time": "2026-11-21T13:40:26.082Z", "unit": "ZLG-0001", "by": "operator-of-the-night-shift",
+                "event": "accepted", "revision": number, "digest": "ef".repeat(32), "source": { "from": "start", "path": path },
+                "changed": [changed], "schedule": { "sequence": 1_000_000_000_u64 }, "slew_ms": 2500,
+            });
+            serde_json::from_value(json).unwrap()
+        };
+        let change = "gyro.sensor[0].static_bias.coefficients_deg_per_h[0]: 0.45 -> 0.41 (-0.04, -8.889 %)";
+        let entries =
+            [accepted(12_345, "/home/ann/bench/units/ZLG-0001.toml", change), accepted(1, "/u.toml", "x")];
+        let text = table(&entries);
+        assert!(text.lines().all(|line| line.chars().count() <= WIDTH), "{text}");
+        assert!(
+            text.contains("ZLG-0001.toml") && text.contains("gyro.sens") && !text.contains("/home"),
+            "{text}"
+        );
     }
 }

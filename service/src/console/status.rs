@@ -32,7 +32,7 @@ One line a unit, or everything of one unit. What does not fit the terminal is le
 first; into a pipe goes all of it. The columns:
   ●  running    ○  not running    ▲  warning    !  fault in the last minute
   state    \"running ±\" with, \"running\" without reversal of the lasing mode
-  rev      revision of the calibration in force; age: of its document
+  rev      revision of the calibration in force; cal. age: time since its document was made
   °C       temperature and its rate, of the first channel that is stale or outside its range, else of the first
   range    where all temperatures lie against the range that the calibration was fitted over
   °/h, mg  length of the correction that is subtracted at present
@@ -47,7 +47,7 @@ pub struct StatusArgs {
     /// Print services and units as JSON on stdout
     #[arg(long)]
     pub json: bool,
-    /// Fit into so many columns; without it into those of the terminal
+    /// Fit into so many columns (default: those of the terminal)
     #[arg(long, value_name = "COLUMNS", value_parser = clap::value_parser!(u16).range(20..))]
     pub width: Option<u16>,
     /// How to reach the service

@@ -24,9 +24,9 @@ pub(crate) struct Posted {
     pub(crate) store: Option<StoreStatus>,
     /// What is wrong until somebody does something about it.
     pub(crate) problems: Vec<Standing>,
-    /// Calibrations accepted since the start.
+    /// Swaps accepted since the start.
     pub(crate) accepted: u64,
-    /// Calibrations refused since the start.
+    /// Swaps refused since the start.
     pub(crate) refused: u64,
 }
 

@@ -20,7 +20,7 @@ pub(super) struct Record {
     pub(super) active: Option<Active>,
     /// What is in force while that one waits for its tick.
     pub(super) before: Option<Box<Active>>,
-    /// Documents accepted since the service started.
+    /// Swaps accepted since the service started: what a unit is given first, from its file, is none.
     pub(super) accepted: u64,
     /// Documents refused since the service started.
     pub(super) refused: u64,

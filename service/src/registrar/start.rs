@@ -141,6 +141,11 @@ impl Work {
         Ok((found, bad))
     }
 
+    /// Whether any unit has been given anything.
+    pub(crate) fn has_units(&self) -> bool {
+        self.records.values().any(|record| record.active.is_some())
+    }
+
     /// Goes on without a folder that cannot be read, with what the state folder has.
     pub(crate) fn miss_folder(&mut self, error: &std::io::Error) {
         tracing::error!(

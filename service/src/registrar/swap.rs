@@ -245,11 +245,13 @@ impl Work {
         let active = Active { revision: counter, calibration, written: Some(written) };
         let before = self.in_force(unit).cloned();
         let record = self.records.entry(unit.clone()).or_default();
+        // What a unit is given first, from its file, is no swap.
+        let first = before.is_none() && matches!(source, Source::Start { .. } | Source::Folder { .. });
         record.before = before.filter(|_| *schedule != Schedule::NextTick).map(Box::new);
         (record.counter, record.active) = (counter, Some(active));
         // A rollback to an overlaid document asks for no signature either; a document under it was asked for one.
         record.untrusted = None;
-        record.accepted += 1;
+        record.accepted += u64::from(!first);
         let account = record.account();
         self.losses.retain(|(concerned, _)| concerned.as_ref() != Some(unit));
         self.refusals.forget(unit);

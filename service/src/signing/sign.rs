@@ -19,8 +19,8 @@ use crate::words::{print, say};
 #[command(after_help = "\
 Examples:
   isotherm sign ZLG-0001.toml --key bench-2.key
-  isotherm sign ZLG-0001.toml --key bench-2.key --output signed/ZLG-0001.toml
-  isotherm sign --replace units/*.toml --key bench-2.key
+  isotherm sign ZLG-0001.toml --key bench-2.key --out signed/ZLG-0001.toml
+  isotherm sign --overwrite units/*.toml --key bench-2.key
 
 A document is validated first. If one of several is bad, none is signed. The signature is one more line of the file, so
 the document's digest, and with it the revision that outputs name, is another one than before.
@@ -33,10 +33,10 @@ pub struct SignArgs {
     #[arg(long, value_name = "FILE")]
     pub key: PathBuf,
     /// Write the signed document here and leave the original as it is; for a single document
-    #[arg(long, value_name = "FILE")]
+    #[arg(long = "out", alias = "output", value_name = "FILE")]
     pub output: Option<PathBuf>,
     /// Replace a signature that is there already, whether it holds or not
-    #[arg(long)]
+    #[arg(long = "overwrite", alias = "replace")]
     pub replace: bool,
     /// Print one JSON object on stdout instead
     #[arg(long)]
@@ -65,7 +65,7 @@ struct Outcome {
 /// Signs the files and says what became of each.
 pub(crate) fn run(args: &SignArgs) -> Exit {
     if args.output.is_some() && args.files.len() > 1 {
-        say("isotherm: --output names one file, so one document can be given with it");
+        say("isotherm: --out names one file, so one document can be given with it");
         return Exit::Usage;
     }
     let key = match private_key::read(&args.key) {

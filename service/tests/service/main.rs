@@ -7,6 +7,7 @@
 //! | `journal` | a log alone is enough for the same bits again |
 //! | `metrics` | metrics and health over HTTP |
 //! | `console_status` | what `isotherm status` and `top` show of it |
+//! | `reach` | defaults, environment and file by which programs meet; what is said where they do not |
 //! | `serve_command` | the program itself: start, stop, signals |
 //! | `shipped_configuration` | the Zenoh configurations that are shipped |
 
@@ -21,6 +22,7 @@ mod console_status;
 mod journal;
 mod loopback;
 mod metrics;
+mod reach;
 mod registrar;
 mod serve_command;
 mod shipped_configuration;

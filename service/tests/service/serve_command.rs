@@ -22,15 +22,15 @@ fn isotherm(arguments: &[&str]) -> Command {
 }
 
 /// A service process that is ended with the test.
-struct Served {
+pub(crate) struct Served {
     child: Child,
     stdout: BufReader<ChildStdout>,
-    locators: Vec<String>,
+    pub(crate) locators: Vec<String>,
 }
 
 impl Served {
     /// Starts it on loopback and waits until it says that it is ready.
-    fn start(arguments: &[&str]) -> Self {
+    pub(crate) fn start(arguments: &[&str]) -> Self {
         Self::start_with(arguments, Stdio::piped())
     }
 
@@ -60,7 +60,7 @@ impl Served {
     }
 
     /// Sends a signal and waits for the end: exit code, rest of stdout, stderr.
-    fn stop(mut self, signal: &str) -> (Option<i32>, String, String) {
+    pub(crate) fn stop(mut self, signal: &str) -> (Option<i32>, String, String) {
         kill(signal, &self.child);
         let (mut stdout, mut stderr) = (String::new(), String::new());
         self.stdout.read_to_string(&mut stdout).unwrap();

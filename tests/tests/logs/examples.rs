@@ -1,4 +1,4 @@
-//! Examples in the help of `isotherm-replay` that need a service, run as they are printed but for the port.
+//! Examples in the help of `isotherm-replay` that need a service, run as they are printed; the environment says where it is.
 
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
@@ -7,8 +7,11 @@ use std::time::{Duration, Instant};
 use isotherm_tests::bench::LIMIT;
 use isotherm_tests::process::{Service, program, run_well};
 
-/// Where the examples find their service.
-const SERVICE: &str = "tcp/127.0.0.1:7447";
+/// Whether a line needs a service.
+fn needs_service(line: &str) -> bool {
+    let records = line.starts_with("isotherm-replay record ") && !line.contains("--no-service");
+    records || line.starts_with("isotherm-replay play ")
+}
 
 /// The lines of a help text that are to be typed: two places in, behind the word "Example".
 fn examples(help: &str) -> Vec<&str> {
@@ -17,7 +20,7 @@ fn examples(help: &str) -> Vec<&str> {
 }
 
 /// Types a line into a shell that finds the program.
-fn typed(folder: &Path, line: &str) -> Child {
+fn typed(folder: &Path, line: &str, service: &str) -> Child {
     let programs = program("isotherm-replay").parent().expect("it is in a folder").to_path_buf();
     let found = std::env::var_os("PATH").unwrap_or_default();
     let path = std::env::join_paths(std::iter::once(programs).chain(std::env::split_paths(&found)));
@@ -25,6 +28,7 @@ fn typed(folder: &Path, line: &str) -> Child {
         .args(["-c", &format!("exec {line}")])
         .current_dir(folder)
         .env("PATH", path.expect("folders without colons"))
+        .env("ISOTHERM_CONNECT", service)
         .stdin(Stdio::null())
         .stdout(Stdio::null())
         .spawn()
@@ -48,17 +52,17 @@ fn examples_with_a_service_work_as_printed() {
     for command in ["play", "record"] {
         let help = run_well("isotherm-replay", &[command, "--help"]);
         let lines = examples(&help);
-        assert!(lines.iter().any(|line| line.contains(SERVICE)), "{command}:\n{help}");
+        assert!(lines.iter().any(|line| needs_service(line)), "{command}:\n{help}");
         let folder = tempfile::tempdir().expect("a folder");
         // Each command has a service of its own: units of one would be there for the next.
         let service = Service::start(&[]);
         for line in lines {
             // What needs no service has been run by the tests of the program; what stands before needs to be there.
-            let needs = line.contains(SERVICE);
+            let needs = needs_service(line);
             if command == "record" && !needs {
                 continue;
             }
-            let mut child = typed(folder.path(), &line.replace(SERVICE, &service.locator));
+            let mut child = typed(folder.path(), line, &service.locator);
             if command == "record" {
                 interrupt(&child, &folder.path().join("run.mcap"));
             }

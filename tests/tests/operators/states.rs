@@ -284,7 +284,7 @@ async fn a_pre_launch_calibration_finds_the_constants_and_a_rollback_gives_the_o
         status
             .pre_launch_outcome
             .clone()
-            .filter(|outcome| outcome.overlay.is_some() && status.swaps.accepted == 2)
+            .filter(|outcome| outcome.overlay.is_some() && status.swaps.accepted == 1)
     });
     let outcome = outcome.await;
     let PreLaunchVerdict::Accepted(gyros) = &outcome.verdict else { panic!("{outcome:#?}") };

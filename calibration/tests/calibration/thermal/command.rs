@@ -67,7 +67,7 @@ fn folders_recordings_and_several_units() {
 
     // Nobody has said which unit a text log is of.
     let (words, code) = said(at, &["log.csv", "--mapping", "mapping.toml", "--out", "of-whom.toml"]);
-    assert!(code == Some(2) && words.contains("give --unit SERIAL, or --document"), "{words}");
+    assert!(code == Some(2) && words.contains("give --unit SERIAL, or --calibration"), "{words}");
     assert!(!at.join("of-whom.toml").exists());
     // A document says when it was made: today, or as it is told.
     let created = |name: &str| Written::read(&at.join(name)).unwrap().document.created.unwrap().to_string();

@@ -19,6 +19,11 @@ use crate::cli::{Outcome, print, show};
 use crate::error::Error;
 use crate::progress::Bar;
 
+/// Most units that a sentence names.
+const NAMED: usize = 8;
+/// Gyro ticks in a message of a text log.
+const TEXT_BATCH: usize = 64;
+
 /// Runs the command on recordings.
 pub(super) fn run(args: &CorrectArgs) -> Result<Outcome, Error> {
     let files = args.log.files(1, None)?;
@@ -37,16 +42,43 @@ pub(super) fn run(args: &CorrectArgs) -> Result<Outcome, Error> {
     let calibrations =
         loaded.iter().map(|(unit, (_, calibration))| (unit.clone(), calibration.clone())).collect();
     outlines.damaged.iter().for_each(|words| show::warn(words));
-    let plans = plans(args, outlines, calibrations)?;
+    let (plans, without) = plans(args, outlines, calibrations)?;
+    if let Some(words) = &without {
+        show::warn(words);
+    }
+    let documents: Vec<_> = loaded.values().map(|(path, _)| path.as_path()).collect();
+    let outcome = make(args, &files, &mut part, plans, &documents)?;
+    Ok(if without.is_some() { Outcome::DataLoss } else { outcome })
+}
+
+/// Runs the command on a text log whose corrected ticks go into a recording.
+pub(super) fn run_text(args: &CorrectArgs, calibration: &Path) -> Result<Outcome, Error> {
+    let loaded = load_calibration(calibration)?;
+    loaded.warnings.iter().for_each(|warning| show::warn(&warning.to_string()));
+    let files = args.log.files(TEXT_BATCH, Some(&loaded.unit))?;
+    let id = args.log.units()?.pop_first().unwrap_or_else(|| loaded.unit.clone());
+    let basis = Basis::Given { settings: args.settings()?, calibration: Some(loaded) };
+    let plans = vec![UnitPlan { id, basis, compare: false }];
+    make(args, &files, &mut args.log.part()?, plans, &[calibration])
+}
+
+/// Corrects the units as planned, and writes what comes of it with the documents beside it.
+fn make(
+    args: &CorrectArgs,
+    files: &LogFiles,
+    part: &mut Part,
+    plans: Vec<UnitPlan>,
+    documents: &[&Path],
+) -> Result<Outcome, Error> {
     let units: Vec<_> = plans.iter().map(|plan| plan.id.clone()).collect();
     let inputs: Vec<_> = args.log.inputs().into_iter().chain(args.calibration.iter().cloned()).collect();
     let mut sink = Sink::open(args.out.as_deref(), args.format, &units, &inputs)?;
-    for (path, _) in loaded.values() {
+    for path in documents {
         sink.document(read_small(path, "read the calibration document")?)?;
     }
     // A journal is followed from its beginning; what comes before the part is corrected and not given out.
     let by_journal = plans.iter().any(|plan| matches!(plan.basis, Basis::Journal { .. }));
-    let from_ns = if by_journal && part.start > Span::ZERO { beginning(&files, &mut part)? } else { 0 };
+    let from_ns = if by_journal && part.start > Span::ZERO { beginning(files, part)? } else { 0 };
     let cores = available_parallelism().map_or(1, usize::from);
     let options = RunOptions {
         threads: args.threads.map_or(cores, usize::from),
@@ -55,7 +87,7 @@ pub(super) fn run(args: &CorrectArgs) -> Result<Outcome, Error> {
         diff: DiffOptions::default(),
     };
     let (mut bar, mut ticks) = (None, 0);
-    let result = correct(&files, &part, plans, options, &mut |made, progress| {
+    let result = correct(files, part, plans, options, &mut |made, progress| {
         let bar = bar.get_or_insert_with(|| Bar::over_log(progress.clone()));
         ticks += made.iter().map(|(_, output)| output.ticks).sum::<u64>();
         bar.show(format!("{ticks} ticks"));
@@ -86,12 +118,12 @@ fn beginning(files: &LogFiles, part: &mut Part) -> Result<u64, Error> {
     Ok(first.map_or(0, |message| message.received_ns.saturating_add(start_ns)))
 }
 
-/// What each unit of the log is corrected by.
+/// What each unit of the log is corrected by; and what is said of units that nothing is known to correct by.
 fn plans(
     args: &CorrectArgs,
     outlines: Outlines,
     mut calibrations: BTreeMap<UnitId, Loaded>,
-) -> Result<Vec<UnitPlan>, Error> {
+) -> Result<(Vec<UnitPlan>, Option<String>), Error> {
     let wanted = args.log.units()?;
     if let Some(unit) = wanted.iter().find(|unit: &&UnitId| !outlines.units.contains_key(*unit)) {
         return Err(Error::Usage(format!("--unit {unit}: there is nothing of this unit in the log")));
@@ -124,11 +156,19 @@ fn plans(
         };
         plans.push(UnitPlan { id, basis, compare });
     }
-    if !without.is_empty() {
-        return Err(Error::Usage(format!(
-            "there is no journal to correct {} by: give --calibration FILE for each, or name the other units with --unit",
-            without.join(", ")
-        )));
+    let without = (!without.is_empty()).then(|| {
+        let named = without.iter().take(NAMED).cloned().collect::<Vec<_>>().join(", ");
+        let more = match without.len().saturating_sub(NAMED) {
+            0 => String::new(),
+            more => format!(" and {more} more"),
+        };
+        format!(
+            "there is no journal to correct {named}{more} by: give --calibration FILE for each, or name the other units with --unit"
+        )
+    });
+    // What was asked for by name must be there.
+    if let Some(words) = without.clone().filter(|_| plans.is_empty() || !wanted.is_empty()) {
+        return Err(Error::Usage(words));
     }
     if let Some(unit) = calibrations.keys().next() {
         return Err(Error::Usage(format!(
@@ -138,5 +178,5 @@ fn plans(
     if plans.is_empty() {
         return Err(Error::Usage("there are no raw messages in the log to correct".to_owned()));
     }
-    Ok(plans)
+    Ok((plans, without))
 }

@@ -54,16 +54,15 @@ pub(super) fn run(args: &CorrectArgs) -> Result<Outcome, Error> {
     let settings = args.settings()?;
     let format = args.format.unwrap_or_default();
     let calibration = calibration(args)?;
+    if args.out.as_ref().and_then(|out| out.extension()).is_some_and(|extension| extension == "mcap") {
+        return super::recording::run_text(args, calibration);
+    }
     let loaded = load_calibration(calibration)?;
     for warning in &loaded.warnings {
         show::warn(&warning.to_string());
     }
     let mut events = args.log.events()?;
     if let Some(out) = &args.out {
-        if out.extension().is_some_and(|extension| extension == "mcap") {
-            let words = "a text log is corrected to CSV or wire frames; `isotherm-replay convert` makes a recording of it";
-            return Err(Error::Usage(words.to_owned()));
-        }
         let inputs = events.inner().paths().iter().chain(&args.log.mapping).map(PathBuf::as_path);
         refuse_overwriting(out, &inputs.chain([calibration]).collect::<Vec<_>>())?;
     }

@@ -31,8 +31,8 @@ fn in_field(field: &FieldDifference, [name_a, name_b]: [&str; 2]) -> String {
     let bits = |bits: &Option<String>| bits.as_ref().map(|bits| format!("  {bits}")).unwrap_or_default();
     let width = name_a.len().max(name_b.len());
     let equivalent = match equivalent {
-        Some(Equivalent::DegPerH(rate)) => format!("    differ by {rate:e} °/h\n"),
-        Some(Equivalent::MilliG(force)) => format!("    differ by {force:e} mg\n"),
+        Some(Equivalent::DegPerH(rate)) => format!("    differ by {rate:.3e} °/h\n"),
+        Some(Equivalent::MilliG(force)) => format!("    differ by {force:.3e} mg\n"),
         None => String::new(),
     };
     format!(

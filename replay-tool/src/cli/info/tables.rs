@@ -5,23 +5,25 @@ use std::fmt::Write;
 use comfy_table::{CellAlignment, Table, presets};
 use isotherm_correction::units::{Span, Timestamp};
 use isotherm_log::info::{
-    FileInfo, JournalInfo, LogInfo, ReadingInfo, Spread, StateInfo, StatusInfo, TopicInfo, UnitInfo,
+    FileInfo, JournalInfo, LogInfo, Spread, StateInfo, StatusInfo, TopicInfo, UnitInfo,
 };
 use isotherm_log::source::LogReport;
 
+use super::readings::{date, readings};
 use crate::cli::show;
 
 /// Most swaps, commands, states or revisions that are listed; JSON has more.
 const LISTED: usize = 20;
 
 /// Everything.
-pub(super) fn of(info: &LogInfo) -> String {
+pub(in crate::cli) fn of(info: &LogInfo) -> String {
     let mut text = String::new();
     files(&mut text, info);
     for (unit, of) in &info.units {
         line(&mut text, format_args!("\nUnit {unit}"));
         text += &topics(&of.topics);
         let begin_ns = of.topics.iter().filter_map(|topic| topic.first_ns).min().unwrap_or(0);
+        line(&mut text, format_args!("first tick {}", date(begin_ns.into())));
         unit_details(&mut text, of, begin_ns);
     }
     if !info.other_topics.is_empty() {
@@ -72,7 +74,11 @@ fn files(text: &mut String, info: &LogInfo) {
     if let (Some(first), Some(last)) = (info.first_received_ns, info.last_received_ns) {
         line(
             text,
-            format_args!("received over {}, from {first} ns since 1970", seconds(last.saturating_sub(first))),
+            format_args!(
+                "received over {}, from {}",
+                seconds(last.saturating_sub(first)),
+                date(first.into())
+            ),
         );
     }
     if !info.service_versions.is_empty() {
@@ -197,16 +203,7 @@ fn topic_details(text: &mut String, topic: &TopicInfo) {
 }
 
 fn unit_details(text: &mut String, unit: &UnitInfo, begin_ns: i64) {
-    for (what, sensors) in [("gyro", &unit.gyros), ("accelerometer", &unit.accelerometers)] {
-        for (info, number) in sensors.iter().zip(1..) {
-            readings(text, what, &number.to_string(), info);
-        }
-    }
-    for (what, named) in [("temperature", &unit.temperatures), ("health", &unit.health)] {
-        for (name, info) in &named.by_name {
-            readings(text, what, name, info);
-        }
-    }
+    *text += &readings(unit);
     if let Some(modes) = &unit.modes {
         let between = modes.between_changes.map_or_else(String::new, |between| {
             format!(", {} from one to the next (median)", seconds(between.p50_ns))
@@ -294,15 +291,6 @@ fn states(text: &mut String, status: &StatusInfo, begin_ns: i64) {
         line(text, format_args!("state {state}: {when}"));
     }
     more(text, status.states.len());
-}
-
-fn readings(text: &mut String, what: &str, name: &str, info: &ReadingInfo) {
-    let missing = if info.missing > 0 { format!(", {} missing", info.missing) } else { String::new() };
-    let ReadingInfo { readings, min, max, mean, .. } = info;
-    line(
-        text,
-        format_args!("{what} {name}: {readings} readings, {min} to {max}, mean {mean:.6e} as sent{missing}"),
-    );
 }
 
 /// Says that a list is longer than what was printed.

@@ -154,7 +154,7 @@ fn float(number: u64) -> f64 {
 pub(super) fn advise(error: Error, options: &RecordOptions) -> Error {
     let waits = matches!(options.service, ServiceWait::Within(_));
     match error {
-        Error::Bus(BusError::NoService { .. }) if waits => Error::NoService {
+        Error::Bus(BusError::NoService { .. } | BusError::Unreachable { .. }) if waits => Error::NoService {
             words: format!("{error}; --wait waits for it, --no-service records what there is without one"),
         },
         error => error,

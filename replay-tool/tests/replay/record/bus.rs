@@ -354,10 +354,11 @@ async fn a_second_recorder_does_not_touch_the_file_of_the_first() {
 fn a_missing_service_is_an_error_within_the_time() {
     let folder = tempfile::tempdir().unwrap();
     let begun = std::time::Instant::now();
-    let output = replay(folder.path(), &["record", "run", "--timeout", "0.3"]);
+    let nobody = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().to_string();
+    let output = replay(folder.path(), &["record", "run", "--timeout", "0.3", "--connect", &nobody]);
     let errors = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(1), "{errors}");
-    assert!(errors.contains("no service answers") && errors.contains("--no-service"), "{errors}");
+    assert!(errors.contains(&nobody) && errors.contains("--no-service"), "{errors}");
     assert!(begun.elapsed() < Duration::from_secs(8));
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0, "no file is left behind");
 }

@@ -104,6 +104,7 @@ fn draw(bar: &ProgressBar, progress: &PreLaunchProgress) {
 
 /// The outcome in words, its verdict in the first line.
 fn words(unit: &UnitId, outcome: &PreLaunchOutcome) -> String {
+    let next = super::in_standby(unit);
     match &outcome.verdict {
         PreLaunchVerdict::Accepted(changes) => {
             let overlay = outcome.overlay.as_ref().map_or_else(String::new, |digest| {
@@ -112,16 +113,16 @@ fn words(unit: &UnitId, outcome: &PreLaunchOutcome) -> String {
             });
             let header = ["gyro", "C0 change °/h", "± °/h", "B0 change °/h", "± °/h", "Earth rate °/h"];
             let table = show::table(header, changes.iter().map(row).collect(), 1);
-            format!("{unit}: pre-launch calibration accepted{overlay}\n{table}")
+            format!("{unit}: pre-launch calibration accepted{overlay}\n{table}\n{next}")
         }
         PreLaunchVerdict::Refused(reasons) => {
             for reason in reasons {
                 say(format_args!("isotherm: {reason}"));
             }
-            format!("{unit}: pre-launch calibration refused; it has changed nothing")
+            format!("{unit}: pre-launch calibration refused; it has changed nothing\n{next}")
         }
         PreLaunchVerdict::Aborted => {
-            format!("{unit}: pre-launch calibration aborted; the constants are as before")
+            format!("{unit}: pre-launch calibration aborted; the constants are as before\n{next}")
         }
     }
 }

@@ -55,7 +55,7 @@ fn words(unit: &UnitId, report: &SelfTestReport) -> String {
     };
     let rows = report.items.iter().map(row).collect();
     let table = show::table(["check", "value", "at least", "at most", "unit", "verdict"], rows, 1);
-    format!("{unit}: self-test {verdict}\n{table}")
+    format!("{unit}: self-test {verdict}\n{table}\n{}", super::in_standby(unit))
 }
 
 fn row(item: &SelfTestItem) -> Vec<String> {

@@ -33,7 +33,7 @@ fn the_narrow_table_keeps_what_matters_and_the_wide_one_has_all() {
     for column in ["unit", "state", "rev", "°C", "range", "°/h", "Hz", "note"] {
         assert!(head(80).contains(column), "{column} in {}", head(80));
     }
-    for column in ["°C/min", "mg", "gaps", "dup", "late", "bad", "p99", "age"] {
+    for column in ["°C/min", "mg", "gaps", "dup", "late", "bad", "p99", "cal. age"] {
         assert!(head(160).contains(column), "{column} in {}", head(160));
     }
 }

@@ -28,7 +28,7 @@ const COLUMNS: [Column; 16] = [
     Column::number("late", 13, 4),
     Column::number("bad", 9, 3),
     Column::number("p99", 8, 7),
-    Column::number("age", 12, 4),
+    Column::number("cal. age", 12, 8),
 ];
 
 /// What is to be noticed, at the end of each line, gets one part in this many of the line at least.

@@ -80,7 +80,7 @@ async fn frames<M: Message + 'static>(
         // The receiver may be gone already.
         drop(sender.send(frame.map_or(News::NotUnderstood, news)));
     };
-    client.session.declare_subscriber(key.to_owned()).callback(told).await.map_err(client.declare(key))
+    client.session.declare_subscriber(key.to_owned()).callback(told).await.map_err(Client::declare(key))
 }
 
 /// Subscribes to tokens: those that stand are told of first.
@@ -99,5 +99,5 @@ async fn tokens(
     };
     let liveliness = client.session.liveliness();
     let subscriber = liveliness.declare_subscriber(key.to_owned()).history(true).callback(told);
-    subscriber.await.map_err(client.declare(key))
+    subscriber.await.map_err(Client::declare(key))
 }

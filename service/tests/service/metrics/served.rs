@@ -77,7 +77,7 @@ fn the_option_replaces_the_configured_address() {
     let (_served, ready) = start(&["--config", config, "--metrics", "[::1]:0"]);
     assert!(address(&ready).is_ipv6());
     let (code, stderr) = refused(&["--config", config]);
-    assert_eq!(code, Some(78), "{stderr}");
+    assert_eq!(code, Some(1), "{stderr}");
 }
 
 #[test]
@@ -85,7 +85,7 @@ fn a_second_service_on_the_same_port_does_not_start() {
     let (_first, ready) = start(&["--metrics", "127.0.0.1:0"]);
     let address = address(&ready).to_string();
     let (code, stderr) = refused(&["--metrics", &address]);
-    assert_eq!(code, Some(78), "{stderr}");
+    assert_eq!(code, Some(1), "{stderr}");
     let last = stderr.lines().last().unwrap();
     for words in [&*address, "--metrics", "[metrics] listen", "in use", "another port"] {
         assert!(last.contains(words), "{words}: {stderr}");

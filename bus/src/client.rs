@@ -1,0 +1,294 @@
+//! The one way from a program to a service: what is said on the command line, else in the environment, else in the user's file,
+//! else where a service listens by default.
+
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
+use std::time::{Duration, Instant};
+
+use isotherm_document::{Form, Reader, element, utf8};
+use schemars::JsonSchema;
+use serde::Deserialize;
+use zenoh::{Config, Session};
+
+use crate::endpoint::{DEFAULT_ENDPOINT, endpoint};
+use crate::session::{endpoints, set};
+use crate::{BusError, SessionOptions, obstacle};
+
+/// Environment variable that says where the service is: one endpoint, or several separated by commas.
+pub const CONNECT_VARIABLE: &str = "ISOTHERM_CONNECT";
+
+/// How long to wait before a session is opened again.
+const AGAIN: Duration = Duration::from_millis(250);
+
+/// How to reach a service.
+///
+/// Where none of endpoint, listener and Zenoh configuration is given, [`CONNECT_VARIABLE`] says where the service is, else
+/// [`user_file`], else it is at [`DEFAULT_ENDPOINT`].
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+pub struct ClientOptions {
+    /// Address of the service or a router, repeatable (default: `ISOTHERM_CONNECT`, else isotherm/client.toml in your configuration
+    /// folder, else 127.0.0.1:7447)
+    #[cfg_attr(feature = "clap", arg(long, value_name = "HOST:PORT", value_parser = endpoint))]
+    pub connect: Vec<String>,
+    /// Address to listen on, repeatable
+    #[cfg_attr(feature = "clap", arg(long, value_name = "HOST:PORT", value_parser = endpoint, hide_short_help = true))]
+    pub listen: Vec<String>,
+    /// Zenoh configuration (JSON5)
+    #[cfg_attr(feature = "clap", arg(long, value_name = "FILE", hide_short_help = true))]
+    pub zenoh_config: Option<PathBuf>,
+    /// Key prefix of the site, e.g. site/a
+    #[cfg_attr(feature = "clap", arg(long, value_name = "PREFIX", hide_short_help = true))]
+    pub namespace: Option<String>,
+}
+
+/// How a client takes part in the network.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    /// It exchanges messages with those that it is connected to.
+    Peer,
+    /// It hears everything through the service or router that it is connected to. This needs exactly one endpoint; with others, with
+    /// a listener or with a Zenoh configuration it is a [`Role::Peer`].
+    Listener,
+}
+
+/// A way to reach a service, made from all that was said of it.
+#[derive(Debug, Clone)]
+pub struct Way {
+    config: Config,
+    tried: Vec<String>,
+}
+
+/// What the file of a user may say.
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[serde(default)]
+#[schemars(deny_unknown_fields)]
+struct UserKeys {
+    /// Endpoints of the service.
+    connect: Vec<String>,
+    /// A Zenoh configuration file; relative paths count from this file.
+    #[schemars(length(min = 1))]
+    zenoh_config: Option<String>,
+    /// Prefix of every key.
+    #[schemars(length(min = 1))]
+    namespace: Option<String>,
+}
+
+static FORM: LazyLock<Form> = LazyLock::new(Form::of::<UserKeys>);
+
+/// The user's file: `isotherm/client.toml` in `$XDG_CONFIG_HOME` or `~/.config`.
+#[must_use]
+pub fn user_file() -> Option<PathBuf> {
+    let folder = |name: &str| std::env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
+    let folder = folder("XDG_CONFIG_HOME").or_else(|| Some(folder("HOME")?.join(".config")))?;
+    Some(folder.join("isotherm/client.toml"))
+}
+
+impl ClientOptions {
+    /// The way to the service.
+    ///
+    /// # Errors
+    /// [`BusError::Endpoint`], [`BusError::UserFile`], [`BusError::Configuration`] and [`BusError::Option`].
+    pub fn way(&self, role: Role) -> Result<Way, BusError> {
+        let mut options = self.stated()?;
+        if options.config.is_none() && options.connect.is_empty() && options.listen.is_empty() {
+            options.connect = vec![DEFAULT_ENDPOINT.to_owned()];
+        }
+        options.way(role)
+    }
+
+    /// The way for who needs no service: where nothing says where to connect, it is a peer on its own.
+    ///
+    /// # Errors
+    /// As [`Self::way`].
+    pub fn way_if_stated(&self, role: Role) -> Result<Way, BusError> {
+        self.stated()?.way(role)
+    }
+
+    fn stated(&self) -> Result<SessionOptions, BusError> {
+        self.resolved(std::env::var(CONNECT_VARIABLE).ok().as_deref(), user_file().as_deref())
+    }
+
+    /// What the options, the variable and the user's file say together.
+    fn resolved(&self, variable: Option<&str>, file: Option<&Path>) -> Result<SessionOptions, BusError> {
+        let mut options = SessionOptions {
+            config: self.zenoh_config.clone(),
+            connect: self.connect.clone(),
+            listen: self.listen.clone(),
+            namespace: self.namespace.clone(),
+        };
+        let said = |options: &SessionOptions| {
+            options.config.is_some() || !options.connect.is_empty() || !options.listen.is_empty()
+        };
+        let user = file.map_or(Ok(UserKeys::default()), read_user_file)?;
+        options.namespace = options.namespace.or(user.namespace);
+        if !said(&options) {
+            let endpoints = variable.unwrap_or_default().split(',').map(str::trim);
+            for text in endpoints.filter(|text| !text.is_empty()) {
+                let read = endpoint(text).map_err(|reason| BusError::Endpoint {
+                    option: CONNECT_VARIABLE,
+                    value: text.to_owned(),
+                    reason,
+                });
+                options.connect.push(read?);
+            }
+        }
+        if !said(&options) {
+            options.connect = user.connect;
+            options.config = user.zenoh_config.map(|path| match file.and_then(Path::parent) {
+                Some(folder) => folder.join(path),
+                None => path.into(),
+            });
+        }
+        Ok(options)
+    }
+}
+
+impl SessionOptions {
+    fn way(&self, role: Role) -> Result<Way, BusError> {
+        let mut config = self.to_config()?;
+        if role == Role::Listener
+            && self.config.is_none()
+            && self.connect.len() == 1
+            && self.listen.is_empty()
+        {
+            set(&mut config, "mode", "client")?;
+            set(&mut config, "listen/endpoints", Vec::<String>::new())?;
+        }
+        if self.config.is_none() && !self.connect.is_empty() {
+            // Once: what does not answer is reported at once, not after many trials.
+            set(&mut config, "connect/timeout_ms", 0)?;
+        }
+        let tried = match endpoints(&config, "connect/endpoints") {
+            tried if tried.is_empty() => endpoints(&config, "listen/endpoints"),
+            tried => tried,
+        };
+        Ok(Way { config, tried })
+    }
+}
+
+impl Way {
+    /// Endpoints at which the service is looked for.
+    #[must_use]
+    pub fn tried(&self) -> &[String] {
+        &self.tried
+    }
+
+    /// Opens a session within the limit, again and again where nothing listens yet; what is waited for is said once.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub async fn open_patiently(&self, limit: Duration, say: impl Fn(&str)) -> Result<Session, BusError> {
+        let deadline = Instant::now() + limit;
+        let mut said = false;
+        loop {
+            let left = deadline.saturating_duration_since(Instant::now());
+            match self.open(left).await {
+                Err(error @ BusError::Unreachable { .. }) if Instant::now() + AGAIN < deadline => {
+                    if !std::mem::replace(&mut said, true) {
+                        say(&format!("{error}; trying again for {limit:?}"));
+                    }
+                    tokio::time::sleep(AGAIN).await;
+                }
+                opened => return opened,
+            }
+        }
+    }
+
+    /// Opens a session within the limit.
+    ///
+    /// # Errors
+    /// [`BusError::Unreachable`] with what to do next, [`BusError::Listen`], or [`BusError::Open`] where the cause is not known.
+    pub async fn open(&self, limit: Duration) -> Result<Session, BusError> {
+        obstacle::before(&self.config)?;
+        let config = self.config.clone();
+        // A task of its own: opening may hold its thread, and a timeout on the same one would not be heard.
+        let opening = tokio::spawn(async move { zenoh::open(config).await });
+        let source = match tokio::time::timeout(limit, opening).await {
+            Ok(Ok(Ok(session))) => return Ok(session),
+            Ok(Ok(Err(source))) => source,
+            Ok(Err(join)) => join.into(),
+            Err(_) => format!("not connected within {limit:?}").into(),
+        };
+        let config = self.config.clone();
+        let known = tokio::task::spawn_blocking(move || obstacle::after(&config, limit)).await;
+        Err(known.ok().flatten().unwrap_or(BusError::Open(source)))
+    }
+}
+
+/// Reads the user's file; one that is not there says nothing.
+fn read_user_file(path: &Path) -> Result<UserKeys, BusError> {
+    let bad = |problems: &[isotherm_document::Problem]| {
+        BusError::UserFile(problems.iter().map(ToString::to_string).collect())
+    };
+    let file = path.display().to_string();
+    let bytes = match std::fs::read(path) {
+        Ok(bytes) => bytes,
+        // No folder on the way to it, either.
+        Err(error)
+            if matches!(error.kind(), std::io::ErrorKind::NotFound | std::io::ErrorKind::NotADirectory) =>
+        {
+            return Ok(UserKeys::default());
+        }
+        Err(error) => return Err(BusError::UserFile(vec![format!("{file}: cannot be read: {error}")])),
+    };
+    let text = utf8(&bytes, Some(&file)).map_err(|problems| bad(&problems))?;
+    let mut reader = Reader::new(text, Some(&file));
+    let mut keys: Option<UserKeys> = reader.read(&FORM);
+    for (index, text) in keys.iter_mut().flat_map(|keys| &mut keys.connect).enumerate() {
+        match endpoint(text) {
+            Ok(read) => *text = read,
+            Err(reason) => reader.report(&element("connect", index), format!("is {text:?}, {reason}")),
+        }
+    }
+    reader.finish(keys).map_err(|problems| bad(&problems))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn connect(options: &ClientOptions, variable: Option<&str>, file: Option<&Path>) -> Vec<String> {
+        options.resolved(variable, file).unwrap().connect
+    }
+
+    #[test]
+    fn options_come_before_the_variable_before_the_file_before_the_default() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("client.toml");
+        std::fs::write(&file, "connect = [\"c:3\"]\nnamespace = \"site/c\"\n").unwrap();
+        let nothing = ClientOptions::default();
+        let given = ClientOptions { connect: vec!["tcp/a:1".to_owned()], ..nothing.clone() };
+        assert_eq!(connect(&given, Some("b:2"), Some(&file)), ["tcp/a:1"]);
+        assert_eq!(connect(&nothing, Some("b:2, tls/d:4"), Some(&file)), ["tcp/b:2", "tls/d:4"]);
+        assert_eq!(connect(&nothing, Some(""), Some(&file)), ["tcp/c:3"]);
+        assert_eq!(connect(&nothing, None, Some(&folder.path().join("none/x"))), Vec::<String>::new());
+        let tried = |way: Result<Way, BusError>| way.unwrap().tried().to_vec();
+        assert_eq!(tried(given.way(Role::Peer)), ["tcp/a:1"]);
+        assert_eq!(tried(given.way_if_stated(Role::Listener)), ["tcp/a:1"]);
+        let listens = ClientOptions { listen: vec!["tcp/a:1".to_owned()], ..nothing.clone() };
+        assert_eq!(connect(&listens, Some("b:2"), Some(&file)), Vec::<String>::new());
+        // The site does not depend on who says where the service is.
+        assert_eq!(given.resolved(None, Some(&file)).unwrap().namespace.as_deref(), Some("site/c"));
+    }
+
+    #[test]
+    fn what_is_wrong_in_variable_and_file_is_said_with_its_place() {
+        let nothing = ClientOptions::default();
+        let error = nothing.resolved(Some("a:1,nonsense"), None).unwrap_err();
+        assert!(
+            error.to_string().starts_with("ISOTHERM_CONNECT is \"nonsense\", must be HOST:PORT"),
+            "{error}"
+        );
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("client.toml");
+        std::fs::write(&file, "connect = [\"a:1\", \"a:70000\"]\nnamespaces = \"x\"\n").unwrap();
+        let BusError::UserFile(problems) = nothing.resolved(None, Some(&file)).unwrap_err() else { panic!() };
+        let [port, key] = &*problems else { panic!("{problems:?}") };
+        assert!(port.contains("client.toml:1:19: connect[1]: is \"a:70000\", has the port"), "{port}");
+        assert!(
+            key.contains("client.toml:2:1: namespaces") && key.contains("did you mean `namespace`?"),
+            "{key}"
+        );
+    }
+}

@@ -1,0 +1,81 @@
+//! Why a session cannot be opened, found out by trying the same addresses without Zenoh, whose own words name places in its source.
+
+use std::io::ErrorKind;
+use std::net::{SocketAddr, TcpListener, TcpStream, ToSocketAddrs};
+use std::time::Duration;
+
+use zenoh::Config;
+
+use crate::BusError;
+use crate::endpoint::{address, host_and_port};
+use crate::session::endpoints;
+
+/// Longest trial of one address.
+const TRIAL: Duration = Duration::from_secs(1);
+
+/// What keeps a session from listening, tried before it is opened: the ports are free again afterwards.
+pub(crate) fn before(config: &Config) -> Result<(), BusError> {
+    // A session that goes on without its listeners, or waits for them, is not held up.
+    if !matches!(config.get_json("listen/timeout_ms").as_deref(), Ok("0" | "null") | Err(_)) {
+        return Ok(());
+    }
+    endpoints(config, "listen/endpoints").iter().try_for_each(|endpoint| listen(endpoint))
+}
+
+fn listen(endpoint: &str) -> Result<(), BusError> {
+    let Some(host_and_port) = host_and_port(endpoint) else { return Ok(()) };
+    let Err(error) = TcpListener::bind(host_and_port) else { return Ok(()) };
+    let reason = match error.kind() {
+        ErrorKind::AddrInUse => {
+            "another program listens there, perhaps a service; stop it, or give another address with --listen HOST:PORT".to_owned()
+        }
+        ErrorKind::AddrNotAvailable => {
+            "this machine does not have the address; give one of its own with --listen HOST:PORT".to_owned()
+        }
+        ErrorKind::PermissionDenied => {
+            "this user may not take the port; give one from 1024 on with --listen HOST:PORT".to_owned()
+        }
+        _ => format!("{error}; give another address with --listen HOST:PORT"),
+    };
+    Err(BusError::Listen { endpoint: address(endpoint).to_owned(), reason })
+}
+
+/// What has kept a session from connecting within `limit`.
+pub(crate) fn after(config: &Config, limit: Duration) -> Option<BusError> {
+    let endpoints = endpoints(config, "connect/endpoints");
+    let reasons: Vec<_> = endpoints.iter().filter_map(|endpoint| silent(endpoint, limit)).collect();
+    (!reasons.is_empty()).then(|| BusError::Unreachable { reasons })
+}
+
+/// Why nothing came of an endpoint, with what to do next.
+fn silent(endpoint: &str, limit: Duration) -> Option<String> {
+    let at = address(endpoint);
+    let address = host_and_port(endpoint)?;
+    let elsewhere = "say where the service is: --connect HOST:PORT or ISOTHERM_CONNECT";
+    let addresses: Vec<SocketAddr> = match address.to_socket_addrs() {
+        Ok(addresses) => addresses.collect(),
+        Err(_) => return Some(format!("{at}: the host name is not known; {elsewhere}")),
+    };
+    let mut last = None;
+    for address in addresses {
+        match TcpStream::connect_timeout(&address, TRIAL) {
+            Ok(_) => {
+                return Some(format!(
+                    "{at}: something listens there but does not answer as a service within {limit:?}; is it another program, a \
+                     stopped service, or one with other certificates? Else {elsewhere}"
+                ));
+            }
+            Err(error) => last = Some(error),
+        }
+    }
+    let error = last?;
+    Some(match error.kind() {
+        ErrorKind::ConnectionRefused => {
+            format!("{at}: nothing listens there; start one with `isotherm serve`, or {elsewhere}")
+        }
+        ErrorKind::TimedOut => {
+            format!("{at}: the machine does not answer; check network and firewall, or {elsewhere}")
+        }
+        _ => format!("{at}: {error}; {elsewhere}"),
+    })
+}

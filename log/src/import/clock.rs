@@ -1,0 +1,70 @@
+//! Units of time and rates that a log does not state with its columns.
+
+/// Nanoseconds in the units of time.
+pub(super) const UNITS_NS: [(&str, f64); 4] = [("s", 1e9), ("ms", 1e6), ("us", 1e3), ("ns", 1.0)];
+/// Ticks that are likely (ns).
+const LIKELY_TICK_NS: std::ops::RangeInclusive<f64> = 1e6..=1e9;
+/// Ticks that are possible (ns).
+const POSSIBLE_TICK_NS: std::ops::RangeInclusive<f64> = 5e4..=6e10;
+
+/// Rows per second, where the lines before the data say so: `// Update Rate: 100.0Hz`, `# Config: data_rate = 2000.0 Hz`.
+pub(super) fn rate_in(lines: &[String]) -> Option<f64> {
+    lines.iter().find_map(|line| {
+        let line = line.to_lowercase();
+        let (head, rest) = line.split_once("rate")?;
+        let begins = head.ends_with(|c: char| !c.is_alphabetic()) || head.is_empty();
+        let number: String = rest
+            .trim_start_matches([':', '=', ' ', ',', ';', '\t', '(', ')'])
+            .trim_start_matches("hz")
+            .trim_start_matches(|c: char| !c.is_ascii_digit())
+            .chars()
+            .take_while(|c| c.is_ascii_digit() || *c == '.')
+            .collect();
+        number.parse().ok().filter(|rate: &f64| begins && line.contains("hz") && (1e-3..=1e6).contains(rate))
+    })
+}
+
+/// The unit of stamps by their usual step: the only one that gives the stated rate, a time of this century, or a likely tick.
+pub(super) fn unit_of(step: f64, largest: f64, stated_hz: Option<f64>) -> Option<String> {
+    let only = |fits: &dyn Fn(f64) -> bool| {
+        let mut units = UNITS_NS.iter().filter(|(_, ns)| fits(*ns));
+        match (units.next(), units.next()) {
+            (Some((unit, _)), None) => Some((*unit).to_owned()),
+            _ => None,
+        }
+    };
+    let rate = stated_hz.and_then(|rate| only(&|ns| (step * ns * rate / 1e9 - 1.0).abs() < 0.1));
+    // From 2001 to 2096.
+    let century =
+        || only(&|ns| (1e18..4e18).contains(&(largest * ns)) && POSSIBLE_TICK_NS.contains(&(step * ns)));
+    let likely = || only(&|ns| LIKELY_TICK_NS.contains(&(step * ns)));
+    rate.or_else(century).or_else(likely)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn units_of_time_and_rates_that_logs_state() {
+        for (step, largest, rate, expected) in [
+            (0.01, 60.0, None, Some("s")),
+            (10.0, 60_000.0, None, Some("ms")),
+            (5000.0, 6e7, None, Some("us")),
+            (5e6, 1.4e18, None, Some("ns")),
+            (1000.0, 1.7e15, None, Some("us")),
+            (1000.0, 1e6, None, None),
+            (1000.0, 1e6, Some(1000.0), Some("us")),
+        ] {
+            assert_eq!(unit_of(step, largest, rate).as_deref(), expected, "{step}");
+        }
+        for (line, expected) in [
+            ("// Update Rate: 100.0Hz", Some(100.0)),
+            ("# Config: data_rate = 2000.0 Hz, filter = 488 Hz", Some(2000.0)),
+            ("Sample Rate (Hz),125", Some(125.0)),
+            ("# calibrated at 20 Hz", None),
+        ] {
+            assert_eq!(rate_in(&[line.to_owned()]), expected, "{line}");
+        }
+    }
+}

@@ -1,0 +1,208 @@
+//! What the rows of a log say of its columns, in one pass and in constant memory.
+
+use std::path::Path;
+
+use super::layout::{Found, cells};
+use crate::error::Error;
+use crate::text::{open_decoded, parse_float};
+
+/// Rows by which the usual step, and gravity, are told.
+const SAMPLE: usize = 4096;
+/// A step longer than so many usual ones is a gap.
+pub(super) const GAP: f64 = 1.5;
+
+/// What the cells of one column are.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Column {
+    /// Cells with a number.
+    pub(super) numbers: u64,
+    /// Cells with nothing in them.
+    pub(super) empty: u64,
+    /// Cells with anything else.
+    pub(super) other: u64,
+    /// Cells whose number has a fraction.
+    pub(super) fractions: u64,
+    /// Largest size of a number.
+    pub(super) largest: f64,
+    pub(super) minimum: f64,
+    pub(super) maximum: f64,
+    pub(super) steps: Steps,
+    last: Option<(i64, f64)>,
+}
+
+/// Differences of successive numbers.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Steps {
+    first: Vec<f64>,
+    /// The usual step.
+    pub(super) usual: f64,
+    /// Steps of zero or less.
+    pub(super) back: u64,
+    /// Steps longer than [`GAP`] usual ones, and the longest step.
+    pub(super) gaps: u64,
+    pub(super) longest: f64,
+    /// Of the first steps, the one that 99 of 100 do not exceed.
+    pub(super) p99: f64,
+    settled: bool,
+}
+
+impl Steps {
+    fn take(&mut self, step: f64) {
+        if step <= 0.0 {
+            self.back += 1;
+            return;
+        }
+        self.longest = self.longest.max(step);
+        if self.settled {
+            self.gaps += u64::from(step > GAP * self.usual);
+            return;
+        }
+        self.first.push(step);
+        if self.first.len() == SAMPLE {
+            self.settle();
+        }
+    }
+
+    fn settle(&mut self) {
+        if self.settled || self.first.is_empty() {
+            return;
+        }
+        self.settled = true;
+        self.first.sort_by(f64::total_cmp);
+        let at =
+            |share: usize| self.first.get((self.first.len() - 1) * share / 100).copied().unwrap_or_default();
+        (self.usual, self.p99) = (at(50), at(99));
+        self.gaps = self.first.iter().filter(|step| **step > GAP * self.usual).map(|_| 1).sum();
+    }
+}
+
+impl Column {
+    fn take(&mut self, cell: &str, mark: u8) {
+        if cell.is_empty() {
+            self.empty += 1;
+            return;
+        }
+        let Some(number) = parse_float(cell, mark).filter(|number| number.is_finite()) else {
+            self.other += 1;
+            return;
+        };
+        if self.numbers == 0 {
+            (self.minimum, self.maximum) = (number, number);
+        }
+        self.numbers += 1;
+        self.fractions += u64::from(number.fract() != 0.0);
+        self.largest = self.largest.max(number.abs());
+        self.minimum = self.minimum.min(number);
+        self.maximum = self.maximum.max(number);
+        let parts = parts(cell, mark).unwrap_or((0, number));
+        if let Some((whole, fraction)) = self.last.replace(parts) {
+            #[expect(clippy::cast_precision_loss, reason = "steps are small")]
+            let step = parts.0.saturating_sub(whole) as f64;
+            self.steps.take(step + (parts.1 - fraction));
+        }
+    }
+
+    /// Whether it could be the clock of the rows.
+    pub(super) fn increases(&self) -> bool {
+        self.numbers > 1 && self.steps.back == 0 && self.empty + self.other == 0
+    }
+
+    /// Whether it counts the rows.
+    pub(super) fn counts(&self) -> bool {
+        let one = (self.steps.usual - 1.0).abs() < 1e-9;
+        self.increases() && self.fractions == 0 && one && self.minimum >= 0.0
+    }
+}
+
+/// A plain decimal number as its whole part and its fraction: the difference of two times of this century in ns is exact.
+fn parts(cell: &str, mark: u8) -> Option<(i64, f64)> {
+    let (whole, fraction) = cell.split_once(char::from(mark)).unwrap_or((cell, ""));
+    let digits = |text: &str| text.bytes().all(|byte| byte.is_ascii_digit());
+    if !digits(fraction) || !digits(whole.trim_start_matches(['-', '+'])) {
+        return None;
+    }
+    let size: f64 = format!("0.{fraction}0").parse().ok()?;
+    Some((whole.parse().ok()?, if whole.starts_with('-') { -size } else { size }))
+}
+
+/// What was found of all rows.
+#[derive(Debug, Clone)]
+pub(super) struct Figures {
+    pub(super) columns: Vec<Column>,
+    pub(super) rows: u64,
+}
+
+impl Figures {
+    /// Reads the file to its end.
+    pub(super) fn of(path: &Path, found: &Found) -> Result<Self, Error> {
+        let mut lines = open_decoded(path, found.encoding)?;
+        let mut figures = Self { columns: vec![Column::default(); found.width], rows: 0 };
+        let first = found.rows.first().map(String::as_str).unwrap_or_default();
+        let mut begun = false;
+        while let Some(line) = lines.next_line().map_err(|error| Error::file(path, "read the log", error))? {
+            begun |= line == first;
+            let comment = found.comment.is_some_and(|prefix| line.trim_start().starts_with(prefix));
+            if !begun || comment || line.trim().is_empty() {
+                continue;
+            }
+            figures.rows += 1;
+            for (column, cell) in figures.columns.iter_mut().zip(cells(&line, found.split_at)) {
+                column.take(&cell, found.decimal_mark);
+            }
+        }
+        for column in &mut figures.columns {
+            column.steps.settle();
+        }
+        Ok(figures)
+    }
+}
+
+/// Median of the size of the vectors that three columns hold in the first rows.
+pub(super) fn usual_size(found: &Found, columns: [usize; 3]) -> Option<f64> {
+    let size = |line: &String| {
+        let cells = cells(line, found.split_at);
+        let numbers = columns.map(|column| parse_float(cells.get(column)?, found.decimal_mark));
+        let sum: Option<f64> = numbers.into_iter().map(|number| number.map(|number| number * number)).sum();
+        sum.map(f64::sqrt)
+    };
+    let mut sizes: Vec<f64> = found.rows.iter().filter_map(size).collect();
+    sizes.sort_by(f64::total_cmp);
+    sizes.get(sizes.len() / 2).copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn column(numbers: impl IntoIterator<Item = f64>) -> Column {
+        column_of(numbers.into_iter().map(|number| number.to_string()))
+    }
+
+    fn column_of(cells: impl IntoIterator<Item = String>) -> Column {
+        let mut column = Column::default();
+        cells.into_iter().for_each(|cell| column.take(&cell, b'.'));
+        column.steps.settle();
+        column
+    }
+
+    #[test]
+    fn steps_of_long_times_are_exact() {
+        let stamps =
+            column_of((0..100).map(|row| format!("{}", 1_403_636_579_758_555_392_i64 + row * 5_000_000)));
+        assert!((stamps.steps.usual - 5_000_000.0).abs() < 1e-9, "{}", stamps.steps.usual);
+        let seconds =
+            column_of((0..100).map(|row| format!("-{}.{:02}", 1_600_000_000 - row / 4, 75 - row % 4 * 25)));
+        assert_eq!((seconds.steps.usual, seconds.steps.back), (0.25, 0));
+    }
+
+    #[test]
+    fn steps_gaps_counters_and_counters_that_begin_anew() {
+        let stamps =
+            column((0..10_000).map(|row| f64::from(row) * 5.0 + if row < 6000 { 0.0 } else { 40.0 }));
+        assert_eq!((stamps.steps.usual, stamps.steps.gaps, stamps.steps.longest), (5.0, 1, 45.0));
+        assert!(stamps.increases() && !stamps.counts());
+        assert!(column((0..300).map(|row| f64::from(row + 7))).counts());
+        let wraps = column((0..300).map(|row| f64::from(row % 256)));
+        assert!(!wraps.increases() && wraps.steps.back == 1);
+    }
+}

@@ -1,0 +1,320 @@
+//! How the bytes of a log become rows and cells.
+
+use std::io::{ErrorKind, Read};
+use std::path::Path;
+use std::sync::Arc;
+
+use super::{Hints, refuse};
+use crate::error::Error;
+use crate::mapping::{Delimiter, Encoding};
+use crate::text::{open_decoded, open_raw, parse_float, split_cells};
+
+/// Bytes by which an encoding is told.
+const SAMPLE_BYTES: u64 = 1 << 18;
+/// Lines by which a layout is told.
+const SAMPLE_LINES: usize = 600;
+/// Most rows of other figures in front of the data.
+const MOST_ODD: usize = 10;
+/// Prefixes of lines that are no data.
+const COMMENTS: [&str; 5] = ["//", "#", "%", ";", "!"];
+/// Delimiters in the order in which they are preferred, as the mapping spells them.
+const DELIMITERS: [(&str, Delimiter); 5] = [
+    ("tab", Delimiter::Character(b'\t')),
+    ("semicolon", Delimiter::Character(b';')),
+    ("comma", Delimiter::Character(b',')),
+    ("pipe", Delimiter::Character(b'|')),
+    ("whitespace", Delimiter::Whitespace),
+];
+
+/// What was found of a file's form.
+#[derive(Debug, Clone)]
+pub(super) struct Found {
+    pub(super) encoding: Encoding,
+    /// As the mapping spells it.
+    pub(super) delimiter: &'static str,
+    pub(super) split_at: Delimiter,
+    pub(super) decimal_mark: u8,
+    pub(super) comment: Option<&'static str>,
+    pub(super) skip_lines: usize,
+    /// Names of the columns as they stand in the header; `None` without one.
+    pub(super) header: Option<Vec<String>>,
+    /// The mapping can name columns by the header.
+    pub(super) by_name: bool,
+    /// Cells of a row of units below the header.
+    pub(super) units: Vec<String>,
+    pub(super) drop_rows: usize,
+    pub(super) width: usize,
+    /// Lines before the data, for what they say of rates.
+    pub(super) preamble: Vec<String>,
+    /// First rows of data.
+    pub(super) rows: Vec<String>,
+}
+
+/// Cells of a line.
+pub(super) fn cells(line: &str, delimiter: Delimiter) -> Vec<String> {
+    split_cells(line, delimiter).unwrap_or_default()
+}
+
+/// Finds the form of a file.
+pub(super) fn find(path: &Path, hints: &Hints) -> Result<Found, Error> {
+    let encoding = match hints.encoding {
+        Some(encoding) => encoding,
+        None => encoding_of(&sample(path)?),
+    };
+    let lines = first_lines(path, encoding)?;
+    if lines.first().is_some_and(|line| line.starts_with("#RAWIMU") || line.starts_with("%RAWIMU")) {
+        return Err(refuse(
+            path,
+            "is a NovAtel ASCII log, whose last cell carries a checksum: convert it to CSV first (NovAtel Convert, `RAWIMU` to ASCII columns)",
+        ));
+    }
+    let delimiters: Vec<_> = match &hints.delimiter {
+        Some(word) => DELIMITERS.into_iter().filter(|(name, _)| name == word).collect(),
+        None => DELIMITERS.to_vec(),
+    };
+    let marks = match hints.decimal_mark {
+        Some(',') => vec![b','],
+        Some(_) => vec![b'.'],
+        None => vec![b'.', b','],
+    };
+    let mut best: Option<(Score, Block)> = None;
+    for (name, delimiter) in delimiters {
+        for &mark in &marks {
+            if delimiter == Delimiter::Character(mark) {
+                continue;
+            }
+            let Some((score, block)) = block(&lines, name, delimiter, mark) else { continue };
+            if best.as_ref().is_none_or(|(before, _)| score > *before) {
+                best = Some((score, block));
+            }
+        }
+    }
+    let (_, block) = best.ok_or_else(|| {
+        refuse(path, format!("no rows of numbers in the first {} lines: is it a text log?", lines.len()))
+    })?;
+    Ok(dressed(&lines, block, encoding))
+}
+
+/// How well a delimiter and a decimal mark explain the lines: rows, then share of cells that are numbers (in thousandths).
+type Score = (usize, usize);
+
+/// The longest run of rows of numbers.
+#[derive(Debug, Clone, Copy)]
+struct Block {
+    name: &'static str,
+    delimiter: Delimiter,
+    mark: u8,
+    start: usize,
+    width: usize,
+}
+
+/// Where a run of rows begins, its width, its rows, and the sum of their shares of numbers.
+type Run = (usize, usize, usize, usize);
+
+/// The longest run of lines that are rows of numbers of one width.
+fn block(lines: &[String], name: &'static str, delimiter: Delimiter, mark: u8) -> Option<(Score, Block)> {
+    let (mut best, mut run): (Option<(Score, Block)>, Option<Run>) = (None, None);
+    let mut close = |run: &mut Option<Run>| {
+        let Some((start, width, rows, share)) = run.take() else { return };
+        let score = (rows, share / rows.max(1));
+        if best.as_ref().is_none_or(|(before, _)| score > *before) {
+            best = Some((score, Block { name, delimiter, mark, start, width }));
+        }
+    };
+    for (index, line) in lines.iter().enumerate() {
+        if line.trim().is_empty() {
+            continue;
+        }
+        match numeric(line, delimiter, mark) {
+            Some((width, share)) => {
+                if run.is_some_and(|(_, of_run, _, _)| of_run != width) {
+                    close(&mut run);
+                }
+                let (_, _, rows, sum) = run.get_or_insert((index, width, 0, 0));
+                *rows += 1;
+                *sum += share;
+            }
+            // A comment between rows ends no run.
+            None if COMMENTS.iter().any(|prefix| line.trim_start().starts_with(prefix)) => {}
+            None => close(&mut run),
+        }
+    }
+    close(&mut run);
+    best
+}
+
+/// Width of a row of numbers, and the share of its filled cells that are numbers (in thousandths); `None` for another line.
+fn numeric(line: &str, delimiter: Delimiter, mark: u8) -> Option<(usize, usize)> {
+    let cells = cells(line, delimiter);
+    let filled = cells.iter().filter(|cell| !cell.is_empty()).count();
+    let numbers = cells.iter().filter(|cell| parse_float(cell, mark).is_some()).count();
+    (numbers >= 2 && numbers * 2 > filled).then(|| (cells.len(), numbers * 1000 / filled))
+}
+
+/// Adds what stands before the rows.
+fn dressed(lines: &[String], block: Block, encoding: Encoding) -> Found {
+    let Block { name, delimiter, mark, start, width } = block;
+    let before: Vec<&String> = lines.iter().take(start).filter(|line| !line.trim().is_empty()).collect();
+    let wordy = |cells: &[String]| {
+        let words = cells
+            .iter()
+            .filter(|cell| cell.chars().any(char::is_alphabetic) && parse_float(cell, mark).is_none());
+        cells.len() >= 2 && words.count() * 2 > cells.len()
+    };
+    let mut units = Vec::new();
+    let mut header_at = before.len().checked_sub(1);
+    if let Some(at) = header_at {
+        let last = cells(before[at], delimiter);
+        let bracketed = |cell: &String| cell.is_empty() || cell == "-" || cell.starts_with(['(', '[']);
+        if last.len().abs_diff(width) <= 1
+            && last.iter().all(bracketed)
+            && last.iter().any(|cell| cell.len() > 2)
+        {
+            units = last;
+            header_at = at.checked_sub(1);
+        }
+    }
+    let header_at = header_at.filter(|at| {
+        let names = cells(before[*at], delimiter);
+        names.len().abs_diff(width) <= 1 && wordy(&names)
+    });
+    let drop_rows = usize::from(!units.is_empty());
+    let preamble: Vec<String> =
+        before.iter().take(header_at.unwrap_or(before.len())).map(|line| (*line).clone()).collect();
+    let header_line = header_at.map(|at| before[at].clone());
+    let comment = comment(lines, header_line.as_deref());
+    let skipped = |upto: usize| {
+        let is_comment = |line: &str| comment.is_some_and(|prefix| line.trim_start().starts_with(prefix));
+        before.iter().take(upto).filter(|line| !is_comment(line)).count()
+    };
+    let header = header_line.map(|line| cells(&line, delimiter));
+    // The reader wants as many names as cells, each once.
+    let by_name = header.as_ref().is_some_and(|names| {
+        let mut sorted: Vec<_> = names.iter().filter(|name| !name.is_empty()).collect();
+        sorted.sort();
+        sorted.windows(2).all(|pair| pair[0] != pair[1]) && names.len() == width
+    });
+    let skip_lines = match header_at {
+        Some(at) if by_name => skipped(at),
+        // By numbers: the header is one of the lines in front.
+        Some(_) => skipped(before.len()) - drop_rows,
+        None => skipped(before.len()),
+    };
+    let mut rows: Vec<String> =
+        lines.iter().skip(start).filter(|line| !line.trim().is_empty()).cloned().collect();
+    let odd = if header_at.is_none() { odd_rows(&rows, delimiter, mark) } else { 0 };
+    rows.drain(..odd);
+    let skip_lines = skip_lines + odd;
+    Found {
+        encoding,
+        delimiter: name,
+        split_at: delimiter,
+        decimal_mark: mark,
+        comment,
+        skip_lines,
+        header,
+        by_name,
+        units,
+        drop_rows,
+        width,
+        preamble,
+        rows,
+    }
+}
+
+/// Rows of other figures in front of the data: their last is the last of the first rows with a fraction in a column of whole numbers.
+fn odd_rows(rows: &[String], delimiter: Delimiter, mark: u8) -> usize {
+    if rows.len() < 4 * MOST_ODD {
+        return 0;
+    }
+    let whole = |row: &String| -> Vec<bool> {
+        let is_whole = |cell: &String| {
+            parse_float(cell, mark)
+                .is_none_or(|number| number.fract() == 0.0 && !cell.contains(char::from(mark)))
+        };
+        cells(row, delimiter).iter().map(is_whole).collect()
+    };
+    let (front, data) = rows.split_at(MOST_ODD);
+    let mut of_data = vec![true; data.first().map_or(0, |row| whole(row).len())];
+    for row in data {
+        of_data.iter_mut().zip(whole(row)).for_each(|(all, this)| *all &= this);
+    }
+    let odd = |row: &String| whole(row).iter().zip(&of_data).any(|(this, all)| *all && !this);
+    front.iter().rposition(odd).map_or(0, |last| last + 1)
+}
+
+/// The prefix of lines that are passed over: one that a line other than the header has, and the header has not.
+fn comment(lines: &[String], header: Option<&str>) -> Option<&'static str> {
+    COMMENTS.into_iter().find(|prefix| {
+        lines.iter().any(|line| line.trim_start().starts_with(prefix))
+            && !header.is_some_and(|header| header.trim_start().starts_with(prefix))
+    })
+}
+
+/// The first bytes of a file, decompressed.
+fn sample(path: &Path) -> Result<Vec<u8>, Error> {
+    let (source, _) = open_raw(path, &Arc::default())?;
+    let mut bytes = Vec::new();
+    match source.take(SAMPLE_BYTES).read_to_end(&mut bytes) {
+        Err(error) if error.kind() != ErrorKind::UnexpectedEof => {
+            Err(Error::file(path, "read the log", error))
+        }
+        _ => Ok(bytes),
+    }
+}
+
+/// The encoding by its mark; without one, UTF-16 by the zero bytes of Latin letters, UTF-8 where it is valid, else Latin-1.
+fn encoding_of(bytes: &[u8]) -> Encoding {
+    let zeros = |odd: usize| bytes.iter().skip(odd).step_by(2).filter(|byte| **byte == 0).count();
+    let most = bytes.len() / 4;
+    match bytes {
+        [0xff, 0xfe, ..] => Encoding::Utf16Le,
+        [0xfe, 0xff, ..] => Encoding::Utf16Be,
+        _ if bytes.len() > 8 && zeros(1) > most && zeros(0) == 0 => Encoding::Utf16Le,
+        _ if bytes.len() > 8 && zeros(0) > most && zeros(1) == 0 => Encoding::Utf16Be,
+        // A character that the sample cuts is in order.
+        _ if std::str::from_utf8(bytes).map_or_else(|error| error.error_len().is_none(), |_| true) => {
+            Encoding::Utf8
+        }
+        _ => Encoding::Latin1,
+    }
+}
+
+/// The first lines, without their ends.
+fn first_lines(path: &Path, encoding: Encoding) -> Result<Vec<String>, Error> {
+    let mut lines = open_decoded(path, encoding)?;
+    let mut first = Vec::new();
+    while first.len() < SAMPLE_LINES {
+        match lines.next_line().map_err(|error| Error::file(path, "read the log", error))? {
+            Some(line) => first.push(line),
+            None => break,
+        }
+    }
+    Ok(first)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn encodings_are_told_by_mark_zeros_and_validity() {
+        let wide = |text: &str, big: bool| -> Vec<u8> {
+            text.encode_utf16()
+                .flat_map(|unit| if big { unit.to_be_bytes() } else { unit.to_le_bytes() })
+                .collect()
+        };
+        for (bytes, expected) in [
+            (b"\xef\xbb\xbfa,b".to_vec(), Encoding::Utf8),
+            ("Temp [°C]".as_bytes().to_vec(), Encoding::Utf8),
+            ("Temp [°C]".as_bytes()[..7].to_vec(), Encoding::Utf8),
+            (b"Temp [\xb0C]".to_vec(), Encoding::Latin1),
+            (wide("\u{feff}time,gx", false), Encoding::Utf16Le),
+            (wide("\u{feff}time,gx", true), Encoding::Utf16Be),
+            (wide("time,gx,gy,gz", false), Encoding::Utf16Le),
+            (wide("time,gx,gy,gz", true), Encoding::Utf16Be),
+        ] {
+            assert_eq!(encoding_of(&bytes), expected, "{bytes:?}");
+        }
+    }
+}

@@ -1,0 +1,318 @@
+//! From what was found of a log to a mapping, and to what must be asked.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use super::clock::{UNITS_NS, rate_in, unit_of};
+use super::figures::{Figures, usual_size};
+use super::layout::{self, Found};
+use super::names::{Kind, Meaning, meaning};
+use super::written::{FileText, Sensors, Temperature, Time};
+use super::{Hints, Proposal, Question, refuse};
+use crate::error::Error;
+
+/// Standard gravity in the units that an accelerometer may have.
+const GRAVITY: [(&str, f64); 3] = [("m_per_s2", 9.80665), ("g", 1.0), ("mg", 1000.0)];
+
+/// Proposes a mapping for the files of one log.
+///
+/// # Errors
+/// [`Error::File`]; [`Error::Usage`] for a file that no mapping can describe, or without gyros.
+pub fn propose(paths: &[impl AsRef<Path>], hints: &Hints) -> Result<Proposal, Error> {
+    let mut proposal = Proposal { mapping: String::new(), notes: Vec::new(), open: Vec::new() };
+    let names: Vec<_> = paths
+        .iter()
+        .map(|path| {
+            path.as_ref().file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
+        })
+        .collect();
+    for (path, name) in paths.iter().zip(&names) {
+        let found = layout::find(path.as_ref(), hints)?;
+        let figures = Figures::of(path.as_ref(), &found)?;
+        let file = File { name, found: &found, figures: &figures, hints };
+        let text = file.text(paths.len() > 1, &mut proposal);
+        proposal.mapping.push_str(&text.text());
+    }
+    let has_gyros = proposal.mapping.contains("[file.gyro]");
+    if !has_gyros && !proposal.open.iter().any(|open| matches!(open, Question::Columns { .. })) {
+        let first = paths.first().map_or(Path::new("the log"), AsRef::as_ref);
+        return Err(refuse(
+            first,
+            "has no columns of three gyros that can be told by their names: say which they are with --columns",
+        ));
+    }
+    let notes: Vec<_> = proposal.notes.iter().map(|note| format!("#   {note}\n")).collect();
+    proposal.mapping = format!(
+        "# Proposed by `isotherm-replay import` for {}; look it over.\n{}version = 1\n{}",
+        names.join(", "),
+        notes.concat(),
+        proposal.mapping
+    );
+    Ok(proposal)
+}
+
+/// A file with all that is known of it.
+#[derive(Debug, Clone, Copy)]
+struct File<'a> {
+    name: &'a str,
+    found: &'a Found,
+    figures: &'a Figures,
+    hints: &'a Hints,
+}
+
+/// The columns of x, y and z.
+type Axes<'m> = [Option<(usize, &'m Meaning)>; 3];
+
+/// Columns that mean something.
+type Meanings = Vec<(usize, Meaning)>;
+
+impl<'a> File<'a> {
+    fn text(self, named: bool, proposal: &mut Proposal) -> FileText<'a> {
+        let Found { encoding, delimiter, decimal_mark, .. } = self.found;
+        let header = if self.found.header.is_some() { "a header" } else { "no header" };
+        proposal.notes.push(format!(
+            "{}: {}, {delimiter}, decimal mark {:?}, {header}, {} columns, {} rows",
+            self.name,
+            encoding.word(),
+            char::from(*decimal_mark),
+            self.found.width,
+            self.figures.rows
+        ));
+        let meanings = self.meanings();
+        let groups = [Kind::Gyro, Kind::Accel].map(|kind| Self::group(&meanings, kind));
+        if groups.iter().all(Option::is_none) {
+            proposal.open.push(self.ask_columns());
+        }
+        let counter = self.counter(&meanings, proposal);
+        let time = self.time(&meanings, counter.is_some(), proposal);
+        let mut sensors = Vec::new();
+        for (group, kind) in groups.into_iter().zip(["gyro", "accel"]) {
+            let Some((columns, first)) = group else { continue };
+            let unit = self.sensor_unit(&columns, &first, kind, proposal);
+            let may_be_empty = columns.iter().any(|column| self.is_sparse(*column));
+            proposal.notes.push(format!("{kind}: {} in {unit}", self.listed(&columns)));
+            sensors.push(Sensors { kind, columns, unit, counter, may_be_empty });
+        }
+        let temperatures = self.temperatures(&meanings, proposal);
+        let name = named.then(|| self.name.to_owned());
+        FileText {
+            name,
+            found: self.found,
+            skip_bad_rows: self.hints.skip_bad_rows,
+            time,
+            sensors,
+            temperatures,
+        }
+    }
+
+    /// What the columns hold: by the names that were given, else by the header, else by the name of the file.
+    fn meanings(self) -> Meanings {
+        let given = &self.hints.columns;
+        let names = if given.is_empty() { self.found.header.as_deref().unwrap_or_default() } else { given };
+        let unit =
+            |index: usize| self.found.units.get(index).map(String::as_str).filter(|_| given.is_empty());
+        let first = names.iter().enumerate().take(self.found.width);
+        let mut meanings: Meanings =
+            first.filter_map(|(index, column)| Some((index, meaning(column, unit(index))?))).collect();
+        // A column in which no number stands says nothing, whatever its name.
+        meanings
+            .retain(|(index, _)| self.figures.columns.get(*index).is_some_and(|column| column.numbers > 0));
+        let of_file = meaning(&format!("{} x", self.name.split('.').next().unwrap_or_default()), None);
+        match of_file {
+            Some(file) if names.is_empty() && matches!(file.kind, Kind::Gyro | Kind::Accel) => {
+                let time = usize::from(self.found.width == 4 && self.figures.columns[0].increases());
+                if self.found.width == time + 3 {
+                    let axis = |axis: usize| (time + axis, Meaning { axis: Some(axis), ..file.clone() });
+                    meanings.extend((0..3).map(axis));
+                    meanings
+                        .extend((time == 1).then(|| meaning("time", None)).flatten().map(|time| (0, time)));
+                }
+            }
+            _ => {}
+        }
+        meanings
+    }
+
+    /// The three columns of a kind, x, y and z, of the best of those that the log has.
+    fn group(meanings: &Meanings, kind: Kind) -> Option<(Vec<usize>, Meaning)> {
+        // Where only the first of three names its unit, the others have it too.
+        let mut groups: BTreeMap<&str, Axes<'_>> = BTreeMap::new();
+        for (index, meaning) in meanings.iter().filter(|(_, meaning)| meaning.kind == kind) {
+            let Some(axis) = meaning.axis else { continue };
+            groups.entry(&meaning.stem).or_default()[axis].get_or_insert((*index, meaning));
+        }
+        let whole = groups.into_values().filter_map(|axes| match axes {
+            [Some(x), Some(y), Some(z)] => Some([x, y, z]),
+            _ => None,
+        });
+        let best =
+            whole.min_by_key(|axes| (axes.iter().map(|(_, meaning)| meaning.rank).min(), axes[0].0))?;
+        let first = best.iter().map(|(_, meaning)| *meaning).min_by_key(|meaning| meaning.rank)?.clone();
+        Some((best.iter().map(|(index, _)| *index).collect(), first))
+    }
+
+    fn sensor_unit(self, columns: &[usize], first: &Meaning, kind: &str, proposal: &mut Proposal) -> String {
+        let hint = if kind == "gyro" { &self.hints.gyro_unit } else { &self.hints.accel_unit };
+        if let Some(unit) = hint.as_deref().or(first.unit) {
+            return unit.to_owned();
+        }
+        let headed = |name: &str| self.found.header.iter().flatten().any(|have| have == name);
+        if headed("PacketCounter") && headed("Gyr_X") && !first.increment {
+            proposal.notes.push(format!(
+                "{kind}: the header is that of Xsens' MT Manager, which writes rad/s and m/s²"
+            ));
+            return if kind == "gyro" { "rad_per_s" } else { "m_per_s2" }.to_owned();
+        }
+        if kind == "accel"
+            && !first.increment
+            && let Ok(three) = <[usize; 3]>::try_from(columns)
+            && let Some(size) = usual_size(self.found, three)
+            && let Some((unit, _)) = GRAVITY.iter().find(|(_, g)| (size / g - 1.0).abs() < 0.1)
+        {
+            proposal.notes.push(format!("accel: the unit is told by its size at the beginning, {size:.4}"));
+            return (*unit).to_owned();
+        }
+        let largest = columns.iter().filter_map(|column| self.figures.columns.get(*column));
+        let largest = largest.fold(0.0_f64, |largest, column| largest.max(column.largest)).to_string();
+        let columns = self.listed(columns);
+        proposal.open.push(if kind == "gyro" {
+            Question::GyroUnit { columns, largest }
+        } else {
+            Question::AccelUnit { columns, largest }
+        });
+        "raw".to_owned()
+    }
+
+    fn counter(self, meanings: &Meanings, proposal: &mut Proposal) -> Option<usize> {
+        let named = meanings.iter().filter(|(_, meaning)| meaning.kind == Kind::Counter);
+        for (index, _) in named {
+            let Some(column) = self.figures.columns.get(*index) else { continue };
+            let name = self.listed(&[*index]);
+            if column.counts() {
+                proposal.notes.push(format!("counter: {name}, {} gaps in it", column.steps.gaps));
+                return Some(*index);
+            }
+            proposal.notes.push(match column.steps.back {
+                0 => format!("counter: {name} grows by {}, not by one: not used", column.steps.usual),
+                back => {
+                    format!("counter: {name} begins anew {back} times (up to {}): not used", column.maximum)
+                }
+            });
+        }
+        None
+    }
+
+    fn time(self, meanings: &Meanings, counted: bool, proposal: &mut Proposal) -> Time {
+        let mut clocks: Vec<_> = meanings.iter().filter(|(_, meaning)| meaning.kind == Kind::Time).collect();
+        clocks.sort_by_key(|(index, meaning)| (meaning.rank, *index));
+        let mut found = None;
+        for (index, meaning) in clocks {
+            if let Some(column) = self.figures.columns.get(*index).filter(|column| column.increases()) {
+                found = Some((*index, meaning, column));
+                break;
+            }
+            let name = self.listed(&[*index]);
+            proposal.notes.push(format!("time: {name} does not always grow: not used"));
+        }
+        let stated = self.hints.rate_hz.or_else(|| rate_in(&self.found.preamble));
+        let Some((index, meaning, column)) = found else {
+            let Some(rate) = stated else {
+                proposal.open.push(Question::Rate { file: self.name.to_owned() });
+                return Time { tick_ns: 1e7, ..Time::default() };
+            };
+            let by = if self.hints.rate_hz.is_some() { "given" } else { "the log's first lines say" };
+            proposal.notes.push(format!("time: {rate} rows per second, as {by}"));
+            return Time { tick_ns: 1e9 / rate, ..Time::default() };
+        };
+        let step = column.steps.usual;
+        let unit = self
+            .hints
+            .time_unit
+            .as_deref()
+            .or(meaning.unit)
+            .map(ToOwned::to_owned)
+            .or_else(|| unit_of(step, column.maximum, stated));
+        let unit = unit.unwrap_or_else(|| {
+            let column = self.listed(&[index]);
+            proposal.open.push(Question::TimeUnit { column, step: step.to_string() });
+            "s".to_owned()
+        });
+        let ns = UNITS_NS.iter().find(|(word, _)| *word == unit).map_or(1e9, |(_, ns)| *ns);
+        let tick_ns = (step * ns).max(1.0);
+        // Rounded to what stamps can say, so that 0.01 s is 10 000 000 ns.
+        let tick_ns = if tick_ns > 1e4 { (tick_ns / 10.0).round() * 10.0 } else { tick_ns };
+        let jitter = column.steps.p99 / step;
+        let gap_after_ticks =
+            (!counted && column.steps.gaps > 0).then(|| (jitter * super::figures::GAP).max(1.5));
+        proposal.notes.push(format!(
+            "time: {} in {unit}, every {} ms ({:.6} Hz), {} gaps, longest step {} ms",
+            self.listed(&[index]),
+            tick_ns / 1e6,
+            1e9 / tick_ns,
+            column.steps.gaps,
+            (column.steps.longest * ns).round() / 1e6
+        ));
+        Time {
+            column: Some(index),
+            unit,
+            tick_ns,
+            gap_after_ticks: gap_after_ticks.map(|ticks| (ticks * 100.0).round() / 100.0),
+        }
+    }
+
+    fn temperatures(self, meanings: &Meanings, proposal: &mut Proposal) -> Vec<Temperature> {
+        let mut found: Vec<Temperature> = Vec::new();
+        for (index, meaning) in meanings.iter().filter(|(_, meaning)| meaning.kind == Kind::Temperature) {
+            let Some(column) = self.figures.columns.get(*index) else { continue };
+            let unit = meaning.unit.unwrap_or_else(|| {
+                let likely = column.minimum > -90.0 && column.maximum < 200.0 && column.fractions > 0;
+                if likely { "deg_c" } else { "raw" }
+            });
+            let words: Vec<_> =
+                meaning.stem.split(' ').filter(|word| !word.starts_with("temp") && *word != "out").collect();
+            let mut channel = match words.join("_") {
+                none if none.is_empty() => "imu".to_owned(),
+                words => words.chars().take(20).collect(),
+            };
+            if let Some(axis) = meaning.axis {
+                channel = format!("{channel}_{}", ["x", "y", "z"][axis]);
+            }
+            if found.iter().any(|other| other.channel == channel) {
+                channel = format!("{channel}_{}", found.len() + 1);
+            }
+            proposal.notes.push(format!(
+                "temperature: {} in {unit} as channel {channel:?}, {} to {}",
+                self.listed(&[*index]),
+                column.minimum,
+                column.maximum
+            ));
+            found.push(Temperature { channel, column: *index, unit, may_be_empty: self.is_sparse(*index) });
+        }
+        found
+    }
+
+    /// Whether some rows have nothing in a column.
+    fn is_sparse(self, column: usize) -> bool {
+        self.figures.columns.get(column).is_some_and(|column| column.empty > 0)
+    }
+
+    fn ask_columns(self) -> Question {
+        let header = self.found.header.as_ref().map(|names| names.join(" | "));
+        let rows = header.into_iter().chain(self.found.rows.first().cloned()).collect();
+        Question::Columns { file: self.name.to_owned(), width: self.found.width, rows }
+    }
+
+    /// Columns for people.
+    fn listed(self, columns: &[usize]) -> String {
+        let name = |column: &usize| {
+            let name = self
+                .found
+                .header
+                .as_ref()
+                .and_then(|names| names.get(*column))
+                .filter(|name| !name.is_empty());
+            name.map_or_else(|| format!("column {}", column + 1), Clone::clone)
+        };
+        columns.iter().map(name).collect::<Vec<_>>().join(", ")
+    }
+}

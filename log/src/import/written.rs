@@ -1,0 +1,133 @@
+//! The mapping as text.
+
+use std::fmt::Write;
+
+use super::layout::Found;
+use crate::mapping::Encoding;
+
+/// Sensors of one kind.
+#[derive(Debug, Clone)]
+pub(super) struct Sensors {
+    pub(super) kind: &'static str,
+    pub(super) columns: Vec<usize>,
+    pub(super) unit: String,
+    pub(super) counter: Option<usize>,
+    pub(super) may_be_empty: bool,
+}
+
+/// A temperature channel.
+#[derive(Debug, Clone)]
+pub(super) struct Temperature {
+    pub(super) channel: String,
+    pub(super) column: usize,
+    pub(super) unit: &'static str,
+    pub(super) may_be_empty: bool,
+}
+
+/// Where the time of a row comes from.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Time {
+    pub(super) column: Option<usize>,
+    pub(super) unit: String,
+    pub(super) tick_ns: f64,
+    pub(super) gap_after_ticks: Option<f64>,
+}
+
+/// Everything that one file of a mapping says.
+#[derive(Debug, Clone)]
+pub(super) struct FileText<'a> {
+    pub(super) name: Option<String>,
+    pub(super) found: &'a Found,
+    pub(super) skip_bad_rows: bool,
+    pub(super) time: Time,
+    pub(super) sensors: Vec<Sensors>,
+    pub(super) temperatures: Vec<Temperature>,
+}
+
+/// A text as TOML writes it.
+fn quoted(text: &str) -> String {
+    toml::Value::String(text.to_owned()).to_string()
+}
+
+impl FileText<'_> {
+    /// The file's part of the mapping.
+    pub(super) fn text(&self) -> String {
+        let Self { found, time, .. } = self;
+        let mut text = String::from("\n[[file]]\n");
+        let mut line = |words: std::fmt::Arguments<'_>| {
+            // Writing to a string cannot fail.
+            let _ = writeln!(text, "{words}");
+        };
+        if let Some(name) = &self.name {
+            line(format_args!("name = {}", quoted(name)));
+        }
+        if found.encoding != Encoding::Utf8 {
+            line(format_args!("encoding = \"{}\"", found.encoding.word()));
+        }
+        line(format_args!("delimiter = \"{}\"", found.delimiter));
+        if found.decimal_mark != b'.' {
+            line(format_args!("decimal_mark = \",\""));
+        }
+        if let Some(comment) = found.comment {
+            line(format_args!("comment = {}", quoted(comment)));
+        }
+        if found.skip_lines > 0 {
+            line(format_args!("skip_lines = {}", found.skip_lines));
+        }
+        if found.by_name {
+            line(format_args!("header = true"));
+        }
+        if found.drop_rows > 0 {
+            line(format_args!("drop_rows = {}", found.drop_rows));
+        }
+        if self.skip_bad_rows {
+            line(format_args!("on_bad_row = \"skip\""));
+        }
+        line(format_args!("\n[file.time]"));
+        if let Some(column) = time.column {
+            line(format_args!("column = {}\nunit = \"{}\"", self.column(column), time.unit));
+        }
+        line(format_args!("tick_ns = {:?}", time.tick_ns));
+        if let Some(ticks) = time.gap_after_ticks {
+            line(format_args!("gap_after_ticks = {ticks:?}"));
+        }
+        for sensors in &self.sensors {
+            let counts = sensors.unit == "counts";
+            let output = if counts { "counts" } else { "mean" };
+            line(format_args!("\n[file.{}]\noutput = \"{output}\"", sensors.kind));
+            if let Some(counter) = sensors.counter {
+                line(format_args!("sequence_column = {}", self.column(counter)));
+            }
+            if sensors.may_be_empty {
+                line(format_args!("may_be_empty = true"));
+            }
+            line(format_args!("sensors = ["));
+            for column in &sensors.columns {
+                line(format_args!(
+                    "    {{ column = {}, unit = \"{}\" }},",
+                    self.column(*column),
+                    sensors.unit
+                ));
+            }
+            line(format_args!("]"));
+        }
+        for temperature in &self.temperatures {
+            let (channel, column) = (quoted(&temperature.channel), self.column(temperature.column));
+            line(format_args!(
+                "\n[[file.temperature]]\nchannel = {channel}\ncolumn = {column}\nunit = \"{}\"",
+                temperature.unit
+            ));
+            if temperature.may_be_empty {
+                line(format_args!("may_be_empty = true"));
+            }
+        }
+        text
+    }
+
+    /// A column by its name where the header has one that stands alone, else by its number.
+    fn column(&self, index: usize) -> String {
+        let name =
+            self.found.header.as_ref().filter(|_| self.found.by_name).and_then(|names| names.get(index));
+        name.filter(|name| !name.is_empty()).map_or_else(|| (index + 1).to_string(), |name| quoted(name))
+    }
+}
