@@ -71,7 +71,7 @@ impl Columns {
             (Some(OutputKind::Counts), None) => {
                 return Err(Error::Refused(vec![
                     "the gyro readings are counts: give the angle that one stands for with --increment-weight ARCSEC, or \
-                     a calibration document with --document"
+                     a calibration document with --calibration"
                         .to_owned(),
                 ]));
             }
@@ -96,7 +96,7 @@ impl Columns {
             }
             Some(OutputKind::Counts) => {
                 return Err(Error::Refused(vec![
-                    "the accelerometer readings are counts: give a calibration document with --document"
+                    "the accelerometer readings are counts: give a calibration document with --calibration"
                         .to_owned(),
                 ]));
             }
@@ -105,7 +105,7 @@ impl Columns {
         let mut columns = Self::build(unit, Kind::Force, accels, scale);
         columns.notes.push(
             "The readings are the accelerometers' mean outputs as the log has them. Where they are volts, m/s² stands for V; \
-             --document makes specific force of them."
+             --calibration makes specific force of them."
                 .to_owned(),
         );
         Ok(columns)

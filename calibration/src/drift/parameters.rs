@@ -240,7 +240,7 @@ pub fn put(
         let Some((axis, _)) = along else {
             reasons.push(format!(
                 "gyro {} of the document lies along no case axis ({row:?}), so its own drift cannot be told from corrected \
-                 rates: analyse the raw readings (without --document) and put the printed table in by hand",
+                 rates: analyse the raw readings (without --calibration) and put the printed table in by hand",
                 sensor.name
             ));
             continue;

@@ -22,7 +22,7 @@ pub fn bare(series: &Series, accel_output: AccelOutput) -> Result<Document, Erro
     let mut reasons = Vec::new();
     if series.gyros.output != Some(OutputKind::Mean) {
         reasons.push(
-            "the log's gyros put out counts: the angle of one is known to a document only, give one with --document"
+            "the log's gyros put out counts: the angle of one is known to a document only, give one with --calibration"
                 .to_owned(),
         );
     }
@@ -34,7 +34,7 @@ pub fn bare(series: &Series, accel_output: AccelOutput) -> Result<Document, Erro
         } else if count != MIN_SENSORS {
             reasons.push(format!(
                 "the log has {count} {kind}, from {MIN_SENSORS} to {MAX_SENSORS} are possible, but only three stand along \
-                 the case axes by themselves: give their nominal axes with --document"
+                 the case axes by themselves: give their nominal axes with --calibration"
             ));
         }
     }
@@ -54,7 +54,7 @@ pub fn bare(series: &Series, accel_output: AccelOutput) -> Result<Document, Erro
     }
     if !other.is_empty() {
         reasons.push(format!(
-            "temperature {} {} not read °C (most readings are outside {} to {} °C, or no numbers): give the conversion with --document",
+            "temperature {} {} not read °C (most readings are outside {} to {} °C, or no numbers): give the conversion with --calibration",
             if other.len() == 1 { "channel" } else { "channels" },
             if other.len() == 1 { format!("{} does", other[0]) } else { format!("{} do", other.join(", ")) },
             RANGE_DEG_C[0],

@@ -219,7 +219,7 @@ fn directions(poses: &[Pose]) -> Result<Vec<Vector3<f64>>, String> {
     if poses.iter().any(|pose| pose.outputs.len() != 3) {
         return Err(
             "the document's accelerometers do not give 1 g, and with more than three of them directions cannot be guessed: state \
-             their nominal scale factors and axes in --document"
+             their nominal scale factors and axes in --calibration"
                 .to_owned(),
         );
     }

@@ -72,13 +72,13 @@ pub fn nominal_of(series: &Series) -> Result<Document, Error> {
     for (kind, ticks) in [("gyro", &series.gyros), ("accelerometer", &series.accels)] {
         if ticks.output == Some(OutputKind::Counts) {
             reasons.push(format!(
-                "the {kind} readings are counts: give a document with their scale (--document)"
+                "the {kind} readings are counts: give a document with their scale (--calibration)"
             ));
         }
         if !ticks.is_empty() && ticks.readings.len() != 3 {
             let count = ticks.readings.len();
             reasons.push(format!(
-                "the log has {count} {kind}s: without a document (--document) their axes are known of three only"
+                "the log has {count} {kind}s: without a document (--calibration) their axes are known of three only"
             ));
         }
     }
@@ -92,7 +92,7 @@ pub fn nominal_of(series: &Series) -> Result<Document, Error> {
         if 2 * away.count() > channel.raw.len() {
             reasons.push(format!(
                 "temperature channel {name:?} has readings outside {} to {} °C: it is no temperature in °C; name the right column in \
-                 the mapping, or give a document with the channel's conversion (--document)",
+                 the mapping, or give a document with the channel's conversion (--calibration)",
                 DEG_C[0], DEG_C[1]
             ));
         }
@@ -117,7 +117,7 @@ pub fn nominal_of(series: &Series) -> Result<Document, Error> {
             format!(
                 "which temperature channel each gyro follows cannot be told from their names ({list}): name them gyro0, gyro1, gyro2 (and accel0 …) in \
                  the mapping, or give a document that says so \
-                 (--document)"
+                 (--calibration)"
             )
         }]));
     }

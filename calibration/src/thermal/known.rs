@@ -104,7 +104,7 @@ fn stays(name: &str, [low, high]: [f64; 2], plain: bool) -> String {
     }
     format!(
         "temperature channel {name:?} stays between {} and {}, which are taken as °C, because nothing converts them: {needed}. Where the \
-         channel is not in °C, as with volts or counts of a thermometer, give a document with its conversion (--document); where it is no \
+         channel is not in °C, as with volts or counts of a thermometer, give a document with its conversion (--calibration); where it is no \
          thermometer, name the right column in the mapping; else run the chamber",
         short(low),
         short(high)

@@ -59,7 +59,6 @@ pub fn fit(poses: &[Pose], force: &[[f64; 3]], gyro: usize, among: &[usize]) -> 
 /// Fits every gyro, and judges each by poses that its fit has not seen: those of `alike` are left out together with a pose.
 ///
 /// By gyro: what was found, or why nothing is stated of it.
-#[must_use]
 pub fn judged(
     poses: &[Pose],
     force: &[[f64; 3]],

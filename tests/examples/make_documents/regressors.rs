@@ -45,7 +45,7 @@ impl Term {
 
 /// A polynomial with one more coefficient.
 fn with<Q: Quantity>(before: Option<&Curve<Q>>, power: usize, coefficient: f64, range: [f64; 2]) -> Curve<Q> {
-    let mut coefficients = match before.map(Curve::shape) {
+    let mut coefficients = match before.map(|curve| curve.shape()) {
         Some(Shape::Polynomial { coefficients, .. }) => coefficients.clone(),
         _ => Vec::new(),
     };
