@@ -168,7 +168,7 @@ fn of_positions_at_two_temperatures() {
     std::fs::write(path("base.toml"), Written::of(&stand::document()).unwrap().text).unwrap();
     let (cold, hot, room, out) = (path("cold.mcap"), path("hot.mcap"), path("room.mcap"), path("new.toml"));
     let logs = ["positions", &cold, &hot, "--judge", &room, "--times", &path("times.csv")];
-    let rest = ["--document", &path("base.toml"), "--gravity", "9.8154", "--out", &out, "--json"];
+    let rest = ["--calibration", &path("base.toml"), "--gravity", "9.8154", "--out", &out, "--json"];
     let report = json(&[&logs[..], &rest].concat());
     let coefficients = report["coefficients"].as_array().unwrap();
     let errors = [1, 2, 3].map(|number| {
@@ -256,7 +256,7 @@ fn of_a_mode_reversed_gyro() {
         &run,
         "--judge",
         &judge,
-        "--document",
+        "--calibration",
         &base,
         "--remove-mean",
         "--out",
@@ -300,7 +300,7 @@ fn of_a_thermal_fit_to_recordings_with_accelerometers() {
         let out = path(&format!("{method}.toml"));
         let fit =
             ["thermal", &train, "--judge", &judge, "--method", method, "--window", "20", "--accept-partial"];
-        json(&[&fit[..], &["--document", &document, "--out", &out, "--json"]].concat());
+        json(&[&fit[..], &["--calibration", &document, "--out", &out, "--json"]].concat());
         for (log, sample) in [(&train, Sample::In), (&judge, Sample::Out)] {
             let ticks = replayed(&[log], &out, &["--ignore-journal"]);
             for (axis, letter) in ["x", "y", "z"].into_iter().enumerate() {
@@ -322,7 +322,7 @@ fn of_noise_and_drift_and_of_a_judgement() {
     let (log, out, csv) = (path("static.mcap"), path("new.toml"), path("corrected.csv"));
     record_one(Path::new(&log), &fibre_optic(7, "FOG-0001", 9000.0));
     let document = text_of(&shipped("FOG-0001.toml"));
-    let report = json(&["drift", &log, "--document", &document, "--out", &out, "--json"]);
+    let report = json(&["drift", &log, "--calibration", &document, "--out", &out, "--json"]);
     let ticks = replayed(&[&log], &out, &["--ignore-journal"]);
     // The first tick has no temperature yet and is analysed like all others.
     assert_eq!(report["ticks"].as_u64(), Some(ticks.len() as u64));

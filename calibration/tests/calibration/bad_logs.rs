@@ -87,10 +87,10 @@ fn a_recording_that_is_cut_short_is_told_by_every_command_and_ends_with_3() {
     let (fog, page) = (fog(), path("page.html"));
     let commands: [&[&str]; 5] = [
         &["drift", &log, "--html", &page],
-        &["drift", &log, "--document", &fog, "--json"],
+        &["drift", &log, "--calibration", &fog, "--json"],
         &["validate", &fog, &log],
         &["validate", &fog, &log, "--json"],
-        &["impact", &log, "--document", &fog, "--calibration-hours", "0.5", "--hours", "0.5"],
+        &["impact", &log, "--calibration", &fog, "--calibration-hours", "0.5", "--hours", "0.5"],
     ];
     for command in commands {
         let (code, said, errors) = words(&calibrate(command));
@@ -120,7 +120,7 @@ fn a_recording_that_is_cut_short_is_told_by_every_command_and_ends_with_3() {
     let commands: [&[&str]; 7] = [
         &["thermal", &nothing],
         &["drift", &nothing],
-        &["modes", &nothing, "--document", &fog, "--remove-mean"],
+        &["modes", &nothing, "--calibration", &fog, "--remove-mean"],
         &["positions", &nothing],
         &["tumble", &nothing],
         &["rates", &nothing, "--axis", "z", "--rates", "1,-1", "--remove-mean"],
@@ -186,7 +186,7 @@ fn positions_with_swapped_columns_name_them() {
             format!("{},{},{}\n", from + 2.0, to - 1.0, positions.positions[*position].name)
         });
         std::fs::write(&times, format!("start_s,end_s,position\n{}", rows.collect::<String>())).unwrap();
-        let call = ["positions", log.to_str().unwrap(), "--document", base.to_str().unwrap(), "--plan", plan];
+        let call = ["positions", log.to_str().unwrap(), "--calibration", base.to_str().unwrap(), "--plan", plan];
         let (code, said, errors) = words(&calibrate(&[&call[..], &["--gravity", "9.8154"], more].concat()));
         (code, format!("{said}{errors}"))
     };
@@ -234,7 +234,7 @@ fn modes_point_out_swapped_columns_where_the_attitude_is_stated() {
         }
         let _ = std::fs::remove_file(&log);
         record_events(&log, "ZLG-0001", &all);
-        let call = ["modes", log.to_str().unwrap(), "--document", base.to_str().unwrap()];
+        let call = ["modes", log.to_str().unwrap(), "--calibration", base.to_str().unwrap()];
         let (_, said, errors) = words(&calibrate(&[&call[..], &stated].concat()));
         let report: Value = serde_json::from_str(&said).unwrap_or_default();
         format!("{}{errors}", report["warnings"])
@@ -248,7 +248,7 @@ fn modes_point_out_swapped_columns_where_the_attitude_is_stated() {
     // The right columns, and the heading of another log.
     let _ = std::fs::remove_file(&log);
     record_events(&log, "ZLG-0001", events_of(&[zeeman(1, chamber())]));
-    let call = ["modes", log.to_str().unwrap(), "--document", base.to_str().unwrap(), "--latitude", "55.75"];
+    let call = ["modes", log.to_str().unwrap(), "--calibration", base.to_str().unwrap(), "--latitude", "55.75"];
     let (_, said, _) = words(&calibrate(&[&call[..], &["--heading", "210", "--json"]].concat()));
     assert!(said.contains("the gyros do not fit the attitude"), "{said}");
 }
@@ -260,7 +260,7 @@ fn thermal_refuses_a_log_in_another_attitude_than_the_stated_one() {
     record(Path::new(&log), &fibre_optic(5, "FOG-0001", 3000.0));
     let fog = fog();
     let call =
-        ["thermal", &log, "--document", &fog, "--latitude", "55.75", "--heading", "30", "--pitch", "0"];
+        ["thermal", &log, "--calibration", &fog, "--latitude", "55.75", "--heading", "30", "--pitch", "0"];
     let (_, said, errors) = words(&calibrate(&[&call[..], &["--roll", "0"]].concat()));
     assert!(!format!("{said}{errors}").contains("do not fit the attitude"), "{said}{errors}");
     let refused = fails(&[&call[..], &["--roll", "180"]].concat(), 1);

@@ -300,7 +300,7 @@ fn a_recording_is_analysed_and_its_parameters_go_into_a_document() {
 
     let document = root().join("config/calibration/FOG-0001.toml").display().to_string();
     let arguments =
-        ["drift", &path("static.mcap"), "--document", &document, "--out", &path("new.toml"), "--json"];
+        ["drift", &path("static.mcap"), "--calibration", &document, "--out", &path("new.toml"), "--json"];
     let corrected = json(&arguments);
     assert_eq!(corrected["corrected"], true);
     let text = std::fs::read_to_string(path("new.toml")).unwrap();

@@ -124,7 +124,7 @@ fn the_command_sails_stated_drifts_and_documents() {
     assert!(page.contains(report["verdict"].as_str().unwrap()));
 
     let document = shipped("ZLG-0001.toml").display().to_string();
-    let arguments = ["impact", "--document", &document, "--seeds", "4", "--hours", "12", "--json"];
+    let arguments = ["impact", "--calibration", &document, "--seeds", "4", "--hours", "12", "--json"];
     let many = json(&arguments);
     assert_eq!(many["rows"].as_array().unwrap().len(), 3);
     assert_eq!(calibrate(&arguments).stdout, calibrate(&arguments).stdout, "the same bytes");
@@ -137,7 +137,7 @@ fn the_command_sails_stated_drifts_and_documents() {
     };
     let constant = folder.path().join("constant.toml").display().to_string();
     std::fs::write(&constant, text.lines().map(still).collect::<String>()).unwrap();
-    let bound = json(&["impact", "--document", &constant, "--seeds", "4", "--hours", "12", "--json"]);
+    let bound = json(&["impact", "--calibration", &constant, "--seeds", "4", "--hours", "12", "--json"]);
     let said = format!("{} {}", bound["verdict"], bound["notes"]);
     assert_eq!(bound["rows"][0]["median"]["radial_largest_m"], 0.0, "{said}");
     for words in [

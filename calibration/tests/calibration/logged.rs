@@ -67,7 +67,7 @@ fn drift_says_the_same_of_a_log_in_every_form() {
     let mut means = Vec::new();
     for accelerometers in [&[][..], &["--accelerometers"]] {
         let of = |arguments: &[&str]| json(&[&["drift"], arguments, accelerometers, &["--json"]].concat());
-        let corrected_by = of(&[&raw, "--document", &document]);
+        let corrected_by = of(&[&raw, "--calibration", &document]);
         assert_eq!(corrected_by["corrected"], true);
         let by_csv = of(&[&csv]);
         let by_mcap = of(&[&mcap, "--corrected"]);
@@ -126,11 +126,11 @@ fn impact_sails_the_drift_of_a_log() {
         assert!(radial > 0.0 && radial < 20_000.0, "{row}");
     }
     assert_eq!(by_csv, sail(&mcap, &[]));
-    let of_unit = sail(&csv, &["--document", &document]);
-    assert_eq!(of_unit, sail(&raw, &["--document", &document]));
+    let of_unit = sail(&csv, &["--calibration", &document]);
+    assert_eq!(of_unit, sail(&raw, &["--calibration", &document]));
     assert_ne!(of_unit, by_csv, "the estimator expects something else");
     // A log that is too short for the calibration is refused in words.
-    let short = calibrate(&["impact", &csv, "--calibration-hours", "3", "--document", &document]);
+    let short = calibrate(&["impact", &csv, "--calibration-hours", "3", "--calibration", &document]);
     assert_eq!(short.status.code(), Some(1));
     assert!(String::from_utf8_lossy(&short.stderr).contains("--calibration-hours"));
     let raw_alone = calibrate(&["impact", &raw, "--calibration-hours", "1"]);

@@ -82,7 +82,7 @@ fn modes_are_fitted_judged_written_and_reported() {
     record(&run, &[zeeman(1, Profile::constant(50.0).ramp(-30.0, 4.0).ramp(50.0, 4.0))]);
     record(&judge, &[zeeman(2, Profile::constant(20.0).hold(4.0).ramp(45.0, 3.0).ramp(0.0, 5.0).hold(4.0))]);
     let (out, html) = (place("modes.toml"), place("modes.html"));
-    let fit = ["modes", text(&run), "--document", text(&base), "--latitude", "55.75", "--heading", "30"];
+    let fit = ["modes", text(&run), "--calibration", text(&base), "--latitude", "55.75", "--heading", "30"];
     let rest =
         ["--judge", text(&judge), "--out", text(&out), "--html", text(&html), "--created", "2026-11-22"];
     let said = succeeds(&[&fit[..], &rest[..]].concat());
@@ -128,10 +128,10 @@ fn modes_are_fitted_judged_written_and_reported() {
     several_modes(folder.path(), &run, &again);
 
     // What is missing is asked for; what is there already is kept.
-    assert!(fails(&["modes", text(&run), "--document", text(&base)], 2).contains("--latitude and --heading"));
+    assert!(fails(&["modes", text(&run), "--calibration", text(&base)], 2).contains("--latitude and --heading"));
     assert!(fails(&["modes", text(&run), "--remove-mean"], 2).contains("give --calibration"));
     assert!(fails(&[&fit[..], &["--out", text(&out)]].concat(), 2).contains("--overwrite"));
-    let other = ["modes", text(&run), "--document", text(&base), "--remove-mean", "--unit", "NOBODY"];
+    let other = ["modes", text(&run), "--calibration", text(&base), "--remove-mean", "--unit", "NOBODY"];
     assert!(fails(&other, 1).contains("is --unit right?"));
 }
 
@@ -150,7 +150,7 @@ fn several_modes(folder: &Path, run: &Path, alone: &Path) {
     let (out, html) = (place("batch.toml"), place("batch.html"));
     let logs = ["modes", text(run), text(&second), text(&third)];
     let rest =
-        ["--document", text(&documents), "--latitude", "55.75", "--heading", "30", "--created", "2026-11-22"];
+        ["--calibration", text(&documents), "--latitude", "55.75", "--heading", "30", "--created", "2026-11-22"];
     let outputs = ["--out", text(&out), "--html", text(&html)];
     let arguments = [&logs[..], &rest, &outputs].concat();
     let (code, said, errors) = words(&calibrate(&arguments));

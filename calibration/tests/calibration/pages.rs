@@ -45,12 +45,12 @@ fn pages_to_be_looked_at() {
         (logs(&["cold", "hot"], "MEMS-0001"), logs(&["cold", "room", "hot"], "MEMS-0002"));
     let (base, gravity) = (at("documents/MEMS-0001.toml"), ["--gravity", "9.8154", "--overwrite"]);
     let (out, judge) = (at("positions.toml"), at("room-MEMS-0001.mcap"));
-    let single = ["positions", &own[0], &own[1], "--document", &base, "--out", &out, "--judge", &judge];
+    let single = ["positions", &own[0], &own[1], "--calibration", &base, "--out", &out, "--judge", &judge];
     page("positions", &[&single[..], &gravity].concat());
     let mut batch = vec!["positions", &own[0], &own[1], &judge];
     batch.extend(others.iter().map(String::as_str));
     let (documents, several) = (at("documents"), at("several.toml"));
-    batch.extend(["--document", &documents, "--out", &several]);
+    batch.extend(["--calibration", &documents, "--out", &several]);
     page("batch", &[&batch[..], &gravity].concat());
     shock(&folder, &page);
 
@@ -76,7 +76,7 @@ fn pages_to_be_looked_at() {
         &[modes_rates::zeeman(2, Profile::constant(20.0).hold(4.0).ramp(45.0, 3.0).hold(4.0))],
     );
     let place = ["--latitude", "55.75", "--heading", "30"];
-    page("modes", &[&["modes", &run, "--judge", &other, "--document", &base][..], &place].concat());
+    page("modes", &[&["modes", &run, "--judge", &other, "--calibration", &base][..], &place].concat());
     let turned = at("table.mcap");
     modes_rates::record(
         Path::new(&turned),
@@ -85,7 +85,7 @@ fn pages_to_be_looked_at() {
     let (unit, scale) = (at("documents/MEMS-0001.toml"), at("rates.toml"));
     let steps =
         ["--axis", "z", "--rates", "36,-36,108,-108", "--remove-mean", "--overwrite", "--out", &scale];
-    page("rates", &[&["rates", &turned, "--document", &unit][..], &steps].concat());
+    page("rates", &[&["rates", &turned, "--calibration", &unit][..], &steps].concat());
     let whole = at("unit.toml");
     let _ = std::fs::remove_file(&whole);
     let parts = ["merge", &unit, &at("before.toml"), &scale, "--out", &whole];
@@ -118,7 +118,7 @@ fn shock(folder: &Path, page: &dyn Fn(&str, &[&str])) {
             &[
                 "positions",
                 &log,
-                "--document",
+                "--calibration",
                 &document,
                 "--gravity",
                 "9.8154",

@@ -53,7 +53,7 @@ fn scale_and_bias_stand_at_the_temperature_of_their_own_channel() {
     let warmer = record(&room, &mems_chamber(0).instrument, 20.0);
     assert!((3.0..6.0).contains(&warmer), "the accelerometers are {warmer} °C warmer than the housing");
     let old = wrong(&base);
-    let call = ["positions", &room, "--document", &base, "--gravity", "9.8154", "--out", &out, "--json"];
+    let call = ["positions", &room, "--calibration", &base, "--gravity", "9.8154", "--out", &out, "--json"];
     let report: Value = serde_json::from_str(&succeeds(&call)).unwrap();
     for number in 0..4 {
         assert_eq!(report["verdicts"][number]["accepted"], true, "{}", report["verdict"]);
@@ -84,7 +84,7 @@ fn curves_reach_as_far_as_their_own_channel_went() {
         (log.clone(), deg_c, record(&log, &mems_chamber(0).instrument, deg_c))
     });
     let logs_of: Vec<&str> = logs.iter().map(|(log, ..)| log.as_str()).collect();
-    let rest = ["--document", &base, "--gravity", "9.8154", "--out", &out, "--json"];
+    let rest = ["--calibration", &base, "--gravity", "9.8154", "--out", &out, "--json"];
     let report: Value =
         serde_json::from_str(&succeeds(&[&["positions"], &logs_of[..], &rest].concat())).unwrap();
     assert_eq!(report["accepted"], true, "{}", report["verdict"]);
@@ -118,7 +118,7 @@ fn what_makes_a_judging_run_worse_leaves_the_old_document() {
     record(&judge, &own, 20.0);
     let document = shipped("MEMS-0001.toml").display().to_string();
     let call =
-        ["positions", &log, "--judge", &judge, "--document", &document, "--gravity", "9.8154", "--out", &out];
+        ["positions", &log, "--judge", &judge, "--calibration", &document, "--gravity", "9.8154", "--out", &out];
     let errors = fails(&call, 1);
     assert!(!Path::new(&out).exists());
     assert!(errors.contains("accelerometer y: rms grows from "), "{errors}");

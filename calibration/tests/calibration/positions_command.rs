@@ -48,7 +48,7 @@ fn the_command_writes_the_document_and_says_what_it_did() {
         logs.push(format!("{name}.csv"));
     }
     std::fs::write(at("base.toml"), Written::of(&stand::document()).unwrap().text).unwrap();
-    let common = ["--mapping", "mapping.toml", "--document", "base.toml", "--gravity", "9.8154"];
+    let common = ["--mapping", "mapping.toml", "--calibration", "base.toml", "--gravity", "9.8154"];
     let call = |more: &[&str]| {
         let mut args = vec!["positions", "cold.csv", "hot.csv"];
         args.extend(common);
@@ -87,7 +87,7 @@ fn the_command_writes_the_document_and_says_what_it_did() {
     // JSON instead of tables; a warning where nobody says what gravity is.
     let json = within(
         folder.path(),
-        &["positions", "room.csv", "--mapping", "mapping.toml", "--document", "base.toml", "--json"],
+        &["positions", "room.csv", "--mapping", "mapping.toml", "--calibration", "base.toml", "--json"],
     );
     let value: serde_json::Value = serde_json::from_slice(&json.stdout).unwrap();
     assert!(value["warnings"].to_string().contains("state --gravity"), "{value}");
@@ -110,7 +110,7 @@ fn several_units_on_one_stand_end_with_one_table() {
         std::fs::write(at(&format!("documents/{unit}.toml")), Written::of(&document).unwrap().text).unwrap();
     }
     let logs = ["positions", "MEMS-0001.mcap", "MEMS-0002.mcap"];
-    let rest = ["--document", "documents", "--gravity", "9.8154", "--out", "new.toml", "--html", "new.html"];
+    let rest = ["--calibration", "documents", "--gravity", "9.8154", "--out", "new.toml", "--html", "new.html"];
     let done = within(folder.path(), &[&logs[..], &rest].concat());
     assert!(done.status.success(), "{}", text(&done.stderr));
     let said = text(&done.stdout);
@@ -125,7 +125,7 @@ fn several_units_on_one_stand_end_with_one_table() {
         assert!(at(&format!("new-{unit}.html")).exists());
     }
     // By itself a unit comes to the same.
-    let alone = ["positions", "MEMS-0002.mcap", "--document", "documents/MEMS-0002.toml"];
+    let alone = ["positions", "MEMS-0002.mcap", "--calibration", "documents/MEMS-0002.toml"];
     let done = within(folder.path(), &[&alone[..], &["--gravity", "9.8154", "--out", "alone.toml"]].concat());
     assert!(done.status.success(), "{}", text(&done.stderr));
     let accel = |name: &str| Written::read(&at(name)).unwrap().document.accel;
@@ -187,7 +187,7 @@ fn a_judging_log_in_another_unit_of_measure_is_refused() {
     }
     std::fs::write(folder.path().join("base.toml"), Written::of(&document).unwrap().text).unwrap();
     let call =
-        ["positions", "own.mcap", "--judge", "other.mcap", "--document", "base.toml", "--gravity", "9.8154"];
+        ["positions", "own.mcap", "--judge", "other.mcap", "--calibration", "base.toml", "--gravity", "9.8154"];
     let done = within(folder.path(), &call);
     assert_eq!(done.status.code(), Some(1));
     let errors = text(&done.stderr);

@@ -19,7 +19,7 @@ fn steps_that_are_not_those_of_the_log_write_nothing() {
     record(Path::new(&log), &table(0, [1.0, 0.0, 0.0], &RATES));
     let document = shipped("MEMS-0001.toml").display().to_string();
     let refused = |stated: &[&str]| {
-        let call = ["rates", &log, "--document", &document, "--out", &out];
+        let call = ["rates", &log, "--calibration", &document, "--out", &out];
         let errors = fails(&[&call[..], &ATTITUDE, stated].concat(), 1);
         assert!(!Path::new(&out).exists(), "{errors}");
         errors
@@ -46,7 +46,7 @@ fn steps_that_are_not_those_of_the_log_write_nothing() {
     let turning = refused(&["--steps", &steps]);
     assert!(turning.contains("% of the largest rate, at most 1 % are a result (χ² "), "{turning}");
     // What fits is written.
-    let call = ["rates", &log, "--document", &document, "--out", &out, "--axis", "x", "--rates", all];
+    let call = ["rates", &log, "--calibration", &document, "--out", &out, "--axis", "x", "--rates", all];
     succeeds(&[&call[..], &ATTITUDE].concat());
     let text = std::fs::read_to_string(&out).unwrap();
     let weight = Document::parse(&text, None).unwrap().document.gyro.sensor[0].increment_weight_rad_per_rad;
@@ -71,7 +71,7 @@ fn a_judging_run_that_shows_noise_alone_refuses_nothing() {
             record(Path::new(log), &table(10 * seed + index as u64, axis, rates));
         }
         let [x, y, z, judge] = &logs;
-        let call = ["rates", x, y, z, "--judge", judge, "--document", &document, "--json"];
+        let call = ["rates", x, y, z, "--judge", judge, "--calibration", &document, "--json"];
         let stated = ["--axis", "x", "--axis", "y", "--axis", "z", "--axis", "0,0.6,0.8"];
         let rates = ["--rates", "36,-36,108,-108", "--judge-rates", "72,-72"];
         let said = succeeds(&[&call[..], &stated, &rates, &ATTITUDE].concat());

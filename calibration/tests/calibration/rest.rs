@@ -29,10 +29,10 @@ fn drift_and_impact_refuse_a_dead_gyro_behind_a_correction() {
     let document = shipped("FOG-0001.toml").display().to_string();
     let new = folder.path().join("new.toml").display().to_string();
     let dead = log(folder.path(), |columns| columns[1].fill(0.0), |_| true);
-    let words = fails(&["drift", &dead, "--document", &document, "--out", &new], 1);
+    let words = fails(&["drift", &dead, "--calibration", &document, "--out", &new], 1);
     assert!(words.contains("gyro y: every reading is 0: the sensor is dead"), "{words}");
     assert!(!Path::new(&new).exists(), "no document");
-    let words = fails(&[&["impact", &dead, "--document", &document], &SHORT[..]].concat(), 1);
+    let words = fails(&[&["impact", &dead, "--calibration", &document], &SHORT[..]].concat(), 1);
     assert!(words.contains("gyro y: every reading is 0: the sensor is dead"), "{words}");
 }
 
@@ -41,8 +41,8 @@ fn drift_and_impact_tell_of_frozen_readings_and_of_a_wrong_measure() {
     let folder = tempfile::tempdir().unwrap();
     let document = shipped("FOG-0001.toml").display().to_string();
     let both = |log: &str| {
-        let drift = succeeds(&["drift", log, "--document", &document]);
-        [drift, succeeds(&[&["impact", log, "--document", &document], &SHORT[..]].concat())]
+        let drift = succeeds(&["drift", log, "--calibration", &document]);
+        [drift, succeeds(&[&["impact", log, "--calibration", &document], &SHORT[..]].concat())]
     };
     let frozen = log(folder.path(), |columns| columns[1][3000..4000].fill(0.0), |_| true);
     for told in both(&frozen) {
@@ -54,7 +54,7 @@ fn drift_and_impact_tell_of_frozen_readings_and_of_a_wrong_measure() {
     }
     let moving = log(folder.path(), |columns| columns[2].iter_mut().for_each(|rate| *rate += 2e5), |_| true);
     for command in [&["drift"][..], &[&["impact"], &SHORT[..]].concat()] {
-        let words = fails(&[command, &[&moving, "--document", &document]].concat(), 1);
+        let words = fails(&[command, &[&moving, "--calibration", &document]].concat(), 1);
         assert!(words.contains("at most 20 °/s is rest"), "{words}");
     }
 }
@@ -78,7 +78,7 @@ fn drift_leaves_single_readings_far_beyond_the_noise_out() {
         |columns: &mut [Vec<f64>; 3]| columns[0].iter_mut().step_by(800).for_each(|rate| *rate = 1e11);
     let spikes = log(folder.path(), spoil, |_| true);
     let document = shipped("FOG-0001.toml").display().to_string();
-    let told = succeeds(&["drift", &spikes, "--document", &document]);
+    let told = succeeds(&["drift", &spikes, "--calibration", &document]);
     assert!(told.contains("; left out on all axes, since"), "{told}");
     let told = succeeds(&["drift", &spikes]);
     assert!(told.contains("gyro x: 9 single readings are far beyond the noise"), "{told}");
@@ -135,13 +135,13 @@ fn impact_tells_of_missing_ticks_and_of_what_a_short_log_lacks() {
     let folder = tempfile::tempdir().unwrap();
     let document = shipped("FOG-0001.toml").display().to_string();
     let gaps = log(folder.path(), |_| (), |index| index % 5 != 0);
-    let told = succeeds(&[&["impact", &gaps, "--document", &document], &SHORT[..]].concat());
+    let told = succeeds(&[&["impact", &gaps, "--calibration", &document], &SHORT[..]].concat());
     assert!(told.contains("ticks (20.0 %) are missing"), "{told}");
-    let words = fails(&["impact", &gaps, "--document", &document], 1);
+    let words = fails(&["impact", &gaps, "--calibration", &document], 1);
     assert!(words.contains("FOG-0001.toml has no [gyro.sensor.drift]"), "{words}");
     let spoil = |columns: &mut [Vec<f64>; 3]| columns[0].iter_mut().step_by(5).for_each(|r| *r = f64::NAN);
     let holes = log(folder.path(), spoil, |_| true);
-    let words = fails(&[&["impact", &holes, "--document", &document], &SHORT[..]].concat(), 1);
+    let words = fails(&[&["impact", &holes, "--calibration", &document], &SHORT[..]].concat(), 1);
     assert!(words.contains("are no good numbers"), "{words}");
 }
 

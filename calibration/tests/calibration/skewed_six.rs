@@ -116,7 +116,7 @@ fn rates_find_six_gyros() {
         modes_rates::record(Path::new(&logs[index]), &scenarios);
     }
     let table = "--axis x --axis y --axis z --rates 36,-36,108,-108 --latitude 55.75 --heading 30 --pitch 0 --roll 0 --json";
-    let mut arguments = vec!["rates", &logs[0], &logs[1], &logs[2], "--document", &base, "--out", &out];
+    let mut arguments = vec!["rates", &logs[0], &logs[1], &logs[2], "--calibration", &base, "--out", &out];
     arguments.extend(table.split(' '));
     let report = json(&arguments);
     assert_eq!(report["accepted"], true, "{}", report["verdict"]);
@@ -151,20 +151,20 @@ fn drift_looks_at_six_gyros_or_at_the_three_axes_that_they_make() {
         assert!((walk(sensor) / 0.15 - 1.0).abs() < 0.1, "{sensor}");
     }
     // Six that are twice as many as needed: the axes have their noise over √2.
-    let corrected = json(&["drift", &log, "--document", &base, "--json"]);
+    let corrected = json(&["drift", &log, "--calibration", &base, "--json"]);
     let corrected = corrected["sensors"].as_array().unwrap();
     assert_eq!(corrected.len(), 3);
     for sensor in corrected {
         assert!((walk(sensor) / 0.106 - 1.0).abs() < 0.1, "{sensor}");
     }
     // Which of six gyros an axis' drift is of cannot be told.
-    let refused = fails(&["drift", &log, "--document", &base, "--out", &out], 1);
+    let refused = fails(&["drift", &log, "--calibration", &base, "--out", &out], 1);
     assert!(
         refused.contains("gyro a of the document lies along no case axis") && !Path::new(&out).exists(),
         "{refused}"
     );
     // What a log left, for navigation: along three axes too.
-    let sailed = json(&["impact", &log, "--document", &base, "--calibration-hours", "0.5", "--json"]);
+    let sailed = json(&["impact", &log, "--calibration", &base, "--calibration-hours", "0.5", "--json"]);
     assert!(
         sailed["notes"].to_string().contains("no document states what the drift of these is"),
         "{sailed}"
@@ -181,7 +181,7 @@ fn six_sensors_are_judged_and_a_hand_tumbled_unit_of_six_is_refused() {
     save(&base, &document());
     let report = json(&["validate", &base, &log, "--json"]);
     assert_eq!(report["verdicts"].as_array().unwrap().len(), 6, "three axes of each kind");
-    let (code, _, errors) = words(&calibrate(&["tumble", &log, "--document", &base, "--gravity", "9.8154"]));
+    let (code, _, errors) = words(&calibrate(&["tumble", &log, "--calibration", &base, "--gravity", "9.8154"]));
     assert!(code == Some(1) && errors.contains("6 accelerometers: |f| = g is for three"), "{errors}");
     assert!(errors.contains("positions"), "{errors}");
 }
@@ -209,7 +209,7 @@ fn modes_find_a_fourth_gyro_that_stands_askew() {
     }
     save(&base, &document);
     let place = "--latitude 55.75 --heading 30 --json --out";
-    let mut arguments = vec!["modes", &log, "--document", &base];
+    let mut arguments = vec!["modes", &log, "--calibration", &base];
     arguments.extend(place.split(' '));
     let report = json(&[&arguments[..], &[&out]].concat());
     assert_eq!(report["accepted"], true, "{}", report["verdict"]);

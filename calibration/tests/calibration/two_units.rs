@@ -44,7 +44,7 @@ fn noise_and_drift_of_both_end_with_one_table() {
     let path = |name: &str| folder.path().join(name).display().to_string();
     let (log, documents) = both(folder.path(), at_rest(3000.0));
     let (out, html) = (path("new.toml"), path("drift.html"));
-    let said = succeeds(&["drift", &log, "--document", &documents, "--out", &out, "--html", &html]);
+    let said = succeeds(&["drift", &log, "--calibration", &documents, "--out", &out, "--html", &html]);
     let table = said.rsplit("\n\n").find(|part| part.starts_with("2 units: ")).unwrap();
     assert!(table.starts_with("2 units: 6 of 6 sensors analysed.\n"), "{table}");
     assert_eq!(table.lines().filter(|line| line.contains("FOG-0002") && line.contains("gyro ")).count(), 3);
@@ -53,7 +53,7 @@ fn noise_and_drift_of_both_end_with_one_table() {
     // A unit comes to the same by itself.
     let of = |name: &str| Written::read(&folder.path().join(name)).unwrap().document;
     let (one, alone) = (format!("{documents}/FOG-0002.toml"), path("alone.toml"));
-    let said = succeeds(&["drift", &log, "--document", &one, "--out", &alone]);
+    let said = succeeds(&["drift", &log, "--calibration", &one, "--out", &alone]);
     assert!(said.contains("the logs have unit FOG-0001 too, which is left alone"), "{said}");
     assert_eq!(of("new-FOG-0002.toml").gyro, of("alone.toml").gyro);
     assert!(
@@ -63,7 +63,7 @@ fn noise_and_drift_of_both_end_with_one_table() {
     // Raw readings need no document; a unit without one does not stop the other.
     assert_eq!(units(&json(&["drift", &log, "--json"])), UNITS);
     std::fs::remove_file(&one).unwrap();
-    let (code, said, errors) = words(&calibrate(&["drift", &log, "--document", &documents]));
+    let (code, said, errors) = words(&calibrate(&["drift", &log, "--calibration", &documents]));
     assert!(code == Some(1) && errors.contains("FOG-0002.toml is not there"), "{errors}");
     assert!(said.contains("2 units: 3 of 3 sensors analysed, 1 of the units came to nothing."), "{said}");
     assert!(fails(&["drift", &log, "--out", &out], 2).contains("give it with --calibration"));
@@ -91,7 +91,7 @@ fn both_put_down_by_hand_end_with_one_table() {
     succeeds(&[&fit[..], &["--unit", UNITS[1], "--out", &alone]].concat());
     let accel = |name: &str| Written::read(&folder.path().join(name)).unwrap().document.accel;
     assert_eq!(accel("alone.toml"), accel("new-FOG-0002.toml"));
-    let said = succeeds(&[&fit[..], &["--document", &alone]].concat());
+    let said = succeeds(&[&fit[..], &["--calibration", &alone]].concat());
     assert!(said.contains("warning: the logs have unit FOG-0001 too, which is left alone"), "{said}");
 }
 
@@ -104,7 +104,7 @@ fn both_on_a_table_are_fitted_and_one_document_takes_one() {
     let fit = "--axis z --rates 36,-36 --latitude 55.75 --heading 30 --pitch 0 --roll 0 --json";
     let fit: Vec<&str> = ["rates", &log].into_iter().chain(fit.split(' ')).collect();
     assert_eq!(units(&json(&[&fit[..], &["--out", &path("new.toml")]].concat())), UNITS);
-    let alone = json(&[&fit[..], &["--document", &path("new-FOG-0001.toml")]].concat());
+    let alone = json(&[&fit[..], &["--calibration", &path("new-FOG-0001.toml")]].concat());
     assert_eq!(alone["unit"], "FOG-0001");
     assert!(alone["warnings"].to_string().contains("unit FOG-0002 too, which is left alone"), "{alone}");
 }
@@ -122,6 +122,6 @@ fn both_at_rest_are_judged_by_a_folder_and_refused_by_one_document() {
         refused.contains("several units (FOG-0001, FOG-0002): choose one with --unit, or give a folder"),
         "{refused}"
     );
-    let refused = fails(&["impact", &log, "--document", &one, "--calibration-hours", "0.5"], 1);
+    let refused = fails(&["impact", &log, "--calibration", &one, "--calibration-hours", "0.5"], 1);
     assert!(refused.contains("several units (FOG-0001, FOG-0002): choose one with --unit"), "{refused}");
 }

@@ -118,7 +118,7 @@ fn constant_temperature_is_refused() {
     // Volts of a thermometer, which nothing converts.
     refused(
         run(0..5400, |s| Second { deg_c: 1.5 + 0.01 * usual(s).deg_c, ..usual(s) }),
-        &["stays between 1.40 and 1.90, which are taken as °C", "volts", "--document", "right column"],
+        &["stays between 1.40 and 1.90, which are taken as °C", "volts", "--calibration", "right column"],
     );
 }
 

@@ -72,10 +72,10 @@ fn folders_recordings_and_several_units() {
     // A document says when it was made: today, or as it is told.
     let created = |name: &str| Written::read(&at.join(name)).unwrap().document.created.unwrap().to_string();
     assert!((began.clone()..=today()).contains(&created("of-file.toml")), "{}", created("of-file.toml"));
-    let old = ["log.csv", "--document", "of-file.toml", "--created", "2024-02-29", "--out", "old.toml"];
+    let old = ["log.csv", "--calibration", "of-file.toml", "--created", "2024-02-29", "--out", "old.toml"];
     said(at, &with(&old));
     assert_eq!(created("old.toml"), "2024-02-29");
-    let args = ["log.csv", "--document", "old.toml", "--mapping", "mapping.toml", "--out", "new.toml"];
+    let args = ["log.csv", "--calibration", "old.toml", "--mapping", "mapping.toml", "--out", "new.toml"];
     said(at, &args);
     assert!((began..=today()).contains(&created("new.toml")), "it is a new one");
 
@@ -98,7 +98,7 @@ fn folders_recordings_and_several_units() {
     assert_eq!(both["reports"][1]["unit"], "B");
     assert_eq!(json(&["other.mcap", "--unit", "B"])["unit"], "B");
     std::fs::write(at.join("a.toml"), read("of-file.toml").replace("\"UNIT\"", "\"A\"")).unwrap();
-    let (words, code) = said(at, &["whole.mcap", "other.mcap", "--document", "a.toml", "--out", "of-a.toml"]);
+    let (words, code) = said(at, &["whole.mcap", "other.mcap", "--calibration", "a.toml", "--out", "of-a.toml"]);
     assert!(
         code == Some(0) && words.contains("warning: the logs have unit B too, which is left alone"),
         "{words}"
@@ -135,7 +135,7 @@ fn folders_recordings_and_several_units() {
     // A run that goes one way only: every sensor is refused, which is no part, and no document says so.
     std::fs::write(at.join("b.toml"), read("of-file.toml").replace("\"UNIT\"", "\"B\"")).unwrap();
     let mut one_way =
-        vec!["other.mcap", "--duration", "2800", "--method", "sequential", "--document", "b.toml"];
+        vec!["other.mcap", "--duration", "2800", "--method", "sequential", "--calibration", "b.toml"];
     one_way.extend(["--accept-partial", "--out", "none.toml", "--html", "none.html"]);
     let (words, code) = said(at, &one_way);
     assert!(
