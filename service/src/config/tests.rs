@@ -210,7 +210,7 @@ fn an_endpoint_that_is_none_is_a_problem_of_the_configuration() {
     let problems = parse("[zenoh]\nlisten = [\"nowhere\"]").unwrap_err();
     assert_eq!(problems.len(), 1);
     assert!(
-        problems[0].starts_with("service.toml:1:1: zenoh: listen/endpoints = [\"nowhere\"] is not valid"),
+        problems[0].starts_with("service.toml:1:1: zenoh: listen is \"nowhere\", must be HOST:PORT"),
         "{problems:?}"
     );
 }

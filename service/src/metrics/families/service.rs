@@ -59,7 +59,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "",
         kind: Type::Counter,
         labels: &["outcome"],
-        help: "Calibrations accepted and refused, of all units, unknown ones included",
+        help: "Swaps accepted and refused, of all units, unknown ones included; first documents from files are no swaps",
         samples: |look, out| {
             out.counter(&["accepted"], look.posted.accepted)?;
             out.counter(&["refused"], look.posted.refused)

@@ -87,7 +87,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "",
         kind: Type::Counter,
         labels: &["unit", "outcome"],
-        help: "Calibrations accepted and refused for the unit",
+        help: "Swaps accepted and refused for the unit",
         samples: |look, out| {
             each(look, |unit, look| {
                 out.counter(&[unit, "accepted"], look.status.swaps.accepted)?;
