@@ -186,7 +186,8 @@ fn positions_with_swapped_columns_name_them() {
             format!("{},{},{}\n", from + 2.0, to - 1.0, positions.positions[*position].name)
         });
         std::fs::write(&times, format!("start_s,end_s,position\n{}", rows.collect::<String>())).unwrap();
-        let call = ["positions", log.to_str().unwrap(), "--calibration", base.to_str().unwrap(), "--plan", plan];
+        let call =
+            ["positions", log.to_str().unwrap(), "--calibration", base.to_str().unwrap(), "--plan", plan];
         let (code, said, errors) = words(&calibrate(&[&call[..], &["--gravity", "9.8154"], more].concat()));
         (code, format!("{said}{errors}"))
     };
@@ -248,7 +249,8 @@ fn modes_point_out_swapped_columns_where_the_attitude_is_stated() {
     // The right columns, and the heading of another log.
     let _ = std::fs::remove_file(&log);
     record_events(&log, "ZLG-0001", events_of(&[zeeman(1, chamber())]));
-    let call = ["modes", log.to_str().unwrap(), "--calibration", base.to_str().unwrap(), "--latitude", "55.75"];
+    let call =
+        ["modes", log.to_str().unwrap(), "--calibration", base.to_str().unwrap(), "--latitude", "55.75"];
     let (_, said, _) = words(&calibrate(&[&call[..], &["--heading", "210", "--json"]].concat()));
     assert!(said.contains("the gyros do not fit the attitude"), "{said}");
 }

@@ -128,7 +128,9 @@ fn modes_are_fitted_judged_written_and_reported() {
     several_modes(folder.path(), &run, &again);
 
     // What is missing is asked for; what is there already is kept.
-    assert!(fails(&["modes", text(&run), "--calibration", text(&base)], 2).contains("--latitude and --heading"));
+    assert!(
+        fails(&["modes", text(&run), "--calibration", text(&base)], 2).contains("--latitude and --heading")
+    );
     assert!(fails(&["modes", text(&run), "--remove-mean"], 2).contains("give --calibration"));
     assert!(fails(&[&fit[..], &["--out", text(&out)]].concat(), 2).contains("--overwrite"));
     let other = ["modes", text(&run), "--calibration", text(&base), "--remove-mean", "--unit", "NOBODY"];
@@ -149,8 +151,16 @@ fn several_modes(folder: &Path, run: &Path, alone: &Path) {
     record(&third, &[of("ZLG-0003", Profile::constant(20.0).hold(0.5))]);
     let (out, html) = (place("batch.toml"), place("batch.html"));
     let logs = ["modes", text(run), text(&second), text(&third)];
-    let rest =
-        ["--calibration", text(&documents), "--latitude", "55.75", "--heading", "30", "--created", "2026-11-22"];
+    let rest = [
+        "--calibration",
+        text(&documents),
+        "--latitude",
+        "55.75",
+        "--heading",
+        "30",
+        "--created",
+        "2026-11-22",
+    ];
     let outputs = ["--out", text(&out), "--html", text(&html)];
     let arguments = [&logs[..], &rest, &outputs].concat();
     let (code, said, errors) = words(&calibrate(&arguments));

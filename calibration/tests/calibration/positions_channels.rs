@@ -117,8 +117,18 @@ fn what_makes_a_judging_run_worse_leaves_the_old_document() {
     record(&log, &other, 20.0);
     record(&judge, &own, 20.0);
     let document = shipped("MEMS-0001.toml").display().to_string();
-    let call =
-        ["positions", &log, "--judge", &judge, "--calibration", &document, "--gravity", "9.8154", "--out", &out];
+    let call = [
+        "positions",
+        &log,
+        "--judge",
+        &judge,
+        "--calibration",
+        &document,
+        "--gravity",
+        "9.8154",
+        "--out",
+        &out,
+    ];
     let errors = fails(&call, 1);
     assert!(!Path::new(&out).exists());
     assert!(errors.contains("accelerometer y: rms grows from "), "{errors}");

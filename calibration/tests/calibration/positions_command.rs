@@ -110,7 +110,8 @@ fn several_units_on_one_stand_end_with_one_table() {
         std::fs::write(at(&format!("documents/{unit}.toml")), Written::of(&document).unwrap().text).unwrap();
     }
     let logs = ["positions", "MEMS-0001.mcap", "MEMS-0002.mcap"];
-    let rest = ["--calibration", "documents", "--gravity", "9.8154", "--out", "new.toml", "--html", "new.html"];
+    let rest =
+        ["--calibration", "documents", "--gravity", "9.8154", "--out", "new.toml", "--html", "new.html"];
     let done = within(folder.path(), &[&logs[..], &rest].concat());
     assert!(done.status.success(), "{}", text(&done.stderr));
     let said = text(&done.stdout);
@@ -186,8 +187,16 @@ fn a_judging_log_in_another_unit_of_measure_is_refused() {
         record_events(&folder.path().join(format!("{name}.mcap")), "MEMS-0001", &events);
     }
     std::fs::write(folder.path().join("base.toml"), Written::of(&document).unwrap().text).unwrap();
-    let call =
-        ["positions", "own.mcap", "--judge", "other.mcap", "--calibration", "base.toml", "--gravity", "9.8154"];
+    let call = [
+        "positions",
+        "own.mcap",
+        "--judge",
+        "other.mcap",
+        "--calibration",
+        "base.toml",
+        "--gravity",
+        "9.8154",
+    ];
     let done = within(folder.path(), &call);
     assert_eq!(done.status.code(), Some(1));
     let errors = text(&done.stderr);

@@ -181,7 +181,8 @@ fn six_sensors_are_judged_and_a_hand_tumbled_unit_of_six_is_refused() {
     save(&base, &document());
     let report = json(&["validate", &base, &log, "--json"]);
     assert_eq!(report["verdicts"].as_array().unwrap().len(), 6, "three axes of each kind");
-    let (code, _, errors) = words(&calibrate(&["tumble", &log, "--calibration", &base, "--gravity", "9.8154"]));
+    let (code, _, errors) =
+        words(&calibrate(&["tumble", &log, "--calibration", &base, "--gravity", "9.8154"]));
     assert!(code == Some(1) && errors.contains("6 accelerometers: |f| = g is for three"), "{errors}");
     assert!(errors.contains("positions"), "{errors}");
 }

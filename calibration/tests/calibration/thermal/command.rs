@@ -98,7 +98,8 @@ fn folders_recordings_and_several_units() {
     assert_eq!(both["reports"][1]["unit"], "B");
     assert_eq!(json(&["other.mcap", "--unit", "B"])["unit"], "B");
     std::fs::write(at.join("a.toml"), read("of-file.toml").replace("\"UNIT\"", "\"A\"")).unwrap();
-    let (words, code) = said(at, &["whole.mcap", "other.mcap", "--calibration", "a.toml", "--out", "of-a.toml"]);
+    let (words, code) =
+        said(at, &["whole.mcap", "other.mcap", "--calibration", "a.toml", "--out", "of-a.toml"]);
     assert!(
         code == Some(0) && words.contains("warning: the logs have unit B too, which is left alone"),
         "{words}"
