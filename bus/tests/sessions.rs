@@ -255,7 +255,7 @@ async fn closing_is_quick_and_bad_options_are_named() {
 
     let options = SessionOptions { listen: vec!["no endpoint".to_owned()], ..SessionOptions::default() };
     let error = open(&options).await.unwrap_err();
-    assert!(matches!(error, BusError::Option { option: "listen/endpoints", .. }), "{error}");
+    assert!(matches!(error, BusError::Endpoint { option: "listen", .. }), "{error}");
 }
 
 #[tokio::test(flavor = "multi_thread")]
