@@ -15,9 +15,10 @@ const MOST_ENTRIES: u32 = 10_000;
 
 /// Columns of the terminal that a table fits.
 const WIDTH: usize = 100;
-/// Longest name of who and of what it came from, and shortest room for what changed.
-const LONGEST_NAME: usize = 20;
-const SHORTEST_CHANGES: usize = 16;
+/// Longest name of who and of what it came from.
+const LONGEST_NAME: usize = 16;
+/// What stands before a line of what changed.
+const INDENT: &str = "        ";
 
 /// Arguments of `history`.
 #[derive(Debug, Clone, Args)]
@@ -71,26 +72,25 @@ pub(super) async fn run(args: &HistoryArgs) -> Result<Exit, ConsoleError> {
     Ok(print(&text, Exit::Ok))
 }
 
-/// The entries, a line each; the JSON has them whole.
+/// The entries, each with a line of its own for what changed; the JSON has them whole.
 fn table(entries: &[AuditEntry]) -> String {
-    let header = ["no.", "time (UTC)", "what", "rev", "digest", "by", "from", "changes"];
-    let mut rows: Vec<Vec<String>> = entries.iter().map(row).collect();
-    let length = |text: &str| text.chars().count();
-    let widest = |column: usize| {
-        let cells = rows.iter().filter_map(|row| row.get(column)).map(|cell| length(cell));
-        cells.chain(header.get(column).map(|name| length(name))).max().unwrap_or_default()
-    };
-    // A space on either side of each, and one between them.
-    let taken: usize = (0..header.len() - 1).map(widest).sum::<usize>() + 3 * header.len() + 1;
-    let left = WIDTH.saturating_sub(taken).max(SHORTEST_CHANGES);
-    for changes in rows.iter_mut().filter_map(|row| row.last_mut()) {
-        *changes = show::cut(changes, left);
+    let header = ["no.", "time (UTC)", "what", "rev", "digest", "by", "from"];
+    let (rows, changes): (Vec<_>, Vec<_>) = entries.iter().map(row).unzip();
+    let table = show::table(header, rows, header.len()).to_string();
+    // The header and the line under it change nothing.
+    let changes = [const { String::new() }; 2].into_iter().chain(changes);
+    let mut text = String::new();
+    for (line, changes) in table.lines().zip(changes) {
+        text.extend([line.trim_end(), "\n"]);
+        if !changes.is_empty() {
+            text.extend([INDENT, &show::cut(&changes, WIDTH - INDENT.len()), "\n"]);
+        }
     }
-    show::table(header, rows, header.len()).to_string() + "\n"
+    text
 }
 
-/// One line of the table.
-fn row(entry: &AuditEntry) -> Vec<String> {
+/// One line of the table, and what changed.
+fn row(entry: &AuditEntry) -> (Vec<String>, String) {
     let AuditEntry { number, time, by, event, .. } = entry;
     let head = |digest: &dyn std::fmt::Display| digest.to_string().chars().take(12).collect::<String>();
     let [revision, digest, from, changes] = match event {
@@ -130,7 +130,9 @@ fn row(entry: &AuditEntry) -> Vec<String> {
     // To the second; the JSON has the rest.
     let time: String = time.to_string().replace('T', " ").chars().take(19).collect();
     let cut = |text: &str| show::cut(text, LONGEST_NAME);
-    vec![number.to_string(), time, event.name().to_owned(), revision, digest, cut(by), cut(&from), changes]
+    let cells =
+        vec![number.to_string(), time, event.name().to_owned(), revision, digest, cut(by), cut(&from)];
+    (cells, changes)
 }
 
 /// When it took effect and what changed, short.
@@ -183,7 +185,7 @@ mod tests {
         let text = table(&entries);
         assert!(text.lines().all(|line| line.chars().count() <= WIDTH), "{text}");
         assert!(
-            text.contains("ZLG-0001.toml") && text.contains("gyro.sens") && !text.contains("/home"),
+            text.contains("ZLG-0001.toml") && text.contains("0.45 -> 0.41") && !text.contains("/home"),
             "{text}"
         );
     }
