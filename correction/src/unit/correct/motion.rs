@@ -11,8 +11,8 @@ use super::{Corrector, OnItsWay};
 use crate::calibration::Calibration;
 use crate::lanes::{Lanes, narrow};
 use crate::orientation::SensorMask;
-use crate::sample::{CorrectedTick, TickFlags};
-use crate::thermal::{Motion, MotionBanks, Shares};
+use crate::sample::{CorrectedTick, MAX_SENSORS, TickFlags};
+use crate::thermal::{Bank, Motion, Shares};
 use crate::unit::slew::between;
 use crate::units::{Span, Timestamp};
 use crate::vector::{cross, minus, plus};
@@ -62,11 +62,6 @@ impl MotionMemory {
     }
 }
 
-impl MotionInUse {
-    /// Nothing that follows motion.
-    const NONE: ([Lanes; 4], [Lanes; 1]) = ([[0.0; 8]; 4], [[0.0; 8]; 1]);
-}
-
 impl Corrector {
     /// What is in use, for a slew away from it; `None` where it is nothing.
     pub(super) fn motion_in_use(&self, calibration: &Calibration, shares: &Shares) -> Option<MotionInUse> {
@@ -81,22 +76,26 @@ impl Corrector {
 
     /// Coefficients of the gyros' terms that follow motion.
     fn gyro_motion<const N: usize>(&self, shares: &Shares) -> [[f64; N]; 4] {
-        let banks = self.thermal.motion.as_deref();
-        let mut terms = banks.map_or([[0.0; N]; 4], |MotionBanks { gyros, .. }| gyros.at(shares));
-        if let Some(slewing) = self.slewing() {
-            let old = slewing.from.motion.as_ref().map_or(&MotionInUse::NONE.0, |old| &old.gyros);
-            slewing.terms(&mut terms, old);
-        }
-        terms
+        let bank = self.thermal.motion.as_deref().map(|banks| &banks.gyros);
+        self.coefficients(bank, self.slew_from_motion().map(|old| &old.gyros), shares)
     }
 
     /// Coefficients of the accelerometers' terms that follow motion.
     fn accel_motion<const N: usize>(&self, shares: &Shares) -> [[f64; N]; 1] {
-        let banks = self.thermal.motion.as_deref();
-        let mut terms = banks.map_or([[0.0; N]; 1], |MotionBanks { accels, .. }| accels.at(shares));
+        let bank = self.thermal.motion.as_deref().map(|banks| &banks.accels);
+        self.coefficients(bank, self.slew_from_motion().map(|old| &old.accels), shares)
+    }
+
+    /// Coefficients of a bank, on their way from the old ones; zero where there are none.
+    fn coefficients<const N: usize, const T: usize>(
+        &self,
+        bank: Option<&Bank<T>>,
+        old: Option<&[Lanes; T]>,
+        shares: &Shares,
+    ) -> [[f64; N]; T] {
+        let mut terms = bank.map_or([[0.0; N]; T], |bank| bank.at(shares));
         if let Some(slewing) = self.slewing() {
-            let old = slewing.from.motion.as_ref().map_or(&MotionInUse::NONE.1, |old| &old.accels);
-            slewing.terms(&mut terms, old);
+            slewing.terms(&mut terms, old.unwrap_or(&[[0.0; MAX_SENSORS]; T]));
         }
         terms
     }
