@@ -38,6 +38,12 @@ impl Pose {
         intervals.iter().map(|interval| Self::over(track, run, *interval)).collect()
     }
 
+    /// Mean output of one gyro; no number where there is none.
+    #[must_use]
+    pub fn gyro(&self, index: usize) -> f64 {
+        self.gyros.get(index).copied().unwrap_or(f64::NAN)
+    }
+
     /// Means over one interval.
     #[must_use]
     pub fn over(track: &Track, run: usize, interval: Interval) -> Self {

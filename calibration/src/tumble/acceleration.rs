@@ -44,7 +44,7 @@ pub fn fit(poses: &[Pose], force: &[[f64; 3]], gyro: usize, among: &[usize]) -> 
         axis => weight(among[row]) * force[among[row]][axis - 1],
     };
     let design = DMatrix::from_fn(among.len(), COEFFICIENTS, row);
-    let reading = |pose: &usize| poses[*pose].gyros.get(gyro).copied().unwrap_or(f64::NAN) * weight(*pose);
+    let reading = |pose: &usize| poses[*pose].gyro(gyro) * weight(*pose);
     let readings = DVector::from_iterator(among.len(), among.iter().map(reading));
     let found = solve(&design, &readings, Weak::Refuse(SINGULAR)).ok()?;
     let c = &found.coefficients;
@@ -66,7 +66,7 @@ pub fn judged(
 ) -> [Result<GyroDrift, String>; 3] {
     let all: Vec<usize> = (0..poses.len()).collect();
     [0, 1, 2].map(|gyro| {
-        let reading = |pose: usize| poses[pose].gyros.get(gyro).copied().unwrap_or(f64::NAN);
+        let reading = |pose: usize| poses[pose].gyro(gyro);
         let found = fit(poses, force, gyro, &all).ok_or("the poses do not span the directions of gravity")?;
         let mean = Size::of(&all.iter().map(|pose| reading(*pose)).collect::<Vec<_>>()).mean;
         let about_mean: Vec<f64> = all.iter().map(|pose| reading(*pose) - mean).collect();

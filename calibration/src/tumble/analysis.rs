@@ -250,7 +250,7 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 fn at_rest(poses: &[Pose]) -> [f64; 3] {
     let total: f64 = poses.iter().map(|pose| pose.duration_s).sum();
     [0, 1, 2].map(|gyro| {
-        let of = |pose: &Pose| pose.gyros.get(gyro).copied().unwrap_or(f64::NAN) * pose.duration_s;
+        let of = |pose: &Pose| pose.gyro(gyro) * pose.duration_s;
         poses.iter().map(of).sum::<f64>() / total
     })
 }
