@@ -22,6 +22,7 @@
 //! | [`console`] | the operator's side: commands that talk to a running service |
 //! | [`check`] | validation of calibration documents and configurations |
 //! | [`signing`] | keys, signed documents and who is trusted, as files |
+//! | [`logging`], [`words`] | what is said on stderr and stdout, for other programs too |
 //! | [`report`], [`demo`] | the demonstration and its report |
 //!
 //! How a message travels: Zenoh's receive thread calls [`intake::Intake::receive`], which finds the unit, locks it, has
@@ -42,7 +43,7 @@ pub mod intake;
 mod keeper;
 pub mod kept;
 pub mod latency;
-mod logging;
+pub mod logging;
 mod metrics;
 mod registrar;
 pub mod report;
@@ -54,7 +55,7 @@ mod text;
 pub mod totals;
 pub mod unit;
 pub mod watch;
-mod words;
+pub mod words;
 
 pub use config::Settings;
 pub use error::ServiceError;
