@@ -22,7 +22,7 @@
 //! | [`console`] | the operator's side: commands that talk to a running service |
 //! | [`check`] | validation of calibration documents and configurations |
 //! | [`signing`] | keys, signed documents and who is trusted, as files |
-//! | [`report`], [`demo`] | the demonstration and its report |
+//! | [`demo`] | the demonstration and its report |
 //!
 //! How a message travels: Zenoh's receive thread calls [`intake::Intake::receive`], which finds the unit, locks it, has
 //! it corrected and publishes what came out, all before it returns. A second thread, the keeper, does what only a clock
@@ -45,7 +45,6 @@ pub mod latency;
 mod logging;
 mod metrics;
 mod registrar;
-pub mod report;
 mod serve;
 pub mod service;
 pub mod signing;
