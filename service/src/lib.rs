@@ -23,7 +23,7 @@
 //! | [`check`] | validation of calibration documents and configurations |
 //! | [`signing`] | keys, signed documents and who is trusted, as files |
 //! | [`logging`], [`words`] | what is said on stderr and stdout, for other programs too |
-//! | [`report`], [`demo`] | the demonstration and its report |
+//! | [`demo`] | the demonstration and its report |
 //!
 //! How a message travels: Zenoh's receive thread calls [`intake::Intake::receive`], which finds the unit, locks it, has
 //! it corrected and publishes what came out, all before it returns. A second thread, the keeper, does what only a clock
@@ -46,7 +46,6 @@ pub mod latency;
 pub mod logging;
 mod metrics;
 mod registrar;
-pub mod report;
 mod serve;
 pub mod service;
 pub mod signing;

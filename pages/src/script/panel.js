@@ -84,7 +84,9 @@ class Panel {
       this.laneNames(g);
     } else if (y) {
       clipped(g, view, () => {
-        for (const one of shown) drawSeries(g, view, y, one.samples, one.form, chart.colours[one.ink], density);
+        const { paper } = chart.colours;
+        const lines = shown.map(one => drawSeries(g, view, y, one.samples, one.form, { colour: chart.colours[one.ink], paper, density }));
+        for (const line of lines) line();
       });
     }
     clipped(g, view, () => drawMarks(g, view, chart.visibleMarks(), chart.colours));

@@ -1,11 +1,17 @@
 // The numbers of a chart: reading them, and what of them falls into a column of pixels. Nothing here knows the page.
 
-/** A typed array of base64. */
-function decoded(text, type) {
-  const binary = atob(text);
-  const bytes = new Uint8Array(binary.length);
-  for (let i = 0; i < binary.length; i++) bytes[i] = binary.charCodeAt(i);
-  return new { f64: Float64Array, f32: Float32Array, u32: Uint32Array }[type](bytes.buffer);
+/** A typed array of its bytes, first ones first, compressed and in base64. */
+async function unpacked(text, type) {
+  const packed = Uint8Array.from(atob(text), letter => letter.charCodeAt(0));
+  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
+  const planes = new Uint8Array(await new Response(stream).arrayBuffer());
+  const array = { f64: Float64Array, f32: Float32Array, u32: Uint32Array }[type];
+  const [size, count] = [array.BYTES_PER_ELEMENT, planes.length / array.BYTES_PER_ELEMENT];
+  const bytes = new Uint8Array(planes.length);
+  for (let byte = 0; byte < size; byte++) {
+    for (let i = 0; i < count; i++) bytes[i * size + byte] = planes[byte * count + i];
+  }
+  return new array(bytes.buffer);
 }
 
 /** Samples with their lists read; `list` gives the array of a reference. */

@@ -46,8 +46,11 @@ function clipped(g, view, draw) {
   g.restore();
 }
 
-/** One curve. Where many samples fall into a column, its smallest to largest is filled and the mean drawn over it. */
-function drawSeries(g, view, y, s, form, colour, density) {
+/**
+ * One curve. Where many samples fall into a column, its smallest to largest is filled here; what is returned draws the line of
+ * means, once all curves are filled.
+ */
+function drawSeries(g, view, y, s, form, { colour, paper, density }) {
   const bottom = view.top + view.height;
   const level = value => bottom - y.to(value);
   g.strokeStyle = g.fillStyle = colour;
@@ -59,8 +62,15 @@ function drawSeries(g, view, y, s, form, colour, density) {
       if (value !== value) continue;
       g.fillRect(view.left + view.to(placeOf(s, i)) - size / 2, level(value + s.mean.middle) - size / 2, size, size);
     }
-    return;
+    return () => {};
   }
+  // The line lies above the bands of all curves, on a rim of paper that keeps it apart from their colours.
+  const lined = (count, point, rim) => () => {
+    g.strokeStyle = paper;
+    if (rim) strokeRuns(g, count, point, 3.5);
+    g.strokeStyle = g.fillStyle = colour;
+    strokeRuns(g, count, point, 1.3);
+  };
   const columns = Math.max(1, Math.round(view.width * density));
   if (end - from > 2 * columns) {
     const seen = columnsOf(s, view.range, columns, x => view.to(x) * density);
@@ -72,8 +82,7 @@ function drawSeries(g, view, y, s, form, colour, density) {
     }
     g.globalAlpha = 1;
     // A few empty columns are no gap where bins are wider than columns.
-    strokeRuns(g, columns, c => seen.mean[c] === seen.mean[c] ? [view.left + (c + 0.5) / density, level(seen.mean[c])] : null);
-    return;
+    return lined(columns, c => seen.mean[c] === seen.mean[c] ? [view.left + (c + 0.5) / density, level(seen.mean[c])] : null, true);
   }
   if (!s.single) {
     g.globalAlpha = 0.38;
@@ -89,18 +98,20 @@ function drawSeries(g, view, y, s, form, colour, density) {
     const value = s.mean.list[from + i];
     return value === value ? [view.left + view.to(placeOf(s, from + i)), level(value + s.mean.middle)] : null;
   };
-  strokeRuns(g, end - from, point);
-  if (end - from < view.width / 8) {
+  const line = lined(end - from, point, !s.single);
+  return () => {
+    line();
+    if (end - from >= view.width / 8) return;
     for (let i = 0; i < end - from; i++) {
       const place = point(i);
       if (place) g.fillRect(place[0] - 1.5, place[1] - 1.5, 3, 3);
     }
-  }
+  };
 }
 
 /** Joins points by lines; where there is none, the line ends. */
-function strokeRuns(g, count, point) {
-  g.lineWidth = 1.3;
+function strokeRuns(g, count, point, width) {
+  g.lineWidth = width;
   g.lineJoin = "round";
   g.beginPath();
   let drawing = false;

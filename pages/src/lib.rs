@@ -8,7 +8,7 @@
 //! draws, for each column of pixels, the smallest and largest of what falls into it, so that no peak is lost at any zoom.
 //!
 //! ```
-//! use isotherm_log::plot::page::{Axis, Chart, Content, Form, Ink, Page, Panel, Samples, Series};
+//! use isotherm_pages::{Axis, Chart, Content, Form, Ink, Page, Panel, Samples, Series};
 //!
 //! let residual = Series {
 //!     name: "residual".into(),
@@ -33,7 +33,7 @@
 //! assert!(page.to_html().starts_with("<!doctype html>"));
 //! ```
 //!
-//! What this module refuses to do: know anything of logs, units or calibrations.
+//! What this crate refuses to do: know anything of logs, units or calibrations.
 
 mod chart;
 mod encode;
@@ -47,15 +47,15 @@ pub use chart::{Axis, Bits, Chart, Content, Form, Ink, Lane, Mark, Panel, Places
 use encode::Store;
 
 /// The page's style sheet; the script takes the colours from it too.
-const STYLE: &str = include_str!("page/style.css");
+const STYLE: &str = include_str!("style.css");
 
 /// The parts of the page's script, in this order. The first three know nothing of the page and are tested by themselves.
 const SCRIPT: [&str; 5] = [
-    include_str!("page/scale.js"),
-    include_str!("page/samples.js"),
-    include_str!("page/draw.js"),
-    include_str!("page/panel.js"),
-    include_str!("page/chart.js"),
+    include_str!("script/scale.js"),
+    include_str!("script/samples.js"),
+    include_str!("script/draw.js"),
+    include_str!("script/panel.js"),
+    include_str!("script/chart.js"),
 ];
 
 /// A table whose first column names the rows.

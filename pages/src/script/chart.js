@@ -1,7 +1,7 @@
 // A chart: its panels, its tool bar, zooming and moving, the tooltip.
 
 const INKS = ["paper", "ink", "faint", "rule", "raw", "corrected", "other", "truth", "first", "second", "third", "fourth", "fifth", "sixth", "alert"];
-const HELP = "Wheel or + and \u2212: zoom. Drag: zoom to a part. Shift and drag, or \u2190 and \u2192: move. Double click or Home: all of it.";
+const HELP = "Ctrl and wheel, or + and \u2212: zoom. Drag: zoom to a part. Shift and drag, or \u2190 and \u2192: move. Double click or Home: all of it.";
 
 class Chart {
   constructor(figure) {
@@ -26,16 +26,8 @@ class Chart {
     this.resize();
   }
 
-  /** The numbers behind a reference; each list is read once. */
-  list({ list, type }) {
-    Chart.lists ??= new Map();
-    if (!Chart.lists.has(list)) {
-      const holder = document.getElementById("data" + list);
-      Chart.lists.set(list, decoded(holder.textContent, type));
-      holder.remove();
-    }
-    return Chart.lists.get(list);
-  }
+  /** The numbers behind a reference. */
+  list({ list }) { return lists.get("data" + list); }
 
   wholeRange() {
     let [low, high] = [Infinity, -Infinity];
@@ -168,10 +160,12 @@ class Chart {
   listen() {
     const { stack, figure } = this;
     stack.addEventListener("wheel", event => {
-      const found = this.find(event);
+      // The bare wheel scrolls the page.
+      const sideways = event.shiftKey || Math.abs(event.deltaX) > Math.abs(event.deltaY);
+      const found = event.ctrlKey || event.metaKey || sideways ? this.find(event) : null;
       if (!found) return;
       event.preventDefault();
-      if (event.shiftKey || Math.abs(event.deltaX) > Math.abs(event.deltaY)) this.move((event.deltaX || event.deltaY) / 1000);
+      if (sideways) this.move((event.deltaX || event.deltaY) / 1000);
       else this.zoom(Math.exp(Math.min(Math.max(event.deltaY, -300), 300) / 400), found.x);
     }, { passive: false });
     stack.addEventListener("pointerdown", event => this.press(event));
@@ -286,4 +280,14 @@ class Chart {
   }
 }
 
-document.querySelectorAll("figure.chart").forEach(figure => new Chart(figure));
+/** All lists of the page by the names of their elements. */
+const lists = new Map();
+
+async function begin() {
+  for (const holder of document.querySelectorAll("script[data-type]")) {
+    lists.set(holder.id, await unpacked(holder.textContent, holder.dataset.type));
+    holder.remove();
+  }
+  document.querySelectorAll("figure.chart").forEach(figure => new Chart(figure));
+}
+begin();
