@@ -37,6 +37,8 @@ use zenoh::query::QueryTarget;
 /// Every wait ends here at the latest.
 const LIMIT: Duration = Duration::from_secs(60);
 const UNIT: &str = "MEMS-0001";
+/// The same unit beside ROS 2.
+const NATIVE: &str = "NATIVE";
 /// Messages of the loop if nobody says otherwise.
 const MESSAGES: usize = 4000;
 /// Messages that may be under way: a publisher with `keep_all` waits for nobody else.
@@ -62,9 +64,12 @@ impl Bridge {
         assert_ne!(changed, mapping);
         std::fs::write(folder.join("ros2.toml"), changed).unwrap();
         std::fs::create_dir_all(folder.join("units")).unwrap();
-        let document = format!("{UNIT}.toml");
-        std::fs::copy(root().join("config/calibration").join(&document), folder.join("units").join(document))
-            .unwrap();
+        let document =
+            std::fs::read_to_string(root().join(format!("config/calibration/{UNIT}.toml"))).unwrap();
+        for unit in [UNIT, NATIVE] {
+            let own = document.replace(&format!("unit = \"{UNIT}\""), &format!("unit = \"{unit}\""));
+            std::fs::write(folder.join(format!("units/{unit}.toml")), own).unwrap();
+        }
         std::fs::write(folder.join("service.toml"), "calibrations = \"units\"\ncongestion = \"block\"\n")
             .unwrap();
         let mut child = Command::new(env!("CARGO_BIN_EXE_isotherm-ros"))
@@ -419,7 +424,7 @@ async fn the_way_through_ros_costs_little() {
     let mut driver = Driver::join(&bridge.locator("ros")).await;
     let (mut corrected, _diagnostics) = driver.hear().await;
     let mut raw = driver.publisher("/imu/data_raw", IMU).await;
-    let unit = UnitId::new("NATIVE").unwrap();
+    let unit = UnitId::new(NATIVE).unwrap();
     let options = SessionOptions { connect: vec![bridge.locator("service")], ..SessionOptions::default() };
     let (source, sink) = (open(&options).await.unwrap(), open(&options).await.unwrap());
     let mut consumer = Consumer::declare(&sink, Some(&unit)).await.unwrap();
@@ -432,6 +437,7 @@ async fn the_way_through_ros_costs_little() {
         corrected.imu().await;
         let by_ros = start.elapsed();
         let start = Instant::now();
+        producer.accel(OutputKind::Mean, step.accel.unwrap()).await.unwrap();
         producer.gyro(OutputKind::Mean, step.gyro).await.unwrap();
         tokio::time::timeout(LIMIT, consumer.next()).await.expect("a batch").unwrap();
         if number >= WARM {

@@ -1,9 +1,9 @@
 //! Tokens as others write them. What is written here is frozen in `vectors.json`.
 
 use super::*;
+use crate::Mapping;
 use crate::graph::{Finding, Topics};
 use crate::interface::{IMU, NO_HASH};
-use crate::Mapping;
 
 fn node(name: &str) -> Node {
     Node { domain: 3, session: "ab12".to_owned(), namespace: "/car".to_owned(), name: name.to_owned() }
