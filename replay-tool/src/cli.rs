@@ -17,8 +17,9 @@ mod step;
 use std::io::{self, Write};
 use std::process::ExitCode;
 
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{Parser, Subcommand};
 use isotherm_correction::units::Span;
+use isotherm_document::program::Common;
 
 use crate::error::Error;
 use log_args::LogArgs;
@@ -48,12 +49,8 @@ enum Command {
     Plot(plot::PlotArgs),
     Convert(convert::ConvertArgs),
     Simulate(simulate::SimulateArgs),
-    /// Print a completion script for a shell
-    #[command(after_help = "Example:\n  isotherm-replay completions bash > isotherm-replay.bash")]
-    Completions {
-        /// The shell
-        shell: clap_complete::Shell,
-    },
+    #[command(flatten)]
+    Common(Common),
 }
 
 /// Reads seconds.
@@ -89,10 +86,9 @@ fn run(cli: Cli) -> Result<Outcome, Error> {
         Command::Plot(args) => plot::run(&args),
         Command::Convert(args) => convert::run(&args),
         Command::Simulate(args) => simulate::run(&args),
-        Command::Completions { shell } => {
-            let mut script = Vec::new();
-            clap_complete::generate(shell, &mut Cli::command(), "isotherm-replay", &mut script);
-            print(&script)?;
+        Command::Common(common) => {
+            let done = common.run::<Cli>();
+            print(&done.map_err(|(path, source)| Error::file(&path, "write manual pages into", source))?)?;
             Ok(Outcome::Complete)
         }
     }
