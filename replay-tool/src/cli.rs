@@ -1,10 +1,12 @@
 //! The command line: arguments in, exit code out.
 
+mod cat;
 mod convert;
 mod correct;
 mod diff;
 mod import;
 mod info;
+mod list;
 mod log_args;
 mod play;
 mod plot;
@@ -46,6 +48,8 @@ enum Command {
     Step(step::StepArgs),
     Import(import::ImportArgs),
     Info(info::InfoArgs),
+    List(list::ListArgs),
+    Cat(cat::CatArgs),
     Plot(plot::PlotArgs),
     Convert(convert::ConvertArgs),
     Simulate(simulate::SimulateArgs),
@@ -83,6 +87,8 @@ fn run(cli: Cli) -> Result<Outcome, Error> {
         Command::Step(args) => step::run(&args),
         Command::Import(args) => import::run(&args),
         Command::Info(args) => info::run(&args),
+        Command::List(args) => list::run(&args),
+        Command::Cat(args) => cat::run(&args),
         Command::Plot(args) => plot::run(&args),
         Command::Convert(args) => convert::run(&args),
         Command::Simulate(args) => simulate::run(&args),
