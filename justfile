@@ -47,6 +47,22 @@ bench-clients:
 instructions:
     .ci/run instructions
 
+# Judge the unit, build the Debian package, try it in a clean root (needs root and debootstrap)
+packages:
+    .ci/run packages
+
+# Build the programs without shared libraries, for containers
+static:
+    packaging/static
+
+# Build the package in two folders and compare the bytes (twice a full build)
+reproducible:
+    packaging/reproducible
+
+# Make a release in target/release-VERSION: checks, packages, static programs, SBOM, checksums
+release:
+    packaging/release
+
 # Run the demo briefly and print its figures
 demo:
     .ci/run demo

@@ -23,5 +23,5 @@ pub mod nominal;
 mod tests;
 
 pub use bag::{BagSummary, BagTopic, BagWriter};
-pub use message::{Header, Imu, RosMessage, Temperature, Time, Vector3, time};
+pub use message::{Header, Imu, RosMessage, Temperature, Time, Vector3, means, time};
 pub use names::{Names, token};

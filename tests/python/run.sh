@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # The Python package: its wheel is built, installed into a clean environment, and tested there against the frozen frames and the
-# service. Recordings, ROS 2 bags and Parquet files of `isotherm-replay convert` against what programs of others read in them.
+# service. Recordings with their JSON, ROS 2 bags and Parquet files of `isotherm-replay convert` against what programs of others read in them.
 #
 # Makes a virtual environment under target/. ISOTHERM_BIN is the service's program (default: it is built here). Skipped, in plain words,
 # where Python or its venv module is missing.
