@@ -39,6 +39,10 @@ python:
 fuzz-c:
     ISOTHERM_FUZZ=100000000 cargo test --release --locked -p isotherm-protocol --test versions no_frame_leads -- --nocapture
 
+# Send 100 000 Imu messages through ROS 2's keys and the service; compare the latency with the project's own topics
+ros-loop:
+    ISOTHERM_ROS_MESSAGES=100000 cargo test --release --locked --workspace --test bridge -- --nocapture --test-threads=1
+
 # Measure how fast the clients decode: Python, and C with cc (after `just python`)
 bench-clients:
     bash clients/bench.sh

@@ -165,7 +165,7 @@ fn operate(console: Console) -> Exit {
 }
 
 /// Runs a command that a blocked stderr must not hold up: what it says there goes through a queue.
-fn unheld(log: &LogArgs, command: impl Future<Output = Exit>) -> Exit {
+pub fn unheld(log: &LogArgs, command: impl Future<Output = Exit>) -> Exit {
     // However this ends, by a panic too.
     let _finish = FinishLog;
     if let Err(error) = start_writer() {

@@ -24,6 +24,7 @@
 //! | [`console`] | the operator's side: commands that talk to a running service |
 //! | [`check`] | validation of calibration documents and configurations |
 //! | [`signing`] | keys, signed documents and who is trusted, as files |
+//! | [`logging`], [`words`] | what is said on stderr and stdout, for other programs too |
 //! | [`demo`] | the demonstration and its report |
 //!
 //! How a message travels: Zenoh's receive thread calls [`intake::Intake::receive`], which finds the unit, locks it, has
@@ -44,7 +45,7 @@ pub mod intake;
 mod keeper;
 pub mod kept;
 pub mod latency;
-mod logging;
+pub mod logging;
 mod metrics;
 mod pulse;
 mod registrar;
@@ -57,7 +58,7 @@ mod text;
 pub mod totals;
 pub mod unit;
 pub mod watch;
-mod words;
+pub mod words;
 
 pub use config::Settings;
 pub use error::ServiceError;
