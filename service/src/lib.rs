@@ -17,6 +17,7 @@
 //! | `registrar` | the one path of every swap, and commands |
 //! | `keeper` | status, and what only a clock can do |
 //! | `metrics` | metrics and health over HTTP |
+//! | `web` | the console in the browser, on the same server |
 //! | [`store`] | what is remembered over a restart: audit file, documents |
 //! | [`fault`], [`latency`], [`totals`] | what is counted |
 //! | [`console`] | the operator's side: commands that talk to a running service |
@@ -54,6 +55,7 @@ mod text;
 pub mod totals;
 pub mod unit;
 pub mod watch;
+pub mod web;
 mod words;
 
 pub use config::Settings;

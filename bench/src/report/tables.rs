@@ -68,7 +68,7 @@ fn latency_rows<'a>(rows: impl Iterator<Item = &'a Row>) -> String {
         &head,
         rows.enumerate().map(|(index, row)| {
             let name = load(row, &mut last);
-            let reference = !name.is_empty() && (index == 0 || !row.case.swaps);
+            let reference = !name.is_empty() && (index == 0 || !row.case.is_disturbed());
             let mut cells = vec![name, middle(row)];
             cells.extend(row.median.latency_us.map(thousands));
             let [half, _, p99, _] = row.latency_ratio;

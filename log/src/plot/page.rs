@@ -56,6 +56,7 @@ const SCRIPT: [&str; 5] = [
     include_str!("page/draw.js"),
     include_str!("page/panel.js"),
     include_str!("page/chart.js"),
+    include_str!("page/zoom.js"),
 ];
 
 /// A table whose first column names the rows.
