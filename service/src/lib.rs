@@ -19,6 +19,7 @@
 //! | `metrics` | metrics and health over HTTP |
 //! | `pulse` | whether the receive path is alive |
 //! | `supervisor` | what systemd is told |
+//! | `web` | the console in the browser, on the same server |
 //! | [`store`] | what is remembered over a restart: audit file, documents |
 //! | [`fault`], [`latency`], [`totals`] | what is counted |
 //! | [`console`] | the operator's side: commands that talk to a running service |
@@ -58,6 +59,7 @@ mod text;
 pub mod totals;
 pub mod unit;
 pub mod watch;
+pub mod web;
 pub mod words;
 
 pub use config::Settings;
