@@ -7,7 +7,7 @@ mod table;
 use serde::Serialize;
 
 pub(crate) use offline::Offline;
-pub(crate) use table::{BY_UNITS, alone, beyond_first, table};
+pub(crate) use table::table;
 
 use crate::chain::{Case, Measure, Profile, Row, Run, Subject, take_turns};
 use crate::error::Error;

@@ -19,6 +19,7 @@
 //! | [`presence`] | waiting until the service is there |
 //! | [`receipt`] | proof that subscribers have taken what was sent |
 //! | [`routes`] | keys whose routes Zenoh is to remember |
+//! | [`threads`] | work for the threads that receive |
 
 pub mod client;
 pub mod consumer;
@@ -32,6 +33,7 @@ pub mod producer;
 pub mod receipt;
 pub mod routes;
 pub mod session;
+pub mod threads;
 
 pub use client::{ClientOptions, Role};
 pub use consumer::Consumer;

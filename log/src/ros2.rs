@@ -25,6 +25,6 @@ mod tests;
 pub use bag::{BagSummary, BagTopic, BagWriter};
 pub use message::{
     CdrError, Header, Imu, NOT_MEASURED, Quaternion, RosMessage, Temperature, Time, UNKNOWN, Vector3,
-    from_cdr, time, to_cdr,
+    from_cdr, means, time, to_cdr,
 };
 pub use names::{Names, token};

@@ -49,14 +49,18 @@ use encode::Store;
 /// The page's style sheet; the script takes the colours from it too.
 const STYLE: &str = include_str!("style.css");
 
-/// The parts of the page's script, in this order. The first three know nothing of the page and are tested by themselves.
-const SCRIPT: [&str; 5] = [
+/// The parts of the script that draw a chart, in this order: class `Chart` of the last draws into a figure what a shape says,
+/// numbers from its method `list`. The first three know nothing of the page and are tested by themselves.
+pub const CHART_SCRIPT: [&str; 5] = [
     include_str!("script/scale.js"),
     include_str!("script/samples.js"),
     include_str!("script/draw.js"),
     include_str!("script/panel.js"),
     include_str!("script/chart.js"),
 ];
+
+/// Charts of a page: they take their numbers from it, and one can zoom into them.
+const ZOOM_SCRIPT: &str = include_str!("script/zoom.js");
 
 /// A table whose first column names the rows.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -153,7 +157,10 @@ impl Page {
         let script = if self.charts == 0 {
             String::new()
         } else {
-            format!("<script>\n\"use strict\";\n(() => {{\n{}}})();\n</script>\n", SCRIPT.concat())
+            format!(
+                "<script>\n\"use strict\";\n(() => {{\n{}{ZOOM_SCRIPT}}})();\n</script>\n",
+                CHART_SCRIPT.concat()
+            )
         };
         format!(
             "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\

@@ -122,7 +122,7 @@ fn a_page_without_charts_has_no_script() {
 
 #[test]
 fn the_script_maps_decimates_and_labels_as_it_should_where_node_is_there() {
-    let parts = SCRIPT.get(..2).unwrap().concat();
+    let parts = CHART_SCRIPT.get(..2).unwrap().concat();
     let script = format!(
         "\"use strict\";\nconst assert = require('assert');\n{parts}\n{}",
         include_str!("script/tests.js")
@@ -144,7 +144,11 @@ fn the_script_maps_decimates_and_labels_as_it_should_where_node_is_there() {
 fn the_whole_script_can_be_parsed_where_node_is_there() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("script.js");
-    std::fs::write(&path, format!("\"use strict\";\n(() => {{\n{}}})();\n", SCRIPT.concat())).unwrap();
+    std::fs::write(
+        &path,
+        format!("\"use strict\";\n(() => {{\n{}{ZOOM_SCRIPT}}})();\n", CHART_SCRIPT.concat()),
+    )
+    .unwrap();
     match Command::new("node").arg("--check").arg(&path).output() {
         Err(error) => println!("skipped: no node: {error}"),
         Ok(output) => assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr)),

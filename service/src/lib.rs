@@ -17,6 +17,9 @@
 //! | `registrar` | the one path of every swap, and commands |
 //! | `keeper` | status, and what only a clock can do |
 //! | `metrics` | metrics and health over HTTP |
+//! | `pulse` | whether the receive path is alive |
+//! | `supervisor` | what systemd is told |
+//! | `web` | the console in the browser, on the same server |
 //! | [`store`] | what is remembered over a restart: audit file, documents |
 //! | [`fault`], [`latency`], [`totals`] | what is counted |
 //! | [`console`] | the operator's side: commands that talk to a running service |
@@ -45,18 +48,22 @@ pub mod kept;
 pub mod latency;
 pub mod logging;
 mod metrics;
+mod pulse;
 mod registrar;
 mod serve;
 pub mod service;
 pub mod signing;
 pub mod store;
+mod supervisor;
 mod text;
 pub mod totals;
 pub mod unit;
 pub mod watch;
+pub mod web;
 pub mod words;
 
 pub use config::Settings;
 pub use error::ServiceError;
+pub use pulse::Stuck;
 pub use service::{RunningService, start, start_with};
 pub use totals::{Totals, UnitTotals};

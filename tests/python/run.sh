@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # The Python package: its wheel is built, installed into a clean environment, and tested there against the frozen frames and the
-# service. Recordings, ROS 2 bags and Parquet files of `isotherm-replay convert` against what programs of others read in them. The bridge to
-# ROS 2 against other implementations of its keys and messages.
+# service. Recordings with their JSON, ROS 2 bags and Parquet files of `isotherm-replay convert` against what programs of others read in
+# them. The bridge to ROS 2 against other implementations of its keys and messages.
 #
 # Makes a virtual environment under target/. ISOTHERM_BIN is the service's program (default: it is built here). Skipped, in plain words,
 # where Python or its venv module is missing.

@@ -149,7 +149,9 @@ impl Log {
         for (out, compression) in [(&recording, "zstd"), (&uncompressed, "none")] {
             let mut convert = Command::new(beside("isotherm-replay")?);
             convert.arg("convert").arg(&text).arg("--mapping").arg(&mapping);
-            run(convert.args(["--unit", UNIT, "--compression", compression]).arg(out))?;
+            run(convert
+                .args(["--unit", UNIT, "--compression", compression, "--no-json-channels", "--out"])
+                .arg(out))?;
         }
         let mut log = Self { recording, uncompressed, document, corrected, ticks: 0 };
         let corrected = log.corrected.clone();

@@ -190,13 +190,21 @@ impl Imu {
     /// Means over a corrected tick: its increments divided by its duration.
     #[must_use]
     pub fn of_tick(header: Header, tick: &CorrectedTick) -> Self {
-        let duration_s = tick.duration.as_s();
-        let mean = |increments: [f64; 3]| increments.map(|increment| increment / duration_s);
-        let no_force = TickFlags::ACCELEROMETER_MISSING | TickFlags::VELOCITY_INVALID;
-        let rate = (!tick.flags.contains(TickFlags::ANGLE_INVALID)).then(|| mean(tick.delta_angle));
-        let force = (!tick.flags.intersects(no_force)).then(|| mean(tick.delta_velocity));
+        let (rate, force) = means(tick);
         Self::new(header, rate, force)
     }
+}
+
+/// Mean rate (rad/s) and specific force (m/s²) over a corrected tick: its increments divided by its duration; `None` where its flags
+/// say that it is not known.
+#[must_use]
+pub fn means(tick: &CorrectedTick) -> (Option<[f64; 3]>, Option<[f64; 3]>) {
+    let duration_s = tick.duration.as_s();
+    let mean = |increments: [f64; 3]| increments.map(|increment| increment / duration_s);
+    let no_force = TickFlags::ACCELEROMETER_MISSING | TickFlags::VELOCITY_INVALID;
+    let rate = (!tick.flags.contains(TickFlags::ANGLE_INVALID)).then(|| mean(tick.delta_angle));
+    let force = (!tick.flags.intersects(no_force)).then(|| mean(tick.delta_velocity));
+    (rate, force)
 }
 
 /// `sensor_msgs/msg/Temperature`.

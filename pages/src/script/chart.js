@@ -1,12 +1,11 @@
-// A chart: its panels, its tool bar, zooming and moving, the tooltip.
+// A chart: its panels, its legend, the tooltip.
 
 const INKS = ["paper", "ink", "faint", "rule", "raw", "corrected", "other", "truth", "first", "second", "third", "fourth", "fifth", "sixth", "alert"];
-const HELP = "Ctrl and wheel, or + and \u2212: zoom. Drag: zoom to a part. Shift and drag, or \u2190 and \u2192: move. Double click or Home: all of it.";
 
 class Chart {
-  constructor(figure) {
+  constructor(figure, shape = JSON.parse(figure.querySelector("script[type='application/json']").textContent)) {
     this.figure = figure;
-    this.shape = JSON.parse(figure.querySelector("script[type='application/json']").textContent);
+    this.shape = shape;
     this.hidden = new Set();
     this.withoutOutliers = false;
     this.at = null;
@@ -26,9 +25,6 @@ class Chart {
     this.resize();
   }
 
-  /** The numbers behind a reference. */
-  list({ list }) { return lists.get("data" + list); }
-
   wholeRange() {
     let [low, high] = [Infinity, -Infinity];
     for (const panel of this.panels) {
@@ -43,6 +39,7 @@ class Chart {
     return dots ? widened([low, high], 0.02, this.shape.x.logarithmic) : [low, high];
   }
 
+  /** The legend: a button for each curve and kind of mark, that shows and hides it. */
   toolbar() {
     const bar = element("div", "bar");
     this.figure.prepend(bar);
@@ -50,25 +47,7 @@ class Chart {
     for (const [all, form] of [[this.legends.shared, "line"], [kinds, "dash"]]) {
       for (const [name, ink] of all) this.toggle(bar, name, ink, form);
     }
-    const buttons = element("span", "buttons", bar);
-    const button = (text, title, act) => {
-      const made = element("button", "", buttons, text);
-      made.type = "button";
-      made.title = title;
-      made.addEventListener("click", act);
-      return made;
-    };
-    button("+", "Zoom in", () => this.zoom(0.5));
-    button("\u2212", "Zoom out", () => this.zoom(2));
-    button("All", "All of it", () => this.show(this.whole));
-    const outliers = button("Without outliers", "Vertical axes for 98 of 100 values", () => {
-      this.withoutOutliers = !this.withoutOutliers;
-      outliers.setAttribute("aria-pressed", String(this.withoutOutliers));
-      this.draw();
-    });
-    outliers.setAttribute("aria-pressed", "false");
-    this.readout = element("output", "", bar);
-    element("p", "help", this.figure, HELP);
+    return bar;
   }
 
   toggle(bar, name, ink, form) {
@@ -133,66 +112,22 @@ class Chart {
     // All panels have the room at their left that the widest label needs.
     const wanted = Math.max(...this.panels.map(panel => panel.measured()));
     for (const panel of this.panels) panel.draw(wanted);
-    const step = (this.range[1] - this.range[0]) / 1000;
-    this.readout.textContent = this.shape.x.label + " " +
-      this.range.map(x => this.place(Math.min(Math.max(x, this.data[0]), this.data[1]), step)).join(" to ");
     this.drawOver();
   }
 
   drawOver() { for (const panel of this.panels) if (panel.view) panel.drawOver(this.at, this.selection); }
 
-  show(range) {
-    this.range = held(range, this.whole);
-    this.draw();
-  }
-
-  zoom(factor, at = (this.range[0] + this.range[1]) / 2) {
-    const least = Math.max((this.whole[1] - this.whole[0]) * 1e-9, 1e-9);
-    this.range = zoomed(this.range, at, factor, this.whole, least);
-    this.draw();
-  }
-
-  move(share) {
-    const by = share * (this.range[1] - this.range[0]);
-    this.show([this.range[0] + by, this.range[1] + by]);
-  }
-
   listen() {
-    const { stack, figure } = this;
-    stack.addEventListener("wheel", event => {
-      // The bare wheel scrolls the page.
-      const sideways = event.shiftKey || Math.abs(event.deltaX) > Math.abs(event.deltaY);
-      const found = event.ctrlKey || event.metaKey || sideways ? this.find(event) : null;
-      if (!found) return;
-      event.preventDefault();
-      if (sideways) this.move((event.deltaX || event.deltaY) / 1000);
-      else this.zoom(Math.exp(Math.min(Math.max(event.deltaY, -300), 300) / 400), found.x);
-    }, { passive: false });
-    stack.addEventListener("pointerdown", event => this.press(event));
+    const { stack } = this;
     stack.addEventListener("pointermove", event => this.moved(event));
-    stack.addEventListener("pointerup", event => this.release(event));
-    stack.addEventListener("pointercancel", () => { this.drag = this.selection = null; this.drawOver(); });
     stack.addEventListener("pointerleave", () => this.hide());
-    stack.addEventListener("dblclick", () => this.show(this.whole));
-    figure.addEventListener("keydown", event => this.key(event));
     new ResizeObserver(() => { if (!this.paper) this.resize(); }).observe(stack);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.recolour());
-    addEventListener("beforeprint", () => this.forPaper(true));
-    addEventListener("afterprint", () => this.forPaper(false));
   }
 
   recolour() {
     this.colours = this.readColours();
     this.draw();
-  }
-
-  /** Printing is in light colours, whatever the screen has. */
-  forPaper(paper) {
-    this.paper = paper;
-    document.documentElement.classList.toggle("paper", paper);
-    this.colours = this.readColours();
-    this.resize();
-    this.drawNow();
   }
 
   /** The panel and the place of the axis under the pointer, or null. */
@@ -206,39 +141,11 @@ class Chart {
     return null;
   }
 
-  press(event) {
-    const found = event.button === 0 ? this.find(event) : null;
-    if (!found) return;
-    this.figure.focus({ preventScroll: true });
-    this.stack.setPointerCapture(event.pointerId);
-    this.drag = { from: found.x, client: event.clientX, range: [...this.range], pan: event.shiftKey };
-    event.preventDefault();
-  }
-
   moved(event) {
     const found = this.find(event);
-    if (this.drag) {
-      const { view } = this.panels[0];
-      if (this.drag.pan) {
-        const by = (event.clientX - this.drag.client) / view.width * (this.drag.range[1] - this.drag.range[0]);
-        this.show([this.drag.range[0] - by, this.drag.range[1] - by]);
-      } else if (found) {
-        this.selection = [this.drag.from, Math.min(Math.max(found.x, this.range[0]), this.range[1])];
-      }
-    }
     this.at = found ? found.x : null;
     this.drawOver();
     if (found) this.tell(event, found); else this.tip.hidden = true;
-  }
-
-  release(event) {
-    const { drag, selection } = this;
-    this.drag = this.selection = null;
-    if (drag && !drag.pan && selection && Math.abs(event.clientX - drag.client) > 4) {
-      this.show([Math.min(...selection), Math.max(...selection)]);
-    } else {
-      this.drawOver();
-    }
   }
 
   hide() {
@@ -266,28 +173,4 @@ class Chart {
     tip.style.top = event.clientY - box.top + 16 + "px";
     tip.style.left = (left + 16 + tip.offsetWidth > box.width ? Math.max(left - 16 - tip.offsetWidth, 0) : left + 16) + "px";
   }
-
-  key(event) {
-    if (event.ctrlKey || event.metaKey || event.altKey) return;
-    const act = {
-      ArrowLeft: () => this.move(-0.1), ArrowRight: () => this.move(0.1), PageUp: null, PageDown: null,
-      "+": () => this.zoom(0.5), "=": () => this.zoom(0.5), "-": () => this.zoom(2),
-      Home: () => this.show(this.whole), Escape: () => { this.drag = this.selection = null; this.hide(); },
-    }[event.key];
-    if (!act) return;
-    event.preventDefault();
-    act();
-  }
 }
-
-/** All lists of the page by the names of their elements. */
-const lists = new Map();
-
-async function begin() {
-  for (const holder of document.querySelectorAll("script[data-type]")) {
-    lists.set(holder.id, await unpacked(holder.textContent, holder.dataset.type));
-    holder.remove();
-  }
-  document.querySelectorAll("figure.chart").forEach(figure => new Chart(figure));
-}
-begin();

@@ -21,6 +21,13 @@ class Panel {
     const box = element("div", "plot", this.element);
     this.canvas = element("canvas", "", box);
     this.over = element("canvas", "over", box);
+    this.read();
+    this.height = shape.lanes ? this.lanes.length * ROW : shape.height;
+  }
+
+  /** Reads the numbers; again where they have changed. */
+  read() {
+    const { chart, shape } = this;
     const read = samples => resolved(samples, ref => chart.list(ref));
     this.series = (shape.series ?? []).map(one => ({ ...one, samples: read(one.samples) }));
     const shared = new Map();
@@ -30,7 +37,6 @@ class Panel {
       if (!shared.has(key)) shared.set(key, read(lane.samples));
       return { ...lane, samples: shared.get(key) };
     });
-    this.height = shape.lanes ? this.lanes.length * ROW : shape.height;
   }
 
   shown() { return this.series.filter(one => !this.chart.hidden.has(one.name)); }
@@ -54,7 +60,7 @@ class Panel {
     }
     this.width = width;
     // Room for the names of rows, where there is any.
-    this.least = width > 800 ? 168 : this.chart.paper ? 132 : 72;
+    this.least = this.chart.margin ?? (width > 800 ? 168 : this.chart.paper ? 132 : 72);
   }
 
   /** Makes the vertical axis; the room that its labels need. */
