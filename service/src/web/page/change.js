@@ -2,10 +2,18 @@
 
 const BY = "isotherm-by";
 
-/** Who asks, for the audit file; remembered on this computer. */
+/** Who asks, for the audit file; remembered on this computer, and the same in all fields. */
 function byField() {
-  const input = make("input", { type: "text", maxLength: 64, required: true, autocomplete: "off", value: localStorage.getItem(BY) ?? "",
-    onchange: () => localStorage.setItem(BY, input.value.trim()) });
+  const input = make("input", { type: "text", className: "by", maxLength: 64, required: true, autocomplete: "off",
+    value: localStorage.getItem(BY) ?? "" });
+  input.addEventListener("change", () => {
+    localStorage.setItem(BY, input.value.trim());
+    for (const other of document.querySelectorAll("input.by")) {
+      if (other === input) continue;
+      other.value = input.value;
+      other.dispatchEvent(new Event("input"));
+    }
+  });
   return input;
 }
 
