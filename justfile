@@ -39,6 +39,10 @@ python:
 fuzz-c:
     ISOTHERM_FUZZ=100000000 cargo test --release --locked -p isotherm-protocol --test versions no_frame_leads -- --nocapture
 
+# Send 100 000 Imu messages through ROS 2's keys and the service; compare the latency with the project's own topics
+ros-loop:
+    ISOTHERM_ROS_MESSAGES=100000 cargo test --release --locked --workspace --test bridge -- --nocapture --test-threads=1
+
 # Measure how fast the clients decode: Python, and C with cc (after `just python`)
 bench-clients:
     bash clients/bench.sh
@@ -46,6 +50,22 @@ bench-clients:
 # Count instructions per tick and compare them with the committed figures (needs valgrind)
 instructions:
     .ci/run instructions
+
+# Judge the unit, build the Debian package, try it in a clean root (needs root and debootstrap)
+packages:
+    .ci/run packages
+
+# Build the programs without shared libraries, for containers
+static:
+    packaging/static
+
+# Build the package in two folders and compare the bytes (twice a full build)
+reproducible:
+    packaging/reproducible
+
+# Make a release in target/release-VERSION: checks, packages, static programs, SBOM, checksums
+release:
+    packaging/release
 
 # Run the demo briefly and print its figures
 demo:

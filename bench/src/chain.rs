@@ -87,7 +87,7 @@ pub(crate) struct ChainArgs {
 }
 
 /// All that was measured.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Report {
     /// On what.
     pub(crate) machine: Machine,

@@ -4,9 +4,9 @@ use std::ffi::OsString;
 use std::os::unix::process::CommandExt;
 use std::path::PathBuf;
 
-use clap::{Args, CommandFactory, Parser, Subcommand};
-use clap_complete::Shell;
+use clap::{Args, Parser, Subcommand};
 use isotherm_document::advanced;
+use isotherm_document::program::Common;
 
 use crate::check::CheckArgs;
 use crate::console::{self, CommandArgs, Console, HistoryArgs, RollbackArgs, StatusArgs, SwapArgs, TopArgs};
@@ -66,11 +66,8 @@ enum Command {
     /// Fit and judge calibration documents: isotherm-calibrate
     #[command(disable_help_flag = true)]
     Calibrate(Sibling),
-    /// Print the completions of a shell
-    Completions {
-        /// The shell
-        shell: Shell,
-    },
+    #[command(flatten)]
+    Common(Common),
 }
 
 /// Arguments for another program.
@@ -152,11 +149,13 @@ pub fn run() -> Exit {
         Command::Sign(args) => crate::signing::sign(&args),
         Command::Keygen(args) => crate::signing::keygen(&args),
         Command::Demo(args) => unheld(&LogArgs::quiet(), demo(args)),
-        Command::Completions { shell } => {
-            let mut script = Vec::new();
-            clap_complete::generate(shell, &mut Cli::command(), "isotherm", &mut script);
-            print(&String::from_utf8_lossy(&script), Exit::Ok)
-        }
+        Command::Common(common) => match common.run::<Cli>() {
+            Ok(printed) => print(&String::from_utf8_lossy(&printed), Exit::Ok),
+            Err((folder, error)) => {
+                say(format_args!("isotherm: cannot write manual pages into {}: {error}", folder.display()));
+                Exit::Failed
+            }
+        },
     }
 }
 
@@ -173,7 +172,7 @@ fn operate(console: Console) -> Exit {
 }
 
 /// Runs a command that a blocked stderr must not hold up: what it says there goes through a queue.
-fn unheld(log: &LogArgs, command: impl Future<Output = Exit>) -> Exit {
+pub fn unheld(log: &LogArgs, command: impl Future<Output = Exit>) -> Exit {
     // However this ends, by a panic too.
     let _finish = FinishLog;
     if let Err(error) = start_writer() {
@@ -204,6 +203,8 @@ fn logged(log: &LogArgs, command: impl Future<Output = Exit>) -> Exit {
 
 #[cfg(test)]
 mod tests {
+    use clap::CommandFactory;
+
     use super::*;
 
     #[test]

@@ -15,6 +15,7 @@ use crate::config::Settings;
 use crate::exit::Exit;
 use crate::metrics::Endpoint;
 use crate::service::{open_store, start_on};
+use crate::supervisor;
 use crate::words::{print_within, say};
 use crate::{ServiceError, Totals};
 
@@ -114,6 +115,7 @@ async fn serve(args: ServeArgs) -> Result<Option<Totals>, ServiceError> {
     let state = open_store(settings.state.as_deref())?;
     let awaited = settings.session.awaited()?;
     let metrics = Endpoint::start(&settings.metrics, awaited.clone()).await?;
+    supervisor::status(&format!("waiting for {awaited}"));
     let session = tokio::select! {
         session = open_session(settings.session.clone(), &awaited) => session?,
         // There is nothing to flush.
@@ -123,6 +125,11 @@ async fn serve(args: ServeArgs) -> Result<Option<Totals>, ServiceError> {
     let service = start_on(settings, Calibrations::default(), state, metrics, session).await?;
     tracing::info!(version = env!("CARGO_PKG_VERSION"), locators = locators.join(" "), "ready");
     announce(&args, &locators, service.metrics())?;
+    let ready = format!("correcting, on {}", locators.join(" "));
+    supervisor::ready(&ready);
+    let pulse = service.pulse();
+    // Through the stop too: it has a limit of its own.
+    tokio::spawn(supervisor::watch(ready, move || pulse.look()));
 
     let name = loop {
         tokio::select! {
@@ -131,6 +138,7 @@ async fn serve(args: ServeArgs) -> Result<Option<Totals>, ServiceError> {
         }
     };
     tracing::info!(signal = name, "stopping");
+    supervisor::stopping();
     tokio::select! {
         totals = service.stop() => Ok(Some(totals)),
         _ = stop_asked() => Ok(None),

@@ -21,7 +21,7 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::task::{AbortHandle, JoinSet};
 
 use super::page::{pack, page};
-use super::source::{Look, Verdict};
+use super::source::{Look, Source, Verdict};
 use super::{Desk, NoLook};
 
 /// Most connections at a time; a further one takes the place of the oldest that has not asked for anything yet.
@@ -120,7 +120,7 @@ async fn answer(
     let answer = match request.uri().path() {
         "/metrics" if reads => metrics(&request, desk).await,
         "/healthz" if reads => healthz(desk).await,
-        "/livez" if reads => text(StatusCode::OK, PLAIN, "alive\n"),
+        "/livez" if reads => livez(desk),
         "/readyz" if reads => readyz(desk),
         "/metrics" | "/healthz" | "/livez" | "/readyz" => {
             let mut answer = text(StatusCode::METHOD_NOT_ALLOWED, PLAIN, "only GET and HEAD\n");
@@ -164,6 +164,14 @@ async fn metrics(request: &Request<Incoming>, desk: &Arc<Desk>) -> Answer {
             answer
         }
         Err(error) => text(StatusCode::INTERNAL_SERVER_ERROR, PLAIN, format!("{error}\n")),
+    }
+}
+
+/// Whether the process is worth keeping. Nothing is looked at here, either.
+fn livez(desk: &Desk) -> Answer {
+    match desk.source.get().map_or(Ok(()), Source::receives) {
+        Ok(()) => text(StatusCode::OK, PLAIN, "alive\n"),
+        Err(stuck) => text(StatusCode::SERVICE_UNAVAILABLE, PLAIN, format!("{stuck}\n")),
     }
 }
 

@@ -2,6 +2,8 @@
 
 use std::sync::LazyLock;
 
+use isotherm_pages::CHART_SCRIPT;
+
 /// A file that browsers ask for.
 #[derive(Debug)]
 pub(super) struct Asset {
@@ -10,14 +12,8 @@ pub(super) struct Asset {
     pub(super) text: String,
 }
 
-/// The charts are those of plots (`docs/adr/0020-zoomable-plots.md`): one engine for both.
-const SCRIPT: &str = concat!(
-    "\"use strict\";\n",
-    include_str!("../../../log/src/plot/page/scale.js"),
-    include_str!("../../../log/src/plot/page/samples.js"),
-    include_str!("../../../log/src/plot/page/draw.js"),
-    include_str!("../../../log/src/plot/page/panel.js"),
-    include_str!("../../../log/src/plot/page/chart.js"),
+/// The console's own parts of the script.
+const PARTS: [&str; 10] = [
     include_str!("page/ask.js"),
     include_str!("page/figures.js"),
     include_str!("page/parts.js"),
@@ -28,7 +24,11 @@ const SCRIPT: &str = concat!(
     include_str!("page/command.js"),
     include_str!("page/history.js"),
     include_str!("page/main.js"),
-);
+];
+
+/// The whole script. The charts are those of plots (`docs/adr/0020-zoomable-plots.md`): one engine for both.
+static SCRIPT: LazyLock<String> =
+    LazyLock::new(|| ["\"use strict\";\n"].into_iter().chain(CHART_SCRIPT).chain(PARTS).collect());
 
 /// All of them.
 static ASSETS: LazyLock<[Asset; 4]> = LazyLock::new(|| {
@@ -36,7 +36,7 @@ static ASSETS: LazyLock<[Asset; 4]> = LazyLock::new(|| {
     [
         asset("/", "text/html; charset=utf-8", include_str!("page/index.html")),
         asset("/web/console.css", "text/css; charset=utf-8", include_str!("page/style.css")),
-        asset("/web/console.js", "text/javascript; charset=utf-8", SCRIPT),
+        asset("/web/console.js", "text/javascript; charset=utf-8", &SCRIPT),
         asset("/web/icon.svg", "image/svg+xml", include_str!("page/icon.svg")),
     ]
 });
