@@ -102,7 +102,7 @@ class Proposal {
     const problems = [...reply.problems.map(one => [one, "bad"]), ...reply.warnings.map(one => [one, "warned"])];
     this.answer.replaceChildren(make("p", { className: "outcome " + className }, words),
       problems.length ? make("ul", { className: "problems" }, ...problems.map(([one, level]) => make("li", { className: level },
-        one.file === null ? null : make("b", {}, "Line " + one.line + ", column " + one.column + " "),
+        one.file === null || !one.key && one.line === 1 ? null : make("b", {}, "Line " + one.line + ", column " + one.column + " "),
         (one.key ? one.key + ": " : "") + one.message))) : "",
       reply.difference && reply.outcome !== "unchanged" ? difference(reply.difference) : "");
     this.act.disabled = reply.outcome !== "would-be-accepted" || !this.page.writes();
