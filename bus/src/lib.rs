@@ -43,4 +43,4 @@ pub use error::{BusError, Json5Problem, without_places, words};
 pub use outlet::{Outlet, OutletOptions};
 pub use producer::{Producer, ProducerOptions};
 pub use routes::DeclaredKeys;
-pub use session::{SessionOptions, close, locators, open};
+pub use session::{SessionOptions, close, locators, open, open_config};

@@ -14,6 +14,7 @@ use crate::demo::DemoArgs;
 use crate::exit::Exit;
 use crate::logging::{FinishLog, LogArgs, start_writer};
 use crate::signing::{KeygenArgs, SignArgs};
+use crate::web::WebArgs;
 use crate::words::{print, say};
 
 /// Corrects the raw increments of inertial units in a stream, over Zenoh
@@ -49,6 +50,8 @@ enum Command {
     /// Move a unit from state to state: standby, run, self-test, pre-launch calibration
     #[command(name = "command")]
     Give(CommandArgs),
+    /// Print the address of the console in the browser, with its token
+    Web(WebArgs),
     /// Validate calibration documents, service configurations and Zenoh configurations
     Check(CheckArgs),
     /// Sign calibration documents
@@ -108,6 +111,9 @@ pub struct ServeArgs {
     /// Serve metrics and health over HTTP on this address; replaces the configured one
     #[arg(long, value_name = "ADDRESS:PORT")]
     pub metrics: Option<std::net::SocketAddr>,
+    /// Serve the console in the browser too, read-only unless configured otherwise; `isotherm web` prints its address
+    #[arg(long)]
+    pub web: bool,
     /// How to reach others; each option given replaces the configured one
     #[command(flatten)]
     pub session: isotherm_bus::SessionOptions,
@@ -138,6 +144,7 @@ pub fn run() -> Exit {
         Command::Rollback(args) => operate(Console::Rollback(args)),
         Command::History(args) => operate(Console::History(args)),
         Command::Give(args) => operate(Console::Command(args)),
+        Command::Web(args) => crate::web::show(&args),
         Command::Check(args) => crate::check::run(&args),
         Command::Sign(args) => crate::signing::sign(&args),
         Command::Keygen(args) => crate::signing::keygen(&args),
@@ -165,7 +172,7 @@ fn operate(console: Console) -> Exit {
 }
 
 /// Runs a command that a blocked stderr must not hold up: what it says there goes through a queue.
-fn unheld(log: &LogArgs, command: impl Future<Output = Exit>) -> Exit {
+pub fn unheld(log: &LogArgs, command: impl Future<Output = Exit>) -> Exit {
     // However this ends, by a panic too.
     let _finish = FinishLog;
     if let Err(error) = start_writer() {

@@ -74,6 +74,8 @@ fn settings(args: &ServeArgs) -> Result<Settings, ServiceError> {
     if args.metrics.is_some() {
         settings.metrics.listen = args.metrics;
     }
+    settings.web.enabled |= args.web;
+    settings.listen_for_web();
     let (configured, given) = (&mut settings.session, &args.session);
     if given.config.is_some() {
         configured.config.clone_from(&given.config);

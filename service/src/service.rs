@@ -25,6 +25,7 @@ use crate::store::{Opened, Store};
 use crate::totals::Totals;
 use crate::unit::UnitActor;
 use crate::watch::{WatchSettings, Watcher};
+use crate::web::Web;
 use declare::Declared;
 
 /// The part of the time for a stop that is kept for closing the session, one in so many.
@@ -110,8 +111,9 @@ pub(crate) async fn start_on(
         None => None,
     };
     let declared = Declared::new(&session, &intake, &keeper.bell(), &desk, &pulse).await?;
+    let web = Web::start(&settings, &session, &intake)?;
     if let Some(metrics) = &metrics {
-        metrics.open(source);
+        metrics.open(source, web);
     }
     Ok(RunningService {
         session,
