@@ -115,7 +115,6 @@ async fn serve(args: ServeArgs) -> Result<Option<Totals>, ServiceError> {
     let state = open_store(settings.state.as_deref())?;
     let awaited = settings.session.awaited()?;
     let metrics = Endpoint::start(&settings.metrics, awaited.clone()).await?;
-    supervisor::status(&format!("waiting for {awaited}"));
     let session = tokio::select! {
         session = open_session(settings.session.clone(), &awaited) => session?,
         // There is nothing to flush.
@@ -157,6 +156,7 @@ async fn open_session(options: SessionOptions, awaited: &str) -> Result<Session,
             Err(_) => {
                 let waited_s = start.elapsed().as_secs();
                 tracing::warn!(waited_s, "nothing is corrected yet: waiting for {awaited}");
+                supervisor::status(&format!("nothing is corrected yet: waiting for {awaited}"));
                 pause = FURTHER_WORDS;
             }
         }

@@ -139,7 +139,7 @@ fn topics_are_listed_and_their_messages_printed() {
     for log in [&common[..], &mapped] {
         let output = replay(path, &[&["list", "--json"], log].concat());
         check(&output, 0, "");
-        let said: serde_json::Value = serde_json::from_str(&stdout(&output)).unwrap();
+        let said: Value = serde_json::from_str(&stdout(&output)).unwrap();
         assert!(said["topics"]["imu/M-1/raw/gyro"]["messages"].as_u64() > Some(1), "{said}");
         assert_eq!(said["topics"].as_object().unwrap().len(), 3, "{said}");
     }
@@ -147,8 +147,7 @@ fn topics_are_listed_and_their_messages_printed() {
     assert!(table.contains("imu/M-1/raw/temp") && !table.contains("gyro"), "{table}");
     let output = replay(path, &["cat", "log.mcap", "--topic", "imu/M-1/raw/gyro", "--limit", "2"]);
     check(&output, 0, "");
-    let lines: Vec<serde_json::Value> =
-        stdout(&output).lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let lines: Vec<Value> = stdout(&output).lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     assert_eq!(lines.len(), 2);
     assert_eq!(lines[0]["topic"], "imu/M-1/raw/gyro");
     assert_eq!(lines[0]["message"]["ticks"][1]["sequence"], 1);
