@@ -2,7 +2,7 @@
 
 use crate::accelerometer::{AccelerometerOutput, Accelerometers};
 use crate::check::{ANY, DEG_C, NOT_NEGATIVE, POSITIVE, Report, at, nth};
-use crate::effects::{Effects, Play};
+use crate::effects::{AxesPlay, Effects, Play};
 use crate::error::{Key, ScenarioError};
 use crate::fibre_optic::FibreOpticGyro;
 use crate::instrument::{Gyros, Instrument};
@@ -50,7 +50,7 @@ pub(crate) fn instrument(report: &mut Report, instrument: &Instrument, tick_s: f
 }
 
 fn effects(report: &mut Report, instrument: &Instrument) {
-    let Effects { gyros, accelerometers } = &instrument.effects;
+    let Effects { gyros, accelerometers, gyro_axes, accelerometer_axes } = &instrument.effects;
     let accels = instrument.accelerometers.as_ref().map_or(0, |block| block.sensors.len());
     for (path, got, expected) in [
         ("instrument.effects.gyros", gyros.len(), instrument.gyros.count()),
@@ -66,6 +66,15 @@ fn effects(report: &mut Report, instrument: &Instrument) {
             report.number(key, per_k, ANY);
         }
     };
+    for (path, axes) in [
+        ("instrument.effects.gyro_axes", gyro_axes),
+        ("instrument.effects.accelerometer_axes", accelerometer_axes),
+    ] {
+        if let Some(AxesPlay { half_width_k, share }) = axes {
+            report.number(at(path), *half_width_k, POSITIVE);
+            report.number(at(path), *share, (-10.0, 10.0));
+        }
+    }
     for (index, gyro) in gyros.iter().enumerate() {
         let key = nth("instrument.effects.gyros", index);
         report.numbers(key, &gyro.acceleration_rad_per_s_per_m_per_s2, (-1.0, 1.0));

@@ -26,13 +26,19 @@ pub struct Effects {
     /// One entry per accelerometer, or none.
     #[serde(default)]
     pub accelerometers: Vec<AccelerometerEffects>,
+    /// Friction in what turns the gyros' axes with the housing's temperature.
+    #[serde(default)]
+    pub gyro_axes: Option<AxesPlay>,
+    /// Friction in what turns the accelerometers' axes.
+    #[serde(default)]
+    pub accelerometer_axes: Option<AxesPlay>,
 }
 
 impl Effects {
     /// Whether there are none.
     #[must_use]
     pub fn is_none(&self) -> bool {
-        self.gyros.is_empty() && self.accelerometers.is_empty()
+        *self == Self::default()
     }
 }
 
@@ -79,6 +85,23 @@ pub struct Play {
     pub per_k: f64,
 }
 
+/// A play in the mounts of sensors: this share of the turning of their axes is dragged along, the rest follows at once \[004\].
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AxesPlay {
+    /// Half width w of the slack (K, > 0).
+    pub half_width_k: f64,
+    /// Share of the turning.
+    pub share: f64,
+}
+
+impl AxesPlay {
+    /// By how much the axes are behind the housing's temperature (K), as a play.
+    const fn behind(self) -> Play {
+        Play { half_width_k: self.half_width_k, per_k: self.share }
+    }
+}
+
 /// A play with its memory.
 #[derive(Debug, Clone, Copy, Default)]
 struct PlayState {
@@ -102,6 +125,8 @@ impl PlayState {
 pub(crate) struct EffectsState {
     gyros: Sensors<(GyroEffects, PlayState)>,
     accelerometers: Sensors<(AccelerometerEffects, PlayState)>,
+    /// Of the gyros' and the accelerometers' axes.
+    axes: [(Option<Play>, PlayState); 2],
 }
 
 /// What the accelerometers sense of one tick beside the specific force at the reference point.
@@ -121,17 +146,30 @@ impl EffectsState {
                 .iter()
                 .map(|accel| (*accel, PlayState::default()))
                 .collect(),
+            axes: [effects.gyro_axes, effects.accelerometer_axes]
+                .map(|play| (play.map(AxesPlay::behind), PlayState::default())),
         }
     }
 
-    /// Follows the sensors' temperatures (°C) at the end of a step of the thermal clock.
-    pub(crate) fn thermal_step(&mut self, gyros_deg_c: &[f64], accels_deg_c: &[f64]) {
+    /// Follows the temperatures of sensors and housing (°C) at the end of a step of the thermal clock.
+    pub(crate) fn thermal_step(&mut self, gyros_deg_c: &[f64], accels_deg_c: &[f64], housing_deg_c: f64) {
+        for (play, state) in &mut self.axes {
+            state.step(*play, housing_deg_c);
+        }
         for ((gyro, play), deg_c) in self.gyros.iter_mut().zip(gyros_deg_c) {
             play.step(gyro.play, *deg_c);
         }
         for ((accel, play), deg_c) in self.accelerometers.iter_mut().zip(accels_deg_c) {
             play.step(accel.play, *deg_c);
         }
+    }
+
+    /// Temperatures as which the gyros' and the accelerometers' axes turn (°C), in a housing of `housing_deg_c`.
+    pub(crate) fn axes_deg_c(&self, housing_deg_c: f64, share: f64) -> [f64; 2] {
+        [0, 1].map(|kind: usize| match &self.axes[kind] {
+            (Some(_), state) => housing_deg_c + state.error.at(share),
+            (None, _) => housing_deg_c,
+        })
     }
 
     /// Whether gyros have any.

@@ -112,7 +112,8 @@ impl Simulation {
                 accelerometers.thermal_step(from_deg_c, to_deg_c);
             }
             let accels = self.accelerometers.as_ref().map(|block| block.deg_c(1.0)).unwrap_or_default();
-            self.effects.thermal_step(&self.gyros.sensor_deg_c(1.0), &accels);
+            let housing_deg_c = self.surroundings.housing_deg_c(1.0);
+            self.effects.thermal_step(&self.gyros.sensor_deg_c(1.0), &accels, housing_deg_c);
         }
     }
 
@@ -171,7 +172,8 @@ impl Simulation {
         middle_s: f64,
     ) -> Option<Sensors<f64>> {
         let share = self.surroundings.share(middle_s);
-        let deg_c = (self.surroundings.housing_deg_c(share), self.surroundings.board_deg_c(share));
+        let [_, axes_deg_c] = self.effects.axes_deg_c(self.surroundings.housing_deg_c(share), share);
+        let deg_c = (axes_deg_c, self.surroundings.board_deg_c(share));
         let failures = &self.failures;
         let block = self.accelerometers.as_mut()?;
         let felt = self.effects.feel(&self.trajectory, (middle_s, length_s), || block.axes(deg_c.0), share);
@@ -211,7 +213,8 @@ impl Simulation {
         let middle_s = whole_to_real(start_ns + end_ns) * 0.5e-9;
         self.advance_to(middle_s);
         let share = self.surroundings.share(middle_s);
-        let axes = self.gyro_orientation.axes(self.surroundings.housing_deg_c(share));
+        let [axes_deg_c, _] = self.effects.axes_deg_c(self.surroundings.housing_deg_c(share), share);
+        let axes = self.gyro_orientation.axes(axes_deg_c);
         let (mut halves, parts) = self.inputs(middle_s, length_s, &axes);
         let whole = parts[0].plus(parts[1]);
         let mut drifts = Sensors::new();

@@ -9,10 +9,11 @@ use isotherm_correction::channel::{ChannelParts, ThermalFilterParts};
 use isotherm_correction::curve::CurveParts;
 use isotherm_correction::drift::DriftParts;
 use isotherm_correction::operation::SelfTestParts;
-use isotherm_correction::orientation::OrientationParts;
+use isotherm_correction::orientation::{AxesPlay, OrientationParts};
 use isotherm_correction::reversal::ReversalParts;
 use isotherm_correction::sample::{ChannelName, OutputKind};
 pub use isotherm_correction::thermal::Feature;
+use isotherm_correction::thermal::{ACCEL_TERMS, GYRO_TERMS, Term};
 
 /// A constant over −60…100 °C.
 #[must_use]
@@ -89,6 +90,7 @@ pub fn orientation(rows: &[[f64; 3]]) -> OrientationParts {
         reference_deg_c: 20.0,
         rows: rows.to_vec(),
         slopes_per_deg_c: Vec::new(),
+        plays: Vec::new(),
         weights: Vec::new(),
         range_deg_c: [-60.0, 100.0],
         parity_limit: None,
@@ -137,6 +139,43 @@ pub fn identity() -> CalibrationParts {
         reversal: None,
         self_test: SelfTestParts::default(),
     }
+}
+
+/// A term with a coefficient so many times that of which it adds about 10⁻⁴ rad/s or 10⁻³ m/s² where temperature swings by 3 °C about
+/// 20 °C at 0.4 rad/s, and the unit by about 0.5 rad/s and 10 m/s².
+#[must_use]
+pub fn stated(term: Term, gyros: bool, times: f64) -> TermParts {
+    let feature = match term.feature {
+        Feature::One | Feature::LasingMode | Feature::Meander => 1.0,
+        Feature::Reading | Feature::RateMagnitude | Feature::Lag | Feature::ThermalRate => 0.5,
+        Feature::ThermalAcceleration => 0.3,
+        Feature::Play => 1.5,
+        Feature::ForceX | Feature::ForceY | Feature::ForceZ => 10.0,
+        Feature::ForceSquared => 100.0,
+    };
+    let gain = constant(times * if gyros { 1e-4 } else { 1e-3 } / feature);
+    match term.feature {
+        Feature::Lag => TermParts::lag(5.0, gain),
+        Feature::Play => TermParts::play(1.5, gain),
+        feature => TermParts::new(feature, gain),
+    }
+}
+
+/// [`identity`] with every term that is declared, of each sensor, and axes that turn and stick.
+#[must_use]
+pub fn every_term() -> CalibrationParts {
+    let mut parts = identity();
+    for (i, gyro) in parts.gyros.iter_mut().enumerate() {
+        gyro.terms = GYRO_TERMS.map(|term| stated(term, true, [1.0, -0.7, 0.4][i])).to_vec();
+    }
+    for (i, accel) in parts.accels.iter_mut().enumerate() {
+        accel.terms = ACCEL_TERMS.map(|term| stated(term, false, [1.0, -0.7, 0.4][i])).to_vec();
+    }
+    for axes in [Some(&mut parts.gyro_orientation), parts.accel_orientation.as_mut()].into_iter().flatten() {
+        axes.slopes_per_deg_c = vec![[0.0, 2e-6, -1e-6], [1e-6, 0.0, 3e-6], [-2e-6, 1e-6, 0.0]];
+        axes.plays = vec![AxesPlay { half_width_deg_c: 0.4, share: 0.5 }];
+    }
+    parts
 }
 
 /// Three gyros only, with a magnetic bias and the substitution over a mode switch.

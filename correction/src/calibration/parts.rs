@@ -100,11 +100,11 @@ pub enum CoefficientParts {
 /// the feature is what the sensor reads, or its magnitude, they are dimensionless, and s²/m where it is the square of a force.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TermParts {
-    /// What the coefficient is multiplied by. Only [`Feature::Lag`] may stand more than once, at most [`crate::thermal::MAX_LAGS`]
-    /// times.
+    /// What the coefficient is multiplied by. Only [`Feature::Lag`] and [`Feature::Play`] may stand more than once, at most
+    /// [`MAX_LAGS`](crate::thermal::MAX_LAGS) and [`MAX_PLAYS`](crate::thermal::MAX_PLAYS) times.
     pub feature: Feature,
-    /// τ of a lag (s), at least the filter's grid step; no other feature looks at it.
-    pub time_constant_s: f64,
+    /// τ of a lag (s), at least the filter's grid step; half width of a play (°C, > 0); no other feature looks at it.
+    pub parameter: f64,
     /// The coefficient.
     pub coefficient: CoefficientParts,
 }
@@ -113,19 +113,25 @@ impl TermParts {
     /// A term with a coefficient over temperature.
     #[must_use]
     pub fn new(feature: Feature, coefficient: CurveParts) -> Self {
-        Self { feature, time_constant_s: 0.0, coefficient: CoefficientParts::Curve(coefficient) }
+        Self { feature, parameter: 0.0, coefficient: CoefficientParts::Curve(coefficient) }
     }
 
     /// A term with a coefficient by thermal branch.
     #[must_use]
     pub fn branched(feature: Feature, coefficient: BranchedParts) -> Self {
-        Self { feature, time_constant_s: 0.0, coefficient: CoefficientParts::Branched(coefficient) }
+        Self { feature, parameter: 0.0, coefficient: CoefficientParts::Branched(coefficient) }
     }
 
     /// A thermal lag `g(T)·(T − L_τ[T])/τ` (models §2, §8); τ in s.
     #[must_use]
     pub fn lag(time_constant_s: f64, gain: CurveParts) -> Self {
-        Self { time_constant_s, ..Self::new(Feature::Lag, gain) }
+        Self { parameter: time_constant_s, ..Self::new(Feature::Lag, gain) }
+    }
+
+    /// A hysteresis `g(T)·(p_w[T] − T)` (models §2); w in °C.
+    #[must_use]
+    pub fn play(half_width_deg_c: f64, gain: CurveParts) -> Self {
+        Self { parameter: half_width_deg_c, ..Self::new(Feature::Play, gain) }
     }
 }
 
@@ -138,7 +144,7 @@ pub struct TrendParts {
     pub interval_s: [f64; 2],
 }
 
-/// One accelerometer (models §3): `f = (U − S(T) − lags)·r(T_board)/K(T)`.
+/// One accelerometer (models §3): `f = (U − S(T) − …)·r(T_board)/K(T)`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AccelParts {
     /// Index of the temperature channel of the sensor; `None`: the assumed temperature holds for ever.

@@ -22,6 +22,7 @@ pub(crate) fn calibration(output: OutputKind, count: f64, accels: bool) -> Calib
         reference_deg_c: 20.0,
         rows: vec![[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
         slopes_per_deg_c: Vec::new(),
+        plays: Vec::new(),
         weights: Vec::new(),
         range_deg_c: [-40.0, 80.0],
         parity_limit: None,

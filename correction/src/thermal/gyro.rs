@@ -6,8 +6,8 @@ use arrayvec::ArrayVec;
 use serde::{Deserialize, Serialize};
 
 use super::bank::Follows;
-use super::lag::{Lag, MAX_LAGS, settled};
 use super::terms::{GYRO_TERMS, Terms};
+use super::trail::{Trail, Trailed, settled};
 use crate::calibration::GyroParts;
 use crate::channel::{ThermalFilter, ThermalState};
 use crate::curve::CurveError;
@@ -70,10 +70,11 @@ impl GyroModel {
 }
 
 impl GyroModel {
-    /// The terms on a ramp that has lasted for long, so that every lag has settled on it.
+    /// The terms on a ramp that has lasted for long, so that everything that trails has settled on it.
     pub(crate) fn steady(&self, thermal: &ThermalState, filter: &ThermalFilter) -> GyroTerms {
-        let lagged = settled(self.terms.lags(), thermal, filter);
-        let ([increment_weight, bias, magnetic, meander], _) = Follows::terms(self, thermal, &lagged, filter);
+        let trailed = settled(self.terms.trails(), thermal, filter);
+        let ([increment_weight, bias, magnetic, meander], _) =
+            Follows::terms(self, thermal, &trailed, filter);
         GyroTerms { increment_weight, bias, magnetic, meander }
     }
 }
@@ -155,18 +156,13 @@ impl Follows<4> for GyroModel {
         self.channel
     }
 
-    fn lags(&self) -> &[Lag] {
-        self.terms.lags()
+    fn trails(&self) -> &[Trail] {
+        self.terms.trails()
     }
 
     /// In the order of [`GyroTerms`].
-    fn terms(
-        &self,
-        thermal: &ThermalState,
-        lagged: &[f64; MAX_LAGS],
-        filter: &ThermalFilter,
-    ) -> ([f64; 4], bool) {
-        let ([error, bias, magnetic, meander], clamped) = self.terms.lines(thermal, lagged, filter);
+    fn terms(&self, thermal: &ThermalState, trailed: &Trailed, filter: &ThermalFilter) -> ([f64; 4], bool) {
+        let ([error, bias, magnetic, meander], clamped) = self.terms.lines(thermal, trailed, filter);
         ([self.increment_weight * (1.0 + error), bias, magnetic, meander], clamped)
     }
 }

@@ -6,8 +6,8 @@ use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 
 use super::bank::Follows;
-use super::lag::{Lag, MAX_LAGS};
 use super::terms::{ACCEL_TERMS, GYRO_TERMS, Terms};
+use super::trail::{MAX_TRAILS, Trail, Trailed};
 use crate::calibration::{AccelParts, GyroParts};
 use crate::channel::{ThermalFilter, ThermalState};
 use crate::curve::{Curve, CurveError};
@@ -54,7 +54,7 @@ impl MotionTerms {
 
     /// Its lines at a thermal state.
     pub(crate) fn at(&self, thermal: &ThermalState, filter: &ThermalFilter) -> [f64; 4] {
-        self.terms.lines(thermal, &[0.0; MAX_LAGS], filter).0
+        self.terms.lines(thermal, &[0.0; MAX_TRAILS], filter).0
     }
 
     fn is_empty(&self) -> bool {
@@ -67,17 +67,12 @@ impl<const T: usize> Follows<T> for MotionTerms {
         self.channel
     }
 
-    fn lags(&self) -> &[Lag] {
+    fn trails(&self) -> &[Trail] {
         &[]
     }
 
-    fn terms(
-        &self,
-        thermal: &ThermalState,
-        lagged: &[f64; MAX_LAGS],
-        filter: &ThermalFilter,
-    ) -> ([f64; T], bool) {
-        self.terms.lines(thermal, lagged, filter)
+    fn terms(&self, thermal: &ThermalState, trailed: &Trailed, filter: &ThermalFilter) -> ([f64; T], bool) {
+        self.terms.lines(thermal, trailed, filter)
     }
 }
 

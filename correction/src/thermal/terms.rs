@@ -7,7 +7,7 @@ use alloc::vec::Vec;
 
 use serde::{Deserialize, Serialize};
 
-use super::lag::{Lag, MAX_LAGS};
+use super::trail::{Trail, Trailed};
 use crate::calibration::{BranchArgument, CoefficientParts, TermParts};
 use crate::channel::{ThermalFilter, ThermalState};
 use crate::curve::{Curve, CurveError, CurveParts};
@@ -25,6 +25,8 @@ pub enum Feature {
     Meander,
     /// `(T − L_τ[T])/τ`, `L_τ` a first-order low-pass (°C/s).
     Lag,
+    /// `p_w[T] − T`, `p_w` a play of half width w: what sticks, and is dragged along by temperature (°C).
+    Play,
     /// Ṫ (°C/s).
     ThermalRate,
     /// T̈ (°C/s²).
@@ -51,12 +53,13 @@ pub struct Term {
 }
 
 /// Terms of a gyro (models §2): all but the first add to its bias Ω (rad/s).
-pub const GYRO_TERMS: [Term; 11] = [
+pub const GYRO_TERMS: [Term; 12] = [
     Term { feature: Feature::Reading, key: "increment_weight_error" },
     Term { feature: Feature::One, key: "static_bias" },
     Term { feature: Feature::LasingMode, key: "magnetic_bias" },
     Term { feature: Feature::Meander, key: "slow_meander" },
     Term { feature: Feature::Lag, key: "lag" },
+    Term { feature: Feature::Play, key: "hysteresis" },
     Term { feature: Feature::ThermalRate, key: "thermal_rate" },
     Term { feature: Feature::ThermalAcceleration, key: "thermal_acceleration" },
     Term { feature: Feature::ForceX, key: "acceleration_sensitive_drift.x" },
@@ -66,9 +69,10 @@ pub const GYRO_TERMS: [Term; 11] = [
 ];
 
 /// Terms of an accelerometer (models §3): they add to its bias S (output units), the last one to what remains of it as a force.
-pub const ACCEL_TERMS: [Term; 3] = [
+pub const ACCEL_TERMS: [Term; 4] = [
     Term { feature: Feature::One, key: "bias" },
     Term { feature: Feature::Lag, key: "lag" },
+    Term { feature: Feature::Play, key: "hysteresis" },
     Term { feature: Feature::ForceSquared, key: "second_order" },
 ];
 
@@ -83,7 +87,12 @@ impl Feature {
     const fn line(self) -> usize {
         match self {
             Self::Reading | Self::ForceX | Self::ForceSquared => 0,
-            Self::One | Self::Lag | Self::ThermalRate | Self::ThermalAcceleration | Self::ForceY => 1,
+            Self::One
+            | Self::Lag
+            | Self::Play
+            | Self::ThermalRate
+            | Self::ThermalAcceleration
+            | Self::ForceY => 1,
             Self::LasingMode | Self::ForceZ => 2,
             Self::Meander | Self::RateMagnitude => 3,
         }
@@ -139,8 +148,8 @@ impl Coefficient {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct Terms {
     terms: Vec<(Feature, Coefficient)>,
-    /// Of the terms that are lags, in their order.
-    lags: Vec<Lag>,
+    /// Of the terms that trail behind the temperature, in their order.
+    trails: Vec<Trail>,
 }
 
 impl Terms {
@@ -172,9 +181,11 @@ impl Terms {
                     }
                 };
                 compiled.terms.extend(coefficient.map(|coefficient| (term.feature, coefficient)));
-                if term.feature == Feature::Lag {
-                    compiled.lags.push(Lag::new(part.time_constant_s, filter));
-                }
+                compiled.trails.extend(match term.feature {
+                    Feature::Lag => Some(Trail::lag(part.parameter, filter)),
+                    Feature::Play => Some(Trail::Play { half_width_deg_c: part.parameter }),
+                    _ => None,
+                });
             }
         }
         sound.then_some(compiled)
@@ -185,27 +196,27 @@ impl Terms {
         self.terms.is_empty()
     }
 
-    /// The lags' time constants.
-    pub(crate) fn lags(&self) -> &[Lag] {
-        &self.lags
+    /// What trails behind the temperature.
+    pub(crate) fn trails(&self) -> &[Trail] {
+        &self.trails
     }
 
-    /// The sum of each line at a thermal state, and whether an argument was clamped to its fitted range. `lagged` is `L_τ[T]` (°C) of
-    /// each lag. A feature that changes from tick to tick counts as 1.
+    /// The sum of each line at a thermal state, and whether an argument was clamped to its fitted range. `trailed` are the states of
+    /// what trails (°C). A feature that changes from tick to tick counts as 1.
     pub(crate) fn lines<const T: usize>(
         &self,
         thermal: &ThermalState,
-        lagged: &[f64; MAX_LAGS],
+        trailed: &Trailed,
         filter: &ThermalFilter,
     ) -> ([f64; T], bool) {
         let mut sums = [0.0; T];
         let mut any_clamped = false;
-        let mut lags = self.lags.iter().zip(lagged);
+        let mut trails = self.trails.iter().zip(trailed);
         for (feature, coefficient) in &self.terms {
             let (value, factor) = match feature {
-                Feature::Lag => lags
+                Feature::Lag | Feature::Play => trails
                     .next()
-                    .map_or((0.0, 0.0), |(lag, lagged)| (thermal.temperature - lagged, lag.per_second)),
+                    .map_or((0.0, 0.0), |(trail, state)| trail.feature(*state, thermal.temperature)),
                 Feature::ThermalRate => (thermal.rate, 1.0),
                 Feature::ThermalAcceleration => (thermal.acceleration, 1.0),
                 _ => (1.0, 1.0),

@@ -172,9 +172,9 @@ impl ThermalMemory {
         };
         for index in 0..memory.channels.len() {
             if let Some(state) = memory.channels.get(index).and_then(ChannelMemory::state) {
-                memory.restart_lags(calibration, index, state.temperature);
+                memory.resume_trails(calibration, index, state.temperature);
                 if let Some((old, old_memory)) = before {
-                    memory.carry_lags(calibration, (old, old_memory));
+                    memory.carry_trails(calibration, (old, old_memory));
                 }
                 memory.update(calibration, index, now, Span::ZERO);
             }
@@ -186,16 +186,16 @@ impl ThermalMemory {
         memory
     }
 
-    /// Goes on with lags that were filtered in the same way.
-    fn carry_lags(&mut self, calibration: &Calibration, (old, old_memory): (&Calibration, &Self)) {
+    /// Goes on with what trails behind a temperature that was filtered in the same way.
+    fn carry_trails(&mut self, calibration: &Calibration, (old, old_memory): (&Calibration, &Self)) {
         let followed = |calibration: &Calibration, channel: Option<usize>| {
             channel.and_then(|index| calibration.channels.get(index)).cloned()
         };
         let same = |new, before| followed(calibration, new) == followed(old, before);
-        self.gyros.carry_lags(&calibration.gyros, (&old.gyros, &old_memory.gyros), |lane| {
+        self.gyros.carry_trails(&calibration.gyros, (&old.gyros, &old_memory.gyros), |lane| {
             same(calibration.gyros[lane].channel, old.gyros[lane].channel)
         });
-        self.accels.carry_lags(&calibration.accels, (&old.accels, &old_memory.accels), |lane| {
+        self.accels.carry_trails(&calibration.accels, (&old.accels, &old_memory.accels), |lane| {
             same(calibration.accels[lane].channel, old.accels[lane].channel)
         });
     }
@@ -276,16 +276,16 @@ impl ThermalMemory {
             }
             Verdict::Restarted => {
                 if let Some(state) = memory.state() {
-                    self.restart_lags(calibration, index, state.temperature);
+                    self.resume_trails(calibration, index, state.temperature);
                 }
                 self.update(calibration, index, start, calibration.filter.grid_step);
             }
         }
     }
 
-    fn restart_lags(&mut self, calibration: &Calibration, channel: usize, temperature: f64) {
-        self.gyros.restart_lags(&calibration.gyros, channel, temperature);
-        self.accels.restart_lags::<AccelModel>(&calibration.accels, channel, temperature);
+    fn resume_trails(&mut self, calibration: &Calibration, channel: usize, temperature: f64) {
+        self.gyros.resume_trails(&calibration.gyros, channel, temperature);
+        self.accels.resume_trails::<AccelModel>(&calibration.accels, channel, temperature);
     }
 
     /// Turns everything that follows a channel towards its present state.

@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 
 use isotherm_correction::curve::{Curve as CoreCurve, CurveError};
 use isotherm_correction::orientation::ROW_NORM_TOLERANCE;
+use isotherm_correction::thermal::Feature;
 
 use super::curve::CurveForm;
 use super::terms::StatedTerm;
@@ -119,7 +120,8 @@ fn terms(r: &mut Reader<'_>, path: &str, terms: &[StatedTerm<'_>], filter: Optio
             let path = |key: &str| format!("{path}.{key}");
             one_argument(r, (&path(run_up), first), (&path(braking), second));
         }
-        let (Some(tau), Some(Filter { grid_step_s, .. })) = (term.time_constant_s, filter) else { continue };
+        let (Feature::Lag, Some(tau)) = (term.feature, term.parameter) else { continue };
+        let Some(Filter { grid_step_s, .. }) = filter else { continue };
         if tau < *grid_step_s && !r.is_damaged("temperature.filter.grid_step_s") {
             let path = format!("{path}.{}.time_constant_s", term.key);
             r.refuse(

@@ -4,7 +4,7 @@ use isotherm_correction::calibration::{AccelParts, CalibrationParts, GyroParts, 
 use isotherm_correction::channel::{ChannelParts, ThermalFilterParts};
 use isotherm_correction::drift::DriftParts;
 use isotherm_correction::operation::{SelfTestCounter, SelfTestParts, SelfTestVoltage};
-use isotherm_correction::orientation::OrientationParts;
+use isotherm_correction::orientation::{AxesPlay, OrientationParts};
 use isotherm_correction::reversal::{FitWindow as CoreFitWindow, ReversalParts};
 use isotherm_correction::sample::{ChannelName, MAX_CHANNEL_NAME, OutputKind};
 use isotherm_correction::servo::{ServoForm, ServoParts};
@@ -12,8 +12,8 @@ use isotherm_correction::servo::{ServoForm, ServoParts};
 use super::measure::{ARCSEC, DEG_PER_H, DEG_PER_S, DEG_PER_SQRT_H, HOUR};
 use super::terms::StatedTerm;
 use super::types::{
-    AccelOutput, AccelSensor, Channel, Document, Drift, FitWindow, GyroOutput, GyroSensor, ModeReversal,
-    Orientation, SelfTest, Servo, ServoKind, Temperature, Trend,
+    AccelOutput, AccelSensor, AxesHysteresis, Channel, Document, Drift, FitWindow, GyroOutput, GyroSensor,
+    ModeReversal, Orientation, SelfTest, Servo, ServoKind, Temperature, Trend,
 };
 
 /// Temperature range of an orientation that does not depend on temperature (°C): nothing lies outside.
@@ -174,11 +174,16 @@ fn orientation<P>(orientation: &Orientation<P>, parity: Option<(f64, u32)>) -> O
         reference_deg_c: thermal.map_or(0.0, |thermal| thermal.reference_deg_c),
         rows: orientation.rows.clone(),
         slopes_per_deg_c: slopes.map(Iterator::collect).unwrap_or_default(),
+        plays: thermal.map(|thermal| thermal.hysteresis.iter().map(play).collect()).unwrap_or_default(),
         weights: orientation.weights.clone().unwrap_or_default(),
         range_deg_c: thermal.map_or(EVERYWHERE_DEG_C, |thermal| thermal.range_deg_c),
         parity_limit: parity.map(|(limit, _)| limit),
         parity_confirm_ticks: parity.map_or(1, |(_, ticks)| ticks),
     }
+}
+
+fn play(stated: &AxesHysteresis) -> AxesPlay {
+    AxesPlay { half_width_deg_c: stated.half_width_deg_c, share: stated.share_ratio }
 }
 
 fn trend(trend: &Trend) -> TrendParts {

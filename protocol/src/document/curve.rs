@@ -46,6 +46,8 @@ quantities! {
     ThermalAcceleration: [DegPerHPerDegCPerS2] over [DegC, DegCPerS2];
     /// Gain of a thermal lag.
     LagGain: [DegPerHPerDegCPerS] over [DegC];
+    /// Gain of a hysteresis.
+    HysteresisGain: [DegPerHPerDegC] over [DegC];
     /// Drift of a gyro by specific force.
     DriftByForce: [DegPerHPerG] over [DegC];
     /// Relative deviation from one over the rate of a gyro.
@@ -60,6 +62,8 @@ quantities! {
     OutputBias: [CountsPerS, V, MPerS2] over [DegC];
     /// Gain of a thermal lag of an accelerometer, in units of its output per °C/s.
     OutputLagGain: [CountsPerSPerDegCPerS, VPerDegCPerS, MPerS2PerDegCPerS] over [DegC];
+    /// Gain of a hysteresis of an accelerometer, in units of its output per °C.
+    OutputHysteresisGain: [CountsPerSPerDegC, VPerDegC, MPerS2PerDegC] over [DegC];
 }
 
 /// A curve of one quantity, in the units of its keys.

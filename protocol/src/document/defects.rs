@@ -64,6 +64,8 @@ fn key(document: &Document, defect: &Defect) -> &'static str {
         (Section::Gyro(_), "input_limit") if counts => "input_limit_counts_per_tick",
         (Section::Gyro(_), "input_limit") => "input_limit_deg_per_s",
         (Section::Gyro(_) | Section::Accel(_), "lag.time_constant_s") => "lag",
+        (Section::Gyro(_) | Section::Accel(_), "hysteresis.half_width_deg_c") => "hysteresis",
+        (Section::GyroOrientation | Section::AccelOrientation, "plays") => "thermal.hysteresis",
         (Section::GyroOrientation | Section::AccelOrientation, "row") => "rows",
         (Section::GyroOrientation | Section::AccelOrientation, "weight") => "weights",
         (Section::Gyro(_), "trend.coefficients") => "trend.coefficients_deg_per_h",

@@ -14,8 +14,8 @@ pub(super) struct StatedTerm<'d> {
     pub(super) feature: Feature,
     /// Its key in the sensor's table.
     pub(super) key: String,
-    /// τ of a lag (s).
-    pub(super) time_constant_s: Option<f64>,
+    /// τ of a lag (s), half width of a play (°C).
+    pub(super) parameter: Option<f64>,
     pub(super) coefficient: StatedCoefficient<'d>,
 }
 
@@ -30,7 +30,7 @@ impl<'d> StatedTerm<'d> {
     /// Its curves, each with its path in the sensor's table.
     pub(super) fn curves(&self) -> Vec<(String, &'d CurveForm)> {
         match self.coefficient {
-            StatedCoefficient::Curve(curve) if self.time_constant_s.is_some() => {
+            StatedCoefficient::Curve(curve) if self.parameter.is_some() => {
                 vec![(join(&self.key, "gain"), curve)]
             }
             StatedCoefficient::Curve(curve) => vec![(self.key.clone(), curve)],
@@ -53,8 +53,8 @@ impl<'d> StatedTerm<'d> {
                 braking: braking.to_parts(0.0),
             }),
         };
-        let time_constant_s = self.time_constant_s.unwrap_or_default();
-        TermParts { feature: self.feature, time_constant_s, coefficient }
+        let parameter = self.parameter.unwrap_or_default();
+        TermParts { feature: self.feature, parameter, coefficient }
     }
 }
 
@@ -72,7 +72,7 @@ impl<'d> Terms<'d> {
     fn curve<Q: Quantity>(&mut self, feature: Feature, curve: Option<&'d Curve<Q>>) {
         let key = self.key(feature).to_owned();
         let coefficient = curve.map(|curve| StatedCoefficient::Curve(curve));
-        let term = |coefficient| StatedTerm { feature, key, time_constant_s: None, coefficient };
+        let term = |coefficient| StatedTerm { feature, key, parameter: None, coefficient };
         self.found.extend(coefficient.map(term));
     }
 
@@ -80,16 +80,17 @@ impl<'d> Terms<'d> {
         let Some(Branches { run_up, braking }) = branches else { return };
         let coefficient = StatedCoefficient::Branched { run_up, braking };
         let key = self.key(feature).to_owned();
-        self.found.push(StatedTerm { feature, key, time_constant_s: None, coefficient });
+        self.found.push(StatedTerm { feature, key, parameter: None, coefficient });
     }
 
-    fn lags<Q: Quantity>(&mut self, lags: impl Iterator<Item = (f64, &'d Curve<Q>)>) {
-        let key = self.key(Feature::Lag);
-        for (i, (time_constant_s, gain)) in lags.enumerate() {
+    /// Terms that may stand more than once, each with its parameter.
+    fn list<Q: Quantity>(&mut self, feature: Feature, stated: impl Iterator<Item = (f64, &'d Curve<Q>)>) {
+        let key = self.key(feature);
+        for (i, (parameter, gain)) in stated.enumerate() {
             self.found.push(StatedTerm {
-                feature: Feature::Lag,
+                feature,
                 key: element(key, i),
-                time_constant_s: Some(time_constant_s),
+                parameter: Some(parameter),
                 coefficient: StatedCoefficient::Curve(gain),
             });
         }
@@ -113,7 +114,9 @@ impl GyroSensor {
         terms.curve(Feature::Meander, self.slow_meander.as_ref());
         terms.branches(Feature::ThermalRate, self.thermal_rate.as_ref());
         terms.branches(Feature::ThermalAcceleration, self.thermal_acceleration.as_ref());
-        terms.lags(self.lag.iter().map(|lag| (lag.time_constant_s, &lag.gain)));
+        terms.list(Feature::Lag, self.lag.iter().map(|lag| (lag.time_constant_s, &lag.gain)));
+        let plays = self.hysteresis.iter().map(|play| (play.half_width_deg_c, &play.gain));
+        terms.list(Feature::Play, plays);
         terms.curve(Feature::RateMagnitude, self.increment_weight_asymmetry.as_ref());
         let axes = [Feature::ForceX, Feature::ForceY, Feature::ForceZ];
         terms.along_axes(axes, self.acceleration_sensitive_drift.as_ref());
@@ -126,7 +129,9 @@ impl AccelSensor {
     pub(super) fn terms(&self) -> Vec<StatedTerm<'_>> {
         let mut terms = Terms { declared: &ACCEL_TERMS, found: Vec::new() };
         terms.curve(Feature::One, self.bias.as_ref());
-        terms.lags(self.lag.iter().map(|lag| (lag.time_constant_s, &lag.gain)));
+        terms.list(Feature::Lag, self.lag.iter().map(|lag| (lag.time_constant_s, &lag.gain)));
+        let plays = self.hysteresis.iter().map(|play| (play.half_width_deg_c, &play.gain));
+        terms.list(Feature::Play, plays);
         terms.curve(Feature::ForceSquared, self.second_order.as_ref());
         terms.found
     }

@@ -10,11 +10,11 @@ mod gyro;
 mod origin;
 mod self_test;
 
-pub use accel::{Accel, AccelLag, AccelOrientation, AccelOutput, AccelParity, AccelSensor};
+pub use accel::{Accel, AccelHysteresis, AccelLag, AccelOrientation, AccelOutput, AccelParity, AccelSensor};
 pub use drift::Drift;
 pub use gyro::{
-    AlongAxes, Branches, Gyro, GyroOrientation, GyroOutput, GyroParity, GyroSensor, Lag, Servo, ServoKind,
-    Trend,
+    AlongAxes, Branches, Gyro, GyroOrientation, GyroOutput, GyroParity, GyroSensor, Hysteresis, Lag, Servo,
+    ServoKind, Trend,
 };
 pub use origin::{Created, Log, Measure, Origin, Residual, Sample};
 pub use self_test::{SelfTest, SelfTestCounter, SelfTestVoltage};
@@ -162,6 +162,22 @@ pub struct OrientationThermal {
     /// C1: change of each row (direction cosines; 1 is 206265″). Source: 004.
     #[schemars(length(min = 3, max = 8))]
     pub slopes_arcsec_per_deg_c: Vec<[f64; 3]>,
+    /// What of the change sticks: T above is `T + Σ share·(p_w[T] − T)`, `p_w` a play of half width w. Source: models §4, 004.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(length(max = 8))]
+    pub hysteresis: Vec<AxesHysteresis>,
+}
+
+/// One play of the axes.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields, title = "Hysteresis of an orientation")]
+pub struct AxesHysteresis {
+    /// w.
+    #[schemars(range(min = 0.001, max = 1000.0))]
+    pub half_width_deg_c: f64,
+    /// Share of the change that goes with the play.
+    #[schemars(range(min = -10.0, max = 10.0))]
+    pub share_ratio: f64,
 }
 
 /// The four-step substitution over a switch of the lasing mode.

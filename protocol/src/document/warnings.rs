@@ -79,6 +79,7 @@ fn without_channel(r: &Reader<'_>, path: &str, sensor: &GyroSensor, found: &mut 
         ("thermal_rate", sensor.thermal_rate.is_some()),
         ("thermal_acceleration", sensor.thermal_acceleration.is_some()),
         ("lag", !sensor.lag.is_empty()),
+        ("hysteresis", !sensor.hysteresis.is_empty()),
     ] {
         if there && sensor.channel.is_none() {
             found.push(r.warning(&join(path, key), "has no effect: the gyro follows no temperature channel"));

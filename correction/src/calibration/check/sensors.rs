@@ -7,7 +7,10 @@ use crate::channel::ThermalFilter;
 use crate::curve::Curve;
 use crate::orientation::{Orientation, OrientationError, OrientationParts};
 use crate::sample::OutputKind;
-use crate::thermal::{ACCEL_TERMS, AccelModel, Feature, GYRO_TERMS, GyroModel, MAX_LAGS, Term, TermError};
+use crate::thermal::{
+    ACCEL_TERMS, AccelModel, Feature, GYRO_TERMS, GyroModel, MAX_LAGS, MAX_PLAYS, PLAY_WIDTHS_DEG_C, Term,
+    TermError,
+};
 
 /// Farthest that an accelerometer may sit from the reference point along an axis (m).
 const MOST_POSITION_M: f64 = 100.0;
@@ -65,14 +68,28 @@ pub(super) fn accel_model(
     Some(model)
 }
 
-/// Number of a sensor's terms of each feature, and the lags' time constants.
+/// Number of a sensor's terms of each feature, the lags' time constants and the half widths of plays.
 fn terms(checker: &mut Checker, terms: &[TermParts], declared: &[Term], parts: &CalibrationParts) {
     for Term { feature, key } in declared {
         let stated = terms.iter().filter(|term| term.feature == *feature);
-        checker.count(key, stated.count(), 0, if *feature == Feature::Lag { MAX_LAGS } else { 1 });
+        let most = match feature {
+            Feature::Lag => MAX_LAGS,
+            Feature::Play => MAX_PLAYS,
+            _ => 1,
+        };
+        checker.count(key, stated.count(), 0, most);
     }
-    for TermParts { time_constant_s, .. } in terms.iter().filter(|term| term.feature == Feature::Lag) {
-        checker.within("lag.time_constant_s", *time_constant_s, parts.filter.grid_step_s, 1e7);
+    for TermParts { feature, parameter, .. } in terms {
+        match feature {
+            Feature::Lag => {
+                checker.within("lag.time_constant_s", *parameter, parts.filter.grid_step_s, 1e7);
+            }
+            Feature::Play => {
+                let [least, most] = PLAY_WIDTHS_DEG_C;
+                checker.within("hysteresis.half_width_deg_c", *parameter, least, most);
+            }
+            _ => {}
+        }
     }
 }
 
@@ -93,6 +110,7 @@ pub(super) fn orientation(
     sensors: usize,
 ) -> Option<Orientation> {
     checker.count("rows", parts.rows.len(), sensors, sensors);
+    checker.count("plays", parts.plays.len(), 0, MAX_PLAYS);
     for &index in following {
         checker.channel("channels", Some(index));
     }

@@ -3,7 +3,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::super::curve::{Curve, OutputBias, OutputLagGain, Relative, ScaleFactor, SecondOrder};
+use super::super::curve::{
+    Curve, OutputBias, OutputHysteresisGain, OutputLagGain, Relative, ScaleFactor, SecondOrder,
+};
 use super::Orientation;
 
 /// The accelerometers of the unit: `f = (U − S(T) − lags)·r(T_board)/K(T)`.
@@ -73,6 +75,10 @@ pub struct AccelSensor {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 8))]
     pub lag: Vec<AccelLag>,
+    /// Hysteresis of the bias, as for gyros. Source: models §2, Prandtl–Ishlinskii.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(length(max = 8))]
+    pub hysteresis: Vec<AccelHysteresis>,
     /// K2: what it feels beyond f per f², f along its input axis. Source: models §3, IEEE 528.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub second_order: Option<Curve<SecondOrder>>,
@@ -95,6 +101,17 @@ pub struct AccelLag {
     pub time_constant_s: f64,
     /// g(T).
     pub gain: Curve<OutputLagGain>,
+}
+
+/// One play of an accelerometer's bias.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields, title = "Hysteresis of an accelerometer")]
+pub struct AccelHysteresis {
+    /// w.
+    #[schemars(range(min = 0.001, max = 1000.0))]
+    pub half_width_deg_c: f64,
+    /// g(T).
+    pub gain: Curve<OutputHysteresisGain>,
 }
 
 /// Detection and exclusion of a failed accelerometer.
