@@ -17,6 +17,7 @@ pub use gyro::{GyroModel, GyroTerms, TrendModel};
 pub(crate) use gyro::{TermError, Trends};
 pub(crate) use motion::{Motion, MotionTerms};
 pub(crate) use ramp::{Pace, Ramp};
-pub use terms::{ACCEL_TERMS, Feature, GYRO_TERMS, Term};
+pub(crate) use terms::Others;
+pub use terms::{ACCEL_TERMS, Feature, GYRO_TERMS, MAX_REGRESSORS, Term};
 pub use trail::{MAX_LAGS, MAX_PLAYS};
 pub(crate) use trail::{PLAY_WIDTHS_DEG_C, drag};

@@ -45,17 +45,17 @@ use sha2::{Digest, Sha256};
 pub use correction_change::{Side, correction_change};
 pub use curve::{
     Curve, CurveForm, DriftByForce, Frequency, HysteresisGain, LagGain, OutputBias, OutputHysteresisGain,
-    Quantity, RateBias, Relative, RelativeOverRate, ScaleFactor, SecondOrder, Shape, ThermalAcceleration,
-    ThermalRate,
+    OutputRegressorGain, Quantity, RateBias, RegressorGain, Relative, RelativeOverRate, ScaleFactor,
+    SecondOrder, Shape, ThermalAcceleration, ThermalRate,
 };
 pub use difference::{difference, lost_sections};
 pub use measure::{Argument, Unit};
 pub use types::{
-    Accel, AccelHysteresis, AccelLag, AccelOrientation, AccelOutput, AccelParity, AccelSensor, AlongAxes,
-    AxesHysteresis, Branches, Channel, Created, Document, Drift, Filter, FitWindow, Gyro, GyroOrientation,
-    GyroOutput, GyroParity, GyroSensor, Hysteresis, Lag, Log, Measure, ModeReversal, Orientation,
-    OrientationThermal, Origin, Residual, Sample, SelfTest, SelfTestCounter, SelfTestVoltage, Servo,
-    ServoKind, Temperature, Trend,
+    Accel, AccelHysteresis, AccelLag, AccelOrientation, AccelOutput, AccelParity, AccelRegressor,
+    AccelSensor, AlongAxes, Auxiliary, AxesHysteresis, Branches, Channel, Created, Document, Drift, Filter,
+    FitWindow, Gyro, GyroOrientation, GyroOutput, GyroParity, GyroSensor, Hysteresis, Lag, Log, Measure,
+    ModeReversal, Orientation, OrientationThermal, Origin, Regressor, Residual, Sample, SelfTest,
+    SelfTestCounter, SelfTestVoltage, Servo, ServoKind, Temperature, Trend,
 };
 
 /// Oldest version of the document's form that is still read.

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use isotherm_correction::calibration::{
-    AccelParts, BranchedParts, Calibration, CalibrationParts, GyroParts, TermParts,
+    AccelParts, BranchedParts, Calibration, CalibrationParts, GyroParts, RegressorParts, Source, TermParts,
 };
 use isotherm_correction::channel::{ChannelParts, ThermalFilterParts};
 use isotherm_correction::curve::CurveParts;
@@ -128,6 +128,7 @@ pub fn identity() -> CalibrationParts {
             assumed_deg_c: 20.0,
         },
         channels: vec![channel("t")],
+        auxiliaries: Vec::new(),
         gyro_output: OutputKind::Mean,
         gyros: vec![plain_gyro(); 3],
         gyro_orientation: orientation(&ALONG_CASE_AXES),
@@ -142,7 +143,7 @@ pub fn identity() -> CalibrationParts {
 }
 
 /// A term with a coefficient so many times that of which it adds about 10⁻⁴ rad/s or 10⁻³ m/s² where temperature swings by 3 °C about
-/// 20 °C at 0.4 rad/s, and the unit by about 0.5 rad/s and 10 m/s².
+/// 20 °C at 0.4 rad/s, the auxiliary channels differ by 2 ± 1, and the unit by about 0.5 rad/s and 10 m/s².
 #[must_use]
 pub fn stated(term: Term, gyros: bool, times: f64) -> TermParts {
     let feature = match term.feature {
@@ -150,6 +151,7 @@ pub fn stated(term: Term, gyros: bool, times: f64) -> TermParts {
         Feature::Reading | Feature::RateMagnitude | Feature::Lag | Feature::ThermalRate => 0.5,
         Feature::ThermalAcceleration => 0.3,
         Feature::Play => 1.5,
+        Feature::Regressor => 2.0,
         Feature::ForceX | Feature::ForceY | Feature::ForceZ => 10.0,
         Feature::ForceSquared => 100.0,
     };
@@ -157,14 +159,24 @@ pub fn stated(term: Term, gyros: bool, times: f64) -> TermParts {
     match term.feature {
         Feature::Lag => TermParts::lag(5.0, gain),
         Feature::Play => TermParts::play(1.5, gain),
+        Feature::Regressor => {
+            let (channel, minus) = (Source::Auxiliary(0), Some(Source::Auxiliary(1)));
+            TermParts::regressor(RegressorParts { channel, minus, reference: 0.5 }, gain)
+        }
         feature => TermParts::new(feature, gain),
     }
 }
 
-/// [`identity`] with every term that is declared, of each sensor, and axes that turn and stick.
+/// [`identity`] with two auxiliary channels, u and v.
+#[must_use]
+pub fn with_auxiliaries() -> CalibrationParts {
+    CalibrationParts { auxiliaries: vec![channel("u"), channel("v")], ..identity() }
+}
+
+/// [`with_auxiliaries`] and every term that is declared, of each sensor, and axes that turn and stick.
 #[must_use]
 pub fn every_term() -> CalibrationParts {
-    let mut parts = identity();
+    let mut parts = with_auxiliaries();
     for (i, gyro) in parts.gyros.iter_mut().enumerate() {
         gyro.terms = GYRO_TERMS.map(|term| stated(term, true, [1.0, -0.7, 0.4][i])).to_vec();
     }

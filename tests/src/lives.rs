@@ -253,7 +253,7 @@ pub fn uncalibrated() -> Scenario {
 #[must_use]
 pub fn terms() -> Scenario {
     let calibration = compile(&every_term());
-    let mut script = Script::new(18, &calibration, &[("t", 24.0)]);
+    let mut script = Script::new(18, &calibration, &[("t", 24.0), ("u", 5.0), ("v", 3.0)]);
     (script.mishaps, script.scatter) = (2, 3.0);
     script.ticks(2500);
     script.restart();

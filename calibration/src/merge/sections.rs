@@ -10,7 +10,7 @@ pub(super) type Sections = BTreeMap<String, Value>;
 /// Keys that say nothing about the correction.
 const ABOUT: [&str; 4] = ["schema", "created", "note", "origin"];
 /// Terms of a gyro's Ω, which one fit makes together.
-const BIAS: [&str; 8] = [
+const BIAS: [&str; 9] = [
     "static_bias",
     "magnetic_bias",
     "slow_meander",
@@ -18,6 +18,7 @@ const BIAS: [&str; 8] = [
     "thermal_acceleration",
     "lag",
     "hysteresis",
+    "regressor",
     "trend",
 ];
 
@@ -36,7 +37,12 @@ pub(super) fn group(key: &str) -> String {
         ["gyro", "sensor", name, term] if term.starts_with("increment_weight") => {
             format!("gyro.sensor.{name} weight")
         }
-        ["accel", "sensor", name, "scale_factor" | "bias" | "board_ratio_error" | "lag" | "hysteresis"] => {
+        [
+            "accel",
+            "sensor",
+            name,
+            "scale_factor" | "bias" | "board_ratio_error" | "lag" | "hysteresis" | "regressor",
+        ] => {
             format!("accel.sensor.{name} output")
         }
         [kind, "orientation", "rows" | "weights" | "thermal"] => format!("{kind}.orientation axes"),

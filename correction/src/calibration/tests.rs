@@ -97,6 +97,7 @@ fn parts() -> CalibrationParts {
             assumed_deg_c: 20.0,
         },
         channels: vec![channel("block"), channel("accel"), channel("board"), channel("spare")],
+        auxiliaries: Vec::new(),
         gyro_output: OutputKind::Mean,
         gyros: vec![gyro(1.0), gyro(-2.0), gyro(0.5)],
         gyro_orientation: axes(

@@ -61,6 +61,7 @@ pub(crate) fn calibration(output: OutputKind, count: f64, accels: bool) -> Calib
             assumed_deg_c: 20.0,
         },
         channels: Vec::new(),
+        auxiliaries: Vec::new(),
         gyro_output: output,
         gyros: vec![gyro; 3],
         gyro_orientation: axes(),

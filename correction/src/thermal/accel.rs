@@ -3,9 +3,9 @@
 use serde::{Deserialize, Serialize};
 
 use super::bank::Follows;
-use super::terms::{ACCEL_TERMS, Terms};
-use super::trail::{Trail, Trailed, settled};
-use crate::calibration::AccelParts;
+use super::terms::{ACCEL_TERMS, Others, SensorState, Terms};
+use super::trail::{Trail, settled};
+use crate::calibration::{AccelParts, RegressorParts};
 use crate::channel::{ThermalFilter, ThermalState};
 use crate::curve::{Curve, CurveError, CurveParts};
 
@@ -50,9 +50,14 @@ impl AccelModel {
     }
 
     /// S (output units) and K on a ramp that has lasted for long, so that everything that trails has settled on it.
-    pub(crate) fn steady(&self, thermal: &ThermalState, filter: &ThermalFilter) -> (f64, f64) {
+    pub(crate) fn steady(
+        &self,
+        thermal: &ThermalState,
+        (filter, others): (&ThermalFilter, Others<'_>),
+    ) -> (f64, f64) {
         let trailed = settled(self.terms.trails(), thermal, filter);
-        let ([bias, _], _) = Follows::<2>::terms(self, thermal, &trailed, filter);
+        let state = SensorState { thermal, trailed: &trailed, others };
+        let ([bias, _], _) = Follows::<2>::terms(self, &state, filter);
         (bias, self.scale_factor.at(thermal.temperature).value)
     }
 
@@ -72,9 +77,13 @@ impl Follows<2> for AccelModel {
         self.terms.trails()
     }
 
-    fn terms(&self, thermal: &ThermalState, trailed: &Trailed, filter: &ThermalFilter) -> ([f64; 2], bool) {
-        let ([_, bias], clamped) = self.terms.lines(thermal, trailed, filter);
-        let scale_factor = self.scale_factor.at(thermal.temperature);
+    fn regressors(&self) -> &[RegressorParts] {
+        self.terms.regressors()
+    }
+
+    fn terms(&self, state: &SensorState<'_>, filter: &ThermalFilter) -> ([f64; 2], bool) {
+        let ([_, bias], clamped) = self.terms.lines(state, filter);
+        let scale_factor = self.scale_factor.at(state.thermal.temperature);
         ([bias, 1.0 / scale_factor.value], clamped || scale_factor.clamped)
     }
 }
@@ -90,8 +99,12 @@ impl Follows<1> for AccelModel {
         &[]
     }
 
-    fn terms(&self, thermal: &ThermalState, _: &Trailed, _: &ThermalFilter) -> ([f64; 1], bool) {
-        let ratio = self.board_ratio.at(thermal.temperature);
+    fn regressors(&self) -> &[RegressorParts] {
+        &[]
+    }
+
+    fn terms(&self, state: &SensorState<'_>, _: &ThermalFilter) -> ([f64; 1], bool) {
+        let ratio = self.board_ratio.at(state.thermal.temperature);
         ([ratio.value], ratio.clamped)
     }
 }

@@ -8,7 +8,9 @@ use arrayvec::ArrayVec;
 use serde::{Deserialize, Serialize};
 
 use super::ramp::Pace;
+use super::terms::{Others, SensorState};
 use super::trail::{MAX_TRAILS, Trail, Trailed, advance, resume};
+use crate::calibration::RegressorParts;
 use crate::channel::{ThermalFilter, ThermalState};
 use crate::lanes::Line;
 use crate::orientation::SensorMask;
@@ -21,8 +23,10 @@ pub(crate) trait Follows<const T: usize> {
     fn channel(&self) -> Option<usize>;
     /// What trails behind the temperature and enters the terms.
     fn trails(&self) -> &[Trail];
-    /// Every term at a thermal state, and whether an argument was clamped to its fitted range.
-    fn terms(&self, thermal: &ThermalState, trailed: &Trailed, filter: &ThermalFilter) -> ([f64; T], bool);
+    /// What other channels say and enters the terms.
+    fn regressors(&self) -> &[RegressorParts];
+    /// Every term in a state, and whether an argument was clamped to its fitted range.
+    fn terms(&self, state: &SensorState<'_>, filter: &ThermalFilter) -> ([f64; T], bool);
 }
 
 /// Most channels that all sensors of a unit follow: one for each gyro, each accelerometer and each accelerometer's board.
@@ -79,6 +83,11 @@ impl Paces {
         place.map_or(0.0, |(_, pace)| pace.share(time))
     }
 
+    /// Whether whatever follows a channel sets out at `time`.
+    fn starts(&self, channel: usize, time: Timestamp) -> bool {
+        self.followed.iter().any(|(followed, pace)| *followed == channel && pace.starts(time))
+    }
+
     /// Goes on as others do.
     pub(crate) fn carry(&mut self, old: &Self) {
         old.followed.iter().for_each(|(channel, pace)| self.set(*channel, *pace));
@@ -133,7 +142,8 @@ impl<const T: usize> Bank<T> {
         let assumed = ThermalState { temperature: filter.assumed_deg_c, ..ThermalState::default() };
         for (lane, sensor) in sensors.iter().take(MAX_SENSORS).enumerate() {
             bank.share_of[lane] = paces.place(sensor.channel());
-            let (terms, clamped) = sensor.terms(&assumed, bank.trailed(lane), filter);
+            let state = SensorState { thermal: &assumed, trailed: bank.trailed(lane), others: &|_| None };
+            let (terms, clamped) = sensor.terms(&state, filter);
             bank.hold(lane, terms, clamped);
         }
         bank
@@ -207,14 +217,15 @@ impl<const T: usize> Bank<T> {
         &mut self,
         sensors: &[S],
         (channel, thermal): (usize, &ThermalState),
-        filter: &ThermalFilter,
+        (filter, others): (&ThermalFilter, Others<'_>),
         (share, at_once): (f64, bool),
     ) {
         for (lane, sensor) in sensors.iter().enumerate() {
             if sensor.channel() != Some(channel) {
                 continue;
             }
-            let (terms, clamped) = sensor.terms(thermal, self.trailed(lane), filter);
+            let state = SensorState { thermal, trailed: self.trailed(lane), others };
+            let (terms, clamped) = sensor.terms(&state, filter);
             if at_once || !self.started.contains(lane) {
                 self.hold(lane, terms, clamped);
             } else {
@@ -222,6 +233,35 @@ impl<const T: usize> Bank<T> {
                 self.clamped = self.clamped.set(lane, clamped);
             }
             self.started = self.started.with(lane);
+        }
+    }
+
+    /// Evaluates every term of the sensors that have a channel as a regressor, from which a reading came at `start`.
+    ///
+    /// Readings of one moment act together, in whatever order they come: a sensor that sets out at `start` sets out for the new
+    /// result. A reading between acts with the next one of the sensor's own temperature; the `first` of all is met at once.
+    pub(crate) fn join<S: Follows<T>>(
+        &mut self,
+        sensors: &[S],
+        rests_on: impl Fn(&RegressorParts) -> bool,
+        own_state: impl Fn(usize) -> Option<ThermalState>,
+        (filter, others): (&ThermalFilter, Others<'_>),
+        (paces, start, first): (&Paces, Timestamp, bool),
+    ) {
+        for (lane, sensor) in sensors.iter().enumerate() {
+            let concerned = self.started.contains(lane) && sensor.regressors().iter().any(&rests_on);
+            let Some(own) = sensor.channel().filter(|_| concerned) else { continue };
+            let Some(thermal) = own_state(own).filter(|_| first || paces.starts(own, start)) else {
+                continue;
+            };
+            let state = SensorState { thermal: &thermal, trailed: self.trailed(lane), others };
+            let (terms, clamped) = sensor.terms(&state, filter);
+            if first {
+                self.hold(lane, terms, clamped);
+            } else {
+                self.lines.iter_mut().zip(terms).for_each(|(line, term)| line.turn(lane, 0.0, term));
+                self.clamped = self.clamped.set(lane, clamped);
+            }
         }
     }
 

@@ -6,9 +6,9 @@ use arrayvec::ArrayVec;
 use serde::{Deserialize, Serialize};
 
 use super::bank::Follows;
-use super::terms::{GYRO_TERMS, Terms};
-use super::trail::{Trail, Trailed, settled};
-use crate::calibration::GyroParts;
+use super::terms::{GYRO_TERMS, Others, SensorState, Terms};
+use super::trail::{Trail, settled};
+use crate::calibration::{GyroParts, RegressorParts};
 use crate::channel::{ThermalFilter, ThermalState};
 use crate::curve::CurveError;
 use crate::lanes::Lanes;
@@ -71,10 +71,14 @@ impl GyroModel {
 
 impl GyroModel {
     /// The terms on a ramp that has lasted for long, so that everything that trails has settled on it.
-    pub(crate) fn steady(&self, thermal: &ThermalState, filter: &ThermalFilter) -> GyroTerms {
+    pub(crate) fn steady(
+        &self,
+        thermal: &ThermalState,
+        (filter, others): (&ThermalFilter, Others<'_>),
+    ) -> GyroTerms {
         let trailed = settled(self.terms.trails(), thermal, filter);
-        let ([increment_weight, bias, magnetic, meander], _) =
-            Follows::terms(self, thermal, &trailed, filter);
+        let state = SensorState { thermal, trailed: &trailed, others };
+        let ([increment_weight, bias, magnetic, meander], _) = Follows::terms(self, &state, filter);
         GyroTerms { increment_weight, bias, magnetic, meander }
     }
 }
@@ -160,9 +164,13 @@ impl Follows<4> for GyroModel {
         self.terms.trails()
     }
 
+    fn regressors(&self) -> &[RegressorParts] {
+        self.terms.regressors()
+    }
+
     /// In the order of [`GyroTerms`].
-    fn terms(&self, thermal: &ThermalState, trailed: &Trailed, filter: &ThermalFilter) -> ([f64; 4], bool) {
-        let ([error, bias, magnetic, meander], clamped) = self.terms.lines(thermal, trailed, filter);
+    fn terms(&self, state: &SensorState<'_>, filter: &ThermalFilter) -> ([f64; 4], bool) {
+        let ([error, bias, magnetic, meander], clamped) = self.terms.lines(state, filter);
         ([self.increment_weight * (1.0 + error), bias, magnetic, meander], clamped)
     }
 }

@@ -6,9 +6,9 @@ use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 
 use super::bank::Follows;
-use super::terms::{ACCEL_TERMS, GYRO_TERMS, Terms};
-use super::trail::{MAX_TRAILS, Trail, Trailed};
-use crate::calibration::{AccelParts, GyroParts};
+use super::terms::{ACCEL_TERMS, GYRO_TERMS, SensorState, Terms};
+use super::trail::{MAX_TRAILS, Trail};
+use crate::calibration::{AccelParts, GyroParts, RegressorParts};
 use crate::channel::{ThermalFilter, ThermalState};
 use crate::curve::{Curve, CurveError};
 use crate::lanes::Lanes;
@@ -54,7 +54,8 @@ impl MotionTerms {
 
     /// Its lines at a thermal state.
     pub(crate) fn at(&self, thermal: &ThermalState, filter: &ThermalFilter) -> [f64; 4] {
-        self.terms.lines(thermal, &[0.0; MAX_TRAILS], filter).0
+        let state = SensorState { thermal, trailed: &[0.0; MAX_TRAILS], others: &|_| None };
+        self.terms.lines(&state, filter).0
     }
 
     fn is_empty(&self) -> bool {
@@ -71,8 +72,12 @@ impl<const T: usize> Follows<T> for MotionTerms {
         &[]
     }
 
-    fn terms(&self, thermal: &ThermalState, trailed: &Trailed, filter: &ThermalFilter) -> ([f64; T], bool) {
-        self.terms.lines(thermal, trailed, filter)
+    fn regressors(&self) -> &[RegressorParts] {
+        &[]
+    }
+
+    fn terms(&self, state: &SensorState<'_>, filter: &ThermalFilter) -> ([f64; T], bool) {
+        self.terms.lines(state, filter)
     }
 }
 

@@ -8,7 +8,7 @@ use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 
 use super::trail::{Trail, Trailed};
-use crate::calibration::{BranchArgument, CoefficientParts, TermParts};
+use crate::calibration::{BranchArgument, CoefficientParts, RegressorParts, Source, TermParts};
 use crate::channel::{ThermalFilter, ThermalState};
 use crate::curve::{Curve, CurveError, CurveParts};
 
@@ -27,6 +27,8 @@ pub enum Feature {
     Lag,
     /// `p_w[T] − T`, `p_w` a play of half width w: what sticks, and is dragged along by temperature (°C).
     Play,
+    /// `x − x₀`: what another channel says, less what a third one does and a constant (the channel's unit).
+    Regressor,
     /// Ṫ (°C/s).
     ThermalRate,
     /// T̈ (°C/s²).
@@ -53,13 +55,14 @@ pub struct Term {
 }
 
 /// Terms of a gyro (models §2): all but the first add to its bias Ω (rad/s).
-pub const GYRO_TERMS: [Term; 12] = [
+pub const GYRO_TERMS: [Term; 13] = [
     Term { feature: Feature::Reading, key: "increment_weight_error" },
     Term { feature: Feature::One, key: "static_bias" },
     Term { feature: Feature::LasingMode, key: "magnetic_bias" },
     Term { feature: Feature::Meander, key: "slow_meander" },
     Term { feature: Feature::Lag, key: "lag" },
     Term { feature: Feature::Play, key: "hysteresis" },
+    Term { feature: Feature::Regressor, key: "regressor" },
     Term { feature: Feature::ThermalRate, key: "thermal_rate" },
     Term { feature: Feature::ThermalAcceleration, key: "thermal_acceleration" },
     Term { feature: Feature::ForceX, key: "acceleration_sensitive_drift.x" },
@@ -69,10 +72,11 @@ pub const GYRO_TERMS: [Term; 12] = [
 ];
 
 /// Terms of an accelerometer (models §3): they add to its bias S (output units), the last one to what remains of it as a force.
-pub const ACCEL_TERMS: [Term; 4] = [
+pub const ACCEL_TERMS: [Term; 5] = [
     Term { feature: Feature::One, key: "bias" },
     Term { feature: Feature::Lag, key: "lag" },
     Term { feature: Feature::Play, key: "hysteresis" },
+    Term { feature: Feature::Regressor, key: "regressor" },
     Term { feature: Feature::ForceSquared, key: "second_order" },
 ];
 
@@ -90,6 +94,7 @@ impl Feature {
             Self::One
             | Self::Lag
             | Self::Play
+            | Self::Regressor
             | Self::ThermalRate
             | Self::ThermalAcceleration
             | Self::ForceY => 1,
@@ -150,6 +155,24 @@ pub(crate) struct Terms {
     terms: Vec<(Feature, Coefficient)>,
     /// Of the terms that trail behind the temperature, in their order.
     trails: Vec<Trail>,
+    /// Of the terms that other channels enter.
+    regressors: Vec<RegressorParts>,
+}
+
+/// Most regressors of one sensor.
+pub const MAX_REGRESSORS: usize = 8;
+
+/// Smoothed value of any channel, where it was read.
+pub(crate) type Others<'a> = &'a dyn Fn(Source) -> Option<f64>;
+
+/// What the terms of a sensor are evaluated in.
+pub(crate) struct SensorState<'a> {
+    /// Its own temperature.
+    pub(crate) thermal: &'a ThermalState,
+    /// States of what trails behind it (°C).
+    pub(crate) trailed: &'a Trailed,
+    /// The other channels.
+    pub(crate) others: Others<'a>,
 }
 
 impl Terms {
@@ -181,6 +204,7 @@ impl Terms {
                     }
                 };
                 compiled.terms.extend(coefficient.map(|coefficient| (term.feature, coefficient)));
+                compiled.regressors.extend(part.regressor.filter(|_| term.feature == Feature::Regressor));
                 compiled.trails.extend(match term.feature {
                     Feature::Lag => Some(Trail::lag(part.parameter, filter)),
                     Feature::Play => Some(Trail::Play { half_width_deg_c: part.parameter }),
@@ -201,22 +225,30 @@ impl Terms {
         &self.trails
     }
 
-    /// The sum of each line at a thermal state, and whether an argument was clamped to its fitted range. `trailed` are the states of
-    /// what trails (°C). A feature that changes from tick to tick counts as 1.
+    /// What other channels say.
+    pub(crate) fn regressors(&self) -> &[RegressorParts] {
+        &self.regressors
+    }
+
+    /// The sum of each line in a state, and whether an argument was clamped to its fitted range. A feature that changes from tick to
+    /// tick counts as 1.
     pub(crate) fn lines<const T: usize>(
         &self,
-        thermal: &ThermalState,
-        trailed: &Trailed,
+        SensorState { thermal, trailed, others }: &SensorState<'_>,
         filter: &ThermalFilter,
     ) -> ([f64; T], bool) {
         let mut sums = [0.0; T];
         let mut any_clamped = false;
-        let mut trails = self.trails.iter().zip(trailed);
+        let mut trails = self.trails.iter().zip(trailed.iter());
+        let mut regressors = self.regressors.iter();
         for (feature, coefficient) in &self.terms {
             let (value, factor) = match feature {
                 Feature::Lag | Feature::Play => trails
                     .next()
                     .map_or((0.0, 0.0), |(trail, state)| trail.feature(*state, thermal.temperature)),
+                Feature::Regressor => {
+                    (regressors.next().map_or(0.0, |regressor| regressor.value(*others)), 1.0)
+                }
                 Feature::ThermalRate => (thermal.rate, 1.0),
                 Feature::ThermalAcceleration => (thermal.acceleration, 1.0),
                 _ => (1.0, 1.0),

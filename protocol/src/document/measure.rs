@@ -58,11 +58,19 @@ pub enum Unit {
     VPerDegC,
     /// (m/s²)/°C.
     MPerS2PerDegC,
+    /// °/h per unit of a channel.
+    DegPerHPerUnit,
+    /// counts/s per unit of a channel.
+    CountsPerSPerUnit,
+    /// V per unit of a channel.
+    VPerUnit,
+    /// m/s² per unit of a channel.
+    MPerS2PerUnit,
 }
 
 impl Unit {
     /// All of them.
-    pub const ALL: [Self; 20] = [
+    pub const ALL: [Self; 24] = [
         Self::DegPerH,
         Self::DegPerHPerDegCPerS,
         Self::DegPerHPerDegCPerS2,
@@ -83,6 +91,10 @@ impl Unit {
         Self::CountsPerSPerDegC,
         Self::VPerDegC,
         Self::MPerS2PerDegC,
+        Self::DegPerHPerUnit,
+        Self::CountsPerSPerUnit,
+        Self::VPerUnit,
+        Self::MPerS2PerUnit,
     ];
 
     /// Spelling in keys.
@@ -109,6 +121,10 @@ impl Unit {
             Self::CountsPerSPerDegC => "counts_per_s_per_deg_c",
             Self::VPerDegC => "v_per_deg_c",
             Self::MPerS2PerDegC => "m_per_s2_per_deg_c",
+            Self::DegPerHPerUnit => "deg_per_h_per_unit",
+            Self::CountsPerSPerUnit => "counts_per_s_per_unit",
+            Self::VPerUnit => "v_per_unit",
+            Self::MPerS2PerUnit => "m_per_s2_per_unit",
         }
     }
 
@@ -136,6 +152,10 @@ impl Unit {
             Self::CountsPerSPerDegC => "(counts/s)/°C",
             Self::VPerDegC => "V/°C",
             Self::MPerS2PerDegC => "(m/s²)/°C",
+            Self::DegPerHPerUnit => "(°/h)/unit",
+            Self::CountsPerSPerUnit => "(counts/s)/unit",
+            Self::VPerUnit => "V/unit",
+            Self::MPerS2PerUnit => "(m/s²)/unit",
         }
     }
 
@@ -143,9 +163,11 @@ impl Unit {
     #[must_use]
     pub const fn in_core_units(self) -> f64 {
         match self {
-            Self::DegPerH | Self::DegPerHPerDegC | Self::DegPerHPerDegCPerS | Self::DegPerHPerDegCPerS2 => {
-                DEG_PER_H
-            }
+            Self::DegPerH
+            | Self::DegPerHPerDegC
+            | Self::DegPerHPerUnit
+            | Self::DegPerHPerDegCPerS
+            | Self::DegPerHPerDegCPerS2 => DEG_PER_H,
             Self::Ppm => PPM,
             Self::DegPerHPerG => DEG_PER_H / STANDARD_GRAVITY_M_PER_S2,
             Self::MicroGPerG2 => 1e-6 / STANDARD_GRAVITY_M_PER_S2,

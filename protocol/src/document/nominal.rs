@@ -19,6 +19,7 @@ impl Document {
             sensor.thermal_acceleration = None;
             sensor.lag.clear();
             sensor.hysteresis.clear();
+            sensor.regressor.clear();
             sensor.trend = None;
             sensor.servo = None;
         }
@@ -29,6 +30,7 @@ impl Document {
                 sensor.board_ratio_error = None;
                 sensor.lag.clear();
                 sensor.hysteresis.clear();
+                sensor.regressor.clear();
                 sensor.scale_factor = sensor.scale_factor.held_at(assumed);
                 sensor.bias = sensor.bias.as_ref().map(|bias| bias.held_at(assumed));
             }

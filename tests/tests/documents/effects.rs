@@ -1,11 +1,12 @@
 //! What sensors do with the unit's motion: simulated as physics, taken out by the terms of a document.
 
 use isotherm_protocol::document::{
-    AccelHysteresis, AlongAxes, AxesHysteresis, Curve, Document, Hysteresis, Shape, Unit,
+    AccelHysteresis, AccelRegressor, AlongAxes, Auxiliary, AxesHysteresis, Curve, Document, Hysteresis,
+    Regressor, Shape, Unit,
 };
 use isotherm_simulator::Scenario;
 use isotherm_simulator::chamber::Profile;
-use isotherm_simulator::effects::{AccelerometerEffects, AxesPlay, Effects, GyroEffects, Play};
+use isotherm_simulator::effects::{AccelerometerEffects, AxesPlay, Effects, GyroEffects, Play, Supply};
 use isotherm_simulator::instrument::Gyros;
 use isotherm_simulator::motion::{Motion, Path};
 use isotherm_simulator::noise::GyroNoise;
@@ -262,5 +263,61 @@ fn hysteresis_of_the_axes_is_removed() {
     let [floor, with, left] = judged(|errors| errors.0);
     assert!(with > 1.0 && left < floor + 0.03 * with, "°/h: {with} {left} {floor}");
     let [floor, with, left] = judged(|errors| errors.1);
-    assert!(with > 0.05 && left < floor + 0.03 * with, "mg: {with} {left} {floor}");
+    assert!(with > 0.03 && left < floor + 0.03 * with, "mg: {with} {left} {floor}");
+}
+
+#[test]
+fn what_goes_with_a_gradient_and_with_the_supply_is_removed() {
+    let (by_gradient, by_supply) = ([3.0, -2.0, 4.0], [25.0, -30.0, 18.0]);
+    let gyros = [0, 1, 2].map(|i: usize| GyroEffects {
+        gradient_rad_per_s_per_k: by_gradient[i] * DEG_PER_H,
+        supply_rad_per_s_per_v: by_supply[i] * DEG_PER_H,
+        ..GyroEffects::default()
+    });
+    let accelerometers = [0, 1, 2].map(|i: usize| AccelerometerEffects {
+        gradient_m_per_s2_per_k: 0.05 * by_gradient[i] * 1e-3 * G,
+        supply_m_per_s2_per_v: 0.05 * by_supply[i] * 1e-3 * G,
+        ..AccelerometerEffects::default()
+    });
+    let supply = Supply { channel: "supply".into(), nominal_v: 5.0, swing_v: 0.4, period_s: 700.0 };
+    let effects = Effects {
+        gyros: gyros.to_vec(),
+        accelerometers: accelerometers.to_vec(),
+        supply: Some(supply),
+        ..Effects::default()
+    };
+    let scenario = thermal_loop(TUMBLE, effects);
+    let state = |document: &mut Document| {
+        let (name, unit) = ("supply".to_owned(), "V".to_owned());
+        let conversion = vec![0.0, 1.0];
+        document.auxiliary = vec![Auxiliary { name, unit, conversion, range: [3.0, 7.0], spike_limit: 0.5 }];
+        for (i, sensor) in document.gyro.sensor.iter_mut().enumerate() {
+            let regressor = |channel: String, minus, reference, gain| Regressor {
+                channel,
+                minus,
+                reference,
+                gain: Curve::new(constant(gain)),
+            };
+            sensor.regressor = vec![
+                regressor(format!("gyro{i}"), Some("housing".into()), 0.0, by_gradient[i]),
+                regressor("supply".into(), None, 5.0, by_supply[i]),
+            ];
+        }
+        for (i, sensor) in document.accel.as_mut().unwrap().sensor.iter_mut().enumerate() {
+            let scale = sensor.scale_factor.shape().at(25.0).unwrap();
+            let regressor = |channel: String, minus, reference, milli_g: f64| {
+                let gain =
+                    Curve::new(constant(0.05 * milli_g * 1e-3 * G * scale)).in_unit(Unit::MPerS2PerUnit);
+                AccelRegressor { channel, minus, reference, gain }
+            };
+            sensor.regressor = vec![
+                regressor(format!("accel{i}"), Some("housing".into()), 0.0, by_gradient[i]),
+                regressor("supply".into(), None, 5.0, by_supply[i]),
+            ];
+        }
+    };
+    let [floor, with, left] = judged(&scenario, state, |document, scenario| errors(document, scenario).0);
+    assert!(with > 10.0 && left < floor + 0.03 * with, "°/h: {with} {left} {floor}");
+    let [floor, with, left] = judged(&scenario, state, |document, scenario| errors(document, scenario).1);
+    assert!(with > 0.5 && left < floor + 0.03 * with, "mg: {with} {left} {floor}");
 }

@@ -2,9 +2,9 @@
 //! finite for whatever comes in.
 
 use isotherm_correction::calibration::CalibrationParts;
-use isotherm_correction::sample::CorrectedTick;
+use isotherm_correction::sample::{ChannelName, CorrectedTick, TemperatureReading};
 use isotherm_correction::thermal::{ACCEL_TERMS, GYRO_TERMS, Term};
-use isotherm_tests::calibrations::{compile, identity, stated};
+use isotherm_tests::calibrations::{compile, stated, with_auxiliaries};
 use isotherm_tests::drive::{self, Owned};
 use isotherm_tests::streams::{accel, gyro, temperature};
 
@@ -15,7 +15,7 @@ const SMOOTH: f64 = 0.03;
 
 /// All sensors of one kind with a term, or none.
 fn with(term: Term, gyros: bool, times: f64) -> CalibrationParts {
-    let mut parts = identity();
+    let mut parts = with_auxiliaries();
     let stated = stated(term, gyros, times);
     let sensors = if gyros {
         parts.gyros.iter_mut().map(|gyro| &mut gyro.terms).collect::<Vec<_>>()
@@ -34,7 +34,13 @@ fn run(parts: &CalibrationParts, odd: impl Fn(u32) -> Option<f64>) -> Vec<Correc
     for k in 0..TICKS {
         let t = f64::from(k) * 0.005;
         if k % 200 == 0 {
-            events.push(Owned::Temperature(vec![temperature(k.into(), 20.0 + 3.0 * (0.4 * t).sin())]));
+            let of = |name, raw| TemperatureReading {
+                channel: ChannelName::from(name).unwrap(),
+                ..temperature(k.into(), raw)
+            };
+            let swing = 3.0 * (0.4 * t).sin();
+            // In no order: what is read at one moment acts together.
+            events.push(Owned::Temperature(vec![of("u", 5.0 + swing), of("t", 20.0 + swing), of("v", 2.5)]));
         }
         let swing = |phase: f64| (1.3 * t + phase).sin();
         let mut forces = [9.0 * swing(0.1), 12.0 * swing(2.0), 10.0 * swing(4.0)];

@@ -221,6 +221,11 @@ fn every_number_names_its_unit() {
         "accel.orientation.rows",
         "accel.orientation.weights",
         "self_test.counter.max_increase",
+        "auxiliary.conversion",
+        "auxiliary.range",
+        "auxiliary.spike_limit",
+        "gyro.sensor.regressor.reference",
+        "accel.sensor.regressor.reference",
     ];
     for key in keys_of_schema() {
         let numeric = |node: &Json| matches!(node["type"].as_str(), Some("number" | "integer"));

@@ -4,7 +4,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::super::curve::{
-    Curve, OutputBias, OutputHysteresisGain, OutputLagGain, Relative, ScaleFactor, SecondOrder,
+    Curve, OutputBias, OutputHysteresisGain, OutputLagGain, OutputRegressorGain, Relative, ScaleFactor,
+    SecondOrder,
 };
 use super::Orientation;
 
@@ -79,6 +80,10 @@ pub struct AccelSensor {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 8))]
     pub hysteresis: Vec<AccelHysteresis>,
+    /// Bias by other channels, as for gyros. Source: models §2.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(length(max = 8))]
+    pub regressor: Vec<AccelRegressor>,
     /// K2: what it feels beyond f per f², f along its input axis. Source: models §3, IEEE 528.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub second_order: Option<Curve<SecondOrder>>,
@@ -112,6 +117,24 @@ pub struct AccelHysteresis {
     pub half_width_deg_c: f64,
     /// g(T).
     pub gain: Curve<OutputHysteresisGain>,
+}
+
+/// One regressor of an accelerometer's bias.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields, title = "Regressor of an accelerometer")]
+pub struct AccelRegressor {
+    /// x: temperature or auxiliary channel.
+    #[schemars(length(min = 1, max = 24), extend("x-must-be" = "a name of 1 to 24 bytes"))]
+    pub channel: String,
+    /// Channel of the same unit that is subtracted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(length(min = 1, max = 24), extend("x-must-be" = "a name of 1 to 24 bytes"))]
+    pub minus: Option<String>,
+    /// Constant that is subtracted, in the channel's unit.
+    #[serde(default)]
+    pub reference: f64,
+    /// g(T), T of the sensor.
+    pub gain: Curve<OutputRegressorGain>,
 }
 
 /// Detection and exclusion of a failed accelerometer.

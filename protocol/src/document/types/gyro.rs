@@ -5,8 +5,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::super::curve::{
-    Curve, DriftByForce, Frequency, HysteresisGain, LagGain, RateBias, Relative, RelativeOverRate,
-    ThermalAcceleration, ThermalRate,
+    Curve, DriftByForce, Frequency, HysteresisGain, LagGain, RateBias, RegressorGain, Relative,
+    RelativeOverRate, ThermalAcceleration, ThermalRate,
 };
 use super::{Drift, Orientation};
 
@@ -90,6 +90,10 @@ pub struct GyroSensor {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 8))]
     pub hysteresis: Vec<Hysteresis>,
+    /// Bias by other channels `Σ g(T)·(x − x₀)`; needs `channel`. Source: models §2.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(length(max = 8))]
+    pub regressor: Vec<Regressor>,
     /// Drift by specific force along the case axes; needs `[accel]`. Source: models §2, IEEE 528.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub acceleration_sensitive_drift: Option<AlongAxes<Curve<DriftByForce>>>,
@@ -156,6 +160,24 @@ pub struct Hysteresis {
     pub half_width_deg_c: f64,
     /// g(T).
     pub gain: Curve<HysteresisGain>,
+}
+
+/// One regressor.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields, title = "Regressor")]
+pub struct Regressor {
+    /// x: temperature or auxiliary channel.
+    #[schemars(length(min = 1, max = 24), extend("x-must-be" = "a name of 1 to 24 bytes"))]
+    pub channel: String,
+    /// Channel of the same unit that is subtracted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(length(min = 1, max = 24), extend("x-must-be" = "a name of 1 to 24 bytes"))]
+    pub minus: Option<String>,
+    /// Constant that is subtracted, in the channel's unit.
+    #[serde(default)]
+    pub reference: f64,
+    /// g(T), T of the sensor.
+    pub gain: Curve<RegressorGain>,
 }
 
 /// Polynomial of the time since turn-on, held outside its interval.
