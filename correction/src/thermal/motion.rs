@@ -86,6 +86,8 @@ impl<const T: usize> Follows<T> for MotionTerms {
 pub(crate) struct Motion {
     pub(crate) gyros: Vec<MotionTerms>,
     pub(crate) accels: Vec<MotionTerms>,
+    /// Whether a gyro drifts with the specific force.
+    pub(crate) feels_force: bool,
     /// Where the accelerometers sit, axis by axis (m).
     pub(crate) positions_m: [Lanes; 3],
 }
@@ -101,7 +103,8 @@ impl Motion {
         for (lane, position) in positions_m.take(MAX_SENSORS).enumerate() {
             lanes.iter_mut().zip(position).for_each(|(axis, metres)| axis[lane] = metres);
         }
-        let motion = Self { gyros, accels, positions_m: lanes };
+        let feels_force = gyros.iter().any(|gyro| gyro.terms.feel_force());
+        let motion = Self { gyros, accels, feels_force, positions_m: lanes };
         (!motion.is_empty()).then(|| Box::new(motion))
     }
 

@@ -220,6 +220,13 @@ impl Terms {
         self.terms.is_empty()
     }
 
+    /// Whether one is multiplied by the specific force along a case axis.
+    pub(crate) fn feel_force(&self) -> bool {
+        self.terms
+            .iter()
+            .any(|(feature, _)| matches!(feature, Feature::ForceX | Feature::ForceY | Feature::ForceZ))
+    }
+
     /// What trails behind the temperature.
     pub(crate) fn trails(&self) -> &[Trail] {
         &self.trails

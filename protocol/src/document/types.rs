@@ -50,7 +50,7 @@ pub struct Document {
     pub origin: Option<Origin>,
     /// Temperature channels and their filter.
     pub temperature: Temperature,
-    /// Channels that are no temperatures, for `regressor`; filtered alike. Source: models §2.
+    /// Channels that are no temperatures, for `regressor`. Source: models §2.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 16))]
     pub auxiliary: Vec<Auxiliary>,
@@ -130,20 +130,20 @@ pub struct Channel {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Auxiliary channel")]
 pub struct Auxiliary {
-    /// Name on the raw temperature topic, 1 to 24 bytes.
+    /// Name on the raw temperature topic.
     #[schemars(length(min = 1, max = 24), extend("x-must-be" = "a name of 1 to 24 bytes"))]
     pub name: String,
-    /// Unit of measure, 1 to 24 bytes.
+    /// Unit of measure.
     #[schemars(length(min = 1, max = 24), extend("x-must-be" = "a unit of 1 to 24 bytes"))]
     pub unit: String,
-    /// a₀, a₁, … of x = Σ aⱼ·Uʲ, U the raw reading.
+    /// As `conversion_deg_c`.
     #[serde(default = "Channel::identity")]
     #[schemars(length(min = 1, max = 8))]
     pub conversion: Vec<f64>,
-    /// Physical range; readings outside are rejected.
+    /// Physical range.
     #[schemars(extend("x-rising" = true))]
     pub range: [f64; 2],
-    /// Largest distance from the median of five readings; others are rejected.
+    /// As `spike_limit_deg_c`.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub spike_limit: f64,
 }
@@ -190,7 +190,7 @@ pub struct OrientationThermal {
     /// C1: change of each row (direction cosines; 1 is 206265″). Source: 004.
     #[schemars(length(min = 3, max = 8))]
     pub slopes_arcsec_per_deg_c: Vec<[f64; 3]>,
-    /// What of the change sticks: T above is `T + Σ share·(p_w[T] − T)`, `p_w` a play of half width w. Source: models §4, 004.
+    /// Plays: T becomes `T + Σ share·(p_w[T] − T)`. Source: models §4, 004.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 8))]
     pub hysteresis: Vec<AxesHysteresis>,
@@ -203,7 +203,7 @@ pub struct AxesHysteresis {
     /// w.
     #[schemars(range(min = 0.001, max = 1000.0))]
     pub half_width_deg_c: f64,
-    /// Share of the change that goes with the play.
+    /// Share.
     #[schemars(range(min = -10.0, max = 10.0))]
     pub share_ratio: f64,
 }

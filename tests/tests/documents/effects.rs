@@ -1,5 +1,6 @@
 //! What sensors do with the unit's motion: simulated as physics, taken out by the terms of a document.
 
+use isotherm_correction::sample::SensorFlags;
 use isotherm_protocol::document::{
     AccelHysteresis, AccelRegressor, AlongAxes, Auxiliary, AxesHysteresis, Curve, Document, Hysteresis,
     Regressor, Shape, Unit,
@@ -147,6 +148,32 @@ fn a_scale_that_depends_on_the_rate_is_removed() {
         |document, scenario| errors(document, scenario).0,
     );
     assert!(with > 20.0 && left < floor + 0.01 * with, "{with} {left} {floor}");
+}
+
+#[test]
+fn a_rate_outside_its_curve_is_flagged_as_such() {
+    let mut document = document();
+    for sensor in &mut document.gyro.sensor {
+        let knots = vec![[-10.0, 5.0], [10.0, 5.0]];
+        sensor.increment_weight_over_rate = Some(Curve::new(Shape::PiecewiseLinear { knots }));
+    }
+    for (rate_deg_per_s, outside) in [(5.0, false), (40.0, true)] {
+        let path = Path::ConstantRate { axis: [1.0, 1.0, -1.0], rate_deg_per_s };
+        let scenario = Scenario { duration_s: 5.0, ..scenario(path, Effects::default()) };
+        run(&compile(&document), &scenario, |_, tick| {
+            for flags in &tick.gyro_flags {
+                assert_eq!(
+                    flags.contains(SensorFlags::CLAMPED_RATE),
+                    outside,
+                    "{rate_deg_per_s} °/s: {flags:?}"
+                );
+                assert!(
+                    flags.contains(SensorFlags::VALID) && !flags.contains(SensorFlags::CLAMPED_TEMPERATURE)
+                );
+            }
+        })
+        .unwrap();
+    }
 }
 
 #[test]

@@ -76,11 +76,11 @@ pub struct AccelSensor {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 8))]
     pub lag: Vec<AccelLag>,
-    /// Hysteresis of the bias, as for gyros. Source: models §2, Prandtl–Ishlinskii.
+    /// As for gyros. Source: models §2.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 8))]
     pub hysteresis: Vec<AccelHysteresis>,
-    /// Bias by other channels, as for gyros. Source: models §2.
+    /// As for gyros. Source: models §2.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 8))]
     pub regressor: Vec<AccelRegressor>,
@@ -123,17 +123,17 @@ pub struct AccelHysteresis {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Regressor of an accelerometer")]
 pub struct AccelRegressor {
-    /// x: temperature or auxiliary channel.
+    /// x.
     #[schemars(length(min = 1, max = 24), extend("x-must-be" = "a name of 1 to 24 bytes"))]
     pub channel: String,
-    /// Channel of the same unit that is subtracted.
+    /// Subtracted channel.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(length(min = 1, max = 24), extend("x-must-be" = "a name of 1 to 24 bytes"))]
     pub minus: Option<String>,
-    /// Constant that is subtracted, in the channel's unit.
+    /// Subtracted constant.
     #[serde(default)]
     pub reference: f64,
-    /// g(T), T of the sensor.
+    /// g(T).
     pub gain: Curve<OutputRegressorGain>,
 }
 

@@ -86,7 +86,7 @@ pub struct GyroSensor {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 8))]
     pub lag: Vec<Lag>,
-    /// Hysteresis `Σ g(T)·(p_w[T] − T)`, `p_w` a play of half width w. Source: models §2, Prandtl–Ishlinskii.
+    /// Hysteresis `Σ g(T)·(p_w[T] − T)`, `p_w` a play. Source: models §2.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 8))]
     pub hysteresis: Vec<Hysteresis>,
@@ -166,17 +166,17 @@ pub struct Hysteresis {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Regressor")]
 pub struct Regressor {
-    /// x: temperature or auxiliary channel.
+    /// x.
     #[schemars(length(min = 1, max = 24), extend("x-must-be" = "a name of 1 to 24 bytes"))]
     pub channel: String,
-    /// Channel of the same unit that is subtracted.
+    /// Subtracted channel.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(length(min = 1, max = 24), extend("x-must-be" = "a name of 1 to 24 bytes"))]
     pub minus: Option<String>,
-    /// Constant that is subtracted, in the channel's unit.
+    /// Subtracted constant.
     #[serde(default)]
     pub reference: f64,
-    /// g(T), T of the sensor.
+    /// g(T).
     pub gain: Curve<RegressorGain>,
 }
 
