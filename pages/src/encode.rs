@@ -82,7 +82,7 @@ impl Store {
         if let Some((_, value)) = self.places.iter().find(|(known, _)| Arc::ptr_eq(known, list)) {
             return value.clone();
         }
-        let value = json!({ "list": self.add("f64", list.iter().map(|value| value.to_le_bytes())) });
+        let value = json!({ "list": self.add("f64", &list.iter().map(|value| value.to_le_bytes())) });
         self.places.push((Arc::clone(list), value.clone()));
         value
     }
@@ -98,14 +98,14 @@ impl Store {
         #[expect(clippy::cast_possible_truncation, reason = "single precision is what is wanted")]
         let short = |value| f32::from_bits((distance(value) as f32).to_bits() & !0xf);
         let values = list.iter().map(|value| short(value).to_le_bytes());
-        json!({ "list": self.add("f32", values), "middle": middle })
+        json!({ "list": self.add("f32", &values), "middle": middle })
     }
 
     fn flags(&mut self, bits: &Arc<Bits>) -> Value {
         if let Some((_, value)) = self.bits.iter().find(|(known, _)| Arc::ptr_eq(known, bits)) {
             return value.clone();
         }
-        let value = json!({ "list": self.add("u32", bits.0.iter().map(|bits| bits.to_le_bytes())) });
+        let value = json!({ "list": self.add("u32", &bits.0.iter().map(|bits| bits.to_le_bytes())) });
         self.bits.push((Arc::clone(bits), value.clone()));
         value
     }
@@ -116,7 +116,7 @@ impl Store {
     fn add<const N: usize>(
         &mut self,
         kind: &'static str,
-        numbers: impl Iterator<Item = [u8; N]> + Clone,
+        numbers: &(impl Iterator<Item = [u8; N]> + Clone),
     ) -> usize {
         let mut packed = ZlibEncoder::new(Vec::new(), Compression::fast());
         for byte in 0..N {
