@@ -187,8 +187,8 @@ impl Feeder {
         }
         // What was lost on the way is missing by number, what the driver never sent by time.
         let missing = last.map_or(0, |last| {
-            let lost = attachment.sequence.abs_diff(last.sequence).saturating_sub(1);
-            lost.max(self.timeline.missing(stamp))
+            let never_came = attachment.sequence.abs_diff(last.sequence).saturating_sub(1);
+            never_came.max(self.timeline.missing(stamp))
         });
         let tick = last.map_or(0, |last| last.tick.saturating_add(1).saturating_add(missing));
         let timing = self.timeline.tick(stamp, Some(tick), None);

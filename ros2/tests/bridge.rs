@@ -259,10 +259,13 @@ impl Correct {
 }
 
 /// What must be equal to the bit: stamp, rates, specific forces.
-fn bits(imu: &Imu) -> (i32, u32, [u64; 6]) {
-    let [a, b, c] = <[f64; 3]>::from(imu.angular_velocity).map(f64::to_bits);
-    let [d, e, f] = <[f64; 3]>::from(imu.linear_acceleration).map(f64::to_bits);
-    (imu.header.stamp.sec, imu.header.stamp.nanosec, [a, b, c, d, e, f])
+fn bits(imu: &Imu) -> (i32, u32, [[u64; 3]; 2]) {
+    let means = [imu.angular_velocity, imu.linear_acceleration];
+    (
+        imu.header.stamp.sec,
+        imu.header.stamp.nanosec,
+        means.map(|mean| <[f64; 3]>::from(mean).map(f64::to_bits)),
+    )
 }
 
 /// Messages that are none, one after the other.
@@ -388,7 +391,7 @@ async fn a_router_of_theirs_and_a_driver_that_leaves_out_ticks() {
     for (number, step) in steps().take(300).enumerate() {
         match number {
             // Never published: stamps show it. Lost on the way: numbers do.
-            100..103 => continue,
+            100..103 => {}
             200..205 => raw.sequence += 1,
             _ => {
                 raw.put(to_cdr(&message(&step)).unwrap()).await;

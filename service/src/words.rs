@@ -45,6 +45,7 @@ pub(crate) fn say_lines(lines: impl Display) {
 
 /// Prints a result as [`print`] does, and goes on without it where stdout takes nothing for so long: a terminal that is
 /// stopped or a full pipe must not hold up the end of a service.
+#[must_use]
 pub fn print_within(limit: Duration, text: String, exit: Exit) -> Exit {
     let (sender, printed) = sync_channel(1);
     let thread = std::thread::Builder::new().spawn(move || sender.send(print(&text, exit)));
@@ -57,6 +58,7 @@ pub fn print_within(limit: Duration, text: String, exit: Exit) -> Exit {
 /// Colours stay; other control characters, but for line breaks and tabs, are shown by their codes.
 ///
 /// A reader that has closed its end of the pipe, as `head` does, has what it wanted.
+#[must_use]
 pub fn print(text: &str, exit: Exit) -> Exit {
     let text = coloured(text);
     let mut stdout = io::stdout().lock();

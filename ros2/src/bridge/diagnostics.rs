@@ -94,8 +94,8 @@ fn judge(mapping: &UnitMapping, look: &Look, before: &UnitTotals) -> (Level, Str
         match (status.state, status.output) {
             (State::Standby | State::SelfTest | State::PreLaunchCalibration, _) => {}
             (_, Output::Calibrated) => {
-                let states = status.channels.iter();
-                let stale: Vec<_> = states.filter(|it| it.stale).map(|it| it.name.as_str()).collect();
+                let stale = status.channels.iter().filter(|channel| channel.stale);
+                let stale: Vec<_> = stale.map(|channel| channel.name.as_str()).collect();
                 if !stale.is_empty() {
                     found.push((Level::Warn, format!("no temperature from {}", stale.join(", "))));
                 }

@@ -80,12 +80,10 @@ pub(super) async fn publish(
                 Ok(imu) => {
                     let put = outlet.put(&imu).await;
                     let mut first = false;
-                    unit.count(|totals| match put {
-                        Ok(()) => totals.imu_out += 1,
-                        Err(_) => {
-                            totals.unpublished += 1;
-                            first = totals.unpublished == 1;
-                        }
+                    unit.count(|totals| {
+                        let outcome = if put.is_ok() { &mut totals.imu_out } else { &mut totals.unpublished };
+                        *outcome += 1;
+                        first = totals.unpublished == 1;
                     });
                     if let Some(error) = put.err().filter(|_| first) {
                         let (unit, topic) = (unit.id().as_str(), &unit.mapping.corrected);

@@ -114,16 +114,16 @@ async fn command(bus: &Session, unit: &UnitId, does: Does, request: &Attachment)
         Ok(replies) => replies,
         Err(error) => return failed(isotherm_bus::words(&error)),
     };
-    while let Ok(reply) = replies.recv_async().await {
-        match reply.into_result() {
-            Ok(sample) => match serde_json::from_slice::<CommandReply>(&sample.payload().to_bytes()) {
-                Ok(reply) => return TriggerResponse { success: reply.accepted, message: in_words(&reply) },
-                Err(error) => return failed(format!("the service's answer is none: {error}")),
-            },
-            Err(error) => return failed(String::from_utf8_lossy(&error.payload().to_bytes()).into_owned()),
-        }
+    let Ok(reply) = replies.recv_async().await else {
+        return failed(format!("no service answered within {ANSWER:?}"));
+    };
+    match reply.into_result() {
+        Ok(sample) => match serde_json::from_slice::<CommandReply>(&sample.payload().to_bytes()) {
+            Ok(reply) => TriggerResponse { success: reply.accepted, message: in_words(&reply) },
+            Err(error) => failed(format!("the service's answer is none: {error}")),
+        },
+        Err(error) => failed(String::from_utf8_lossy(&error.payload().to_bytes()).into_owned()),
     }
-    failed(format!("no service answered within {ANSWER:?}"))
 }
 
 fn in_words(reply: &CommandReply) -> String {

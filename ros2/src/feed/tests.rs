@@ -192,7 +192,7 @@ fn cdr_big_endian(imu: &Imu, to: &mut Vec<u8>) {
     to.extend(nanosec.to_be_bytes());
     to.extend(9u32.to_be_bytes());
     to.extend(b"imu_link\0");
-    while (to.len() - 4) % 8 != 0 {
+    while !(to.len() - 4).is_multiple_of(8) {
         to.push(0);
     }
     let orientation = [imu.orientation.x, imu.orientation.y, imu.orientation.z, imu.orientation.w];

@@ -39,7 +39,7 @@ fn the_document_comes_before_the_mapping() {
         gyro: crate::mapping::SensorsMapping { random_walk: None, ..mapping().gyro },
         ..mapping()
     };
-    assert_eq!(Noise::of(&document("MEMS-0001"), [2; 8], &unstated).rate(0.01), UNKNOWN);
+    assert_eq!(Noise::of(&document("MEMS-0001"), [2; 8], &unstated).gyro, None, "unknown");
 }
 
 #[test]
