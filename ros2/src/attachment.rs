@@ -28,7 +28,7 @@ pub enum AttachmentError {
     /// It is not there.
     #[error("has no attachment: its sender is no node of rmw_zenoh")]
     None,
-    /// It is as rmw_zenoh had it before jazzy 0.2.4.
+    /// It is as `rmw_zenoh` had it before jazzy 0.2.4.
     #[error("has the attachment of rmw_zenoh before 0.2.4 (jazzy) or 0.6.0 (rolling): update its sender")]
     Old,
     /// It is anything else.

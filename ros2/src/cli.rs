@@ -29,10 +29,10 @@ const REACH: Duration = Duration::from_secs(30);
 /// Where the service in this process listens if its configuration does not say.
 const ANY_PORT: &str = "tcp/127.0.0.1:0";
 
-/// Corrects Imu topics of ROS 2 (rmw_zenoh: jazzy, kilted, lyrical, rolling), without ROS
 #[derive(Debug, Parser)]
 #[command(
     name = "isotherm-ros",
+    about = "Corrects Imu topics of ROS 2 (rmw_zenoh: jazzy, kilted, lyrical, rolling), without ROS",
     version,
     arg_required_else_help = true,
     after_help = "Exit codes: 0 done, 1 failed, 2 called wrongly, 3 finished, but data was lost, 78 bad mapping, configuration or document."

@@ -15,7 +15,7 @@ use isotherm_protocol::key::UnitId;
 
 use crate::Error;
 use crate::qos::Qos;
-use keys::{DurationRule, Keys, TimeKeys, UnitKeys};
+use keys::{DurationRule, Keys, TemperatureKeys, TimeKeys, UnitKeys};
 
 /// Version of the mapping's form that this program reads.
 pub const VERSION: u32 = 1;
@@ -132,11 +132,9 @@ fn mapping(r: &mut Reader<'_>, keys: Keys) -> Option<Mapping> {
             }
             used.push((topic, path));
         }
-        for (i, keys) in stated.get(index).into_iter().flat_map(|keys| &keys.temperature).enumerate() {
-            let same = |other: &&keys::TemperatureKeys| other.channel == keys.channel;
-            if stated.get(index).is_some_and(|unit| unit.temperature.iter().take(i).any(|other| same(&other)))
-            {
-                let why = format!("is {:?}, which is the channel of an earlier topic", keys.channel);
+        for (i, TemperatureKeys { channel, .. }) in keys.temperature.iter().enumerate() {
+            if keys.temperature.iter().take(i).any(|earlier| earlier.channel == *channel) {
+                let why = format!("is {channel:?}, which is the channel of an earlier topic");
                 r.report(&join(&element(&channels, i), "channel"), why);
             }
         }

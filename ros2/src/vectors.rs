@@ -3,6 +3,7 @@
 //! (`ISOTHERM_BLESS=1`).
 
 use isotherm_log::ros2::{Header, Imu, Temperature, Time, to_cdr};
+use isotherm_protocol::digest::Digits;
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -15,7 +16,7 @@ use crate::name::{Kind, Node, gid, key};
 use crate::qos::{History, Qos, Reliability};
 
 fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+    Digits(bytes).to_string()
 }
 
 fn payload(name: &str, message: &impl Serialize) -> Value {

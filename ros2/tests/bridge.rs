@@ -37,6 +37,8 @@ use zenoh::query::QueryTarget;
 /// Every wait ends here at the latest.
 const LIMIT: Duration = Duration::from_secs(60);
 const UNIT: &str = "MEMS-0001";
+/// The same unit beside ROS 2.
+const NATIVE: &str = "NATIVE";
 /// Messages of the loop if nobody says otherwise.
 const MESSAGES: usize = 4000;
 /// Messages that may be under way: a publisher with `keep_all` waits for nobody else.
@@ -58,13 +60,16 @@ impl Bridge {
     /// Starts it with the shipped mapping, but for what must not be lost here.
     fn start(folder: &Path, arguments: &[&str]) -> Self {
         let mapping = std::fs::read_to_string(root().join("config/ros2.toml")).unwrap();
-        let mapping = mapping.replace("\"keep_last\"           #", "\"keep_all\" #");
-        assert!(mapping.contains("history = \"keep_all\" #"), "{mapping}");
-        std::fs::write(folder.join("ros2.toml"), mapping).unwrap();
+        let changed = mapping.replace("history = \"keep_last\"", "history = \"keep_all\"");
+        assert_ne!(changed, mapping);
+        std::fs::write(folder.join("ros2.toml"), changed).unwrap();
         std::fs::create_dir_all(folder.join("units")).unwrap();
-        let document = format!("{UNIT}.toml");
-        std::fs::copy(root().join("config/calibration").join(&document), folder.join("units").join(document))
-            .unwrap();
+        let document =
+            std::fs::read_to_string(root().join(format!("config/calibration/{UNIT}.toml"))).unwrap();
+        for unit in [UNIT, NATIVE] {
+            let own = document.replace(&format!("unit = \"{UNIT}\""), &format!("unit = \"{unit}\""));
+            std::fs::write(folder.join(format!("units/{unit}.toml")), own).unwrap();
+        }
         std::fs::write(folder.join("service.toml"), "calibrations = \"units\"\ncongestion = \"block\"\n")
             .unwrap();
         let mut child = Command::new(env!("CARGO_BIN_EXE_isotherm-ros"))
@@ -156,14 +161,22 @@ impl Driver {
         Topic { publisher, gid: gid(&token), sequence: 0 }
     }
 
+    /// Corrected messages and diagnostics, once the bridge knows of both: it has been told of them in this order.
+    async fn hear(&self) -> (Heard, Heard) {
+        let corrected = self.subscribe("/imu/data", IMU).await;
+        let mut diagnostics = self.subscribe("/diagnostics", DIAGNOSTICS).await;
+        diagnostics.next().await;
+        (corrected, diagnostics)
+    }
+
     /// What is heard on a topic; payload and attachment of each.
-    async fn subscribe(&self, topic: &str, interface: Interface) -> (Heard, Subscriber<()>) {
+    async fn subscribe(&self, topic: &str, interface: Interface) -> Heard {
         let (sender, heard) = unbounded_channel();
         let subscriber = self.session.declare_subscriber(key(7, topic, interface)).callback(move |sample| {
             let attachment = sample.attachment().map(|bytes| bytes.to_bytes().into_owned());
             let _ = sender.send((sample.payload().to_bytes().into_owned(), attachment));
         });
-        (Heard(heard), subscriber.await.unwrap())
+        Heard { heard, _subscriber: subscriber.await.unwrap() }
     }
 
     async fn call(&self, service: &str) -> TriggerResponse {
@@ -177,11 +190,14 @@ impl Driver {
     }
 }
 
-struct Heard(UnboundedReceiver<(Vec<u8>, Option<Vec<u8>>)>);
+struct Heard {
+    heard: UnboundedReceiver<(Vec<u8>, Option<Vec<u8>>)>,
+    _subscriber: Subscriber<()>,
+}
 
 impl Heard {
     async fn next(&mut self) -> (Vec<u8>, Option<Vec<u8>>) {
-        tokio::time::timeout(LIMIT, self.0.recv()).await.expect("a message").expect("the session is open")
+        tokio::time::timeout(LIMIT, self.heard.recv()).await.expect("a message").expect("the session is open")
     }
 
     async fn imu(&mut self) -> Imu {
@@ -268,8 +284,7 @@ async fn imu_messages_come_back_corrected_to_the_bit_and_none_is_lost() {
     let folder = tempfile::tempdir().unwrap();
     let bridge = Bridge::start(folder.path(), &["--listen", "127.0.0.1:0"]);
     let mut driver = Driver::join(&bridge.locator("ros")).await;
-    let (mut corrected, _corrected) = driver.subscribe("/imu/data", IMU).await;
-    let (mut diagnostics, _diagnostics) = driver.subscribe("/diagnostics", DIAGNOSTICS).await;
+    let (mut corrected, mut diagnostics) = driver.hear().await;
     let channels: Vec<_> = steps().next().unwrap().temperatures.iter().map(|it| it.channel).collect();
     let mut temperatures = Vec::new();
     for channel in &channels {
@@ -358,7 +373,7 @@ async fn a_router_of_theirs_and_a_driver_that_leaves_out_ticks() {
     let locator = isotherm_bus::locators(&router).remove(0);
     let bridge = Bridge::start(folder.path(), &["--connect", &locator]);
     let mut driver = Driver::join(&locator).await;
-    let (mut corrected, _corrected) = driver.subscribe("/imu/data", IMU).await;
+    let (mut corrected, _diagnostics) = driver.hear().await;
     let tokens = driver.session.liveliness().get("@ros2_lv/7/**").timeout(LIMIT).await.unwrap();
     let mut graph = Vec::new();
     while let Ok(reply) = tokens.recv_async().await {
@@ -385,11 +400,9 @@ async fn a_router_of_theirs_and_a_driver_that_leaves_out_ticks() {
         corrected.imu().await;
     }
     let (code, totals) = bridge.stop();
-    assert_eq!(
-        (&totals["gaps"], &totals["missing"], &totals["announced_missing"]),
-        (&2.into(), &8.into(), &8.into()),
-        "{totals}"
-    );
+    for (key, value) in [("gaps", 2), ("missing", 8), ("announced_missing", 8)] {
+        assert_eq!(totals[key], value, "{key}: {totals}");
+    }
     assert_eq!((code, totals["imu_out"].as_u64()), (Some(0), Some(sent)), "{totals}");
     close(driver.session, LIMIT).await.unwrap();
     close(router, LIMIT).await.unwrap();
@@ -409,9 +422,9 @@ async fn the_way_through_ros_costs_little() {
     let folder = tempfile::tempdir().unwrap();
     let bridge = Bridge::start(folder.path(), &["--listen", "127.0.0.1:0"]);
     let mut driver = Driver::join(&bridge.locator("ros")).await;
-    let (mut corrected, _corrected) = driver.subscribe("/imu/data", IMU).await;
+    let (mut corrected, _diagnostics) = driver.hear().await;
     let mut raw = driver.publisher("/imu/data_raw", IMU).await;
-    let unit = UnitId::new("NATIVE").unwrap();
+    let unit = UnitId::new(NATIVE).unwrap();
     let options = SessionOptions { connect: vec![bridge.locator("service")], ..SessionOptions::default() };
     let (source, sink) = (open(&options).await.unwrap(), open(&options).await.unwrap());
     let mut consumer = Consumer::declare(&sink, Some(&unit)).await.unwrap();
@@ -424,6 +437,7 @@ async fn the_way_through_ros_costs_little() {
         corrected.imu().await;
         let by_ros = start.elapsed();
         let start = Instant::now();
+        producer.accel(OutputKind::Mean, step.accel.unwrap()).await.unwrap();
         producer.gyro(OutputKind::Mean, step.gyro).await.unwrap();
         tokio::time::timeout(LIMIT, consumer.next()).await.expect("a batch").unwrap();
         if number >= WARM {

@@ -1,9 +1,9 @@
 //! Tokens as others write them. What is written here is frozen in `vectors.json`.
 
 use super::*;
+use crate::Mapping;
 use crate::graph::{Finding, Topics};
 use crate::interface::{IMU, NO_HASH};
-use crate::{Mapping, qos};
 
 fn node(name: &str) -> Node {
     Node { domain: 3, session: "ab12".to_owned(), namespace: "/car".to_owned(), name: name.to_owned() }
@@ -11,7 +11,7 @@ fn node(name: &str) -> Node {
 
 #[test]
 fn tokens_are_read_as_they_are_written() {
-    let token = node("imu").endpoint(7, Kind::Publisher, "/imu/raw", IMU, qos::Qos::SENSOR_DATA);
+    let token = node("imu").endpoint(7, Kind::Publisher, "/imu/raw", IMU, Qos::SENSOR_DATA);
     let topic = Some(("/imu/raw".to_owned(), IMU.dds.to_owned(), IMU.hash.to_owned()));
     let seen = Seen { kind: Kind::Publisher, node: "/car/imu".to_owned(), topic };
     assert_eq!(parse(&token), Some(seen.clone()));

@@ -38,7 +38,6 @@ fn every_key_arrives_where_it_belongs() {
         reference_delay_ms = 200
         folder = { settle_ms = 20, poll_s = 0.5 }
         metrics = { listen = "0.0.0.0:9464", allow_remote = true }
-        web = { enabled = true, write = true, hosts = ["bench.example"], token_file = "token" }
         [swap]
         max_age_days = 10
         age = "refuse"
@@ -110,19 +109,13 @@ fn every_key_arrives_where_it_belongs() {
         stop_timeout: Duration::from_millis(1500),
         congestion: CongestionControl::Block,
         metrics: MetricsSettings { listen: Some("0.0.0.0:9464".parse().unwrap()), allow_remote: true },
-        web: WebSettings {
-            enabled: true,
-            write: true,
-            hosts: vec!["bench.example".to_owned()],
-            token_file: Some(folder.path().join("token")),
-        },
         session: SessionOptions {
             config: Some(folder.path().join("z.json5")),
             connect: vec!["tcp/127.0.0.1:1".to_owned()],
             listen: vec!["tcp/127.0.0.1:0".to_owned()],
             namespace: Some("site/a".to_owned()),
         },
-        digest: None,
+        ..Settings::default()
     };
     assert_eq!(Settings::parse(text, &folder.path().join("service.toml")), Ok(expected));
 }

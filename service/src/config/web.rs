@@ -45,7 +45,8 @@ mod tests {
 
     #[test]
     fn a_host_is_a_name_without_a_port() {
-        assert_eq!(read("[web]\nhosts = [\"bench.example\", \"10.0.0.7\"]").unwrap().web.hosts.len(), 2);
+        let hosts = read("[web]\nhosts = [\"bench.example\", \"10.0.0.7\"]").unwrap().web.hosts;
+        assert_eq!(hosts, ["bench.example", "10.0.0.7"]);
         for host in ["bench:9464", "http://bench", "", "*", "a b", "user@bench"] {
             let problems = read(&format!("[web]\nhosts = [\"{host}\"]")).unwrap_err();
             assert!(

@@ -37,7 +37,7 @@ const HEADERS: [(HeaderName, &str); 6] = [
 ];
 
 /// What there is to say: its kind and itself; or why there is nothing.
-type Made = Result<(&'static str, String), Answer>;
+type Made = Result<(&'static str, String), (StatusCode, String)>;
 
 /// A swap, as the page asks for it.
 #[derive(Debug, Deserialize)]
@@ -154,18 +154,20 @@ impl Web {
                 of_bus(document, "text/plain; charset=utf-8")
             }
             Route::Bundle(unit) => return self.download(unit).await,
-            Route::Swap(_) | Route::Command(_) => Err(not_allowed("POST")),
+            Route::Swap(_) | Route::Command(_) => {
+                Err((StatusCode::METHOD_NOT_ALLOWED, "only POST".to_owned()))
+            }
         };
         match made {
             Ok((kind, body)) => packed(&headers, kind, &body),
-            Err(answer) => answer,
+            Err((status, words)) => said(status, &words),
         }
     }
 
     /// Half a second of a unit's ticks.
     async fn watch(&self, unit: UnitId) -> Made {
         let Ok(permit) = Arc::clone(&self.live).try_acquire_owned() else {
-            return Err(said(StatusCode::SERVICE_UNAVAILABLE, "too many live charts are open"));
+            return Err((StatusCode::SERVICE_UNAVAILABLE, "too many live charts are open".to_owned()));
         };
         let intake = Arc::clone(&self.intake);
         let watched = tokio::task::spawn_blocking(move || {
@@ -175,7 +177,7 @@ impl Web {
         match watched.await {
             Ok(Ok(live)) => of_json(live),
             Ok(Err(unit)) => Err(no_unit(unit.as_str())),
-            Err(_) => Err(said(StatusCode::INTERNAL_SERVER_ERROR, "the unit could not be looked at")),
+            Err(_) => Err((StatusCode::INTERNAL_SERVER_ERROR, "the unit could not be looked at".to_owned())),
         }
     }
 
@@ -203,7 +205,7 @@ impl Web {
             Ok((key, parameters, payload)) => {
                 match of_bus(self.client.text(&key, &parameters, Some(&payload)).await, JSON) {
                     Ok((kind, body)) => text(StatusCode::OK, kind, body),
-                    Err(answer) => answer,
+                    Err((status, words)) => said(status, &words),
                 }
             }
             Err((status, words)) => said(status, &words),
@@ -269,18 +271,18 @@ fn limit(query: &str) -> usize {
 }
 
 fn of_json(json: serde_json::Result<String>) -> Made {
-    json.map(|json| (JSON, json)).map_err(|error| said(StatusCode::INTERNAL_SERVER_ERROR, &error.to_string()))
+    json.map(|json| (JSON, json)).map_err(|error| (StatusCode::INTERNAL_SERVER_ERROR, error.to_string()))
 }
 
 fn of_bus(answer: Result<String, ConsoleError>, kind: &'static str) -> Made {
     answer.map(|body| (kind, body)).map_err(|error| match error {
-        ConsoleError::Refused(words) => said(StatusCode::CONFLICT, &words),
-        error => said(StatusCode::GATEWAY_TIMEOUT, &error.to_string()),
+        ConsoleError::Refused(words) => (StatusCode::CONFLICT, words),
+        error => (StatusCode::GATEWAY_TIMEOUT, error.to_string()),
     })
 }
 
-fn no_unit(serial: &str) -> Answer {
-    said(StatusCode::NOT_FOUND, &format!("this service knows no unit {serial}"))
+fn no_unit(serial: &str) -> (StatusCode, String) {
+    (StatusCode::NOT_FOUND, format!("this service knows no unit {serial}"))
 }
 
 fn refused((status, words): Refusal) -> Answer {

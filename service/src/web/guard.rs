@@ -4,6 +4,7 @@ use std::net::{IpAddr, SocketAddr};
 
 use hyper::StatusCode;
 use hyper::header::{AUTHORIZATION, CONTENT_TYPE, HOST, HeaderMap, HeaderName, ORIGIN};
+use hyper::http::HeaderValue;
 use hyper::http::uri::Authority;
 use isotherm_protocol::digest::Digest;
 
@@ -57,7 +58,7 @@ impl Guard {
             return Err(foreign);
         }
         let site = headers.get_all(&FETCH_SITE).iter();
-        if !site.map(|site| site.as_bytes()).all(|site| [&b"same-origin"[..], b"none"].contains(&site)) {
+        if !site.map(HeaderValue::as_bytes).all(|site| [&b"same-origin"[..], b"none"].contains(&site)) {
             return Err(foreign);
         }
         let bearer = one(headers, &AUTHORIZATION).and_then(|value| {

@@ -7,6 +7,7 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use isotherm_protocol::digest::Digest;
 
 use crate::ServiceError;
 use crate::config::Settings;
@@ -130,7 +131,7 @@ fn file(settings: &Settings) -> Option<PathBuf> {
 fn made() -> io::Result<String> {
     let mut bytes = [0; BYTES];
     getrandom::fill(&mut bytes).map_err(io::Error::other)?;
-    Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
+    Ok(Digest(bytes).to_string())
 }
 
 fn read(file: &Path) -> io::Result<String> {

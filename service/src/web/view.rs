@@ -18,7 +18,7 @@ use crate::console::{Fleet, worst_first};
 
 /// All units, those that need somebody first.
 #[derive(Debug, Serialize)]
-struct Units<'f> {
+struct Overview<'f> {
     /// This service's name for itself.
     instance: &'f str,
     /// Whether swaps, rollbacks and commands are taken here.
@@ -156,7 +156,7 @@ impl Web {
             // Their names and states are told in the lines of the units.
             Service { gone, status: ServiceStatus { units: Vec::new(), ..status } }
         });
-        serde_json::to_string(&Units {
+        serde_json::to_string(&Overview {
             instance: &self.instance,
             write: self.write,
             options: &self.options,

@@ -2,10 +2,18 @@
 
 const BY = "isotherm-by";
 
-/** Who asks, for the audit file; remembered on this computer. */
+/** Who asks, for the audit file; remembered on this computer, and the same in all fields. */
 function byField() {
-  const input = make("input", { type: "text", maxLength: 64, required: true, autocomplete: "off", value: localStorage.getItem(BY) ?? "",
-    onchange: () => localStorage.setItem(BY, input.value.trim()) });
+  const input = make("input", { type: "text", className: "by", maxLength: 64, required: true, autocomplete: "off",
+    value: localStorage.getItem(BY) ?? "" });
+  input.addEventListener("change", () => {
+    localStorage.setItem(BY, input.value.trim());
+    for (const other of document.querySelectorAll("input.by")) {
+      if (other === input) continue;
+      other.value = input.value;
+      other.dispatchEvent(new Event("input"));
+    }
+  });
   return input;
 }
 
@@ -94,7 +102,7 @@ class Proposal {
     const problems = [...reply.problems.map(one => [one, "bad"]), ...reply.warnings.map(one => [one, "warned"])];
     this.answer.replaceChildren(make("p", { className: "outcome " + className }, words),
       problems.length ? make("ul", { className: "problems" }, ...problems.map(([one, level]) => make("li", { className: level },
-        one.file === null ? null : make("b", {}, "Line " + one.line + ", column " + one.column + " "),
+        one.file === null || !one.key && one.line === 1 ? null : make("b", {}, "Line " + one.line + ", column " + one.column + " "),
         (one.key ? one.key + ": " : "") + one.message))) : "",
       reply.difference && reply.outcome !== "unchanged" ? difference(reply.difference) : "");
     this.act.disabled = reply.outcome !== "would-be-accepted" || !this.page.writes();

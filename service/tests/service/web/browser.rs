@@ -1,4 +1,4 @@
-//! A headless Chromium, spoken to by the DevTools protocol over a pipe: no driver, no library, no port.
+//! A headless Chromium, spoken to by the protocol of its developer tools over a pipe: no driver, no library, no port.
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
@@ -105,18 +105,18 @@ impl Browser {
             addresses: Vec::new(),
             _profile: profile,
         };
-        let target = browser.command("Target.createTarget", json!({ "url": "about:blank" }));
+        let target = browser.command("Target.createTarget", &json!({ "url": "about:blank" }));
         let target = json!({ "targetId": target["targetId"], "flatten": true });
-        let attached = browser.command("Target.attachToTarget", target);
+        let attached = browser.command("Target.attachToTarget", &target);
         browser.session = attached["sessionId"].as_str().map(ToOwned::to_owned);
         for domain in ["Page", "Runtime", "Log", "Network"] {
-            browser.command(&format!("{domain}.enable"), json!({}));
+            browser.command(&format!("{domain}.enable"), &json!({}));
         }
         browser
     }
 
     /// Gives a command and waits for its result.
-    pub(crate) fn command(&mut self, method: &str, parameters: Value) -> Value {
+    pub(crate) fn command(&mut self, method: &str, parameters: &Value) -> Value {
         self.last += 1;
         let mut message = json!({ "id": self.last, "method": method, "params": parameters });
         if let Some(session) = &self.session {
@@ -139,7 +139,7 @@ impl Browser {
         let parameters = &message["params"];
         match message["method"].as_str() {
             Some("Runtime.exceptionThrown") => {
-                self.complaints.push(parameters["exceptionDetails"].to_string())
+                self.complaints.push(parameters["exceptionDetails"].to_string());
             }
             Some("Runtime.consoleAPICalled") if parameters["type"] == "error" => {
                 self.complaints.push(parameters["args"].to_string());
@@ -157,7 +157,7 @@ impl Browser {
     /// The value of an expression in the page; promises are waited for.
     pub(crate) fn value(&mut self, expression: &str) -> Value {
         let asked = json!({ "expression": expression, "awaitPromise": true, "returnByValue": true, "userGesture": true });
-        let result = self.command("Runtime.evaluate", asked);
+        let result = self.command("Runtime.evaluate", &asked);
         assert!(result.get("exceptionDetails").is_none(), "{expression}: {}", result["exceptionDetails"]);
         result["result"]["value"].clone()
     }
@@ -202,21 +202,21 @@ impl Browser {
     }
 
     pub(crate) fn open(&mut self, address: &str) {
-        self.command("Page.navigate", json!({ "url": address }));
+        self.command("Page.navigate", &json!({ "url": address }));
     }
 
     /// A window of this size (px), light or dark.
     pub(crate) fn window(&mut self, width: u32, height: u32, dark: bool) {
         let size = json!({ "width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600 });
-        self.command("Emulation.setDeviceMetricsOverride", size);
+        self.command("Emulation.setDeviceMetricsOverride", &size);
         let scheme = json!({ "name": "prefers-color-scheme", "value": if dark { "dark" } else { "light" } });
-        self.command("Emulation.setEmulatedMedia", json!({ "features": [scheme] }));
+        self.command("Emulation.setEmulatedMedia", &json!({ "features": [scheme] }));
     }
 
     /// A picture of the page, the whole of it or what is seen.
     pub(crate) fn picture(&mut self, file: &Path, whole: bool) {
         let asked = json!({ "format": "png", "captureBeyondViewport": whole });
-        let picture = self.command("Page.captureScreenshot", asked);
+        let picture = self.command("Page.captureScreenshot", &asked);
         std::fs::write(file, Base64::decode_vec(picture["data"].as_str().unwrap()).unwrap()).unwrap();
     }
 

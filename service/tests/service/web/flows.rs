@@ -120,7 +120,17 @@ async fn an_operator_opens_swaps_is_refused_rolls_back_commands_and_loses_the_co
     page.press("Run");
     page.until(&has(".pill", "running"));
 
-    // The connection goes and comes back; so does what was in force.
+    loses_the_connection(&mut stage, &mut page);
+
+    // What the other side wrote is text, and no part of the page.
+    page.value("location.hash = '#/unit/' + encodeURIComponent('<img src=x onerror=alert(1)>')");
+    page.until(&has("h1", "<img src=x onerror=alert(1)>"));
+    assert_eq!(page.value("document.querySelectorAll('main img').length"), 0);
+    page.is_content(&stage.origin());
+}
+
+/// The connection goes and comes back; so does what was in force.
+fn loses_the_connection(stage: &mut Stage, page: &mut Browser) {
     stage.stop_service();
     page.until(&has("#link", "Connection lost"));
     page.until("document.body.classList.contains('lost')");
@@ -131,10 +141,4 @@ async fn an_operator_opens_swaps_is_refused_rolls_back_commands_and_loses_the_co
     page.value("document.dispatchEvent(new KeyboardEvent('keydown', { key: 'u', bubbles: true }))");
     page.until("document.querySelectorAll('table.units tbody tr').length >= 2");
     page.until("document.querySelector('tr.warning th')");
-
-    // What the other side wrote is text, and no part of the page.
-    page.value("location.hash = '#/unit/' + encodeURIComponent('<img src=x onerror=alert(1)>')");
-    page.until(&has("h1", "<img src=x onerror=alert(1)>"));
-    assert_eq!(page.value("document.querySelectorAll('main img').length"), 0);
-    page.is_content(&stage.origin());
 }

@@ -49,7 +49,7 @@ fn send(address: SocketAddr, method: &str, path: &str, others: &[(&str, &str)], 
     let kept = kept.map(|(name, value)| (*name, value.as_str()));
     // What is empty is left out.
     let lines = kept.chain(others.iter().copied()).filter(|(_, value)| !value.is_empty());
-    let lines: String = lines.map(|(name, value)| format!("{name}: {value}\r\n")).collect();
+    let lines: String = lines.flat_map(|(name, value)| [name, ": ", value, "\r\n"]).collect();
     say(address, &format!("{method} {path} HTTP/1.1\r\n{lines}\r\n{body}"))
 }
 
@@ -98,7 +98,6 @@ async fn whoever_tries_to_get_round_the_guard_is_refused_and_changes_nothing() {
     stand.run_unit(UNIT, 20).await;
     let first = post(address, &format!("/api/unit/{UNIT}/swap"), &swap_of(1.0));
     assert_eq!((first.status, &first.json()["outcome"]), (200, &"accepted".into()), "{first:?}");
-    let entries = stand.history(UNIT).await.len();
     let (swap, command) = (format!("/api/unit/{UNIT}/swap"), format!("/api/unit/{UNIT}/command"));
     let body = swap_of(9.0).to_string();
     let bearer = format!("Bearer {TOKEN}");
@@ -163,13 +162,10 @@ async fn whoever_tries_to_get_round_the_guard_is_refused_and_changes_nothing() {
     {
         assert_ne!(read(address, path).status, 200, "{path}");
     }
-    let present = stand.status(UNIT);
-    assert_eq!(present.calibration.unwrap().revision.counter, 1);
-    assert_eq!(
-        stand.history(UNIT).await.len(),
-        entries + usize::from(entries == 1),
-        "nothing but the first tick"
-    );
+    assert_eq!(stand.revisions(UNIT, 20).await, [1]);
+    let history = stand.history(UNIT).await;
+    let done = history.iter().filter(|entry| !matches!(entry.event, AuditEvent::InForce(_)));
+    assert_eq!(done.count(), 1, "the first swap alone: {history:#?}");
     stand.stop().await;
 }
 
@@ -222,7 +218,8 @@ async fn a_swap_a_rollback_and_a_command_are_those_of_the_bus() {
     assert_eq!(stand.revisions(UNIT, 20).await, [1, 2]);
     let refused = post(address, &swap, &json!({ "document": "schema = 1\nunit = 7", "by": "ann" })).json();
     assert_eq!((&refused["outcome"], &refused["revision"]), (&"refused".into(), &2.into()));
-    assert_eq!(refused["problems"][0]["line"], 2, "{refused}");
+    let of_unit = refused["problems"].as_array().unwrap().iter().find(|problem| problem["key"] == "unit");
+    assert_eq!(of_unit.unwrap()["line"], 2, "{refused}");
     let back = post(address, &command, &json!({ "command": "rollback", "by": "bob" })).json();
     assert_eq!((&back["accepted"], &back["swap"]["revision"]), (&true.into(), &3.into()), "{back}");
     let standby = post(address, &command, &json!({ "command": "standby", "by": "bob" })).json();
@@ -313,7 +310,7 @@ async fn pages_come_with_their_policy_and_without_the_token() {
     write!(packed, "GET /web/console.js HTTP/1.1\r\nHost: {address}\r\nAccept-Encoding: gzip\r\n\r\n")
         .unwrap();
     let script = unpacked(&mut packed);
-    assert!(script.len() < 40_000 * 4 && script.starts_with(b"\"use strict\""), "{}", script.len());
+    assert!(script.len() < 100_000 && script.starts_with(b"\"use strict\""), "{}", script.len());
     stand.stop().await;
 }
 
@@ -404,7 +401,7 @@ async fn one_download_has_everything_for_a_fault_report_and_no_token() {
     let status: Value = serde_json::from_str(&files["status.json"]).unwrap();
     assert_eq!(status["units"][0]["unit"], UNIT);
     assert!(files["summary.txt"].contains(UNIT) && files["README.txt"].contains("journalctl"));
-    assert_eq!(files[&format!("unit/{UNIT}/history.json")].contains("accepted"), true);
+    assert!(files[&format!("unit/{UNIT}/history.json")].contains("accepted"));
     assert_eq!(files.len(), 6, "{:?}", files.keys());
     stand.stop().await;
 }
@@ -415,7 +412,8 @@ async fn both_services_that_have_a_unit_are_shown() {
     folders.put("u.toml", &document(UNIT, 1.0));
     others.put("u.toml", &document(UNIT, 1.0));
     let (mut stand, address) = stand(&folders, false).await;
-    let connect = locators(stand.service.session());
+    // To the first, and to who sends and asks: peers pass nothing on.
+    let connect = [locators(stand.service.session()), locators(&stand.session)].concat();
     let session = open(&SessionOptions { connect, ..SessionOptions::default() }).await.unwrap();
     let second = start(others.settings(), session).await.unwrap();
     let own = stand.service.session().zid().to_string();
