@@ -4,7 +4,7 @@ import json
 import pathlib
 import subprocess
 
-PROGRAMS = ["isotherm-service", "isotherm-replay-tool", "isotherm-calibration"]
+PROGRAMS = ["isotherm-service", "isotherm-replay-tool", "isotherm-calibration", "isotherm-ros"]
 NAMES = ("LICENSE", "LICENCE", "COPYING", "NOTICE", "UNLICENSE")
 
 
@@ -22,7 +22,7 @@ def main() -> None:
         tree += ["--package", program]
     used = {" ".join(line.split()[:2]) for line in cargo(*tree).splitlines() if line}
     texts: dict[str, list[str]] = {}
-    print("Libraries that are part of isotherm, isotherm-replay and isotherm-calibrate, and their licences.\n")
+    print("Libraries that are part of isotherm, isotherm-replay, isotherm-calibrate and isotherm-ros, and their licences.\n")
     for name in sorted(used):
         package = packages[name]
         if package["source"] is None:

@@ -3,10 +3,10 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
-use clap::{Args, CommandFactory, Parser, Subcommand};
-use clap_complete::Shell;
+use clap::{Args, Parser, Subcommand};
 use isotherm_bus::{ClientOptions, Role, SessionOptions, close, endpoint, locators, open, open_config};
 use isotherm_document::advanced;
+use isotherm_document::program::Common;
 use isotherm_service::cli::unheld;
 use isotherm_service::exit::Exit;
 use isotherm_service::logging::LogArgs;
@@ -48,11 +48,8 @@ enum Command {
     Bridge(BridgeArgs),
     /// Validate mappings
     Check(CheckArgs),
-    /// Print the completions of a shell
-    Completions {
-        /// The shell
-        shell: Shell,
-    },
+    #[command(flatten)]
+    Common(Common),
 }
 
 /// Arguments of `bridge`.
@@ -110,11 +107,16 @@ pub fn run() -> Exit {
     match advanced::parse::<Cli>().command {
         Command::Bridge(args) => unheld(&args.log.clone(), bridge(args)),
         Command::Check(args) => check::run(&args),
-        Command::Completions { shell } => {
-            let mut script = Vec::new();
-            clap_complete::generate(shell, &mut Cli::command(), "isotherm-ros", &mut script);
-            print(&String::from_utf8_lossy(&script), Exit::Ok)
-        }
+        Command::Common(common) => match common.run::<Cli>() {
+            Ok(printed) => print(&String::from_utf8_lossy(&printed), Exit::Ok),
+            Err((folder, error)) => {
+                say(format_args!(
+                    "isotherm-ros: cannot write manual pages into {}: {error}",
+                    folder.display()
+                ));
+                Exit::Failed
+            }
+        },
     }
 }
 
@@ -220,6 +222,8 @@ async fn correct(args: &BridgeArgs) -> Result<(Option<RunningService>, Session),
 
 #[cfg(test)]
 mod tests {
+    use clap::CommandFactory;
+
     use super::*;
 
     #[test]
