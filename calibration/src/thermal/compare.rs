@@ -27,6 +27,8 @@ pub(super) const HEADING: &str = "Accuracy: rms of windows on the judging runs; 
 /// What a sensor's terms are compared with.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Rivals {
+    /// The mean; nothing where the level is not known.
+    pub(super) mean: Vec<(Term, f64, f64)>,
     /// A cubic.
     pub(super) cubic: Vec<(Term, f64, f64)>,
     /// A cubic and Ṫ.
@@ -94,10 +96,16 @@ impl Compared {
         self.levels
     }
 
-    /// Whether a cubic leaves less of an axis than the document does.
-    fn prefers_cubic(&self, axis: usize) -> bool {
-        let rms = self.rms.get(axis).copied().flatten();
-        rms.is_some_and(|[.., cubic, _, document]| cubic < document)
+    /// What leaves less of an axis than the document does, in words: a mean or a cubic.
+    fn prefers(&self, axis: usize) -> Option<(&'static str, fn(&Rivals) -> &Vec<(Term, f64, f64)>)> {
+        let [_, mean, cubic, _, document] = self.rms.get(axis).copied().flatten()?;
+        if mean.min(cubic) >= document {
+            None
+        } else if mean < cubic {
+            Some(("constant", |rivals| &rivals.mean))
+        } else {
+            Some(("cubic by plain least squares", |rivals| &rivals.cubic))
+        }
     }
 
     /// By axis what is left in the end, beside the noise that nothing takes away and that of the thermometers.
@@ -150,17 +158,20 @@ impl Outcome {
         Compared::of([&self.plain(), &cubic, &with_rate, document], fitted, judging, watch)
     }
 
-    /// Takes cubics where a judging run leaves less with them; whether there was one.
-    pub(super) fn take_cubics(&mut self, compared: &Compared) -> bool {
+    /// Takes a mean or a cubic where a judging run leaves less with it; whether there was one.
+    pub(super) fn take_simpler(&mut self, compared: &Compared) -> bool {
+        let sensors =
+            [self.base.accel.as_ref().map_or(0, |accel| accel.sensor.len()), self.base.gyro.sensor.len()];
         let mut changed = false;
         for (sensor, _, found) in &mut self.found {
-            if !axis_of(sensor).is_some_and(|axis| compared.prefers_cubic(axis)) {
-                continue;
-            }
+            // Of more than three sensors none stands for an axis.
+            let axis = axis_of(sensor).filter(|_| sensors[usize::from(sensor.gyro)] == 3);
+            let Some((words, of)) = axis.and_then(|axis| compared.prefers(axis)) else { continue };
             let Some(rivals) = found.rivals.as_ref().filter(|_| found.choice.is_some()) else { continue };
-            if found.refused.is_none() && found.terms != rivals.cubic && !rivals.cubic.is_empty() {
-                found.terms.clone_from(&rivals.cubic);
-                found.words = format!("cubic: the judging run leaves more with {}", found.words);
+            let simpler = of(rivals);
+            if found.refused.is_none() && found.terms != *simpler && !simpler.is_empty() {
+                found.terms.clone_from(simpler);
+                found.words = format!("{words}: the judging run leaves more with {}", found.words);
                 found.passed_on = None;
                 changed = true;
             }

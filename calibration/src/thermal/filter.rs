@@ -6,8 +6,9 @@ use isotherm_protocol::document::{Document, Filter};
 
 use super::columns::{Branch, Columns, Term};
 use super::fit::Sensor;
-use super::joint::{self, Joint};
+use super::joint::Joint;
 use super::known::{Known, channel};
+use super::ladder::smoothings_s;
 use super::model::{Dynamics, Spec};
 use super::samples::Samples;
 use super::select::Target;
@@ -40,7 +41,11 @@ pub(super) fn choose_filter(
             let smoothings = SLOW_SMOOTHINGS_S.into_iter().filter(|s| *s <= longest_s.max(250.0));
             on_grid(filter, &smoothings.collect::<Vec<_>>(), &DERIVATIVE_STEPS_S)
         }
-        stated => joint::filters(filter, stated),
+        None => {
+            let tells = histories.values().all(|known| known.history.tells_dynamics());
+            on_grid(filter, smoothings_s(tells), &[DERIVATIVE_STEPS_S[0]])
+        }
+        Some(stated) => on_grid(filter, &[stated], &[filter.derivative_step_s]),
     };
     let mut best: Option<(f64, Filter)> = None;
     for mut trial in trials {
@@ -76,7 +81,7 @@ pub(super) fn choose_filter(
 }
 
 /// Filters with smoothings and derivative steps (s) in whole grid steps, each once.
-pub(super) fn on_grid(filter: &Filter, smoothings_s: &[f64], steps_s: &[f64]) -> Vec<Filter> {
+fn on_grid(filter: &Filter, smoothings_s: &[f64], steps_s: &[f64]) -> Vec<Filter> {
     let whole = |length: f64| libm::round(length / filter.grid_step_s).max(1.0) * filter.grid_step_s;
     let mut tried: BTreeSet<(u64, u64)> = BTreeSet::new();
     let pairs = smoothings_s.iter().flat_map(|smoothing| steps_s.iter().map(move |step| (*smoothing, *step)));

@@ -1,7 +1,5 @@
 //! All terms at once: what the sensors of a channel are explained best by together, and each by itself.
 
-use isotherm_protocol::document::Filter;
-
 use super::columns::{Branch, Columns, Term};
 use super::compare::Rivals;
 use super::fit::Sensor;
@@ -117,7 +115,7 @@ impl<'a> Joint<'a> {
     }
 }
 
-/// Cubics over temperature by plain least squares, without and with what follows Ṫ: a lag of the shortest time constant where a sensor
+/// A mean, and cubics over temperature, by plain least squares, without and with what follows Ṫ: a lag of the shortest time constant where a sensor
 /// has no such term.
 pub(super) fn rivals(
     columns: &mut Columns<'_>,
@@ -133,25 +131,15 @@ pub(super) fn rivals(
     columns.make(&rate)?;
     let weights = target.weights.iter().map(|weight| f64::from(u8::from(*weight > 0.0))).collect();
     let plain = Target { weights, ..target.clone() };
-    let solved = |terms: Vec<Term>| {
-        let spec = Spec {
-            degree: CUBIC,
-            dynamics: Dynamics { terms, ..Dynamics::default() },
-            scale,
-            ..Spec::default()
-        };
+    let solved = |degree: usize, terms: Vec<Term>| {
+        let spec =
+            Spec { degree, dynamics: Dynamics { terms, ..Dynamics::default() }, scale, ..Spec::default() };
         let solution = plain.solve(columns, &spec, true);
         solution.map_or_else(Vec::new, |solution| Found::terms_of(&spec, &solution, target.level))
     };
-    Ok(Rivals { cubic: solved(Vec::new()), with_rate: solved(rate) })
-}
-
-/// The filters that are tried: smoothings of the temperature (s), on the grid of the one at hand.
-pub(super) fn filters(filter: &Filter, smoothing_s: Option<f64>) -> Vec<Filter> {
-    const SMOOTHINGS_S: [f64; 3] = [5.0, 20.0, 60.0];
-    const DERIVATIVE_STEP_S: f64 = 20.0;
-    match smoothing_s {
-        Some(smoothing) => super::filter::on_grid(filter, &[smoothing], &[filter.derivative_step_s]),
-        None => super::filter::on_grid(filter, &SMOOTHINGS_S, &[DERIVATIVE_STEP_S]),
-    }
+    Ok(Rivals {
+        mean: solved(0, Vec::new()),
+        cubic: solved(CUBIC, Vec::new()),
+        with_rate: solved(CUBIC, rate),
+    })
 }

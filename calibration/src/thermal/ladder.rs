@@ -18,7 +18,11 @@ const LONGEST_SHARE: f64 = 0.2;
 const DEGREES: [&[usize]; 2] = [&[3, 5], &[2, 3]];
 const STATIC_DEGREES: [&[usize]; 2] = [&[1, 2, 3, 4, 5], &[1, 2, 3]];
 /// Weights of zero against the gains of lags, as shares of the columns' variances.
-pub const SHRINKS: [f64; 10] = [1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0];
+const SHRINKS: [f64; 10] = [1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 5e-2, 0.3];
+/// The least of them where the log does not tell lags from hysteresis: pieces of the same two passes agree with any.
+const LEAST_UNTOLD: f64 = 5e-2;
+/// Smoothings of the temperature that are tried (s); the first only where the log tells so fast a lag.
+const SMOOTHINGS_S: [f64; 3] = [5.0, 20.0, 60.0];
 
 /// A model that all sensors of a channel may have.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,6 +33,8 @@ pub struct Plan {
     pub taus_s: Vec<f64>,
     /// Power of temperature in the gains.
     pub gain_degree: usize,
+    /// Weights of zero against them that are tried.
+    pub shrinks: Vec<f64>,
     /// Whether gyros have T̈ beside them, for a thermometer that is behind a part of what it stands for.
     pub leads: bool,
 }
@@ -44,8 +50,14 @@ impl Plan {
         let tells = history.tells_dynamics();
         let taus_s = taus(longest_run_s, grid_step_s);
         let degrees = DEGREES[usize::from(!tells)].iter();
-        let plan =
-            |(degree, leads)| Self { degree, taus_s: taus_s.clone(), gain_degree: usize::from(tells), leads };
+        let shrinks: Vec<f64> = SHRINKS.into_iter().filter(|share| tells || *share >= LEAST_UNTOLD).collect();
+        let plan = |(degree, leads)| Self {
+            degree,
+            taus_s: taus_s.clone(),
+            gain_degree: usize::from(tells),
+            shrinks: shrinks.clone(),
+            leads,
+        };
         degrees.flat_map(|&degree| [false, true].map(|leads| (degree, leads && tells))).map(plan).collect()
     }
 
@@ -59,6 +71,12 @@ impl Plan {
         }
         Spec { degree: self.degree, dynamics, scale, shrink }
     }
+}
+
+/// Smoothings of the temperature that logs can tell (s).
+#[must_use]
+pub fn smoothings_s(tells_dynamics: bool) -> &'static [f64] {
+    SMOOTHINGS_S.get(usize::from(!tells_dynamics)..).unwrap_or(&[])
 }
 
 /// Models of the static bias alone.

@@ -90,7 +90,7 @@ impl Outcome {
         let (document, curves, mut verdicts, troubles, compared) = loop {
             let document = self.document(|found| &found.terms);
             let compared = self.compared(&document, (runs, judges), &rest, &mut watch)?;
-            if self.take_cubics(&compared) {
+            if self.take_simpler(&compared) {
                 continue;
             }
             let written = Written::of(&document)?;

@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 
 use super::branches::History;
 use super::columns::{Columns, Term};
-use super::ladder::{Plan, SHRINKS, statics};
+use super::ladder::{Plan, statics};
 use super::model::Spec;
 use super::noise::Noise;
 use super::scale::{self, Kept};
@@ -16,6 +16,8 @@ use crate::robust::{block_length, is_white, median_if_any};
 
 /// Score of a larger model, as a share of that of a smaller one, above which the smaller one is kept.
 const NO_BETTER: f64 = 0.985;
+/// Likewise for a static bias alone beside what the other sensors of its channel have: one log tells little of one sensor.
+const PLAINLY_STATIC: f64 = 0.8;
 /// Largest share of the mean's score with which an axis is accepted.
 pub const WORTH_IT: f64 = 0.9;
 /// How many times what is usual a temperature may count.
@@ -224,15 +226,20 @@ impl<'a> Trials<'a> {
         placed.iter().map(row).sum::<f64>().max(0.0).sqrt()
     }
 
-    /// Chooses a sensor's model: what its channel has chosen for all, or a static bias alone where that is as good.
+    /// Chooses a sensor's model: what its channel has chosen for all, or a static bias alone where that is plainly better.
     #[must_use]
     pub fn choose(&self, tried: Vec<Tried>, plan: Option<Spec>, history: &History, largest: bool) -> Choice {
         let widest = self.target.widest_scale();
         let mean = self.score(&Spec::default()).unwrap_or(f64::NAN);
         let statics: Vec<Tried> =
             statics(history, widest).into_iter().filter_map(|spec| self.tried(spec)).collect();
-        let mut candidates = statics.clone();
-        candidates.extend(plan.and_then(|spec| self.tried(spec)));
+        let plan = plan.and_then(|spec| self.tried(spec));
+        let limit = plan.as_ref().map_or(f64::INFINITY, |plan| PLAINLY_STATIC * plan.score);
+        let mut candidates: Vec<Tried> =
+            statics.iter().filter(|tried| tried.score < limit).cloned().collect();
+        if candidates.is_empty() {
+            candidates.extend(plan);
+        }
         let mut tried = [statics, tried].concat();
         let chosen = if largest {
             tried.iter().max_by(|a, b| a.count.cmp(&b.count).then(b.score.total_cmp(&a.score))).cloned()
@@ -269,7 +276,7 @@ impl<'a> Trials<'a> {
 pub fn together(plans: &[Plan], trials: &[(bool, &Trials<'_>)]) -> Option<(usize, f64, f64)> {
     let mut best: Option<(usize, f64, f64)> = None;
     for (index, plan) in plans.iter().enumerate() {
-        for shrink in SHRINKS {
+        for &shrink in &plan.shrinks {
             let score = |(gyro, trials): &(bool, &Trials<'_>)| {
                 trials.score(&plan.spec(*gyro, trials.target.widest_scale(), shrink)).map(libm::log)
             };

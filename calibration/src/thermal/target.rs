@@ -21,6 +21,9 @@ use crate::written::Written;
 /// Shortest windows of a levelling (s).
 const LEVELLING_S: f64 = 60.0;
 
+/// What a run's beginning is left out for (s): derivatives and fast lags rest on the guess that nothing had moved before.
+const SETTLED_S: f64 = 60.0;
+
 /// What a unit without error would put out during a run, over whole turns where it is turned: then the accelerometers, which feel
 /// the table too, have none.
 pub(super) fn rest(run: &Run, document: &Document, stand: &Stand, watch: impl Watch) -> Result<Rest, Error> {
@@ -132,6 +135,13 @@ pub(super) fn target(
         // A longer window has less noise.
         *weight *= samples.get(*run).map_or(1.0, |run| run.window_s / usual_s);
     }
+    let since = samples.iter().flat_map(|run| &run.time_s);
+    target
+        .weights
+        .iter_mut()
+        .zip(since)
+        .filter(|(_, since)| **since < SETTLED_S)
+        .for_each(|(weight, _)| *weight = 0.0);
     let (temperature, range) = (&known.temperature, known.history.range_deg_c);
     match told(sensor.gyro, &inputs, temperature, range) {
         Err(why) => target.kept = Some(why),
