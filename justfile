@@ -47,6 +47,10 @@ ros-loop:
 bench-clients:
     bash clients/bench.sh
 
+# Fit six simulated coils and judge them against truth: how many times smaller drift gets (minutes)
+accuracy:
+    cargo test --release --locked -p isotherm-calibration --test calibration accuracy_on_simulated_coils -- --ignored --nocapture
+
 # Count instructions per tick and compare them with the committed figures (needs valgrind)
 instructions:
     .ci/run instructions
