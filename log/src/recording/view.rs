@@ -1,5 +1,5 @@
 //! Readings and corrected ticks once more as JSON with a JSON Schema, for viewers that know nothing of this project: Foxglove,
-//! PlotJuggler.
+//! `PlotJuggler`.
 //!
 //! They have channels of their own, named as the topic with `/json` behind it; each tick is one message. Nothing reads them back here.
 
