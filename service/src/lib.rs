@@ -15,6 +15,7 @@
 //! | [`intake`] | what the receive threads do |
 //! | [`mod@unit`] | one unit's part |
 //! | `registrar` | the one path of every swap, and commands |
+//! | `pair` | other instances for the same stream |
 //! | `keeper` | status, and what only a clock can do |
 //! | `metrics` | metrics and health over HTTP |
 //! | [`store`] | what is remembered over a restart: audit file, documents |
@@ -44,6 +45,7 @@ pub mod kept;
 pub mod latency;
 mod logging;
 mod metrics;
+mod pair;
 mod registrar;
 pub mod report;
 mod serve;

@@ -1,16 +1,23 @@
 //! What comes over the session: statuses, and who is there.
 
+use std::time::Duration;
+
 use isotherm_protocol::codec::{self, Message};
 use isotherm_protocol::key;
+use isotherm_protocol::pair::PairReport;
 use isotherm_protocol::service_status::ServiceStatus;
 use isotherm_protocol::status::Status;
 use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
+use tokio::task::JoinHandle;
 use zenoh::pubsub::Subscriber;
 use zenoh::sample::{Sample, SampleKind};
 
 use crate::console::ConsoleError;
 use crate::console::client::Client;
 use crate::console::status::or_none;
+
+/// How often it is asked who speaks for which unit.
+const PAIRS_INTERVAL: Duration = Duration::from_secs(1);
 
 /// Something new.
 #[derive(Debug)]
@@ -23,6 +30,8 @@ pub(super) enum News {
     UnitAlive(String, bool),
     /// So has a service instance.
     ServiceAlive(String, bool),
+    /// What every service instance does for which unit.
+    Pairs(Vec<PairReport>),
     /// A status that is not understood.
     NotUnderstood,
 }
@@ -31,6 +40,7 @@ pub(super) enum News {
 #[derive(Debug)]
 pub(super) struct Feed {
     news: UnboundedReceiver<News>,
+    pairs: JoinHandle<()>,
     // Dropping them ends the subscriptions.
     _subscribers: [Subscriber<()>; 4],
 }
@@ -53,7 +63,8 @@ impl Feed {
         // The receiver is here.
         or_none(instances)?.into_iter().for_each(|status| drop(sender.send(News::Service(Box::new(status)))));
         statuses?.into_iter().for_each(|status| drop(sender.send(News::Unit(Box::new(status)))));
-        Ok(Self { news, _subscribers: [units, services, units_alive, services_alive] })
+        let pairs = tokio::spawn(ask_pairs(client.clone(), sender));
+        Ok(Self { news, pairs, _subscribers: [units, services, units_alive, services_alive] })
     }
 
     /// The next news; `None` once the session is gone.
@@ -64,6 +75,24 @@ impl Feed {
     /// News that have come already.
     pub(super) fn next_now(&mut self) -> Option<News> {
         self.news.try_recv().ok()
+    }
+}
+
+impl Drop for Feed {
+    fn drop(&mut self) {
+        self.pairs.abort();
+    }
+}
+
+/// Asks time and again who speaks for which unit.
+async fn ask_pairs(client: Client, sender: UnboundedSender<News>) {
+    loop {
+        if let Ok(reports) = client.pairs().await
+            && sender.send(News::Pairs(reports)).is_err()
+        {
+            return;
+        }
+        tokio::time::sleep(PAIRS_INTERVAL).await;
     }
 }
 
