@@ -147,8 +147,10 @@ impl Intake {
         let known = self.unit(serial);
         let Some(unit) = known.or_else(|| self.appear(serial, stream, frame, arrival)) else { return false };
         let mut actor = lock(&unit);
-        if let Some(pair) = self.pair.as_ref().filter(|pair| pair.has_stood_still(arrival)) {
-            actor.follow(arrival, pair.standing().active, true);
+        if let Some((pair, short)) =
+            self.pair.as_ref().and_then(|pair| Some((pair, pair.has_stood_still(arrival)?)))
+        {
+            actor.follow(arrival, pair.standing().active, short);
         }
         guarded(&mut actor, |actor| actor.receive(stream, frame, arrival));
         actor.is_status_due()

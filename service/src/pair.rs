@@ -27,6 +27,8 @@ pub(crate) use watch::Watch;
 
 /// How long a unit that is not taken is remembered.
 const PASSED_OVER: Duration = Duration::from_secs(10);
+/// How long a process may stand still without losing its connections: well below the lease.
+const SHORT: Duration = Duration::from_millis(300);
 /// Most such units.
 const MOST_PASSED_OVER: usize = 4096;
 
@@ -141,17 +143,19 @@ impl Pair {
         }
     }
 
-    /// Whether this process has stood still for so long that another instance may speak in its place by now.
-    pub(crate) fn has_stood_still(&self, now: Instant) -> bool {
+    /// Where this process has stood still for so long that another instance may speak in its place by now: whether it was so short that no
+    /// connection was lost by it.
+    pub(crate) fn has_stood_still(&self, now: Instant) -> Option<bool> {
         if !self.has_others() {
-            return false;
+            return None;
         }
         let still_us = self.since_start_us(now).saturating_sub(self.beat.load(Ordering::Acquire));
-        u128::from(still_us) > (self.takeover + self.takeover / 2).as_micros()
+        let still = Duration::from_micros(still_us);
+        (still > self.takeover + self.takeover / 2).then_some(still < SHORT)
     }
 
     /// The watch looks; whether it has stood still before.
-    fn look(&self, now: Instant) -> bool {
+    fn look(&self, now: Instant) -> Option<bool> {
         let still = self.has_stood_still(now);
         self.beat.store(self.since_start_us(now), Ordering::Release);
         still

@@ -11,11 +11,15 @@ use isotherm_correction::unit::UnitSettings;
 
 use super::{Deed, Mark, Outline, Sequencer};
 use crate::journal::{JournalEntry, JournalEvent};
-use crate::key::{Input, UnitId};
+use crate::key::{Input, RawStream, UnitId};
 use crate::stream::{Heard, UnitStream};
 
 /// How far apart the stream's own memories are taken (ns): an entry may be as late as that.
 const APART_NS: u64 = 1_000_000_000;
+/// The input by which it is known which frames came before a memory.
+const GYRO: Input = Input::Raw(RawStream::Gyro);
+/// How much later than a memory the last frame may come that the memory has heard (ns).
+const LONGEST_LAG_NS: u64 = 300_000_000;
 /// How long an entry may wait for frames that the other service has heard (ns).
 const LONGEST_WAIT_NS: u64 = 1_000_000_000;
 /// Most frames that wait for a memory, and most that are kept between two; beyond them the oldest go, and the memory is asked for anew.
@@ -161,6 +165,10 @@ impl Follower {
     pub fn advance(&mut self, own: &UnitStream, now_ns: u64) -> (Option<Rebuilt>, bool) {
         if let Some((memory, at_ns)) = self.memory.clone() {
             let anchor = Anchor { entry: memory, at_ns, frames: self.gone };
+            // Where the last gyro frame that the other had heard did not come, some behind it may be missing too.
+            if !self.has_last_gyro_frame(&anchor.entry) {
+                return (None, now_ns > at_ns.saturating_add(LONGEST_LAG_NS));
+            }
             let rebuilt = self.rebuild(&anchor, false);
             let Some(made) = &rebuilt else {
                 return (None, now_ns > at_ns.saturating_add(4 * super::NEAR_NS));
@@ -217,6 +225,18 @@ impl Follower {
             self.lose();
         }
         (rebuilt, stuck)
+    }
+
+    fn has_last_gyro_frame(&self, memory: &JournalEntry) -> bool {
+        let Some(heard) = memory.heard.get(GYRO.index()).filter(|heard| heard.frames > 0) else {
+            return true;
+        };
+        let is_it = |frame: &Frame| {
+            let mut own = Heard::default();
+            own.note(&frame.bytes);
+            frame.input == GYRO && own.crc == heard.crc
+        };
+        self.frames.iter().rev().any(is_it)
     }
 
     /// Takes the stream's own memory, and gives up what is older than the one before it.

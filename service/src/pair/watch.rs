@@ -185,13 +185,13 @@ impl Work {
         let still = self.pair.look(now);
         let standing = self.pair.standing();
         let looked = self.intake.each_unit(|actor| {
-            if still && actor.speaks() {
-                actor.follow(now, standing.active, true);
+            if let Some(short) = still.filter(|_| actor.speaks()) {
+                actor.follow(now, standing.active, short);
             }
             let Wants { memory, spoke, alarm } = actor.watch_speech(now, &standing);
             (memory || spoke || alarm.is_some()).then(|| (actor.id().clone(), memory, spoke, alarm))
         });
-        if still {
+        if still.is_some() {
             tracing::warn!("this process stood still: it listens whether another instance speaks");
         }
         let mut spoken = Vec::new();

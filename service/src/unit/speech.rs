@@ -248,13 +248,12 @@ impl UnitActor {
             following.asked = None;
         }
         let alone = standing.alone_since.map(|since| now.saturating_duration_since(since));
-        let is_due = if joined {
-            alone.is_some_and(|_| !standing.yields) || following.kept.is_late(now, standing.takeover)
-        } else if following.doubt {
-            alone.is_some() || following.kept.is_late(now, standing.takeover)
-        } else {
-            alone.is_some_and(|alone| alone >= LONELY) || following.kept.is_silent(now, LONELY)
-        };
+        let late = following.kept.is_late(now, standing.takeover);
+        let lonely = alone.is_some_and(|alone| alone >= LONELY) || following.kept.is_silent(now, LONELY);
+        let is_due = lonely
+            || (joined && (alone.is_some() || late))
+            // Where the other was lost with the doubt, it may be the other that went on.
+            || (following.doubt && alone.is_none() && late);
         if is_due {
             wants.spoke = !following.doubt;
             self.speak(now, standing.takeover);

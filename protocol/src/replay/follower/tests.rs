@@ -6,10 +6,8 @@ use isotherm_correction::units::{Span, Timestamp};
 
 use super::*;
 use crate::codec;
-use crate::key::RawStream;
 use crate::raw::GyroBatch;
 
-const GYRO: Input = Input::Raw(RawStream::Gyro);
 const TICK_NS: u64 = 5_000_000;
 
 fn id() -> UnitId {
