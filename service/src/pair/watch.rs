@@ -17,7 +17,7 @@ use super::{Pair, Questions};
 use crate::ServiceError;
 use crate::fault::FaultKind;
 use crate::intake::Intake;
-use crate::unit::{Alarm, Wants};
+use crate::unit::{Alarm, UnitActor, Wants};
 
 /// How often the units are looked at where no other instance is there.
 const ALONE: Duration = Duration::from_millis(100);
@@ -146,7 +146,7 @@ impl Work {
                 if self.pair.come(member) {
                     tracing::info!(name, mode, priority, "another service instance is there");
                     self.questions.records(None);
-                    self.intake.each_unit(|actor| actor.introduce());
+                    self.intake.each_unit(UnitActor::introduce);
                 }
                 self.look(Instant::now());
             }

@@ -72,7 +72,7 @@ impl Work {
         match done {
             Ok(0) => return,
             Ok(count) => {
-                tracing::debug!(%unit, count, "entries of the other instance's audit file are written down here too")
+                tracing::debug!(%unit, count, "entries of the other instance's audit file are written down here too");
             }
             Err(error) => {
                 tracing::error!(%unit, "the other instance's history is not written down here: {error}");

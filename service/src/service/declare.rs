@@ -46,8 +46,8 @@ impl Declared {
             vec![subscribe(session, key::ALL_CALIBRATION, move |sample| put.put(sample)).await?];
         subscribers.extend(inputs(session, intake, bell, taken, pair).await?);
         let alive = key::service_alive(&session.zid().to_string());
-        let token = session.liveliness().declare_token(alive).await;
-        let token = token.map_err(|source| ServiceError::Declare { key: key::ALL_SERVICES_ALIVE, source })?;
+        let own = session.liveliness().declare_token(alive).await;
+        let own = own.map_err(|source| ServiceError::Declare { key: key::ALL_SERVICES_ALIVE, source })?;
         let [calibration, command, history, kept] = [(); 4].map(|()| desk.clone());
         let ask = |asked| {
             let bell = bell.clone();
@@ -67,7 +67,7 @@ impl Declared {
         // Whoever sees it may ask.
         let member = session.liveliness().declare_token(pair.me().token()).await;
         let member = member.map_err(|source| ServiceError::Declare { key: key::ALL_MEMBERS, source })?;
-        Ok(Self { subscribers, queryables, receipt, alive: [token, member] })
+        Ok(Self { subscribers, queryables, receipt, alive: [own, member] })
     }
 
     /// Ends it, and waits for what is being received; whether that went well. The token stays until it is dropped: where it goes,

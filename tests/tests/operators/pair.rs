@@ -26,7 +26,6 @@ const AHEAD: u64 = 40;
 
 /// Both services, what is produced for them, and who hears them.
 struct Stand {
-    folder: tempfile::TempDir,
     pair: Pair,
     session: Session,
     operator: Operator,
@@ -35,6 +34,8 @@ struct Stand {
     playing: JoinHandle<()>,
     revisions: Vec<u64>,
     dice: Dice,
+    // Goes after those who live in it.
+    _folder: tempfile::TempDir,
 }
 
 fn scenario(unit: &str, seed: u64) -> Scenario {
@@ -62,8 +63,17 @@ impl Stand {
         let made = Arc::new(Mutex::new(made));
         let playing = tokio::spawn(play(Arc::clone(&made)));
         let (operator, revisions) = (Operator::new(session.clone()), vec![1; units]);
-        let stand =
-            Self { folder, pair, session, operator, ears, made, playing, revisions, dice: Dice::new(21) };
+        let stand = Self {
+            _folder: folder,
+            pair,
+            session,
+            operator,
+            ears,
+            made,
+            playing,
+            revisions,
+            dice: Dice::new(21),
+        };
         until_paired(&stand.session, units).await;
         stand
     }
@@ -138,32 +148,45 @@ fn configuration(more: &str) -> String {
     format!("[pair]\n{more}\n")
 }
 
+/// What happens to the instance that speaks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Mishap {
+    Killed,
+    Stopped,
+}
+
+impl Stand {
+    /// Has the instance that speaks come to grief and come back; the longest pause that any unit's subscriber saw.
+    async fn suffer(&mut self, mishap: Mishap) -> Duration {
+        let (speaking, at) = (self.speaker().await, Instant::now());
+        match mishap {
+            Mishap::Killed => self.pair.kill(speaking),
+            Mishap::Stopped => self.pair.signal(speaking, "STOP"),
+        }
+        tokio::time::sleep(Duration::from_millis(600)).await;
+        let pause = self.pause_since(at).await;
+        assert_eq!(self.speaker().await, 1 - speaking);
+        // Who speaks now takes swaps, and counts on.
+        self.swap(self.units() - 1).await;
+        match mishap {
+            Mishap::Killed => self.restart(speaking).await,
+            Mishap::Stopped => self.pair.signal(speaking, "CONT"),
+        }
+        until_paired(&self.session, self.units()).await;
+        self.swap(0).await;
+        pause
+    }
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn a_killed_and_a_stopped_service_are_not_missed() {
     let mut stand = Stand::start(2, &configuration("")).await;
     tokio::time::sleep(Duration::from_secs(1)).await;
     stand.swap(0).await;
-    for event in 0..4 {
-        let (speaking, at) = (stand.speaker().await, Instant::now());
-        if event % 2 == 0 {
-            stand.pair.kill(speaking);
-        } else {
-            stand.pair.signal(speaking, "STOP");
-        }
-        tokio::time::sleep(Duration::from_millis(600)).await;
-        let pause = stand.pause_since(at).await;
-        println!("event {event}: longest pause {pause:?}");
+    for mishap in [Mishap::Killed, Mishap::Stopped, Mishap::Killed, Mishap::Stopped] {
+        let pause = stand.suffer(mishap).await;
+        println!("{mishap:?}: longest pause {pause:?}");
         assert!(pause < Duration::from_secs(1), "{pause:?}");
-        assert_eq!(stand.speaker().await, 1 - speaking);
-        // Who speaks now takes swaps, and counts on.
-        stand.swap(1).await;
-        if event % 2 == 0 {
-            stand.restart(speaking).await;
-        } else {
-            stand.pair.signal(speaking, "CONT");
-        }
-        until_paired(&stand.session, stand.units()).await;
-        stand.swap(0).await;
         tokio::time::sleep(Duration::from_millis(1200)).await;
     }
     let compared: Vec<_> =
@@ -185,7 +208,41 @@ async fn a_killed_and_a_stopped_service_are_not_missed() {
     });
     assert_eq!(histories[0], histories[1]);
     assert_eq!(histories[0].len() as u64, stand.revisions.iter().sum::<u64>());
-    let folder = stand.folder.path().to_owned();
-    let doubled = stand.end().await;
-    println!("doubled {doubled}, {}", folder.display());
+    println!("doubled {}", stand.end().await);
+}
+
+/// `ISOTHERM_PAIR=UNITS,KILLS,STOPS` makes it shorter.
+#[tokio::test(flavor = "multi_thread")]
+#[ignore = "takes ten minutes: just pair"]
+async fn a_hundred_kills_and_fifty_stops_lose_nothing() {
+    let sizes = std::env::var("ISOTHERM_PAIR").unwrap_or_else(|_| "20,100,50".to_owned());
+    let sizes: Vec<usize> = sizes.split(',').map(|size| size.parse().expect("a number")).collect();
+    let [units, kills, stops] = sizes[..] else { panic!("ISOTHERM_PAIR=UNITS,KILLS,STOPS") };
+    let mut stand = Stand::start(units, &configuration("")).await;
+    tokio::time::sleep(Duration::from_secs(1)).await;
+    for (mishap, count) in [(Mishap::Killed, kills), (Mishap::Stopped, stops)] {
+        let mut pauses = Vec::new();
+        for _ in 0..count {
+            let moment = stand.dice.below(1000);
+            tokio::time::sleep(Duration::from_millis(moment)).await;
+            pauses.push(stand.suffer(mishap).await);
+        }
+        pauses.sort_unstable();
+        let share =
+            |share: usize| pauses.get((pauses.len() * share / 100).min(pauses.len().saturating_sub(1)));
+        println!(
+            "{mishap:?} {count}: pauses p50 {:?}, p99 {:?}, longest {:?}",
+            share(50),
+            share(99),
+            pauses.last()
+        );
+    }
+    let differing: u64 = reports(&stand.session)
+        .await
+        .iter()
+        .flat_map(|report| &report.units)
+        .map(|unit| unit.ticks_differing)
+        .sum();
+    assert_eq!(differing, 0);
+    println!("doubled {}", stand.end().await);
 }

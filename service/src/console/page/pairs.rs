@@ -46,21 +46,19 @@ fn instance(report: &PairReport) -> String {
     let count = |role| report.units.iter().filter(|unit| unit.role == role).count();
     let sum = |number: fn(&UnitRole) -> u64| grouped(report.units.iter().map(number).sum());
     let member = &report.member;
-    let mut words = format!("{}  speaks for {}", member.name, of(count(Role::Speaking), "unit"));
-    for role in [Role::Standby, Role::Joining] {
-        if count(role) > 0 {
-            words += &format!(", {} for {}", role.name(), count(role));
-        }
-    }
-    words += &format!(
-        "  {}  priority {}  takeovers {}  {} ticks compared, {} other",
+    let silent = [Role::Standby, Role::Joining].into_iter().filter(|role| count(*role) > 0);
+    let silent: Vec<_> = silent.map(|role| format!(", {} for {}", role.name(), count(role))).collect();
+    format!(
+        "{}  speaks for {}{}  {}  priority {}  takeovers {}  {} ticks compared, {} other",
+        member.name,
+        of(count(Role::Speaking), "unit"),
+        silent.concat(),
         member.mode.name(),
         member.priority,
         sum(|unit| unit.takeovers),
         sum(|unit| unit.ticks_compared),
         sum(|unit| unit.ticks_differing),
-    );
-    words
+    )
 }
 
 /// Who does what for one unit: "north speaks, south standby"; nothing where there is one instance.
