@@ -40,6 +40,9 @@ pub struct Intake {
     looked_for_room: Mutex<Option<Instant>>,
 }
 
+/// How long whoever asks something of a unit waits until it is known which instance speaks for it, and how often that is looked for.
+const LONGEST_DOUBT: Duration = Duration::from_millis(500);
+const DOUBT_INTERVAL: Duration = Duration::from_millis(5);
 /// How long a unit without a calibration is silent before another may have its place.
 const STRANGER_KEPT: Duration = Duration::from_secs(60);
 /// Shortest distance of two looks for such a unit.
@@ -92,6 +95,15 @@ impl Intake {
     pub(crate) fn speaks_for(&self, unit: &UnitId) -> bool {
         let first = || self.pair.as_ref().is_none_or(|pair| pair.speaks_first());
         self.with(unit, |actor| actor.speaks()).unwrap_or_else(first)
+    }
+
+    /// The same; waits where it is being found out.
+    pub(crate) fn answers_for(&self, unit: &UnitId) -> bool {
+        let since = Instant::now();
+        while since.elapsed() < LONGEST_DOUBT && self.with(unit, |actor| actor.doubts()) == Some(true) {
+            std::thread::sleep(DOUBT_INTERVAL);
+        }
+        self.speaks_for(unit)
     }
 
     /// This instance's name for itself: its Zenoh id as text.

@@ -29,7 +29,7 @@ impl Work {
         });
         match asked {
             // The instance that speaks answers.
-            Ok((unit, _)) if !self.intake.speaks_for(&unit) => {}
+            Ok((unit, _)) if !self.intake.answers_for(&unit) => {}
             Ok((unit, options)) => {
                 let reply = self.bus_swap(&unit, &payload.to_bytes(), options);
                 answer_json(query, &key::calibration(&unit), &reply);
@@ -49,7 +49,7 @@ impl Work {
             tracing::warn!("{key} names no unit: the document is passed over");
             return;
         };
-        if !self.intake.speaks_for(&unit) {
+        if !self.intake.answers_for(&unit) {
             return;
         }
         let attachment = sample.attachment().map(|bytes| bytes.to_bytes().into_owned()).unwrap_or_default();
@@ -100,7 +100,7 @@ impl Work {
         let payload = query.payload().map(|bytes| bytes.to_bytes().into_owned()).unwrap_or_default();
         let asked = one_unit(query, key::parse_command).and_then(|unit| Ok((unit, read_order(&payload)?)));
         match asked {
-            Ok((unit, _)) if !self.intake.speaks_for(&unit) => {}
+            Ok((unit, _)) if !self.intake.answers_for(&unit) => {}
             Ok((unit, order)) => match self.command(&unit, &order) {
                 Some(reply) => answer_json(query, &key::command(&unit), &reply),
                 None => refuse(query, &format!("unit {unit} has not appeared: nothing was received of it")),

@@ -125,6 +125,12 @@ impl UnitActor {
         self.stream.next_counter().saturating_sub(1)
     }
 
+    /// Whether it is being found out if another instance speaks.
+    #[must_use]
+    pub(crate) fn doubts(&self) -> bool {
+        self.speech.following.as_ref().is_some_and(|following| following.doubt)
+    }
+
     /// Whether this instance publishes the unit's ticks, and swaps and commands are its own.
     #[must_use]
     pub fn speaks(&self) -> bool {
@@ -249,11 +255,13 @@ impl UnitActor {
         }
         let alone = standing.alone_since.map(|since| now.saturating_duration_since(since));
         let late = following.kept.is_late(now, standing.takeover);
+        // Nor does a unit that sends nothing wait for ever.
+        let still_silent = now.saturating_duration_since(following.since) > standing.takeover * 2;
         let lonely = alone.is_some_and(|alone| alone >= LONELY) || following.kept.is_silent(now, LONELY);
         let is_due = lonely
             || (joined && (alone.is_some() || late))
             // Where the other was lost with the doubt, it may be the other that went on.
-            || (following.doubt && alone.is_none() && late);
+            || (following.doubt && alone.is_none() && (late || still_silent));
         if is_due {
             wants.spoke = !following.doubt;
             self.speak(now, standing.takeover);

@@ -164,8 +164,8 @@ impl Kept {
         let since = self.since;
         self.heard.retain(|(end, _), heard| {
             let old = age(heard.at) >= LONGEST_WAIT;
-            let passed =
-                newest.is_some_and(|newest| newest > *end) && since.is_some_and(|since| heard.at > since);
+            let passed = newest.is_some_and(|newest| newest > *end)
+                && since.is_some_and(|since| heard.at > since + SETTLED);
             settled.missed |= old && passed && in_step;
             !old
         });
