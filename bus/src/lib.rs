@@ -21,6 +21,7 @@
 //! | [`inquiry`] | asking every service at once |
 //! | [`receipt`] | proof that subscribers have taken what was sent |
 //! | [`routes`] | keys whose routes Zenoh is to remember |
+//! | [`threads`] | work for the threads that receive |
 
 pub mod arbiter;
 pub mod client;
@@ -36,6 +37,7 @@ pub mod producer;
 pub mod receipt;
 pub mod routes;
 pub mod session;
+pub mod threads;
 
 pub use arbiter::FirstWins;
 pub use client::{ClientOptions, Role};
@@ -46,4 +48,4 @@ pub use error::{BusError, Json5Problem, without_places, words};
 pub use outlet::{Outlet, OutletOptions};
 pub use producer::{Producer, ProducerOptions};
 pub use routes::DeclaredKeys;
-pub use session::{SessionOptions, close, connected, locators, open};
+pub use session::{SessionOptions, close, connected, locators, open, open_config};

@@ -21,12 +21,14 @@ use crate::intake::Intake;
 use crate::keeper::Keeper;
 use crate::metrics::{Endpoint, Source};
 use crate::pair::{Asker, Pair, Watch};
+use crate::pulse::{Pulse, Stuck};
 use crate::registrar::{Desk, Found, Opening, Registrar, Work};
 use crate::signing::read_trusted_keys;
 use crate::store::{Opened, Store};
 use crate::totals::Totals;
 use crate::unit::UnitActor;
 use crate::watch::{WatchSettings, Watcher};
+use crate::web::Web;
 use declare::Declared;
 
 /// How long other instances may take to show themselves.
@@ -41,6 +43,7 @@ pub struct RunningService {
     session: Session,
     settings: Settings,
     intake: Arc<Intake>,
+    pulse: Arc<Pulse>,
     watcher: Option<Watcher>,
     declared: Declared,
     keeper: Keeper,
@@ -95,6 +98,7 @@ pub(crate) async fn start_on(
     let pair = Pair::new(&settings, session.zid().to_string(), now_unix_ms(), members(&session).await?);
     let pair = Arc::new(pair);
     let intake = Arc::new(intake.paired_with(Arc::clone(&pair)));
+    let pulse = Arc::new(Pulse::new(settings.congestion));
 
     let mut work = Work::new(&settings, Arc::clone(&intake), store, &opened);
     work.take_over(&calibrations);
@@ -104,6 +108,7 @@ pub(crate) async fn start_on(
     tracing::debug!(units = prepared, "publishers and keys of units with a calibration are declared");
     let board = work.board();
     let source = Source::new(&settings, (Arc::clone(&intake), Arc::clone(&pair)), Arc::clone(&board));
+    let source = source.feeling(Arc::clone(&pulse));
     let registrar = Registrar::start(opening, work).map_err(ServiceError::Thread)?;
     let keeper = Keeper::start(&session, Arc::clone(&intake), board, &pair, &settings)
         .map_err(ServiceError::Thread)?;
@@ -118,14 +123,17 @@ pub(crate) async fn start_on(
     // First to hear the others: what they have published of a tick that comes now is to be known.
     let (questions, _asker) = Asker::start(&session, &pair, &intake, desk.clone());
     let watch = Watch::start(&session, &pair, &intake, questions).await?;
-    let declared = Declared::new(&session, &intake, &keeper.bell(), &desk, (&pair, &settings.units)).await?;
+    let inputs = (&pair, settings.units.as_slice(), &pulse);
+    let declared = Declared::new(&session, &intake, &keeper.bell(), &desk, inputs).await?;
+    let web = Web::start(&settings, &session, &intake)?;
     if let Some(metrics) = &metrics {
-        metrics.open(source);
+        metrics.open(source, web);
     }
     Ok(RunningService {
         session,
         settings,
         intake,
+        pulse,
         watcher,
         declared,
         keeper,
@@ -219,7 +227,7 @@ impl RunningService {
     ///
     /// The session given to [`start`] is closed for whoever else holds it.
     pub async fn stop(self) -> Totals {
-        let Self { session, settings, intake, watcher, declared, keeper, registrar, desk: _, pair, metrics } =
+        let Self { session, settings, intake, watcher, declared, keeper, registrar, pair, metrics, .. } =
             self;
         metrics.iter().for_each(Endpoint::stopping);
         let deadline = Instant::now() + settings.stop_timeout;
@@ -262,6 +270,21 @@ impl RunningService {
         tracing::info!("the documents of the folder are read again");
         self.watcher.iter().for_each(Watcher::reread);
         self.desk.judge_again();
+    }
+
+    /// Whether the receive path is alive: messages are done in time, or, where none is there, its threads give signs of life.
+    ///
+    /// Asks for the sign that the next call will want to see; that no sign comes is noticed 2 s later, 30 s with `congestion = "block"`.
+    ///
+    /// # Errors
+    /// [`Stuck`]: what takes too long.
+    pub fn receives(&self) -> Result<(), Stuck> {
+        self.pulse.look()
+    }
+
+    /// The same, for whoever looks beside the service.
+    pub(crate) fn pulse(&self) -> Arc<Pulse> {
+        Arc::clone(&self.pulse)
     }
 
     /// The session that it runs on.

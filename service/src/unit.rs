@@ -6,6 +6,7 @@ mod producers;
 mod quiet;
 mod rates;
 mod scribe;
+mod seen;
 mod speech;
 mod tell;
 
@@ -36,6 +37,7 @@ pub(crate) use account::SwapAccount;
 pub use present::Present;
 pub use quiet::QuietSettings;
 pub use scribe::{Journal, JournalOutlet};
+pub(crate) use seen::TickSeen;
 pub(crate) use speech::{Alarm, Standing, Wants};
 
 /// Where corrected frames go; `Err` is an output that could not be published.

@@ -131,7 +131,7 @@ fn every_key_arrives_where_it_belongs() {
             namespace: Some("site/a".to_owned()),
             lease: None,
         },
-        digest: None,
+        ..Settings::default()
     };
     assert_eq!(Settings::parse(text, &folder.path().join("service.toml")), Ok(expected));
 }

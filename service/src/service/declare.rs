@@ -19,6 +19,7 @@ use crate::config::chunk;
 use crate::intake::{Intake, OutletMaker};
 use crate::keeper::{Asked, Bell};
 use crate::pair::Pair;
+use crate::pulse::Pulse;
 use crate::registrar::Desk;
 use crate::unit::{Journal, Outlet};
 
@@ -38,13 +39,13 @@ impl Declared {
         intake: &Arc<Intake>,
         bell: &Bell,
         desk: &Desk,
-        (pair, taken): (&Arc<Pair>, &[String]),
+        (pair, taken, pulse): (&Arc<Pair>, &[String], &Arc<Pulse>),
     ) -> Result<Self, ServiceError> {
         let put = desk.clone();
         let receipt = Receipt::declare(session).await?;
         let mut subscribers =
             vec![subscribe(session, key::ALL_CALIBRATION, move |sample| put.put(sample)).await?];
-        subscribers.extend(inputs(session, intake, bell, taken, pair).await?);
+        subscribers.extend(inputs(session, (intake, bell, pulse), taken, pair).await?);
         let alive = key::service_alive(&session.zid().to_string());
         let own = session.liveliness().declare_token(alive).await;
         let own = own.map_err(|source| ServiceError::Declare { key: key::ALL_SERVICES_ALIVE, source })?;
@@ -123,11 +124,13 @@ pub(super) fn journal(session: Session, congestion: CongestionControl) -> Journa
 fn take(
     intake: &Arc<Intake>,
     bell: &Bell,
+    pulse: &Arc<Pulse>,
     receive: fn(&Intake, &str, Option<&[u8]>, Instant) -> bool,
 ) -> impl Fn(Sample) + Send + Sync + 'static {
-    let (intake, bell) = (Arc::clone(intake), bell.clone());
+    let (intake, bell, pulse) = (Arc::clone(intake), bell.clone(), Arc::clone(pulse));
     move |sample| {
         let arrival = Instant::now();
+        let _in_hand = pulse.take(arrival);
         let bytes = sample.payload().to_bytes();
         let frame = (sample.kind() == SampleKind::Put).then_some(&*bytes);
         if receive(&intake, sample.key_expr().as_str(), frame, arrival) {
@@ -140,12 +143,12 @@ fn take(
 /// seldom, and tell which units nobody takes.
 async fn inputs(
     session: &Session,
-    intake: &Arc<Intake>,
-    bell: &Bell,
+    (intake, bell, pulse): (&Arc<Intake>, &Bell, &Arc<Pulse>),
     taken: &[String],
     pair: &Arc<Pair>,
 ) -> Result<Vec<Subscriber<()>>, ServiceError> {
-    let (raw, reference) = (take(intake, bell, Intake::receive), take(intake, bell, Intake::reference));
+    let raw = take(intake, bell, pulse, Intake::receive);
+    let reference = take(intake, bell, pulse, Intake::reference);
     let chunks: Vec<_> = taken.iter().filter_map(|pattern| chunk(pattern)).collect();
     if chunks.iter().any(|chunk| chunk.as_str() == "*") {
         let raw = subscribe(session, key::ALL_RAW, raw).await?;
