@@ -6,12 +6,13 @@
 //! | [`weighted`] | rows with weights, outliers without; standard errors under correlated residuals |
 //! | [`correlated`] | rows under white noise, a Markov drift and rounding to counts, made independent by a Kalman filter |
 //! | [`nonlinear`] | Levenberg and Marquardt's method, with the covariance of what was found |
-//! | [`blocks`] | cross-validation: fits without one block after the other |
+//! | [`blocks`], [`folds`] | cross-validation: fits without one block after the other, free or shrunk |
 //! | [`local`] | a parabola over a stretch, for smoothing |
 //! | [`search`] | the smallest value of a function of one to three numbers |
 
 pub mod blocks;
 pub mod correlated;
+pub mod folds;
 pub mod linear;
 pub mod local;
 pub mod nonlinear;

@@ -148,6 +148,12 @@ impl Run {
         if self.given.is_empty() { self.files() } else { &self.given }
     }
 
+    /// Whether it is from a file that another run is from, too.
+    #[must_use]
+    pub fn shares_log(&self, other: &Self) -> bool {
+        self.files().iter().any(|file| other.files().contains(file))
+    }
+
     /// Its readings as columns.
     ///
     /// # Errors

@@ -235,7 +235,7 @@ fn rest(name: &str, means: &Table, place: Option<&Place>) -> Result<Rest, Error>
         )]));
     };
     let rate = rate.map(|rate| AngularRate::from_rad_per_s(rate).as_deg_per_h());
-    Ok(Rest { rate_deg_per_h: Some(rate), force_m_per_s2: None })
+    Ok(Rest { rate_deg_per_h: Some(rate), ..Rest::default() })
 }
 
 /// Axes that nothing can be said of.

@@ -20,8 +20,8 @@ use stands::StandArgs;
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     isotherm-calibrate thermal train.mcap --judge other.mcap --calibration unit.toml --out unit-new.toml --html unit.html\n  \
-    isotherm-calibrate thermal train.mcap --method lag --latitude 55.75 --heading 30 --calibration unit.toml --out unit-new.toml\n  \
-    isotherm-calibrate thermal chamber.tsv --mapping config/mappings/chamber-mems.toml --unit CHAMBER-MEMS --method lag \\\n      \
+    isotherm-calibrate thermal train.mcap --latitude 55.75 --heading 30 --calibration unit.toml --out unit-new.toml\n  \
+    isotherm-calibrate thermal chamber.tsv --mapping config/mappings/chamber-mems.toml --unit CHAMBER-MEMS \\\n      \
     --duration 3130 --judge chamber.tsv --judge-start 3130 --out chamber-mems.toml\n  \
     isotherm-calibrate thermal up.mcap down.mcap --calibration unit.toml --latitude 55.75 --heading 30 --pitch 0 --roll 0 --roll 180 \\\n      \
     --out unit-new.toml\n  \
@@ -71,10 +71,9 @@ pub(super) struct ThermalArgs {
 enum MethodArg {
     /// Plateaus first, then rate, then acceleration of the temperature (the paper's)
     Sequential,
-    /// All terms at once, with lags on a fixed ladder
+    /// All terms at once, as much of each as holds on stretches that were left out
+    #[value(alias = "lag")]
     Joint,
-    /// Lags whose time constants are searched
-    Lag,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -174,7 +173,6 @@ impl ThermalArgs {
             method: match self.method {
                 MethodArg::Sequential => Method::Sequential,
                 MethodArg::Joint => Method::Joint,
-                MethodArg::Lag => Method::Lag,
             },
             terms: if self.terms == TermsArg::All { Terms::All } else { Terms::Auto },
             stands: Vec::new(),

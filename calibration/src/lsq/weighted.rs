@@ -2,7 +2,6 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::blocks::Blocks;
 use super::linear::{self, Weak};
 use crate::robust::median_if_any;
 
@@ -37,14 +36,20 @@ pub struct Solution {
 }
 
 /// Coefficients with which the columns add up best to the target, each row with its weight; rows whose target or
-/// column is no number, or whose weight is zero, take no part. Spikes lose their weight. `None` without enough rows.
+/// column is no number, or whose weight is zero, take no part. Spikes lose their weight. Rows of `holding`, for weights with the sum
+/// of one, hold coefficients to zero. `None` without enough rows.
 #[must_use]
-pub fn solve(columns: &[&[f64]], target: &[f64], weights: &[f64]) -> Option<Solution> {
+pub fn solve(
+    columns: &[&[f64]],
+    target: &[f64],
+    weights: &[f64],
+    holding: Option<&DMatrix<f64>>,
+) -> Option<Solution> {
     let mut robust = vec![1.0; target.len()];
     let mut last = None;
     for _ in 0..PASSES {
         let rows: Vec<f64> = weights.iter().zip(&robust).map(|(w, r)| w * r).collect();
-        let solution = once(columns, target, &rows)?;
+        let solution = once(columns, target, &rows, holding)?;
         let next = spikes(&solution.residual, weights);
         let still = robust.iter().zip(&next).all(|(a, b)| (a - b).abs() < 1e-3);
         robust = next;
@@ -60,8 +65,13 @@ pub fn solve(columns: &[&[f64]], target: &[f64], weights: &[f64]) -> Option<Solu
 
 /// One weighted solution.
 #[must_use]
-pub fn once(columns: &[&[f64]], target: &[f64], weights: &[f64]) -> Option<Solution> {
-    let rows = Rows::of(columns, target, weights);
+pub fn once(
+    columns: &[&[f64]],
+    target: &[f64],
+    weights: &[f64],
+    holding: Option<&DMatrix<f64>>,
+) -> Option<Solution> {
+    let rows = Rows::of(columns, target, weights, holding);
     let count = columns.len();
     if count == 0 || !is_enough(rows.good.len(), count) {
         return None;
@@ -75,93 +85,63 @@ pub fn once(columns: &[&[f64]], target: &[f64], weights: &[f64]) -> Option<Solut
         .collect();
     #[expect(clippy::cast_precision_loss, reason = "rows of a fit are far below 2⁵³")]
     let free = (rows.good.len() - count) as f64;
-    let variance = found.chi_square() / free * inflation(&residual, &rows.good);
+    let square = found.residual.rows(0, rows.good.len()).norm_squared();
+    let variance = square / free * inflation(&residual, &rows.good);
     let sigmas = (0..count).map(|index| variance.sqrt() * found.sigma(index)).collect();
     let finite = found.coefficients.iter().all(|c| c.is_finite());
     finite.then(|| Solution {
         coefficients: found.coefficients.iter().copied().collect(),
         sigmas,
         residual,
-        rms: (found.chi_square() / rows.weight).sqrt(),
+        rms: (square / rows.weight).sqrt(),
         outliers: 0,
     })
 }
 
-/// Rows that take part, each multiplied with the root of its weight.
-pub(super) struct Rows {
-    pub(super) good: Vec<usize>,
-    pub(super) design: DMatrix<f64>,
-    pub(super) values: DVector<f64>,
+/// Rows that take part, each multiplied with the root of its weight, and those that hold coefficients.
+struct Rows {
+    good: Vec<usize>,
+    design: DMatrix<f64>,
+    values: DVector<f64>,
     /// Sum of the weights.
-    pub(super) weight: f64,
+    weight: f64,
 }
 
 impl Rows {
-    pub(super) fn of(columns: &[&[f64]], target: &[f64], weights: &[f64]) -> Self {
+    fn of(columns: &[&[f64]], target: &[f64], weights: &[f64], holding: Option<&DMatrix<f64>>) -> Self {
         let is_good = |&row: &usize| {
             let finite = target[row].is_finite() && columns.iter().all(|column| column[row].is_finite());
             finite && weights[row] > 0.0
         };
         let good: Vec<usize> = (0..target.len()).filter(is_good).collect();
         let root = |row: usize| weights[row].sqrt();
+        let weight: f64 = good.iter().map(|&row| weights[row]).sum();
+        let held = holding.map_or(0, DMatrix::nrows);
+        let entry = |i: usize, j: usize| match (good.get(i), holding) {
+            (Some(row), _) => root(*row) * columns[j][*row],
+            // Further columns are free.
+            (None, Some(holding)) if j < holding.ncols() => weight.sqrt() * holding[(i - good.len(), j)],
+            (None, _) => 0.0,
+        };
         Self {
-            design: DMatrix::from_fn(good.len(), columns.len(), |i, j| root(good[i]) * columns[j][good[i]]),
-            values: DVector::from_fn(good.len(), |i, _| root(good[i]) * target[good[i]]),
-            weight: good.iter().map(|&row| weights[row]).sum(),
+            design: DMatrix::from_fn(good.len() + held, columns.len(), entry),
+            values: DVector::from_fn(good.len() + held, |i, _| {
+                good.get(i).map_or(0.0, |row| root(*row) * target[*row])
+            }),
+            weight,
             good,
         }
     }
 }
 
 /// Whether so many rows can bear so many coefficients.
-pub(super) fn is_enough(rows: usize, columns: usize) -> bool {
+fn is_enough(rows: usize, columns: usize) -> bool {
     rows >= 2 * columns + 3
 }
 
 /// The ridge of rows whose weights have this sum.
-pub(super) fn hold(weight: f64) -> Weak {
+fn hold(weight: f64) -> Weak {
     Weak::Ridge { share: RIDGE, nothing: NOTHING * weight.sqrt() }
-}
-
-/// Fits to rows with weights, without one piece of them after the other.
-#[derive(Debug)]
-pub struct Pieces {
-    blocks: Blocks,
-    columns: Vec<usize>,
-    weights: Vec<f64>,
-}
-
-impl Pieces {
-    /// Of columns, target and weights as of [`once`]; each row belongs to a piece, numbered from 0.
-    #[must_use]
-    pub fn of(columns: &[&[f64]], target: &[f64], weights: &[f64], piece: &[usize]) -> Self {
-        let rows = Rows::of(columns, target, weights);
-        let mut sums = vec![0.0; piece.iter().max().map_or(0, |last| last + 1)];
-        let own: Vec<usize> = rows.good.iter().map(|&row| piece[row]).collect();
-        own.iter().zip(&rows.good).for_each(|(piece, row)| sums[*piece] += weights[*row]);
-        Self {
-            blocks: Blocks::of(&rows.design, &rows.values, &own),
-            columns: (0..columns.len()).collect(),
-            weights: sums,
-        }
-    }
-
-    /// Coefficients of the fit to all other pieces; `None` where they have too few rows.
-    #[must_use]
-    pub fn without(&self, left_out: usize) -> Option<Vec<f64>> {
-        if self.columns.is_empty() {
-            return Some(Vec::new());
-        }
-        let others = || (0..self.weights.len()).filter(|piece| *piece != left_out);
-        let rows = others().map(|piece| self.blocks.rows(piece)).sum();
-        if !is_enough(rows, self.columns.len()) {
-            return None;
-        }
-        let weight: f64 = others().map(|piece| self.weights[piece]).sum();
-        let found = self.blocks.without(left_out, &self.columns, hold(weight))?;
-        let finite = found.coefficients.iter().all(|c| c.is_finite());
-        finite.then(|| found.coefficients.iter().copied().collect())
-    }
 }
 
 /// By how much the variance of a coefficient grows because neighbouring residuals resemble each other.
@@ -231,7 +211,7 @@ mod tests {
             target[spike] += 50.0;
         }
         target[50] = f64::NAN;
-        let solution = solve(&[&ones, &x], &target, &ones).unwrap();
+        let solution = solve(&[&ones, &x], &target, &ones, None).unwrap();
         assert!((solution.coefficients[0] - 3.0).abs() < 4.0 * solution.sigmas[0], "{solution:?}");
         assert!((solution.coefficients[1] + 2.0).abs() < 4.0 * solution.sigmas[1]);
         assert!(solution.sigmas[1] < 0.05 && solution.sigmas[1] > 0.01, "{:?}", solution.sigmas);
@@ -242,8 +222,8 @@ mod tests {
     fn what_cannot_be_told_apart_stays_finite_and_too_few_rows_are_refused() {
         let ones = vec![1.0; 20];
         let target = vec![2.0; 20];
-        let solution = solve(&[&ones, &ones], &target, &ones).unwrap();
+        let solution = solve(&[&ones, &ones], &target, &ones, None).unwrap();
         assert!((solution.coefficients.iter().sum::<f64>() - 2.0).abs() < 1e-6);
-        assert!(solve(&[&ones[..4], &ones[..4]], &target[..4], &ones[..4]).is_none());
+        assert!(solve(&[&ones[..4], &ones[..4]], &target[..4], &ones[..4], None).is_none());
     }
 }

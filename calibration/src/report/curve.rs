@@ -45,6 +45,8 @@ pub struct Rest {
     pub rate_deg_per_h: Option<[f64; 3]>,
     /// Specific force along the case axes (m/s²).
     pub force_m_per_s2: Option<[f64; 3]>,
+    /// Levels before and after by axis, gyros first, of another part of the same log: they stand in for what is not known.
+    pub levels: Option<[[f64; 2]; 6]>,
 }
 
 /// A run, corrected before and after.
@@ -95,8 +97,9 @@ impl Curve {
             } else {
                 ([before.force(axis), after.force(axis)], rest.force_m_per_s2)
             };
-            let truth = truth.and_then(|truth| truth.get(axis).copied());
-            let [before, after_values] = common(values, truth)?;
+            let truth = truth.and_then(|truth| truth.get(axis).copied()).map(|truth| [truth; 2]);
+            let carried = rest.levels.and_then(|levels| levels.get(axis + if gyro { 0 } else { 3 }).copied());
+            let [before, after_values] = common(values, truth.or(carried))?;
             let channel = channel_of(document, gyro, axis);
             let temperature = channel.and_then(|channel| after.temperature_deg_c.get(&channel).cloned());
             let kind = if gyro { "gyro" } else { "accelerometer" };
@@ -147,9 +150,9 @@ impl Curve {
     }
 }
 
-/// Both where both are numbers, less what a unit without error would put out, or less the mean of each; `None` without any.
+/// Both where both are numbers, less what a unit without error would put out of each, or less the mean of each; `None` without any.
 #[expect(clippy::cast_precision_loss, reason = "windows of a log are far below 2⁵³")]
-fn common([before, after]: [&[f64]; 2], truth: Option<f64>) -> Option<[Vec<f64>; 2]> {
+fn common([before, after]: [&[f64]; 2], truth: Option<[f64; 2]>) -> Option<[Vec<f64>; 2]> {
     let pairs: Vec<(f64, f64)> = before
         .iter()
         .zip(after)
@@ -159,10 +162,8 @@ fn common([before, after]: [&[f64]; 2], truth: Option<f64>) -> Option<[Vec<f64>;
     if good.is_empty() {
         return None;
     }
-    let mean = |of: fn(&(f64, f64)) -> f64| {
-        truth.unwrap_or_else(|| good.iter().map(|pair| of(pair)).sum::<f64>() / good.len() as f64)
-    };
-    let (before, after) = (mean(|pair| pair.0), mean(|pair| pair.1));
+    let mean = |of: fn(&(f64, f64)) -> f64| good.iter().map(|pair| of(pair)).sum::<f64>() / good.len() as f64;
+    let [before, after] = truth.unwrap_or_else(|| [mean(|pair| pair.0), mean(|pair| pair.1)]);
     Some([pairs.iter().map(|(a, _)| a - before).collect(), pairs.iter().map(|(_, b)| b - after).collect()])
 }
 

@@ -113,7 +113,7 @@ fn judging_a_run_shows_what_the_terms_do() {
     let document: &Document = &after.document;
     assert_eq!(curve::channel_of(document, true, 0), document.gyro.sensor[0].channel);
     assert_eq!(output_unit(document), "m/s²", "what its accelerometers put out");
-    let truth = judged(Rest { rate_deg_per_h: Some([0.0; 3]), force_m_per_s2: None });
+    let truth = judged(Rest { rate_deg_per_h: Some([0.0; 3]), ..Rest::default() });
     let [before, after] = truth.curves[0].sizes();
     assert!(before.mean.abs() > 2.0 * after.mean.abs(), "the bias is taken away: {before:?} {after:?}");
     assert_eq!(Curve::verdicts(&truth.curves).len(), 6);

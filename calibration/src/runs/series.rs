@@ -35,6 +35,17 @@ pub struct Channel {
     pub raw: Vec<f64>,
 }
 
+impl Channel {
+    /// Times since the first reading (s).
+    #[must_use]
+    pub fn since_s(&self) -> Vec<f64> {
+        let first = self.time_ns.first().copied().unwrap_or_default();
+        #[expect(clippy::cast_precision_loss, reason = "lengths of logs")]
+        let since_s = |time: &i64| time.saturating_sub(first) as f64 * 1e-9;
+        self.time_ns.iter().map(since_s).collect()
+    }
+}
+
 /// Everything that a log has of one unit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {

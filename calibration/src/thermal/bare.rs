@@ -180,10 +180,11 @@ fn document(
 /// A filter for readings that come every so many seconds.
 #[must_use]
 pub fn filter(step_s: f64) -> Filter {
-    // Readings about a second apart belong on a grid of a second.
+    // Readings about a second apart belong on a grid of a second; lags need some points between those that come seldom.
+    let own_s = if step_s > FINEST_GRID { step_s / FINEST_GRID } else { step_s };
     let grids = [0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0];
-    let minutes = || (60.0 * libm::ceil(step_s / 60.0)).min(LONGEST_GRID_STEP_S);
-    let grid = grids.into_iter().find(|step| *step > 0.8 * step_s).unwrap_or_else(minutes);
+    let minutes = || (60.0 * libm::ceil(own_s / 60.0)).min(LONGEST_GRID_STEP_S);
+    let grid = grids.into_iter().find(|step| *step > 0.8 * own_s).unwrap_or_else(minutes);
     Filter {
         grid_step_s: grid,
         smoothing_s: 10.0 * grid,

@@ -157,7 +157,7 @@ impl Basis {
     }
 
     /// What up to eight terms subtract over the windows of a run (°/h).
-    fn drive(&self, run: &Samples, terms: &[Term]) -> Result<Vec<Vec<f64>>, Error> {
+    pub(super) fn drive(&self, run: &Samples, terms: &[Term]) -> Result<Vec<Vec<f64>>, Error> {
         // A unit has three gyros at least.
         let padding = iter::repeat_n(Term::Static(0), MIN_SENSORS.saturating_sub(terms.len()));
         let padded: Vec<Term> = terms.iter().copied().chain(padding).collect();

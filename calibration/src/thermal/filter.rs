@@ -6,23 +6,22 @@ use isotherm_protocol::document::{Document, Filter};
 
 use super::columns::{Branch, Columns, Term};
 use super::fit::Sensor;
+use super::joint::Joint;
 use super::known::{Known, channel};
+use super::ladder::smoothings_s;
 use super::model::{Dynamics, Spec};
 use super::samples::Samples;
-use super::search;
 use super::select::Target;
 use super::settings::{Method, Settings};
 use crate::error::Error;
 
-/// Smoothings of the temperature that are tried (s).
-const SMOOTHINGS_S: [f64; 4] = [5.0, 10.0, 20.0, 40.0];
 /// For the sequential method, whose derivatives know nothing of lags: smoothing, its delay being all the lag that there is, and
 /// derivative step (s).
 const SLOW_SMOOTHINGS_S: [f64; 8] = [15.0, 40.0, 90.0, 180.0, 250.0, 400.0, 650.0, 1000.0];
+const DERIVATIVE_STEPS_S: [f64; 2] = [20.0, 40.0];
 /// Longest smoothing as a share of the longest run, and in grid steps.
 const LONGEST_SMOOTHING_SHARE: f64 = 0.06;
 const LONGEST_SMOOTHING_GRID_STEPS: f64 = 2000.0;
-const DERIVATIVE_STEPS_S: [f64; 2] = [20.0, 40.0];
 
 /// The filter with which the sensors are explained best together.
 pub(super) fn choose_filter(
@@ -33,62 +32,65 @@ pub(super) fn choose_filter(
     histories: &BTreeMap<String, Known>,
     settings: &Settings,
 ) -> Result<Filter, Error> {
-    let grid = filter.grid_step_s;
     let sequential = settings.method == Method::Sequential;
-    let (smoothings, steps): (Vec<f64>, Vec<f64>) = match settings.smoothing_s {
-        Some(smoothing) => (vec![smoothing], vec![filter.derivative_step_s]),
+    let longest_s = longest_run_s(samples);
+    let trials = match settings.smoothing_s {
         None if sequential => {
             let longest_s =
-                (LONGEST_SMOOTHING_SHARE * longest_run_s(samples)).min(LONGEST_SMOOTHING_GRID_STEPS * grid);
+                (LONGEST_SMOOTHING_SHARE * longest_s).min(LONGEST_SMOOTHING_GRID_STEPS * filter.grid_step_s);
             let smoothings = SLOW_SMOOTHINGS_S.into_iter().filter(|s| *s <= longest_s.max(250.0));
-            (smoothings.collect(), DERIVATIVE_STEPS_S.to_vec())
+            on_grid(filter, &smoothings.collect::<Vec<_>>(), &DERIVATIVE_STEPS_S)
         }
-        None => (SMOOTHINGS_S.to_vec(), vec![20.0]),
+        None => {
+            let tells = histories.values().all(|known| known.history.tells_dynamics());
+            on_grid(filter, smoothings_s(tells), &[DERIVATIVE_STEPS_S[0]])
+        }
+        Some(stated) => on_grid(filter, &[stated], &[filter.derivative_step_s]),
     };
-    let whole = |length: f64| libm::round(length / grid).max(1.0) * grid;
     let mut best: Option<(f64, Filter)> = None;
-    let mut tried: BTreeSet<(u64, u64)> = BTreeSet::new();
-    for smoothing in &smoothings {
-        for step in &steps {
-            let mut trial =
-                Filter { smoothing_s: whole(*smoothing), derivative_step_s: whole(*step), ..filter.clone() };
-            if !tried.insert((trial.smoothing_s.to_bits(), trial.derivative_step_s.to_bits())) {
+    for mut trial in trials {
+        let (mut cost, mut dead_band) = (0.0, 0.0_f64);
+        for (name, known) in histories {
+            let mut columns = Columns::new(known.basis(channel(bare, name)?, &trial), samples);
+            let (rate, acceleration) = (Term::Rate(Branch::Both, 0), Term::Acceleration(Branch::Both, 0));
+            columns.make(&[rate, acceleration])?;
+            dead_band = dead_band.max(usual_product(columns.get(rate), columns.get(acceleration)));
+            let alive = sensors.iter().zip(targets).filter(|(sensor, _)| sensor.follows(name));
+            if !sequential {
+                let alive: Vec<_> = alive.collect();
+                cost += Joint::of(columns, samples, (known, longest_s), &alive)?.cost();
                 continue;
             }
-            let mut cost = 0.0;
-            let mut dead_band: f64 = 0.0;
-            for (name, known) in histories {
-                let mut columns = Columns::new(known.basis(channel(bare, name)?, &trial), samples);
-                let (rate, acceleration) = (Term::Rate(Branch::Both, 0), Term::Acceleration(Branch::Both, 0));
-                columns.make(&[rate, acceleration])?;
-                dead_band = dead_band.max(usual_product(columns.get(rate), columns.get(acceleration)));
-                let mut spec = Spec { degree: 4, ..Spec::default() };
-                if known.history.both_directions() {
-                    spec.dynamics = if sequential {
-                        Dynamics { name: String::new(), terms: vec![rate, acceleration] }
-                    } else {
-                        search::ladders(false, grid, &known.history, longest_run_s(samples))
-                            .pop()
-                            .unwrap_or_default()
-                    };
-                }
-                columns.make(&spec.terms(true))?;
-                for (sensor, target) in sensors.iter().zip(targets) {
-                    if sensor.channel == *name && sensor.dead.is_none() && (sensor.gyro || !sequential) {
-                        let spec = Spec { scale: target.widest_scale(), ..spec.clone() };
-                        cost += target
-                            .solve(&columns, &spec, false)
-                            .map_or(0.0, |solution| libm::log(solution.rms));
-                    }
-                }
+            let mut spec = Spec { degree: 4, ..Spec::default() };
+            if known.history.both_directions() {
+                spec.dynamics = Dynamics { name: String::new(), terms: vec![rate, acceleration] };
             }
-            trial.branch_dead_band_deg_c2_per_s3 = Some(crate::written::tidy(dead_band));
-            if best.as_ref().is_none_or(|(least, _)| cost < *least) {
-                best = Some((cost, trial));
+            columns.make(&spec.terms(true))?;
+            for (_, target) in alive.filter(|(sensor, _)| sensor.gyro) {
+                let spec = Spec { scale: target.widest_scale(), ..spec.clone() };
+                let solution = target.solve(&columns, &spec, false);
+                cost += solution.map_or(0.0, |solution| libm::log(solution.rms));
             }
+        }
+        trial.branch_dead_band_deg_c2_per_s3 = Some(crate::written::tidy(dead_band));
+        if best.as_ref().is_none_or(|(least, _)| cost < *least) {
+            best = Some((cost, trial));
         }
     }
     Ok(best.map_or_else(|| filter.clone(), |(_, filter)| filter))
+}
+
+/// Filters with smoothings and derivative steps (s) in whole grid steps, each once.
+fn on_grid(filter: &Filter, smoothings_s: &[f64], steps_s: &[f64]) -> Vec<Filter> {
+    let whole = |length: f64| libm::round(length / filter.grid_step_s).max(1.0) * filter.grid_step_s;
+    let mut tried: BTreeSet<(u64, u64)> = BTreeSet::new();
+    let pairs = smoothings_s.iter().flat_map(|smoothing| steps_s.iter().map(move |step| (*smoothing, *step)));
+    let filters = pairs.map(|(smoothing, step)| Filter {
+        smoothing_s: whole(smoothing),
+        derivative_step_s: whole(step),
+        ..filter.clone()
+    });
+    filters.filter(|f| tried.insert((f.smoothing_s.to_bits(), f.derivative_step_s.to_bits()))).collect()
 }
 
 /// Length of the longest run (s).

@@ -4,16 +4,19 @@ use isotherm_protocol::document::{Document, Origin};
 
 use super::bare::{bare, carry, filter, nominal_of};
 use super::checks::{self, Findings};
-use super::columns::Columns;
+use super::columns::{Columns, Term};
 use super::filter::{choose_filter, longest_run_s};
+use super::found::Found;
+use super::joint::{CUBIC, Joint, rivals};
 use super::known::{Known, channel, histories};
-use super::outcome::{Found, Outcome};
+use super::ladder::lags;
+use super::outcome::Outcome;
 use super::samples::Samples;
-use super::select::{Target, Tried, WORTH_IT, terms_of};
-use super::settings::{Method, Settings, Terms};
+use super::select::{Target, WORTH_IT};
+use super::sequential;
+use super::settings::{Method, Settings};
 use super::stand::Stand;
 use super::target::{rest, target};
-use super::{passes, search, sequential};
 use crate::drift::figures::six;
 use crate::error::Error;
 use crate::report::{FitReport, Rest};
@@ -21,9 +24,6 @@ use crate::runs::series::Series;
 use crate::runs::table::usual_window_s;
 use crate::runs::{Run, Watch};
 use crate::written::Written;
-
-/// Highest powers of temperature that are tried.
-const DEGREES: [usize; 5] = [1, 2, 3, 4, 5];
 
 /// A document and what is to be said of it.
 #[derive(Debug)]
@@ -45,6 +45,13 @@ pub(super) struct Sensor {
     pub(super) channel: String,
     /// Why it cannot be fitted at all.
     pub(super) dead: Option<String>,
+}
+
+impl Sensor {
+    /// Whether it works and follows a channel.
+    pub(super) fn follows(&self, channel: &str) -> bool {
+        self.dead.is_none() && self.channel == channel
+    }
 }
 
 /// Fits the thermal terms of a unit to its runs, and judges them on others.
@@ -139,22 +146,12 @@ pub fn fit(
     let mut outcome = Outcome::new(&base, plain, chosen.clone(), settings);
     outcome.warnings = warnings;
     outcome.scales(&sensors, &targets);
+    let longest_s = longest_run_s(&samples);
     for (name, known) in &histories {
-        let basis = known.basis(channel(&outcome.bare, name)?, &chosen);
-        let mut columns = Columns::new(basis, &samples);
-        let longest_s = longest_run_s(&samples);
-        let mine: Vec<usize> = (0..sensors.len()).filter(|&i| sensors[i].channel == *name).collect();
-        let alive: Vec<&Target> =
-            mine.iter().filter(|&&i| sensors[i].dead.is_none()).map(|&i| &targets[i]).collect();
-        let searched = match settings.method {
-            Method::Lag => search::searched(&mut columns, &alive, &known.history, longest_s)?,
-            _ => Vec::new(),
-        };
-        for index in mine {
-            let one = (&sensors[index], &targets[index]);
-            let found = find(&mut columns, one, (known, longest_s), &searched, settings)?;
-            outcome.add(&sensors[index], columns.basis(), found);
-        }
+        let columns = Columns::new(known.basis(channel(&outcome.bare, name)?, &chosen), &samples);
+        let all: Vec<(&Sensor, &Target)> =
+            sensors.iter().zip(&targets).filter(|(sensor, _)| sensor.channel == *name).collect();
+        sensors_of(&mut outcome, columns, &all, (known, longest_s), &samples)?;
         outcome.history(name, &known.history);
     }
     outcome.finish((runs, judges), origin, |run, stand| rest(run, &base, stand, ()), watch)
@@ -203,95 +200,69 @@ fn sensors(bare: &Document, dead: &[(bool, usize, String)]) -> Vec<Sensor> {
     gyros.chain(accels).collect()
 }
 
-/// Finds the terms of one sensor.
-fn find(
+/// Finds the terms of a channel's sensors.
+fn sensors_of<'a>(
+    outcome: &mut Outcome,
+    mut columns: Columns<'a>,
+    sensors: &[(&'a Sensor, &'a Target)],
+    (known, longest_s): (&'a Known, f64),
+    samples: &'a [Samples],
+) -> Result<(), Error> {
+    let (dead, alive): (Vec<_>, Vec<_>) = sensors.iter().partition(|(sensor, _)| sensor.dead.is_some());
+    let basis = columns.basis().clone();
+    for (sensor, _) in dead {
+        outcome.add(sensor, &basis, Found::dead(sensor.dead.as_deref().unwrap_or_default()));
+    }
+    if outcome.settings.method == Method::Sequential {
+        for (sensor, target) in alive {
+            let found = step_by_step(&mut columns, (sensor, target), known)?;
+            outcome.add(sensor, &basis, found);
+        }
+        return Ok(());
+    }
+    let terms = outcome.settings.terms;
+    let mut joint = Joint::of(columns, samples, (known, longest_s), &alive)?;
+    for (sensor, _) in alive {
+        let found = joint.find(sensor, terms)?;
+        outcome.add(sensor, &basis, found);
+    }
+    Ok(())
+}
+
+/// Finds the terms of one sensor one after the other.
+fn step_by_step(
     columns: &mut Columns<'_>,
     (sensor, target): (&Sensor, &Target),
-    (known, longest_s): (&Known, f64),
-    searched: &[super::model::Dynamics],
-    settings: &Settings,
+    known: &Known,
 ) -> Result<Found, Error> {
-    if let Some(why) = &sensor.dead {
-        return Ok(Found { dead: true, ..Found::refused(why) });
-    }
     let history = &known.history;
-    if settings.method == Method::Sequential {
-        if !history.both_directions() {
-            return Ok(Found::refused(
-                "the temperature goes one way only: the sequential method needs ramps both ways",
-            ));
-        }
-        let grid = columns.basis().filter.grid_step_s;
-        let steps = if sensor.gyro {
-            sequential::gyro_terms().to_vec()
-        } else {
-            vec![search::lags(&[(3.0 * grid).max(10.0)], 0).terms]
-        };
-        columns.make(&terms_of(&[sequential::degree(history)], &[]))?;
-        for terms in &steps {
-            columns.make(terms)?;
-        }
-        return Ok(match sequential::find(columns, target, history, &steps) {
-            Err(why) => Found::refused(&why),
-            Ok(found) => {
-                let (left, mean) =
-                    (sequential::left(columns, target, &found), sequential::left(columns, target, &[]));
-                let flat = target.flat(columns).filter(|_| left > WORTH_IT * mean);
-                flat.map_or_else(
-                    || Found::sequential(found, left, mean),
-                    |level| Found::flat(&level, target.level),
-                )
-            }
-        });
-    }
-    let dynamics = match settings.method {
-        // What was searched beside what is fixed: a search follows the noise of its log, too.
-        Method::Lag => {
-            let grid_step_s = columns.basis().filter.grid_step_s;
-            let mut all = searched.to_vec();
-            if sensor.gyro && history.tells_dynamics() {
-                all.extend(searched.iter().filter(|searched| searched.terms.len() > 4).map(search::leading));
-            }
-            all.extend(search::ladders(sensor.gyro, grid_step_s, history, longest_s).into_iter().skip(1));
-            all
-        }
-        _ => search::ladders(sensor.gyro, columns.basis().filter.grid_step_s, history, longest_s),
-    };
-    let degrees = if history.tells_dynamics() { &DEGREES[..] } else { &DEGREES[..3] };
-    columns.make(&terms_of(degrees, &dynamics))?;
-    let mut choice = target.choose(columns, (degrees, &dynamics), (history, &known.temperature));
-    if settings.terms == Terms::All {
-        let largest = |tried: &Tried| !tried.spec.trend && tried.spec.scale == target.widest_scale();
-        let models = choice.tried.iter().enumerate().filter(|(_, tried)| largest(tried));
-        choice.chosen = models.max_by_key(|(_, tried)| tried.count).map(|(index, _)| index);
-    }
-    let Some(best) = choice.best().cloned() else {
+    if !history.both_directions() {
         return Ok(Found::refused(
-            "cross-validation has nothing to judge by: the log has one stretch of temperature only; run the chamber both ways",
+            "the temperature goes one way only: the sequential method needs ramps both ways",
         ));
-    };
-    if settings.terms == Terms::Auto && (choice.mean.is_nan() || best.score > WORTH_IT * choice.mean) {
-        if let Some(level) = target.flat(columns) {
-            return Ok(Found { choice: Some(choice), ..Found::flat(&level, target.level) });
-        }
-        let why = format!(
-            "nothing beats its mean: the best model, {}, leaves {:.3e} on stretches that it did not see, the mean {:.3e}; the axis \
-             follows something else than temperature",
-            best.spec.words(),
-            best.score,
-            choice.mean
-        );
-        return Ok(Found { choice: Some(choice), ..Found::refused(&why) });
     }
-    let share = passes::share(target, columns, (history, &known.temperature));
-    let doubt = passes::doubt(share).filter(|_| !best.spec.dynamics.terms.is_empty());
-    let solution = target.solve(columns, &best.spec, true);
-    Ok(match solution {
-        None => Found { choice: Some(choice), ..Found::refused("the model has no solution on this log") },
-        Some(solution) => {
-            let mut found = Found::chosen(choice, &best.spec, &solution, target.level);
-            found.remarks.extend(doubt);
-            found
+    let grid = columns.basis().filter.grid_step_s;
+    let steps = if sensor.gyro {
+        sequential::gyro_terms().to_vec()
+    } else {
+        vec![lags(&[(3.0 * grid).max(10.0)], 0).terms]
+    };
+    columns.make(&(0..=sequential::degree(history).max(CUBIC)).map(Term::Static).collect::<Vec<_>>())?;
+    for terms in &steps {
+        columns.make(terms)?;
+    }
+    let mut found = match sequential::find(columns, target, history, &steps) {
+        Err(why) => Found::refused(&why),
+        Ok(found) => {
+            let (left, mean) =
+                (sequential::left(columns, target, &found), sequential::left(columns, target, &[]));
+            let flat = target.flat(columns).filter(|_| left > WORTH_IT * mean);
+            flat.map_or_else(
+                || Found::sequential(found, left, mean),
+                |level| Found::flat(&level, target.level),
+            )
         }
-    })
+    };
+    found.rivals = Some(rivals(columns, sensor, target, target.widest_scale())?);
+    Ok(found)
 }

@@ -25,10 +25,10 @@ pub struct Spec {
     pub degree: usize,
     /// What follows the change of temperature.
     pub dynamics: Dynamics,
-    /// Whether a drift with time is estimated beside it. It is never written: it keeps the curves clean of it.
-    pub trend: bool,
     /// Highest power of temperature in the scale factor error; `None` where the scale factor stays.
     pub scale: Option<usize>,
+    /// Weight of zero against the gains of what follows the change, as a share of each column's variance.
+    pub shrink: f64,
 }
 
 impl Spec {
@@ -57,9 +57,6 @@ impl Spec {
         }
         if let Some(degree) = self.scale {
             words = format!("{words}, scale factor error {}", of_degree(degree));
-        }
-        if self.trend {
-            words = format!("{words}, beside a drift with time");
         }
         words
     }

@@ -5,97 +5,17 @@ use isotherm_protocol::document::{Document, Filter, Origin, Sample};
 use super::branches::History;
 use super::checks::SMALLEST_RANGE_DEG_C;
 use super::columns::{Basis, Term};
+use super::compare;
 use super::fit::{Fitted, Sensor};
-use super::model::{Spec, put_accel, put_gyro};
-use super::select::{Choice, WORTH_IT};
+use super::found::Found;
+use super::model::{put_accel, put_gyro};
 use super::settings::Settings;
 use super::stand::Stand;
 use crate::error::Error;
-use crate::lsq::weighted::Solution;
 use crate::report::{Curve, FLAT, Figure, Rest, Verdict, judge};
 use crate::runs::{Run, Watch};
 use crate::size::Size;
 use crate::written::Written;
-
-/// Share of the rms in sample that the terms of a sensor which drifts with time may leave by themselves, without a judging run:
-/// where they leave more, less of the log is explained by what the document says than by what it does not.
-const LEFT_BESIDE_DRIFT: f64 = 0.5;
-
-/// What came of one sensor.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub(super) struct Found {
-    /// Coefficients and their standard errors.
-    pub(super) terms: Vec<(Term, f64, f64)>,
-    /// The model in words.
-    pub(super) words: String,
-    /// Cross-validation, where it was asked.
-    pub(super) choice: Option<Choice>,
-    /// Why there are no terms.
-    pub(super) refused: Option<String>,
-    /// What is to be known.
-    pub(super) remarks: Vec<String>,
-    /// Whether a drift with time was estimated beside the terms, which is no part of the document.
-    pub(super) drifts: bool,
-    /// Whether the sensor does not work at all.
-    pub(super) dead: bool,
-    /// Whether temperature does nothing to it.
-    pub(super) flat: bool,
-}
-
-impl Found {
-    pub(super) fn refused(why: &str) -> Self {
-        Self { refused: Some(why.to_owned()), ..Self::default() }
-    }
-
-    /// A sensor that temperature does nothing to; where its level is known, that is its bias.
-    pub(super) fn flat(level: &Solution, known: bool) -> Self {
-        let constant = level.coefficients.first().zip(level.sigmas.first()).filter(|_| known);
-        Self {
-            terms: constant.map(|(value, sigma)| (Term::Static(0), *value, *sigma)).into_iter().collect(),
-            words: "constant".to_owned(),
-            flat: true,
-            ..Self::default()
-        }
-    }
-
-    pub(super) fn sequential(terms: Vec<(Term, f64, f64)>, left: f64, mean: f64) -> Self {
-        if left <= WORTH_IT * mean {
-            return Self { terms, words: "plateaus, then Ṫ±, then T̈±".to_owned(), ..Self::default() };
-        }
-        Self::refused(&format!(
-            "nothing beats its mean: the terms leave {left:.3e}, the mean {mean:.3e}, in sample"
-        ))
-    }
-
-    pub(super) fn chosen(choice: Choice, spec: &Spec, solution: &Solution, level: bool) -> Self {
-        let terms = spec.terms(level).into_iter().zip(solution.coefficients.iter().zip(&solution.sigmas));
-        let mut remarks = Vec::new();
-        // A few are the fit's own business; more are somebody's.
-        if 10 * solution.outliers > solution.residual.len() {
-            remarks.push(format!(
-                "{} of {} windows were left out as spikes: look at the log, something disturbs the sensor",
-                solution.outliers,
-                solution.residual.len()
-            ));
-        }
-        if spec.trend {
-            remarks.push(
-                "it drifts with time besides temperature; the drift was estimated and is no part of the document: expect the level to \
-                 change from run to run"
-                    .to_owned(),
-            );
-        }
-        Self {
-            terms: terms.map(|(term, (value, sigma))| (term, *value, *sigma)).collect(),
-            words: spec.words(),
-            choice: Some(choice),
-            refused: None,
-            remarks,
-            drifts: spec.trend,
-            ..Self::default()
-        }
-    }
-}
 
 /// Everything that gathers on the way.
 #[derive(Debug)]
@@ -167,19 +87,25 @@ impl Outcome {
         self.found.sort_by_key(|(sensor, ..)| (!sensor.gyro, sensor.index));
         let before = Written::of(&self.plain())?;
         let window_s = self.settings.window_s.unwrap_or(self.settings.fit_window_s);
-        let (document, curves, mut verdicts, troubles) = loop {
-            let document = self.document();
+        let (document, curves, mut verdicts, troubles, compared) = loop {
+            let document = self.document(|found| &found.terms);
+            let compared = self.compared(&document, (runs, judges), &rest, &mut watch)?;
+            if self.take_simpler(&compared) {
+                continue;
+            }
             let written = Written::of(&document)?;
             let (mut curves, mut troubles) = (Vec::new(), Vec::new());
             let both =
                 runs.iter().map(|run| (run, Sample::In)).chain(judges.iter().map(|run| (run, Sample::Out)));
             for (index, (run, sample)) in both.enumerate() {
                 let stand = self.settings.stand(index);
+                let shares = sample == Sample::Out && runs.iter().any(|other| run.shares_log(other));
+                let rest = Rest { levels: shares.then(|| compared.levels()), ..rest(run, &stand)? };
                 let both_ways = judge(
                     run,
                     sample,
                     (&before.loaded, &written.loaded),
-                    (&written.document, &rest(run, &stand)?),
+                    (&written.document, &rest),
                     stand.window_s(window_s),
                     &mut watch,
                 )?;
@@ -199,9 +125,10 @@ impl Outcome {
             }
             // Every time round there is a sensor less.
             if !self.take_out(&verdicts) {
-                break (document, curves, verdicts, troubles);
+                break (document, curves, verdicts, troubles, compared);
             }
         };
+        let table = compared.table(&self, &curves);
         self.say(&mut verdicts);
         for (sensor, _, found) in self.found.iter().filter(|(_, _, found)| found.refused.is_none()) {
             self.warnings.extend(found.remarks.iter().map(|words| format!("{}: {words}", sensor.name)));
@@ -216,23 +143,23 @@ impl Outcome {
         }
         let any_accepted = self.found.iter().any(|(.., found)| found.refused.is_none());
         self.warnings.extend(any_accepted.then(|| self.kept_terms()).flatten());
-        let report = self.report(verdicts, curves);
+        let mut report = self.report(verdicts, curves);
+        report.tables.push((compare::HEADING.to_owned(), table));
         Ok(Fitted { written, report, any_accepted })
     }
 
     /// The document without the fitted terms, with the filter of the fit.
-    fn plain(&self) -> Document {
+    pub(super) fn plain(&self) -> Document {
         let mut document = self.bare.clone();
         document.temperature.filter = Some(self.filter.clone());
         document
     }
 
-    /// The document with what was found; a refused sensor keeps what it had.
-    fn document(&self) -> Document {
+    /// The document with what was found, or something else for it; a refused sensor keeps what it had.
+    pub(super) fn document(&self, of: impl for<'a> Fn(&'a Found) -> &'a Vec<(Term, f64, f64)>) -> Document {
         let mut document = self.plain();
         for (sensor, basis, found) in &self.found {
-            let terms: Vec<(Term, f64)> =
-                found.terms.iter().map(|(term, value, _)| (*term, *value)).collect();
+            let terms: Vec<(Term, f64)> = of(found).iter().map(|(term, value, _)| (*term, *value)).collect();
             if sensor.gyro {
                 let Some(gyro) = document.gyro.sensor.get_mut(sensor.index) else { continue };
                 match self.base.gyro.sensor.get(sensor.index).filter(|_| found.refused.is_some()) {
@@ -262,36 +189,18 @@ impl Outcome {
         document
     }
 
-    /// Takes the terms of sensors out whose axis became worse, or whose drift with time hides what they are worth; whether there
-    /// was one.
+    /// Takes the terms of sensors out whose axis became worse; whether there was one.
     fn take_out(&mut self, verdicts: &[Verdict]) -> bool {
         let mut worse = false;
         for verdict in verdicts {
             let mine = self.found.iter_mut().find(|(sensor, _, found)| {
                 axis_name(sensor).as_ref() == Some(&verdict.of) && found.refused.is_none()
             });
-            let Some((_, _, found)) = mine else { continue };
-            let judged = verdict.out_of_sample.is_some();
-            let [before, after] = verdict.in_sample.map(|size| size.rms);
-            let why = if !verdict.accepted {
-                let sample = if judged { "on the judging run" } else { "in sample" };
-                Some(format!("{sample} its {}", verdict.reason))
-            } else if found.drifts && !judged && after > LEFT_BESIDE_DRIFT * before {
-                Some(format!(
-                    "it drifts with time besides temperature, and its terms alone, without that drift, leave {:.0} % of its rms in \
-                     sample, more than {:.0} %: what is temperature and what is time cannot be told from this log. Judge it on another \
-                     run (--judge), or make one with a third pass",
-                    100.0 * after / before,
-                    100.0 * LEFT_BESIDE_DRIFT
-                ))
-            } else {
-                None
-            };
-            if let Some(why) = why {
-                found.refused = Some(why);
-                found.terms.clear();
-                worse = true;
-            }
+            let Some((_, _, found)) = mine.filter(|_| !verdict.accepted) else { continue };
+            let sample = if verdict.out_of_sample.is_some() { "on the judging run" } else { "in sample" };
+            found.refused = Some(format!("{sample} its {}", verdict.reason));
+            found.terms.clear();
+            worse = true;
         }
         worse
     }
@@ -389,7 +298,12 @@ fn constant(curves: &[Curve]) -> Vec<String> {
     words
 }
 
-/// The case axis that a sensor of a unit with three stands for, as the curves call it.
+/// The case axis that a sensor of a unit with three stands for, gyros first.
+pub(super) fn axis_of(sensor: &Sensor) -> Option<usize> {
+    (sensor.index < 3).then_some(sensor.index + if sensor.gyro { 0 } else { 3 })
+}
+
+/// The same, as the curves call it.
 fn axis_name(sensor: &Sensor) -> Option<String> {
     let axis = ["x", "y", "z"].get(sensor.index)?;
     Some(format!("{} {axis}", if sensor.gyro { "gyro" } else { "accelerometer" }))

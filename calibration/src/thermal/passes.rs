@@ -5,9 +5,10 @@
 //! have in common.
 
 use super::branches::History;
-use super::columns::Columns;
+use super::columns::{Columns, Term};
 use super::model::Spec;
-use super::select::Target;
+use super::noise::Noise;
+use super::select::{Target, Trials};
 
 /// Power of the static bias that a pass is told from the others by.
 const DEGREE: usize = 3;
@@ -25,11 +26,10 @@ pub fn share(
     if history.tells_dynamics() || !history.both_directions() {
         return None;
     }
-    let by_pass = History { piece: history.ramp.clone(), ..history.clone() };
-    let left = |degree: usize| {
-        let spec = Spec { degree, scale: target.widest_scale(), ..Spec::default() };
-        target.score(columns, &spec, &by_pass, temperature)
-    };
+    let terms: Vec<Term> = (0..=DEGREE).map(Term::Static).collect();
+    let trials = Trials::of(target, columns, &terms, &Noise::default(), (&history.ramp, temperature));
+    let left =
+        |degree: usize| trials.score(&Spec { degree, scale: target.widest_scale(), ..Spec::default() });
     Some(left(DEGREE)? / left(0)?)
 }
 

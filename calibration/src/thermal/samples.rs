@@ -8,15 +8,18 @@ use isotherm_log::offline::Loaded;
 use isotherm_protocol::document::{Curve, Document, Shape};
 
 use super::bare::along_axes;
-use super::thermometer::without_noise;
+use super::checks::median_step_s;
+use super::noise::Thermometer;
+use super::thermometer::{noise_of, without_noise};
 use crate::error::Error;
+use crate::robust::median;
 use crate::runs::series::Series;
 use crate::runs::table::{Rows, Table, Takes};
 use crate::runs::{Run, Troubles, Watch};
 use crate::written::Written;
 
 /// One run.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Samples {
     /// What the run is called.
     pub name: String,
@@ -34,6 +37,8 @@ pub struct Samples {
     pub responses: Vec<Vec<f64>>,
     /// Temperature readings by channel, without the noise of the thermometers.
     pub temperatures: BTreeMap<String, Vec<TemperatureReading>>,
+    /// The thermometers by channel.
+    pub thermometers: BTreeMap<String, Thermometer>,
     /// Smoothed temperatures by channel at the end of each window (°C).
     pub deg_c: BTreeMap<String, Vec<f64>>,
     /// What the correction passed over.
@@ -86,6 +91,7 @@ impl Samples {
             forces: of_forces,
             responses,
             temperatures: readings(series),
+            thermometers: thermometers(series),
             deg_c: temperature_deg_c,
             troubles,
         })
@@ -105,11 +111,7 @@ pub fn start_ns(series: &Series) -> i64 {
 pub fn readings(series: &Series) -> BTreeMap<String, Vec<TemperatureReading>> {
     let channel = |(name, channel): (&String, &crate::runs::series::Channel)| {
         let known = ChannelName::from(name).ok()?;
-        let first = channel.time_ns.first().copied().unwrap_or_default();
-        #[expect(clippy::cast_precision_loss, reason = "lengths of logs")]
-        let since_s = |time: &i64| time.saturating_sub(first) as f64 * 1e-9;
-        let time_s: Vec<f64> = channel.time_ns.iter().map(since_s).collect();
-        let pairs = channel.time_ns.iter().zip(without_noise(&time_s, &channel.raw));
+        let pairs = channel.time_ns.iter().zip(without_noise(&channel.since_s(), &channel.raw));
         let readings = pairs.map(|(time, raw)| TemperatureReading {
             channel: known,
             time: Timestamp::from_ns(*time),
@@ -118,6 +120,19 @@ pub fn readings(series: &Series) -> BTreeMap<String, Vec<TemperatureReading>> {
         Some((name.clone(), readings.collect()))
     };
     series.temperatures.iter().filter_map(channel).collect()
+}
+
+/// The thermometers of a series by channel.
+fn thermometers(series: &Series) -> BTreeMap<String, Thermometer> {
+    let thermometer = |(name, channel): (&String, &crate::runs::series::Channel)| {
+        let thermometer = Thermometer {
+            usual: median(&channel.raw),
+            sigma: noise_of(&channel.since_s(), &channel.raw),
+            step_s: median_step_s(&channel.time_ns),
+        };
+        (name.clone(), thermometer)
+    };
+    series.temperatures.iter().map(thermometer).collect()
 }
 
 /// A constant bias of one output unit on every accelerometer.

@@ -106,7 +106,7 @@ pub fn smoothed(shown: &[f64], run: &[usize], temperature: &[f64], [low, high]: 
         };
         let powers = [power(0), power(1), power(2), power(3)];
         let columns: Vec<&[f64]> = powers.iter().map(Vec::as_slice).collect();
-        let Some(solution) = once(&columns, &values, &vec![1.0; rows.len()]) else { continue };
+        let Some(solution) = once(&columns, &values, &vec![1.0; rows.len()], None) else { continue };
         for (row, (value, left)) in rows.iter().zip(values.iter().zip(&solution.residual)) {
             smooth[*row] = value - left;
         }

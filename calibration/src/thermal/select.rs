@@ -1,24 +1,25 @@
-//! Cross-validation: which terms survive on stretches that they were not fitted to.
+//! Cross-validation: which model survives on stretches that it was not fitted to.
 
 use std::borrow::Cow;
 
+use nalgebra::DMatrix;
+
 use super::branches::History;
 use super::columns::{Columns, Term};
-use super::model::{Dynamics, Spec};
+use super::ladder::{Plan, statics};
+use super::model::Spec;
+use super::noise::Noise;
 use super::scale::{self, Kept};
-use crate::lsq::weighted::{Pieces, Solution, once, solve};
+use crate::lsq::folds::{Folds, Shrink};
+use crate::lsq::weighted::{Solution, once, solve};
 use crate::robust::{block_length, is_white, median_if_any};
 
 /// Score of a larger model, as a share of that of a smaller one, above which the smaller one is kept.
 const NO_BETTER: f64 = 0.985;
-/// Likewise for the drift with time, which stays out of the document and must be plain to be believed.
-const PLAIN_DRIFT: f64 = 0.8;
-/// Likewise for T̈, whose gain passes the thermometer's noise on as no other term does: what cross-validation sees is means over
-/// minutes, in which that noise has gone, and a near-tie there costs many times what it gains in single ticks.
-const PLAIN_ACCELERATION: f64 = 0.8;
+/// Likewise for a static bias alone beside what the other sensors of its channel have: one log tells little of one sensor.
+const PLAINLY_STATIC: f64 = 0.8;
 /// Largest share of the mean's score with which an axis is accepted.
 pub const WORTH_IT: f64 = 0.9;
-
 /// How many times what is usual a temperature may count.
 const CROWDED: f64 = 3.0;
 
@@ -31,8 +32,6 @@ pub struct Target {
     pub weights: Vec<f64>,
     /// By window: its run.
     pub run: Vec<usize>,
-    /// By window: time since its run's beginning as a share of the run, −0.5 to 0.5.
-    pub share: Vec<f64>,
     /// Whether the level is known; otherwise each run has one of its own.
     pub level: bool,
     /// What a scale factor error of 1 ppm adds in each window; `None` where the scale factor stays.
@@ -48,7 +47,7 @@ pub struct Tried {
     pub spec: Spec,
     /// Number of its coefficients in the document.
     pub count: usize,
-    /// Root mean square of what it leaves on stretches that it did not see.
+    /// Root mean square of what it leaves on stretches that it did not see, with the thermometer's noise that it passes on.
     pub score: f64,
 }
 
@@ -72,15 +71,11 @@ impl Choice {
 }
 
 impl Target {
-    /// Columns that take part in the fit and stay out of the document: a level for each run, and a drift with time.
-    fn nuisance(&self, trend: bool) -> Vec<Vec<f64>> {
+    /// Columns that take part in the fit and stay out of the document: a level for each run where it is not known.
+    fn levels(&self) -> Vec<Vec<f64>> {
         let runs = self.run.last().map_or(0, |last| last + 1);
-        let only = |of: usize, value: &dyn Fn(usize) -> f64| {
-            (0..self.run.len()).map(|row| if self.run[row] == of { value(row) } else { 0.0 }).collect()
-        };
-        let levels = (0..if self.level { 0 } else { runs }).map(|of| only(of, &|_| 1.0));
-        let drifts = (0..if trend { runs } else { 0 }).map(|of| only(of, &|row| self.share[row]));
-        levels.chain(drifts).collect()
+        let only = |of: usize| self.run.iter().map(|run| f64::from(u8::from(*run == of))).collect();
+        (0..if self.level { 0 } else { runs }).map(only).collect()
     }
 
     /// The largest scale factor error that the runs can tell.
@@ -89,10 +84,10 @@ impl Target {
         self.scale.as_ref().map(|_| scale::HIGHEST)
     }
 
-    /// The columns of a model, in the order of its terms, those that stay out of the document behind.
-    fn design<'a>(&self, columns: &'a Columns<'_>, spec: &Spec) -> Vec<Cow<'a, [f64]>> {
-        let nuisance = self.nuisance(spec.trend).into_iter().map(Cow::Owned);
-        spec.terms(self.level).into_iter().map(|term| self.column(columns, term)).chain(nuisance).collect()
+    /// Columns of terms, and behind them those that stay out of the document.
+    fn design<'a>(&self, columns: &'a Columns<'_>, terms: &[Term]) -> Vec<Cow<'a, [f64]>> {
+        let levels = self.levels().into_iter().map(Cow::Owned);
+        terms.iter().map(|term| self.column(columns, *term)).chain(levels).collect()
     }
 
     /// The column of a term that was made; those of the scale factor are the sensor's own.
@@ -107,16 +102,23 @@ impl Target {
         }
     }
 
-    /// Solves for a model; the coefficients come in the order of its terms, those that stay out of the document behind.
+    /// Solves for a model without shrinking; the coefficients come in the order of its terms, those that stay out of the document behind.
     #[must_use]
     pub fn solve(&self, columns: &Columns<'_>, spec: &Spec, robust: bool) -> Option<Solution> {
-        let design = self.design(columns, spec);
+        self.held(columns, spec, robust, None)
+    }
+
+    fn held(
+        &self,
+        columns: &Columns<'_>,
+        spec: &Spec,
+        robust: bool,
+        holding: Option<&DMatrix<f64>>,
+    ) -> Option<Solution> {
+        let design = self.design(columns, &spec.terms(self.level));
         let all: Vec<&[f64]> = design.iter().map(AsRef::as_ref).collect();
-        if robust {
-            solve(&all, &self.values, &self.weights)
-        } else {
-            once(&all, &self.values, &self.weights)
-        }
+        let solve = if robust { solve } else { once };
+        solve(&all, &self.values, &self.weights, holding)
     }
 
     /// The level, and nothing else, where what it leaves is no more than noise.
@@ -124,175 +126,194 @@ impl Target {
     pub fn flat(&self, columns: &Columns<'_>) -> Option<Solution> {
         self.solve(columns, &Spec::default(), true).filter(|level| is_white(&level.residual))
     }
+}
 
-    /// Root mean square of what a model leaves on pieces that were left out one by one, over temperatures that the others have
-    /// too. `None` where too little can be judged.
+/// One sensor's rows, ready to be judged with any model of some terms.
+#[derive(Debug)]
+pub struct Trials<'a> {
+    target: &'a Target,
+    /// All terms.
+    terms: Vec<Term>,
+    folds: Folds,
+    /// Covariance of all terms and levels from the thermometer's noise.
+    noise: DMatrix<f64>,
+}
+
+impl<'a> Trials<'a> {
+    /// Of a sensor with all terms that are to be tried, whose columns were made; windows by piece and temperature (°C), the point about
+    /// which powers are taken.
     #[must_use]
-    pub fn score(
-        &self,
+    pub fn of(
+        target: &'a Target,
         columns: &Columns<'_>,
-        spec: &Spec,
-        history: &History,
-        temperature: &[f64],
-    ) -> Option<f64> {
-        let design = self.design(columns, spec);
+        terms: &[Term],
+        noise: &Noise,
+        (piece, temperature): (&[usize], &[f64]),
+    ) -> Self {
+        let first = usize::from(!target.level);
+        let widest = target.widest_scale().into_iter().flat_map(|widest| (first..=widest).map(Term::Scale));
+        let mut terms: Vec<Term> = terms.iter().copied().chain(widest).collect();
+        terms.sort_unstable();
+        terms.dedup();
+        let design = target.design(columns, &terms);
         let all: Vec<&[f64]> = design.iter().map(AsRef::as_ref).collect();
-        let pieces = history.piece.iter().max().map_or(0, |last| last + 1);
         // White noise is in every model alike: averaged over some windows it no longer hides which of them is better.
-        let block = block_length(self.values.len());
-        let (mut square, mut weight, mut judged) = (0.0, 0.0, 0);
-        let fits = Pieces::of(&all, &self.values, &self.weights, &history.piece);
-        for left_out in 0..pieces {
-            let others = (0..self.values.len()).filter(|&row| history.piece[row] != left_out);
-            let judging = others.filter(|&row| self.weights[row] > 0.0 && temperature[row].is_finite());
-            let (low, high) = judging.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), row| {
-                (low.min(temperature[row]), high.max(temperature[row]))
-            });
-            let rows: Vec<usize> = (0..self.values.len())
-                .filter(|&row| {
-                    history.piece[row] == left_out
-                        && self.weights[row] > 0.0
-                        && self.values[row].is_finite()
-                        && (low..=high).contains(&temperature[row])
-                })
-                .collect();
-            if rows.len() < 3 {
-                continue;
-            }
-            let Some(coefficients) = fits.without(left_out) else { continue };
-            let residual = |row: usize| {
-                let terms = all.iter().zip(&coefficients);
-                terms.fold(self.values[row], |left, (column, c)| left - c * column[row])
-            };
-            for block in rows.chunks(block) {
-                let left = block.iter().map(|&row| (self.weights[row], residual(row)));
-                let (sum, share) = left
-                    .filter(|(_, left)| left.is_finite())
-                    .fold((0.0, 0.0), |(sum, share), (w, left)| (sum + w * left, share + w));
-                if share > 0.0 {
-                    let mean = sum / share;
-                    square += share * mean * mean;
-                    weight += share;
-                }
-            }
-            judged += 1;
-        }
-        (judged >= 2 && weight > 0.0).then(|| (square / weight).sqrt())
+        let block = block_length(target.values.len());
+        let known = ranges(target, piece, temperature);
+        let is_judged = |row: usize| {
+            let [low, high] = known.get(piece[row]).copied().unwrap_or([f64::INFINITY, f64::NEG_INFINITY]);
+            (low..=high).contains(&temperature[row])
+        };
+        let folds = Folds::of(&all, (&target.values, &target.weights), piece, is_judged, block);
+        let away: Vec<f64> = temperature.iter().map(|t| t - columns.basis().reference_deg_c).collect();
+        let noise = DMatrix::from_fn(all.len(), all.len(), |i, j| match (terms.get(i), terms.get(j)) {
+            (Some(a), Some(b)) => noise.covariance(*a, *b, &away),
+            _ => 0.0,
+        });
+        Self { target, terms, folds, noise }
     }
 
-    /// Scores the models of all degrees and dynamics and chooses the smallest that is as good as the best.
-    #[must_use]
-    pub fn choose(
-        &self,
-        columns: &Columns<'_>,
-        (degrees, dynamics): (&[usize], &[Dynamics]),
-        (history, temperature): (&History, &[f64]),
-    ) -> Choice {
-        let constant = Spec::default();
-        let mean = self.score(columns, &constant, history, temperature).unwrap_or(f64::NAN);
-        let mut tried = Vec::new();
-        let mut try_one = |spec: Spec| {
-            let score = self.score(columns, &spec, history, temperature)?;
-            let count = spec.terms(self.level).len();
-            tried.push(Tried { spec, count, score });
-            Some(score)
+    /// Places of a model's columns, those that stay out of the document behind.
+    fn places(&self, spec: &Spec) -> Vec<usize> {
+        let place = |term: Term| self.terms.iter().position(|other| *other == term);
+        let levels = self.terms.len()..self.noise.nrows();
+        spec.terms(self.target.level).into_iter().filter_map(place).chain(levels).collect()
+    }
+
+    /// What stands against each coefficient of a model.
+    fn shares(&self, spec: &Spec) -> Vec<f64> {
+        let share = |term: &Term| match term {
+            Term::Static(_) | Term::Scale(_) => 0.0,
+            _ => spec.shrink,
         };
-        for dynamics in dynamics {
-            for &degree in degrees {
-                try_one(Spec {
-                    degree,
-                    dynamics: dynamics.clone(),
-                    trend: false,
-                    scale: self.widest_scale(),
-                });
-            }
+        let levels = self.terms.len()..self.noise.nrows();
+        self.terms.iter().map(share).chain(levels.map(|_| 0.0)).collect()
+    }
+
+    /// Root mean square of what a model leaves on pieces that were left out one by one, over temperatures that the others have too, with
+    /// the noise that it passes on. `None` where too little can be judged.
+    #[must_use]
+    pub fn score(&self, spec: &Spec) -> Option<f64> {
+        let share = self.shares(spec);
+        self.folds.score(&self.places(spec), Shrink { share: &share, noise: &self.noise })
+    }
+
+    /// A model with its score.
+    #[must_use]
+    pub fn tried(&self, spec: Spec) -> Option<Tried> {
+        let (score, count) = (self.score(&spec)?, spec.terms(self.target.level).len());
+        Some(Tried { spec, count, score })
+    }
+
+    /// Solves for a model, its coefficients held as it says.
+    #[must_use]
+    pub fn solve(&self, columns: &Columns<'_>, spec: &Spec) -> Option<Solution> {
+        let share = self.shares(spec);
+        let shrink = Shrink { share: &share, noise: &self.noise };
+        let holding = self.folds.holding(&self.places(spec), shrink)?;
+        self.target.held(columns, spec, true, Some(&holding))
+    }
+
+    /// Root mean square of the thermometer's noise that found coefficients of terms pass on.
+    #[must_use]
+    pub fn passed_on(&self, found: &[(Term, f64)]) -> f64 {
+        let placed: Vec<(usize, f64)> = found
+            .iter()
+            .filter_map(|(term, c)| Some((self.terms.iter().position(|other| other == term)?, *c)))
+            .collect();
+        let row =
+            |&(i, a): &(usize, f64)| -> f64 { placed.iter().map(|&(j, b)| a * b * self.noise[(i, j)]).sum() };
+        placed.iter().map(row).sum::<f64>().max(0.0).sqrt()
+    }
+
+    /// Chooses a sensor's model: what its channel has chosen for all, or a static bias alone where that is plainly better.
+    #[must_use]
+    pub fn choose(&self, tried: Vec<Tried>, plan: Option<Spec>, history: &History, largest: bool) -> Choice {
+        let widest = self.target.widest_scale();
+        let mean = self.score(&Spec::default()).unwrap_or(f64::NAN);
+        let statics: Vec<Tried> =
+            statics(history, widest).into_iter().filter_map(|spec| self.tried(spec)).collect();
+        let plan = plan.and_then(|spec| self.tried(spec));
+        let limit = plan.as_ref().map_or(f64::INFINITY, |plan| PLAINLY_STATIC * plan.score);
+        let mut candidates: Vec<Tried> =
+            statics.iter().filter(|tried| tried.score < limit).cloned().collect();
+        if candidates.is_empty() {
+            candidates.extend(plan);
         }
-        let mut chosen = smallest(&tried);
-        if let Some(least) = chosen.and_then(|index| tried.get(index)).map(|best| best.score) {
-            let drifting = self.with_drift(columns, &tried, (history, temperature));
-            let first = tried.len();
-            tried.extend(drifting);
-            let plain = |(index, tried): (usize, &Tried)| {
-                (tried.score < PLAIN_DRIFT * least).then_some((index, tried.score))
-            };
-            let best =
-                tried.iter().enumerate().skip(first).filter_map(plain).min_by(|a, b| a.1.total_cmp(&b.1));
-            chosen = best.map_or(chosen, |(index, _)| Some(index));
-        }
-        let chosen =
-            chosen.and_then(|index| self.least_scale(columns, &mut tried, index, (history, temperature)));
+        let mut tried = [statics, tried].concat();
+        let chosen = if largest {
+            tried.iter().max_by(|a, b| a.count.cmp(&b.count).then(b.score.total_cmp(&a.score))).cloned()
+        } else {
+            smallest(&candidates).map(|best| self.least_scale(&mut tried, best))
+        };
+        let chosen = chosen.map(|chosen| {
+            let place = tried.iter().position(|other| other.spec == chosen.spec);
+            place.unwrap_or_else(|| {
+                tried.push(chosen);
+                tried.len() - 1
+            })
+        });
         Choice { mean, tried, chosen }
     }
-}
 
-impl Target {
     /// Tries the chosen model with smaller scale factor errors, and without: the smallest that is as good.
-    fn least_scale(
-        &self,
-        columns: &Columns<'_>,
-        tried: &mut Vec<Tried>,
-        chosen: usize,
-        (history, temperature): (&History, &[f64]),
-    ) -> Option<usize> {
-        let first = tried.len();
-        let (widest, own) = (self.widest_scale(), tried.get(chosen)?.clone());
-        let smaller =
-            widest.into_iter().flat_map(|widest| (usize::from(!self.level)..widest).map(Some).chain([None]));
-        for scale in smaller {
-            let spec = Spec { scale, ..own.spec.clone() };
-            if let Some(score) = self.score(columns, &spec, history, temperature) {
-                tried.push(Tried { count: spec.terms(self.level).len(), spec, score });
-            }
-        }
-        let mut among: Vec<usize> = (first..tried.len()).collect();
-        among.push(chosen);
-        let models: Vec<Tried> = among.iter().filter_map(|&index| tried.get(index).cloned()).collect();
-        smallest(&models).and_then(|best| among.get(best).copied())
-    }
-
-    /// The best model of each kind of dynamics once more, beside a drift with time.
-    fn with_drift(
-        &self,
-        columns: &Columns<'_>,
-        tried: &[Tried],
-        (history, temperature): (&History, &[f64]),
-    ) -> Vec<Tried> {
-        let mut drifting: Vec<Tried> = Vec::new();
-        for one in tried {
-            let name = &one.spec.dynamics.name;
-            // Without a dynamic term a drift takes what a lag has left, and the next run pays for it.
-            if one.spec.dynamics.terms.is_empty()
-                || drifting.iter().any(|done| done.spec.dynamics.name == *name)
-            {
-                continue;
-            }
-            let same = tried.iter().filter(|other| other.spec.dynamics.name == *name);
-            let Some(best) = same.min_by(|a, b| a.score.total_cmp(&b.score)) else { continue };
-            let spec = Spec { trend: true, ..best.spec.clone() };
-            if let Some(score) = self.score(columns, &spec, history, temperature) {
-                drifting.push(Tried { spec, count: best.count, score });
-            }
-        }
-        drifting
+    fn least_scale(&self, tried: &mut Vec<Tried>, chosen: &Tried) -> Tried {
+        let widest = self.target.widest_scale();
+        let smaller = widest
+            .into_iter()
+            .flat_map(|widest| (usize::from(!self.target.level)..widest).map(Some).chain([None]));
+        let mut models: Vec<Tried> =
+            smaller.filter_map(|scale| self.tried(Spec { scale, ..chosen.spec.clone() })).collect();
+        tried.extend(models.iter().cloned());
+        models.push(chosen.clone());
+        smallest(&models).unwrap_or(chosen).clone()
     }
 }
 
-/// The smallest model that is hardly worse than the best; one with T̈ where all without are plainly worse.
-fn smallest(tried: &[Tried]) -> Option<usize> {
-    let has_acceleration =
-        |tried: &Tried| tried.spec.dynamics.terms.iter().any(|term| matches!(term, Term::Acceleration(..)));
-    let least = |acceleration: bool| {
-        let own = tried.iter().filter(|tried| has_acceleration(tried) == acceleration);
-        own.map(|tried| tried.score).fold(f64::INFINITY, f64::min)
+/// What all sensors of a channel are explained best by together: the plan, how much it is shrunk, and the mean logarithm of their scores.
+/// One log tells little of how much to believe; what conducts heat to one sensor does so to all.
+#[must_use]
+pub fn together(plans: &[Plan], trials: &[(bool, &Trials<'_>)]) -> Option<(usize, f64, f64)> {
+    let mut best: Option<(usize, f64, f64)> = None;
+    for (index, plan) in plans.iter().enumerate() {
+        for &shrink in &plan.shrinks {
+            let score = |(gyro, trials): &(bool, &Trials<'_>)| {
+                trials.score(&plan.spec(*gyro, trials.target.widest_scale(), shrink)).map(libm::log)
+            };
+            let Some(scores) = trials.iter().map(score).collect::<Option<Vec<f64>>>() else { continue };
+            let sum: f64 = scores.iter().sum();
+            if !scores.is_empty() && best.is_none_or(|(.., least)| sum < least) {
+                best = Some((index, shrink, sum));
+            }
+        }
+    }
+    best
+}
+
+/// By piece: the range of temperatures (°C) that the other pieces have.
+fn ranges(target: &Target, piece: &[usize], temperature: &[f64]) -> Vec<[f64; 2]> {
+    let count = piece.iter().max().map_or(0, |last| last + 1);
+    let mut own = vec![[f64::INFINITY, f64::NEG_INFINITY]; count];
+    for (row, piece) in piece.iter().enumerate() {
+        let t = temperature[row];
+        if t.is_finite() && target.weights[row] > 0.0 {
+            own[*piece] = [own[*piece][0].min(t), own[*piece][1].max(t)];
+        }
+    }
+    let of_others = |left_out: usize| {
+        let others = own.iter().enumerate().filter(|(piece, _)| *piece != left_out);
+        others.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], (_, own)| {
+            [low.min(own[0]), high.max(own[1])]
+        })
     };
-    let plain = least(true) < PLAIN_ACCELERATION * least(false);
-    let best = least(plain);
-    let among = tried.iter().enumerate().filter(|(_, tried)| plain || !has_acceleration(tried));
-    let good = among.filter(|(_, tried)| tried.score * NO_BETTER <= best);
-    good.min_by(|(_, a), (_, b)| {
-        (a.count, a.score).partial_cmp(&(b.count, b.score)).unwrap_or(std::cmp::Ordering::Equal)
-    })
-    .map(|(index, _)| index)
+    (0..count).map(of_others).collect()
+}
+
+/// The smallest model that is hardly worse than the best.
+fn smallest(tried: &[Tried]) -> Option<&Tried> {
+    let best = tried.iter().map(|tried| tried.score).fold(f64::INFINITY, f64::min);
+    let good = tried.iter().filter(|tried| tried.score * NO_BETTER <= best);
+    good.min_by(|a, b| a.count.cmp(&b.count).then(a.score.total_cmp(&b.score)))
 }
 
 /// Weights that keep slow parts from dominating: no temperature counts for more than `CROWDED` times what is usual, so that a hold of
@@ -315,29 +336,4 @@ pub fn equal_temperature(temperature: &[f64], at_rest: &[bool], [low, high]: [f6
         (usual / among.max(1.0)).clamp(0.1, 1.0)
     };
     windows().map(weight).collect()
-}
-
-/// All terms that some models have.
-#[must_use]
-pub fn terms_of(degrees: &[usize], dynamics: &[Dynamics]) -> Vec<Term> {
-    let highest = degrees.iter().copied().max().unwrap_or(0);
-    (0..=highest).map(Term::Static).chain(dynamics.iter().flat_map(|d| d.terms.iter().copied())).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::thermal::search::{lags, leading};
-
-    #[test]
-    fn a_gain_on_the_acceleration_must_be_plain() {
-        let lags = lags(&[3.0, 27.0, 250.0], 1);
-        let tried = |dynamics: &Dynamics, score: f64| {
-            let spec = Spec { degree: 3, dynamics: dynamics.clone(), ..Spec::default() };
-            Tried { count: spec.terms(true).len(), spec, score }
-        };
-        let chosen = |score: f64| smallest(&[tried(&lags, 1.0), tried(&leading(&lags), score)]);
-        assert_eq!([0.97, 0.9, 0.7].map(chosen), [Some(0), Some(0), Some(1)]);
-        assert_eq!(smallest(&[tried(&leading(&lags), 1.0)]), Some(0), "there is no other");
-    }
 }

@@ -69,7 +69,7 @@ pub fn find(columns: &Columns<'_>, target: &Target, history: &History, steps: &[
         let own: Vec<_> = terms.iter().map(|term| target.column(columns, *term)).collect();
         let all: Vec<&[f64]> =
             own.iter().map(AsRef::as_ref).chain(levels.iter().map(Vec::as_slice)).collect();
-        let solution = solve(&all, &target.values, &resting).ok_or("too few windows on plateaus")?;
+        let solution = solve(&all, &target.values, &resting, None).ok_or("too few windows on plateaus")?;
         let found: Vec<(Term, f64, f64)> = terms
             .iter()
             .zip(solution.coefficients.iter().zip(&solution.sigmas))
@@ -94,7 +94,7 @@ pub fn find(columns: &Columns<'_>, target: &Target, history: &History, steps: &[
                 left.iter_mut().zip(columns.get(*term)).for_each(|(left, column)| *left -= value * column);
             }
             let own: Vec<&[f64]> = parts[step].iter().map(|(term, ..)| columns.get(*term)).collect();
-            let solution = solve(&own, &left, &moving).ok_or("too few windows on ramps")?;
+            let solution = solve(&own, &left, &moving, None).ok_or("too few windows on ramps")?;
             for (i, (_, value, sigma)) in parts[step].iter_mut().enumerate() {
                 let new = solution.coefficients[i];
                 still &= (new - *value).abs() <= STILL * new.abs();

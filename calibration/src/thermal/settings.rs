@@ -9,10 +9,8 @@ use super::stand::{Site, Stand};
 pub enum Method {
     /// 000: the static bias from the plateaus, then the rate's share, then the acceleration's, one after the other.
     Sequential,
-    /// All terms at once, lags on a fixed ladder of time constants among them.
+    /// All terms at once: static bias, lags on a ladder of time constants with gains that follow temperature, T̈.
     Joint,
-    /// Lags whose time constants are searched, with gains that may follow temperature.
-    Lag,
 }
 
 impl Method {
@@ -22,7 +20,6 @@ impl Method {
         match self {
             Self::Sequential => "sequential",
             Self::Joint => "joint",
-            Self::Lag => "lag",
         }
     }
 }

@@ -21,6 +21,9 @@ use crate::written::Written;
 /// Shortest windows of a levelling (s).
 const LEVELLING_S: f64 = 60.0;
 
+/// What a run's beginning is left out for (s): derivatives and fast lags rest on the guess that nothing had moved before.
+const SETTLED_S: f64 = 60.0;
+
 /// What a unit without error would put out during a run, over whole turns where it is turned: then the accelerometers, which feel
 /// the table too, have none.
 pub(super) fn rest(run: &Run, document: &Document, stand: &Stand, watch: impl Watch) -> Result<Rest, Error> {
@@ -49,12 +52,12 @@ pub(super) fn rest(run: &Run, document: &Document, stand: &Stand, watch: impl Wa
     })?;
     let deg_per_h = rate.map(|rate| AngularRate::from_rad_per_s(rate).as_deg_per_h());
     Ok(match &stand.turning {
-        None => Rest { rate_deg_per_h: Some(deg_per_h), force_m_per_s2: *force_m_per_s2 },
+        None => Rest { rate_deg_per_h: Some(deg_per_h), force_m_per_s2: *force_m_per_s2, ..Rest::default() },
         Some(turning) => {
             let along: f64 = turning.axis.iter().zip(deg_per_h).map(|(a, e)| a * e).sum();
             let table = turning.rate_deg_per_h();
             let rate = [0, 1, 2].map(|axis| table[axis] + along * turning.axis[axis]);
-            Rest { rate_deg_per_h: Some(rate), force_m_per_s2: None }
+            Rest { rate_deg_per_h: Some(rate), ..Rest::default() }
         }
     })
 }
@@ -108,8 +111,6 @@ pub(super) fn target(
         let responses = run.responses.get(sensor.index);
         // Whatever it feels goes through a scale factor that may follow temperature: what it felt on the whole is no part of its bias.
         let usual = Size::of(outputs).mean;
-        #[expect(clippy::cast_precision_loss, reason = "windows of a log")]
-        let count = run.time_s.len() as f64;
         for (row, output) in outputs.iter().enumerate() {
             let response =
                 if sensor.gyro { 1.0 } else { responses.and_then(|r| r.get(row)).copied().unwrap_or(1.0) };
@@ -122,8 +123,6 @@ pub(super) fn target(
             };
             target.values.push((output - expected) / response);
             target.run.push(index);
-            #[expect(clippy::cast_precision_loss, reason = "windows of a log")]
-            target.share.push(row as f64 / count - 0.5);
             inputs.push(input);
             shown.push(*output);
             per_input.push(1e-6 / response);
@@ -136,6 +135,13 @@ pub(super) fn target(
         // A longer window has less noise.
         *weight *= samples.get(*run).map_or(1.0, |run| run.window_s / usual_s);
     }
+    let since = samples.iter().flat_map(|run| &run.time_s);
+    target
+        .weights
+        .iter_mut()
+        .zip(since)
+        .filter(|(_, since)| **since < SETTLED_S)
+        .for_each(|(weight, _)| *weight = 0.0);
     let (temperature, range) = (&known.temperature, known.history.range_deg_c);
     match told(sensor.gyro, &inputs, temperature, range) {
         Err(why) => target.kept = Some(why),

@@ -42,13 +42,7 @@ struct Local {
 /// spikes, and readings that come again or too late, stay as they are.
 #[must_use]
 pub fn without_noise(time_s: &[f64], readings: &[f64]) -> Vec<f64> {
-    let mut rows: Vec<usize> = Vec::with_capacity(readings.len());
-    for row in 0..readings.len().min(time_s.len()) {
-        let goes_on = rows.last().is_none_or(|last| time_s[row] > time_s[*last]);
-        if goes_on && readings[row].is_finite() && !is_spike(readings, row) {
-            rows.push(row);
-        }
-    }
+    let rows = sound(time_s, readings);
     let bins = bins(&rows, time_s, readings);
     let good: Vec<f64> = rows.iter().map(|&row| readings[row]).collect();
     let Some(sigma) = sigma(&bins, &good) else { return readings.to_vec() };
@@ -69,6 +63,29 @@ pub fn without_noise(time_s: &[f64], readings: &[f64]) -> Vec<f64> {
         smoothed[row] = (1.0 - share) * of(before) + share * of(after);
     }
     smoothed
+}
+
+/// Standard deviation of the white noise of a reading; zero for too few.
+#[must_use]
+#[expect(clippy::cast_precision_loss, reason = "readings of a log")]
+pub fn noise_of(time_s: &[f64], readings: &[f64]) -> f64 {
+    let rows = sound(time_s, readings);
+    let bins = bins(&rows, time_s, readings);
+    let good: Vec<f64> = rows.iter().map(|&row| readings[row]).collect();
+    let in_a_bin = rows.len() as f64 / bins.len().max(1) as f64;
+    sigma(&bins, &good).map_or(0.0, |sigma| sigma * in_a_bin.sqrt())
+}
+
+/// Rows of readings that are neither spikes nor repeated.
+fn sound(time_s: &[f64], readings: &[f64]) -> Vec<usize> {
+    let mut rows: Vec<usize> = Vec::with_capacity(readings.len());
+    for row in 0..readings.len().min(time_s.len()) {
+        let goes_on = rows.last().is_none_or(|last| time_s[row] > time_s[*last]);
+        if goes_on && readings[row].is_finite() && !is_spike(readings, row) {
+            rows.push(row);
+        }
+    }
+    rows
 }
 
 impl Local {
@@ -205,6 +222,11 @@ mod tests {
             let (time, truth, shown) = chamber(noise, resolution);
             let smoothed = without_noise(&time, &shown);
             let (before, after) = (rms(&shown, &truth), rms(&smoothed, &truth));
+            assert!(
+                (noise_of(&time, &shown) / before - 1.0).abs() < 0.2,
+                "{} {before}",
+                noise_of(&time, &shown)
+            );
             assert!(after < 0.4 * before, "{noise} {resolution}: {before} → {after}");
             let corner = |of: &[f64]| rms(&of[1180..1220], &truth[1180..1220]);
             assert!(corner(&smoothed) < 2.0 * corner(&shown), "{noise}: {}", corner(&smoothed));

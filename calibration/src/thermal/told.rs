@@ -1,12 +1,13 @@
 //! What is said of a thermal fit: the origin in the document, and the report.
 
-use isotherm_log::plot::page::Table;
+use isotherm_pages::Table;
 use isotherm_protocol::document::{Document, Origin};
 
 use super::columns::Basis;
 use super::fit::Sensor;
+use super::found::Found;
 use super::model::described;
-use super::outcome::{Found, Outcome};
+use super::outcome::Outcome;
 use super::scale::Kept;
 use super::select::{Target, Tried};
 use crate::drift::figures::short;
@@ -139,8 +140,7 @@ fn validation(found: &[(Sensor, Basis, Found)]) -> Option<Table> {
     let mut rows = Vec::new();
     for (sensor, _, found) in found {
         let Some(choice) = &found.choice else { continue };
-        let kind_of =
-            |tried: &'_ Tried| (tried.spec.dynamics.name.clone(), tried.spec.trend, tried.spec.scale);
+        let kind_of = |tried: &'_ Tried| (tried.spec.dynamics.name.clone(), tried.spec.scale);
         let mut kinds: Vec<&Tried> = Vec::new();
         for tried in &choice.tried {
             match kinds.iter_mut().find(|kind| kind_of(kind) == kind_of(tried)) {

@@ -296,7 +296,7 @@ fn of_a_thermal_fit_to_recordings_with_accelerometers() {
         record_one(Path::new(log), &Scenario { chamber, ..fibre_optic(seed, "FOG-0001", seconds) });
     }
     let document = text_of(&shipped("FOG-0001.toml"));
-    for method in ["sequential", "joint", "lag"] {
+    for method in ["sequential", "joint"] {
         let out = path(&format!("{method}.toml"));
         let fit =
             ["thermal", &train, "--judge", &judge, "--method", method, "--window", "20", "--accept-partial"];

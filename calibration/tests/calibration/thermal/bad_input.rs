@@ -269,7 +269,7 @@ fn one_direction_and_too_few_plateaus_are_told() {
 #[test]
 fn readings_every_ten_seconds_are_fitted() {
     // Time constants of the ladders that the readings cannot carry were all set to the shortest that they can.
-    for method in [Method::Joint, Method::Lag] {
+    for method in [Method::Joint] {
         let made = tried(thermometer_at(|s| s % 10 == 0), method).unwrap();
         assert!(made.report.accepted(), "{}", made.report.to_text());
         for verdict in &made.report.verdicts {
@@ -324,7 +324,7 @@ fn an_axis_that_temperature_does_nothing_to_is_a_good_one() {
             second
         })
     };
-    for method in [Method::Joint, Method::Lag, Method::Sequential] {
+    for method in [Method::Joint, Method::Sequential] {
         let made = tried(flat(), method).unwrap();
         let verdict = made.report.verdicts.iter().find(|verdict| verdict.of == "gyro y").unwrap();
         assert!(verdict.accepted, "{method:?}: {}", verdict.words());

@@ -62,10 +62,10 @@ fn out_of_sample(path: &std::path::Path, written: &Written) -> [[f64; 2]; 6] {
     })
 }
 
-/// Rms and deviation out of sample of cubic and of cubic + Ṫ, whichever is better, and of the cubic, as measured on this log with
-/// least squares and equal weights: gx, gy, gz (°/s), ax, ay, az (m/s²).
+/// Rms out of sample of the cubic, as measured on this log with least squares and equal weights: gx, gy, gz (°/s), ax, ay, az (m/s²);
+/// and the share of it that a document may leave.
 const CUBIC: [f64; 6] = [9.37e-3, 1.43e-3, 2.73e-3, 1.06e-2, 3.44e-2, 6.15e-2];
-const BETTER: [f64; 6] = [7.35e-3, 1.04e-3, 2.73e-3, 6.04e-3, 1.85e-2, 3.01e-2];
+const SHARE: [f64; 6] = [0.65, 0.45, 1.0, 0.48, 0.37, 0.37];
 /// Deviation of the raw last cooling about its mean.
 const RAW: [f64; 6] = [1.856e-3, 1.1035e-2, 2.895e-3, 2.494e-2, 3.644e-2, 8.543e-2];
 
@@ -75,25 +75,25 @@ fn real_chamber_log_needs_data() {
         println!("skipped: no data");
         return;
     };
-    for method in [Method::Joint, Method::Lag] {
-        let made = fitted(&path, method);
-        println!("{method:?}: {}", made.report.headline().replace(". ", ".\n  "));
-        let out = out_of_sample(&path, &made.written);
-        for axis in 0..6 {
-            let [rms, deviation] = out[axis];
-            println!(
-                "axis {axis}: rms {rms:.3e} ({:.2} of the cubic, {:.2} of the better), deviation {deviation:.3e} ({:.2} of raw)",
-                rms / CUBIC[axis],
-                rms / BETTER[axis],
-                deviation / RAW[axis]
-            );
-            assert!(deviation <= 1.001 * RAW[axis], "{method:?} axis {axis}: {deviation:e}");
-            // gyro x steps without a change of temperature and is refused; gyro y and the accelerometers y and z gain most.
-            if method == Method::Joint && axis > 0 {
-                assert!(rms <= BETTER[axis], "axis {axis}: {rms:e}");
-                assert!(![1, 4, 5].contains(&axis) || rms <= 0.5 * CUBIC[axis], "axis {axis}: {rms:e}");
-            }
-        }
+    let made = fitted(&path, Method::Joint);
+    println!("{}", made.report.to_text());
+    let out = out_of_sample(&path, &made.written);
+    for axis in 0..6 {
+        let [rms, deviation] = out[axis];
+        let (of_cubic, of_raw) = (rms / CUBIC[axis], deviation / RAW[axis]);
+        println!(
+            "axis {axis}: rms {rms:.3e}, {of_cubic:.3} of the cubic; deviation {deviation:.3e}, {of_raw:.3} of raw"
+        );
+        assert!(made.report.verdicts[axis].accepted && of_cubic <= SHARE[axis], "axis {axis}: {of_cubic}");
+        // gyro x steps without a change of temperature: what follows temperature takes its level along, not its shape.
+        assert!(axis == 0 || of_raw < 0.7, "axis {axis}: {of_raw}");
+    }
+    // The lines of the report: no axis is worse than a mean or a cubic.
+    let (_, lines) = made.report.tables.iter().find(|(heading, _)| heading.starts_with("Accuracy")).unwrap();
+    assert_eq!(lines.rows.len(), 6);
+    for row in &lines.rows {
+        let rms: Vec<f64> = row[3..].iter().map(|cell| cell.parse().unwrap()).collect();
+        assert!(rms[4] <= rms[1] && rms[4] <= rms[2], "{row:?}");
     }
 }
 
@@ -103,26 +103,22 @@ fn without_a_judging_run_no_axis_of_the_real_log_gets_worse_needs_data() {
         println!("skipped: no data");
         return;
     };
-    for method in [Method::Sequential, Method::Joint, Method::Lag] {
+    for method in [Method::Sequential, Method::Joint] {
         let settings = Settings { method, ..Settings::default() };
         let train = part(&path, 0.0, Some(TURN_S));
         let made = fit(None, (&[train], &[]), &settings, Origin::default(), ()).unwrap();
         println!("{method:?}: {}", made.report.headline());
         let out = out_of_sample(&path, &made.written);
-        for axis in 0..6 {
+        for axis in 1..6 {
             assert!(out[axis][1] <= 1.001 * RAW[axis], "{method:?} axis {axis}: {:e}", out[axis][1]);
         }
         if method != Method::Sequential {
-            let x = &made.report.verdicts[0];
-            assert!(
-                !x.accepted && x.reason.contains("drifts with time") && x.reason.contains("--judge"),
-                "{x:?}"
-            );
             // What holds on the last cooling holds without knowing it.
-            for axis in [1, 3, 4, 5] {
+            for axis in [0, 1, 3, 4, 5] {
+                let of_cubic = out[axis][0] / CUBIC[axis];
                 assert!(
-                    made.report.verdicts[axis].accepted && out[axis][0] <= BETTER[axis],
-                    "{method:?} {axis}"
+                    made.report.verdicts[axis].accepted && of_cubic <= SHARE[axis],
+                    "{method:?} {axis}: {of_cubic}"
                 );
             }
         }

@@ -61,7 +61,7 @@ pub(crate) fn run_of(log: &Path, mapping: &Mapping) -> Run {
 fn the_residual_of_the_report_is_that_of_the_service() {
     let folder = tempfile::tempdir().unwrap();
     let (log, mapping) = text_log(folder.path());
-    for method in [Method::Sequential, Method::Joint, Method::Lag] {
+    for method in [Method::Sequential, Method::Joint] {
         let run = run_of(&log, &mapping);
         let settings = Settings { method, window_s: Some(10.0), ..Settings::default() };
         let made = fit(None, (&[run], &[]), &settings, Origin::default(), ()).unwrap();

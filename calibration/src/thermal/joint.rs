@@ -1,0 +1,145 @@
+//! All terms at once: what the sensors of a channel are explained best by together, and each by itself.
+
+use super::columns::{Branch, Columns, Term};
+use super::compare::Rivals;
+use super::fit::Sensor;
+use super::found::Found;
+use super::known::Known;
+use super::ladder::{Plan, lags, statics};
+use super::model::{Dynamics, Spec};
+use super::noise::Noise;
+use super::passes;
+use super::samples::Samples;
+use super::select::{Target, Trials, WORTH_IT, together};
+use super::settings::Terms;
+use crate::error::Error;
+
+/// Highest power of temperature in any model.
+const HIGHEST: usize = 5;
+/// Power of the static bias that a document is compared with.
+pub(super) const CUBIC: usize = 3;
+
+/// The sensors of one channel with every model that is tried.
+pub(super) struct Joint<'a> {
+    columns: Columns<'a>,
+    known: &'a Known,
+    plans: Vec<Plan>,
+    trials: Vec<(&'a Sensor, &'a Target, Trials<'a>)>,
+    /// The plan that is best for all, how much it is shrunk, and the sum of the logarithms of the scores.
+    best: Option<(usize, f64, f64)>,
+}
+
+impl<'a> Joint<'a> {
+    /// Of the live sensors of a channel.
+    pub(super) fn of(
+        mut columns: Columns<'a>,
+        samples: &'a [Samples],
+        (known, longest_s): (&'a Known, f64),
+        sensors: &[(&'a Sensor, &'a Target)],
+    ) -> Result<Self, Error> {
+        let history = &known.history;
+        let plans = Plan::all(history, columns.basis().filter.grid_step_s, longest_s);
+        let any_gyro = sensors.iter().any(|(sensor, _)| sensor.gyro);
+        let mut terms: Vec<Term> = (0..=HIGHEST).map(Term::Static).collect();
+        terms.extend(plans.iter().flat_map(|plan| plan.spec(any_gyro, None, 0.0).dynamics.terms));
+        columns.make(&terms)?;
+        let noise = Noise::of(columns.basis(), samples, &terms)?;
+        let trials: Vec<_> = sensors
+            .iter()
+            .map(|&(sensor, target)| {
+                let pieces = (&history.piece[..], &known.temperature[..]);
+                (sensor, target, Trials::of(target, &columns, &terms, &noise, pieces))
+            })
+            .collect();
+        let both: Vec<(bool, &Trials<'_>)> =
+            trials.iter().map(|(sensor, _, trials)| (sensor.gyro, trials)).collect();
+        let best = together(&plans, &both);
+        Ok(Self { columns, known, plans, trials, best })
+    }
+
+    /// What is left over all sensors, as the sum of the logarithms of their scores.
+    pub(super) fn cost(&self) -> f64 {
+        let alone = |(_, target, trials): &(&Sensor, &Target, Trials<'_>)| {
+            let scores = statics(&self.known.history, target.widest_scale());
+            let least = scores.iter().filter_map(|spec| trials.score(spec)).fold(f64::INFINITY, f64::min);
+            if least.is_finite() { libm::log(least) } else { 0.0 }
+        };
+        self.best.map_or_else(|| self.trials.iter().map(alone).sum(), |(.., cost)| cost)
+    }
+
+    /// Finds the terms of one sensor.
+    pub(super) fn find(&mut self, sensor: &Sensor, terms: Terms) -> Result<Found, Error> {
+        let place = self.trials.iter().position(|(other, ..)| *other == sensor);
+        let Some((_, target, trials)) = place.and_then(|place| self.trials.get(place)) else {
+            return Ok(Found::refused("it has no windows"));
+        };
+        let (history, widest) = (&self.known.history, target.widest_scale());
+        let spec_of = |plan: &Plan, shrink: f64| plan.spec(sensor.gyro, widest, shrink);
+        let plan = self.best.and_then(|(index, shrink, _)| Some((self.plans.get(index)?, shrink)));
+        let shrink = self.best.map_or(0.0, |(_, shrink, _)| shrink);
+        let tried = self.plans.iter().filter_map(|plan| trials.tried(spec_of(plan, shrink))).collect();
+        let plan = plan.map(|(plan, shrink)| spec_of(plan, shrink));
+        let choice = trials.choose(tried, plan, history, terms == Terms::All);
+        let Some(best) = choice.best().cloned() else {
+            return Ok(Found::refused(
+                "cross-validation has nothing to judge by: the log has one stretch of temperature only; run the chamber both ways",
+            ));
+        };
+        if terms == Terms::Auto && (choice.mean.is_nan() || best.score > WORTH_IT * choice.mean) {
+            if let Some(level) = target.flat(&self.columns) {
+                return Ok(Found { choice: Some(choice), ..Found::flat(&level, target.level) });
+            }
+            let why = format!(
+                "nothing beats its mean: the best model, {}, leaves {:.3e} on stretches that it did not see, the mean {:.3e}; the axis \
+                 follows something else than temperature",
+                best.spec.words(),
+                best.score,
+                choice.mean
+            );
+            return Ok(Found { choice: Some(choice), ..Found::refused(&why) });
+        }
+        let share = passes::share(target, &self.columns, (history, &self.known.temperature));
+        let doubt = passes::doubt(share).filter(|_| !best.spec.dynamics.terms.is_empty());
+        let Some(solution) = trials.solve(&self.columns, &best.spec) else {
+            return Ok(Found {
+                choice: Some(choice),
+                ..Found::refused("the model has no solution on this log")
+            });
+        };
+        let mut found = Found::chosen(choice, &best.spec, &solution, target.level);
+        let pairs: Vec<(Term, f64)> = found.terms.iter().map(|(term, value, _)| (*term, *value)).collect();
+        found.passed_on = Some(trials.passed_on(&pairs));
+        found.remarks.extend(doubt);
+        found.rivals = Some(rivals(&mut self.columns, sensor, target, best.spec.scale)?);
+        Ok(found)
+    }
+}
+
+/// A mean, and cubics over temperature, by plain least squares, without and with what follows Ṫ: a lag of the shortest time constant where a sensor
+/// has no such term.
+pub(super) fn rivals(
+    columns: &mut Columns<'_>,
+    sensor: &Sensor,
+    target: &Target,
+    scale: Option<usize>,
+) -> Result<Rivals, Error> {
+    let rate = if sensor.gyro {
+        vec![Term::Rate(Branch::Both, 0)]
+    } else {
+        lags(&[(3.0 * columns.basis().filter.grid_step_s).max(2.0)], 0).terms
+    };
+    columns.make(&rate)?;
+    let weights = target.weights.iter().map(|weight| f64::from(u8::from(*weight > 0.0))).collect();
+    let plain = Target { weights, ..target.clone() };
+    let solved = |degree: usize, terms: Vec<Term>| {
+        let spec =
+            Spec { degree, dynamics: Dynamics { terms, ..Dynamics::default() }, scale, ..Spec::default() };
+        let solution = plain.solve(columns, &spec, true);
+        solution.map_or_else(Vec::new, |solution| Found::terms_of(&spec, &solution, target.level))
+    };
+    Ok(Rivals {
+        mean: solved(0, Vec::new()),
+        cubic: solved(CUBIC, Vec::new()),
+        with_rate: solved(CUBIC, rate),
+    })
+}
