@@ -39,6 +39,10 @@ python:
 fuzz-c:
     ISOTHERM_FUZZ=100000000 cargo test --release --locked -p isotherm-protocol --test versions no_frame_leads -- --nocapture
 
+# Send 100 000 Imu messages through ROS 2's keys and the service; compare the latency with the project's own topics
+ros-loop:
+    ISOTHERM_ROS_MESSAGES=100000 cargo test --release --locked --workspace --test bridge -- --nocapture --test-threads=1
+
 # Measure how fast the clients decode: Python, and C with cc (after `just python`)
 bench-clients:
     bash clients/bench.sh
@@ -51,6 +55,22 @@ accuracy:
 instructions:
     .ci/run instructions
 
+# Judge the unit, build the Debian package, try it in a clean root (needs root and debootstrap)
+packages:
+    .ci/run packages
+
+# Build the programs without shared libraries, for containers
+static:
+    packaging/static
+
+# Build the package in two folders and compare the bytes (twice a full build)
+reproducible:
+    packaging/reproducible
+
+# Make a release in target/release-VERSION: checks, packages, static programs, SBOM, checksums
+release:
+    packaging/release
+
 # Run the demo briefly and print its figures
 demo:
     .ci/run demo
@@ -58,3 +78,11 @@ demo:
 # Measure everything, into target/performance (about an hour; QUICK=1: whether all works)
 performance:
     bash bench/performance.sh
+
+# Pictures of the console in the browser at every size and colour, into target/console (needs chromium)
+console-pictures:
+    ISOTHERM_PICTURES="$PWD/target/console" cargo test --release --locked -p isotherm-service --test service web::pictures -- --nocapture
+
+# Latency with 200 units at 200 Hz while pages of the console are open, beside latency without (after `cargo build --release --locked`)
+console-cost:
+    target/release/isotherm-bench chain --measure console --subject service --seconds 8

@@ -5,6 +5,7 @@
 
 mod case;
 mod check;
+mod page;
 mod profile;
 pub(crate) mod python;
 pub(crate) mod round;
@@ -35,6 +36,8 @@ pub(crate) enum Measure {
     Saturation,
     /// Latency while every unit is given another calibration each second, beside latency without.
     Swap,
+    /// Latency while pages of the console in the browser are open, beside latency of a service without it.
+    Console,
 }
 
 /// Arguments of `chain`.
@@ -84,7 +87,7 @@ pub(crate) struct ChainArgs {
 }
 
 /// All that was measured.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Report {
     /// On what.
     pub(crate) machine: Machine,
@@ -147,6 +150,14 @@ impl ChainArgs {
                 (Measure::Swap, vec![without.clone(), Case { swaps: true, ..without }])
             }));
         }
+        if self.measure.contains(&Measure::Console) {
+            let units = usize_of(&self.units, 200);
+            let rate = self.rate.first().copied().unwrap_or(200);
+            cases.extend(units.into_iter().map(|units| {
+                let without = Case::paced(units, rate, 1, if self.quick { 2.0 } else { seconds.max(4.0) });
+                (Measure::Console, vec![without.clone(), Case { pages: true, ..without }])
+            }));
+        }
         cases
     }
 
@@ -193,9 +204,10 @@ pub(crate) fn measure(args: &ChainArgs) -> Report {
         let reference = outcomes.first().cloned().unwrap_or_default();
         let before = outcomes.clone();
         rows.extend(runs.iter().zip(outcomes).map(|((case, profile, subject), outcomes)| {
-            // Swaps are compared with the same subject without them, all else with the relay.
-            let without =
-                runs.iter().position(|(other, _, same)| case.swaps && !other.swaps && same == subject);
+            // Swaps and pages are compared with the same subject without them, all else with the relay.
+            let without = runs
+                .iter()
+                .position(|(other, _, same)| case.is_disturbed() && !other.is_disturbed() && same == subject);
             let of = without.and_then(|index| before.get(index)).unwrap_or(&reference);
             Row::new(*measure, case, (*subject, &profile.name), outcomes, of)
         }));
@@ -232,10 +244,11 @@ fn runs(variants: &[Case], profiles: &[Profile], subjects: &[Subject]) -> Vec<Ru
     let mut runs = Vec::new();
     for profile in profiles {
         for case in variants {
-            let able =
-                |subject: &&Subject| !variants.iter().any(|case| case.swaps) || **subject == Subject::Service;
+            let able = |subject: &&Subject| {
+                !variants.iter().any(Case::is_disturbed) || **subject == Subject::Service
+            };
             let first = runs.is_empty();
-            // The relay is the reference of swaps too, without any.
+            // The relay is the reference of these too, without any.
             let relay = variants.len() > 1 && first;
             runs.extend(relay.then(|| (case.clone(), profile.clone(), Subject::Relay)));
             runs.extend(

@@ -13,7 +13,6 @@ use crate::error::Error;
 use crate::instructions::{self, Figures};
 use crate::kernel;
 use crate::part::{self, Role};
-use crate::report::{self, ReportArgs};
 use crate::scale::{self, ScaleArgs};
 
 /// How fast Isotherm is, as ratios to named references
@@ -51,8 +50,6 @@ enum Command {
     Chain(ChainArgs),
     /// How cost, memory, start-up and swaps grow with the number of units; offline correction beside numpy
     Scale(ScaleArgs),
-    /// Write figures, printed as JSON before, as tables and plots
-    Report(ReportArgs),
     /// Play one part of a chain
     #[command(hide = true)]
     Part {
@@ -133,7 +130,6 @@ fn run(command: Command) -> Result<String, Error> {
             let report = scale::measure(&args)?;
             Ok(if args.json { as_json(&report) } else { scale::table(&report) })
         }
-        Command::Report(args) => report::write(&args),
         Command::Part { role, plan } => part::run(role, &plan).map(|()| String::new()),
         Command::Pass { index } => instructions::pass(index).map(|()| String::new()),
     }

@@ -42,10 +42,11 @@ pub(crate) struct Row {
 pub(crate) type Make = fn() -> Result<Box<dyn Kernel>, Error>;
 
 /// Every kernel; the first is the reference.
-pub(crate) const KERNELS: [Make; 16] = [
+pub(crate) const KERNELS: [Make; 17] = [
     || Ok(Box::new(peer::Peer::new())),
     || Ok(Box::new(unit::identity()?)),
     || Ok(Box::new(unit::steady()?)),
+    || Ok(Box::new(unit::in_motion()?)),
     || Ok(Box::new(unit::zeeman()?)),
     || Ok(Box::new(unit::fibre_optic()?)),
     || Ok(Box::new(unit::skewed_six()?)),

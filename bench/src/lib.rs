@@ -6,7 +6,6 @@
 //! | `instructions` | the same counted in instructions, for a machine that is never quiet |
 //! | `chain` | source, service or relay, and sink over TCP loopback: latency, throughput, loss |
 //! | `scale` | growth with the number of units; offline correction beside numpy |
-//! | `report` | tables and plots of the figures above |
 //! | `part` | the processes of a chain |
 //! | `rounds` | interleaved rounds and their medians |
 //! | `clock`, `machine`, `process`, `progress` | what the benches stand on |
@@ -23,7 +22,6 @@ mod machine;
 mod part;
 mod process;
 mod progress;
-mod report;
 mod rounds;
 mod scale;
 

@@ -4,10 +4,10 @@ use std::fs;
 use std::thread::available_parallelism;
 use std::time::Duration;
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 /// A machine.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Machine {
     /// Name of the processor.
     pub(crate) processor: String,
@@ -56,7 +56,7 @@ fn load() -> f64 {
 }
 
 /// What a process has used.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub(crate) struct Usage {
     /// Processor time, of the system's part too (s).
     pub(crate) cpu_s: f64,

@@ -43,6 +43,9 @@ pub(crate) struct Ready {
     pub(crate) ready: bool,
     /// Where it listens.
     pub(crate) locators: Vec<String>,
+    /// Where it answers over HTTP, if it does.
+    #[serde(default)]
+    pub(crate) metrics: Option<String>,
 }
 
 /// How long a part waits for the others (s).

@@ -4,10 +4,10 @@ mod fit;
 mod offline;
 mod table;
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 pub(crate) use offline::Offline;
-pub(crate) use table::{BY_UNITS, alone, beyond_first, table};
+pub(crate) use table::table;
 
 use crate::chain::{Case, Measure, Profile, Row, Run, Subject, take_turns};
 use crate::error::Error;
@@ -40,7 +40,7 @@ pub(crate) struct ScaleArgs {
 }
 
 /// All that was measured.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Report {
     /// On what.
     pub(crate) machine: Machine,
@@ -59,7 +59,7 @@ pub(crate) struct Report {
 }
 
 /// How something grows with the number of units.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Growth {
     /// What.
     pub(crate) what: String,

@@ -19,6 +19,7 @@
 //! | [`presence`] | waiting until the service is there |
 //! | [`receipt`] | proof that subscribers have taken what was sent |
 //! | [`routes`] | keys whose routes Zenoh is to remember |
+//! | [`threads`] | work for the threads that receive |
 
 pub mod client;
 pub mod consumer;
@@ -32,6 +33,7 @@ pub mod producer;
 pub mod receipt;
 pub mod routes;
 pub mod session;
+pub mod threads;
 
 pub use client::{ClientOptions, Role};
 pub use consumer::Consumer;
@@ -41,4 +43,4 @@ pub use error::{BusError, Json5Problem, without_places, words};
 pub use outlet::{Outlet, OutletOptions};
 pub use producer::{Producer, ProducerOptions};
 pub use routes::DeclaredKeys;
-pub use session::{SessionOptions, close, locators, open};
+pub use session::{SessionOptions, close, locators, open, open_config};

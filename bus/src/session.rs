@@ -133,11 +133,10 @@ fn loopback() -> Result<Config, BusError> {
 }
 
 /// Sets one value of a configuration.
-pub(crate) fn set(
-    config: &mut Config,
-    option: &'static str,
-    value: impl Into<Value>,
-) -> Result<(), BusError> {
+///
+/// # Errors
+/// [`BusError::Option`].
+pub fn set(config: &mut Config, option: &'static str, value: impl Into<Value>) -> Result<(), BusError> {
     let value = value.into().to_string();
     config.insert_json5(option, &value).map_err(|source| BusError::Option { option, value, source })
 }
@@ -150,7 +149,14 @@ pub(crate) fn set(
 /// [`BusError::Configuration`], [`BusError::Endpoint`] and [`BusError::Option`] for what the options say, [`BusError::Listen`]
 /// where a port cannot be bound, [`BusError::Unreachable`] where no endpoint can be reached, [`BusError::Open`] for anything else.
 pub async fn open(options: &SessionOptions) -> Result<Session, BusError> {
-    let config = options.to_config()?;
+    open_config(options.to_config()?).await
+}
+
+/// Opens a session with a configuration.
+///
+/// # Errors
+/// As [`open`].
+pub async fn open_config(config: Config) -> Result<Session, BusError> {
     obstacle::before(&config)?;
     let started = Instant::now();
     match zenoh::open(config.clone()).await {

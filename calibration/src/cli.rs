@@ -21,7 +21,8 @@ mod validate;
 use std::io::{self, Write};
 use std::process::ExitCode;
 
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{Parser, Subcommand};
+use isotherm_document::program::Common;
 
 use crate::error::Error;
 
@@ -51,12 +52,8 @@ enum Command {
     Thermal(thermal::ThermalArgs),
     Tumble(tumble::TumbleArgs),
     Validate(validate::ValidateArgs),
-    /// Print a completion script for a shell
-    #[command(after_help = "Example:\n  isotherm-calibrate completions bash > isotherm-calibrate.bash")]
-    Completions {
-        /// The shell
-        shell: clap_complete::Shell,
-    },
+    #[command(flatten)]
+    Common(Common),
 }
 
 /// Runs the command that the arguments name.
@@ -73,10 +70,9 @@ fn run(cli: Cli) -> Result<(), Error> {
         Command::Thermal(args) => args.run(),
         Command::Tumble(args) => args.run(),
         Command::Validate(args) => args.run(),
-        Command::Completions { shell } => {
-            let mut script = Vec::new();
-            clap_complete::generate(shell, &mut Cli::command(), "isotherm-calibrate", &mut script);
-            print(&script)
+        Command::Common(common) => {
+            let done = common.run::<Cli>();
+            print(&done.map_err(|(path, source)| Error::file(&path, "write manual pages into", source))?)
         }
     }
 }

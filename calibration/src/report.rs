@@ -26,7 +26,7 @@ pub(crate) mod words;
 
 use std::fmt::Write;
 
-use isotherm_log::plot::page::{Chart, Table};
+use isotherm_pages::{Chart, Table};
 
 pub use batch::{BatchRow, BatchTable, UnitReport, in_parallel, of_unit};
 pub use curve::{Curve, Judged, Rest, judge, output_unit};

@@ -138,7 +138,10 @@ fn over_temperature(sheet: &mut Sheet, terms: &[Term], range: [f64; 2]) {
 /// The correction at one temperature of all channels, on a ramp.
 pub(crate) fn steady(written: &Written, temperature: f64, ramp_deg_c_per_min: f64) -> Steady {
     let state = ThermalState { temperature, rate: ramp_deg_c_per_min / 60.0, ..ThermalState::default() };
-    written.loaded.calibration.steady(|_| Some(state), None)
+    // An auxiliary channel has no temperature: what rests on it is left out.
+    let calibration = &written.loaded.calibration;
+    let known = |name| calibration.channels().iter().any(|channel| channel.name() == name);
+    calibration.steady(|name| known(name).then_some(state), None)
 }
 
 /// The sums of all terms.

@@ -396,6 +396,8 @@ static inline void isotherm_put_text(isotherm_writer *w, uint32_t most, isotherm
 #define ISOTHERM_SENSOR_NOT_FINITE (1u << 4)
 /* excluded by the parity check */
 #define ISOTHERM_SENSOR_EXCLUDED (1u << 5)
+/* outside the range of the weight over rate */
+#define ISOTHERM_SENSOR_CLAMPED_RATE (1u << 6)
 
 typedef enum {
     ISOTHERM_READINGS_COUNTS,

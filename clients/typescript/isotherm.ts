@@ -46,6 +46,8 @@ export const sensorFlags = {
   NOT_FINITE: 16,
   /** excluded by the parity check */
   EXCLUDED: 32,
+  /** outside the range of the weight over rate */
+  CLAMPED_RATE: 64,
 } as const;
 
 export interface GyroBatch {

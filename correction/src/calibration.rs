@@ -24,8 +24,8 @@ use serde::{Deserialize, Serialize};
 pub use check::MAX_SELF_TEST_READINGS;
 pub use defect::{Defect, DefectKind, Section};
 pub use parts::{
-    AccelParts, BranchArgument, BranchedParts, CalibrationParts, CoefficientParts, GyroParts, TermParts,
-    TrendParts,
+    AccelParts, BranchArgument, BranchedParts, CalibrationParts, CoefficientParts, GyroParts, RegressorParts,
+    Source, TermParts, TrendParts,
 };
 pub use steady::{Jump, Steady};
 
@@ -42,7 +42,12 @@ use crate::thermal::{AccelModel, GyroModel, Motion, Trends};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Calibration {
     pub(crate) filter: ThermalFilter,
+    /// Temperatures, then auxiliaries.
     pub(crate) channels: Vec<Channel>,
+    /// How many of them are temperatures.
+    pub(crate) temperatures: usize,
+    /// Whether a sensor has regressors.
+    pub(crate) regresses: bool,
     pub(crate) gyro_output: OutputKind,
     pub(crate) gyros: Vec<GyroModel>,
     /// One for each gyro. Apart from the models: what an estimator expects changes nothing of the correction, and a
@@ -108,7 +113,9 @@ impl Calibration {
 
     /// Whether another set filters the same channels in the same way, so that thermal memory means the same in both.
     pub(crate) fn same_thermal_basis(&self, other: &Self) -> bool {
-        self.filter == other.filter && self.channels == other.channels
+        self.filter == other.filter
+            && self.channels == other.channels
+            && self.temperatures == other.temperatures
     }
 
     /// What the drift estimator is to expect of a gyro; `None` where the set says nothing, or there is no such gyro.
@@ -126,6 +133,14 @@ impl Calibration {
     /// The temperature channels that the set follows, in its own order.
     #[must_use]
     pub fn channels(&self) -> &[Channel] {
-        &self.channels
+        self.channels.get(..self.temperatures).unwrap_or_default()
+    }
+
+    /// Place of a channel among all.
+    pub(crate) fn place(&self, source: Source) -> usize {
+        match source {
+            Source::Temperature(index) => index,
+            Source::Auxiliary(index) => self.temperatures + index,
+        }
     }
 }

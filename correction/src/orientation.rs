@@ -16,17 +16,19 @@ mod range;
 use alloc::vec::Vec;
 use core::array;
 
+use arrayvec::ArrayVec;
 use serde::{Deserialize, Serialize};
 
 use linear::{Rows, condition_number, is_conditioned, orthonormal_columns};
 
 pub use parity::{ISOLATION_RATIO, ParityCheck, ParityVerdict};
 pub use parts::{
-    CONDITION_LIMIT, OrientationError, OrientationParts, ROW_NORM_TOLERANCE, WEIGHT_RATIO_LIMIT,
+    AxesPlay, CONDITION_LIMIT, OrientationError, OrientationParts, ROW_NORM_TOLERANCE, WEIGHT_RATIO_LIMIT,
 };
 
 use crate::lanes;
 use crate::sample::{MAX_SENSORS, MIN_SENSORS, Sensors};
+use crate::thermal::MAX_PLAYS;
 
 /// Which sensors of a kind take part: bit i for sensor i.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
@@ -88,6 +90,7 @@ pub struct Orientation {
     /// Rows of `C_0`, normalised; rows beyond `sensors` are zero.
     rows: Rows,
     slopes_per_deg_c: Rows,
+    plays: ArrayVec<AxesPlay, MAX_PLAYS>,
     /// √w with the mean of w over all sensors made one, so that parity keeps the sensors' unit.
     root_weights: [f64; MAX_SENSORS],
     parity_limit: Option<f64>,
@@ -132,6 +135,7 @@ impl Orientation {
             sensors: parts.rows.len(),
             rows,
             slopes_per_deg_c,
+            plays: parts.plays.iter().copied().take(MAX_PLAYS).collect(),
             root_weights: root_weights(&parts.weights, parts.rows.len()),
             parity_limit: parts.parity_limit,
             parity_confirm_ticks: parts.parity_confirm_ticks,
@@ -164,6 +168,11 @@ impl Orientation {
     #[must_use]
     pub const fn sensors(&self) -> usize {
         self.sensors
+    }
+
+    /// What sticks of the thermal change.
+    pub(crate) fn plays(&self) -> &[AxesPlay] {
+        &self.plays
     }
 
     /// First and last temperature of the fitted range (°C).

@@ -194,7 +194,8 @@ impl Substitution {
         }
         let (end_time, duration) = (input.end_time, input.duration);
         lost.push(LostTick { end_time, duration, predicted, sensors: increments.len() });
-        resolved
+        // What comes behind a transition that is cut is still part of it, and taken as it reads.
+        resolved && !(self.left == 0 && reversal.is_cut(duration))
     }
 
     /// Steps 3 and 4. Returns false where an angle had to be given up.

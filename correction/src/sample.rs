@@ -133,6 +133,8 @@ bitflags! {
         const NOT_FINITE = 1 << 4;
         /// Excluded by the parity check: the unit goes on with the other sensors.
         const EXCLUDED = 1 << 5;
+        /// The rate was outside the range of the gyro's weight over rate, which was held at its end.
+        const CLAMPED_RATE = 1 << 6;
     }
 }
 

@@ -6,16 +6,18 @@
 mod accel;
 mod bank;
 mod gyro;
-mod lag;
 mod motion;
 mod ramp;
 mod terms;
+mod trail;
 
 pub use accel::AccelModel;
 pub(crate) use bank::{Bank, MotionBanks, Paces, Shares};
 pub use gyro::{GyroModel, GyroTerms, TrendModel};
 pub(crate) use gyro::{TermError, Trends};
-pub use lag::MAX_LAGS;
 pub(crate) use motion::{Motion, MotionTerms};
 pub(crate) use ramp::{Pace, Ramp};
-pub use terms::{ACCEL_TERMS, Feature, GYRO_TERMS, Term};
+pub(crate) use terms::Others;
+pub use terms::{ACCEL_TERMS, Feature, GYRO_TERMS, MAX_REGRESSORS, Term};
+pub use trail::{MAX_LAGS, MAX_PLAYS};
+pub(crate) use trail::{PLAY_WIDTHS_DEG_C, drag};

@@ -17,6 +17,7 @@ mod axes;
 mod change;
 mod correct;
 mod counters;
+mod footing;
 mod gyro_intake;
 mod health;
 mod operating;

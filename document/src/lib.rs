@@ -43,6 +43,8 @@ pub mod escape;
 mod kind;
 mod number;
 mod problem;
+#[cfg(feature = "clap")]
+pub mod program;
 mod reader;
 mod schema;
 mod stand_in;

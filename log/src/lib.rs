@@ -16,16 +16,18 @@
 //! | [`part`] | some of its units, some of its time |
 //! | [`schedule`] | when its messages are to go out again |
 //! | [`faults`] | delay, loss, duplication and reordering on purpose, from a seed |
+//! | [`date`] | times of a producer's clock as dates |
 //! | [`progress`] | how far a log has been read |
 //! | [`replica`] | a unit's stream, made again from frames and journal |
 //! | [`offline`] | a log through the service's state machine |
 //! | [`diff`] | two corrected logs compared |
 //! | [`info`] | what a log holds, in figures |
-//! | [`plot`] | a log, or two, as a page to look at; pages for other reports |
+//! | [`plot`] | a log, or two, as a page to look at |
 //! | [`mod@file`] | small files read whole, outputs that must not fall on inputs |
 //! | [`error`] | what can go wrong |
 
 pub mod convert;
+pub mod date;
 pub mod diff;
 pub mod error;
 pub mod faults;

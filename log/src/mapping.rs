@@ -15,6 +15,8 @@ pub use encoding::Encoding;
 use isotherm_correction::sample::{ChannelName, OutputKind};
 use isotherm_correction::units::Span;
 pub use isotherm_document::Problem;
+pub use keys::{AccelUnit, GyroUnit, TemperatureUnit};
+pub use meaning::SensorUnit;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -172,6 +174,14 @@ pub struct Conversion {
     pub factor: f64,
     /// The result is an increment over the tick, to be divided by its duration.
     pub per_tick: bool,
+}
+
+impl Conversion {
+    /// The number that a cell stands for.
+    #[must_use]
+    pub fn of(&self, cell: f64) -> f64 {
+        (cell - self.mid_scale) * self.factor
+    }
 }
 
 /// One sensor's column.

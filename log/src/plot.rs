@@ -5,7 +5,6 @@
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`page`] | the page itself: zoomable diagrams in one HTML file, for other reports too |
 //! | `track` | values over time in bounded memory |
 //! | `reading` | the logs in step, message by message |
 //! | `unit` | what the messages of a unit give to draw |
@@ -17,7 +16,6 @@
 mod difference;
 mod layout;
 mod nominal;
-pub mod page;
 mod reading;
 #[cfg(test)]
 mod tests;
@@ -34,7 +32,7 @@ use crate::error::Error;
 use crate::part::Messages;
 use crate::source::LogReport;
 
-use page::Page;
+use isotherm_pages::Page;
 use reading::Plot;
 
 /// Names of the case axes.

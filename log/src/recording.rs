@@ -4,6 +4,7 @@
 //! |---|---|
 //! | channel | a key, without namespace; encoding [`MESSAGE_ENCODING`], metadata `unit` where it has one |
 //! | schema | kind of the frame, by name (`isotherm/raw_gyro`); encoding [`SCHEMA_ENCODING`], whose text says where the bytes are described |
+//! | channel `…/json` | on request, ticks and readings once more as JSON with a JSON Schema, for viewers; passed over here |
 //! | log time | when it was received (ns since 1970-01-01 UTC) |
 //! | publish time | end of its last tick on the producer's clock (ns); the log time where it has none |
 //! | attachment | calibration documents by digest, the service's configuration |
@@ -20,6 +21,7 @@ mod record;
 pub mod recover;
 mod schema;
 mod skip;
+mod view;
 mod writer;
 
 #[cfg(test)]

@@ -23,5 +23,8 @@ pub mod nominal;
 mod tests;
 
 pub use bag::{BagSummary, BagTopic, BagWriter};
-pub use message::{Header, Imu, RosMessage, Temperature, Time, Vector3, time};
+pub use message::{
+    CdrError, Header, Imu, NOT_MEASURED, Quaternion, RosMessage, Temperature, Time, UNKNOWN, Vector3,
+    from_cdr, means, time, to_cdr,
+};
 pub use names::{Names, token};

@@ -10,7 +10,7 @@ mod resolve;
 mod row;
 #[cfg(test)]
 mod tests;
-mod timeline;
+pub mod timeline;
 mod window;
 
 use std::path::{Path, PathBuf};

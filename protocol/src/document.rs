@@ -44,15 +44,17 @@ use sha2::{Digest, Sha256};
 
 pub use correction_change::{Side, correction_change};
 pub use curve::{
-    Curve, CurveForm, DriftByForce, Frequency, LagGain, OutputBias, Quantity, RateBias, Relative,
-    RelativeOverRate, ScaleFactor, SecondOrder, Shape, ThermalAcceleration, ThermalRate,
+    Curve, CurveForm, DriftByForce, Frequency, HysteresisGain, LagGain, OutputBias, OutputHysteresisGain,
+    OutputRegressorGain, Quantity, RateBias, RegressorGain, Relative, RelativeOverRate, ScaleFactor,
+    SecondOrder, Shape, ThermalAcceleration, ThermalRate,
 };
 pub use difference::{difference, lost_sections};
 pub use measure::{Argument, Unit};
 pub use types::{
-    Accel, AccelLag, AccelOrientation, AccelOutput, AccelParity, AccelSensor, AlongAxes, Branches, Channel,
-    Created, Document, Drift, Filter, FitWindow, Gyro, GyroOrientation, GyroOutput, GyroParity, GyroSensor,
-    Lag, Log, Measure, ModeReversal, Orientation, OrientationThermal, Origin, Residual, Sample, SelfTest,
+    Accel, AccelHysteresis, AccelLag, AccelOrientation, AccelOutput, AccelParity, AccelRegressor,
+    AccelSensor, AlongAxes, Auxiliary, AxesHysteresis, Branches, Channel, Created, Document, Drift, Filter,
+    FitWindow, Gyro, GyroOrientation, GyroOutput, GyroParity, GyroSensor, Hysteresis, Lag, Log, Measure,
+    ModeReversal, Orientation, OrientationThermal, Origin, Regressor, Residual, Sample, SelfTest,
     SelfTestCounter, SelfTestVoltage, Servo, ServoKind, Temperature, Trend,
 };
 

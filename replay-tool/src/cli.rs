@@ -1,10 +1,12 @@
 //! The command line: arguments in, exit code out.
 
+mod cat;
 mod convert;
 mod correct;
 mod diff;
 mod import;
 mod info;
+mod list;
 mod log_args;
 mod play;
 mod plot;
@@ -17,8 +19,9 @@ mod step;
 use std::io::{self, Write};
 use std::process::ExitCode;
 
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{Parser, Subcommand};
 use isotherm_correction::units::Span;
+use isotherm_document::program::Common;
 
 use crate::error::Error;
 use log_args::LogArgs;
@@ -45,15 +48,13 @@ enum Command {
     Step(step::StepArgs),
     Import(import::ImportArgs),
     Info(info::InfoArgs),
+    List(list::ListArgs),
+    Cat(cat::CatArgs),
     Plot(plot::PlotArgs),
     Convert(convert::ConvertArgs),
     Simulate(simulate::SimulateArgs),
-    /// Print a completion script for a shell
-    #[command(after_help = "Example:\n  isotherm-replay completions bash > isotherm-replay.bash")]
-    Completions {
-        /// The shell
-        shell: clap_complete::Shell,
-    },
+    #[command(flatten)]
+    Common(Common),
 }
 
 /// Reads seconds.
@@ -86,13 +87,14 @@ fn run(cli: Cli) -> Result<Outcome, Error> {
         Command::Step(args) => step::run(&args),
         Command::Import(args) => import::run(&args),
         Command::Info(args) => info::run(&args),
+        Command::List(args) => list::run(&args),
+        Command::Cat(args) => cat::run(&args),
         Command::Plot(args) => plot::run(&args),
         Command::Convert(args) => convert::run(&args),
         Command::Simulate(args) => simulate::run(&args),
-        Command::Completions { shell } => {
-            let mut script = Vec::new();
-            clap_complete::generate(shell, &mut Cli::command(), "isotherm-replay", &mut script);
-            print(&script)?;
+        Command::Common(common) => {
+            let done = common.run::<Cli>();
+            print(&done.map_err(|(path, source)| Error::file(&path, "write manual pages into", source))?)?;
             Ok(Outcome::Complete)
         }
     }

@@ -71,6 +71,8 @@ pub struct Conversion {
     pub place: Place,
     /// Whether chunks of a recording are compressed.
     pub compress: bool,
+    /// Whether ticks and readings are in a recording once more as JSON, for viewers.
+    pub json: bool,
     /// Names of the log's files and of its mapping, for the provenance.
     pub sources: Vec<(String, String)>,
     /// For ROS 2 bags.

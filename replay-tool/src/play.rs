@@ -24,6 +24,7 @@ use zenoh::key_expr::OwnedKeyExpr;
 use crate::error::Error;
 use crate::pace::Speed;
 use player::Player;
+pub(crate) use reel::wanted;
 use stop::stop_asked;
 
 pub use report::{Counts, PlayReport, Position, Returned, UnitReport};

@@ -88,6 +88,8 @@ pub struct RecordOptions {
     pub until_service_stops: bool,
     /// Whether chunks are compressed.
     pub compress: bool,
+    /// Whether ticks and readings are written once more as JSON, for viewers.
+    pub json: bool,
     /// When chunks and files end.
     pub bounds: Bounds,
     /// How many files of a row are kept.
@@ -167,6 +169,7 @@ async fn on_session(
     let writing = RecordingOptions {
         compress: options.compress,
         overwrite: options.overwrite,
+        json: options.json,
         ..RecordingOptions::default()
     };
     let (tell, mut told) = unbounded_channel();

@@ -4,9 +4,9 @@ use std::ffi::OsString;
 use std::os::unix::process::CommandExt;
 use std::path::PathBuf;
 
-use clap::{Args, CommandFactory, Parser, Subcommand};
-use clap_complete::Shell;
+use clap::{Args, Parser, Subcommand};
 use isotherm_document::advanced;
+use isotherm_document::program::Common;
 
 use crate::check::CheckArgs;
 use crate::console::{self, CommandArgs, Console, HistoryArgs, RollbackArgs, StatusArgs, SwapArgs, TopArgs};
@@ -14,6 +14,7 @@ use crate::demo::DemoArgs;
 use crate::exit::Exit;
 use crate::logging::{FinishLog, LogArgs, start_writer};
 use crate::signing::{KeygenArgs, SignArgs};
+use crate::web::WebArgs;
 use crate::words::{print, say};
 
 /// Corrects the raw increments of inertial units in a stream, over Zenoh
@@ -49,6 +50,8 @@ enum Command {
     /// Move a unit from state to state: standby, run, self-test, pre-launch calibration
     #[command(name = "command")]
     Give(CommandArgs),
+    /// Print the address of the console in the browser, with its token
+    Web(WebArgs),
     /// Validate calibration documents, service configurations and Zenoh configurations
     Check(CheckArgs),
     /// Sign calibration documents
@@ -63,11 +66,8 @@ enum Command {
     /// Fit and judge calibration documents: isotherm-calibrate
     #[command(disable_help_flag = true)]
     Calibrate(Sibling),
-    /// Print the completions of a shell
-    Completions {
-        /// The shell
-        shell: Shell,
-    },
+    #[command(flatten)]
+    Common(Common),
 }
 
 /// Arguments for another program.
@@ -111,6 +111,9 @@ pub struct ServeArgs {
     /// Serve metrics and health over HTTP on this address; replaces the configured one
     #[arg(long, value_name = "ADDRESS:PORT")]
     pub metrics: Option<std::net::SocketAddr>,
+    /// Serve the console in the browser too, read-only unless configured otherwise; `isotherm web` prints its address
+    #[arg(long)]
+    pub web: bool,
     /// How to reach others; each option given replaces the configured one
     #[command(flatten)]
     pub session: isotherm_bus::SessionOptions,
@@ -141,15 +144,18 @@ pub fn run() -> Exit {
         Command::Rollback(args) => operate(Console::Rollback(args)),
         Command::History(args) => operate(Console::History(args)),
         Command::Give(args) => operate(Console::Command(args)),
+        Command::Web(args) => crate::web::show(&args),
         Command::Check(args) => crate::check::run(&args),
         Command::Sign(args) => crate::signing::sign(&args),
         Command::Keygen(args) => crate::signing::keygen(&args),
         Command::Demo(args) => unheld(&LogArgs::quiet(), demo(args)),
-        Command::Completions { shell } => {
-            let mut script = Vec::new();
-            clap_complete::generate(shell, &mut Cli::command(), "isotherm", &mut script);
-            print(&String::from_utf8_lossy(&script), Exit::Ok)
-        }
+        Command::Common(common) => match common.run::<Cli>() {
+            Ok(printed) => print(&String::from_utf8_lossy(&printed), Exit::Ok),
+            Err((folder, error)) => {
+                say(format_args!("isotherm: cannot write manual pages into {}: {error}", folder.display()));
+                Exit::Failed
+            }
+        },
     }
 }
 
@@ -166,7 +172,7 @@ fn operate(console: Console) -> Exit {
 }
 
 /// Runs a command that a blocked stderr must not hold up: what it says there goes through a queue.
-fn unheld(log: &LogArgs, command: impl Future<Output = Exit>) -> Exit {
+pub fn unheld(log: &LogArgs, command: impl Future<Output = Exit>) -> Exit {
     // However this ends, by a panic too.
     let _finish = FinishLog;
     if let Err(error) = start_writer() {
@@ -197,6 +203,8 @@ fn logged(log: &LogArgs, command: impl Future<Output = Exit>) -> Exit {
 
 #[cfg(test)]
 mod tests {
+    use clap::CommandFactory;
+
     use super::*;
 
     #[test]

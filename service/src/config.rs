@@ -7,7 +7,9 @@ mod keys;
 mod metrics;
 mod read;
 mod swap;
+mod web;
 
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -22,6 +24,10 @@ use crate::ServiceError;
 use crate::text::{self, read_bounded};
 pub use metrics::MetricsSettings;
 pub use swap::{FolderSettings, Severity, SwapSettings};
+pub use web::WebSettings;
+
+/// Where the console in the browser is, unless `[metrics]` says otherwise.
+const USUAL_LISTENER: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), 9464);
 
 /// Everything that an operator can set, checked.
 #[derive(Debug, Clone, PartialEq)]
@@ -53,6 +59,8 @@ pub struct Settings {
     pub congestion: CongestionControl,
     /// Where metrics and health are served.
     pub metrics: MetricsSettings,
+    /// The console in the browser, beside the metrics.
+    pub web: WebSettings,
     /// How to open the Zenoh session.
     pub session: SessionOptions,
     /// SHA-256 of the configuration's text; `None` without one.
@@ -75,6 +83,7 @@ impl Default for Settings {
             stop_timeout: Duration::from_secs(3),
             congestion: CongestionControl::Drop,
             metrics: MetricsSettings::default(),
+            web: WebSettings::default(),
             session: SessionOptions::default(),
             digest: None,
         }
@@ -93,6 +102,13 @@ impl Settings {
             .and_then(|text| Self::parse(text, path))
             .map(|settings| Self { digest: Some(Digest::of(&bytes)), ..settings })
             .map_err(ServiceError::Configuration)
+    }
+
+    /// Where the console in the browser is served and no address is given, the usual one on loopback.
+    pub(crate) fn listen_for_web(&mut self) {
+        if self.web.enabled {
+            self.metrics.listen.get_or_insert(USUAL_LISTENER);
+        }
     }
 
     /// Reads the text of a configuration; `path` names it in problems, and its folder is where relative paths count from.

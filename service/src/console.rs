@@ -12,14 +12,14 @@
 //!
 //! They know the service by its keys alone, so that they work from any machine that reaches it.
 
-mod client;
+pub(crate) mod client;
 mod command;
 mod error;
 mod follow;
 mod history;
-mod page;
+pub(crate) mod page;
 mod show;
-mod status;
+pub(crate) mod status;
 mod swap;
 mod top;
 
@@ -30,6 +30,8 @@ pub use history::HistoryArgs;
 pub use status::StatusArgs;
 pub use swap::{RollbackArgs, SwapArgs};
 pub use top::TopArgs;
+
+pub(crate) use top::{Feed, Fleet, worst_first};
 
 use crate::exit::Exit;
 use crate::words::say;

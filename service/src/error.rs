@@ -61,6 +61,14 @@ pub enum ServiceError {
         /// Why.
         source: std::io::Error,
     },
+    /// The token of the console in the browser cannot be had.
+    #[error("the token of the console in the browser, {path}: {source}", path = path.display())]
+    Token {
+        /// Its file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
     /// The runtime or a thread cannot be started.
     #[error("cannot start a thread: {0}")]
     Thread(#[source] std::io::Error),
@@ -87,6 +95,9 @@ impl ServiceError {
             }
             // An address that is not allowed, not one that somebody else has.
             Self::Metrics { source, .. } if source.kind() == std::io::ErrorKind::Other => {
+                Exit::BadConfiguration
+            }
+            Self::Token { source, .. } if source.kind() == std::io::ErrorKind::InvalidData => {
                 Exit::BadConfiguration
             }
             Self::Bus(error) => Exit::of_bus(error),

@@ -22,7 +22,8 @@ pub enum Exit {
 
 impl Exit {
     /// What an error of the session stands for.
-    pub(crate) fn of_bus(error: &BusError) -> Self {
+    #[must_use]
+    pub fn of_bus(error: &BusError) -> Self {
         if error.is_configuration() {
             Self::BadConfiguration
         } else if error.is_usage() {

@@ -17,12 +17,16 @@
 //! | `registrar` | the one path of every swap, and commands |
 //! | `keeper` | status, and what only a clock can do |
 //! | `metrics` | metrics and health over HTTP |
+//! | `pulse` | whether the receive path is alive |
+//! | `supervisor` | what systemd is told |
+//! | `web` | the console in the browser, on the same server |
 //! | [`store`] | what is remembered over a restart: audit file, documents |
 //! | [`fault`], [`latency`], [`totals`] | what is counted |
 //! | [`console`] | the operator's side: commands that talk to a running service |
 //! | [`check`] | validation of calibration documents and configurations |
 //! | [`signing`] | keys, signed documents and who is trusted, as files |
-//! | [`report`], [`demo`] | the demonstration and its report |
+//! | [`logging`], [`words`] | what is said on stderr and stdout, for other programs too |
+//! | [`demo`] | the demonstration and its report |
 //!
 //! How a message travels: Zenoh's receive thread calls [`intake::Intake::receive`], which finds the unit, locks it, has
 //! it corrected and publishes what came out, all before it returns. A second thread, the keeper, does what only a clock
@@ -42,21 +46,24 @@ pub mod intake;
 mod keeper;
 pub mod kept;
 pub mod latency;
-mod logging;
+pub mod logging;
 mod metrics;
+mod pulse;
 mod registrar;
-pub mod report;
 mod serve;
 pub mod service;
 pub mod signing;
 pub mod store;
+mod supervisor;
 mod text;
 pub mod totals;
 pub mod unit;
 pub mod watch;
-mod words;
+pub mod web;
+pub mod words;
 
 pub use config::Settings;
 pub use error::ServiceError;
+pub use pulse::Stuck;
 pub use service::{RunningService, start, start_with};
 pub use totals::{Totals, UnitTotals};

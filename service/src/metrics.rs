@@ -20,7 +20,7 @@
 
 mod families;
 mod health;
-mod http;
+pub(crate) mod http;
 mod page;
 mod source;
 mod state_folder;
@@ -37,6 +37,7 @@ use tokio::task::JoinHandle;
 
 use crate::ServiceError;
 use crate::config::MetricsSettings;
+use crate::web::Web;
 pub(crate) use source::Source;
 
 use health::{STOPPING, Watch};
@@ -103,6 +104,7 @@ impl Endpoint {
         let address = listener.local_addr().map_err(refused)?;
         let desk = Arc::new(Desk {
             source: OnceLock::new(),
+            web: OnceLock::new(),
             waits_for,
             started: Instant::now(),
             watch: Arc::new(Mutex::new(watch)),
@@ -117,10 +119,13 @@ impl Endpoint {
         Ok(Some(Self { address, desk, tasks }))
     }
 
-    /// The service is at work: answers are made from this from here on.
-    pub(crate) fn open(&self, source: Source) {
+    /// The service is at work: answers are made from this from here on, those of the console in the browser too.
+    pub(crate) fn open(&self, source: Source, web: Option<Web>) {
         // Opened once.
         let _ = self.desk.source.set(source);
+        if let Some(web) = web {
+            let _ = self.desk.web.set(web);
+        }
     }
 
     /// Where it is.
@@ -165,6 +170,8 @@ impl Drop for Endpoint {
 struct Desk {
     /// Set when the service is at work.
     source: OnceLock<Source>,
+    /// The console in the browser, likewise.
+    web: OnceLock<Web>,
     /// What it waits for until then.
     waits_for: String,
     started: Instant,

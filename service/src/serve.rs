@@ -15,6 +15,7 @@ use crate::config::Settings;
 use crate::exit::Exit;
 use crate::metrics::Endpoint;
 use crate::service::{open_store, start_on};
+use crate::supervisor;
 use crate::words::{print_within, say};
 use crate::{ServiceError, Totals};
 
@@ -73,6 +74,8 @@ fn settings(args: &ServeArgs) -> Result<Settings, ServiceError> {
     if args.metrics.is_some() {
         settings.metrics.listen = args.metrics;
     }
+    settings.web.enabled |= args.web;
+    settings.listen_for_web();
     let (configured, given) = (&mut settings.session, &args.session);
     if given.config.is_some() {
         configured.config.clone_from(&given.config);
@@ -121,6 +124,11 @@ async fn serve(args: ServeArgs) -> Result<Option<Totals>, ServiceError> {
     let service = start_on(settings, Calibrations::default(), state, metrics, session).await?;
     tracing::info!(version = env!("CARGO_PKG_VERSION"), locators = locators.join(" "), "ready");
     announce(&args, &locators, service.metrics())?;
+    let ready = format!("correcting, on {}", locators.join(" "));
+    supervisor::ready(&ready);
+    let pulse = service.pulse();
+    // Through the stop too: it has a limit of its own.
+    tokio::spawn(supervisor::watch(ready, move || pulse.look()));
 
     let name = loop {
         tokio::select! {
@@ -129,6 +137,7 @@ async fn serve(args: ServeArgs) -> Result<Option<Totals>, ServiceError> {
         }
     };
     tracing::info!(signal = name, "stopping");
+    supervisor::stopping();
     tokio::select! {
         totals = service.stop() => Ok(Some(totals)),
         _ = stop_asked() => Ok(None),
@@ -147,6 +156,7 @@ async fn open_session(options: SessionOptions, awaited: &str) -> Result<Session,
             Err(_) => {
                 let waited_s = start.elapsed().as_secs();
                 tracing::warn!(waited_s, "nothing is corrected yet: waiting for {awaited}");
+                supervisor::status(&format!("nothing is corrected yet: waiting for {awaited}"));
                 pause = FURTHER_WORDS;
             }
         }

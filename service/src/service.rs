@@ -18,12 +18,14 @@ use crate::config::Settings;
 use crate::intake::Intake;
 use crate::keeper::Keeper;
 use crate::metrics::{Endpoint, Source};
+use crate::pulse::{Pulse, Stuck};
 use crate::registrar::{Desk, Found, Opening, Registrar, Work};
 use crate::signing::read_trusted_keys;
 use crate::store::{Opened, Store};
 use crate::totals::Totals;
 use crate::unit::UnitActor;
 use crate::watch::{WatchSettings, Watcher};
+use crate::web::Web;
 use declare::Declared;
 
 /// The part of the time for a stop that is kept for closing the session, one in so many.
@@ -35,6 +37,7 @@ pub struct RunningService {
     session: Session,
     settings: Settings,
     intake: Arc<Intake>,
+    pulse: Arc<Pulse>,
     watcher: Option<Watcher>,
     declared: Declared,
     keeper: Keeper,
@@ -85,6 +88,7 @@ pub(crate) async fn start_on(
     let intake = Intake::new(settings.clone(), calibrations.clone(), outlets).reporting_to(desk.clone());
     let intake = intake.journaling_to(declare::journal(session.clone(), settings.congestion));
     let intake = Arc::new(intake);
+    let pulse = Arc::new(Pulse::new(settings.congestion));
 
     let mut work = Work::new(&settings, Arc::clone(&intake), store, &opened);
     work.take_over(&calibrations);
@@ -94,6 +98,7 @@ pub(crate) async fn start_on(
     tracing::debug!(units = prepared, "publishers and keys of units with a calibration are declared");
     let board = work.board();
     let source = Source::new(&settings, Arc::clone(&intake), Arc::clone(&board), session.zid().to_string());
+    let source = source.feeling(Arc::clone(&pulse));
     let registrar = Registrar::start(opening, work).map_err(ServiceError::Thread)?;
     let keeper =
         Keeper::start(&session, Arc::clone(&intake), board, &settings).map_err(ServiceError::Thread)?;
@@ -105,11 +110,23 @@ pub(crate) async fn start_on(
         }
         None => None,
     };
-    let declared = Declared::new(&session, &intake, &keeper.bell(), &desk).await?;
+    let declared = Declared::new(&session, &intake, &keeper.bell(), &desk, &pulse).await?;
+    let web = Web::start(&settings, &session, &intake)?;
     if let Some(metrics) = &metrics {
-        metrics.open(source);
+        metrics.open(source, web);
     }
-    Ok(RunningService { session, settings, intake, watcher, declared, keeper, registrar, desk, metrics })
+    Ok(RunningService {
+        session,
+        settings,
+        intake,
+        pulse,
+        watcher,
+        declared,
+        keeper,
+        registrar,
+        desk,
+        metrics,
+    })
 }
 
 /// Opens the state folder, or its stand-in.
@@ -178,7 +195,7 @@ impl RunningService {
     ///
     /// The session given to [`start`] is closed for whoever else holds it.
     pub async fn stop(self) -> Totals {
-        let Self { session, settings, intake, watcher, declared, keeper, registrar, desk: _, metrics } = self;
+        let Self { session, settings, intake, watcher, declared, keeper, registrar, metrics, .. } = self;
         metrics.iter().for_each(Endpoint::stopping);
         let deadline = Instant::now() + settings.stop_timeout;
         let left = |deadline: Instant| deadline.saturating_duration_since(Instant::now());
@@ -219,6 +236,21 @@ impl RunningService {
         tracing::info!("the documents of the folder are read again");
         self.watcher.iter().for_each(Watcher::reread);
         self.desk.judge_again();
+    }
+
+    /// Whether the receive path is alive: messages are done in time, or, where none is there, its threads give signs of life.
+    ///
+    /// Asks for the sign that the next call will want to see; that no sign comes is noticed 2 s later, 30 s with `congestion = "block"`.
+    ///
+    /// # Errors
+    /// [`Stuck`]: what takes too long.
+    pub fn receives(&self) -> Result<(), Stuck> {
+        self.pulse.look()
+    }
+
+    /// The same, for whoever looks beside the service.
+    pub(crate) fn pulse(&self) -> Arc<Pulse> {
+        Arc::clone(&self.pulse)
     }
 
     /// The session that it runs on.

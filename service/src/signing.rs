@@ -13,5 +13,6 @@ pub use keygen::KeygenArgs;
 pub use sign::SignArgs;
 pub use trusted::read_trusted_keys;
 
+pub(crate) use files::create;
 pub(crate) use keygen::run as keygen;
 pub(crate) use sign::run as sign;

@@ -5,6 +5,7 @@ mod present;
 mod quiet;
 mod rates;
 mod scribe;
+mod seen;
 mod tell;
 
 use std::sync::Arc;
@@ -32,6 +33,7 @@ pub(crate) use account::SwapAccount;
 pub use present::Present;
 pub use quiet::QuietSettings;
 pub use scribe::{Journal, JournalOutlet};
+pub(crate) use seen::TickSeen;
 
 /// Where corrected frames go; `Err` is an output that could not be published.
 pub type Outlet = Box<dyn FnMut(Vec<u8>) -> Result<(), zenoh::Error> + Send>;

@@ -34,7 +34,7 @@ pub(crate) fn coloured(text: &str) -> String {
 }
 
 /// Says a line on stderr.
-pub(crate) fn say(line: impl Display) {
+pub fn say(line: impl Display) {
     to_stderr(format!("{}\n", escaped(&line.to_string())));
 }
 
@@ -45,7 +45,8 @@ pub(crate) fn say_lines(lines: impl Display) {
 
 /// Prints a result as [`print`] does, and goes on without it where stdout takes nothing for so long: a terminal that is
 /// stopped or a full pipe must not hold up the end of a service.
-pub(crate) fn print_within(limit: Duration, text: String, exit: Exit) -> Exit {
+#[must_use]
+pub fn print_within(limit: Duration, text: String, exit: Exit) -> Exit {
     let (sender, printed) = sync_channel(1);
     let thread = std::thread::Builder::new().spawn(move || sender.send(print(&text, exit)));
     let printed = thread.ok().and_then(|_| printed.recv_timeout(limit).ok());
@@ -57,7 +58,8 @@ pub(crate) fn print_within(limit: Duration, text: String, exit: Exit) -> Exit {
 /// Colours stay; other control characters, but for line breaks and tabs, are shown by their codes.
 ///
 /// A reader that has closed its end of the pipe, as `head` does, has what it wanted.
-pub(crate) fn print(text: &str, exit: Exit) -> Exit {
+#[must_use]
+pub fn print(text: &str, exit: Exit) -> Exit {
     let text = coloured(text);
     let mut stdout = io::stdout().lock();
     match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {

@@ -124,16 +124,16 @@ impl AccelerometersState {
         self.orientation.axes(housing_deg_c)
     }
 
-    /// Readings of a tick; `extra` is added to each sensor's specific force (m/s²).
+    /// Readings of a tick with axes turned as at `axes_deg_c`; `extra` is added to each sensor's specific force (m/s²).
     pub(crate) fn tick(
         &mut self,
         velocity_m_per_s: [f64; 3],
         length_s: f64,
-        (housing_deg_c, board_deg_c): (f64, f64),
+        (axes_deg_c, board_deg_c): (f64, f64),
         share: f64,
         extra: impl Fn(usize) -> f64,
     ) -> Sensors<f64> {
-        let axes = self.orientation.axes(housing_deg_c);
+        let axes = self.orientation.axes(axes_deg_c);
         let output = self.output;
         let states = self.sensors.iter_mut().zip(axes).enumerate();
         let read = |(index, (state, axis)): (usize, (&mut AccelerometerState, [f64; 3]))| {

@@ -46,6 +46,12 @@ impl Report {
         }
     }
 
+    pub(crate) fn channel_name(&mut self, key: Key, name: &str) {
+        if !(1..=MAX_CHANNEL_NAME).contains(&name.len()) {
+            self.0.push(ScenarioError::ChannelName { key, got: name.len() });
+        }
+    }
+
     pub(crate) fn sensors(&mut self, key: Key, got: usize) {
         if !(MIN_SENSORS..=MAX_SENSORS).contains(&got) {
             self.0.push(ScenarioError::SensorCount { key, got });
@@ -167,9 +173,7 @@ fn thermometers(report: &mut Report, instrument: &Instrument, tick_s: f64) {
     report.number(at("instrument.thermometers.period_s"), thermometers.period_s, (tick_s.max(1e-4), 1e6));
     for (index, channel) in thermometers.channels.iter().enumerate() {
         let key = nth("instrument.thermometers.channels", index);
-        if !(1..=MAX_CHANNEL_NAME).contains(&channel.name.len()) {
-            report.0.push(ScenarioError::ChannelName { key, got: channel.name.len() });
-        }
+        report.channel_name(key, &channel.name);
         if thermometers.channels.iter().take(index).any(|earlier| earlier.name == channel.name) {
             report.0.push(ScenarioError::ChannelTwice { key });
         }

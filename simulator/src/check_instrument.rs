@@ -2,7 +2,7 @@
 
 use crate::accelerometer::{AccelerometerOutput, Accelerometers};
 use crate::check::{ANY, DEG_C, NOT_NEGATIVE, POSITIVE, Report, at, nth};
-use crate::effects::{Effects, Play};
+use crate::effects::{AxesPlay, Effects, Play, Supply};
 use crate::error::{Key, ScenarioError};
 use crate::fibre_optic::FibreOpticGyro;
 use crate::instrument::{Gyros, Instrument};
@@ -50,7 +50,7 @@ pub(crate) fn instrument(report: &mut Report, instrument: &Instrument, tick_s: f
 }
 
 fn effects(report: &mut Report, instrument: &Instrument) {
-    let Effects { gyros, accelerometers } = &instrument.effects;
+    let Effects { gyros, accelerometers, supply, gyro_axes, accelerometer_axes } = &instrument.effects;
     let accels = instrument.accelerometers.as_ref().map_or(0, |block| block.sensors.len());
     for (path, got, expected) in [
         ("instrument.effects.gyros", gyros.len(), instrument.gyros.count()),
@@ -66,11 +66,30 @@ fn effects(report: &mut Report, instrument: &Instrument) {
             report.number(key, per_k, ANY);
         }
     };
+    if let Some(Supply { channel, nominal_v, swing_v, period_s }) = supply {
+        let key = at("instrument.effects.supply");
+        report.channel_name(key, channel);
+        if instrument.thermometers.channels.iter().any(|other| other.name == *channel) {
+            report.0.push(ScenarioError::ChannelTwice { key });
+        }
+        report.numbers(key, &[*nominal_v, *swing_v], ANY);
+        report.number(key, *period_s, POSITIVE);
+    }
+    for (path, axes) in [
+        ("instrument.effects.gyro_axes", gyro_axes),
+        ("instrument.effects.accelerometer_axes", accelerometer_axes),
+    ] {
+        if let Some(AxesPlay { half_width_k, share }) = axes {
+            report.number(at(path), *half_width_k, POSITIVE);
+            report.number(at(path), *share, (-10.0, 10.0));
+        }
+    }
     for (index, gyro) in gyros.iter().enumerate() {
         let key = nth("instrument.effects.gyros", index);
         report.numbers(key, &gyro.acceleration_rad_per_s_per_m_per_s2, (-1.0, 1.0));
         report.numbers(key, &gyro.acceleration_per_k, (-1.0, 1.0));
         report.number(key, gyro.reference_deg_c, DEG_C);
+        report.numbers(key, &[gyro.gradient_rad_per_s_per_k, gyro.supply_rad_per_s_per_v], ANY);
         report.number(key, gyro.scale_asymmetry, (-0.1, 0.1));
         report.number(key, gyro.scale_curvature_s2_per_rad2, (-1.0, 1.0));
         play(report, key, gyro.play);
@@ -78,6 +97,7 @@ fn effects(report: &mut Report, instrument: &Instrument) {
     for (index, accel) in accelerometers.iter().enumerate() {
         let key = nth("instrument.effects.accelerometers", index);
         report.numbers(key, &accel.position_m, (-10.0, 10.0));
+        report.numbers(key, &[accel.gradient_m_per_s2_per_k, accel.supply_m_per_s2_per_v], ANY);
         report.number(key, accel.second_order_s2_per_m, (-1.0, 1.0));
         play(report, key, accel.play);
     }

@@ -26,13 +26,22 @@ pub struct Effects {
     /// One entry per accelerometer, or none.
     #[serde(default)]
     pub accelerometers: Vec<AccelerometerEffects>,
+    /// Supply voltage, where sensors depend on it.
+    #[serde(default)]
+    pub supply: Option<Supply>,
+    /// Friction in what turns the gyros' axes with the housing's temperature.
+    #[serde(default)]
+    pub gyro_axes: Option<AxesPlay>,
+    /// Friction in what turns the accelerometers' axes.
+    #[serde(default)]
+    pub accelerometer_axes: Option<AxesPlay>,
 }
 
 impl Effects {
     /// Whether there are none.
     #[must_use]
     pub fn is_none(&self) -> bool {
-        self.gyros.is_empty() && self.accelerometers.is_empty()
+        *self == Self::default()
     }
 }
 
@@ -52,6 +61,10 @@ pub struct GyroEffects {
     pub scale_curvature_s2_per_rad2: f64,
     /// Friction in what follows temperature.
     pub play: Option<Play>,
+    /// Bias by the gradient across it, its own temperature less that of the housing (rad/s per K).
+    pub gradient_rad_per_s_per_k: f64,
+    /// Bias by the supply voltage beyond its nominal value (rad/s per V).
+    pub supply_rad_per_s_per_v: f64,
 }
 
 /// Effects of one accelerometer.
@@ -64,6 +77,36 @@ pub struct AccelerometerEffects {
     pub second_order_s2_per_m: f64,
     /// Friction in what follows temperature.
     pub play: Option<Play>,
+    /// Error by the gradient across it, its own temperature less that of the housing (m/s² per K).
+    pub gradient_m_per_s2_per_k: f64,
+    /// Error by the supply voltage beyond its nominal value (m/s² per V).
+    pub supply_m_per_s2_per_v: f64,
+}
+
+/// Supply voltage of a unit, which swings with its load; read with the thermometers, as a channel of its own.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Supply {
+    /// Name of its channel, 1…24 bytes.
+    pub channel: String,
+    /// Nominal voltage (V), about which it swings.
+    pub nominal_v: f64,
+    /// Amplitude of the swing (V).
+    pub swing_v: f64,
+    /// Period of the swing (s, > 0).
+    pub period_s: f64,
+}
+
+impl Supply {
+    /// Voltage beyond the nominal one at a time (V).
+    fn beyond_v(&self, time_s: f64) -> f64 {
+        self.swing_v * libm::sin(core::f64::consts::TAU * time_s / self.period_s)
+    }
+
+    /// Its reading at a time (V).
+    pub(crate) fn reading_v(&self, time_s: f64) -> f64 {
+        self.nominal_v + self.beyond_v(time_s)
+    }
 }
 
 /// A play: something dragged along by temperature with a slack, so that the way up is not the way down [Prandtl, Ishlinskii].
@@ -77,6 +120,23 @@ pub struct Play {
     pub half_width_k: f64,
     /// Error g by which the sensor is off per kelvin that the play is behind (rad/s or m/s² per K).
     pub per_k: f64,
+}
+
+/// A play in the mounts of sensors: this share of the turning of their axes is dragged along, the rest follows at once \[004\].
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AxesPlay {
+    /// Half width w of the slack (K, > 0).
+    pub half_width_k: f64,
+    /// Share of the turning.
+    pub share: f64,
+}
+
+impl AxesPlay {
+    /// By how much the axes are behind the housing's temperature (K), as a play.
+    const fn behind(self) -> Play {
+        Play { half_width_k: self.half_width_k, per_k: self.share }
+    }
 }
 
 /// A play with its memory.
@@ -102,6 +162,20 @@ impl PlayState {
 pub(crate) struct EffectsState {
     gyros: Sensors<(GyroEffects, PlayState)>,
     accelerometers: Sensors<(AccelerometerEffects, PlayState)>,
+    /// Of the gyros' and the accelerometers' axes.
+    axes: [(Option<Play>, PlayState); 2],
+    supply: Option<Supply>,
+}
+
+/// Where and when a tick is sensed.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Sensed<'a> {
+    pub(crate) middle_s: f64,
+    pub(crate) length_s: f64,
+    /// Place of the middle between two steps of the thermal clock.
+    pub(crate) share: f64,
+    pub(crate) sensors_deg_c: &'a [f64],
+    pub(crate) housing_deg_c: f64,
 }
 
 /// What the accelerometers sense of one tick beside the specific force at the reference point.
@@ -121,11 +195,17 @@ impl EffectsState {
                 .iter()
                 .map(|accel| (*accel, PlayState::default()))
                 .collect(),
+            supply: effects.supply.clone(),
+            axes: [effects.gyro_axes, effects.accelerometer_axes]
+                .map(|play| (play.map(AxesPlay::behind), PlayState::default())),
         }
     }
 
-    /// Follows the sensors' temperatures (°C) at the end of a step of the thermal clock.
-    pub(crate) fn thermal_step(&mut self, gyros_deg_c: &[f64], accels_deg_c: &[f64]) {
+    /// Follows the temperatures of sensors and housing (°C) at the end of a step of the thermal clock.
+    pub(crate) fn thermal_step(&mut self, gyros_deg_c: &[f64], accels_deg_c: &[f64], housing_deg_c: f64) {
+        for (play, state) in &mut self.axes {
+            state.step(*play, housing_deg_c);
+        }
         for ((gyro, play), deg_c) in self.gyros.iter_mut().zip(gyros_deg_c) {
             play.step(gyro.play, *deg_c);
         }
@@ -134,22 +214,39 @@ impl EffectsState {
         }
     }
 
+    /// Temperatures as which the gyros' and the accelerometers' axes turn (°C), in a housing of `housing_deg_c`.
+    pub(crate) fn axes_deg_c(&self, housing_deg_c: f64, share: f64) -> [f64; 2] {
+        [0, 1].map(|kind: usize| match &self.axes[kind] {
+            (Some(_), state) => housing_deg_c + state.error.at(share),
+            (None, _) => housing_deg_c,
+        })
+    }
+
     /// Whether gyros have any.
     pub(crate) fn has_gyros(&self) -> bool {
         !self.gyros.is_empty()
     }
 
-    /// Changes the input angles (rad) of both halves of a tick of `length_s`, over which the increments are `parts`; gives what
+    /// Supply voltage beyond the nominal one (V).
+    fn beyond_v(&self, time_s: f64) -> f64 {
+        self.supply.as_ref().map_or(0.0, |supply| supply.beyond_v(time_s))
+    }
+
+    /// Reading of the supply, where it has a channel: name and voltage.
+    pub(crate) fn supply_reading(&self, time_s: f64) -> Option<(&str, f64)> {
+        self.supply.as_ref().map(|supply| (supply.channel.as_str(), supply.reading_v(time_s)))
+    }
+
+    /// Changes the input angles (rad) of both halves of a tick, over which the increments are `parts`; gives what
     /// adds to each gyro's drift (rad/s).
     pub(crate) fn sense(
         &self,
         halves: &mut Sensors<[f64; 2]>,
         parts: &[Increments; 2],
-        length_s: f64,
-        gyros_deg_c: &[f64],
-        share: f64,
+        Sensed { middle_s, length_s, share, sensors_deg_c, housing_deg_c }: Sensed<'_>,
     ) -> Sensors<f64> {
-        let gyros = self.gyros.iter().zip(halves).zip(gyros_deg_c);
+        let beyond_v = self.beyond_v(middle_s);
+        let gyros = self.gyros.iter().zip(halves).zip(sensors_deg_c);
         let sense = |(((gyro, play), halves), deg_c): ((&(GyroEffects, PlayState), &mut [f64; 2]), &f64)| {
             let away_k = deg_c - gyro.reference_deg_c;
             let by_force =
@@ -157,12 +254,14 @@ impl EffectsState {
             let rate = (halves[0] + halves[1]) / length_s;
             let sign = if rate < 0.0 { -1.0 } else { 1.0 };
             let factor = 1.0 + gyro.scale_asymmetry * sign + gyro.scale_curvature_s2_per_rad2 * rate * rate;
-            let stuck = play.error.at(share);
+            let slow = play.error.at(share)
+                + gyro.gradient_rad_per_s_per_k * (deg_c - housing_deg_c)
+                + gyro.supply_rad_per_s_per_v * beyond_v;
             // Halves of gyros without dither are the whole tick and nothing.
             let of_tick = if parts[1] == Increments::default() { [1.0, 0.0] } else { [0.5, 0.5] };
             let mut drift_rad = 0.0;
             for ((half, part), share) in halves.iter_mut().zip(parts).zip(of_tick) {
-                let own = dot(by_force, part.velocity) + stuck * share * length_s;
+                let own = dot(by_force, part.velocity) + slow * share * length_s;
                 *half = factor * *half + own;
                 drift_rad += own;
             }
@@ -172,21 +271,21 @@ impl EffectsState {
     }
 
     /// What each accelerometer with input axes `axes` senses beside the specific force at the reference point (m/s²), mean of the
-    /// tick of `length_s` about `middle_s`.
+    /// tick.
     pub(crate) fn feel(
         &self,
         trajectory: &Trajectory,
-        (middle_s, length_s): (f64, f64),
+        Sensed { middle_s, length_s, share, sensors_deg_c, housing_deg_c }: Sensed<'_>,
         axes: impl FnOnce() -> Sensors<Vector>,
-        share: f64,
     ) -> Sensors<f64> {
         if self.accelerometers.is_empty() {
             return Sensors::new();
         }
         let felt = Felt::of(trajectory, middle_s, length_s);
-        let sensors = self.accelerometers.iter().zip(axes());
+        let beyond_v = self.beyond_v(middle_s);
+        let sensors = self.accelerometers.iter().zip(axes()).zip(sensors_deg_c);
         sensors
-            .map(|((accel, play), axis)| {
+            .map(|(((accel, play), axis), deg_c)| {
                 let arm = accel.position_m;
                 let mut sum = dot(axis, cross(felt.mean_change, arm));
                 for (weight, rate, force) in &felt.instants {
@@ -195,6 +294,8 @@ impl EffectsState {
                     sum += weight * (centripetal + accel.second_order_s2_per_m * along * along);
                 }
                 sum + play.error.at(share)
+                    + accel.gradient_m_per_s2_per_k * (deg_c - housing_deg_c)
+                    + accel.supply_m_per_s2_per_v * beyond_v
             })
             .collect()
     }

@@ -1,11 +1,11 @@
 //! The simulation: a stream of ticks from a scenario.
 
-use isotherm_correction::sample::{AccelTick, GyroTick, Sensors, TemperatureReading};
+use isotherm_correction::sample::{AccelTick, ChannelName, GyroTick, Sensors, TemperatureReading};
 use isotherm_correction::units::{Span, Timestamp};
 
 use crate::accelerometer::AccelerometersState;
 use crate::chamber::Chamber;
-use crate::effects::EffectsState;
+use crate::effects::{EffectsState, Sensed};
 use crate::error::ScenarioErrors;
 use crate::failure::{FailingSensor, Failures};
 use crate::gyros::{GyroOutput, GyrosState, TickTime};
@@ -112,7 +112,8 @@ impl Simulation {
                 accelerometers.thermal_step(from_deg_c, to_deg_c);
             }
             let accels = self.accelerometers.as_ref().map(|block| block.deg_c(1.0)).unwrap_or_default();
-            self.effects.thermal_step(&self.gyros.sensor_deg_c(1.0), &accels);
+            let housing_deg_c = self.surroundings.housing_deg_c(1.0);
+            self.effects.thermal_step(&self.gyros.sensor_deg_c(1.0), &accels, housing_deg_c);
         }
     }
 
@@ -171,10 +172,14 @@ impl Simulation {
         middle_s: f64,
     ) -> Option<Sensors<f64>> {
         let share = self.surroundings.share(middle_s);
-        let deg_c = (self.surroundings.housing_deg_c(share), self.surroundings.board_deg_c(share));
+        let [_, axes_deg_c] = self.effects.axes_deg_c(self.surroundings.housing_deg_c(share), share);
+        let deg_c = (axes_deg_c, self.surroundings.board_deg_c(share));
         let failures = &self.failures;
         let block = self.accelerometers.as_mut()?;
-        let felt = self.effects.feel(&self.trajectory, (middle_s, length_s), || block.axes(deg_c.0), share);
+        let sensors_deg_c = block.deg_c(share);
+        let housing_deg_c = self.surroundings.housing_deg_c(share);
+        let sensed = Sensed { middle_s, length_s, share, sensors_deg_c: &sensors_deg_c, housing_deg_c };
+        let felt = self.effects.feel(&self.trajectory, sensed, || block.axes(deg_c.0));
         let extra = |index| {
             let felt = felt.get(index).copied().unwrap_or_default();
             failures.extra(FailingSensor::Accelerometer(index), middle_s) + felt
@@ -200,6 +205,11 @@ impl Simulation {
                 Place::Gyro(index) => gyros.get(index).copied().unwrap_or(f64::NAN),
                 Place::Accelerometer(index) => accels.get(index).copied().unwrap_or(f64::NAN),
             }));
+            readings.extend(self.effects.supply_reading(time_s).map(|(name, raw)| TemperatureReading {
+                channel: ChannelName::from(name).unwrap_or_default(),
+                time,
+                raw,
+            }));
         }
         readings
     }
@@ -211,13 +221,16 @@ impl Simulation {
         let middle_s = whole_to_real(start_ns + end_ns) * 0.5e-9;
         self.advance_to(middle_s);
         let share = self.surroundings.share(middle_s);
-        let axes = self.gyro_orientation.axes(self.surroundings.housing_deg_c(share));
+        let [axes_deg_c, _] = self.effects.axes_deg_c(self.surroundings.housing_deg_c(share), share);
+        let axes = self.gyro_orientation.axes(axes_deg_c);
         let (mut halves, parts) = self.inputs(middle_s, length_s, &axes);
         let whole = parts[0].plus(parts[1]);
         let mut drifts = Sensors::new();
         if self.effects.has_gyros() {
             let deg_c = self.gyros.sensor_deg_c(share);
-            drifts = self.effects.sense(&mut halves, &parts, length_s, &deg_c, share);
+            let housing_deg_c = self.surroundings.housing_deg_c(share);
+            let sensed = Sensed { middle_s, length_s, share, sensors_deg_c: &deg_c, housing_deg_c };
+            drifts = self.effects.sense(&mut halves, &parts, sensed);
         }
         if !self.failures.is_empty() {
             for (index, halves) in halves.iter_mut().enumerate() {

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Checks what `isotherm-replay convert` writes with programs of others: mcap, rosbags and duckdb.
+"""Checks what `isotherm-replay convert` writes with programs of others: mcap, jsonschema, rosbags and duckdb.
 
     recordings.py FOLDER
 
@@ -17,6 +17,7 @@ import sys
 
 import duckdb
 import isotherm
+import jsonschema
 from mcap.reader import make_reader
 from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
@@ -144,15 +145,81 @@ SIGNS = {None: None, "Plus": 1, "Minus": -1}
 RAW_KINDS = {"gyro": isotherm.RAW_GYRO, "accel": isotherm.RAW_ACCEL, "temp": isotherm.RAW_TEMPERATURE}
 
 
+class Views:
+    """Channels that describe themselves: read by their JSON Schema alone, as viewers do."""
+
+    def __init__(self):
+        self.validators = {}
+        self.topics = {}
+
+    def take(self, schema, channel, message):
+        same(f"{channel.topic}: schema's encoding", schema.encoding, "jsonschema")
+        if schema.id not in self.validators:
+            described = json.loads(schema.data)
+            jsonschema.Draft202012Validator.check_schema(described)
+            # A field that the schema does not name would be shown without its unit of measure.
+            described["additionalProperties"] = False
+            self.validators[schema.id] = jsonschema.Draft202012Validator(described)
+        view = json.loads(message.data)
+        self.validators[schema.id].validate(view)
+        stamp = view["timestamp"]["sec"] * 10**9 + view["timestamp"]["nsec"]
+        same(f"{channel.topic}: publish time", message.publish_time, stamp)
+        self.topics.setdefault(channel.topic, []).append((stamp, message.log_time, view))
+
+    def of(self, unit, topic):
+        """What is shown of a topic, by the producer's clock."""
+        return sorted(self.topics[f"imu/{unit}/{topic}/json"], key=lambda view: view[0])
+
+    def check(self, units):
+        for name, unit in units.items():
+            views = self.of(name, "corrected")
+            same(f"json: {name}: ticks", len(views), len(unit.corrected))
+            for (stamp, _, view), tick in zip(views, unit.corrected):
+                what, seconds = f"json: {name}: {tick['sequence']}", float(tick["duration_ns"]) * 1e-9
+                same(f"{what}: end", stamp, tick["end_time_ns"])
+                for field in ("sequence", "missed", "flags", "revision"):
+                    same(f"{what}: {field}", view[field], tick[field])
+                same(f"{what}: mode", view["mode"], tick["mode"] or 0)
+                flags = tick["flags"]
+                known = {
+                    "angular_rate_deg_per_h": not flags & (UNCALIBRATED | ANGLE_INVALID),
+                    "specific_force_m_per_s2": not flags & (UNCALIBRATED | ACCELEROMETER_MISSING | VELOCITY_INVALID),
+                }
+                deltas = {"angular_rate_deg_per_h": "delta_angle_rad", "specific_force_m_per_s2": "delta_velocity_m_per_s"}
+                for field, is_known in known.items():
+                    same(f"{what}: {field} is there", field in view, is_known)
+                    if not is_known:
+                        continue
+                    for axis, delta in zip(AXES, tick[deltas[field]]):
+                        right = delta / seconds
+                        if field == "angular_rate_deg_per_h":
+                            right = math.degrees(right) * 3600.0
+                        same(f"{what}: {field}", math.isclose(view[field][axis], right, rel_tol=1e-12, abs_tol=1e-12), True)
+            # Within a message ticks lie as far apart on the recorder's clock as on the producer's.
+            apart = {late[1] - early[1] - (late[0] - early[0]) for early, late in zip(views, views[1:])}
+            same(f"json: {name}: distances kept within messages", 0 in apart, True)
+            for kind, ticks in (("gyro", unit.gyro), ("accel", unit.accel)):
+                views = self.of(name, f"raw/{kind}")
+                got = [(view["sequence"], view["readings"]) for _, _, view in views]
+                same(f"json: {name}: raw {kind}", got, [(tick["sequence"], tick["readings"]) for tick in ticks])
+            views = self.of(name, "raw/temp")
+            got = sorted((stamp, *pair) for stamp, _, view in views for pair in view["raw"].items())
+            same(f"json: {name}: temperatures", got, unit.temperature)
+
+
 def check_mcap(path, units):
     """The recording by the mcap package, its frames by the package isotherm."""
     gyro, accel, temperature, corrected, status = ({unit: [] for unit in units} for _ in range(5))
+    views = Views()
     with open(path, "rb") as file:
         reader = make_reader(file)
         summary = reader.get_summary()
         counted = 0
         for schema, channel, message in reader.iter_messages():
             counted += 1
+            if channel.message_encoding == "json":
+                views.take(schema, channel, message)
+                continue
             same("encoding", channel.message_encoding, "isotherm")
             same("schema's encoding", schema.encoding, "isotherm-wire")
             _, unit, *topic = channel.topic.split("/")
@@ -184,6 +251,7 @@ def check_mcap(path, units):
                         kept |= {"mode": SIGNS[tick["mode"]], "switch_command": tick["switch_command"]}
                     (gyro if topic[1] == "gyro" else accel)[unit].append(kept)
         same("messages in the summary", summary.statistics.message_count, counted)
+    views.check(units)
     for name, unit in units.items():
         same_rows(f"mcap: {name}: raw gyro", flats(gyro[name]), flats(unit.gyro))
         same_rows(f"mcap: {name}: raw accel", flats(accel[name]), flats(unit.accel))

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # The Python package: its wheel is built, installed into a clean environment, and tested there against the frozen frames and the
-# service. Recordings, ROS 2 bags and Parquet files of `isotherm-replay convert` against what programs of others read in them.
+# service. Recordings with their JSON, ROS 2 bags and Parquet files of `isotherm-replay convert` against what programs of others read in
+# them. The bridge to ROS 2 against other implementations of its keys and messages.
 #
 # Makes a virtual environment under target/. ISOTHERM_BIN is the service's program (default: it is built here). Skipped, in plain words,
 # where Python or its venv module is missing.
@@ -29,7 +30,7 @@ wheel=$(echo "$venv"/wheel/isotherm-*.whl)
 pip install "$wheel[recordings,parquet,plot]" --requirement tests/python/requirements.txt
 
 if [ -z "${ISOTHERM_BIN:-}" ]; then
-    cargo build --release --locked --bin isotherm --bin isotherm-replay
+    cargo build --release --locked --bin isotherm --bin isotherm-replay --bin isotherm-ros
     ISOTHERM_BIN=${CARGO_TARGET_DIR:-$PWD/target}/release/isotherm
 fi
 export ISOTHERM_BIN
@@ -45,3 +46,7 @@ if ! "$venv/bin/python" -c 'import sys; sys.exit(sys.version_info < (3, 11))'; t
     exit 0
 fi
 ISOTHERM_PYTHON=$venv/bin/python cargo test --release --locked --workspace --test replay python_reads -- --nocapture
+# zenoh-ros2-sdk without what it depends on: its modules of keys and attachments need nothing.
+pip install --no-deps zenoh-ros2-sdk==0.1.8
+"$venv/bin/python" -B tests/python/ros2.py ros2/vectors.json "$(dirname "$ISOTHERM_BIN")/isotherm-ros" \
+    config/ros2.toml config/calibration

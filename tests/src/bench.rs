@@ -9,7 +9,7 @@ use isotherm_correction::calibration::Calibration;
 use isotherm_protocol::corrected::CorrectedTick;
 use isotherm_protocol::key::UnitId;
 use isotherm_service::calibrations::Calibrations;
-use isotherm_service::{RunningService, Settings, Totals, start_with};
+use isotherm_service::{RunningService, Settings, Stuck, Totals, start_with};
 use zenoh::Session;
 use zenoh::qos::CongestionControl;
 
@@ -43,10 +43,21 @@ impl Bench {
     /// # Panics
     /// Where a session cannot be opened.
     pub async fn start_with(settings: Settings, calibrations: &[(&str, Arc<Calibration>)]) -> Self {
+        // Nothing may be dropped on the way to this consumer: the tests judge the service, not the loopback.
+        Self::start_as(Settings { congestion: CongestionControl::Block, ..settings }, calibrations).await
+    }
+
+    /// One that waits for no subscriber, as a service does that corrects live.
+    ///
+    /// # Panics
+    /// Where a session cannot be opened.
+    pub async fn start_live(calibrations: &[(&str, Arc<Calibration>)]) -> Self {
+        Self::start_as(Settings::default(), calibrations).await
+    }
+
+    async fn start_as(settings: Settings, calibrations: &[(&str, Arc<Calibration>)]) -> Self {
         let session = open(&SessionOptions::default()).await.expect("a session on loopback");
         let options = SessionOptions { connect: locators(&session), ..SessionOptions::default() };
-        // Nothing may be dropped on the way to this consumer: the tests judge the service, not the loopback.
-        let settings = Settings { congestion: CongestionControl::Block, ..settings };
         let mut set = Calibrations::default();
         for (unit, calibration) in calibrations {
             set.insert(UnitId::new(unit).expect("a serial"), Arc::clone(calibration), [7; 8]);
@@ -78,6 +89,14 @@ impl Bench {
         let in_time = tokio::time::timeout(LIMIT, receive).await;
         assert!(in_time.is_ok(), "{unit}: {} of {count} ticks within {LIMIT:?}", ticks.len());
         ticks
+    }
+
+    /// Whether the service's receive path is alive.
+    ///
+    /// # Errors
+    /// What takes too long.
+    pub fn receives(&self) -> Result<(), Stuck> {
+        self.service.receives()
     }
 
     /// Stops the service; its totals, and what the consumer received since: all of it, for the service's token goes behind

@@ -3,16 +3,17 @@
 use std::sync::Arc;
 
 use isotherm_correction::calibration::{
-    AccelParts, BranchedParts, Calibration, CalibrationParts, GyroParts, TermParts,
+    AccelParts, BranchedParts, Calibration, CalibrationParts, GyroParts, RegressorParts, Source, TermParts,
 };
 use isotherm_correction::channel::{ChannelParts, ThermalFilterParts};
 use isotherm_correction::curve::CurveParts;
 use isotherm_correction::drift::DriftParts;
 use isotherm_correction::operation::SelfTestParts;
-use isotherm_correction::orientation::OrientationParts;
+use isotherm_correction::orientation::{AxesPlay, OrientationParts};
 use isotherm_correction::reversal::ReversalParts;
 use isotherm_correction::sample::{ChannelName, OutputKind};
 pub use isotherm_correction::thermal::Feature;
+use isotherm_correction::thermal::{ACCEL_TERMS, GYRO_TERMS, Term};
 
 /// A constant over −60…100 °C.
 #[must_use]
@@ -89,6 +90,7 @@ pub fn orientation(rows: &[[f64; 3]]) -> OrientationParts {
         reference_deg_c: 20.0,
         rows: rows.to_vec(),
         slopes_per_deg_c: Vec::new(),
+        plays: Vec::new(),
         weights: Vec::new(),
         range_deg_c: [-60.0, 100.0],
         parity_limit: None,
@@ -126,6 +128,7 @@ pub fn identity() -> CalibrationParts {
             assumed_deg_c: 20.0,
         },
         channels: vec![channel("t")],
+        auxiliaries: Vec::new(),
         gyro_output: OutputKind::Mean,
         gyros: vec![plain_gyro(); 3],
         gyro_orientation: orientation(&ALONG_CASE_AXES),
@@ -137,6 +140,54 @@ pub fn identity() -> CalibrationParts {
         reversal: None,
         self_test: SelfTestParts::default(),
     }
+}
+
+/// A term with a coefficient so many times that of which it adds about 10⁻⁴ rad/s or 10⁻³ m/s² where temperature swings by 3 °C about
+/// 20 °C at 0.4 rad/s, the auxiliary channels differ by 2 ± 1, and the unit by about 0.5 rad/s and 10 m/s².
+#[must_use]
+pub fn stated(term: Term, gyros: bool, times: f64) -> TermParts {
+    let feature = match term.feature {
+        Feature::One | Feature::LasingMode | Feature::Meander => 1.0,
+        Feature::Reading | Feature::RateMagnitude | Feature::Lag | Feature::ThermalRate => 0.5,
+        Feature::ThermalAcceleration => 0.3,
+        Feature::Play => 1.5,
+        Feature::Regressor => 2.0,
+        Feature::ForceX | Feature::ForceY | Feature::ForceZ => 10.0,
+        Feature::ForceSquared => 100.0,
+    };
+    let gain = constant(times * if gyros { 1e-4 } else { 1e-3 } / feature);
+    match term.feature {
+        Feature::Lag => TermParts::lag(5.0, gain),
+        Feature::Play => TermParts::play(1.5, gain),
+        Feature::Regressor => {
+            let (channel, minus) = (Source::Auxiliary(0), Some(Source::Auxiliary(1)));
+            TermParts::regressor(RegressorParts { channel, minus, reference: 0.5 }, gain)
+        }
+        feature => TermParts::new(feature, gain),
+    }
+}
+
+/// [`identity`] with two auxiliary channels, u and v.
+#[must_use]
+pub fn with_auxiliaries() -> CalibrationParts {
+    CalibrationParts { auxiliaries: vec![channel("u"), channel("v")], ..identity() }
+}
+
+/// [`with_auxiliaries`] and every term that is declared, of each sensor, and axes that turn and stick.
+#[must_use]
+pub fn every_term() -> CalibrationParts {
+    let mut parts = with_auxiliaries();
+    for (i, gyro) in parts.gyros.iter_mut().enumerate() {
+        gyro.terms = GYRO_TERMS.map(|term| stated(term, true, [1.0, -0.7, 0.4][i])).to_vec();
+    }
+    for (i, accel) in parts.accels.iter_mut().enumerate() {
+        accel.terms = ACCEL_TERMS.map(|term| stated(term, false, [1.0, -0.7, 0.4][i])).to_vec();
+    }
+    for axes in [Some(&mut parts.gyro_orientation), parts.accel_orientation.as_mut()].into_iter().flatten() {
+        axes.slopes_per_deg_c = vec![[0.0, 2e-6, -1e-6], [1e-6, 0.0, 3e-6], [-2e-6, 1e-6, 0.0]];
+        axes.plays = vec![AxesPlay { half_width_deg_c: 0.4, share: 0.5 }];
+    }
+    parts
 }
 
 /// Three gyros only, with a magnetic bias and the substitution over a mode switch.

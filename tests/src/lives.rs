@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::calibrations::{
-    Feature, PutTerms, compile, constant, identity, lively_drift, orientation, polynomial,
+    Feature, PutTerms, compile, constant, every_term, identity, lively_drift, orientation, polynomial,
 };
 use isotherm_correction::calibration::{BranchArgument, BranchedParts, Calibration};
 use isotherm_correction::earth::Place;
@@ -113,7 +113,7 @@ const EXCLUDED: Meets =
 /// Never: they are sound.
 #[must_use]
 pub fn all() -> Vec<Scenario> {
-    vec![mode_reversal(), excluded(), navigation(), states(), drift(), swaps(), uncalibrated()]
+    vec![mode_reversal(), excluded(), navigation(), states(), drift(), swaps(), uncalibrated(), terms()]
 }
 
 /// Switches of the lasing mode, with mishaps.
@@ -244,6 +244,23 @@ pub fn uncalibrated() -> Scenario {
     script.ticks(700);
     let settings = UnitSettings { uncalibrated: Uncalibrated::Hold, ..UnitSettings::default() };
     script.scenario("held without a calibration", settings, vec![PENDING, WAITING])
+}
+
+/// Every term that there is, over a restart and a swap to what is there already.
+///
+/// # Panics
+/// Never: it is sound.
+#[must_use]
+pub fn terms() -> Scenario {
+    let calibration = compile(&every_term());
+    let mut script = Script::new(18, &calibration, &[("t", 24.0), ("u", 5.0), ("v", 3.0)]);
+    (script.mishaps, script.scatter) = (2, 3.0);
+    script.ticks(2500);
+    script.restart();
+    script.ticks(1000);
+    script.give(calibration, At::NextTick, Span::from_ms(900));
+    script.ticks(500);
+    script.scenario("every term", UnitSettings::default(), vec![WAITING])
 }
 
 /// Whatever chance brings, over so many rounds of a few ticks.

@@ -2,7 +2,7 @@
 
 #![expect(clippy::expect_used, reason = "what does not hold ends the test")]
 
-use isotherm_correction::calibration::{BranchArgument, BranchedParts};
+use isotherm_correction::calibration::{BranchArgument, BranchedParts, RegressorParts, Source, TermParts};
 use isotherm_correction::drift::Reference;
 use isotherm_correction::earth::Place;
 use isotherm_correction::navigation::NavigationStep;
@@ -65,6 +65,13 @@ fn blocks_of_a_hundred_thousand_ticks(watched: Watched) -> (u64, u64) {
         gyro.terms.branched(Feature::ThermalRate, branched.clone());
         gyro.terms.branched(Feature::ThermalAcceleration, branched);
         gyro.terms.lags([(30.0, constant(1e-5))]);
+        gyro.terms.push(TermParts::play(0.5, constant(1e-5)));
+        let gradient = RegressorParts {
+            channel: Source::Temperature(0),
+            minus: Some(Source::Temperature(1)),
+            reference: 0.0,
+        };
+        gyro.terms.push(TermParts::regressor(gradient, constant(1e-5)));
         gyro.drift = matches!(watched, Watched::AtRest).then(lively_drift);
     }
     let settings = UnitSettings {

@@ -24,6 +24,8 @@ pub(crate) struct Case {
     pub(crate) ticks: usize,
     /// Whether every unit is given another calibration each second.
     pub(crate) swaps: bool,
+    /// Whether pages of the console in the browser are open.
+    pub(crate) pages: bool,
     /// Whether the service has a state folder, in which it writes down every calibration.
     pub(crate) state: bool,
     /// Sessions of the source.
@@ -51,6 +53,7 @@ impl Case {
             seconds,
             ticks: 0,
             swaps: false,
+            pages: false,
             state: true,
             sessions: 1,
             timed_swaps: 0,
@@ -71,12 +74,21 @@ impl Case {
             1 => String::new(),
             batch => format!(", batches of {batch}"),
         };
-        let swaps = if self.swaps { ", a swap each second" } else { "" };
+        let swaps = match (self.swaps, self.pages) {
+            (true, _) => ", a swap each second",
+            (false, true) => ", pages open",
+            (false, false) => "",
+        };
         match self.pace {
             Pace::Saturated { .. } => format!("{} {units}, saturated, batches of {}", self.units, self.batch),
             Pace::Spread => format!("{} {units} × {} Hz, spread{batch}{swaps}", self.units, self.rate_hz),
             Pace::Burst => format!("{} {units} × {} Hz{batch}{swaps}", self.units, self.rate_hz),
         }
+    }
+
+    /// Whether something goes on beside the ticks: compared with the same without it.
+    pub(crate) fn is_disturbed(&self) -> bool {
+        self.swaps || self.pages
     }
 
     /// How long it takes at most, once all is ready.
@@ -124,6 +136,7 @@ impl Case {
             format,
             declare_keys: false,
             state: self.state,
+            web: self.pages,
         }
     }
 }

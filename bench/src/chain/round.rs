@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::case::Case;
 use super::check;
+use super::page::Pages;
 use super::profile::Profile;
 use super::subject::Subject;
 use super::swap::{self, Swapper};
@@ -76,7 +77,7 @@ pub(crate) fn run(
     };
     write(&plan)?;
     let starting = Instant::now();
-    let (middle, locator) = subject.start(&plan, &plan_file, profile)?;
+    let (middle, locator, http) = subject.start(&plan, &plan_file, profile)?;
     let start_s = starting.elapsed().as_secs_f64();
     plan.connect = Some(locator);
     if ends.is_none() {
@@ -104,11 +105,13 @@ pub(crate) fn run(
 
     let before = middle.usage()?;
     let swapper = if case.swaps { Some(Swapper::start(&plan)?) } else { None };
+    let pages = http.filter(|_| case.pages).map(|address| Pages::open(&address)).transpose()?;
     source.tell("go")?;
     let sent: Sent = source.hear(case.limit() + READY_LIMIT)?;
     sink.tell(&sent.messages.to_string())?;
     let received: Received = sink.hear(READY_LIMIT)?;
     swapper.map(Swapper::stop).transpose()?;
+    pages.map(Pages::close).transpose()?;
     let after = middle.usage()?;
     let swap_ms = if subject == Subject::Service { swap::timed(&plan, case.timed_swaps)? } else { 0.0 };
     check::check(&plan, subject, &received)?;

@@ -1,6 +1,6 @@
 //! Medians over rounds, and ratios to the reference.
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use super::Measure;
 use super::case::Case;
@@ -9,7 +9,7 @@ use super::subject::Subject;
 use crate::rounds::median;
 
 /// One subject under one load.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Row {
     /// The load, in words.
     pub(crate) name: String,

@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
+use super::page::TOKEN;
 use super::profile::Profile;
 use super::python;
 use crate::error::Error;
@@ -50,13 +51,13 @@ impl Subject {
         }
     }
 
-    /// Starts it; the process, and where it listens.
+    /// Starts it; the process, where it listens, and where it answers over HTTP.
     pub(crate) fn start(
         self,
         plan: &Plan,
         plan_file: &Path,
         profile: &Profile,
-    ) -> Result<(Process, String), Error> {
+    ) -> Result<(Process, String, Option<String>), Error> {
         let mut command = match self {
             Self::Relay | Self::Keyed => {
                 let mut command = Command::new(this()?);
@@ -70,11 +71,11 @@ impl Subject {
             command.env("ZENOH_RUNTIME", runtime);
         }
         let process = Process::start(self.name(), &mut command, &plan.folder)?;
-        let Ready { locators, .. } = process.hear(START_LIMIT)?;
+        let Ready { locators, metrics, .. } = process.hear(START_LIMIT)?;
         let locator = locators.into_iter().next();
         let locator =
             locator.ok_or_else(|| Error::Part { part: self.name(), what: "listens nowhere".to_owned() })?;
-        Ok((process, locator))
+        Ok((process, locator, metrics))
     }
 
     /// The service, with a document for each unit.
@@ -92,6 +93,14 @@ impl Subject {
         let units = plan.units.max(1);
         let text =
             format!("calibrations = \"units\"\n{state}max_units = {units}\ncongestion = \"{congestion}\"\n");
+        let text = if plan.web {
+            let token = plan.folder.join("token");
+            fs::write(&token, TOKEN).map_err(|source| Error::file(&token, source))?;
+            let web = "[web]\nenabled = true\ntoken_file = \"token\"\n[metrics]\nlisten = \"127.0.0.1:0\"\n";
+            text + web
+        } else {
+            text
+        };
         fs::write(&settings, text).map_err(|source| Error::file(&settings, source))?;
         let mut command = Command::new(program);
         command

@@ -9,7 +9,9 @@ use isotherm_correction::sample::{
     AccelTick, CorrectedTick, GyroTick, OutputKind, SensorFlags, TemperatureReading, TickFlags,
 };
 use isotherm_correction::unit::{Event, Unit, UnitSettings};
-use isotherm_protocol::document::Document;
+use isotherm_correction::units::{AngularRate, STANDARD_GRAVITY_M_PER_S2};
+use isotherm_protocol::document::{AlongAxes, Curve, Document, Shape};
+use isotherm_simulator::effects::{AccelerometerEffects, Effects, GyroEffects};
 use isotherm_simulator::{Scenario, Simulation, presets};
 
 use super::Kernel;
@@ -53,6 +55,34 @@ pub(crate) fn identity() -> Result<UnitCase, Error> {
 pub(crate) fn steady() -> Result<UnitCase, Error> {
     let name = "static bias, scale, orientation";
     UnitCase::new(name, "MEMS-0001.toml", |_| {}, &presets::mems_chamber(1), true)
+}
+
+/// The same unit with what follows its motion: drift with acceleration and accelerometers away from the reference point.
+pub(crate) fn in_motion() -> Result<UnitCase, Error> {
+    const DEG_PER_H_PER_G: [f64; 3] = [12.0, -7.0, 4.0];
+    let positions_m = [[0.03, 0.0, -0.01], [-0.01, 0.025, 0.0], [0.0, -0.02, 0.03]];
+    let mut scenario = presets::mems_chamber(1);
+    let one_deg_per_h_per_g = AngularRate::from_deg_per_h(1.0).as_rad_per_s() / STANDARD_GRAVITY_M_PER_S2;
+    let gyro = GyroEffects {
+        acceleration_rad_per_s_per_m_per_s2: DEG_PER_H_PER_G.map(|drift| drift * one_deg_per_h_per_g),
+        ..GyroEffects::default()
+    };
+    let accel = |position_m| AccelerometerEffects { position_m, ..AccelerometerEffects::default() };
+    scenario.instrument.effects = Effects {
+        gyros: vec![gyro; 3],
+        accelerometers: positions_m.map(accel).to_vec(),
+        ..Effects::default()
+    };
+    let name = "the same, drift with acceleration, size effect";
+    let state = |document: &mut Document| {
+        for sensor in &mut document.gyro.sensor {
+            let [x, y, z] = DEG_PER_H_PER_G.map(|value| Some(Curve::new(Shape::Constant { value })));
+            sensor.acceleration_sensitive_drift = Some(AlongAxes { x, y, z });
+        }
+        let sensors = document.accel.iter_mut().flat_map(|accel| &mut accel.sensor);
+        sensors.zip(positions_m).for_each(|(sensor, position_m)| sensor.position_m = Some(position_m));
+    };
+    UnitCase::new(name, "MEMS-0001.toml", state, &scenario, true)
 }
 
 /// Every term of a Zeeman unit.

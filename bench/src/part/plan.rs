@@ -63,6 +63,8 @@ pub(crate) struct Plan {
     pub(crate) format: Format,
     /// Whether the service has a state folder.
     pub(crate) state: bool,
+    /// Whether it serves the console in the browser.
+    pub(crate) web: bool,
     /// Whether the relay declares the keys that it receives, so that Zenoh looks for their subscribers once only.
     pub(crate) declare_keys: bool,
 }

@@ -13,7 +13,7 @@ use crate::progress::Bar;
 use crate::rounds::median;
 
 /// Ticks per second of one core, medians over the rounds; ratios are medians of those in one round.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Offline {
     /// Ticks of the recording.
     pub(crate) ticks: u64,
@@ -26,7 +26,7 @@ pub(crate) struct Offline {
 }
 
 /// What numpy does.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Numpy {
     /// Vectorised over the log, from the recording to increments.
     pub(crate) vectorised_per_s: f64,
@@ -149,7 +149,9 @@ impl Log {
         for (out, compression) in [(&recording, "zstd"), (&uncompressed, "none")] {
             let mut convert = Command::new(beside("isotherm-replay")?);
             convert.arg("convert").arg(&text).arg("--mapping").arg(&mapping);
-            run(convert.args(["--unit", UNIT, "--compression", compression]).arg(out))?;
+            run(convert
+                .args(["--unit", UNIT, "--compression", compression, "--no-json-channels", "--out"])
+                .arg(out))?;
         }
         let mut log = Self { recording, uncompressed, document, corrected, ticks: 0 };
         let corrected = log.corrected.clone();

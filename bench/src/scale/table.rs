@@ -28,7 +28,7 @@ pub(crate) fn table(report: &Report) -> String {
 }
 
 /// Columns of the figures by number of units.
-pub(crate) const BY_UNITS: [&str; 10] = [
+const BY_UNITS: [&str; 10] = [
     "units",
     "ticks/s",
     "CPU µs/tick",
@@ -42,12 +42,12 @@ pub(crate) const BY_UNITS: [&str; 10] = [
 ];
 
 /// What Zenoh takes by itself where the service has so many units.
-pub(crate) fn alone<'a>(service: &Row, zenoh: &'a [Row]) -> Option<&'a Row> {
+fn alone<'a>(service: &Row, zenoh: &'a [Row]) -> Option<&'a Row> {
     zenoh.iter().find(|row| row.case.units == service.case.units)
 }
 
 /// Resident memory per unit beyond the first row's, in words; none of that row itself.
-pub(crate) fn beyond_first(row: &Row, rows: &[Row]) -> String {
+fn beyond_first(row: &Row, rows: &[Row]) -> String {
     let first = rows.first().filter(|first| first.case.units < row.case.units);
     first.map_or_else(String::new, |first| format!("{:.1}", kib_per_unit(row, first)))
 }

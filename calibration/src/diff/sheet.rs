@@ -1,6 +1,6 @@
 //! Changes in words, tables and charts.
 
-use isotherm_log::plot::page::{Axis, Chart, Ink};
+use isotherm_pages::{Axis, Chart, Ink};
 use serde_json::{Value, json};
 
 use super::{AxisChange, BEYOND, Changes, ValueChange};

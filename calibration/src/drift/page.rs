@@ -1,6 +1,6 @@
 //! The HTML report of a log's noise and drift.
 
-use isotherm_log::plot::page::{Axis, Chart, Content, Form, Ink, Page, Panel, Samples, Series, Table};
+use isotherm_pages::{Axis, Chart, Content, Form, Ink, Page, Panel, Samples, Series, Table};
 
 use super::analysis::{Analysis, ESTIMATORS};
 use super::markov::{Fit, Noise};

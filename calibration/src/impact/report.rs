@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use isotherm_log::plot::page::{Axis, Chart, Content, Form, Ink, Page, Panel, Samples, Series, Table};
+use isotherm_pages::{Axis, Chart, Content, Form, Ink, Page, Panel, Samples, Series, Table};
 use serde::Serialize;
 use serde_json::{Value, json};
 

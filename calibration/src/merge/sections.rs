@@ -10,8 +10,17 @@ pub(super) type Sections = BTreeMap<String, Value>;
 /// Keys that say nothing about the correction.
 const ABOUT: [&str; 4] = ["schema", "created", "note", "origin"];
 /// Terms of a gyro's Ω, which one fit makes together.
-const BIAS: [&str; 7] =
-    ["static_bias", "magnetic_bias", "slow_meander", "thermal_rate", "thermal_acceleration", "lag", "trend"];
+const BIAS: [&str; 9] = [
+    "static_bias",
+    "magnetic_bias",
+    "slow_meander",
+    "thermal_rate",
+    "thermal_acceleration",
+    "lag",
+    "hysteresis",
+    "regressor",
+    "trend",
+];
 
 /// Whether a key is about the document itself.
 pub(super) fn is_about(key: &str) -> bool {
@@ -28,7 +37,12 @@ pub(super) fn group(key: &str) -> String {
         ["gyro", "sensor", name, term] if term.starts_with("increment_weight") => {
             format!("gyro.sensor.{name} weight")
         }
-        ["accel", "sensor", name, "scale_factor" | "bias" | "board_ratio_error" | "lag"] => {
+        [
+            "accel",
+            "sensor",
+            name,
+            "scale_factor" | "bias" | "board_ratio_error" | "lag" | "hysteresis" | "regressor",
+        ] => {
             format!("accel.sensor.{name} output")
         }
         [kind, "orientation", "rows" | "weights" | "thermal"] => format!("{kind}.orientation axes"),

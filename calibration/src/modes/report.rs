@@ -1,6 +1,6 @@
 //! The report of the modes.
 
-use isotherm_log::plot::page::Table;
+use isotherm_pages::Table;
 
 use super::document::main_axis;
 use super::fit::{GyroFit, Term};

@@ -86,6 +86,7 @@ pub fn bare(series: &Series, accel_output: AccelOutput) -> Result<Document, Erro
         created: None,
         note: None,
         origin: None,
+        auxiliary: Vec::new(),
         temperature: Temperature {
             assumed_deg_c: 25.0,
             filter: (!channels.is_empty()).then_some(Filter {

@@ -1,6 +1,6 @@
 //! The error budget of a calibration that is planned (004, equations 3 to 7; models §9), before anyone books the chamber.
 
-use isotherm_log::plot::page::Table;
+use isotherm_pages::Table;
 use serde_json::{Value, json};
 
 use super::doubts::unseen;

@@ -1,6 +1,6 @@
 //! Diagrams of a calibration on a stand.
 
-use isotherm_log::plot::page::{Axis, Chart, Content, Form, Ink, Panel, Samples, Series};
+use isotherm_pages::{Axis, Chart, Content, Form, Ink, Panel, Samples, Series};
 
 use super::analysis::{Analysis, Settings};
 use super::budget::ARCSEC_PER_RAD;

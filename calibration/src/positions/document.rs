@@ -115,11 +115,13 @@ fn orient(accel: &mut isotherm_protocol::document::Accel, analysis: &Analysis, r
             let slope = sensor.axis.get(1).copied().unwrap_or_default();
             slope.map(|c| tidy(Angle::from_rad(c / analysis.half_deg_c).as_arcsec()))
         };
+        let stated = orientation.thermal.take();
         orientation.thermal = Some(OrientationThermal {
             channels: analysis.channels.clone(),
             reference_deg_c: analysis.reference_deg_c,
             range_deg_c: range,
             slopes_arcsec_per_deg_c: analysis.fit.sensors.iter().map(slope).collect(),
+            hysteresis: stated.map(|thermal| thermal.hysteresis).unwrap_or_default(),
         });
         return;
     }

@@ -1,6 +1,6 @@
 //! What is said of a calibration on a stand.
 
-use isotherm_log::plot::page::Table;
+use isotherm_pages::Table;
 use isotherm_protocol::document::{Document, Sample};
 
 use super::analysis::{Analysis, Settings};

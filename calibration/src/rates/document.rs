@@ -74,6 +74,7 @@ pub fn nominal(unit: &str, output: GyroOutput) -> Document {
         created: None,
         note: None,
         origin: None,
+        auxiliary: Vec::new(),
         temperature: Temperature { assumed_deg_c: ASSUMED_DEG_C, filter: None, channel: Vec::new() },
         gyro: Gyro {
             output,

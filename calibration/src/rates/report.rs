@@ -1,7 +1,7 @@
 //! The report of the rates.
 
 use isotherm_correction::units::Angle;
-use isotherm_log::plot::page::{Axis, Chart, Content, Form, Ink, Panel, Samples, Series, Table};
+use isotherm_pages::{Axis, Chart, Content, Form, Ink, Panel, Samples, Series, Table};
 
 use super::make::{Made, Measured};
 use super::solve::GyroRates;

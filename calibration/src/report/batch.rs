@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 
-use isotherm_log::plot::page::{Page, Table};
+use isotherm_pages::{Page, Table};
 use serde_json::{Value, json};
 
 use super::FitReport;

@@ -1,6 +1,6 @@
 //! The report as JSON.
 
-use isotherm_log::plot::page::Table;
+use isotherm_pages::Table;
 use isotherm_protocol::document::Sample;
 use serde_json::{Value, json};
 

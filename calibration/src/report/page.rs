@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use isotherm_log::plot::page::{Axis, Chart, Content, Form, Ink, Mark, Page, Panel, Samples, Series, Table};
+use isotherm_pages::{Axis, Chart, Content, Form, Ink, Mark, Page, Panel, Samples, Series, Table};
 use isotherm_protocol::document::Sample;
 
 use super::{Coefficient, Curve, FitReport, Verdict, stated};

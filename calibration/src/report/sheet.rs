@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use comfy_table::{CellAlignment, presets};
-use isotherm_log::plot::page::{Chart, Page, Table};
+use isotherm_pages::{Chart, Page, Table};
 
 /// A line, sentences, tables and charts.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -1,6 +1,6 @@
 //! What came of one sensor, and its sentence.
 
-use isotherm_log::plot::page::Table;
+use isotherm_pages::Table;
 use isotherm_protocol::document::{Measure, Residual, Sample};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 

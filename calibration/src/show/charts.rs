@@ -1,7 +1,7 @@
 //! The terms of a document as curves.
 
 use isotherm_correction::units::{AngularRate, SpecificForce};
-use isotherm_log::plot::page::{Axis, Chart, Content, Form, Ink, Panel, Samples, Series};
+use isotherm_pages::{Axis, Chart, Content, Form, Ink, Panel, Samples, Series};
 
 use super::about::ARCSEC;
 use super::terms::Term;

@@ -80,10 +80,14 @@ fn gather(of: (&'static str, &str), path: &str, value: &Value, terms: &mut Vec<T
         },
         Value::Array(values) => {
             for (index, value) in values.iter().enumerate() {
-                let time = value.get("time_constant_s").map(number);
-                let path = match time {
-                    Some(Some(time)) => format!("{path} of {time} s"),
-                    _ => format!("{path} {}", index + 1),
+                let stated = |key, unit| Some((number(value.get(key)?)?, unit));
+                let parameter = stated("time_constant_s", "s").or(stated("half_width_deg_c", "°C"));
+                let name = |key| value.get(key).and_then(Value::as_str);
+                let path = match (parameter, name("channel"), name("minus")) {
+                    (Some((number, unit)), ..) => format!("{path} of {number} {unit}"),
+                    (None, Some(channel), None) => format!("{path} {channel}"),
+                    (None, Some(channel), Some(minus)) => format!("{path} {channel} − {minus}"),
+                    (None, None, _) => format!("{path} {}", index + 1),
                 };
                 gather(of, &path, value, terms);
             }

@@ -160,6 +160,7 @@ fn document(
         created: None,
         note: None,
         origin: None,
+        auxiliary: Vec::new(),
         temperature: Temperature { assumed_deg_c: 25.0, filter: Some(filter(step)), channel: channels },
         gyro: Gyro {
             output: GyroOutput::Mean,

@@ -134,6 +134,7 @@ impl Basis {
             created: None,
             note: None,
             origin: None,
+            auxiliary: Vec::new(),
             temperature: Temperature {
                 assumed_deg_c: self.reference_deg_c,
                 filter: Some(Filter { branch_dead_band_deg_c2_per_s3: dead_band, ..self.filter.clone() }),

@@ -1,6 +1,6 @@
 //! What is said of a thermal fit: the origin in the document, and the report.
 
-use isotherm_log::plot::page::Table;
+use isotherm_pages::Table;
 use isotherm_protocol::document::{Document, Origin};
 
 use super::columns::Basis;

@@ -1,7 +1,7 @@
 //! What is said of a tumbled unit.
 
 use isotherm_correction::units::{AngularRate, STANDARD_GRAVITY_M_PER_S2};
-use isotherm_log::plot::page::{Axis, Chart, Content, Form, Ink, Panel, Samples, Series, Table};
+use isotherm_pages::{Axis, Chart, Content, Form, Ink, Panel, Samples, Series, Table};
 use isotherm_protocol::document::{Document, Sample};
 use serde_json::json;
 use std::sync::Arc;

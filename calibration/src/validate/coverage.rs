@@ -1,7 +1,7 @@
 //! What of the fitted range of temperature the logs cover, and how often it was left.
 
 use isotherm_correction::sample::SensorFlags;
-use isotherm_log::plot::page::Table;
+use isotherm_pages::Table;
 
 use crate::drift::figures::short;
 use crate::error::Error;

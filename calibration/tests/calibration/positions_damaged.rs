@@ -56,6 +56,7 @@ fn channels_that_say_nothing_are_told_and_others_stand_in_for_them() {
         reference_deg_c: 20.0,
         range_deg_c: [-40.0, 80.0],
         slopes_arcsec_per_deg_c: vec![[0.0; 3]; 3],
+        hysteresis: Vec::new(),
     };
     document.accel.as_mut().unwrap().orientation.thermal = Some(thermal);
     let deg_c = [-20.0, 50.0];

@@ -12,7 +12,8 @@ use isotherm_protocol::raw::Batcher;
 use isotherm_simulator::{Scenario, Simulation};
 
 /// Chunks so short that a recording which is cut loses its end only.
-const OPTIONS: RecordingOptions = RecordingOptions { compress: true, chunk_bytes: 20_000, overwrite: false };
+const OPTIONS: RecordingOptions =
+    RecordingOptions { compress: true, chunk_bytes: 20_000, overwrite: false, json: false };
 
 /// The fibre-optic unit through the beginning of the judging profile, one tick a second.
 pub(crate) fn fibre_optic(seed: u64, unit: &str, seconds: f64) -> Scenario {

@@ -29,9 +29,9 @@ class Files(unittest.TestCase):
         common = ["correct", "log.csv", "--mapping", "log.mapping.toml", "--unit", UNIT, "--calibration", str(DOCUMENT)]
         cls.replay(*common, "--out", "corrected.csv")
         cls.replay(*common, "--out", "corrected.wire", "--format", "wire")
-        cls.replay("convert", "log.csv", "raw.mcap", "--mapping", "log.mapping.toml", "--unit", UNIT)
+        cls.replay("convert", "log.csv", "--out", "raw.mcap", "--mapping", "log.mapping.toml", "--unit", UNIT)
         cls.replay("correct", "raw.mcap", "--calibration", str(DOCUMENT), "--out", "corrected.mcap")
-        cls.replay("convert", "corrected.mcap", "tables", "--to", "parquet")
+        cls.replay("convert", "corrected.mcap", "--out", "tables", "--to", "parquet")
 
     @classmethod
     def replay(cls, *arguments: str) -> None:

@@ -25,11 +25,11 @@ use sensors::{accel_model, gyro_model, orientation};
 
 /// Validates and compiles.
 pub(super) fn compile(parts: &CalibrationParts) -> Result<Calibration, Vec<Defect>> {
-    let mut checker = Checker::new(parts.channels.len());
+    let mut checker = Checker::new(parts.channels.len(), parts.auxiliaries.len());
     let checker = &mut checker;
     check_filter(checker.at(Section::Filter), &parts.filter);
     let filter = ThermalFilter::new(&parts.filter);
-    check_channels(checker, &parts.channels);
+    check_channels(checker, &parts.channels, &parts.auxiliaries);
 
     checker.at(Section::Gyros).count("sensors", parts.gyros.len(), MIN_SENSORS, MAX_SENSORS);
     let gyros = parts.gyros.iter().enumerate();
@@ -82,7 +82,10 @@ pub(super) fn compile(parts: &CalibrationParts) -> Result<Calibration, Vec<Defec
     match gyro_orientation {
         Some(gyro_orientation) if checker.defects.is_empty() => Ok(Calibration {
             filter,
-            channels: parts.channels.iter().cloned().map(Channel).collect(),
+            channels: parts.channels.iter().chain(&parts.auxiliaries).cloned().map(Channel).collect(),
+            temperatures: parts.channels.len(),
+            regresses: models.iter().any(|gyro| !gyro.terms.regressors().is_empty())
+                || accels.iter().any(|accel| !accel.terms.regressors().is_empty()),
             gyro_output: parts.gyro_output,
             gyro_limits: limits(models.iter().map(|gyro| gyro.input_limit)),
             accel_limits: limits(accels.iter().map(|accel| accel.input_limit)),
@@ -127,10 +130,14 @@ fn check_filter(checker: &mut Checker, filter: &ThermalFilterParts) {
     checker.positive("branch_dead_band", filter.branch_dead_band);
 }
 
-fn check_channels(checker: &mut Checker, channels: &[ChannelParts]) {
-    let names = channels.iter().enumerate().map(|(i, channel)| ("channel", i, channel.name));
-    for (i, channel) in channels.iter().enumerate() {
-        checker.at(Section::Channel(i)).unique(channel.name, names.clone().take(i));
+fn check_channels(checker: &mut Checker, temperatures: &[ChannelParts], auxiliaries: &[ChannelParts]) {
+    let temperatures = temperatures.iter().enumerate().map(|(i, channel)| ("channel", i, channel));
+    let all =
+        temperatures.chain(auxiliaries.iter().enumerate().map(|(i, channel)| ("auxiliary", i, channel)));
+    let names = all.clone().map(|(kind, i, channel)| (kind, i, channel.name));
+    for (before, (kind, i, channel)) in all.enumerate() {
+        let section = if kind == "channel" { Section::Channel(i) } else { Section::Auxiliary(i) };
+        checker.at(section).unique(channel.name, names.clone().take(before));
         checker.coefficients("conversion", &channel.conversion, 8);
         checker.range("range", channel.range_deg_c, -HUGE, HUGE);
         checker.positive("spike_limit", channel.spike_limit_deg_c);

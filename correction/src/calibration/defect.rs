@@ -15,6 +15,8 @@ pub enum Section {
     Filter,
     /// The channel of this index.
     Channel(usize),
+    /// The auxiliary channel of this index.
+    Auxiliary(usize),
     /// The gyros as a set.
     Gyros,
     /// The gyro of this index.

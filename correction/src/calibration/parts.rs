@@ -21,6 +21,8 @@ pub struct CalibrationParts {
     pub filter: ThermalFilterParts,
     /// Temperature channels; sensors name them by index.
     pub channels: Vec<ChannelParts>,
+    /// Channels that are no temperatures, which regressors name; ranges and limits in units of their own.
+    pub auxiliaries: Vec<ChannelParts>,
     /// What the gyros' raw readings stand for.
     pub gyro_output: OutputKind,
     /// Three to eight gyros, in the order of the raw readings.
@@ -94,17 +96,56 @@ pub enum CoefficientParts {
     Branched(BranchedParts),
 }
 
+/// A channel, by its index among those of its kind.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Source {
+    /// A temperature channel.
+    Temperature(usize),
+    /// An auxiliary channel.
+    Auxiliary(usize),
+}
+
+/// A regressor x − x₀: the smoothed value of a channel, less that of another one and a constant.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct RegressorParts {
+    /// The channel.
+    pub channel: Source,
+    /// What is taken from it, for a difference; of the same unit.
+    pub minus: Option<Source>,
+    /// The constant (the channel's unit).
+    pub reference: f64,
+}
+
+impl RegressorParts {
+    /// The channels that it rests on.
+    pub(crate) fn channels(&self) -> impl Iterator<Item = Source> {
+        core::iter::once(self.channel).chain(self.minus)
+    }
+
+    /// Its value from the smoothed values of channels; 0 until all of them were read.
+    pub(crate) fn value(&self, channels: &dyn Fn(Source) -> Option<f64>) -> f64 {
+        let value = || {
+            let minus = self.minus.map_or(Some(0.0), channels)?;
+            Some(channels(self.channel)? - minus - self.reference)
+        };
+        value().unwrap_or(0.0)
+    }
+}
+
 /// One term of a sensor (models §2, §3).
 ///
 /// The unit of a gyro's coefficients is rad/s per unit of the [`Feature`], of an accelerometer's output units per unit of it; where
 /// the feature is what the sensor reads, or its magnitude, they are dimensionless, and s²/m where it is the square of a force.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TermParts {
-    /// What the coefficient is multiplied by. Only [`Feature::Lag`] may stand more than once, at most [`crate::thermal::MAX_LAGS`]
-    /// times.
+    /// What the coefficient is multiplied by. Only [`Feature::Lag`], [`Feature::Play`] and [`Feature::Regressor`] may stand more than
+    /// once, at most [`MAX_LAGS`](crate::thermal::MAX_LAGS), [`MAX_PLAYS`](crate::thermal::MAX_PLAYS) and
+    /// [`MAX_REGRESSORS`](crate::thermal::MAX_REGRESSORS) times.
     pub feature: Feature,
-    /// τ of a lag (s), at least the filter's grid step; no other feature looks at it.
-    pub time_constant_s: f64,
+    /// τ of a lag (s), at least the filter's grid step; half width of a play (°C, > 0); no other feature looks at it.
+    pub parameter: f64,
+    /// What a regressor is, of a sensor that follows a temperature; no other feature looks at it.
+    pub regressor: Option<RegressorParts>,
     /// The coefficient.
     pub coefficient: CoefficientParts,
 }
@@ -113,19 +154,36 @@ impl TermParts {
     /// A term with a coefficient over temperature.
     #[must_use]
     pub fn new(feature: Feature, coefficient: CurveParts) -> Self {
-        Self { feature, time_constant_s: 0.0, coefficient: CoefficientParts::Curve(coefficient) }
+        Self { feature, parameter: 0.0, regressor: None, coefficient: CoefficientParts::Curve(coefficient) }
     }
 
     /// A term with a coefficient by thermal branch.
     #[must_use]
     pub fn branched(feature: Feature, coefficient: BranchedParts) -> Self {
-        Self { feature, time_constant_s: 0.0, coefficient: CoefficientParts::Branched(coefficient) }
+        Self {
+            feature,
+            parameter: 0.0,
+            regressor: None,
+            coefficient: CoefficientParts::Branched(coefficient),
+        }
     }
 
     /// A thermal lag `g(T)·(T − L_τ[T])/τ` (models §2, §8); τ in s.
     #[must_use]
     pub fn lag(time_constant_s: f64, gain: CurveParts) -> Self {
-        Self { time_constant_s, ..Self::new(Feature::Lag, gain) }
+        Self { parameter: time_constant_s, ..Self::new(Feature::Lag, gain) }
+    }
+
+    /// A regressor `g(T)·(x − x₀)` (models §2).
+    #[must_use]
+    pub fn regressor(regressor: RegressorParts, gain: CurveParts) -> Self {
+        Self { regressor: Some(regressor), ..Self::new(Feature::Regressor, gain) }
+    }
+
+    /// A hysteresis `g(T)·(p_w[T] − T)` (models §2); w in °C.
+    #[must_use]
+    pub fn play(half_width_deg_c: f64, gain: CurveParts) -> Self {
+        Self { parameter: half_width_deg_c, ..Self::new(Feature::Play, gain) }
     }
 }
 
@@ -138,7 +196,7 @@ pub struct TrendParts {
     pub interval_s: [f64; 2],
 }
 
-/// One accelerometer (models §3): `f = (U − S(T) − lags)·r(T_board)/K(T)`.
+/// One accelerometer (models §3): `f = (U − S(T) − …)·r(T_board)/K(T)`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AccelParts {
     /// Index of the temperature channel of the sensor; `None`: the assumed temperature holds for ever.

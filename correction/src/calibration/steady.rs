@@ -78,16 +78,17 @@ impl Calibration {
             let (sum, count) = known.fold((0.0, 0.0), |(sum, n), state| (sum + state.temperature, n + 1.0));
             if count > 0.0 { sum / count } else { assumed.temperature }
         };
+        let others = |source| Some(known.get(self.place(source)).copied()??.temperature);
         let sign = mode.map_or(1.0, LasingMode::sign);
 
         let gyros = self.gyros.iter().map(|gyro| {
-            let terms = gyro.steady(&state(gyro.channel), &self.filter);
+            let terms = gyro.steady(&state(gyro.channel), (&self.filter, &others));
             let trend = gyro.trend.as_ref().map_or(0.0, TrendModel::last);
             (terms.bias + trend + sign * terms.magnetic + terms.meander, terms.increment_weight)
         });
         let (gyro_bias, gyro_weight): (Sensors<_>, Sensors<_>) = gyros.unzip();
         let accels = self.accels.iter().map(|accel| {
-            let (bias, scale_factor) = accel.steady(&state(accel.channel), &self.filter);
+            let (bias, scale_factor) = accel.steady(&state(accel.channel), (&self.filter, &others));
             let ratio = accel.board_ratio.at(state(accel.board_channel).temperature).value;
             let scale = scale_factor / ratio;
             (bias / scale, scale)
@@ -108,7 +109,7 @@ impl Calibration {
         let in_case = |inverse: &Option<Inverse>, bias: &[f64]| {
             inverse.as_ref().map(|inverse| inverse.apply(bias)).unwrap_or_default()
         };
-        let outside = known.iter().enumerate().filter(|(channel, state)| {
+        let outside = known.iter().take(self.temperatures).enumerate().filter(|(channel, state)| {
             let range = self.range_of(*channel);
             range.zip(**state).is_some_and(|([low, high], state)| !(low..=high).contains(&state.temperature))
         });

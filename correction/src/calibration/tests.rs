@@ -41,6 +41,7 @@ fn axes(rows: &[[f64; 3]], range_deg_c: [f64; 2]) -> OrientationParts {
         reference_deg_c: 20.0,
         rows: rows.to_vec(),
         slopes_per_deg_c: vec![[0.0, 2e-6, -1e-6], [1e-6, 0.0, 3e-6], [-2e-6, 1e-6, 0.0]],
+        plays: vec![],
         weights: Vec::new(),
         range_deg_c,
         parity_limit: None,
@@ -96,6 +97,7 @@ fn parts() -> CalibrationParts {
             assumed_deg_c: 20.0,
         },
         channels: vec![channel("block"), channel("accel"), channel("board"), channel("spare")],
+        auxiliaries: Vec::new(),
         gyro_output: OutputKind::Mean,
         gyros: vec![gyro(1.0), gyro(-2.0), gyro(0.5)],
         gyro_orientation: axes(

@@ -3,6 +3,7 @@
 use alloc::vec::Vec;
 
 use crate::sample::{MAX_SENSORS, MIN_SENSORS};
+use crate::thermal::PLAY_WIDTHS_DEG_C;
 
 /// Largest deviation of a row's norm from one that is taken for rounding in the document.
 pub const ROW_NORM_TOLERANCE: f64 = 1e-3;
@@ -20,6 +21,8 @@ pub struct OrientationParts {
     pub rows: Vec<[f64; 3]>,
     /// `C_1`: change of each row with temperature (1/°C); empty for none.
     pub slopes_per_deg_c: Vec<[f64; 3]>,
+    /// What sticks of the thermal change; at most [`MAX_PLAYS`](crate::thermal::MAX_PLAYS), none for axes that follow at once.
+    pub plays: Vec<AxesPlay>,
     /// Weight of each sensor in the pseudo-inverse, 1/σ² up to a common factor (> 0); empty for equal.
     pub weights: Vec<f64>,
     /// Fitted range: first and last temperature (°C, first ≤ last); outside it T is clamped.
@@ -29,6 +32,15 @@ pub struct OrientationParts {
     pub parity_limit: Option<f64>,
     /// Ticks in a row that must point at the same sensor before it is excluded (≥ 1 where there is a limit).
     pub parity_confirm_ticks: u32,
+}
+
+/// A part of the thermal change of axes that sticks: they turn as if T were `T + share·(p_w[T] − T)` (models §4).
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct AxesPlay {
+    /// Half width w of the play (°C, > 0).
+    pub half_width_deg_c: f64,
+    /// Share of the change that goes with the play (dimensionless).
+    pub share: f64,
 }
 
 /// What is wrong with a stated orientation.
@@ -122,6 +134,22 @@ pub enum OrientationError {
         /// Stated last temperature (°C).
         last: f64,
     },
+    /// A play without slack, or a share or half width that is no number within its limits.
+    #[error(
+        "play {index} has half width {half_width} °C and share {share}; from {min} to {max} °C and −10 to 10 are allowed"
+    )]
+    Play {
+        /// Index of the play, from 0.
+        index: usize,
+        /// Its half width (°C).
+        half_width: f64,
+        /// Its share.
+        share: f64,
+        /// Least half width (°C).
+        min: f64,
+        /// Largest half width (°C).
+        max: f64,
+    },
     /// The parity limit is zero or negative.
     #[error("parity limit is {got}; it must be above 0")]
     ParityLimit {
@@ -140,6 +168,7 @@ impl OrientationError {
             Self::ListCount { name, .. } | Self::NotFinite { name, .. } => name,
             Self::WeightNotPositive { .. } | Self::WeightRatio { .. } => "weights",
             Self::EmptyRange { .. } => "range_deg_c",
+            Self::Play { .. } => "plays",
             Self::ParityLimit { .. } => "parity_limit",
             Self::ParityConfirm => "parity_confirm_ticks",
             Self::ConditionInside { .. } => "slopes_per_deg_c",
@@ -167,6 +196,12 @@ impl OrientationParts {
     pub(super) fn check_numbers(&self, errors: &mut Vec<OrientationError>) {
         fn named(name: &'static str, rows: &[[f64; 3]]) -> impl Iterator<Item = (&'static str, usize, f64)> {
             rows.iter().enumerate().flat_map(move |(index, row)| row.map(|c| (name, index, c)))
+        }
+        let [min, max] = PLAY_WIDTHS_DEG_C;
+        for (index, AxesPlay { half_width_deg_c, share }) in self.plays.iter().copied().enumerate() {
+            if !(min..=max).contains(&half_width_deg_c) || !(-10.0..=10.0).contains(&share) {
+                errors.push(OrientationError::Play { index, half_width: half_width_deg_c, share, min, max });
+            }
         }
         let [first, last] = self.range_deg_c;
         let weights = self.weights.iter().copied().enumerate();

@@ -33,14 +33,24 @@ impl Transition {
     /// n at ticks of a duration: ticks that carry nothing, the commanded one included (1…32).
     #[must_use]
     pub fn ticks(self, duration: Span) -> u8 {
+        let ticks = self.covered(duration).clamp(1, MAX_TRANSITION_TICKS.into());
+        u8::try_from(ticks).unwrap_or(MAX_TRANSITION_TICKS)
+    }
+
+    /// Whether it covers more ticks of a duration than a transition may have.
+    #[must_use]
+    pub fn is_cut(self, duration: Span) -> bool {
+        self.covered(duration) > MAX_TRANSITION_TICKS.into()
+    }
+
+    fn covered(self, duration: Span) -> i64 {
         match self {
-            Self::Ticks(ticks) => ticks,
+            Self::Ticks(ticks) => ticks.into(),
             Self::Time(time_s) => {
                 // In whole nanoseconds: a clock that is a little off brings no tick in or out.
                 let tick_ns = duration.as_ns().max(1);
                 let covered_ns = Span::from_s(time_s).as_ns().saturating_sub(tick_ns / TOUCHED);
-                let ticks = covered_ns / tick_ns + i64::from(covered_ns % tick_ns > 0);
-                u8::try_from(ticks.clamp(1, MAX_TRANSITION_TICKS.into())).unwrap_or(MAX_TRANSITION_TICKS)
+                covered_ns / tick_ns + i64::from(covered_ns % tick_ns > 0)
             }
         }
     }
@@ -186,6 +196,11 @@ impl Reversal {
     #[must_use]
     pub fn transition_ticks(&self, duration: Span) -> u8 {
         self.parts.transition.ticks(duration)
+    }
+
+    /// Whether a transition is longer than what is bridged, at ticks of a duration.
+    pub(super) fn is_cut(&self, duration: Span) -> bool {
+        self.parts.transition.is_cut(duration)
     }
 
     /// Tick durations beyond which a reading says nothing about a lost tick, and most lost ticks that wait for one fit.

@@ -584,6 +584,28 @@ fn a_transition_stated_as_a_time_is_that_many_ticks_at_any_tick() {
     assert_eq!(stated.transition_ticks(Span::from_ns(1)), 7);
 }
 
+#[test]
+fn a_transition_that_is_cut_is_flagged_at_its_last_bridged_tick() {
+    for (time_s, cut) in [(0.032, false), (0.0335, true)] {
+        let parts = ReversalParts { transition: Transition::Time(time_s), ..ReversalParts::default() };
+        let (reversal, mut substitution) = (reversal(parts), Substitution::new());
+        let unresolved: Vec<i64> = (-20..60)
+            .filter(|k| {
+                let input = TickInput {
+                    end_time: Timestamp::from_ns(k * 1_000_000),
+                    duration: Span::from_ns(1_000_000),
+                    mode: Some(if *k < 1 { LasingMode::Plus } else { LasingMode::Minus }),
+                    switch_command: *k == 1,
+                    missed: 0,
+                    restart: false,
+                };
+                substitution.tick(&reversal, input, &mut [1e-5]).contains(TickFlags::SWITCH_UNRESOLVED)
+            })
+            .collect();
+        assert_eq!(unresolved, if cut { &[32][..] } else { &[] }, "{time_s} s");
+    }
+}
+
 /// A millisecond's ticks of one gyro with a transition of 15 ms; angle error (rad) of the ticks up to the restoring one.
 fn fast_ticks(transition: Transition, angle: impl Fn(f64) -> f64) -> (f64, usize) {
     let parts = ReversalParts {

@@ -1,11 +1,11 @@
-//! An accelerometer's terms (models §3): `f = (U − S(T) − Σ g(T)·(T − L_τ[T])/τ)·r(T_board)/K(T)`.
+//! An accelerometer's terms (models §3): `f = (U − S(T) − …)·r(T_board)/K(T)`.
 
 use serde::{Deserialize, Serialize};
 
 use super::bank::Follows;
-use super::lag::{Lag, MAX_LAGS, settled};
-use super::terms::{ACCEL_TERMS, Terms};
-use crate::calibration::AccelParts;
+use super::terms::{ACCEL_TERMS, Others, SensorState, Terms};
+use super::trail::{Trail, settled};
+use crate::calibration::{AccelParts, RegressorParts};
 use crate::channel::{ThermalFilter, ThermalState};
 use crate::curve::{Curve, CurveError, CurveParts};
 
@@ -49,10 +49,15 @@ impl AccelModel {
         })
     }
 
-    /// S (output units) and K on a ramp that has lasted for long, so that every lag has settled on it.
-    pub(crate) fn steady(&self, thermal: &ThermalState, filter: &ThermalFilter) -> (f64, f64) {
-        let lagged = settled(self.terms.lags(), thermal, filter);
-        let ([bias, _], _) = Follows::<2>::terms(self, thermal, &lagged, filter);
+    /// S (output units) and K on a ramp that has lasted for long, so that everything that trails has settled on it.
+    pub(crate) fn steady(
+        &self,
+        thermal: &ThermalState,
+        (filter, others): (&ThermalFilter, Others<'_>),
+    ) -> (f64, f64) {
+        let trailed = settled(self.terms.trails(), thermal, filter);
+        let state = SensorState { thermal, trailed: &trailed, others };
+        let ([bias, _], _) = Follows::<2>::terms(self, &state, filter);
         (bias, self.scale_factor.at(thermal.temperature).value)
     }
 
@@ -68,18 +73,17 @@ impl Follows<2> for AccelModel {
         self.channel
     }
 
-    fn lags(&self) -> &[Lag] {
-        self.terms.lags()
+    fn trails(&self) -> &[Trail] {
+        self.terms.trails()
     }
 
-    fn terms(
-        &self,
-        thermal: &ThermalState,
-        lagged: &[f64; MAX_LAGS],
-        filter: &ThermalFilter,
-    ) -> ([f64; 2], bool) {
-        let ([_, bias], clamped) = self.terms.lines(thermal, lagged, filter);
-        let scale_factor = self.scale_factor.at(thermal.temperature);
+    fn regressors(&self) -> &[RegressorParts] {
+        self.terms.regressors()
+    }
+
+    fn terms(&self, state: &SensorState<'_>, filter: &ThermalFilter) -> ([f64; 2], bool) {
+        let ([_, bias], clamped) = self.terms.lines(state, filter);
+        let scale_factor = self.scale_factor.at(state.thermal.temperature);
         ([bias, 1.0 / scale_factor.value], clamped || scale_factor.clamped)
     }
 }
@@ -91,12 +95,16 @@ impl Follows<1> for AccelModel {
         self.board_channel
     }
 
-    fn lags(&self) -> &[Lag] {
+    fn trails(&self) -> &[Trail] {
         &[]
     }
 
-    fn terms(&self, thermal: &ThermalState, _: &[f64; MAX_LAGS], _: &ThermalFilter) -> ([f64; 1], bool) {
-        let ratio = self.board_ratio.at(thermal.temperature);
+    fn regressors(&self) -> &[RegressorParts] {
+        &[]
+    }
+
+    fn terms(&self, state: &SensorState<'_>, _: &ThermalFilter) -> ([f64; 1], bool) {
+        let ratio = self.board_ratio.at(state.thermal.temperature);
         ([ratio.value], ratio.clamped)
     }
 }

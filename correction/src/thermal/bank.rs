@@ -7,8 +7,10 @@ use alloc::vec::Vec;
 use arrayvec::ArrayVec;
 use serde::{Deserialize, Serialize};
 
-use super::lag::{Lag, MAX_LAGS};
 use super::ramp::Pace;
+use super::terms::{Others, SensorState};
+use super::trail::{MAX_TRAILS, Trail, Trailed, advance, resume};
+use crate::calibration::RegressorParts;
 use crate::channel::{ThermalFilter, ThermalState};
 use crate::lanes::Line;
 use crate::orientation::SensorMask;
@@ -19,15 +21,12 @@ use crate::units::Timestamp;
 pub(crate) trait Follows<const T: usize> {
     /// The channel, by index; `None` for a sensor that stands at the assumed temperature.
     fn channel(&self) -> Option<usize>;
-    /// Thermal lags that enter the terms.
-    fn lags(&self) -> &[Lag];
-    /// Every term at a thermal state, and whether an argument was clamped to its fitted range.
-    fn terms(
-        &self,
-        thermal: &ThermalState,
-        lagged: &[f64; MAX_LAGS],
-        filter: &ThermalFilter,
-    ) -> ([f64; T], bool);
+    /// What trails behind the temperature and enters the terms.
+    fn trails(&self) -> &[Trail];
+    /// What other channels say and enters the terms.
+    fn regressors(&self) -> &[RegressorParts];
+    /// Every term in a state, and whether an argument was clamped to its fitted range.
+    fn terms(&self, state: &SensorState<'_>, filter: &ThermalFilter) -> ([f64; T], bool);
 }
 
 /// Most channels that all sensors of a unit follow: one for each gyro, each accelerometer and each accelerometer's board.
@@ -84,6 +83,11 @@ impl Paces {
         place.map_or(0.0, |(_, pace)| pace.share(time))
     }
 
+    /// Whether whatever follows a channel sets out at `time`.
+    fn starts(&self, channel: usize, time: Timestamp) -> bool {
+        self.followed.iter().any(|(followed, pace)| *followed == channel && pace.starts(time))
+    }
+
     /// Goes on as others do.
     pub(crate) fn carry(&mut self, old: &Self) {
         old.followed.iter().for_each(|(channel, pace)| self.set(*channel, *pace));
@@ -113,8 +117,8 @@ pub(crate) struct Bank<const T: usize> {
     started: SensorMask,
     /// Sensors of which an argument was outside its fitted range at the last evaluation.
     clamped: SensorMask,
-    /// `L_τ[T]` of each lag (°C), by sensor; empty where no sensor has lags.
-    lagged: Vec<[f64; MAX_LAGS]>,
+    /// States of what trails behind the temperature, by sensor; empty where nothing does.
+    trailed: Vec<Trailed>,
 }
 
 /// What of a unit's terms follows motion: force along the case axes and asymmetry of the gyros, squares of the accelerometers.
@@ -127,26 +131,28 @@ pub(crate) struct MotionBanks {
 impl<const T: usize> Bank<T> {
     /// Starts with the terms as they are at the assumed temperature.
     pub(crate) fn new<S: Follows<T>>(sensors: &[S], filter: &ThermalFilter, paces: &mut Paces) -> Self {
-        let any_lags = sensors.iter().any(|sensor| !sensor.lags().is_empty());
+        let any_trails = sensors.iter().any(|sensor| !sensor.trails().is_empty());
         let mut bank = Self {
             lines: [Line::ZERO; T],
             share_of: [paces.place(None); MAX_SENSORS],
             started: SensorMask::NONE,
             clamped: SensorMask::NONE,
-            lagged: alloc::vec![[filter.assumed_deg_c; MAX_LAGS]; if any_lags { sensors.len() } else { 0 }],
+            trailed: alloc::vec![[filter.assumed_deg_c; MAX_TRAILS]; if any_trails { sensors.len() } else { 0 }],
         };
         let assumed = ThermalState { temperature: filter.assumed_deg_c, ..ThermalState::default() };
         for (lane, sensor) in sensors.iter().take(MAX_SENSORS).enumerate() {
             bank.share_of[lane] = paces.place(sensor.channel());
-            let (terms, clamped) = sensor.terms(&assumed, &bank.lagged(lane), filter);
+            let state = SensorState { thermal: &assumed, trailed: bank.trailed(lane), others: &|_| None };
+            let (terms, clamped) = sensor.terms(&state, filter);
             bank.hold(lane, terms, clamped);
         }
         bank
     }
 
-    /// `L_τ[T]` of one sensor's lags; anything for a sensor without.
-    fn lagged(&self, lane: usize) -> [f64; MAX_LAGS] {
-        self.lagged.get(lane).copied().unwrap_or_default()
+    /// States of what trails behind one sensor's temperature; anything for a sensor without.
+    fn trailed(&self, lane: usize) -> &Trailed {
+        const NOTHING: &Trailed = &[0.0; MAX_TRAILS];
+        self.trailed.get(lane).unwrap_or(NOTHING)
     }
 
     fn hold(&mut self, lane: usize, terms: [f64; T], clamped: bool) {
@@ -154,30 +160,29 @@ impl<const T: usize> Bank<T> {
         self.clamped = self.clamped.set(lane, clamped);
     }
 
-    /// Starts the lags of a channel's sensors anew, from a temperature (°C) that is taken to have stood for ever.
-    pub(crate) fn restart_lags<S: Follows<T>>(&mut self, sensors: &[S], channel: usize, temperature: f64) {
-        for (sensor, lagged) in sensors.iter().zip(&mut self.lagged) {
+    /// Goes on, after a silence, with what trails behind the temperature (°C) of a channel's sensors; where the sensor had no reading
+    /// yet, from a temperature that is taken to have stood for ever.
+    pub(crate) fn resume_trails<S: Follows<T>>(&mut self, sensors: &[S], channel: usize, temperature: f64) {
+        for (lane, (sensor, trailed)) in sensors.iter().zip(&mut self.trailed).enumerate() {
             if sensor.channel() == Some(channel) {
-                *lagged = [temperature; MAX_LAGS];
+                resume(sensor.trails(), trailed, temperature, !self.started.contains(lane));
             }
         }
     }
 
-    /// Goes on with the lags of an earlier bank, of the sensors that `kept` names and whose time constants are the same.
-    pub(crate) fn carry_lags<S: Follows<T>>(
+    /// Goes on with what trails in an earlier bank, of the sensors that `kept` names and where it is the same.
+    pub(crate) fn carry_trails<S: Follows<T>>(
         &mut self,
         sensors: &[S],
         (old_sensors, old): (&[S], &Self),
         kept: impl Fn(usize) -> bool,
     ) {
-        let decays =
-            |sensor: &S| sensor.lags().iter().map(|lag| lag.decay).collect::<ArrayVec<_, MAX_LAGS>>();
-        let lagged = self.lagged.iter_mut().zip(&old.lagged);
-        for (lane, ((sensor, before), (lagged, old))) in
-            sensors.iter().zip(old_sensors).zip(lagged).enumerate()
+        let trailed = self.trailed.iter_mut().zip(&old.trailed);
+        for (lane, ((sensor, before), (trailed, old))) in
+            sensors.iter().zip(old_sensors).zip(trailed).enumerate()
         {
-            if kept(lane) && decays(sensor) == decays(before) {
-                *lagged = *old;
+            if kept(lane) && sensor.trails() == before.trails() {
+                *trailed = *old;
             }
         }
     }
@@ -187,21 +192,21 @@ impl<const T: usize> Bank<T> {
         self.lines.iter_mut().zip(&old.lines).for_each(|(line, old)| line.copy_lane(old, lane));
         self.started = self.started.set(lane, old.started.contains(lane));
         self.clamped = self.clamped.set(lane, old.clamped.contains(lane));
-        if let (Some(lagged), Some(old)) = (self.lagged.get_mut(lane), old.lagged.get(lane)) {
-            *lagged = *old;
+        if let (Some(trailed), Some(old)) = (self.trailed.get_mut(lane), old.trailed.get(lane)) {
+            *trailed = *old;
         }
     }
 
-    /// Moves the lags of a channel's sensors on by one grid point.
+    /// Moves on by one grid point what trails behind the temperature of a channel's sensors.
     pub(crate) fn grid_point<S: Follows<T>>(
         &mut self,
         sensors: &[S],
         channel: usize,
         thermal: &ThermalState,
     ) {
-        for (sensor, lagged) in sensors.iter().zip(&mut self.lagged) {
+        for (sensor, trailed) in sensors.iter().zip(&mut self.trailed) {
             if sensor.channel() == Some(channel) {
-                super::lag::advance(sensor.lags(), lagged, thermal.temperature);
+                advance(sensor.trails(), trailed, thermal.temperature);
             }
         }
     }
@@ -212,14 +217,15 @@ impl<const T: usize> Bank<T> {
         &mut self,
         sensors: &[S],
         (channel, thermal): (usize, &ThermalState),
-        filter: &ThermalFilter,
+        (filter, others): (&ThermalFilter, Others<'_>),
         (share, at_once): (f64, bool),
     ) {
         for (lane, sensor) in sensors.iter().enumerate() {
             if sensor.channel() != Some(channel) {
                 continue;
             }
-            let (terms, clamped) = sensor.terms(thermal, &self.lagged(lane), filter);
+            let state = SensorState { thermal, trailed: self.trailed(lane), others };
+            let (terms, clamped) = sensor.terms(&state, filter);
             if at_once || !self.started.contains(lane) {
                 self.hold(lane, terms, clamped);
             } else {
@@ -227,6 +233,35 @@ impl<const T: usize> Bank<T> {
                 self.clamped = self.clamped.set(lane, clamped);
             }
             self.started = self.started.with(lane);
+        }
+    }
+
+    /// Evaluates every term of the sensors that have a channel as a regressor, from which a reading came at `start`.
+    ///
+    /// Readings of one moment act together, in whatever order they come: a sensor that sets out at `start` sets out for the new
+    /// result. A reading between acts with the next one of the sensor's own temperature; the `first` of all is met at once.
+    pub(crate) fn join<S: Follows<T>>(
+        &mut self,
+        sensors: &[S],
+        rests_on: impl Fn(&RegressorParts) -> bool,
+        own_state: impl Fn(usize) -> Option<ThermalState>,
+        (filter, others): (&ThermalFilter, Others<'_>),
+        (paces, start, first): (&Paces, Timestamp, bool),
+    ) {
+        for (lane, sensor) in sensors.iter().enumerate() {
+            let concerned = self.started.contains(lane) && sensor.regressors().iter().any(&rests_on);
+            let Some(own) = sensor.channel().filter(|_| concerned) else { continue };
+            let Some(thermal) = own_state(own).filter(|_| first || paces.starts(own, start)) else {
+                continue;
+            };
+            let state = SensorState { thermal: &thermal, trailed: self.trailed(lane), others };
+            let (terms, clamped) = sensor.terms(&state, filter);
+            if first {
+                self.hold(lane, terms, clamped);
+            } else {
+                self.lines.iter_mut().zip(terms).for_each(|(line, term)| line.turn(lane, 0.0, term));
+                self.clamped = self.clamped.set(lane, clamped);
+            }
         }
     }
 

@@ -6,9 +6,9 @@ use arrayvec::ArrayVec;
 use serde::{Deserialize, Serialize};
 
 use super::bank::Follows;
-use super::lag::{Lag, MAX_LAGS, settled};
-use super::terms::{GYRO_TERMS, Terms};
-use crate::calibration::GyroParts;
+use super::terms::{GYRO_TERMS, Others, SensorState, Terms};
+use super::trail::{Trail, settled};
+use crate::calibration::{GyroParts, RegressorParts};
 use crate::channel::{ThermalFilter, ThermalState};
 use crate::curve::CurveError;
 use crate::lanes::Lanes;
@@ -70,10 +70,15 @@ impl GyroModel {
 }
 
 impl GyroModel {
-    /// The terms on a ramp that has lasted for long, so that every lag has settled on it.
-    pub(crate) fn steady(&self, thermal: &ThermalState, filter: &ThermalFilter) -> GyroTerms {
-        let lagged = settled(self.terms.lags(), thermal, filter);
-        let ([increment_weight, bias, magnetic, meander], _) = Follows::terms(self, thermal, &lagged, filter);
+    /// The terms on a ramp that has lasted for long, so that everything that trails has settled on it.
+    pub(crate) fn steady(
+        &self,
+        thermal: &ThermalState,
+        (filter, others): (&ThermalFilter, Others<'_>),
+    ) -> GyroTerms {
+        let trailed = settled(self.terms.trails(), thermal, filter);
+        let state = SensorState { thermal, trailed: &trailed, others };
+        let ([increment_weight, bias, magnetic, meander], _) = Follows::terms(self, &state, filter);
         GyroTerms { increment_weight, bias, magnetic, meander }
     }
 }
@@ -155,18 +160,17 @@ impl Follows<4> for GyroModel {
         self.channel
     }
 
-    fn lags(&self) -> &[Lag] {
-        self.terms.lags()
+    fn trails(&self) -> &[Trail] {
+        self.terms.trails()
+    }
+
+    fn regressors(&self) -> &[RegressorParts] {
+        self.terms.regressors()
     }
 
     /// In the order of [`GyroTerms`].
-    fn terms(
-        &self,
-        thermal: &ThermalState,
-        lagged: &[f64; MAX_LAGS],
-        filter: &ThermalFilter,
-    ) -> ([f64; 4], bool) {
-        let ([error, bias, magnetic, meander], clamped) = self.terms.lines(thermal, lagged, filter);
+    fn terms(&self, state: &SensorState<'_>, filter: &ThermalFilter) -> ([f64; 4], bool) {
+        let ([error, bias, magnetic, meander], clamped) = self.terms.lines(state, filter);
         ([self.increment_weight * (1.0 + error), bias, magnetic, meander], clamped)
     }
 }

@@ -6,9 +6,9 @@ use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 
 use super::bank::Follows;
-use super::lag::{Lag, MAX_LAGS};
-use super::terms::{ACCEL_TERMS, GYRO_TERMS, Terms};
-use crate::calibration::{AccelParts, GyroParts};
+use super::terms::{ACCEL_TERMS, GYRO_TERMS, SensorState, Terms};
+use super::trail::{MAX_TRAILS, Trail};
+use crate::calibration::{AccelParts, GyroParts, RegressorParts};
 use crate::channel::{ThermalFilter, ThermalState};
 use crate::curve::{Curve, CurveError};
 use crate::lanes::Lanes;
@@ -54,7 +54,8 @@ impl MotionTerms {
 
     /// Its lines at a thermal state.
     pub(crate) fn at(&self, thermal: &ThermalState, filter: &ThermalFilter) -> [f64; 4] {
-        self.terms.lines(thermal, &[0.0; MAX_LAGS], filter).0
+        let state = SensorState { thermal, trailed: &[0.0; MAX_TRAILS], others: &|_| None };
+        self.terms.lines(&state, filter).0
     }
 
     fn is_empty(&self) -> bool {
@@ -67,17 +68,16 @@ impl<const T: usize> Follows<T> for MotionTerms {
         self.channel
     }
 
-    fn lags(&self) -> &[Lag] {
+    fn trails(&self) -> &[Trail] {
         &[]
     }
 
-    fn terms(
-        &self,
-        thermal: &ThermalState,
-        lagged: &[f64; MAX_LAGS],
-        filter: &ThermalFilter,
-    ) -> ([f64; T], bool) {
-        self.terms.lines(thermal, lagged, filter)
+    fn regressors(&self) -> &[RegressorParts] {
+        &[]
+    }
+
+    fn terms(&self, state: &SensorState<'_>, filter: &ThermalFilter) -> ([f64; T], bool) {
+        self.terms.lines(state, filter)
     }
 }
 
@@ -86,6 +86,8 @@ impl<const T: usize> Follows<T> for MotionTerms {
 pub(crate) struct Motion {
     pub(crate) gyros: Vec<MotionTerms>,
     pub(crate) accels: Vec<MotionTerms>,
+    /// Whether a gyro drifts with the specific force.
+    pub(crate) feels_force: bool,
     /// Where the accelerometers sit, axis by axis (m).
     pub(crate) positions_m: [Lanes; 3],
 }
@@ -101,7 +103,8 @@ impl Motion {
         for (lane, position) in positions_m.take(MAX_SENSORS).enumerate() {
             lanes.iter_mut().zip(position).for_each(|(axis, metres)| axis[lane] = metres);
         }
-        let motion = Self { gyros, accels, positions_m: lanes };
+        let feels_force = gyros.iter().any(|gyro| gyro.terms.feel_force());
+        let motion = Self { gyros, accels, feels_force, positions_m: lanes };
         (!motion.is_empty()).then(|| Box::new(motion))
     }
 

@@ -17,6 +17,11 @@ impl Pace {
         if over == Span::ZERO { Self::default() } else { Self { start, per_second: 1.0 / over.as_s() } }
     }
 
+    /// Whether the way begins at `time`.
+    pub(crate) fn starts(&self, time: Timestamp) -> bool {
+        self.per_second > 0.0 && self.start == time
+    }
+
     /// How far along the way `time` is, 0…1: exactly 0 before the start, exactly 1 at and after the end; 0 without a pace.
     #[inline]
     pub(crate) fn share(&self, time: Timestamp) -> f64 {

@@ -7,8 +7,8 @@ use alloc::vec::Vec;
 
 use serde::{Deserialize, Serialize};
 
-use super::lag::{Lag, MAX_LAGS};
-use crate::calibration::{BranchArgument, CoefficientParts, TermParts};
+use super::trail::{Trail, Trailed};
+use crate::calibration::{BranchArgument, CoefficientParts, RegressorParts, Source, TermParts};
 use crate::channel::{ThermalFilter, ThermalState};
 use crate::curve::{Curve, CurveError, CurveParts};
 
@@ -25,6 +25,10 @@ pub enum Feature {
     Meander,
     /// `(T − L_τ[T])/τ`, `L_τ` a first-order low-pass (°C/s).
     Lag,
+    /// `p_w[T] − T`, `p_w` a play of half width w: what sticks, and is dragged along by temperature (°C).
+    Play,
+    /// `x − x₀`: what another channel says, less what a third one does and a constant (the channel's unit).
+    Regressor,
     /// Ṫ (°C/s).
     ThermalRate,
     /// T̈ (°C/s²).
@@ -51,12 +55,14 @@ pub struct Term {
 }
 
 /// Terms of a gyro (models §2): all but the first add to its bias Ω (rad/s).
-pub const GYRO_TERMS: [Term; 11] = [
+pub const GYRO_TERMS: [Term; 13] = [
     Term { feature: Feature::Reading, key: "increment_weight_error" },
     Term { feature: Feature::One, key: "static_bias" },
     Term { feature: Feature::LasingMode, key: "magnetic_bias" },
     Term { feature: Feature::Meander, key: "slow_meander" },
     Term { feature: Feature::Lag, key: "lag" },
+    Term { feature: Feature::Play, key: "hysteresis" },
+    Term { feature: Feature::Regressor, key: "regressor" },
     Term { feature: Feature::ThermalRate, key: "thermal_rate" },
     Term { feature: Feature::ThermalAcceleration, key: "thermal_acceleration" },
     Term { feature: Feature::ForceX, key: "acceleration_sensitive_drift.x" },
@@ -66,9 +72,11 @@ pub const GYRO_TERMS: [Term; 11] = [
 ];
 
 /// Terms of an accelerometer (models §3): they add to its bias S (output units), the last one to what remains of it as a force.
-pub const ACCEL_TERMS: [Term; 3] = [
+pub const ACCEL_TERMS: [Term; 5] = [
     Term { feature: Feature::One, key: "bias" },
     Term { feature: Feature::Lag, key: "lag" },
+    Term { feature: Feature::Play, key: "hysteresis" },
+    Term { feature: Feature::Regressor, key: "regressor" },
     Term { feature: Feature::ForceSquared, key: "second_order" },
 ];
 
@@ -83,7 +91,13 @@ impl Feature {
     const fn line(self) -> usize {
         match self {
             Self::Reading | Self::ForceX | Self::ForceSquared => 0,
-            Self::One | Self::Lag | Self::ThermalRate | Self::ThermalAcceleration | Self::ForceY => 1,
+            Self::One
+            | Self::Lag
+            | Self::Play
+            | Self::Regressor
+            | Self::ThermalRate
+            | Self::ThermalAcceleration
+            | Self::ForceY => 1,
             Self::LasingMode | Self::ForceZ => 2,
             Self::Meander | Self::RateMagnitude => 3,
         }
@@ -139,8 +153,26 @@ impl Coefficient {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct Terms {
     terms: Vec<(Feature, Coefficient)>,
-    /// Of the terms that are lags, in their order.
-    lags: Vec<Lag>,
+    /// Of the terms that trail behind the temperature, in their order.
+    trails: Vec<Trail>,
+    /// Of the terms that other channels enter.
+    regressors: Vec<RegressorParts>,
+}
+
+/// Most regressors of one sensor.
+pub const MAX_REGRESSORS: usize = 8;
+
+/// Smoothed value of any channel, where it was read.
+pub(crate) type Others<'a> = &'a dyn Fn(Source) -> Option<f64>;
+
+/// What the terms of a sensor are evaluated in.
+pub(crate) struct SensorState<'a> {
+    /// Its own temperature.
+    pub(crate) thermal: &'a ThermalState,
+    /// States of what trails behind it (°C).
+    pub(crate) trailed: &'a Trailed,
+    /// The other channels.
+    pub(crate) others: Others<'a>,
 }
 
 impl Terms {
@@ -172,9 +204,12 @@ impl Terms {
                     }
                 };
                 compiled.terms.extend(coefficient.map(|coefficient| (term.feature, coefficient)));
-                if term.feature == Feature::Lag {
-                    compiled.lags.push(Lag::new(part.time_constant_s, filter));
-                }
+                compiled.regressors.extend(part.regressor.filter(|_| term.feature == Feature::Regressor));
+                compiled.trails.extend(match term.feature {
+                    Feature::Lag => Some(Trail::lag(part.parameter, filter)),
+                    Feature::Play => Some(Trail::Play { half_width_deg_c: part.parameter }),
+                    _ => None,
+                });
             }
         }
         sound.then_some(compiled)
@@ -185,27 +220,42 @@ impl Terms {
         self.terms.is_empty()
     }
 
-    /// The lags' time constants.
-    pub(crate) fn lags(&self) -> &[Lag] {
-        &self.lags
+    /// Whether one is multiplied by the specific force along a case axis.
+    pub(crate) fn feel_force(&self) -> bool {
+        self.terms
+            .iter()
+            .any(|(feature, _)| matches!(feature, Feature::ForceX | Feature::ForceY | Feature::ForceZ))
     }
 
-    /// The sum of each line at a thermal state, and whether an argument was clamped to its fitted range. `lagged` is `L_τ[T]` (°C) of
-    /// each lag. A feature that changes from tick to tick counts as 1.
+    /// What trails behind the temperature.
+    pub(crate) fn trails(&self) -> &[Trail] {
+        &self.trails
+    }
+
+    /// What other channels say.
+    pub(crate) fn regressors(&self) -> &[RegressorParts] {
+        &self.regressors
+    }
+
+    /// The sum of each line in a state, and whether an argument was clamped to its fitted range. A feature that changes from tick to
+    /// tick counts as 1.
     pub(crate) fn lines<const T: usize>(
         &self,
-        thermal: &ThermalState,
-        lagged: &[f64; MAX_LAGS],
+        SensorState { thermal, trailed, others }: &SensorState<'_>,
         filter: &ThermalFilter,
     ) -> ([f64; T], bool) {
         let mut sums = [0.0; T];
         let mut any_clamped = false;
-        let mut lags = self.lags.iter().zip(lagged);
+        let mut trails = self.trails.iter().zip(trailed.iter());
+        let mut regressors = self.regressors.iter();
         for (feature, coefficient) in &self.terms {
             let (value, factor) = match feature {
-                Feature::Lag => lags
+                Feature::Lag | Feature::Play => trails
                     .next()
-                    .map_or((0.0, 0.0), |(lag, lagged)| (thermal.temperature - lagged, lag.per_second)),
+                    .map_or((0.0, 0.0), |(trail, state)| trail.feature(*state, thermal.temperature)),
+                Feature::Regressor => {
+                    (regressors.next().map_or(0.0, |regressor| regressor.value(*others)), 1.0)
+                }
                 Feature::ThermalRate => (thermal.rate, 1.0),
                 Feature::ThermalAcceleration => (thermal.acceleration, 1.0),
                 _ => (1.0, 1.0),

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::orientation::{Inverse, Orientation, ParityCheck, SensorMask};
 use crate::sample::{MAX_PARITY, TickFlags};
-use crate::thermal::Ramp;
+use crate::thermal::{MAX_PLAYS, Ramp, drag};
 use crate::units::{Span, Timestamp};
 
 /// Memory of one kind of sensor's orientation.
@@ -16,6 +16,8 @@ pub(super) struct Axes {
     /// Temperature that the orientation follows (°C); `share` of its way is the share between the inverses.
     temperature: Ramp,
     target: f64,
+    /// Where the plays have been dragged to (°C).
+    played: ArrayVec<f64, MAX_PLAYS>,
     clamped: bool,
     /// Whether a temperature was read: the first one is not approached from the assumed one, but met.
     started: bool,
@@ -37,6 +39,7 @@ impl Axes {
         Self {
             temperature: Ramp::hold(target),
             target,
+            played: orientation.plays().iter().map(|_| target).collect(),
             clamped: outside(orientation, target),
             started: false,
             mask,
@@ -57,6 +60,8 @@ impl Axes {
         over: Span,
     ) {
         let over = if self.started { over } else { Span::ZERO };
+        let clamped = outside(orientation, temperature);
+        let temperature = self.stick(orientation, temperature);
         self.started = true;
         let now = self.at(start);
         self.to = orientation.inverse(temperature, self.mask);
@@ -64,11 +69,23 @@ impl Axes {
         self.give_up_across_a_plane(orientation, start, temperature);
         self.stands = self.from == self.to;
         self.target = temperature;
-        self.clamped = outside(orientation, temperature);
+        self.clamped = clamped;
         self.temperature.turn(start, over, temperature);
         if over == Span::ZERO {
             self.settle();
         }
+    }
+
+    /// Temperature that axes which stick turn as if it were (°C): T + Σ share·(p_w[T] − T). The first of all is taken to have stood
+    /// for ever.
+    fn stick(&mut self, orientation: &Orientation, temperature: f64) -> f64 {
+        let mut felt = temperature;
+        for (play, state) in orientation.plays().iter().zip(&mut self.played) {
+            let from = if self.started { *state } else { temperature };
+            *state = drag(from, temperature, play.half_width_deg_c);
+            felt += play.share * (*state - temperature);
+        }
+        felt
     }
 
     /// Arrives at once where it is heading, after a step of the producer's clock.
@@ -198,6 +215,7 @@ mod tests {
             reference_deg_c: 20.0,
             rows: vec![[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [skewed, -skewed, skewed]],
             slopes_per_deg_c: vec![[0.0, slope, 0.0], [slope, 0.0, 0.0], [0.0; 3], [0.0; 3]],
+            plays: vec![],
             weights: vec![],
             range_deg_c: [20.0, 50.0],
             parity_limit: None,

@@ -56,7 +56,8 @@ impl Health {
             account.invalid += u64::from(!flags.contains(SensorFlags::VALID));
             account.overrange += u64::from(flags.contains(SensorFlags::OVERRANGE));
             account.not_finite += u64::from(flags.contains(SensorFlags::NOT_FINITE));
-            account.clamped += u64::from(flags.contains(SensorFlags::CLAMPED_TEMPERATURE));
+            let clamped = SensorFlags::CLAMPED_TEMPERATURE | SensorFlags::CLAMPED_RATE;
+            account.clamped += u64::from(flags.intersects(clamped));
             account.stale += u64::from(flags.contains(SensorFlags::STALE_TEMPERATURE));
             account.excluded += u64::from(flags.contains(SensorFlags::EXCLUDED));
         }

@@ -8,11 +8,11 @@ use serde::{Deserialize, Serialize};
 
 use super::axes::Axes;
 use super::counters::Counters;
-use crate::calibration::Calibration;
+use super::footing::Footing;
+use crate::calibration::{Calibration, RegressorParts, Source};
 use crate::channel::{ChannelMemory, ThermalState, Verdict};
-use crate::lanes::Lanes;
-use crate::sample::{ChannelName, MAX_SENSORS, SensorFlags, TemperatureReading};
-use crate::thermal::{AccelModel, Bank, MotionBanks, Pace, Paces};
+use crate::sample::{ChannelName, TemperatureReading};
+use crate::thermal::{AccelModel, Bank, GyroModel, MotionBanks, Others, Pace, Paces};
 use crate::units::{Span, Timestamp};
 
 /// Most readings that wait to take effect: two messages of 4096 times with 16 channels each, since a producer sends a
@@ -64,51 +64,6 @@ impl Waiting {
     pub(super) fn restart(&mut self, now: Timestamp) {
         const NEAR: Span = Span::from_ns(3_600_000_000_000);
         self.readings.retain(|r| r.time.since(now) < NEAR && now.since(r.time) < NEAR);
-    }
-}
-
-/// What the temperatures say of the sensors of a kind until the next reading.
-#[derive(Debug, Default, Serialize, Deserialize)]
-pub(super) struct Footing {
-    /// Smoothed temperature of each sensor's channel (°C); the assumed one without a channel or before its first reading.
-    pub(super) temperature_deg_c: Lanes,
-    /// Flags of each sensor in a tick with readings that are sound and temperatures that are fresh.
-    flags: [SensorFlags; MAX_SENSORS],
-    /// A tick that ends later rests on a temperature that is missing, rejected or too old.
-    fresh_until: [Timestamp; MAX_SENSORS],
-    /// Up to this time every sensor is valid and nothing else; `None` where one is not.
-    sound_until: Option<Timestamp>,
-}
-
-impl Footing {
-    /// Whether there is nothing to say of any sensor in a tick that ends at `time`.
-    #[inline]
-    pub(super) fn is_sound(&self, time: Timestamp) -> bool {
-        self.sound_until.is_some_and(|until| time <= until)
-    }
-
-    /// Enters one sensor, by the temperature that it follows (°C) and up to when that is fresh.
-    fn note(
-        &mut self,
-        lane: usize,
-        (temperature_deg_c, fresh_until): (f64, Timestamp),
-        clamped: bool,
-        axes: &Axes,
-    ) {
-        let mut flags = SensorFlags::VALID;
-        flags.set(SensorFlags::CLAMPED_TEMPERATURE, clamped);
-        flags.set(SensorFlags::EXCLUDED, !axes.included().contains(lane));
-        let before = if lane == 0 { Some(fresh_until) } else { self.sound_until };
-        self.sound_until = before.filter(|_| flags == SensorFlags::VALID).map(|until| until.min(fresh_until));
-        self.temperature_deg_c[lane] = temperature_deg_c;
-        self.flags[lane] = flags;
-        self.fresh_until[lane] = fresh_until;
-    }
-
-    /// What is to be said of a sensor in a tick that ends at `time`.
-    pub(super) fn flags(&self, lane: usize, time: Timestamp) -> SensorFlags {
-        let stale = time > self.fresh_until[lane];
-        if stale { self.flags[lane] | SensorFlags::STALE_TEMPERATURE } else { self.flags[lane] }
     }
 }
 
@@ -172,9 +127,9 @@ impl ThermalMemory {
         };
         for index in 0..memory.channels.len() {
             if let Some(state) = memory.channels.get(index).and_then(ChannelMemory::state) {
-                memory.restart_lags(calibration, index, state.temperature);
+                memory.resume_trails(calibration, index, state.temperature);
                 if let Some((old, old_memory)) = before {
-                    memory.carry_lags(calibration, (old, old_memory));
+                    memory.carry_trails(calibration, (old, old_memory));
                 }
                 memory.update(calibration, index, now, Span::ZERO);
             }
@@ -186,16 +141,16 @@ impl ThermalMemory {
         memory
     }
 
-    /// Goes on with lags that were filtered in the same way.
-    fn carry_lags(&mut self, calibration: &Calibration, (old, old_memory): (&Calibration, &Self)) {
+    /// Goes on with what trails behind a temperature that was filtered in the same way.
+    fn carry_trails(&mut self, calibration: &Calibration, (old, old_memory): (&Calibration, &Self)) {
         let followed = |calibration: &Calibration, channel: Option<usize>| {
             channel.and_then(|index| calibration.channels.get(index)).cloned()
         };
         let same = |new, before| followed(calibration, new) == followed(old, before);
-        self.gyros.carry_lags(&calibration.gyros, (&old.gyros, &old_memory.gyros), |lane| {
+        self.gyros.carry_trails(&calibration.gyros, (&old.gyros, &old_memory.gyros), |lane| {
             same(calibration.gyros[lane].channel, old.gyros[lane].channel)
         });
-        self.accels.carry_lags(&calibration.accels, (&old.accels, &old_memory.accels), |lane| {
+        self.accels.carry_trails(&calibration.accels, (&old.accels, &old_memory.accels), |lane| {
             same(calibration.accels[lane].channel, old.accels[lane].channel)
         });
     }
@@ -260,6 +215,7 @@ impl ThermalMemory {
             counters.temperature_unknown_channel += 1;
             return;
         };
+        let first = memory.state().is_none();
         let verdict = memory.read(channel, &calibration.filter, reading.time, reading.raw, |state| {
             self.gyros.grid_point(&calibration.gyros, index, state);
             self.accels.grid_point(&calibration.accels, index, state);
@@ -273,19 +229,21 @@ impl ThermalMemory {
                 let before = self.updated.get(index).copied().flatten();
                 let over = before.map_or(Span::ZERO, |before| start.since(before));
                 self.update(calibration, index, start, over.max(calibration.filter.grid_step));
+                self.join(calibration, index, start, first);
             }
             Verdict::Restarted => {
                 if let Some(state) = memory.state() {
-                    self.restart_lags(calibration, index, state.temperature);
+                    self.resume_trails(calibration, index, state.temperature);
                 }
                 self.update(calibration, index, start, calibration.filter.grid_step);
+                self.join(calibration, index, start, first);
             }
         }
     }
 
-    fn restart_lags(&mut self, calibration: &Calibration, channel: usize, temperature: f64) {
-        self.gyros.restart_lags(&calibration.gyros, channel, temperature);
-        self.accels.restart_lags::<AccelModel>(&calibration.accels, channel, temperature);
+    fn resume_trails(&mut self, calibration: &Calibration, channel: usize, temperature: f64) {
+        self.gyros.resume_trails(&calibration.gyros, channel, temperature);
+        self.accels.resume_trails::<AccelModel>(&calibration.accels, channel, temperature);
     }
 
     /// Turns everything that follows a channel towards its present state.
@@ -294,17 +252,19 @@ impl ThermalMemory {
         if let Some(updated) = self.updated.get_mut(channel) {
             *updated = Some(start);
         }
+        let channels = &self.channels;
+        let others = |source| value(channels, calibration, source);
         let (to, filter) = ((channel, &state), &calibration.filter);
+        let within: (_, Others<'_>) = (filter, &others);
         let way = (self.paces.share(channel, start), over == Span::ZERO);
-        self.gyros.update(&calibration.gyros, to, filter, way);
-        self.accels.update(&calibration.accels, to, filter, way);
-        self.boards.update(&calibration.accels, to, filter, way);
+        self.gyros.update(&calibration.gyros, to, within, way);
+        self.accels.update(&calibration.accels, to, within, way);
+        self.boards.update(&calibration.accels, to, within, way);
         if let (Some(banks), Some(motion)) = (&mut self.motion, &calibration.motion) {
-            banks.gyros.update(&motion.gyros, to, filter, way);
-            banks.accels.update(&motion.accels, to, filter, way);
+            banks.gyros.update(&motion.gyros, to, within, way);
+            banks.accels.update(&motion.accels, to, within, way);
         }
         self.paces.set(channel, Pace::new(start, over));
-        let channels = &self.channels;
         let follow = |axes: &mut Axes, orientation, following: &[usize]| {
             if following.contains(&channel)
                 && let Some(mean) = mean_temperature(channels, following)
@@ -316,6 +276,21 @@ impl ThermalMemory {
         if let (Some(axes), Some(orientation)) = (&mut self.accel_axes, &calibration.accel_orientation) {
             follow(axes, orientation, &calibration.accel_orientation_channels);
         }
+    }
+
+    /// Has the sensors that a channel is a regressor of know its new state.
+    fn join(&mut self, calibration: &Calibration, channel: usize, start: Timestamp, first: bool) {
+        if !calibration.regresses {
+            return;
+        }
+        let (channels, paces) = (&self.channels, &self.paces);
+        let others = |source| value(channels, calibration, source);
+        let own = |index: usize| channels.get(index).and_then(ChannelMemory::state);
+        let rests_on =
+            |parts: &RegressorParts| parts.channels().any(|source| calibration.place(source) == channel);
+        let within: (_, Others<'_>) = (&calibration.filter, &others);
+        self.gyros.join::<GyroModel>(&calibration.gyros, rests_on, own, within, (paces, start, first));
+        self.accels.join::<AccelModel>(&calibration.accels, rests_on, own, within, (paces, start, first));
     }
 
     /// Forgets time, after a step of the producer's clock.
@@ -341,6 +316,11 @@ impl ThermalMemory {
         let channel = |index: Option<usize>| index.and_then(|index| self.channels.get(index));
         let fresh_until =
             |index| channel(index).map_or(Timestamp::from_ns(i64::MAX), |c| c.fresh_until(filter));
+        let regressors_fresh_until = |regressors: &[RegressorParts]| {
+            let sources = regressors.iter().flat_map(RegressorParts::channels);
+            let until = sources.map(|source| fresh_until(Some(calibration.place(source))));
+            until.min().unwrap_or(Timestamp::from_ns(i64::MAX))
+        };
         let temperature = |index| {
             let state = channel(index).and_then(ChannelMemory::state);
             state.map_or(filter.assumed_deg_c, |state| state.temperature)
@@ -350,7 +330,9 @@ impl ThermalMemory {
         for (lane, model) in calibration.gyros.iter().enumerate() {
             let in_motion = self.motion.as_ref().is_some_and(|banks| banks.gyros.clamped(lane));
             let clamped = self.gyros.clamped(lane) || in_motion || axes.clamped();
-            gyros.note(lane, (temperature(model.channel), fresh_until(model.channel)), clamped, axes);
+            let fresh_until =
+                fresh_until(model.channel).min(regressors_fresh_until(model.terms.regressors()));
+            gyros.note(lane, (temperature(model.channel), fresh_until), clamped, axes);
         }
         let mut accels = Footing::default();
         for (lane, model) in calibration.accels.iter().enumerate() {
@@ -358,7 +340,9 @@ impl ThermalMemory {
             let in_motion = self.motion.as_ref().is_some_and(|banks| banks.accels.clamped(lane));
             let clamped =
                 self.accels.clamped(lane) || self.boards.clamped(lane) || in_motion || axes.clamped();
-            let fresh_until = fresh_until(model.channel).min(fresh_until(model.board_channel));
+            let fresh_until = fresh_until(model.channel)
+                .min(fresh_until(model.board_channel))
+                .min(regressors_fresh_until(model.terms.regressors()));
             accels.note(lane, (temperature(model.channel), fresh_until), clamped, axes);
         }
         self.warming_up = self.channels.iter().any(|channel| channel.warming_up(filter));
@@ -377,16 +361,16 @@ impl ThermalMemory {
         memory.state().map(|state| state.temperature)
     }
 
-    /// Every channel that has been read, with its state.
+    /// Every temperature channel that has been read, with its state.
     pub(super) fn temperatures<'a>(
         &'a self,
         calibration: &'a Calibration,
     ) -> impl Iterator<Item = (&'a ChannelName, ThermalState)> + Clone {
-        let channels = calibration.channels.iter().zip(&self.channels);
+        let channels = calibration.channels().iter().zip(&self.channels);
         channels.filter_map(|(channel, memory)| Some((channel.name(), memory.state()?)))
     }
 
-    /// Every channel as it stands at `time`.
+    /// Every channel as it stands at `time`, temperatures first.
     pub(super) fn report<'a>(
         &'a self,
         calibration: &'a Calibration,
@@ -399,6 +383,11 @@ impl ThermalMemory {
             warming_up: memory.warming_up(&calibration.filter),
         })
     }
+}
+
+/// Smoothed value of a channel, where it was read.
+fn value(channels: &[ChannelMemory], calibration: &Calibration, source: Source) -> Option<f64> {
+    channels.get(calibration.place(source)).and_then(ChannelMemory::state).map(|state| state.temperature)
 }
 
 /// Mean over the channels that have a temperature.

@@ -31,10 +31,24 @@ impl Unit {
 
     /// The temperature channels as they stand at the last tick; none without a calibration.
     pub fn channels(&self) -> impl Iterator<Item = ChannelReport> + '_ {
-        self.pipeline
-            .active
-            .iter()
-            .flat_map(|active| active.corrector.thermal().report(&active.calibration, self.pipeline.last_end))
+        self.reports(false)
+    }
+
+    /// The auxiliary channels likewise; their states are in units of their own.
+    pub fn auxiliaries(&self) -> impl Iterator<Item = ChannelReport> + '_ {
+        self.reports(true)
+    }
+
+    fn reports(&self, auxiliaries: bool) -> impl Iterator<Item = ChannelReport> + '_ {
+        self.pipeline.active.iter().flat_map(move |active| {
+            let calibration = &active.calibration;
+            let [skipped, taken] = match auxiliaries {
+                true => [calibration.temperatures, usize::MAX],
+                false => [0, calibration.temperatures],
+            };
+            let reports = active.corrector.thermal().report(calibration, self.pipeline.last_end);
+            reports.skip(skipped).take(taken)
+        })
     }
 
     /// The temperatures in use, by the channel's name; none without a calibration, and of a channel that was not read yet.

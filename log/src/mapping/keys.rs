@@ -191,38 +191,57 @@ pub(super) struct SensorKeys<U> {
     pub(super) mid_scale: Option<f64>,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
+/// Unit of a gyro's readings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[schemars(inline)]
-pub(super) enum GyroUnit {
+pub enum GyroUnit {
+    /// Counts of the tick.
     Counts,
+    /// rad/s.
     RadPerS,
+    /// °/s.
     DegPerS,
+    /// °/h.
     DegPerH,
+    /// rad, over the tick.
     Rad,
+    /// °, over the tick.
     Deg,
+    /// ″, over the tick.
     Arcsec,
+    /// Whatever the calibration document takes.
     Raw,
+    /// The same, over the tick.
     RawPerTick,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
+/// Unit of an accelerometer's readings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[schemars(inline)]
-pub(super) enum AccelUnit {
+pub enum AccelUnit {
+    /// Counts of the tick.
     #[serde(rename = "counts")]
     Counts,
+    /// m/s².
     #[serde(rename = "m_per_s2")]
     MPerS2,
+    /// Standard gravity.
     #[serde(rename = "g")]
     G,
+    /// Thousandth of standard gravity.
     #[serde(rename = "mg")]
     Mg,
+    /// m/s, over the tick.
     #[serde(rename = "m_per_s")]
     MPerS,
+    /// V.
     #[serde(rename = "volt")]
     Volt,
+    /// Whatever the calibration document takes.
     #[serde(rename = "raw")]
     Raw,
+    /// The same, over the tick.
     #[serde(rename = "raw_per_tick")]
     RawPerTick,
 }
@@ -282,12 +301,25 @@ fn every_row() -> u32 {
     1
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
+/// Unit of a temperature channel's readings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[schemars(inline)]
-pub(super) enum TemperatureUnit {
+pub enum TemperatureUnit {
+    /// °C.
     DegC,
+    /// K.
     Kelvin,
+    /// V.
     Volt,
+    /// Whatever the calibration document takes.
     Raw,
+}
+
+impl TemperatureUnit {
+    /// What is added to a reading; −0 changes none.
+    #[must_use]
+    pub fn shift(self) -> f64 {
+        if self == Self::Kelvin { -273.15 } else { -0.0 }
+    }
 }

@@ -9,7 +9,7 @@ use isotherm_document::{Form, Problem, Reader, element, join};
 
 use super::keys::{
     AccelUnit, DecimalMark, DurationRule, FileKeys, GyroKeys, GyroUnit, MappingKeys, SensorKeys, SwitchKeys,
-    TemperatureKeys, TemperatureUnit, TickKeys, TimeKeys,
+    TemperatureKeys, TickKeys, TimeKeys,
 };
 use super::{
     Column, Conversion, Delimiter, FileMapping, GyroMapping, Layout, Mapping, Marks, ModeMapping,
@@ -211,7 +211,7 @@ fn duration(
 }
 
 /// The unit of a sensor's column.
-trait SensorUnit: Copy {
+pub trait SensorUnit: Copy {
     /// How much it is in SI, and whether it is an increment over the tick; `None` for counts.
     fn in_si(self) -> Option<(f64, bool)>;
 }
@@ -314,7 +314,7 @@ fn temperature(keys: TemperatureKeys) -> TemperatureMapping {
     TemperatureMapping {
         channel: ChannelName::from(&keys.channel).unwrap_or_default(),
         column: keys.column,
-        shift: if keys.unit == TemperatureUnit::Kelvin { -273.15 } else { -0.0 },
+        shift: keys.unit.shift(),
         every_rows: keys.every_rows.into(),
         may_be_empty: keys.may_be_empty,
     }

@@ -7,17 +7,19 @@ use isotherm_protocol::key::UnitId;
 
 use super::difference::Difference;
 use super::nominal::{DEG_PER_H, Scale, unscaled};
-use super::page::{Axis, Chart, Content, Form, Ink, Lane, Mark, Page, Panel, Series, Stretch, Table};
 use super::reading::UnitLogs;
 use super::time::seconds;
 use super::track::{Finished, Overall, Track};
 use super::unit::{ACCEL_FLAGS, GYRO_FLAGS, MODE_MINUS, MODE_PLUS, RawTrack, SWITCH, Since, UnitPlot};
 use super::{AXES, PlotSummary};
-use words::{duration, figure, remarks};
+use crate::date::date;
+use isotherm_pages::{Axis, Chart, Content, Form, Ink, Lane, Mark, Page, Panel, Series, Stretch, Table};
+use words::{duration, figure, remarks, results};
 
 /// What the page shows; `None` where there is nothing.
 pub(super) fn page(units: Vec<(UnitId, UnitLogs)>, summary: &PlotSummary) -> Option<Page> {
     let mut page = Page::new(&summary.logs.join(" and "));
+    page.headlines(&results(summary));
     for words in remarks(summary) {
         page.paragraph(&words);
     }
@@ -33,7 +35,8 @@ pub(super) fn page(units: Vec<(UnitId, UnitLogs)>, summary: &PlotSummary) -> Opt
         let chart = drawing.chart(&unit, logs, difference);
         page.heading(&format!("Unit {unit}"));
         page.paragraph(&format!(
-            "Time 0 is {begin_ns} ns on the producer's clock; {} are shown.",
+            "From {} (time 0 is {begin_ns} ns on the producer's clock), {} are shown.",
+            date(begin_ns),
             duration(seconds(end_ns.saturating_sub(begin_ns)))
         ));
         page.chart(&chart);

@@ -10,11 +10,11 @@ use isotherm_protocol::stream::UnitStream;
 
 use super::difference::Difference;
 use super::nominal::Nominal;
-use super::page::Page;
 use super::unit::UnitPlot;
 use super::{DifferenceSummary, MAX_UNITS, PlotLog, PlotOptions, PlotSummary, UnitSummary, layout, track};
 use crate::error::Error;
 use crate::message::{Message, Topic};
+use isotherm_pages::Page;
 
 /// Logs that begin further apart than this are laid side by side by their beginnings (ns).
 const APART_NS: u64 = 86_400_000_000_000;

@@ -9,8 +9,8 @@ mod tests;
 
 use std::sync::Arc;
 
-use super::page::{Bits, Places, Samples};
 use super::time::seconds as seconds_of;
+use isotherm_pages::{Bits, Places, Samples};
 
 /// So many times as many ticks as bins are kept as they are: they take the same room in the file.
 const EXACT: usize = 3;

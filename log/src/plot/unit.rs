@@ -12,10 +12,10 @@ use isotherm_protocol::raw::{AccelBatch, GyroBatch, TemperatureBatch};
 use isotherm_protocol::status::{Output, Status};
 
 use super::nominal::{DEG_PER_H, Nominal};
-use super::page::Ink;
 use super::time::{Clock, Stream, seconds};
 use super::track::Track;
 use crate::message::{Message, Topic};
+use isotherm_pages::Ink;
 
 /// Most marks, stretches or channels of each kind; further ones are counted.
 const MAX_LISTED: usize = 2000;

@@ -14,7 +14,7 @@ use serde::Serialize;
 
 use super::record::{LONGEST_RECORD, parse};
 use super::skip::{Front, pass_over};
-use super::{Attachment, CHANNELS, MESSAGE_ENCODING, Metadata};
+use super::{Attachment, CHANNELS, MESSAGE_ENCODING, Metadata, view};
 use crate::error::Error;
 use crate::message::{Message, Topic};
 
@@ -59,8 +59,8 @@ struct Opened {
     reader: LinearReader,
     /// From the part that was passed over.
     found: VecDeque<Found>,
-    /// Topics by channel; `None` for channels of something else.
-    topics: HashMap<u16, Option<Topic>>,
+    /// What each channel carries.
+    topics: HashMap<u16, Carries>,
     /// The last whole file's end has been seen.
     ended: bool,
 }
@@ -152,6 +152,16 @@ impl RecordingReader {
     }
 }
 
+/// What a channel carries.
+pub(super) enum Carries {
+    /// Frames of a topic.
+    Frames(Topic),
+    /// What stands in frames too.
+    View,
+    /// Something else.
+    Foreign,
+}
+
 /// One record that is of use.
 pub(super) enum Found {
     /// A message; `None` for one of something else.
@@ -224,19 +234,27 @@ impl Opened {
 /// Takes what is of use in a record.
 pub(super) fn take(
     record: Record<'_>,
-    topics: &mut HashMap<u16, Option<Topic>>,
+    topics: &mut HashMap<u16, Carries>,
     ended: &mut bool,
 ) -> Option<Found> {
     match record {
         Record::Channel(channel) => {
-            let ours = channel.message_encoding == MESSAGE_ENCODING;
-            topics.insert(channel.id, ours.then(|| Topic::of(&channel.topic)));
+            let carries = match channel.message_encoding.as_str() {
+                MESSAGE_ENCODING => Carries::Frames(Topic::of(&channel.topic)),
+                view::ENCODING if view::topic(&channel.topic).is_some() => Carries::View,
+                _ => Carries::Foreign,
+            };
+            topics.insert(channel.id, carries);
             None
         }
         Record::Message { header, data } => {
-            let topic = topics.get(&header.channel_id).cloned().flatten();
-            let frame = |topic| Message { topic, received_ns: header.log_time, frame: data.into_owned() };
-            Some(Found::Message(topic.map(frame)))
+            let topic = match topics.get(&header.channel_id) {
+                Some(Carries::Frames(topic)) => topic.clone(),
+                Some(Carries::View) => return None,
+                Some(Carries::Foreign) | None => return Some(Found::Message(None)),
+            };
+            let (received_ns, frame) = (header.log_time, data.into_owned());
+            Some(Found::Message(Some(Message { topic, received_ns, frame })))
         }
         Record::Attachment { header, data, .. } => Some(Found::Attachment(Attachment {
             name: header.name,

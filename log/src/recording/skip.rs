@@ -9,9 +9,8 @@ use std::io::{self, BufReader, ErrorKind, Read, Seek, SeekFrom};
 
 use mcap::records::{Record, op};
 
-use super::reader::{Found, take};
+use super::reader::{Carries, Found, take};
 use super::record::{LONGEST_RECORD, chunk_records, parse};
-use crate::message::Topic;
 
 /// Opcode and length in front of a record.
 const RECORD_HEADER: usize = 9;
@@ -25,8 +24,8 @@ const BLOCK: usize = 1 << 12;
 pub(super) struct Front {
     /// What stands beside the chunks.
     pub(super) found: Vec<Found>,
-    /// Topics by channel; `None` for channels of something else.
-    pub(super) topics: HashMap<u16, Option<Topic>>,
+    /// What each channel carries.
+    pub(super) topics: HashMap<u16, Carries>,
     /// Where reading goes on (bytes from the beginning of the file).
     pub(super) at: u64,
 }

@@ -61,6 +61,42 @@ fn write(path: &Path, messages: &[Message]) {
 }
 
 #[test]
+fn readings_as_json_stand_beside_the_frames_and_are_no_messages() {
+    let folder = tempfile::tempdir().unwrap();
+    let (path, recovered) = (folder.path().join("a.mcap"), folder.path().join("b.mcap"));
+    let options = RecordingOptions { chunk_bytes: 2000, json: true, ..RecordingOptions::default() };
+    let mut writer = RecordingWriter::create(&path, options).unwrap();
+    for message in messages() {
+        writer.write(&message).unwrap();
+    }
+    writer.finish().unwrap();
+    let bytes = std::fs::read(&path).unwrap();
+    let shown: Vec<_> = mcap::MessageStream::new(&bytes)
+        .unwrap()
+        .map(Result::unwrap)
+        .filter(|shown| shown.channel.message_encoding == "json")
+        .collect();
+    assert_eq!(shown.len(), 500);
+    assert_eq!(shown[3].channel.topic, "imu/B-2/raw/temp/json");
+    assert_eq!(shown[3].channel.schema.as_ref().unwrap().encoding, "jsonschema");
+    let json = r#"{"timestamp":{"sec":0,"nsec":15000000},"raw":{"board":25.0}}"#;
+    assert_eq!(String::from_utf8_lossy(&shown[3].data), json);
+    let whole = RecordingReport { messages: 500, ..RecordingReport::default() };
+    let (back, reader) = read(&[&path]);
+    assert_eq!((back, reader.report()), (messages(), &whole));
+    // Without the first chunk, which has the channels' own records, they are known by name.
+    let damaged = 120;
+    let mut bytes = bytes;
+    bytes[damaged] ^= 0xff;
+    std::fs::write(&path, &bytes).unwrap();
+    let report = recover(&path, &recovered, RecordingOptions::default()).unwrap();
+    assert_eq!((report.nameless, report.damaged_places), (0, 1), "{report:?}");
+    let (back, reader) = read(&[&recovered]);
+    assert_eq!(reader.report().foreign_messages, 0);
+    assert!(back.len() > 400 && messages().ends_with(&back[back.len() - 400..]), "{}", back.len());
+}
+
+#[test]
 fn what_was_written_is_read_back() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.mcap");

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use mcap::records::MessageHeader;
 use mcap::{Compression, McapError, WriteOptions, Writer};
 
-use super::{Attachment, CHANNELS, MESSAGE_ENCODING, Metadata, SCHEMA_ENCODING, ending, place, schema};
+use super::{Attachment, CHANNELS, MESSAGE_ENCODING, Metadata, SCHEMA_ENCODING, ending, place, schema, view};
 use crate::error::Error;
 use crate::message::{Message, Topic};
 
@@ -27,11 +27,13 @@ pub struct RecordingOptions {
     pub chunk_bytes: u64,
     /// Whether a file that is there already is written over; one that is being written never is.
     pub overwrite: bool,
+    /// Whether ticks and readings are written once more as JSON, for viewers.
+    pub json: bool,
 }
 
 impl Default for RecordingOptions {
     fn default() -> Self {
-        Self { compress: true, chunk_bytes: CHUNK_BYTES, overwrite: false }
+        Self { compress: true, chunk_bytes: CHUNK_BYTES, overwrite: false, json: false }
     }
 }
 
@@ -57,6 +59,8 @@ struct Channel {
     id: u16,
     /// Messages in it so far.
     messages: u64,
+    /// The channel of the same as JSON: its number, and messages in it so far.
+    view: Option<(u16, u64)>,
 }
 
 /// A recording that is being written.
@@ -67,6 +71,7 @@ pub struct RecordingWriter {
     file: Arc<File>,
     path: PathBuf,
     chunk_bytes: u64,
+    json: bool,
     // Looked up by topic, never gone through: its order reaches nothing.
     channels: HashMap<Topic, Channel>,
     /// Channels that no record beside the chunks names yet, by number.
@@ -102,6 +107,7 @@ impl RecordingWriter {
             file,
             path: path.to_owned(),
             chunk_bytes: options.chunk_bytes,
+            json: options.json,
             channels: HashMap::new(),
             unnamed: BTreeMap::new(),
             waiting: 0,
@@ -147,13 +153,20 @@ impl RecordingWriter {
         } else {
             let id = declare(&mut self.writer, topic).map_err(|source| failed(&self.path, source))?;
             self.unnamed.insert(id.to_string(), topic.key());
-            self.channels.entry(topic.clone()).or_insert(Channel { id, messages: 0 })
+            let mut view = None;
+            if self.json && view::schema(topic).is_some() {
+                let key = view::key(topic);
+                let id =
+                    declare_view(&mut self.writer, topic).map_err(|source| failed(&self.path, source))?;
+                self.unnamed.insert(id.to_string(), key);
+                view = Some((id, 0));
+            }
+            self.channels.entry(topic.clone()).or_insert(Channel { id, messages: 0, view })
         };
         let time = message.time().and_then(|time| u64::try_from(time.as_ns()).ok());
         let header = MessageHeader {
             channel_id: channel.id,
-            // The format has 32 bits for it; it counts round.
-            sequence: u32::try_from(channel.messages & u64::from(u32::MAX)).unwrap_or(0),
+            sequence: round(channel.messages),
             log_time: *received_ns,
             publish_time: time.unwrap_or(*received_ns),
         };
@@ -161,6 +174,17 @@ impl RecordingWriter {
         channel.messages += 1;
         self.waiting += 1;
         self.waiting_bytes += frame.len() as u64 + MESSAGE_BYTES;
+        if let Some((id, messages)) = &mut channel.view {
+            for point in view::points(message) {
+                let (log_time, publish_time) = (point.log_ns, point.time_ns);
+                let header =
+                    MessageHeader { channel_id: *id, sequence: round(*messages), log_time, publish_time };
+                let written = self.writer.write_to_known_channel(&header, &point.json);
+                written.map_err(|source| failed(&self.path, source))?;
+                *messages += 1;
+                self.waiting_bytes += point.json.len() as u64 + MESSAGE_BYTES;
+            }
+        }
         if self.waiting_bytes > self.chunk_bytes { self.flush() } else { Ok(()) }
     }
 
@@ -260,12 +284,37 @@ impl RecordingWriter {
     }
 }
 
+/// A message's number in its channel: the format has 32 bits for it; it counts round.
+fn round(messages: u64) -> u32 {
+    u32::try_from(messages & u64::from(u32::MAX)).unwrap_or(0)
+}
+
 /// Enters a topic with its schema.
 pub(super) fn declare(writer: &mut Writer<BufWriter<Arc<File>>>, topic: &Topic) -> Result<u16, McapError> {
     let schema = writer.add_schema(schema::name(topic), SCHEMA_ENCODING, schema::words(topic).as_bytes())?;
+    enter(writer, schema, topic, &topic.key(), MESSAGE_ENCODING)
+}
+
+/// Enters the channel of the same as JSON, with its schema.
+pub(super) fn declare_view(
+    writer: &mut Writer<BufWriter<Arc<File>>>,
+    topic: &Topic,
+) -> Result<u16, McapError> {
+    let (name, text) = view::schema(topic).unwrap_or_default();
+    let schema = writer.add_schema(name, view::SCHEMA_ENCODING, text.as_bytes())?;
+    enter(writer, schema, topic, &view::key(topic), view::ENCODING)
+}
+
+fn enter(
+    writer: &mut Writer<BufWriter<Arc<File>>>,
+    schema: u16,
+    topic: &Topic,
+    key: &str,
+    encoding: &str,
+) -> Result<u16, McapError> {
     let unit = topic.unit().map(|unit| ("unit".to_owned(), unit.to_string()));
     let metadata: BTreeMap<_, _> = unit.into_iter().collect();
-    writer.add_channel(schema, &topic.key(), MESSAGE_ENCODING, &metadata)
+    writer.add_channel(schema, key, encoding, &metadata)
 }
 
 /// An error of the library as one of this crate.

@@ -148,7 +148,7 @@ impl<'a> Row<'a> {
         for (cell, conversion) in &cells.sensors {
             values.push(match cells.output {
                 OutputKind::Counts => f64::from(self.count(*cell)?) * conversion.factor,
-                OutputKind::Mean => (self.float(*cell)? - conversion.mid_scale) * conversion.factor,
+                OutputKind::Mean => conversion.of(self.float(*cell)?),
             });
         }
         let sequence = cells.sequence.map(|cell| self.sequence(cell));

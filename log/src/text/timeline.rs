@@ -6,18 +6,18 @@ use crate::mapping::{Marks, TimeMapping};
 
 /// When a tick was, and its number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Timing {
+pub struct Timing {
     /// Sequence number.
-    pub(super) sequence: u64,
+    pub sequence: u64,
     /// End (ns).
-    pub(super) end_ns: i64,
+    pub end_ns: i64,
     /// Duration.
-    pub(super) duration: Span,
+    pub duration: Span,
 }
 
 /// Numbers the ticks of one kind and measures their durations.
 #[derive(Debug, Clone)]
-pub(super) struct Timeline {
+pub struct Timeline {
     /// Nominal duration; zero where every tick states its own.
     tick: Span,
     /// Which end of a tick its stamp marks.
@@ -34,7 +34,8 @@ pub(super) struct Timeline {
 
 impl Timeline {
     /// Nothing numbered yet.
-    pub(super) fn new(mapping: &TimeMapping) -> Self {
+    #[must_use]
+    pub fn new(mapping: &TimeMapping) -> Self {
         let tick = mapping.tick.unwrap_or(Span::ZERO);
         Self {
             tick,
@@ -49,7 +50,7 @@ impl Timeline {
     /// The tick of a row whose stamp marks its end, or its start where the duration is known already.
     ///
     /// `sequence` and `duration` are what the row states itself.
-    pub(super) fn tick(&mut self, stamp: i64, sequence: Option<u64>, duration: Option<Span>) -> Timing {
+    pub fn tick(&mut self, stamp: i64, sequence: Option<u64>, duration: Option<Span>) -> Timing {
         let measured = self.step(stamp);
         let sequence = sequence.unwrap_or(self.next);
         self.next = sequence.saturating_add(1);
@@ -79,6 +80,16 @@ impl Timeline {
         let Some(next) = next else { return self.tick };
         let duration = Span::from_ns(next.saturating_sub(stamp));
         if self.longest.is_some_and(|longest| duration > longest) { self.tick } else { duration }
+    }
+
+    /// Ticks that are missing before a row with this stamp, as far as stamps say.
+    #[must_use]
+    pub fn missing(&self, stamp: i64) -> u64 {
+        let since = self.last_stamp.map(|last| Span::from_ns(stamp.saturating_sub(last)));
+        match (since, self.longest) {
+            (Some(since), Some(longest)) if since > longest => missing(since, self.tick),
+            _ => 0,
+        }
     }
 
     /// Whether a tick's duration is known only when the next one begins.

@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 
 use isotherm_correction::curve::{Curve as CoreCurve, CurveError};
 use isotherm_correction::orientation::ROW_NORM_TOLERANCE;
+use isotherm_correction::thermal::Feature;
 
 use super::curve::CurveForm;
 use super::terms::StatedTerm;
@@ -28,6 +29,7 @@ pub(super) fn check(r: &mut Reader<'_>, document: &Document) {
             r.refuse(&path, "needs the specific force, but there is no [accel]: add it, or leave this out");
         }
         terms(r, &element("gyro.sensor", i), &sensor.terms(), document.temperature.filter.as_ref());
+        regressors(r, &element("gyro.sensor", i), &sensor.terms(), document, channels);
     }
     orientation(r, "gyro", &document.gyro.orientation, document.gyro.sensor.len(), channels);
     filter(r, document);
@@ -37,6 +39,7 @@ pub(super) fn check(r: &mut Reader<'_>, document: &Document) {
             output::accel(r, &element("accel.sensor", i), section.output, sensor);
             accel(r, &element("accel.sensor", i), sensor, channels);
             terms(r, &element("accel.sensor", i), &sensor.terms(), document.temperature.filter.as_ref());
+            regressors(r, &element("accel.sensor", i), &sensor.terms(), document, channels);
         }
         orientation(r, "accel", &section.orientation, section.sensor.len(), channels);
     }
@@ -119,12 +122,51 @@ fn terms(r: &mut Reader<'_>, path: &str, terms: &[StatedTerm<'_>], filter: Optio
             let path = |key: &str| format!("{path}.{key}");
             one_argument(r, (&path(run_up), first), (&path(braking), second));
         }
-        let (Some(tau), Some(Filter { grid_step_s, .. })) = (term.time_constant_s, filter) else { continue };
+        let (Feature::Lag, Some(tau)) = (term.feature, term.parameter) else { continue };
+        let Some(Filter { grid_step_s, .. }) = filter else { continue };
         if tau < *grid_step_s && !r.is_damaged("temperature.filter.grid_step_s") {
             let path = format!("{path}.{}.time_constant_s", term.key);
             r.refuse(
                 &path,
                 format!("is {tau} s, must be at least temperature.filter.grid_step_s, {grid_step_s} s"),
+            );
+        }
+    }
+}
+
+/// Regressors of channels that there are; both of a difference in one unit.
+fn regressors(
+    r: &mut Reader<'_>,
+    path: &str,
+    terms: &[StatedTerm<'_>],
+    document: &Document,
+    temperatures: Option<&[&str]>,
+) {
+    let Some(temperatures) = temperatures.filter(|_| !r.is_marked("auxiliary")) else { return };
+    let unit = |name: &str| {
+        let auxiliary = document.auxiliary.iter().find(|channel| channel.name == name);
+        let temperature = temperatures.contains(&name).then_some("°C");
+        auxiliary.map(|channel| channel.unit.as_str()).or(temperature)
+    };
+    for (key, stated) in terms.iter().filter_map(|term| Some((&term.key, term.regressor?))) {
+        let names = [("channel", Some(stated.channel)), ("minus", stated.minus)];
+        for (part, name) in names.into_iter().filter_map(|(part, name)| Some((part, name?))) {
+            if unit(name).is_none() {
+                let all =
+                    temperatures.iter().copied().chain(document.auxiliary.iter().map(|c| c.name.as_str()));
+                let known = all.collect::<Vec<_>>().join(", ");
+                let known = if known.is_empty() { "none" } else { &known };
+                let path = format!("{path}.{key}.{part}");
+                r.refuse(&path, format!("is {name:?}, which is no channel; the channels are: {known}"));
+            }
+        }
+        if let (Some(of), Some(other)) = (unit(stated.channel), stated.minus.and_then(unit))
+            && of != other
+        {
+            let path = format!("{path}.{key}.minus");
+            r.refuse(
+                &path,
+                format!("is in {other}, but the channel is in {of}: a difference needs one unit"),
             );
         }
     }
@@ -175,12 +217,13 @@ fn one_argument(
 fn filter(r: &mut Reader<'_>, document: &Document) {
     const KEY: &str = "branch_dead_band_deg_c2_per_s3";
     let Some(filter) = &document.temperature.filter else {
-        if !document.temperature.channel.is_empty() {
-            r.refuse(
-                "temperature.filter",
-                "is missing: temperature.channel[0] needs it, add `[temperature.filter]`",
-            );
-        }
+        let needed_by = match (&document.temperature.channel[..], &document.auxiliary[..]) {
+            ([], []) => return,
+            ([], _) => "auxiliary[0]",
+            _ => "temperature.channel[0]",
+        };
+        let message = format!("is missing: {needed_by} needs it, add `[temperature.filter]`");
+        r.refuse("temperature.filter", message);
         return;
     };
     let mut sensors = document.gyro.sensor.iter();

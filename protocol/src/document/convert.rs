@@ -1,10 +1,12 @@
 //! Document → the core's parts: names become indices, the file's units become SI.
 
-use isotherm_correction::calibration::{AccelParts, CalibrationParts, GyroParts, TrendParts};
+use isotherm_correction::calibration::{
+    AccelParts, CalibrationParts, GyroParts, Source, TermParts, TrendParts,
+};
 use isotherm_correction::channel::{ChannelParts, ThermalFilterParts};
 use isotherm_correction::drift::DriftParts;
 use isotherm_correction::operation::{SelfTestCounter, SelfTestParts, SelfTestVoltage};
-use isotherm_correction::orientation::OrientationParts;
+use isotherm_correction::orientation::{AxesPlay, OrientationParts};
 use isotherm_correction::reversal::{FitWindow as CoreFitWindow, ReversalParts};
 use isotherm_correction::sample::{ChannelName, MAX_CHANNEL_NAME, OutputKind};
 use isotherm_correction::servo::{ServoForm, ServoParts};
@@ -12,8 +14,8 @@ use isotherm_correction::servo::{ServoForm, ServoParts};
 use super::measure::{ARCSEC, DEG_PER_H, DEG_PER_S, DEG_PER_SQRT_H, HOUR};
 use super::terms::StatedTerm;
 use super::types::{
-    AccelOutput, AccelSensor, Channel, Document, Drift, FitWindow, GyroOutput, GyroSensor, ModeReversal,
-    Orientation, SelfTest, Servo, ServoKind, Temperature, Trend,
+    AccelOutput, AccelSensor, Auxiliary, AxesHysteresis, Channel, Document, Drift, FitWindow, GyroOutput,
+    GyroSensor, ModeReversal, Orientation, SelfTest, Servo, ServoKind, Temperature, Trend,
 };
 
 /// Temperature range of an orientation that does not depend on temperature (°C): nothing lies outside.
@@ -45,6 +47,7 @@ impl Document {
         CalibrationParts {
             filter: filter(temperature),
             channels: temperature.channel.iter().map(channel).collect(),
+            auxiliaries: self.auxiliary.iter().map(auxiliary).collect(),
             gyro_output: match self.gyro.output {
                 GyroOutput::Counts => OutputKind::Counts,
                 GyroOutput::Mean => OutputKind::Mean,
@@ -87,6 +90,14 @@ impl Document {
         self.temperature.channel.iter().position(|channel| channel.name == name).unwrap_or(usize::MAX)
     }
 
+    fn term_parts(&self, terms: &[StatedTerm<'_>]) -> Vec<TermParts> {
+        let auxiliary = |name: &str| self.auxiliary.iter().position(|channel| channel.name == name);
+        let source = |name: &str| {
+            auxiliary(name).map_or_else(|| Source::Temperature(self.channel_index(name)), Source::Auxiliary)
+        };
+        terms.iter().map(|term| term.to_parts(source)).collect()
+    }
+
     fn gyro_parts(&self, sensor: &GyroSensor) -> GyroParts {
         let (increment_weight, input_limit) = match self.gyro.output {
             GyroOutput::Counts => (
@@ -102,7 +113,7 @@ impl Document {
             channel: sensor.channel.as_ref().map(|name| self.channel_index(name)),
             increment_weight: increment_weight.unwrap_or(f64::NAN),
             input_limit: input_limit.unwrap_or(NO_LIMIT),
-            terms: sensor.terms().iter().map(StatedTerm::to_parts).collect(),
+            terms: self.term_parts(&sensor.terms()),
             increment_weight_over_rate: sensor
                 .increment_weight_over_rate
                 .as_ref()
@@ -123,7 +134,7 @@ impl Document {
             channel: sensor.channel.as_ref().map(|name| self.channel_index(name)),
             board_channel: sensor.board_channel.as_ref().map(|name| self.channel_index(name)),
             scale_factor: sensor.scale_factor.to_parts(0.0),
-            terms: sensor.terms().iter().map(StatedTerm::to_parts).collect(),
+            terms: self.term_parts(&sensor.terms()),
             position_m: sensor.position_m.unwrap_or_default(),
             board_ratio: sensor.board_ratio_error.as_ref().map(|curve| curve.to_parts(1.0)),
             input_limit: input_limit.unwrap_or(NO_LIMIT),
@@ -166,6 +177,15 @@ fn channel(channel: &Channel) -> ChannelParts {
     }
 }
 
+fn auxiliary(channel: &Auxiliary) -> ChannelParts {
+    ChannelParts {
+        name: name(&channel.name),
+        conversion: channel.conversion.clone(),
+        range_deg_c: channel.range,
+        spike_limit_deg_c: channel.spike_limit,
+    }
+}
+
 fn orientation<P>(orientation: &Orientation<P>, parity: Option<(f64, u32)>) -> OrientationParts {
     let thermal = orientation.thermal.as_ref();
     let slopes = thermal
@@ -174,11 +194,16 @@ fn orientation<P>(orientation: &Orientation<P>, parity: Option<(f64, u32)>) -> O
         reference_deg_c: thermal.map_or(0.0, |thermal| thermal.reference_deg_c),
         rows: orientation.rows.clone(),
         slopes_per_deg_c: slopes.map(Iterator::collect).unwrap_or_default(),
+        plays: thermal.map(|thermal| thermal.hysteresis.iter().map(play).collect()).unwrap_or_default(),
         weights: orientation.weights.clone().unwrap_or_default(),
         range_deg_c: thermal.map_or(EVERYWHERE_DEG_C, |thermal| thermal.range_deg_c),
         parity_limit: parity.map(|(limit, _)| limit),
         parity_confirm_ticks: parity.map_or(1, |(_, ticks)| ticks),
     }
+}
+
+fn play(stated: &AxesHysteresis) -> AxesPlay {
+    AxesPlay { half_width_deg_c: stated.half_width_deg_c, share: stated.share_ratio }
 }
 
 fn trend(trend: &Trend) -> TrendParts {

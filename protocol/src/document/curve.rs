@@ -46,6 +46,10 @@ quantities! {
     ThermalAcceleration: [DegPerHPerDegCPerS2] over [DegC, DegCPerS2];
     /// Gain of a thermal lag.
     LagGain: [DegPerHPerDegCPerS] over [DegC];
+    /// Gain of a hysteresis.
+    HysteresisGain: [DegPerHPerDegC] over [DegC];
+    /// Gain of a regressor, per unit of its channel.
+    RegressorGain: [DegPerHPerUnit] over [DegC];
     /// Drift of a gyro by specific force.
     DriftByForce: [DegPerHPerG] over [DegC];
     /// Relative deviation from one over the rate of a gyro.
@@ -60,6 +64,10 @@ quantities! {
     OutputBias: [CountsPerS, V, MPerS2] over [DegC];
     /// Gain of a thermal lag of an accelerometer, in units of its output per °C/s.
     OutputLagGain: [CountsPerSPerDegCPerS, VPerDegCPerS, MPerS2PerDegCPerS] over [DegC];
+    /// Gain of a hysteresis of an accelerometer, in units of its output per °C.
+    OutputHysteresisGain: [CountsPerSPerDegC, VPerDegC, MPerS2PerDegC] over [DegC];
+    /// Gain of a regressor of an accelerometer, in units of its output per unit of the channel.
+    OutputRegressorGain: [CountsPerSPerUnit, VPerUnit, MPerS2PerUnit] over [DegC];
 }
 
 /// A curve of one quantity, in the units of its keys.

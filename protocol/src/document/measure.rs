@@ -50,11 +50,27 @@ pub enum Unit {
     DegPerHPerG,
     /// µg/g².
     MicroGPerG2,
+    /// (°/h)/°C.
+    DegPerHPerDegC,
+    /// (counts/s)/°C.
+    CountsPerSPerDegC,
+    /// V/°C.
+    VPerDegC,
+    /// (m/s²)/°C.
+    MPerS2PerDegC,
+    /// °/h per unit of a channel.
+    DegPerHPerUnit,
+    /// counts/s per unit of a channel.
+    CountsPerSPerUnit,
+    /// V per unit of a channel.
+    VPerUnit,
+    /// m/s² per unit of a channel.
+    MPerS2PerUnit,
 }
 
 impl Unit {
     /// All of them.
-    pub const ALL: [Self; 16] = [
+    pub const ALL: [Self; 24] = [
         Self::DegPerH,
         Self::DegPerHPerDegCPerS,
         Self::DegPerHPerDegCPerS2,
@@ -71,6 +87,14 @@ impl Unit {
         Self::MPerS2PerDegCPerS,
         Self::DegPerHPerG,
         Self::MicroGPerG2,
+        Self::DegPerHPerDegC,
+        Self::CountsPerSPerDegC,
+        Self::VPerDegC,
+        Self::MPerS2PerDegC,
+        Self::DegPerHPerUnit,
+        Self::CountsPerSPerUnit,
+        Self::VPerUnit,
+        Self::MPerS2PerUnit,
     ];
 
     /// Spelling in keys.
@@ -93,6 +117,14 @@ impl Unit {
             Self::MPerS2PerDegCPerS => "m_per_s2_per_deg_c_per_s",
             Self::DegPerHPerG => "deg_per_h_per_g",
             Self::MicroGPerG2 => "micro_g_per_g2",
+            Self::DegPerHPerDegC => "deg_per_h_per_deg_c",
+            Self::CountsPerSPerDegC => "counts_per_s_per_deg_c",
+            Self::VPerDegC => "v_per_deg_c",
+            Self::MPerS2PerDegC => "m_per_s2_per_deg_c",
+            Self::DegPerHPerUnit => "deg_per_h_per_unit",
+            Self::CountsPerSPerUnit => "counts_per_s_per_unit",
+            Self::VPerUnit => "v_per_unit",
+            Self::MPerS2PerUnit => "m_per_s2_per_unit",
         }
     }
 
@@ -116,14 +148,26 @@ impl Unit {
             Self::MPerS2PerDegCPerS => "(m/s²)/(°C/s)",
             Self::DegPerHPerG => "(°/h)/g",
             Self::MicroGPerG2 => "µg/g²",
+            Self::DegPerHPerDegC => "(°/h)/°C",
+            Self::CountsPerSPerDegC => "(counts/s)/°C",
+            Self::VPerDegC => "V/°C",
+            Self::MPerS2PerDegC => "(m/s²)/°C",
+            Self::DegPerHPerUnit => "(°/h)/unit",
+            Self::CountsPerSPerUnit => "(counts/s)/unit",
+            Self::VPerUnit => "V/unit",
+            Self::MPerS2PerUnit => "(m/s²)/unit",
         }
     }
 
-    /// How much of the core's unit it is (rad/s, 1, Hz, counts/s, V, m/s² or s²/m; per °C/s, °C/s² or m/s² where it says so).
+    /// How much of the core's unit it is (rad/s, 1, Hz, counts/s, V, m/s² or s²/m; per °C, °C/s, °C/s² or m/s² where it says so).
     #[must_use]
     pub const fn in_core_units(self) -> f64 {
         match self {
-            Self::DegPerH | Self::DegPerHPerDegCPerS | Self::DegPerHPerDegCPerS2 => DEG_PER_H,
+            Self::DegPerH
+            | Self::DegPerHPerDegC
+            | Self::DegPerHPerUnit
+            | Self::DegPerHPerDegCPerS
+            | Self::DegPerHPerDegCPerS2 => DEG_PER_H,
             Self::Ppm => PPM,
             Self::DegPerHPerG => DEG_PER_H / STANDARD_GRAVITY_M_PER_S2,
             Self::MicroGPerG2 => 1e-6 / STANDARD_GRAVITY_M_PER_S2,

@@ -18,6 +18,8 @@ impl Document {
             sensor.thermal_rate = None;
             sensor.thermal_acceleration = None;
             sensor.lag.clear();
+            sensor.hysteresis.clear();
+            sensor.regressor.clear();
             sensor.trend = None;
             sensor.servo = None;
         }
@@ -27,6 +29,8 @@ impl Document {
             for sensor in &mut accel.sensor {
                 sensor.board_ratio_error = None;
                 sensor.lag.clear();
+                sensor.hysteresis.clear();
+                sensor.regressor.clear();
                 sensor.scale_factor = sensor.scale_factor.held_at(assumed);
                 sensor.bias = sensor.bias.as_ref().map(|bias| bias.held_at(assumed));
             }

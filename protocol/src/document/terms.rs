@@ -1,12 +1,14 @@
 //! The terms of a document's sensors, one list for all who go through them: checks, warnings, and what the core gets.
 
-use isotherm_correction::calibration::{BranchArgument, BranchedParts, CoefficientParts, TermParts};
+use isotherm_correction::calibration::{
+    BranchArgument, BranchedParts, CoefficientParts, RegressorParts, Source, TermParts,
+};
 use isotherm_correction::thermal::{ACCEL_TERMS, Feature, GYRO_TERMS, Term};
 use isotherm_document::{element, join};
 
 use super::curve::{Curve, CurveForm, Quantity};
 use super::measure::Argument;
-use super::types::{AccelSensor, AlongAxes, Branches, GyroSensor};
+use super::types::{AccelRegressor, AccelSensor, AlongAxes, Branches, GyroSensor, Regressor};
 
 /// A term that a sensor states.
 #[derive(Debug)]
@@ -14,9 +16,19 @@ pub(super) struct StatedTerm<'d> {
     pub(super) feature: Feature,
     /// Its key in the sensor's table.
     pub(super) key: String,
-    /// τ of a lag (s).
-    pub(super) time_constant_s: Option<f64>,
+    /// τ of a lag (s), half width of a play (°C).
+    pub(super) parameter: Option<f64>,
+    /// What a regressor is.
+    pub(super) regressor: Option<StatedRegressor<'d>>,
     pub(super) coefficient: StatedCoefficient<'d>,
+}
+
+/// Names of a regressor's channels, and its constant.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct StatedRegressor<'d> {
+    pub(super) channel: &'d str,
+    pub(super) minus: Option<&'d str>,
+    pub(super) reference: f64,
 }
 
 /// Its coefficient.
@@ -30,7 +42,7 @@ impl<'d> StatedTerm<'d> {
     /// Its curves, each with its path in the sensor's table.
     pub(super) fn curves(&self) -> Vec<(String, &'d CurveForm)> {
         match self.coefficient {
-            StatedCoefficient::Curve(curve) if self.time_constant_s.is_some() => {
+            StatedCoefficient::Curve(curve) if self.parameter.is_some() || self.regressor.is_some() => {
                 vec![(join(&self.key, "gain"), curve)]
             }
             StatedCoefficient::Curve(curve) => vec![(self.key.clone(), curve)],
@@ -40,8 +52,8 @@ impl<'d> StatedTerm<'d> {
         }
     }
 
-    /// What the core gets.
-    pub(super) fn to_parts(&self) -> TermParts {
+    /// What the core gets; `source` gives a channel by its name.
+    pub(super) fn to_parts(&self, source: impl Fn(&str) -> Source) -> TermParts {
         let coefficient = match self.coefficient {
             StatedCoefficient::Curve(curve) => CoefficientParts::Curve(curve.to_parts(0.0)),
             StatedCoefficient::Branched { run_up, braking } => CoefficientParts::Branched(BranchedParts {
@@ -53,8 +65,25 @@ impl<'d> StatedTerm<'d> {
                 braking: braking.to_parts(0.0),
             }),
         };
-        let time_constant_s = self.time_constant_s.unwrap_or_default();
-        TermParts { feature: self.feature, time_constant_s, coefficient }
+        let parameter = self.parameter.unwrap_or_default();
+        let regressor = self.regressor.map(|StatedRegressor { channel, minus, reference }| RegressorParts {
+            channel: source(channel),
+            minus: minus.map(source),
+            reference,
+        });
+        TermParts { feature: self.feature, parameter, regressor, coefficient }
+    }
+}
+
+impl<'d> From<&'d Regressor> for StatedRegressor<'d> {
+    fn from(Regressor { channel, minus, reference, .. }: &'d Regressor) -> Self {
+        Self { channel, minus: minus.as_deref(), reference: *reference }
+    }
+}
+
+impl<'d> From<&'d AccelRegressor> for StatedRegressor<'d> {
+    fn from(AccelRegressor { channel, minus, reference, .. }: &'d AccelRegressor) -> Self {
+        Self { channel, minus: minus.as_deref(), reference: *reference }
     }
 }
 
@@ -72,7 +101,7 @@ impl<'d> Terms<'d> {
     fn curve<Q: Quantity>(&mut self, feature: Feature, curve: Option<&'d Curve<Q>>) {
         let key = self.key(feature).to_owned();
         let coefficient = curve.map(|curve| StatedCoefficient::Curve(curve));
-        let term = |coefficient| StatedTerm { feature, key, time_constant_s: None, coefficient };
+        let term = |coefficient| StatedTerm { feature, key, parameter: None, regressor: None, coefficient };
         self.found.extend(coefficient.map(term));
     }
 
@@ -80,16 +109,31 @@ impl<'d> Terms<'d> {
         let Some(Branches { run_up, braking }) = branches else { return };
         let coefficient = StatedCoefficient::Branched { run_up, braking };
         let key = self.key(feature).to_owned();
-        self.found.push(StatedTerm { feature, key, time_constant_s: None, coefficient });
+        self.found.push(StatedTerm { feature, key, parameter: None, regressor: None, coefficient });
     }
 
-    fn lags<Q: Quantity>(&mut self, lags: impl Iterator<Item = (f64, &'d Curve<Q>)>) {
-        let key = self.key(Feature::Lag);
-        for (i, (time_constant_s, gain)) in lags.enumerate() {
+    /// Terms that may stand more than once, each with its parameter.
+    fn list<Q: Quantity>(&mut self, feature: Feature, stated: impl Iterator<Item = (f64, &'d Curve<Q>)>) {
+        let key = self.key(feature);
+        for (i, (parameter, gain)) in stated.enumerate() {
             self.found.push(StatedTerm {
-                feature: Feature::Lag,
+                feature,
                 key: element(key, i),
-                time_constant_s: Some(time_constant_s),
+                parameter: Some(parameter),
+                regressor: None,
+                coefficient: StatedCoefficient::Curve(gain),
+            });
+        }
+    }
+
+    fn regressors<Q: Quantity>(&mut self, stated: impl Iterator<Item = (StatedRegressor<'d>, &'d Curve<Q>)>) {
+        let key = self.key(Feature::Regressor);
+        for (i, (regressor, gain)) in stated.enumerate() {
+            self.found.push(StatedTerm {
+                feature: Feature::Regressor,
+                key: element(key, i),
+                parameter: None,
+                regressor: Some(regressor),
                 coefficient: StatedCoefficient::Curve(gain),
             });
         }
@@ -113,7 +157,10 @@ impl GyroSensor {
         terms.curve(Feature::Meander, self.slow_meander.as_ref());
         terms.branches(Feature::ThermalRate, self.thermal_rate.as_ref());
         terms.branches(Feature::ThermalAcceleration, self.thermal_acceleration.as_ref());
-        terms.lags(self.lag.iter().map(|lag| (lag.time_constant_s, &lag.gain)));
+        terms.list(Feature::Lag, self.lag.iter().map(|lag| (lag.time_constant_s, &lag.gain)));
+        let plays = self.hysteresis.iter().map(|play| (play.half_width_deg_c, &play.gain));
+        terms.list(Feature::Play, plays);
+        terms.regressors(self.regressor.iter().map(|stated| (stated.into(), &stated.gain)));
         terms.curve(Feature::RateMagnitude, self.increment_weight_asymmetry.as_ref());
         let axes = [Feature::ForceX, Feature::ForceY, Feature::ForceZ];
         terms.along_axes(axes, self.acceleration_sensitive_drift.as_ref());
@@ -126,7 +173,10 @@ impl AccelSensor {
     pub(super) fn terms(&self) -> Vec<StatedTerm<'_>> {
         let mut terms = Terms { declared: &ACCEL_TERMS, found: Vec::new() };
         terms.curve(Feature::One, self.bias.as_ref());
-        terms.lags(self.lag.iter().map(|lag| (lag.time_constant_s, &lag.gain)));
+        terms.list(Feature::Lag, self.lag.iter().map(|lag| (lag.time_constant_s, &lag.gain)));
+        let plays = self.hysteresis.iter().map(|play| (play.half_width_deg_c, &play.gain));
+        terms.list(Feature::Play, plays);
+        terms.regressors(self.regressor.iter().map(|stated| (stated.into(), &stated.gain)));
         terms.curve(Feature::ForceSquared, self.second_order.as_ref());
         terms.found
     }

@@ -10,11 +10,13 @@ mod gyro;
 mod origin;
 mod self_test;
 
-pub use accel::{Accel, AccelLag, AccelOrientation, AccelOutput, AccelParity, AccelSensor};
+pub use accel::{
+    Accel, AccelHysteresis, AccelLag, AccelOrientation, AccelOutput, AccelParity, AccelRegressor, AccelSensor,
+};
 pub use drift::Drift;
 pub use gyro::{
-    AlongAxes, Branches, Gyro, GyroOrientation, GyroOutput, GyroParity, GyroSensor, Lag, Servo, ServoKind,
-    Trend,
+    AlongAxes, Branches, Gyro, GyroOrientation, GyroOutput, GyroParity, GyroSensor, Hysteresis, Lag,
+    Regressor, Servo, ServoKind, Trend,
 };
 pub use origin::{Created, Log, Measure, Origin, Residual, Sample};
 pub use self_test::{SelfTest, SelfTestCounter, SelfTestVoltage};
@@ -48,6 +50,10 @@ pub struct Document {
     pub origin: Option<Origin>,
     /// Temperature channels and their filter.
     pub temperature: Temperature,
+    /// Channels that are no temperatures, for `regressor`. Source: models §2.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(length(max = 16))]
+    pub auxiliary: Vec<Auxiliary>,
     /// Gyros.
     pub gyro: Gyro,
     /// Accelerometers, if the unit has any.
@@ -120,8 +126,30 @@ pub struct Channel {
     pub spike_limit_deg_c: f64,
 }
 
+/// One auxiliary channel: supply voltage, pressure or the like.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields, title = "Auxiliary channel")]
+pub struct Auxiliary {
+    /// Name on the raw temperature topic.
+    #[schemars(length(min = 1, max = 24), extend("x-must-be" = "a name of 1 to 24 bytes"))]
+    pub name: String,
+    /// Unit of measure.
+    #[schemars(length(min = 1, max = 24), extend("x-must-be" = "a unit of 1 to 24 bytes"))]
+    pub unit: String,
+    /// As `conversion_deg_c`.
+    #[serde(default = "Channel::identity")]
+    #[schemars(length(min = 1, max = 8))]
+    pub conversion: Vec<f64>,
+    /// Physical range.
+    #[schemars(extend("x-rising" = true))]
+    pub range: [f64; 2],
+    /// As `spike_limit_deg_c`.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub spike_limit: f64,
+}
+
 impl Channel {
-    /// The conversion of a channel whose readings are °C already.
+    /// The conversion of a channel whose readings are in its unit already.
     pub(super) fn identity() -> Vec<f64> {
         vec![0.0, 1.0]
     }
@@ -162,6 +190,22 @@ pub struct OrientationThermal {
     /// C1: change of each row (direction cosines; 1 is 206265″). Source: 004.
     #[schemars(length(min = 3, max = 8))]
     pub slopes_arcsec_per_deg_c: Vec<[f64; 3]>,
+    /// Plays: T becomes `T + Σ share·(p_w[T] − T)`. Source: models §4, 004.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(length(max = 8))]
+    pub hysteresis: Vec<AxesHysteresis>,
+}
+
+/// One play of the axes.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields, title = "Hysteresis of an orientation")]
+pub struct AxesHysteresis {
+    /// w.
+    #[schemars(range(min = 0.001, max = 1000.0))]
+    pub half_width_deg_c: f64,
+    /// Share.
+    #[schemars(range(min = -10.0, max = 10.0))]
+    pub share_ratio: f64,
 }
 
 /// The four-step substitution over a switch of the lasing mode.

@@ -63,14 +63,25 @@ fn unused_channels(r: &Reader<'_>, document: &Document, found: &mut Vec<Problem>
     let accel_sensors = accel.into_iter().flat_map(|accel| &accel.sensor);
     let used: Vec<&String> = (document.gyro.sensor.iter().filter_map(|sensor| sensor.channel.as_ref()))
         .chain(accel_sensors.flat_map(|sensor| sensor.channel.iter().chain(&sensor.board_channel)))
+        .chain(regressors(document))
         .chain(gyro_thermal.into_iter().chain(accel_thermal).flat_map(|thermal| &thermal.channels))
         .collect();
-    for (i, channel) in document.temperature.channel.iter().enumerate() {
-        if !used.contains(&&channel.name) {
-            let message = format!("is {:?}, which no sensor and no orientation follows", channel.name);
-            found.push(r.warning(&join(&element("temperature.channel", i), "name"), message));
-        }
+    let temperatures = document.temperature.channel.iter().map(|channel| &channel.name).enumerate();
+    let temperatures = temperatures.map(|(i, name)| (element("temperature.channel", i), name));
+    let auxiliaries = document.auxiliary.iter().map(|channel| &channel.name).enumerate();
+    let auxiliaries = auxiliaries.map(|(i, name)| (element("auxiliary", i), name));
+    for (path, name) in temperatures.chain(auxiliaries).filter(|(_, name)| !used.contains(name)) {
+        let message = format!("is {name:?}, which no sensor and no orientation follows");
+        found.push(r.warning(&join(&path, "name"), message));
     }
+}
+
+/// Channels of regressors.
+fn regressors(document: &Document) -> impl Iterator<Item = &String> {
+    let gyros = document.gyro.sensor.iter().flat_map(|sensor| &sensor.regressor);
+    let accels = document.accel.iter().flat_map(|accel| &accel.sensor).flat_map(|sensor| &sensor.regressor);
+    let gyros = gyros.flat_map(|stated| stated.minus.iter().chain([&stated.channel]));
+    gyros.chain(accels.flat_map(|stated| stated.minus.iter().chain([&stated.channel])))
 }
 
 /// Terms that need a temperature that moves.
@@ -79,6 +90,7 @@ fn without_channel(r: &Reader<'_>, path: &str, sensor: &GyroSensor, found: &mut 
         ("thermal_rate", sensor.thermal_rate.is_some()),
         ("thermal_acceleration", sensor.thermal_acceleration.is_some()),
         ("lag", !sensor.lag.is_empty()),
+        ("hysteresis", !sensor.hysteresis.is_empty()),
     ] {
         if there && sensor.channel.is_none() {
             found.push(r.warning(&join(path, key), "has no effect: the gyro follows no temperature channel"));

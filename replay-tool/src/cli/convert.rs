@@ -16,25 +16,25 @@ use crate::error::Error;
 
 /// Convert recordings to text, ROS 2 bags or Parquet, and text logs to recordings
 #[derive(Debug, Args)]
-#[command(
-    override_usage = "isotherm-replay convert [OPTIONS] <LOG>... <OUT>",
-    after_help = "OUT, the last name, is where it goes: a file that ends in .mcap, .csv or .csv.gz, or a folder with --to.\n\n\
-    Examples:\n  \
+#[command(after_help = "Examples:\n  \
     isotherm-replay simulate --preset mems-chamber --duration 60 --out mems.csv\n  \
-    isotherm-replay convert mems.csv --mapping mems.mapping.toml --unit MEMS-0001 mems.mcap\n  \
-    isotherm-replay convert mems.mcap text --to text\n  \
-    isotherm-replay convert mems.mcap bag --to ros2 --calibration config/calibration/MEMS-0001.toml\n  \
-    isotherm-replay convert mems.mcap tables --to parquet\n\n\
+    isotherm-replay convert mems.csv --mapping mems.mapping.toml --unit MEMS-0001 --out mems.mcap\n  \
+    isotherm-replay convert mems.mcap --to text --out text\n  \
+    isotherm-replay convert mems.mcap --to ros2 --out bag --calibration config/calibration/MEMS-0001.toml\n  \
+    isotherm-replay convert mems.mcap --to parquet --out tables\n\n\
     Text goes to FOLDER/UNIT/raw.csv with raw.mapping.toml, which reads it back to the same ticks, corrected.csv and\n\
     health.csv; or, for one unit, beside a file that ends in .csv or .csv.gz. A new run of the producer begins a new\n\
     file (raw.2.csv). Parquet goes to FOLDER/UNIT/STREAM.parquet. A ROS 2 bag has /imu/UNIT/data and\n\
     /imu/UNIT/temperature/CHANNEL; for units without corrected ticks, or with --raw, /imu/UNIT/data_raw.\n\
-    Exit code 3: something of the log could not be read or written, and the summary says what."
-)]
+    Exit code 3: something of the log could not be read or written, and the summary says what.")]
+#[expect(clippy::struct_excessive_bools, reason = "each is a switch of the command line")]
 pub(super) struct ConvertArgs {
     #[command(flatten)]
     log: LogArgs,
-    /// What it is converted to; without it, as OUT ends
+    /// Where it goes: a file that ends in .mcap, .csv or .csv.gz, or a folder with --to
+    #[arg(long, short, value_name = "FILE")]
+    out: PathBuf,
+    /// What it is converted to (default: as the output's name ends)
     #[arg(long, value_enum, value_name = "TARGET")]
     to: Option<Target>,
     /// Write over files that are there already
@@ -46,6 +46,9 @@ pub(super) struct ConvertArgs {
     /// How chunks of a recording are compressed
     #[arg(long, value_enum, default_value_t)]
     compression: Compression,
+    /// Leave out of a recording the channels with ticks and readings as JSON, which viewers show: it is half as long
+    #[arg(long, hide_short_help = true)]
+    no_json_channels: bool,
     /// Raw readings into a ROS 2 bag too, at nominal scale, where there are corrected ticks
     #[arg(long)]
     raw: bool,
@@ -69,16 +72,6 @@ struct Report<'a> {
 }
 
 impl ConvertArgs {
-    /// Parts the last name from the others: two positional arguments, of which one is a list, could not stand apart with
-    /// an option between them.
-    fn split(&self) -> Result<(LogArgs, PathBuf), Error> {
-        let mut log = self.log.clone();
-        match log.log.pop() {
-            Some(out) if !log.log.is_empty() => Ok((log, out)),
-            _ => Err(Error::Usage("give the log, and behind it where the conversion goes".to_owned())),
-        }
-    }
-
     /// What it is converted to.
     fn target(&self, out: &Path) -> Result<Target, Error> {
         let by_name = Target::by_name(out);
@@ -119,14 +112,17 @@ impl ConvertArgs {
             None if !self.compression.compresses() && target != Target::Mcap => {
                 Err(Error::Usage("--compression is for recordings (.mcap): leave it out".to_owned()))
             }
+            None if self.no_json_channels && target != Target::Mcap => {
+                Err(Error::Usage("--no-json-channels is for recordings (.mcap): leave it out".to_owned()))
+            }
             None => Ok(()),
         }
     }
 
     /// The conversion that the arguments describe.
     fn conversion(&self) -> Result<Conversion, Error> {
-        let (log, out) = self.split()?;
-        let target = self.target(&out)?;
+        let (log, out) = (&self.log, &self.out);
+        let target = self.target(out)?;
         self.refuse_idle_options(target)?;
         for path in &log.log {
             std::fs::metadata(path).map_err(|source| Error::file(path, "open the log", source))?;
@@ -142,9 +138,9 @@ impl ConvertArgs {
         let place = Place { overwrite: self.overwrite, inputs };
         // Before a long log is read, not after.
         match target {
-            Target::Ros2 | Target::Parquet => place.check_folder(&out)?,
-            Target::Text if Target::by_name(&out).is_none() => place.check_folder(&out)?,
-            Target::Text | Target::Mcap => place.check(&out)?,
+            Target::Ros2 | Target::Parquet => place.check_folder(out)?,
+            Target::Text if Target::by_name(out).is_none() => place.check_folder(out)?,
+            Target::Text | Target::Mcap => place.check(out)?,
         }
         let documents = self.calibration.iter().map(|path| document(path)).collect::<Result<_, _>>()?;
         let mut sources: Vec<_> = vec![("log".to_owned(), names(&log.log))];
@@ -155,9 +151,10 @@ impl ConvertArgs {
             files,
             part: log.part()?,
             target,
-            out,
+            out: out.clone(),
             place,
             compress: self.compression.compresses(),
+            json: !self.no_json_channels,
             sources,
             ros2: Ros2Options { raw: self.raw, frame: self.frame.clone(), documents },
         })

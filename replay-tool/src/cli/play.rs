@@ -135,7 +135,7 @@ fn renaming(text: &str) -> Result<(UnitId, UnitId), String> {
 }
 
 /// Reads a key expression.
-fn key_expression(text: &str) -> Result<OwnedKeyExpr, String> {
+pub(super) fn key_expression(text: &str) -> Result<OwnedKeyExpr, String> {
     OwnedKeyExpr::new(text).map_err(|error| isotherm_bus::words(&error))
 }
 

@@ -25,17 +25,18 @@ const SMALLEST_QUEUE: u64 = 1 << 20;
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example, of whatever is published on this address for five seconds, with no service to ask:\n  \
-    isotherm-replay record run.mcap --listen tcp/127.0.0.1:0 --no-service --duration 5\n\n\
+    isotherm-replay record --out run.mcap --listen tcp/127.0.0.1:0 --no-service --duration 5\n\n\
     With `isotherm serve` running, the recording alone is enough to correct again what the service\n\
     corrected, to the bit: it holds raw and corrected messages, status, the journal of every unit, the calibration documents,\n\
     the service's configuration and the units' histories. Ctrl-C ends it in order:\n  \
-    isotherm-replay record run.mcap\n\n\
+    isotherm-replay record --out run.mcap\n\n\
+    Foxglove and PlotJuggler open the files: beside each topic of ticks is a channel …/json.\n\
     Exit code 3: messages were lost, or the disk was full; the files hold everything up to there."
 )]
 #[expect(clippy::struct_excessive_bools, reason = "each is a switch of the command line")]
 pub(super) struct RecordArgs {
     /// File to write to; .mcap is added where it is missing; with --max-size or --max-duration RUN-0001.mcap and so on
-    #[arg(value_name = "OUT")]
+    #[arg(long, short, value_name = "FILE")]
     out: PathBuf,
     #[command(flatten)]
     session: ClientOptions,
@@ -63,6 +64,9 @@ pub(super) struct RecordArgs {
     /// How chunks are compressed
     #[arg(long, value_enum, default_value_t, hide_short_help = true)]
     compression: Compression,
+    /// Leave out the channels with ticks and readings as JSON, which viewers show: files are half as long
+    #[arg(long, hide_short_help = true)]
+    no_json_channels: bool,
     /// End a chunk after this long at the latest (s): what a kill can cost
     #[arg(long, value_name = "SECONDS", default_value = "1", value_parser = seconds, hide_short_help = true)]
     chunk_seconds: Span,
@@ -156,6 +160,7 @@ impl RecordArgs {
             duration: self.duration.map(time),
             until_service_stops: self.until_service_stops,
             compress: self.compression.compresses(),
+            json: !self.no_json_channels,
             bounds: Bounds {
                 chunk: time(self.chunk_seconds),
                 file_bytes: self.max_size,

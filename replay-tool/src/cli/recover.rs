@@ -16,19 +16,19 @@ const SHOWN: usize = 5;
 /// Get back what is whole of a recording that is cut short or damaged
 #[derive(Debug, Args)]
 #[command(after_help = "Example, of a recording that is cut in the middle:\n  \
-    isotherm-replay record cut.mcap --no-service --duration 1\n  \
+    isotherm-replay record --out cut.mcap --no-service --duration 1\n  \
     truncate --size=-50 cut.mcap\n  \
-    isotherm-replay recover cut.mcap whole.mcap\n\n\
+    isotherm-replay recover cut.mcap --out whole.mcap\n\n\
     Chunks are taken or left as a whole, by their checksum; behind a damaged one reading goes on. The new file has a summary;\n\
     calibration documents that the journal holds are attached anew. The old file stays as it is.\n\
     Exit code 3: something that was in the file is lost; the summary says what.")]
 pub(super) struct RecoverArgs {
     /// The recording
-    #[arg(value_name = "IN")]
+    #[arg(value_name = "FILE")]
     input: PathBuf,
     /// The new file
-    #[arg(value_name = "OUT")]
-    output: PathBuf,
+    #[arg(long, short, value_name = "FILE")]
+    out: PathBuf,
     /// How chunks of the new file are compressed
     #[arg(long, value_enum, default_value_t)]
     compression: super::record::Compression,
@@ -52,12 +52,12 @@ pub(super) fn run(args: &RecoverArgs) -> Result<Outcome, Error> {
         ..RecordingOptions::default()
     };
     let mut bar = Bar::over_log(recovery.progress());
-    let recovered = recovery.run(&args.output, options, |report| {
+    let recovered = recovery.run(&args.out, options, |report| {
         bar.step(|| format!("{} messages", report.messages));
     });
     bar.finish();
     let report = recovered?;
-    print(if args.json { show::json(&report) } else { human(&report, &args.output) }.as_bytes())?;
+    print(if args.json { show::json(&report) } else { human(&report, &args.out) }.as_bytes())?;
     Ok(if report.lost_data() { Outcome::DataLoss } else { Outcome::Complete })
 }
 

@@ -13,7 +13,11 @@ pub(super) fn convert(conversion: &Conversion) -> Result<Outcome, Error> {
     let partial = conversion.place.partial(&conversion.out)?;
     // What an earlier run left behind when it was killed.
     let _ = std::fs::remove_file(partial.writing());
-    let options = RecordingOptions { compress: conversion.compress, ..RecordingOptions::default() };
+    let options = RecordingOptions {
+        compress: conversion.compress,
+        json: conversion.json,
+        ..RecordingOptions::default()
+    };
     let mut writer = RecordingWriter::create(partial.writing(), options)?;
     let mut values: BTreeMap<_, _> = conversion.provenance().into_iter().collect();
     values.insert("origin".to_owned(), "converted from a text log".to_owned());

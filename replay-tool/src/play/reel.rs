@@ -220,8 +220,8 @@ fn schedule(options: &PlayOptions) -> Schedule {
     }
 }
 
-/// Whether a message is to be played.
-fn wanted(topics: &[OwnedKeyExpr], topic: &Topic) -> bool {
+/// Whether messages of a topic are taken.
+pub(crate) fn wanted(topics: &[OwnedKeyExpr], topic: &Topic) -> bool {
     if topics.is_empty() {
         return true;
     }

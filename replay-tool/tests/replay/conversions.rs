@@ -50,8 +50,8 @@ fn there_and_back(mapping: &Path, log: &Path) {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
     let [mapping_name, log_name] = [mapping, log].map(|path| path.to_str().unwrap());
-    convert(folder.path(), &[log_name, "-m", mapping_name, "-u", "U-1", "a.mcap"], 0);
-    let back = convert(folder.path(), &["a.mcap", "b.csv"], 0);
+    convert(folder.path(), &[log_name, "-m", mapping_name, "-u", "U-1", "--out", "a.mcap"], 0);
+    let back = convert(folder.path(), &["a.mcap", "--out", "b.csv"], 0);
     assert_eq!((back["duplicates"].as_u64(), &back["lost"]), (Some(0), &serde_json::json!({})));
     let before = events(mapping, log);
     let after = events(&path("b.mapping.toml"), &path("b.csv"));
@@ -59,7 +59,8 @@ fn there_and_back(mapping: &Path, log: &Path) {
     for (before, after) in before.iter().zip(&after) {
         assert_eq!(before, after);
     }
-    let once_more = ["b.csv", "-m", "b.mapping.toml", "-u", "U-1", "c.mcap", "--compression", "none"];
+    let once_more =
+        ["b.csv", "-m", "b.mapping.toml", "-u", "U-1", "--out", "c.mcap", "--compression", "none"];
     convert(folder.path(), &once_more, 0);
     assert!(messages(&path("a.mcap")) == messages(&path("c.mcap")), "the same messages");
     let length = |name: &str| fs::metadata(path(name)).unwrap().len();
@@ -160,7 +161,7 @@ fn odd_serials_and_channels_each_get_their_own_folder_and_name() {
         all.push(health(unit));
     }
     record(&path("odd.mcap"), &all);
-    let summary = convert(folder.path(), &["odd.mcap", "out", "--to", "text"], 0);
+    let summary = convert(folder.path(), &["odd.mcap", "--out", "out", "--to", "text"], 0);
     for unit in ["%2E.", "A-1", "A_1", "0042"] {
         let raw_csv = path(&format!("out/{unit}/raw.csv"));
         let back = events(&path(&format!("out/{unit}/raw.mapping.toml")), &raw_csv);
@@ -178,7 +179,7 @@ fn odd_serials_and_channels_each_get_their_own_folder_and_name() {
         assert_eq!(health, "time_ns,name,value\n7,\"half, \"\"wave\"\"\",48.25\n");
     }
     assert_eq!(files(&summary).len(), 12);
-    let bag = replay(folder.path(), &["convert", "odd.mcap", "bag", "--to", "ros2", "--frame", "x"]);
+    let bag = replay(folder.path(), &["convert", "odd.mcap", "--out", "bag", "--to", "ros2", "--frame", "x"]);
     check(&bag, 2, "A-1: its raw readings are counts: correct the log first");
     assert!(!path("bag").exists());
 }
@@ -188,17 +189,17 @@ fn a_stream_that_is_empty_is_read_back_as_empty() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
     record(&path("accel.mcap"), &[accel("A-1", 7, 10, &[0.1, -0.0])]);
-    convert(folder.path(), &["accel.mcap", "accel.csv"], 0);
+    convert(folder.path(), &["accel.mcap", "--out", "accel.csv"], 0);
     let back = events(&path("accel.mapping.toml"), &path("accel.csv"));
     let [LogEvent::Accel { output: OutputKind::Mean, tick }] = back.as_slice() else { panic!("{back:?}") };
     assert_eq!((tick.sequence, tick.readings[1].to_bits()), (7, (-0.0f64).to_bits()));
 
     record(&path("none.mcap"), &[]);
     for target in ["text", "parquet"] {
-        let summary = convert(folder.path(), &["none.mcap", target, "--to", target], 0);
+        let summary = convert(folder.path(), &["none.mcap", "--out", target, "--to", target], 0);
         assert_eq!(files(&summary), []);
     }
-    let output = replay(folder.path(), &["convert", "none.mcap", "bag", "--to", "ros2"]);
+    let output = replay(folder.path(), &["convert", "none.mcap", "--out", "bag", "--to", "ros2"]);
     check(&output, 2, "nothing in the log can go into a ROS 2 bag: it has no units");
 }
 
@@ -213,7 +214,7 @@ fn doubled_and_late_ticks_and_new_runs_are_told() {
     all.extend((0..5_u64).map(|n| gyro("A-1", 4, n, 10 * n.cast_signed())));
     all.push(Message { frame: vec![1, 2, 3, 4, 5, 6, 7], ..gyro("A-1", 4, 0, 0) });
     record(&path("x.mcap"), &all);
-    let summary = convert(folder.path(), &["x.mcap", "x.csv"], 3);
+    let summary = convert(folder.path(), &["x.mcap", "--out", "x.csv"], 3);
     assert_eq!(summary["duplicates"], 1);
     let lost = serde_json::json!({ "frames that cannot be read": 1, "too late to be put in order": 1 });
     assert_eq!(summary["lost"], lost);
@@ -230,7 +231,7 @@ fn doubled_and_late_ticks_and_new_runs_are_told() {
         assert_eq!(sequences, (0..ticks).collect::<Vec<_>>(), "{name}");
     }
     // Parquet has everything as it came.
-    let summary = convert(folder.path(), &["x.mcap", "tables", "--to", "parquet"], 3);
+    let summary = convert(folder.path(), &["x.mcap", "--out", "tables", "--to", "parquet"], 3);
     assert_eq!(files(&summary), pairs(&[("tables/A-1/raw_gyro.parquet", 707)]));
 }
 
@@ -246,7 +247,7 @@ fn a_recording_that_is_cut_is_converted_to_its_last_whole_chunk() {
     writer.finish().unwrap();
     let bytes = fs::read(path("whole.mcap")).unwrap();
     fs::write(path("cut.mcap"), &bytes[..bytes.len() / 2]).unwrap();
-    let summary = convert(folder.path(), &["cut.mcap", "cut.csv"], 3);
+    let summary = convert(folder.path(), &["cut.mcap", "--out", "cut.csv"], 3);
     assert!(summary["log"]["cut_short"].as_str().unwrap().contains("cut.mcap"));
     let back = events(&path("cut.mapping.toml"), &path("cut.csv"));
     assert!((1..500).contains(&back.len()), "{}", back.len());
@@ -263,11 +264,11 @@ fn the_part_that_is_asked_for_is_converted() {
         all.push(at(n, gyro("B-2", 3, n, 10 * n.cast_signed())));
     }
     record(&path("x.mcap"), &all);
-    let part = ["x.mcap", "x.csv.gz", "--unit", "B-2", "--start", "0.2", "--duration", "0.3"];
+    let part = ["x.mcap", "--out", "x.csv.gz", "--unit", "B-2", "--start", "0.2", "--duration", "0.3"];
     let summary = convert(folder.path(), &part, 0);
     assert_eq!(files(&summary), pairs(&[("x.csv.gz", 31), ("x.mapping.toml", 1)]));
     assert_eq!(events(&path("x.mapping.toml"), &path("x.csv.gz")).len(), 31);
-    let output = replay(folder.path(), &["convert", "x.mcap", "y.csv"]);
+    let output = replay(folder.path(), &["convert", "x.mcap", "--out", "y.csv"]);
     check(
         &output,
         2,
@@ -291,21 +292,21 @@ fn nothing_is_written_over_and_nothing_half_is_left() {
     fs::create_dir_all(path("full/other")).unwrap();
     let before = names();
     let run = |args: &[&str]| replay(folder.path(), &[&["convert"], args].concat());
-    check(&run(&["x.mcap", "x.csv"]), 2, "x.csv is there already");
-    check(&run(&["x.mcap", "y.csv"]), 2, "y.mapping.toml is there already");
-    check(&run(&["x.mcap", "full", "--to", "parquet"]), 2, "the folder full has something in it");
-    check(&run(&["x.mcap", "x.csv", "--to", "ros2"]), 2, "another kind of output");
-    check(&run(&["x.mcap", "x.mcap"]), 2, "a recording already");
-    check(&run(&["x.mcap", "other"]), 2, "does not say what to convert to");
-    check(&run(&["x.mcap", "x.parquet", "--to", "parquet"]), 2, "one file per unit and stream");
-    check(&run(&["x.mcap", "z.csv", "--frame", "x"]), 2, "--frame is for ROS 2 bags");
-    check(&run(&["x.mcap", "z.csv", "--compression", "none"]), 2, "--compression is for recordings");
-    check(&run(&["none.mcap", "z.csv"]), 1, "none.mcap");
-    check(&run(&["x.csv", "-m", "y.mapping.toml", "-u", "A-1", "z.mcap"]), 78, "y.mapping.toml:1");
+    check(&run(&["x.mcap", "--out", "x.csv"]), 2, "x.csv is there already");
+    check(&run(&["x.mcap", "--out", "y.csv"]), 2, "y.mapping.toml is there already");
+    check(&run(&["x.mcap", "--out", "full", "--to", "parquet"]), 2, "the folder full has something in it");
+    check(&run(&["x.mcap", "--out", "x.csv", "--to", "ros2"]), 2, "another kind of output");
+    check(&run(&["x.mcap", "--out", "x.mcap"]), 2, "a recording already");
+    check(&run(&["x.mcap", "--out", "other"]), 2, "does not say what to convert to");
+    check(&run(&["x.mcap", "--out", "x.parquet", "--to", "parquet"]), 2, "one file per unit and stream");
+    check(&run(&["x.mcap", "--out", "z.csv", "--frame", "x"]), 2, "--frame is for ROS 2 bags");
+    check(&run(&["x.mcap", "--out", "z.csv", "--compression", "none"]), 2, "--compression is for recordings");
+    check(&run(&["none.mcap", "--out", "z.csv"]), 1, "none.mcap");
+    check(&run(&["x.csv", "-m", "y.mapping.toml", "-u", "A-1", "--out", "z.mcap"]), 78, "y.mapping.toml:1");
     assert_eq!(names(), before);
     assert_eq!(fs::read_to_string(path("x.csv")).unwrap(), "mine");
-    check(&run(&["x.mcap", "x.csv", "--overwrite"]), 0, "");
-    check(&run(&["x.mcap", "full", "--to", "parquet", "--overwrite"]), 0, "");
+    check(&run(&["x.mcap", "--out", "x.csv", "--overwrite"]), 0, "");
+    check(&run(&["x.mcap", "--out", "full", "--to", "parquet", "--overwrite"]), 0, "");
     assert!(path("full/other").is_dir() && path("full/A-1/raw_gyro.parquet").is_file());
     assert!(fs::read_to_string(path("x.csv")).unwrap().starts_with("end_time_ns,"));
 
@@ -314,6 +315,6 @@ fn nothing_is_written_over_and_nothing_half_is_left() {
     fs::write(path("bad.csv"), csv).unwrap();
     let before = names();
     let bad = ["bad.csv", "-m", "x.mapping.toml", "-u", "A-1"];
-    check(&run(&[&bad[..], &["bad.mcap"]].concat()), 1, "bad.csv:3:");
+    check(&run(&[&bad[..], &["--out", "bad.mcap"]].concat()), 1, "bad.csv:3:");
     assert_eq!(names(), before);
 }

@@ -27,7 +27,8 @@ fn python_reads_what_convert_writes() {
     };
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
-    let mut writer = RecordingWriter::create(&path.join("log.mcap"), RecordingOptions::default()).unwrap();
+    let options = RecordingOptions { json: true, ..RecordingOptions::default() };
+    let mut writer = RecordingWriter::create(&path.join("log.mcap"), options).unwrap();
     for (unit, preset) in UNITS {
         check(
             &replay(path, &["simulate", "--preset", preset, "--duration", "20", "--out", "log.csv"]),
@@ -46,7 +47,7 @@ fn python_reads_what_convert_writes() {
         let documents = UNITS.map(|(unit, _)| document(unit));
         let documents = documents.iter().flat_map(|path| ["--calibration", path.as_str()]);
         let documents: Vec<_> = documents.filter(|_| target == "ros2").collect();
-        let args = [&["convert", "log.mcap", target, "--to", target], raw, &documents].concat();
+        let args = [&["convert", "log.mcap", "--out", target, "--to", target], raw, &documents].concat();
         check(&replay(path, &args), 0, "");
     }
     let output = Command::new(python)

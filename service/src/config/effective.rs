@@ -11,7 +11,7 @@ use zenoh::qos::CongestionControl;
 use super::Settings;
 use super::keys::{
     Congestion, DriftEstimate, FolderKeys, InitialState, Keys, MetricsKeys, NavigationKeys, PreLaunchKeys,
-    SwapKeys, UncalibratedKey, ZenohKeys,
+    SwapKeys, UncalibratedKey, WebKeys, ZenohKeys,
 };
 
 /// What is said before the text.
@@ -94,6 +94,12 @@ impl Settings {
             metrics: MetricsKeys {
                 listen: self.metrics.listen.map(|address| address.to_string()),
                 allow_remote: Some(self.metrics.allow_remote),
+            },
+            web: WebKeys {
+                enabled: Some(self.web.enabled),
+                write: Some(self.web.write),
+                hosts: self.web.hosts.clone(),
+                token_file: self.web.token_file.as_deref().map(text),
             },
             zenoh: ZenohKeys {
                 config: session.config.as_deref().map(text),

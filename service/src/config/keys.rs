@@ -57,6 +57,8 @@ pub(super) struct Keys {
     pub(super) navigation: NavigationKeys,
     /// Metrics and health over HTTP.
     pub(super) metrics: MetricsKeys,
+    /// The console in the browser.
+    pub(super) web: WebKeys,
     /// How the Zenoh session is opened.
     pub(super) zenoh: ZenohKeys,
 }
@@ -179,6 +181,22 @@ pub(super) struct MetricsKeys {
     pub(super) listen: Option<String>,
     /// Whether other machines may reach it.
     pub(super) allow_remote: Option<bool>,
+}
+
+#[derive(Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+#[schemars(deny_unknown_fields)]
+pub(super) struct WebKeys {
+    /// Whether the console is served.
+    pub(super) enabled: Option<bool>,
+    /// Whether it may change anything.
+    pub(super) write: Option<bool>,
+    /// Further names under which browsers may ask for it.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(super) hosts: Vec<String>,
+    /// File of the token.
+    #[schemars(length(min = 1))]
+    pub(super) token_file: Option<String>,
 }
 
 #[derive(Debug, Default, Serialize, Deserialize, JsonSchema)]

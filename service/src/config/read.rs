@@ -15,10 +15,10 @@ use zenoh::qos::CongestionControl;
 
 use super::keys::{
     Congestion, DriftEstimate, FolderKeys, InitialState, Keys, MetricsKeys, NavigationKeys, PreLaunchKeys,
-    SwapKeys, UncalibratedKey, ZenohKeys,
+    SwapKeys, UncalibratedKey, WebKeys, ZenohKeys,
 };
 use super::swap::DAY_S;
-use super::{FolderSettings, MetricsSettings, Settings, SwapSettings};
+use super::{FolderSettings, MetricsSettings, Settings, SwapSettings, WebSettings};
 
 static FORM: LazyLock<Form> = LazyLock::new(Form::of::<Keys>);
 
@@ -27,7 +27,7 @@ pub(super) fn settings(r: &mut Reader<'_>, folder: &Path) -> Option<Settings> {
     let keys: Keys = r.read(&FORM)?;
     let default = Settings::default();
     let state = keys.state.map(|path| folder.join(path));
-    Some(Settings {
+    let mut settings = Settings {
         // With a state folder the folder of the documents may be missing: the last good sets hold until it is there.
         calibrations: match &state {
             Some(_) => keys.calibrations.map(|path| folder.join(path)),
@@ -65,9 +65,12 @@ pub(super) fn settings(r: &mut Reader<'_>, folder: &Path) -> Option<Settings> {
             Congestion::Block => CongestionControl::Block,
         }),
         metrics: metrics(r, keys.metrics),
+        web: web(r, keys.web, folder),
         session: session(r, keys.zenoh, folder),
         digest: None,
-    })
+    };
+    settings.listen_for_web();
+    Some(settings)
 }
 
 fn milliseconds(ms: u32) -> Duration {
@@ -167,6 +170,24 @@ fn metrics(r: &mut Reader<'_>, keys: MetricsKeys) -> MetricsSettings {
         address
     });
     MetricsSettings { listen, ..settings }
+}
+
+fn web(r: &mut Reader<'_>, keys: WebKeys, folder: &Path) -> WebSettings {
+    for host in &keys.hosts {
+        let fits = |c: char| c.is_ascii_alphanumeric() || "-._[]:".contains(c);
+        let bare = !host.contains(':') || host.starts_with('[');
+        if host.is_empty() || !bare || !host.chars().all(fits) {
+            let words =
+                format!("has {host:?}, must be names or addresses without a port, such as \"bench.example\"");
+            r.report("web.hosts", words);
+        }
+    }
+    WebSettings {
+        enabled: keys.enabled.unwrap_or_default(),
+        write: keys.write.unwrap_or_default(),
+        hosts: keys.hosts,
+        token_file: keys.token_file.map(|path| folder.join(path)),
+    }
 }
 
 /// Reads `[zenoh]` and tries the configuration that it stands for.

@@ -115,7 +115,7 @@ fn every_key_arrives_where_it_belongs() {
             listen: vec!["tcp/127.0.0.1:0".to_owned()],
             namespace: Some("site/a".to_owned()),
         },
-        digest: None,
+        ..Settings::default()
     };
     assert_eq!(Settings::parse(text, &folder.path().join("service.toml")), Ok(expected));
 }

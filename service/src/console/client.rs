@@ -41,13 +41,18 @@ fn seconds(text: &str) -> Result<Duration, String> {
 
 /// A session to ask on.
 #[derive(Debug)]
-pub(super) struct Client {
-    pub(super) session: Session,
-    pub(super) timeout: Duration,
+pub(crate) struct Client {
+    pub(crate) session: Session,
+    pub(crate) timeout: Duration,
     tried: String,
 }
 
 impl Client {
+    /// On a session that is open.
+    pub(crate) fn on(session: Session, timeout: Duration) -> Self {
+        Self { session, timeout, tried: "this service".to_owned() }
+    }
+
     /// Opens the session.
     pub(super) async fn open(args: &ClientArgs) -> Result<Self, ConsoleError> {
         let way = args.session.way(Role::Peer)?;
@@ -72,7 +77,7 @@ impl Client {
     }
 
     /// Every answer to a question, once somebody is there to answer it.
-    pub(super) async fn answers(
+    pub(crate) async fn answers(
         &self,
         key: &str,
         parameters: &str,
@@ -118,7 +123,7 @@ impl Client {
     }
 
     /// The first answer to a question, as text.
-    pub(super) async fn text(
+    pub(crate) async fn text(
         &self,
         key: &str,
         parameters: &str,
@@ -155,14 +160,14 @@ impl Client {
     }
 
     /// Status of every unit, in the order of their serials.
-    pub(super) async fn statuses(&self) -> Result<Vec<Status>, ConsoleError> {
+    pub(crate) async fn statuses(&self) -> Result<Vec<Status>, ConsoleError> {
         let mut statuses: Vec<Status> = self.frames(key::ALL_STATUS).await?;
         statuses.sort_by(|a, b| (&a.unit, &a.instance).cmp(&(&b.unit, &b.instance)));
         Ok(statuses)
     }
 
     /// Status of every service instance.
-    pub(super) async fn services(&self) -> Result<Vec<ServiceStatus>, ConsoleError> {
+    pub(crate) async fn services(&self) -> Result<Vec<ServiceStatus>, ConsoleError> {
         let mut services: Vec<ServiceStatus> = self.frames(key::ALL_SERVICE_STATUS).await?;
         services.sort_by(|a, b| a.instance.cmp(&b.instance));
         Ok(services)

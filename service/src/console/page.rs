@@ -26,10 +26,10 @@ use isotherm_correction::sample::ChannelName;
 use isotherm_protocol::status::Status;
 
 pub(crate) use figure::fit;
-pub(crate) use remark::{Level, state_word};
+pub(crate) use remark::{Level, is_running, knows_rates, state_word};
 pub(crate) use services::{services, tally};
 pub(crate) use sheet::sheet;
-pub(crate) use units::{channel_in_view, units};
+pub(crate) use units::{channel_in_view, length, range, units};
 
 /// A unit: its status, and what only an onlooker knows.
 #[derive(Debug, Clone)]

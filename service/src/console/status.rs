@@ -57,9 +57,16 @@ pub struct StatusArgs {
 
 /// What is printed as JSON.
 #[derive(Debug, Serialize)]
-struct Report {
-    services: Vec<ServiceStatus>,
-    units: Vec<Status>,
+pub(crate) struct Report {
+    pub(crate) services: Vec<ServiceStatus>,
+    pub(crate) units: Vec<Status>,
+}
+
+impl Report {
+    /// As the command prints it.
+    pub(crate) fn to_json(&self) -> String {
+        serde_json::to_string_pretty(self).unwrap_or_default() + "\n"
+    }
 }
 
 /// Prints how units and services are.
@@ -73,8 +80,7 @@ pub(super) async fn run(args: &StatusArgs) -> Result<Exit, ConsoleError> {
     let mut report = Report { units: units?, services: or_none(services)? };
     select(&mut report, &args.units)?;
     if args.json {
-        let text = serde_json::to_string_pretty(&report).unwrap_or_default() + "\n";
-        return Ok(print(&text, Exit::Ok));
+        return Ok(print(&report.to_json(), Exit::Ok));
     }
     let columns = args.width.map(usize::from).or_else(terminal_columns);
     let lines = match (args.units.as_slice(), report.units.as_slice()) {
@@ -110,7 +116,7 @@ fn select(report: &mut Report, serials: &[String]) -> Result<(), ConsoleError> {
 }
 
 /// The present time by the clock of this machine (ms since 1970-01-01 UTC).
-pub(super) fn unix_ms() -> i64 {
+pub(crate) fn unix_ms() -> i64 {
     let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
     i64::try_from(since.as_millis()).unwrap_or(i64::MAX)
 }

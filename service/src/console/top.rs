@@ -21,8 +21,9 @@ use super::ConsoleError;
 use super::client::{Client, ClientArgs};
 use super::status::unix_ms;
 use crate::exit::Exit;
-use feed::Feed;
-use fleet::Fleet;
+pub(crate) use feed::Feed;
+pub(crate) use fleet::Fleet;
+pub(crate) use order::worst_first;
 use screen::{Keys, Screen};
 use view::{Act, View};
 

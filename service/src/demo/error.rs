@@ -8,7 +8,6 @@ use isotherm_simulator::ScenarioErrors;
 use thiserror::Error;
 
 use crate::ServiceError;
-use crate::report::ReportError;
 
 /// Why the demo did not come to its end.
 #[derive(Debug, Error)]
@@ -46,9 +45,6 @@ pub enum DemoError {
     /// A producer's task ended unexpectedly.
     #[error("a producer ended unexpectedly: {0}")]
     Task(#[source] tokio::task::JoinError),
-    /// The report cannot be drawn.
-    #[error(transparent)]
-    Report(#[from] ReportError),
     /// The report cannot be written.
     #[error("cannot write {path}: {source}", path = path.display())]
     Write {

@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 use std::convert::Infallible;
+use std::net::SocketAddr;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -20,7 +21,7 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::task::{AbortHandle, JoinSet};
 
 use super::page::{pack, page};
-use super::source::{Look, Verdict};
+use super::source::{Look, Source, Verdict};
 use super::{Desk, NoLook};
 
 /// Most connections at a time; a further one takes the place of the oldest that has not asked for anything yet.
@@ -36,10 +37,11 @@ const PAUSE: Duration = Duration::from_millis(100);
 const OPEN_METRICS: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
 /// For all others the same text: it is good Prometheus text too.
 const PROMETHEUS: &str = "text/plain; version=0.0.4; charset=utf-8";
-const JSON: &str = "application/json";
+pub(crate) const JSON: &str = "application/json";
 const PLAIN: &str = "text/plain; charset=utf-8";
 
-type Answer = Response<Full<Bytes>>;
+/// What is answered.
+pub(crate) type Answer = Response<Full<Bytes>>;
 
 /// A connection that is being served.
 struct Open {
@@ -87,6 +89,8 @@ pub(super) async fn serve(listener: TcpListener, desk: Arc<Desk>) {
 
 /// Answers one request within its time.
 async fn connection(stream: TcpStream, desk: &Arc<Desk>, asked: &AtomicBool) {
+    // Whoever has gone already is not answered.
+    let Ok(local) = stream.local_addr() else { return };
     let answering = http1::Builder::new()
         .timer(TokioTimer::new())
         .header_read_timeout(desk.limits.head)
@@ -99,31 +103,38 @@ async fn connection(stream: TcpStream, desk: &Arc<Desk>, asked: &AtomicBool) {
             TokioIo::new(stream),
             service_fn(|request| {
                 asked.store(true, Ordering::Relaxed);
-                answer(request, desk)
+                answer(request, desk, local)
             }),
         );
     // Whoever went away or was too slow need not be told of.
     let _ = tokio::time::timeout(desk.limits.connection, answering).await;
 }
 
-async fn answer(request: Request<Incoming>, desk: &Arc<Desk>) -> Result<Answer, Infallible> {
+async fn answer(
+    request: Request<Incoming>,
+    desk: &Arc<Desk>,
+    local: SocketAddr,
+) -> Result<Answer, Infallible> {
     // Of HEAD hyper sends the head alone.
     let reads = [Method::GET, Method::HEAD].contains(request.method());
     let answer = match request.uri().path() {
         "/metrics" if reads => metrics(&request, desk).await,
         "/healthz" if reads => healthz(desk).await,
-        "/livez" if reads => text(StatusCode::OK, PLAIN, "alive\n"),
+        "/livez" if reads => livez(desk),
         "/readyz" if reads => readyz(desk),
         "/metrics" | "/healthz" | "/livez" | "/readyz" => {
             let mut answer = text(StatusCode::METHOD_NOT_ALLOWED, PLAIN, "only GET and HEAD\n");
             answer.headers_mut().insert(ALLOW, HeaderValue::from_static("GET, HEAD"));
             answer
         }
-        _ => text(
-            StatusCode::NOT_FOUND,
-            PLAIN,
-            "not found; there are /metrics, /livez, /readyz and /healthz\n",
-        ),
+        _ => match desk.web.get() {
+            Some(web) => web.answer(request, local).await,
+            None => None,
+        }
+        .unwrap_or_else(|| {
+            let words = "not found; there are /metrics, /livez, /readyz and /healthz\n";
+            text(StatusCode::NOT_FOUND, PLAIN, words)
+        }),
     };
     Ok(answer)
 }
@@ -153,6 +164,14 @@ async fn metrics(request: &Request<Incoming>, desk: &Arc<Desk>) -> Answer {
             answer
         }
         Err(error) => text(StatusCode::INTERNAL_SERVER_ERROR, PLAIN, format!("{error}\n")),
+    }
+}
+
+/// Whether the process is worth keeping. Nothing is looked at here, either.
+fn livez(desk: &Desk) -> Answer {
+    match desk.source.get().map_or(Ok(()), Source::receives) {
+        Ok(()) => text(StatusCode::OK, PLAIN, "alive\n"),
+        Err(stuck) => text(StatusCode::SERVICE_UNAVAILABLE, PLAIN, format!("{stuck}\n")),
     }
 }
 
@@ -193,7 +212,20 @@ fn takes(headers: &HeaderMap, header: &HeaderName, what: &str) -> bool {
     })
 }
 
-fn text(status: StatusCode, kind: &'static str, body: impl Into<Bytes>) -> Answer {
+/// Text in a tenth of its bytes, for those who take it so.
+pub(crate) fn packed(headers: &HeaderMap, kind: &'static str, body: &str) -> Answer {
+    match takes(headers, &ACCEPT_ENCODING, "gzip").then(|| pack(body)) {
+        Some(Ok(body)) => {
+            let mut answer = text(StatusCode::OK, kind, body);
+            answer.headers_mut().insert(CONTENT_ENCODING, HeaderValue::from_static("gzip"));
+            answer
+        }
+        _ => text(StatusCode::OK, kind, body.to_owned()),
+    }
+}
+
+/// Text as it is.
+pub(crate) fn text(status: StatusCode, kind: &'static str, body: impl Into<Bytes>) -> Answer {
     let mut answer = Response::new(Full::new(body.into()));
     *answer.status_mut() = status;
     answer.headers_mut().insert(CONTENT_TYPE, HeaderValue::from_static(kind));

@@ -13,6 +13,7 @@ use super::health::{HeldBack, Kind, Reason, STOPPING, Seen, Watch};
 use crate::config::Settings;
 use crate::intake::Intake;
 use crate::logging::dropped_lines;
+use crate::pulse::{Pulse, Stuck};
 use crate::registrar::{Board, Posted, UNWRITTEN};
 use crate::unit::UnitActor;
 
@@ -25,6 +26,7 @@ pub(crate) struct Source {
     started: Instant,
     state_folder: Option<PathBuf>,
     held_back: HeldBack,
+    pulse: Option<Arc<Pulse>>,
 }
 
 /// One look at everything.
@@ -138,7 +140,18 @@ impl Source {
                 ticks: settings.unit.navigation.ticks().into(),
                 window: Duration::from_nanos(window),
             },
+            pulse: None,
         }
+    }
+
+    /// The same, of a service whose receive path is felt.
+    pub(crate) fn feeling(self, pulse: Arc<Pulse>) -> Self {
+        Self { pulse: Some(pulse), ..self }
+    }
+
+    /// Whether the receive path is alive, as far as it is felt.
+    pub(super) fn receives(&self) -> Result<(), Stuck> {
+        self.pulse.as_ref().map_or(Ok(()), Pulse::look)
     }
 
     /// Looks at the units for stalls and alarms.

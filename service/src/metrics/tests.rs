@@ -52,7 +52,7 @@ impl Stand {
         let endpoint = Endpoint::start_within(&on_loopback(), String::new(), watch, limits).await;
         let endpoint = endpoint.unwrap().unwrap();
         let source = Source::new(&settings, Arc::clone(&intake), Arc::<Board>::default(), "test".to_owned());
-        endpoint.open(source);
+        endpoint.open(source, None);
         Self { intake, endpoint, shape, sequence: 0 }
     }
 

@@ -16,6 +16,7 @@ use zenoh::{Session, Wait};
 use crate::ServiceError;
 use crate::intake::{Intake, OutletMaker};
 use crate::keeper::{Asked, Bell};
+use crate::pulse::Pulse;
 use crate::registrar::Desk;
 use crate::unit::{Journal, Outlet};
 
@@ -35,9 +36,10 @@ impl Declared {
         intake: &Arc<Intake>,
         bell: &Bell,
         desk: &Desk,
+        pulse: &Arc<Pulse>,
     ) -> Result<Self, ServiceError> {
-        let raw = take(intake, bell, Intake::receive);
-        let reference = take(intake, bell, Intake::reference);
+        let raw = take(intake, bell, pulse, Intake::receive);
+        let reference = take(intake, bell, pulse, Intake::reference);
         let put = desk.clone();
         let receipt = Receipt::declare(session).await?;
         let subscribers = vec![
@@ -118,11 +120,13 @@ pub(super) fn journal(session: Session, congestion: CongestionControl) -> Journa
 fn take(
     intake: &Arc<Intake>,
     bell: &Bell,
+    pulse: &Arc<Pulse>,
     receive: fn(&Intake, &str, Option<&[u8]>, Instant) -> bool,
 ) -> impl Fn(Sample) + Send + Sync + 'static {
-    let (intake, bell) = (Arc::clone(intake), bell.clone());
+    let (intake, bell, pulse) = (Arc::clone(intake), bell.clone(), Arc::clone(pulse));
     move |sample| {
         let arrival = Instant::now();
+        let _in_hand = pulse.take(arrival);
         let bytes = sample.payload().to_bytes();
         let frame = (sample.kind() == SampleKind::Put).then_some(&*bytes);
         if receive(&intake, sample.key_expr().as_str(), frame, arrival) {

@@ -43,7 +43,7 @@ pub(super) fn replace(path: &Path, text: &str) -> io::Result<()> {
 }
 
 /// Writes a new file with these permissions; one of that name is left alone and is an error.
-pub(super) fn create(path: &Path, text: &str, mode: u32) -> io::Result<()> {
+pub(crate) fn create(path: &Path, text: &str, mode: u32) -> io::Result<()> {
     let file = written(path, text, mode)?;
     file.as_file().sync_all()?;
     file.persist_noclobber(path)?;

@@ -3,12 +3,13 @@
 use isotherm_correction::channel::ThermalState;
 use isotherm_correction::operation::State;
 use isotherm_correction::sample::{ChannelName, LasingMode};
-use isotherm_correction::unit::Unit;
+use isotherm_correction::unit::{ChannelReport, Unit};
 
 /// Temperatures, lasing mode and state of a unit at its last tick.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Present {
     channels: Vec<(ChannelName, ThermalState)>,
+    auxiliaries: Vec<(ChannelName, ThermalState)>,
     /// Lasing mode of the last tick; `None` before the first one, or without modes.
     pub mode: Option<LasingMode>,
     /// What the unit is doing.
@@ -23,7 +24,8 @@ impl Present {
     /// Looks at a unit.
     pub(super) fn of(unit: &Unit) -> Self {
         Self {
-            channels: unit.channels().filter_map(|channel| Some((channel.name, channel.state?))).collect(),
+            channels: states(unit.channels()),
+            auxiliaries: states(unit.auxiliaries()),
             mode: unit.observation().and_then(|seen| seen.mode),
             state: unit.state(),
             revision: unit.calibration().map_or(0, |(_, counter)| counter),
@@ -31,10 +33,14 @@ impl Present {
         }
     }
 
-    /// Smoothed temperature of a channel; `None` where the calibration in force has no such channel, or there was no reading.
+    /// Smoothed value of a channel of either kind; `None` where the calibration in force has no such channel, or there was no reading.
     #[must_use]
     pub fn thermal(&self, name: &ChannelName) -> Option<ThermalState> {
-        self.channels.iter().find(|(channel, _)| channel == name).map(|(_, state)| *state)
+        self.channels
+            .iter()
+            .chain(&self.auxiliaries)
+            .find(|(channel, _)| channel == name)
+            .map(|(_, state)| *state)
     }
 
     /// The temperatures, as "name 23.45 °C".
@@ -42,4 +48,8 @@ impl Present {
     pub fn words(&self) -> Vec<String> {
         self.channels.iter().map(|(name, state)| format!("{name} {:.2} °C", state.temperature)).collect()
     }
+}
+
+fn states(channels: impl Iterator<Item = ChannelReport>) -> Vec<(ChannelName, ThermalState)> {
+    channels.filter_map(|channel| Some((channel.name, channel.state?))).collect()
 }

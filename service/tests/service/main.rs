@@ -9,6 +9,7 @@
 //! | `console_status` | what `isotherm status` and `top` show of it |
 //! | `reach` | defaults, environment and file by which programs meet; what is said where they do not |
 //! | `serve_command` | the program itself: start, stop, signals |
+//! | `web` | the console in the browser: who is answered, and its page in a real browser |
 //! | `shipped_configuration` | the Zenoh configurations that are shipped |
 
 #![expect(
@@ -26,3 +27,4 @@ mod reach;
 mod registrar;
 mod serve_command;
 mod shipped_configuration;
+mod web;

@@ -12,4 +12,4 @@ mod pre_launch;
 mod restart;
 mod said;
 mod schedule;
-mod stand;
+pub(crate) mod stand;

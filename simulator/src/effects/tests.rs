@@ -209,6 +209,7 @@ fn a_list_of_another_length_is_refused_and_no_effect_changes_nothing() {
     scenario.instrument.effects = Effects {
         gyros: vec![GyroEffects::default(); 3],
         accelerometers: vec![AccelerometerEffects::default(); 3],
+        ..Effects::default()
     };
     let after: Vec<Step> = Simulation::new(&scenario).unwrap().take(500).collect();
     assert!(before == after, "effects of nothing");

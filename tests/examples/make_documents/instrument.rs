@@ -82,6 +82,7 @@ pub(crate) fn orientation<P>(axes: &Axes) -> Orientation<P> {
             reference_deg_c: axes.reference_deg_c,
             range_deg_c: RANGE_DEG_C,
             slopes_arcsec_per_deg_c: slopes.collect(),
+            hysteresis: Vec::new(),
         }),
         parity: None,
     }

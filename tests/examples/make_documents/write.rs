@@ -70,6 +70,7 @@ pub(crate) fn document(unit: &str) -> Document {
         created: CREATED.parse().ok().and_then(Created::new),
         note: None,
         origin: None,
+        auxiliary: Vec::new(),
         temperature: Temperature { assumed_deg_c: 25.0, filter: None, channel: Vec::new() },
         gyro: Gyro {
             output: GyroOutput::Mean,

@@ -1,9 +1,13 @@
 //! What sensors do with the unit's motion: simulated as physics, taken out by the terms of a document.
 
-use isotherm_protocol::document::{AlongAxes, Curve, Document, Shape};
+use isotherm_correction::sample::SensorFlags;
+use isotherm_protocol::document::{
+    AccelHysteresis, AccelRegressor, AlongAxes, Auxiliary, AxesHysteresis, Curve, Document, Hysteresis,
+    Regressor, Shape, Unit,
+};
 use isotherm_simulator::Scenario;
 use isotherm_simulator::chamber::Profile;
-use isotherm_simulator::effects::{AccelerometerEffects, Effects, GyroEffects};
+use isotherm_simulator::effects::{AccelerometerEffects, AxesPlay, Effects, GyroEffects, Play, Supply};
 use isotherm_simulator::instrument::Gyros;
 use isotherm_simulator::motion::{Motion, Path};
 use isotherm_simulator::noise::GyroNoise;
@@ -70,7 +74,7 @@ fn constant(value: f64) -> Shape {
 /// without the effect.
 fn judged(
     scenario: &Scenario,
-    state: impl FnOnce(&mut Document),
+    state: impl Fn(&mut Document),
     error: impl Fn(&Document, &Scenario) -> f64,
 ) -> [f64; 3] {
     let mut without_effect = scenario.clone();
@@ -93,7 +97,8 @@ fn drift_with_acceleration_is_removed_over_temperature() {
         reference_deg_c: 25.0,
         ..GyroEffects::default()
     });
-    let scenario = scenario(TUMBLE, Effects { gyros: gyros.to_vec(), accelerometers: Vec::new() });
+    let scenario =
+        scenario(TUMBLE, Effects { gyros: gyros.to_vec(), accelerometers: Vec::new(), ..Effects::default() });
     let [floor, with, left] = judged(
         &scenario,
         |document| {
@@ -123,7 +128,8 @@ fn a_scale_that_depends_on_the_rate_is_removed() {
         ..GyroEffects::default()
     });
     let sine = Path::Sine { axis: [1.0, -0.8, 0.6], amplitude_deg: 30.0, frequency_hz: 0.5, phase_deg: 0.0 };
-    let scenario = scenario(sine, Effects { gyros: gyros.to_vec(), accelerometers: Vec::new() });
+    let scenario =
+        scenario(sine, Effects { gyros: gyros.to_vec(), accelerometers: Vec::new(), ..Effects::default() });
     let [floor, with, left] = judged(
         &scenario,
         |document| {
@@ -145,12 +151,39 @@ fn a_scale_that_depends_on_the_rate_is_removed() {
 }
 
 #[test]
+fn a_rate_outside_its_curve_is_flagged_as_such() {
+    let mut document = document();
+    for sensor in &mut document.gyro.sensor {
+        let knots = vec![[-10.0, 5.0], [10.0, 5.0]];
+        sensor.increment_weight_over_rate = Some(Curve::new(Shape::PiecewiseLinear { knots }));
+    }
+    for (rate_deg_per_s, outside) in [(5.0, false), (40.0, true)] {
+        let path = Path::ConstantRate { axis: [1.0, 1.0, -1.0], rate_deg_per_s };
+        let scenario = Scenario { duration_s: 5.0, ..scenario(path, Effects::default()) };
+        run(&compile(&document), &scenario, |_, tick| {
+            for flags in &tick.gyro_flags {
+                assert_eq!(
+                    flags.contains(SensorFlags::CLAMPED_RATE),
+                    outside,
+                    "{rate_deg_per_s} °/s: {flags:?}"
+                );
+                assert!(
+                    flags.contains(SensorFlags::VALID) && !flags.contains(SensorFlags::CLAMPED_TEMPERATURE)
+                );
+            }
+        })
+        .unwrap();
+    }
+}
+
+#[test]
 fn what_accelerometers_feel_for_sitting_elsewhere_is_removed() {
     let positions = [[0.03, 0.0, -0.01], [-0.01, 0.025, 0.0], [0.0, -0.02, 0.03]];
     let accelerometers =
         positions.map(|position_m| AccelerometerEffects { position_m, ..AccelerometerEffects::default() });
     let sine = Path::Sine { axis: [1.0, -0.8, 0.6], amplitude_deg: 10.0, frequency_hz: 1.0, phase_deg: 0.0 };
-    let effects = Effects { gyros: Vec::new(), accelerometers: accelerometers.to_vec() };
+    let effects =
+        Effects { gyros: Vec::new(), accelerometers: accelerometers.to_vec(), ..Effects::default() };
     let scenario = scenario(sine, effects);
     let [floor, with, left] = judged(
         &scenario,
@@ -179,7 +212,8 @@ fn a_square_in_the_force_is_removed() {
         vibration_m_per_s2: 40.0,
         vibration_phase_deg: 20.0,
     };
-    let effects = Effects { gyros: Vec::new(), accelerometers: accelerometers.to_vec() };
+    let effects =
+        Effects { gyros: Vec::new(), accelerometers: accelerometers.to_vec(), ..Effects::default() };
     let scenario = scenario(vibration, effects);
     let [floor, with, left] = judged(
         &scenario,
@@ -192,4 +226,125 @@ fn a_square_in_the_force_is_removed() {
         |document, scenario| errors(document, scenario).1,
     );
     assert!(with > 0.2 && left < floor + 0.01 * with, "{with} {left} {floor}");
+}
+
+/// Up and down through a loop, slowly beside the thermometers' filter.
+fn thermal_loop(path: Path, effects: Effects) -> Scenario {
+    let chamber = Profile::constant(20.0).hold(2.0).ramp(50.0, 2.0).ramp(20.0, 2.0).ramp(45.0, 2.0);
+    let scenario = scenario(path, effects);
+    Scenario { duration_s: chamber.duration_s(), chamber, tick_ns: 100_000_000, ..scenario }
+}
+
+#[test]
+fn hysteresis_of_biases_is_removed() {
+    // One play of the instrument is two of half its gain for the document: plays add up.
+    let (gyro_per_k, accel_per_k) = ([6.0, -4.0, 8.0], [0.3, -0.2, 0.4]);
+    let play = |half_width_k, per_k| Some(Play { half_width_k, per_k });
+    let gyros = gyro_per_k.map(|g| GyroEffects { play: play(3.0, g * DEG_PER_H), ..GyroEffects::default() });
+    let accelerometers = accel_per_k
+        .map(|g| AccelerometerEffects { play: play(2.0, g * 1e-3 * G), ..AccelerometerEffects::default() });
+    let effects =
+        Effects { gyros: gyros.to_vec(), accelerometers: accelerometers.to_vec(), ..Effects::default() };
+    let scenario = thermal_loop(TUMBLE, effects);
+    let state = |document: &mut Document| {
+        for (sensor, g) in document.gyro.sensor.iter_mut().zip(gyro_per_k) {
+            let halved = Hysteresis { half_width_deg_c: 3.0, gain: Curve::new(constant(0.5 * g)) };
+            sensor.hysteresis = vec![halved.clone(), halved];
+        }
+        for (sensor, g) in document.accel.as_mut().unwrap().sensor.iter_mut().zip(accel_per_k) {
+            // The simulated error is a force, the document's an output.
+            let scale = sensor.scale_factor.shape().at(25.0).unwrap();
+            let gain = Curve::new(constant(g * 1e-3 * G * scale)).in_unit(Unit::MPerS2PerDegC);
+            sensor.hysteresis = vec![AccelHysteresis { half_width_deg_c: 2.0, gain }];
+        }
+    };
+    let [floor, with, left] = judged(&scenario, state, |document, scenario| errors(document, scenario).0);
+    assert!(with > 10.0 && left < floor + 0.03 * with, "°/h: {with} {left} {floor}");
+    let [floor, with, left] = judged(&scenario, state, |document, scenario| errors(document, scenario).1);
+    assert!(with > 0.3 && left < floor + 0.03 * with, "mg: {with} {left} {floor}");
+}
+
+#[test]
+fn hysteresis_of_the_axes_is_removed() {
+    let play = Some(AxesPlay { half_width_k: 4.0, share: 0.6 });
+    let mut scenario =
+        thermal_loop(TUMBLE, Effects { gyro_axes: play, accelerometer_axes: play, ..Effects::default() });
+    // Mounts that turn by some 10″/K.
+    let turn = |rows: &mut Vec<[f64; 3]>| rows.iter_mut().flatten().for_each(|slope| *slope *= 200.0);
+    turn(&mut scenario.instrument.gyro_orientation.rows_per_k);
+    turn(&mut scenario.instrument.accelerometers.as_mut().unwrap().orientation.rows_per_k);
+    let judged = |error: fn((f64, f64)) -> f64| {
+        let mut without_effect = scenario.clone();
+        without_effect.instrument.effects = Effects::default();
+        let mut plain = document();
+        turn(&mut plain.gyro.orientation.thermal.as_mut().unwrap().slopes_arcsec_per_deg_c);
+        let accel = plain.accel.as_mut().unwrap();
+        turn(&mut accel.orientation.thermal.as_mut().unwrap().slopes_arcsec_per_deg_c);
+        let mut with_term = plain.clone();
+        let hysteresis = vec![AxesHysteresis { half_width_deg_c: 4.0, share_ratio: 0.6 }];
+        with_term.gyro.orientation.thermal.as_mut().unwrap().hysteresis = hysteresis.clone();
+        with_term.accel.as_mut().unwrap().orientation.thermal.as_mut().unwrap().hysteresis = hysteresis;
+        [(&plain, &without_effect), (&plain, &scenario), (&with_term, &scenario)]
+            .map(|(document, scenario)| error(errors(document, scenario)))
+    };
+    let [floor, with, left] = judged(|errors| errors.0);
+    assert!(with > 1.0 && left < floor + 0.03 * with, "°/h: {with} {left} {floor}");
+    let [floor, with, left] = judged(|errors| errors.1);
+    assert!(with > 0.03 && left < floor + 0.03 * with, "mg: {with} {left} {floor}");
+}
+
+#[test]
+fn what_goes_with_a_gradient_and_with_the_supply_is_removed() {
+    let (by_gradient, by_supply) = ([3.0, -2.0, 4.0], [25.0, -30.0, 18.0]);
+    let gyros = [0, 1, 2].map(|i: usize| GyroEffects {
+        gradient_rad_per_s_per_k: by_gradient[i] * DEG_PER_H,
+        supply_rad_per_s_per_v: by_supply[i] * DEG_PER_H,
+        ..GyroEffects::default()
+    });
+    let accelerometers = [0, 1, 2].map(|i: usize| AccelerometerEffects {
+        gradient_m_per_s2_per_k: 0.05 * by_gradient[i] * 1e-3 * G,
+        supply_m_per_s2_per_v: 0.05 * by_supply[i] * 1e-3 * G,
+        ..AccelerometerEffects::default()
+    });
+    let supply = Supply { channel: "supply".into(), nominal_v: 5.0, swing_v: 0.4, period_s: 700.0 };
+    let effects = Effects {
+        gyros: gyros.to_vec(),
+        accelerometers: accelerometers.to_vec(),
+        supply: Some(supply),
+        ..Effects::default()
+    };
+    let scenario = thermal_loop(TUMBLE, effects);
+    let state = |document: &mut Document| {
+        let (name, unit) = ("supply".to_owned(), "V".to_owned());
+        let conversion = vec![0.0, 1.0];
+        document.auxiliary = vec![Auxiliary { name, unit, conversion, range: [3.0, 7.0], spike_limit: 0.5 }];
+        for (i, sensor) in document.gyro.sensor.iter_mut().enumerate() {
+            let regressor = |channel: String, minus, reference, gain| Regressor {
+                channel,
+                minus,
+                reference,
+                gain: Curve::new(constant(gain)),
+            };
+            sensor.regressor = vec![
+                regressor(format!("gyro{i}"), Some("housing".into()), 0.0, by_gradient[i]),
+                regressor("supply".into(), None, 5.0, by_supply[i]),
+            ];
+        }
+        for (i, sensor) in document.accel.as_mut().unwrap().sensor.iter_mut().enumerate() {
+            let scale = sensor.scale_factor.shape().at(25.0).unwrap();
+            let regressor = |channel: String, minus, reference, milli_g: f64| {
+                let gain =
+                    Curve::new(constant(0.05 * milli_g * 1e-3 * G * scale)).in_unit(Unit::MPerS2PerUnit);
+                AccelRegressor { channel, minus, reference, gain }
+            };
+            sensor.regressor = vec![
+                regressor(format!("accel{i}"), Some("housing".into()), 0.0, by_gradient[i]),
+                regressor("supply".into(), None, 5.0, by_supply[i]),
+            ];
+        }
+    };
+    let [floor, with, left] = judged(&scenario, state, |document, scenario| errors(document, scenario).0);
+    assert!(with > 10.0 && left < floor + 0.03 * with, "°/h: {with} {left} {floor}");
+    let [floor, with, left] = judged(&scenario, state, |document, scenario| errors(document, scenario).1);
+    assert!(with > 0.5 && left < floor + 0.03 * with, "mg: {with} {left} {floor}");
 }

@@ -1,10 +1,10 @@
 //! Laws of every term that is declared, whichever these are: what a term adds is proportional to its coefficient, makes no jump, and is
 //! finite for whatever comes in.
 
-use isotherm_correction::calibration::{CalibrationParts, TermParts};
-use isotherm_correction::sample::CorrectedTick;
+use isotherm_correction::calibration::CalibrationParts;
+use isotherm_correction::sample::{ChannelName, CorrectedTick, TemperatureReading};
 use isotherm_correction::thermal::{ACCEL_TERMS, GYRO_TERMS, Term};
-use isotherm_tests::calibrations::{Feature, compile, constant, identity};
+use isotherm_tests::calibrations::{compile, stated, with_auxiliaries};
 use isotherm_tests::drive::{self, Owned};
 use isotherm_tests::streams::{accel, gyro, temperature};
 
@@ -13,26 +13,10 @@ const TICKS: u32 = 4000;
 /// Largest change from tick to tick of what a term adds, by the whole of it.
 const SMOOTH: f64 = 0.03;
 
-/// A coefficient of which every feature makes about 10⁻⁴ rad/s or 10⁻³ m/s² on the motion below.
-fn coefficient(term: Term, gyros: bool) -> f64 {
-    let feature = match term.feature {
-        Feature::One | Feature::LasingMode | Feature::Meander => 1.0,
-        Feature::Reading | Feature::RateMagnitude | Feature::Lag | Feature::ThermalRate => 0.5,
-        Feature::ThermalAcceleration => 0.3,
-        Feature::ForceX | Feature::ForceY | Feature::ForceZ => 10.0,
-        Feature::ForceSquared => 100.0,
-    };
-    if gyros { 1e-4 / feature } else { 1e-3 / feature }
-}
-
 /// All sensors of one kind with a term, or none.
 fn with(term: Term, gyros: bool, times: f64) -> CalibrationParts {
-    let mut parts = identity();
-    let gain = constant(times * coefficient(term, gyros));
-    let stated = match term.feature {
-        Feature::Lag => TermParts::lag(5.0, gain),
-        feature => TermParts::new(feature, gain),
-    };
+    let mut parts = with_auxiliaries();
+    let stated = stated(term, gyros, times);
     let sensors = if gyros {
         parts.gyros.iter_mut().map(|gyro| &mut gyro.terms).collect::<Vec<_>>()
     } else {
@@ -50,7 +34,13 @@ fn run(parts: &CalibrationParts, odd: impl Fn(u32) -> Option<f64>) -> Vec<Correc
     for k in 0..TICKS {
         let t = f64::from(k) * 0.005;
         if k % 200 == 0 {
-            events.push(Owned::Temperature(vec![temperature(k.into(), 20.0 + 3.0 * (0.4 * t).sin())]));
+            let of = |name, raw| TemperatureReading {
+                channel: ChannelName::from(name).unwrap(),
+                ..temperature(k.into(), raw)
+            };
+            let swing = 3.0 * (0.4 * t).sin();
+            // In no order: what is read at one moment acts together.
+            events.push(Owned::Temperature(vec![of("u", 5.0 + swing), of("t", 20.0 + swing), of("v", 2.5)]));
         }
         let swing = |phase: f64| (1.3 * t + phase).sin();
         let mut forces = [9.0 * swing(0.1), 12.0 * swing(2.0), 10.0 * swing(4.0)];

@@ -34,6 +34,7 @@ fn recorder(locator: &str, file: &Path) -> Child {
     Command::new(program("isotherm-replay"))
         .args(["record", "--no-service", "--overwrite", "--connect", locator, "--chunk-seconds"])
         .arg(CHUNK.as_secs_f64().to_string())
+        .arg("--out")
         .arg(file)
         .stdout(Stdio::null())
         .spawn()

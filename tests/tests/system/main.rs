@@ -12,3 +12,4 @@ mod i8_clean_stop;
 mod online_equals_offline;
 mod python_subscriber;
 mod real_logs;
+mod watchdog;

@@ -74,6 +74,7 @@ SENSOR_FLAGS: dict[str, int] = {
     "STALE_TEMPERATURE": 1 << 3,
     "NOT_FINITE": 1 << 4,
     "EXCLUDED": 1 << 5,
+    "CLAMPED_RATE": 1 << 6,
 }
 
 # Type: fields (name, form) of a struct, or variants (name, form or None) of an enum.

@@ -3,6 +3,7 @@
 use alloc::vec::Vec;
 
 use super::super::defect::{Defect, DefectKind, Section};
+use super::super::parts::Source;
 use crate::sample::ChannelName;
 
 /// Collects defects.
@@ -11,11 +12,13 @@ pub(super) struct Checker {
     section: Section,
     /// How many temperature channels there are to be named.
     channels: usize,
+    /// How many auxiliary ones.
+    auxiliaries: usize,
 }
 
 impl Checker {
-    pub(super) fn new(channels: usize) -> Self {
-        Self { defects: Vec::new(), section: Section::Filter, channels }
+    pub(super) fn new(channels: usize, auxiliaries: usize) -> Self {
+        Self { defects: Vec::new(), section: Section::Filter, channels, auxiliaries }
     }
 
     /// What is looked at from now on is part of this section.
@@ -65,6 +68,17 @@ impl Checker {
     pub(super) fn channel(&mut self, field: &'static str, index: Option<usize>) {
         let channels = self.channels;
         if let Some(index) = index.filter(|index| *index >= channels) {
+            self.push(field, DefectKind::NoSuchChannel { index, channels });
+        }
+    }
+
+    /// A channel of either kind.
+    pub(super) fn source(&mut self, field: &'static str, source: Source) {
+        let (index, channels) = match source {
+            Source::Temperature(index) => (index, self.channels),
+            Source::Auxiliary(index) => (index, self.auxiliaries),
+        };
+        if index >= channels {
             self.push(field, DefectKind::NoSuchChannel { index, channels });
         }
     }

@@ -2,12 +2,15 @@
 
 use super::super::defect::{DefectKind, Section};
 use super::super::parts::{AccelParts, CalibrationParts, GyroParts, TermParts, TrendParts};
-use super::checker::Checker;
+use super::checker::{Checker, HUGE};
 use crate::channel::ThermalFilter;
 use crate::curve::Curve;
 use crate::orientation::{Orientation, OrientationError, OrientationParts};
 use crate::sample::OutputKind;
-use crate::thermal::{ACCEL_TERMS, AccelModel, Feature, GYRO_TERMS, GyroModel, MAX_LAGS, Term, TermError};
+use crate::thermal::{
+    ACCEL_TERMS, AccelModel, Feature, GYRO_TERMS, GyroModel, MAX_LAGS, MAX_PLAYS, MAX_REGRESSORS,
+    PLAY_WIDTHS_DEG_C, Term, TermError,
+};
 
 /// Farthest that an accelerometer may sit from the reference point along an axis (m).
 const MOST_POSITION_M: f64 = 100.0;
@@ -22,7 +25,7 @@ pub(super) fn gyro_model(
     checker.at(Section::Gyro(index)).channel("channel", gyro.channel);
     checker.positive("increment_weight", gyro.increment_weight.abs());
     checker.positive("input_limit", gyro.input_limit);
-    terms(checker, &gyro.terms, &GYRO_TERMS, parts);
+    terms(checker, (gyro.channel, &gyro.terms), &GYRO_TERMS, parts);
     if let Some(TrendParts { coefficients, interval_s }) = &gyro.trend {
         checker.coefficients("trend.coefficients", coefficients, 3);
         checker.range("trend.interval_s", *interval_s, 0.0, 1e9);
@@ -57,7 +60,7 @@ pub(super) fn accel_model(
         checker.within("position_m", metres, -MOST_POSITION_M, MOST_POSITION_M);
     }
     checker.positive("input_limit", accel.input_limit);
-    terms(checker, &accel.terms, &ACCEL_TERMS, parts);
+    terms(checker, (accel.channel, &accel.terms), &ACCEL_TERMS, parts);
     let model = AccelModel::new(accel, filter, &mut |field, error| checker.push(field, error))?;
     if let Some(at) = sign_change(&model.scale_factor) {
         checker.push("scale_factor", DefectKind::Zero { at });
@@ -65,14 +68,44 @@ pub(super) fn accel_model(
     Some(model)
 }
 
-/// Number of a sensor's terms of each feature, and the lags' time constants.
-fn terms(checker: &mut Checker, terms: &[TermParts], declared: &[Term], parts: &CalibrationParts) {
+/// Number of a sensor's terms of each feature, and what they need beside coefficients; `channel` is the sensor's own.
+fn terms(
+    checker: &mut Checker,
+    (channel, terms): (Option<usize>, &[TermParts]),
+    declared: &[Term],
+    parts: &CalibrationParts,
+) {
     for Term { feature, key } in declared {
         let stated = terms.iter().filter(|term| term.feature == *feature);
-        checker.count(key, stated.count(), 0, if *feature == Feature::Lag { MAX_LAGS } else { 1 });
+        let most = match feature {
+            Feature::Lag => MAX_LAGS,
+            Feature::Play => MAX_PLAYS,
+            Feature::Regressor => MAX_REGRESSORS,
+            _ => 1,
+        };
+        checker.count(key, stated.count(), 0, most);
     }
-    for TermParts { time_constant_s, .. } in terms.iter().filter(|term| term.feature == Feature::Lag) {
-        checker.within("lag.time_constant_s", *time_constant_s, parts.filter.grid_step_s, 1e7);
+    for TermParts { feature, parameter, regressor, .. } in terms {
+        match feature {
+            Feature::Lag => {
+                checker.within("lag.time_constant_s", *parameter, parts.filter.grid_step_s, 1e7);
+            }
+            Feature::Play => {
+                let [least, most] = PLAY_WIDTHS_DEG_C;
+                checker.within("hysteresis.half_width_deg_c", *parameter, least, most);
+            }
+            Feature::Regressor => match regressor {
+                Some(regressor) => {
+                    regressor.channels().for_each(|source| checker.source("regressor.channel", source));
+                    checker.within("regressor.reference", regressor.reference, -HUGE, HUGE);
+                    if channel.is_none() {
+                        checker.push("channel", DefectKind::Missing { needed_by: "regressor" });
+                    }
+                }
+                None => checker.push("regressor", DefectKind::Missing { needed_by: "its coefficient" }),
+            },
+            _ => {}
+        }
     }
 }
 
@@ -93,6 +126,7 @@ pub(super) fn orientation(
     sensors: usize,
 ) -> Option<Orientation> {
     checker.count("rows", parts.rows.len(), sensors, sensors);
+    checker.count("plays", parts.plays.len(), 0, MAX_PLAYS);
     for &index in following {
         checker.channel("channels", Some(index));
     }

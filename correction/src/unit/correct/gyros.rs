@@ -248,7 +248,7 @@ fn sign(phase: Option<LasingMode>) -> f64 {
 #[cold]
 fn mark_clamped(flags: &mut [SensorFlags; MAX_SENSORS], clamped: SensorMask) {
     let lanes = flags.iter_mut().enumerate().filter(|(lane, _)| clamped.contains(*lane));
-    lanes.for_each(|(_, flags)| *flags |= SensorFlags::CLAMPED_TEMPERATURE);
+    lanes.for_each(|(_, flags)| *flags |= SensorFlags::CLAMPED_RATE);
 }
 
 /// Counts what the substitution did.

@@ -100,10 +100,10 @@ impl Corrector {
         terms
     }
 
-    /// Whether an accelerometer sits, or sat before a swap that is on its way, elsewhere than at the reference point.
-    fn has_positions(&self, calibration: &Calibration) -> bool {
+    /// What follows motion, and what did before a swap that is on its way.
+    fn motions<'a>(&'a self, calibration: &'a Calibration) -> impl Iterator<Item = &'a Motion> {
         let old = self.slew_from_motion().map(|old| &old.motion);
-        calibration.motion.as_deref().into_iter().chain(old).any(Motion::has_positions)
+        calibration.motion.as_deref().into_iter().chain(old)
     }
 
     /// Adds to the gyros' biases (rad/s) what follows motion; `rates` are those that the gyros read (rad/s), before any bias is
@@ -137,8 +137,7 @@ impl Corrector {
         clamped
     }
 
-    /// Notes the specific force of a tick in case axes, before the gyros are corrected by it; where it is not to be had, the last one
-    /// stands.
+    /// Notes the specific force of a tick in case axes for the gyros that drift with it; where it is not to be had, the last one stands.
     #[cold]
     pub(super) fn note_force<const N: usize>(
         &mut self,
@@ -146,6 +145,9 @@ impl Corrector {
         tick: &OnItsWay<'_>,
         shares: &Shares,
     ) {
+        if !self.motions(calibration).any(|motion| motion.feels_force) {
+            return;
+        }
         let Some(raw) = tick.accel else { return };
         let readings = narrow::<N>(&raw.readings);
         if !within(readings, narrow(&calibration.accel_limits)) {
@@ -176,7 +178,7 @@ impl Corrector {
         forces: &mut [f64; N],
     ) {
         self.remove_squares(shares, forces);
-        if self.has_positions(calibration) {
+        if self.motions(calibration).any(Motion::has_positions) {
             self.remove_size_effect(calibration, missed, out, forces);
         }
     }

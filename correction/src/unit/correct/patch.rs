@@ -4,7 +4,7 @@ use crate::lanes::Lanes;
 use crate::orientation::SensorMask;
 use crate::sample::{MAX_SENSORS, SensorFlags};
 use crate::unit::counters::Counters;
-use crate::unit::thermal_memory::Footing;
+use crate::unit::footing::Footing;
 use crate::units::Timestamp;
 
 /// A reading that does not count as it stands.

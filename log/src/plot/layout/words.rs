@@ -3,6 +3,28 @@
 use crate::plot::PlotSummary;
 use crate::plot::time::seconds;
 
+/// What each unit has in each log: a sentence, and what else is to be known.
+pub(super) fn results(summary: &PlotSummary) -> Vec<(String, String)> {
+    let mut results = Vec::new();
+    for (unit, logs) in &summary.units {
+        for (name, log) in summary.logs.iter().zip(logs) {
+            let Some(log) = log else { continue };
+            let of = if logs.iter().flatten().count() > 1 { format!(" in {name}") } else { String::new() };
+            let (raw, corrected) = (log.raw_ticks, log.corrected_ticks);
+            let mut more = vec![format!("{raw} raw gyro ticks")];
+            if corrected > 0 || log.missed_ticks > 0 {
+                more.push(format!("{} announced as missing", log.missed_ticks));
+            }
+            if log.marks > 0 {
+                more.push(format!("{} changes and commands", log.marks));
+            }
+            let sentence = format!("Unit {unit}{of}: {corrected} corrected ticks.");
+            results.push((sentence, more.join(", ")));
+        }
+    }
+    results
+}
+
 /// What is to be known of the page as a whole.
 pub(super) fn remarks(summary: &PlotSummary) -> Vec<String> {
     let mut words = Vec::new();

@@ -12,7 +12,8 @@ use mcap::{McapError, Writer};
 use super::RecoveryReport;
 use crate::error::Error;
 use crate::message::Topic;
-use crate::recording::writer::{declare, failed};
+use crate::recording::view;
+use crate::recording::writer::{declare, declare_view, failed};
 use crate::recording::{
     Attachment, CHANNELS, Documents, MESSAGE_ENCODING, METADATA, RecordingOptions, place,
 };
@@ -211,7 +212,10 @@ impl<'a> Rescue<'a> {
             let id = self.writer.add_channel(schema, topic, message_encoding, metadata)?;
             (id, topic.clone(), message_encoding == MESSAGE_ENCODING)
         } else if let Some(key) = self.definitions.keys.get(&number) {
-            (declare(&mut self.writer, &Topic::of(key))?, key.clone(), true)
+            match view::topic(key) {
+                Some(topic) => (declare_view(&mut self.writer, &topic)?, key.clone(), false),
+                None => (declare(&mut self.writer, &Topic::of(key))?, key.clone(), true),
+            }
         } else {
             return Ok(None);
         };

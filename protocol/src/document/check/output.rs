@@ -11,20 +11,37 @@ const GYRO_OUTPUTS: [(GyroOutput, &str, [&str; 2]); 2] = [
     (GyroOutput::Counts, "counts", ["increment_weight_arcsec_per_count", "input_limit_counts_per_tick"]),
     (GyroOutput::Mean, "mean", ["increment_weight_rad_per_rad", "input_limit_deg_per_s"]),
 ];
-/// Input limit of each output, with its name and the units of scale factor, bias and lags.
-const ACCEL_OUTPUTS: [(AccelOutput, &str, &str, [Unit; 3]); 3] = [
+/// Input limit of each output, with its name and the units of scale factor, bias, lags, hysteresis and regressors.
+const ACCEL_OUTPUTS: [(AccelOutput, &str, &str, [Unit; 5]); 3] = [
     (
         AccelOutput::Counts,
         "counts",
         "input_limit_counts_per_tick",
-        [Unit::CountsPerSPerMPerS2, Unit::CountsPerS, Unit::CountsPerSPerDegCPerS],
+        [
+            Unit::CountsPerSPerMPerS2,
+            Unit::CountsPerS,
+            Unit::CountsPerSPerDegCPerS,
+            Unit::CountsPerSPerDegC,
+            Unit::CountsPerSPerUnit,
+        ],
     ),
-    (AccelOutput::Volts, "V", "input_limit_v", [Unit::VPerMPerS2, Unit::V, Unit::VPerDegCPerS]),
+    (
+        AccelOutput::Volts,
+        "V",
+        "input_limit_v",
+        [Unit::VPerMPerS2, Unit::V, Unit::VPerDegCPerS, Unit::VPerDegC, Unit::VPerUnit],
+    ),
     (
         AccelOutput::MetresPerSecondSquared,
         "m/s2",
         "input_limit_m_per_s2",
-        [Unit::MPerS2PerMPerS2, Unit::MPerS2, Unit::MPerS2PerDegCPerS],
+        [
+            Unit::MPerS2PerMPerS2,
+            Unit::MPerS2,
+            Unit::MPerS2PerDegCPerS,
+            Unit::MPerS2PerDegC,
+            Unit::MPerS2PerUnit,
+        ],
     ),
 ];
 
@@ -59,7 +76,7 @@ pub(super) fn gyro(r: &mut Reader<'_>, path: &str, output: GyroOutput, sensor: &
 pub(super) fn accel(r: &mut Reader<'_>, path: &str, output: AccelOutput, sensor: &AccelSensor) {
     if r.is_damaged("accel.output") {
         // Nobody knows the units of these.
-        for key in ["scale_factor", "bias", "lag"] {
+        for key in ["scale_factor", "bias", "lag", "hysteresis", "regressor"] {
             r.damage(&join(path, key));
         }
         return;
@@ -70,7 +87,7 @@ pub(super) fn accel(r: &mut Reader<'_>, path: &str, output: AccelOutput, sensor:
             r.refuse(&path, format!("goes with output = {name:?} only"));
         }
     }
-    let Some((_, _, _, [scale_factor, bias, gain])) =
+    let Some((_, _, _, [scale_factor, bias, of_lag, of_play, of_regressor])) =
         ACCEL_OUTPUTS.into_iter().find(|(this, ..)| *this == output)
     else {
         return;
@@ -78,7 +95,13 @@ pub(super) fn accel(r: &mut Reader<'_>, path: &str, output: AccelOutput, sensor:
     in_unit(r, &join(path, "scale_factor"), Some(&sensor.scale_factor), scale_factor);
     in_unit(r, &join(path, "bias"), sensor.bias.as_ref(), bias);
     for (i, lag) in sensor.lag.iter().enumerate() {
-        in_unit(r, &format!("{path}.lag[{i}].gain"), Some(&lag.gain), gain);
+        in_unit(r, &format!("{path}.lag[{i}].gain"), Some(&lag.gain), of_lag);
+    }
+    for (i, play) in sensor.hysteresis.iter().enumerate() {
+        in_unit(r, &format!("{path}.hysteresis[{i}].gain"), Some(&play.gain), of_play);
+    }
+    for (i, regressor) in sensor.regressor.iter().enumerate() {
+        in_unit(r, &format!("{path}.regressor[{i}].gain"), Some(&regressor.gain), of_regressor);
     }
 }
 

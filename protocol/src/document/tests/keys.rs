@@ -221,6 +221,11 @@ fn every_number_names_its_unit() {
         "accel.orientation.rows",
         "accel.orientation.weights",
         "self_test.counter.max_increase",
+        "auxiliary.conversion",
+        "auxiliary.range",
+        "auxiliary.spike_limit",
+        "gyro.sensor.regressor.reference",
+        "accel.sensor.regressor.reference",
     ];
     for key in keys_of_schema() {
         let numeric = |node: &Json| matches!(node["type"].as_str(), Some("number" | "integer"));
@@ -257,7 +262,10 @@ fn every_form_of_every_curve_in_the_schema_is_read() {
             forms += 1;
             // Of a branched coefficient both curves change, so that they keep one argument.
             let mut read = 0;
-            for text in [FULL, OTHER, &OTHER.replace("\"V\"", "\"m/s2\"").replace("_v", "_m_per_s2")] {
+            let counting = OTHER.replace("input_limit_v = 10\n", "").replace("\"V\"", "\"counts\"");
+            let counting = counting.replace("_v", "_counts_per_s");
+            let measuring = OTHER.replace("\"V\"", "\"m/s2\"").replace("_v", "_m_per_s2");
+            for text in [FULL, OTHER, &measuring, &counting] {
                 let document: toml::Table = text.parse().unwrap();
                 let Some(steps) = places(&document, &key.path).into_iter().next() else { continue };
                 let (mut text, _) = changed(&document, &steps, Some(Value::Table(curve.clone())));

@@ -3,7 +3,10 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::super::curve::{Curve, OutputBias, OutputLagGain, Relative, ScaleFactor, SecondOrder};
+use super::super::curve::{
+    Curve, OutputBias, OutputHysteresisGain, OutputLagGain, OutputRegressorGain, Relative, ScaleFactor,
+    SecondOrder,
+};
 use super::Orientation;
 
 /// The accelerometers of the unit: `f = (U − S(T) − lags)·r(T_board)/K(T)`.
@@ -73,6 +76,14 @@ pub struct AccelSensor {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 8))]
     pub lag: Vec<AccelLag>,
+    /// As for gyros. Source: models §2.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(length(max = 8))]
+    pub hysteresis: Vec<AccelHysteresis>,
+    /// As for gyros. Source: models §2.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(length(max = 8))]
+    pub regressor: Vec<AccelRegressor>,
     /// K2: what it feels beyond f per f², f along its input axis. Source: models §3, IEEE 528.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub second_order: Option<Curve<SecondOrder>>,
@@ -95,6 +106,35 @@ pub struct AccelLag {
     pub time_constant_s: f64,
     /// g(T).
     pub gain: Curve<OutputLagGain>,
+}
+
+/// One play of an accelerometer's bias.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields, title = "Hysteresis of an accelerometer")]
+pub struct AccelHysteresis {
+    /// w.
+    #[schemars(range(min = 0.001, max = 1000.0))]
+    pub half_width_deg_c: f64,
+    /// g(T).
+    pub gain: Curve<OutputHysteresisGain>,
+}
+
+/// One regressor of an accelerometer's bias.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields, title = "Regressor of an accelerometer")]
+pub struct AccelRegressor {
+    /// x.
+    #[schemars(length(min = 1, max = 24), extend("x-must-be" = "a name of 1 to 24 bytes"))]
+    pub channel: String,
+    /// Subtracted channel.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(length(min = 1, max = 24), extend("x-must-be" = "a name of 1 to 24 bytes"))]
+    pub minus: Option<String>,
+    /// Subtracted constant.
+    #[serde(default)]
+    pub reference: f64,
+    /// g(T).
+    pub gain: Curve<OutputRegressorGain>,
 }
 
 /// Detection and exclusion of a failed accelerometer.

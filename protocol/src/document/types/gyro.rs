@@ -5,8 +5,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::super::curve::{
-    Curve, DriftByForce, Frequency, LagGain, RateBias, Relative, RelativeOverRate, ThermalAcceleration,
-    ThermalRate,
+    Curve, DriftByForce, Frequency, HysteresisGain, LagGain, RateBias, RegressorGain, Relative,
+    RelativeOverRate, ThermalAcceleration, ThermalRate,
 };
 use super::{Drift, Orientation};
 
@@ -86,6 +86,14 @@ pub struct GyroSensor {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 8))]
     pub lag: Vec<Lag>,
+    /// Hysteresis `Σ g(T)·(p_w[T] − T)`, `p_w` a play. Source: models §2.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(length(max = 8))]
+    pub hysteresis: Vec<Hysteresis>,
+    /// Bias by other channels `Σ g(T)·(x − x₀)`; needs `channel`. Source: models §2.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(length(max = 8))]
+    pub regressor: Vec<Regressor>,
     /// Drift by specific force along the case axes; needs `[accel]`. Source: models §2, IEEE 528.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub acceleration_sensitive_drift: Option<AlongAxes<Curve<DriftByForce>>>,
@@ -141,6 +149,35 @@ pub struct Lag {
     pub time_constant_s: f64,
     /// g(T).
     pub gain: Curve<LagGain>,
+}
+
+/// One play.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields, title = "Hysteresis")]
+pub struct Hysteresis {
+    /// w.
+    #[schemars(range(min = 0.001, max = 1000.0))]
+    pub half_width_deg_c: f64,
+    /// g(T).
+    pub gain: Curve<HysteresisGain>,
+}
+
+/// One regressor.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields, title = "Regressor")]
+pub struct Regressor {
+    /// x.
+    #[schemars(length(min = 1, max = 24), extend("x-must-be" = "a name of 1 to 24 bytes"))]
+    pub channel: String,
+    /// Subtracted channel.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(length(min = 1, max = 24), extend("x-must-be" = "a name of 1 to 24 bytes"))]
+    pub minus: Option<String>,
+    /// Subtracted constant.
+    #[serde(default)]
+    pub reference: f64,
+    /// g(T).
+    pub gain: Curve<RegressorGain>,
 }
 
 /// Polynomial of the time since turn-on, held outside its interval.

@@ -41,7 +41,8 @@ impl Sink {
                 return Err(Error::Usage("--format is for files other than FILE.mcap".to_owned()));
             }
             refuse_overwriting(out, &inputs)?;
-            let writer = Box::new(RecordingWriter::create(out, RecordingOptions::default())?);
+            let options = RecordingOptions { json: true, ..RecordingOptions::default() };
+            let writer = Box::new(RecordingWriter::create(out, options)?);
             return Ok(Self::Recording { writer, attached: BTreeSet::new(), received_ns: 0 });
         }
         let format = format.unwrap_or_default();

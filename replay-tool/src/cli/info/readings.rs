@@ -1,4 +1,4 @@
-//! Figures of readings, and times as dates.
+//! Figures of readings.
 
 use comfy_table::{CellAlignment, Table, presets};
 use isotherm_log::info::{ReadingInfo, UnitInfo};
@@ -43,22 +43,12 @@ fn figure(number: f64) -> String {
     }
 }
 
-/// A time since 1970 as date and time of day (UTC); one outside 1990 to 2100 is the count of a clock that began anywhere.
-pub(super) fn date(ns: i128) -> String {
-    let seconds = u64::try_from(ns / 1_000_000_000).unwrap_or(0);
-    if !(631_152_000..4_102_444_800).contains(&seconds) {
-        return format!("{ns} ns on its own clock");
-    }
-    let time = std::time::UNIX_EPOCH + std::time::Duration::from_secs(seconds);
-    humantime::format_rfc3339_seconds(time).to_string().replace('T', " ").replace('Z', " UTC")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn numbers_keep_seven_digits_and_times_are_dates() {
+    fn numbers_keep_seven_digits() {
         for (number, expected) in [
             (0.0, "0"),
             (9.806_65, "9.80665"),
@@ -68,7 +58,5 @@ mod tests {
         ] {
             assert_eq!(figure(number), expected);
         }
-        assert_eq!(date(1_763_905_807_000_000_000), "2025-11-23 13:50:07 UTC");
-        assert_eq!(date(5_000_000), "5000000 ns on its own clock");
     }
 }

@@ -4,12 +4,13 @@ use std::fmt::Write;
 
 use comfy_table::{CellAlignment, Table, presets};
 use isotherm_correction::units::{Span, Timestamp};
+use isotherm_log::date::date;
 use isotherm_log::info::{
     FileInfo, JournalInfo, LogInfo, Spread, StateInfo, StatusInfo, TopicInfo, UnitInfo,
 };
 use isotherm_log::source::LogReport;
 
-use super::readings::{date, readings};
+use super::readings::readings;
 use crate::cli::show;
 
 /// Most swaps, commands, states or revisions that are listed; JSON has more.
@@ -23,7 +24,7 @@ pub(in crate::cli) fn of(info: &LogInfo) -> String {
         line(&mut text, format_args!("\nUnit {unit}"));
         text += &topics(&of.topics);
         let begin_ns = of.topics.iter().filter_map(|topic| topic.first_ns).min().unwrap_or(0);
-        line(&mut text, format_args!("first tick {}", date(begin_ns.into())));
+        line(&mut text, format_args!("first tick {}", date(begin_ns)));
         unit_details(&mut text, of, begin_ns);
     }
     if !info.other_topics.is_empty() {
@@ -77,7 +78,7 @@ fn files(text: &mut String, info: &LogInfo) {
             format_args!(
                 "received over {}, from {}",
                 seconds(last.saturating_sub(first)),
-                date(first.into())
+                date(i64::try_from(first).unwrap_or(i64::MAX))
             ),
         );
     }

@@ -153,7 +153,8 @@ async fn wait_for_last(file: impl Fn() -> PathBuf, times: usize) {
 #[tokio::test(flavor = "multi_thread")]
 async fn what_is_published_is_in_the_file() {
     let bench = Bench::new().await;
-    let recorder = bench.record("", &["run", "--chunk-seconds", "0.05", "--unit", "A-1", "--unit", "B-2"]);
+    let recorder =
+        bench.record("", &["--out", "run", "--chunk-seconds", "0.05", "--unit", "A-1", "--unit", "B-2"]);
     let published = publish(&bench, 2000).await;
     // Behind the others: when it is written, they are. The recording names the topics asked for, too.
     let last = bench.publisher("imu/B-2/reference").await;
@@ -187,7 +188,7 @@ async fn what_is_published_is_in_the_file() {
 #[tokio::test(flavor = "multi_thread")]
 async fn at_the_seam_of_two_files_nothing_is_lost_or_doubled() {
     let bench = Bench::new().await;
-    let arguments = ["run", "--max-size", "20K", "--chunk-seconds", "0.01", "--compression", "none"];
+    let arguments = ["--out", "run", "--max-size", "20K", "--chunk-seconds", "0.01", "--compression", "none"];
     let recorder = bench.record("", &arguments);
     let mut published: BTreeMap<String, Vec<Vec<u8>>> = BTreeMap::new();
     let publishers = [bench.publisher(&raw("A-1")).await, bench.publisher(&raw("B-2")).await];
@@ -231,8 +232,18 @@ async fn at_the_seam_of_two_files_nothing_is_lost_or_doubled() {
 #[tokio::test(flavor = "multi_thread")]
 async fn only_the_newest_files_are_kept() {
     let bench = Bench::new().await;
-    let arguments =
-        ["run", "--max-size", "16K", "--keep", "2", "--chunk-seconds", "0.01", "--compression", "none"];
+    let arguments = [
+        "--out",
+        "run",
+        "--max-size",
+        "16K",
+        "--keep",
+        "2",
+        "--chunk-seconds",
+        "0.01",
+        "--compression",
+        "none",
+    ];
     let recorder = bench.record("", &arguments);
     let publisher = bench.publisher(&raw("A-1")).await;
     let mut number = 0;
@@ -258,7 +269,7 @@ async fn only_the_newest_files_are_kept() {
 #[tokio::test(flavor = "multi_thread")]
 async fn what_does_not_fit_the_queue_is_counted_per_topic() {
     let bench = Bench::new().await;
-    let recorder = bench.record("", &["run", "--queue", "1M", "--chunk-seconds", "0.01"]);
+    let recorder = bench.record("", &["--out", "run", "--queue", "1M", "--chunk-seconds", "0.01"]);
     let small = bench.publisher(&raw("A-1")).await;
     let large = bench.publisher(&raw("B-2")).await;
     for number in 0..300 {
@@ -292,7 +303,7 @@ async fn a_full_disk_ends_the_recording_and_nothing_else() {
     let bench = Bench::new().await;
     // Blocks of 512 or of 1024 bytes, as the shell has it.
     let recorder =
-        bench.record("ulimit -f 64;", &["run", "--compression", "none", "--chunk-seconds", "0.02"]);
+        bench.record("ulimit -f 64;", &["--out", "run", "--compression", "none", "--chunk-seconds", "0.02"]);
     let topic = bench.publisher(&raw("A-1")).await;
     let mut published = Vec::new();
     let flood = async {
@@ -314,7 +325,7 @@ async fn a_full_disk_ends_the_recording_and_nothing_else() {
     assert_eq!(figure("received"), figure("written") + figure("lost"));
 
     // Where the limit leaves no room even for an end, the file has none.
-    let output = replay(bench.folder.path(), &["recover", "run.mcap", "whole.mcap", "--json"]);
+    let output = replay(bench.folder.path(), &["recover", "run.mcap", "--out", "whole.mcap", "--json"]);
     let recovered: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!((output.status.code(), &recovered["damaged_bytes"]), (Some(0), &0.into()), "{recovered}");
     let (frames, metadata) = read(&[bench.path("whole.mcap")]);
@@ -331,21 +342,23 @@ async fn a_full_disk_ends_the_recording_and_nothing_else() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_second_recorder_does_not_touch_the_file_of_the_first() {
     let bench = Bench::new().await;
-    let first = bench.record("", &["run", "--chunk-seconds", "0.01"]);
+    let first = bench.record("", &["--out", "run", "--chunk-seconds", "0.01"]);
     let publisher = bench.publisher(&raw("A-1")).await;
     publisher.put(temperature("A-1", 0).frame).await.unwrap();
     wait_for(|| bench.path("run.mcap"), "imu/A-1/raw/temp", 1).await;
-    for arguments in [["run", "--duration", "1", ""], ["run", "--duration", "1", "--overwrite"]] {
+    for arguments in
+        [["--out", "run", "--duration", "1", ""], ["--out", "run", "--duration", "1", "--overwrite"]]
+    {
         let (code, _, errors) = bench.record("", &arguments).end();
         assert_eq!(code, Some(2), "{errors}");
         assert!(errors.contains("run.mcap is being written by another recorder"), "{errors}");
     }
     first.interrupt();
     assert_eq!(first.end().0, Some(0));
-    let (code, _, errors) = bench.record("", &["run", "--duration", "1"]).end();
+    let (code, _, errors) = bench.record("", &["--out", "run", "--duration", "1"]).end();
     assert!(code == Some(2) && errors.contains("--overwrite"), "{errors}");
     assert_eq!(read(&[bench.path("run.mcap")]).0[&raw("A-1")].len(), 1);
-    assert_eq!(bench.record("", &["run", "--duration", "0.1", "--overwrite"]).end().0, Some(0));
+    assert_eq!(bench.record("", &["--out", "run", "--duration", "0.1", "--overwrite"]).end().0, Some(0));
     assert!(read(&[bench.path("run.mcap")]).0.is_empty());
     bench.end().await;
 }
@@ -355,7 +368,7 @@ fn a_missing_service_is_an_error_within_the_time() {
     let folder = tempfile::tempdir().unwrap();
     let begun = std::time::Instant::now();
     let nobody = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().to_string();
-    let output = replay(folder.path(), &["record", "run", "--timeout", "0.3", "--connect", &nobody]);
+    let output = replay(folder.path(), &["record", "--out", "run", "--timeout", "0.3", "--connect", &nobody]);
     let errors = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(1), "{errors}");
     assert!(errors.contains(&nobody) && errors.contains("--no-service"), "{errors}");
@@ -375,7 +388,8 @@ fn limits_are_said_before_anything_is_opened() {
         (&["--max-size", "5T"], "must be a whole number of bytes"),
         (&["--unit", "a b"], "unit \"a b\""),
     ] {
-        let output = replay(folder.path(), &[&["record", "run", "--no-service"], arguments].concat());
+        let output =
+            replay(folder.path(), &[&["record", "--out", "run", "--no-service"], arguments].concat());
         let errors = String::from_utf8_lossy(&output.stderr).into_owned();
         assert_eq!(output.status.code(), Some(2), "{errors}");
         assert!(errors.contains(words), "{errors}");
@@ -384,5 +398,5 @@ fn limits_are_said_before_anything_is_opened() {
 
 #[test]
 fn the_example_of_the_help_works_as_printed() {
-    shell_example("record", &["record run.mcap"]);
+    shell_example("record", &["record --out run.mcap"]);
 }

@@ -36,7 +36,7 @@ async fn memories_are_asked_for_when_it_begins_when_links_have_come_up_and_when_
     let journals = bench.session.declare_queryable(key::ALL_JOURNALS);
     let journals = journals.callback(move |query| (answer.lock().unwrap())(query)).await.unwrap();
 
-    let recorder = bench.start("", &["run", "--timeout", "30"]);
+    let recorder = bench.start("", &["--out", "run", "--timeout", "30"]);
     for number in 1..=2 {
         // One file, and no service that came: the second time it asks of its own accord.
         assert_eq!(timeout(LIMIT, asked.recv()).await.unwrap(), Some(number));

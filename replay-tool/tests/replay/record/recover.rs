@@ -25,7 +25,7 @@ fn what_is_lost_is_said_and_the_old_file_stays() {
     let path = folder.path();
     write(&path.join("a.mcap"));
     let whole = fs::read(path.join("a.mcap")).unwrap();
-    let output = replay(path, &["recover", "a.mcap", "b.mcap", "--json"]);
+    let output = replay(path, &["recover", "a.mcap", "--out", "b.mcap", "--json"]);
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
     let summary: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!((summary["messages"].as_u64(), summary["missing"].as_u64()), (Some(100), Some(0)));
@@ -40,23 +40,23 @@ fn what_is_lost_is_said_and_the_old_file_stays() {
     }
     damaged[chunks[4]] ^= 1;
     fs::write(path.join("a.mcap"), &damaged).unwrap();
-    let output = replay(path, &["recover", "a.mcap", "c.mcap"]);
+    let output = replay(path, &["recover", "a.mcap", "--out", "c.mcap"]);
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     assert_eq!(output.status.code(), Some(3), "{text}");
     assert!(text.contains("imu/A-1/raw/temp: 10 of 100 messages are missing"), "{text}");
     assert_eq!(fs::read(path.join("a.mcap")).unwrap(), damaged);
 
     for (arguments, words) in [
-        (["recover", "a.mcap", "a.mcap"], "would be written over"),
-        (["recover", "a.mcap", "c.mcap"], "there already"),
-        (["recover", "missing.mcap", "d.mcap"], "missing.mcap: cannot open"),
+        (["recover", "a.mcap", "--out", "a.mcap"], "would be written over"),
+        (["recover", "a.mcap", "--out", "c.mcap"], "there already"),
+        (["recover", "missing.mcap", "--out", "d.mcap"], "missing.mcap: cannot open"),
     ] {
         let output = replay(path, &arguments);
         let errors = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(matches!(output.status.code(), Some(1 | 2)) && errors.contains(words), "{errors}");
     }
     assert_eq!(fs::read(path.join("a.mcap")).unwrap(), damaged);
-    assert_eq!(replay(path, &["recover", "a.mcap", "c.mcap", "--overwrite"]).status.code(), Some(3));
+    assert_eq!(replay(path, &["recover", "a.mcap", "--out", "c.mcap", "--overwrite"]).status.code(), Some(3));
 }
 
 #[test]

@@ -75,12 +75,12 @@ pub(crate) fn state_word(state: State) -> &'static str {
 }
 
 /// Whether increments are to go out.
-pub(super) fn is_running(state: State) -> bool {
+pub(crate) fn is_running(state: State) -> bool {
     matches!(state, State::RunningWithReversal | State::RunningWithoutReversal)
 }
 
 /// Rates are not measured by services before 0.2, which do not name themselves either.
-pub(super) fn knows_rates(status: &Status) -> bool {
+pub(crate) fn knows_rates(status: &Status) -> bool {
     !status.instance.is_empty()
 }
 

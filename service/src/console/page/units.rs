@@ -110,8 +110,8 @@ pub(crate) fn channel_in_view(status: &Status) -> Option<&ChannelStatus> {
     status.channels.iter().find(odd).or_else(|| status.channels.first())
 }
 
-/// Where the temperatures lie, all of them together.
-fn range(status: &Status) -> (&'static str, Style) {
+/// Where the temperatures lie, all of them together, and how it looks.
+pub(crate) fn range(status: &Status) -> (&'static str, Style) {
     let some = |is: &dyn Fn(&ChannelStatus) -> bool| status.channels.iter().any(is);
     if some(&|channel| channel.stale) {
         ("stale", tone::WARNING)
@@ -144,6 +144,7 @@ fn applied_mg(status: &Status) -> String {
     )
 }
 
-fn length(vector: [f64; 3]) -> f64 {
+/// Length of a vector.
+pub(crate) fn length(vector: [f64; 3]) -> f64 {
     vector.iter().map(|value| value * value).sum::<f64>().sqrt()
 }

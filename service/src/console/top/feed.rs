@@ -14,7 +14,7 @@ use crate::console::status::or_none;
 
 /// Something new.
 #[derive(Debug)]
-pub(super) enum News {
+pub(crate) enum News {
     /// The status of a unit.
     Unit(Box<Status>),
     /// The status of a service instance.
@@ -27,17 +27,20 @@ pub(super) enum News {
     NotUnderstood,
 }
 
+/// News that are not read yet: a session's own thread, which may be one that ticks come in on, reads nothing.
+type Unread = Box<dyn FnOnce() -> News + Send>;
+
 /// News as they come.
 #[derive(Debug)]
-pub(super) struct Feed {
-    news: UnboundedReceiver<News>,
+pub(crate) struct Feed {
+    news: UnboundedReceiver<Unread>,
     // Dropping them ends the subscriptions.
     _subscribers: [Subscriber<()>; 4],
 }
 
 impl Feed {
     /// Subscribes, and asks for what was said before.
-    pub(super) async fn start(client: &Client) -> Result<Self, ConsoleError> {
+    pub(crate) async fn start(client: &Client) -> Result<Self, ConsoleError> {
         let (sender, news) = unbounded_channel();
         let units = frames(client, key::ALL_STATUS, &sender, |status| News::Unit(Box::new(status))).await?;
         let services =
@@ -51,19 +54,20 @@ impl Feed {
         // Asked after the subscriptions, so that nothing is missed between the two.
         let (statuses, instances) = tokio::join!(client.statuses(), client.services());
         // The receiver is here.
-        or_none(instances)?.into_iter().for_each(|status| drop(sender.send(News::Service(Box::new(status)))));
-        statuses?.into_iter().for_each(|status| drop(sender.send(News::Unit(Box::new(status)))));
+        let known = or_none(instances)?.into_iter().map(|status| News::Service(Box::new(status)));
+        let known = known.chain(statuses?.into_iter().map(|status| News::Unit(Box::new(status))));
+        known.for_each(|news| drop(sender.send(Box::new(|| news))));
         Ok(Self { news, _subscribers: [units, services, units_alive, services_alive] })
     }
 
     /// The next news; `None` once the session is gone.
-    pub(super) async fn next(&mut self) -> Option<News> {
-        self.news.recv().await
+    pub(crate) async fn next(&mut self) -> Option<News> {
+        self.news.recv().await.map(|read| read())
     }
 
     /// News that have come already.
-    pub(super) fn next_now(&mut self) -> Option<News> {
-        self.news.try_recv().ok()
+    pub(crate) fn next_now(&mut self) -> Option<News> {
+        self.news.try_recv().ok().map(|read| read())
     }
 }
 
@@ -71,14 +75,15 @@ impl Feed {
 async fn frames<M: Message + 'static>(
     client: &Client,
     key: &str,
-    sender: &UnboundedSender<News>,
+    sender: &UnboundedSender<Unread>,
     news: fn(M) -> News,
 ) -> Result<Subscriber<()>, ConsoleError> {
     let sender = sender.clone();
     let told = move |sample: Sample| {
-        let frame = codec::decode(&sample.payload().to_bytes());
+        let frame = sample.payload().clone();
+        let read = move || codec::decode(&frame.to_bytes()).map_or(News::NotUnderstood, news);
         // The receiver may be gone already.
-        drop(sender.send(frame.map_or(News::NotUnderstood, news)));
+        drop(sender.send(Box::new(read)));
     };
     client.session.declare_subscriber(key.to_owned()).callback(told).await.map_err(Client::declare(key))
 }
@@ -87,14 +92,15 @@ async fn frames<M: Message + 'static>(
 async fn tokens(
     client: &Client,
     key: &str,
-    sender: &UnboundedSender<News>,
+    sender: &UnboundedSender<Unread>,
     parse: fn(&str) -> Option<&str>,
     news: fn(String, bool) -> News,
 ) -> Result<Subscriber<()>, ConsoleError> {
     let sender = sender.clone();
     let told = move |sample: Sample| {
         if let Some(name) = parse(sample.key_expr().as_str()) {
-            drop(sender.send(news(name.to_owned(), sample.kind() == SampleKind::Put)));
+            let news = news(name.to_owned(), sample.kind() == SampleKind::Put);
+            drop(sender.send(Box::new(|| news)));
         }
     };
     let liveliness = client.session.liveliness();

@@ -30,7 +30,7 @@ pub(super) type Key = (String, String);
 
 /// All that has been seen.
 #[derive(Debug, Default)]
-pub(super) struct Fleet {
+pub(crate) struct Fleet {
     units: BTreeMap<Key, Row>,
     services: BTreeMap<String, Instance>,
     /// Statuses that were not understood.
@@ -86,7 +86,7 @@ impl Look {
 
 impl Fleet {
     /// Takes news that came `now`, which is `now_unix_ms` by the clock of this machine.
-    pub(super) fn take(&mut self, news: News, now: Instant, now_unix_ms: i64) {
+    pub(crate) fn take(&mut self, news: News, now: Instant, now_unix_ms: i64) {
         match news {
             News::Unit(status) => self.unit(*status, now),
             News::Service(status) => {
@@ -150,7 +150,7 @@ impl Fleet {
     }
 
     /// Forgets what has been gone for a day, and what another instance has taken over.
-    pub(super) fn forget(&mut self, now: Instant) {
+    pub(crate) fn forget(&mut self, now: Instant) {
         let kept =
             |gone: Option<Instant>| gone.is_none_or(|gone| now.saturating_duration_since(gone) < FORGOTTEN);
         let there = self.units.iter().filter(|(_, row)| row.gone.is_none());
@@ -164,7 +164,7 @@ impl Fleet {
     }
 
     /// Every unit as it is `now`, by serial.
-    pub(super) fn units(&self, now: Instant, now_unix_ms: i64) -> Vec<Unit<'_>> {
+    pub(crate) fn units(&self, now: Instant, now_unix_ms: i64) -> Vec<Unit<'_>> {
         self.units.iter().map(|(key, row)| self.one(key, row, now, now_unix_ms)).collect()
     }
 
@@ -183,14 +183,14 @@ impl Fleet {
     }
 
     /// Every service instance, and the names of those that are gone.
-    pub(super) fn services(&self) -> (Vec<ServiceStatus>, Vec<String>) {
+    pub(crate) fn services(&self) -> (Vec<ServiceStatus>, Vec<String>) {
         let services = self.services.values().map(|service| service.status.clone()).collect();
         let gone = self.services.iter().filter(|(_, service)| service.gone.is_some());
         (services, gone.map(|(instance, _)| instance.clone()).collect())
     }
 
     /// The service instance of a unit.
-    pub(super) fn service_of(&self, status: &Status) -> Option<&ServiceStatus> {
+    pub(crate) fn service_of(&self, status: &Status) -> Option<&ServiceStatus> {
         self.services.get(&status.instance).map(|service| &service.status)
     }
 }

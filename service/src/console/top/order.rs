@@ -85,6 +85,11 @@ pub(super) fn arrange<'a>(
     units
 }
 
+/// All of them, those that need somebody first.
+pub(crate) fn worst_first(units: Vec<Unit<'_>>) -> Vec<Unit<'_>> {
+    arrange(units, Sort::State, false, "")
+}
+
 /// Whether serial, state or what is to be noticed contains the text, which is in lower case.
 fn matches(unit: &Unit<'_>, filter: &str) -> bool {
     if filter.is_empty() {

@@ -21,7 +21,7 @@ impl Recorder {
     /// Starts one that records to a file, or to a row of files where `more` says so.
     pub(super) fn start(file: PathBuf, locators: &[String], more: &[&str]) -> Self {
         let mut command = Command::new(program("isotherm-replay"));
-        command.arg("record").arg(&file).args(["--until-service-stops", "--json"]);
+        command.args(["record", "--out"]).arg(&file).args(["--until-service-stops", "--json"]);
         for locator in locators {
             command.args(["--connect", locator]);
         }

@@ -2,7 +2,7 @@
 
 use super::{Case, MODE_REVERSAL};
 
-pub(super) const CASES: [Case; 28] = [
+pub(super) const CASES: [Case; 32] = [
     (
         "two channels of one name",
         "name = \"coil\"",
@@ -146,6 +146,38 @@ pub(super) const CASES: [Case; 28] = [
         "time_constant_s = 0.5",
         "gyro.sensor[3].lag[0].time_constant_s",
         "is 0.5 s, must be at least temperature.filter.grid_step_s, 1 s",
+    ),
+    (
+        "regressor of no channel",
+        "increment_weight_error = { kind = \"polynomial\", reference_deg_c = 25.0, coefficients_ppm = [0.0, -6.1, 0.011], range_deg_c = [-40.0, 70.0] }",
+        "regressor = [{ channel = \"supply\", gain = { kind = \"constant\", value_deg_per_h_per_unit = 1.0 } }]",
+        "supply",
+        "gyro.sensor[3].regressor[0].channel",
+        "is \"supply\", which is no channel; the channels are: block, coil, accel, board",
+    ),
+    (
+        "difference to no channel",
+        "increment_weight_error = { kind = \"polynomial\", reference_deg_c = 25.0, coefficients_ppm = [0.0, -6.1, 0.011], range_deg_c = [-40.0, 70.0] }",
+        "regressor = [{ channel = \"coil\", minus = \"air\", gain = { kind = \"constant\", value_deg_per_h_per_unit = 1.0 } }]",
+        "\"air\"",
+        "gyro.sensor[3].regressor[0].minus",
+        "which is no channel",
+    ),
+    (
+        "reference that is no number",
+        "increment_weight_error = { kind = \"polynomial\", reference_deg_c = 25.0, coefficients_ppm = [0.0, -6.1, 0.011], range_deg_c = [-40.0, 70.0] }",
+        "regressor = [{ channel = \"coil\", reference = nan, gain = { kind = \"constant\", value_deg_per_h_per_unit = 1.0 } }]",
+        "reference = nan",
+        "gyro.sensor[3].regressor[0].reference",
+        "nan",
+    ),
+    (
+        "hysteresis without slack",
+        "increment_weight_error = { kind = \"polynomial\", reference_deg_c = 25.0, coefficients_ppm = [0.0, -6.1, 0.011], range_deg_c = [-40.0, 70.0] }",
+        "hysteresis = [{ half_width_deg_c = 0.0, gain = { kind = \"constant\", value_deg_per_h_per_deg_c = 1.0 } }]",
+        "half_width_deg_c = 0.0",
+        "gyro.sensor[3].hysteresis[0].half_width_deg_c",
+        "must be a number",
     ),
     (
         "array for a table",

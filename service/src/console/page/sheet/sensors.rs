@@ -50,7 +50,7 @@ fn now(sensor: &SensorStatus) -> (String, Style) {
     let flags = SensorFlags::from_bits_truncate(sensor.flags);
     if flags.contains(SensorFlags::STALE_TEMPERATURE) {
         ("stale temperature".to_owned(), tone::WARNING)
-    } else if flags.contains(SensorFlags::CLAMPED_TEMPERATURE) {
+    } else if flags.intersects(SensorFlags::CLAMPED_TEMPERATURE | SensorFlags::CLAMPED_RATE) {
         ("clamped".to_owned(), tone::WARNING)
     } else if sensor.ticks == 0 {
         (NONE.to_owned(), tone::PLAIN)

@@ -1,0 +1,99 @@
+//! `isotherm-replay cat`.
+
+use std::io::{self, BufWriter, ErrorKind, Write};
+
+use clap::Args;
+use isotherm_log::message::{Message, Topic};
+use isotherm_protocol::codec::{self, CodecError};
+use isotherm_protocol::corrected::CorrectedBatch;
+use isotherm_protocol::journal::JournalPart;
+use isotherm_protocol::key::RawStream;
+use isotherm_protocol::raw::{AccelBatch, GyroBatch, HealthBatch, TemperatureBatch};
+use isotherm_protocol::reference::Reference;
+use isotherm_protocol::service_status::ServiceStatus;
+use isotherm_protocol::status::Status;
+use serde_json::{Value, json};
+use zenoh::key_expr::OwnedKeyExpr;
+
+use super::play::key_expression;
+use super::{LogArgs, Outcome, show};
+use crate::error::Error;
+use crate::play::wanted;
+
+/// Print the messages of a log as JSON, one a line
+#[derive(Debug, Args)]
+#[command(after_help = "Example, in two steps:\n  \
+    isotherm-replay simulate --preset mems-chamber --duration 60 --out mems.csv\n  \
+    isotherm-replay cat mems.csv --mapping mems.mapping.toml --unit MEMS-0001 --topic 'imu/*/raw/temp' --limit 2\n\n\
+    Each line has `topic`, `received_ns` and `message`, whose fields are those of docs/wire.md; or `error`, where a frame cannot\n\
+    be read (exit code 3).")]
+pub(super) struct CatArgs {
+    #[command(flatten)]
+    log: LogArgs,
+    /// Take only topics of these keys, e.g. 'imu/*/raw/gyro'; repeatable
+    #[arg(long, value_name = "KEY", value_parser = key_expression)]
+    topic: Vec<OwnedKeyExpr>,
+    /// Stop after so many messages
+    #[arg(long, value_name = "N")]
+    limit: Option<u64>,
+}
+
+/// Runs the command.
+pub(super) fn run(args: &CatArgs) -> Result<Outcome, Error> {
+    let mut messages = args.log.messages(1, None)?;
+    let mut out = BufWriter::new(io::stdout().lock());
+    let (mut printed, mut unread) = (0, false);
+    while args.limit.is_none_or(|limit| printed < limit)
+        && let Some(message) = messages.next_message()?
+    {
+        if !wanted(&args.topic, &message.topic) {
+            continue;
+        }
+        let mut line = json!({ "topic": message.topic.key(), "received_ns": message.received_ns });
+        match decoded(&message) {
+            Ok(value) => line["message"] = value,
+            Err(error) => {
+                unread = true;
+                line["error"] = error.to_string().into();
+            }
+        }
+        printed += 1;
+        if let Err(source) = out.write_all(show::json(&line).as_bytes()) {
+            return ended(source);
+        }
+    }
+    if let Err(source) = out.flush() {
+        return ended(source);
+    }
+    Ok(if unread || messages.report().lost_data() { Outcome::DataLoss } else { Outcome::Complete })
+}
+
+/// A reader that has gone away, as `head` does, has what it wanted.
+fn ended(source: io::Error) -> Result<Outcome, Error> {
+    if source.kind() == ErrorKind::BrokenPipe { Ok(Outcome::Complete) } else { Err(Error::Stdout { source }) }
+}
+
+/// What a message says; of a key that is none of the protocol's, its length.
+fn decoded(message: &Message) -> Result<Value, CodecError> {
+    fn of<T: codec::Message + serde::Serialize>(frame: &[u8]) -> Result<Value, CodecError> {
+        // Plain structures of numbers and texts, which always serialise; what is no number becomes null.
+        Ok(serde_json::to_value(codec::decode::<T>(frame)?).unwrap_or_default())
+    }
+    let frame = &message.frame;
+    match &message.topic {
+        Topic::Raw(_, RawStream::Gyro) => codec::decode(frame)
+            .map(|GyroBatch { output, ticks }| json!({ "output": output, "ticks": ticks })),
+        Topic::Raw(_, RawStream::Accel) => codec::decode(frame)
+            .map(|AccelBatch { output, ticks }| json!({ "output": output, "ticks": ticks })),
+        Topic::Raw(_, RawStream::Temperature) => {
+            codec::decode::<TemperatureBatch>(frame).map(|batch| json!({ "readings": batch.readings }))
+        }
+        Topic::Raw(_, RawStream::Health) => of::<HealthBatch>(frame),
+        Topic::Reference(_) => of::<Reference>(frame),
+        Topic::Corrected(_) => of::<CorrectedBatch>(frame),
+        Topic::Status(_) => of::<Status>(frame),
+        Topic::Journal(_) => of::<JournalPart>(frame),
+        Topic::Service(_) => of::<ServiceStatus>(frame),
+        Topic::Other(_) => Ok(json!({ "bytes": frame.len() })),
+    }
+}

@@ -1,0 +1,96 @@
+//! `isotherm-replay list`.
+
+use std::collections::BTreeMap;
+
+use clap::Args;
+use comfy_table::{CellAlignment, Table, presets};
+use serde::Serialize;
+use zenoh::key_expr::OwnedKeyExpr;
+
+use super::play::key_expression;
+use super::{LogArgs, Outcome, print, show};
+use crate::error::Error;
+use crate::play::wanted;
+use crate::progress::Bar;
+
+/// List the topics of a log: messages, bytes, times
+#[derive(Debug, Args)]
+#[command(after_help = "Example, in two steps:\n  \
+    isotherm-replay simulate --preset mems-chamber --duration 60 --out mems.csv\n  \
+    isotherm-replay list mems.csv --mapping mems.mapping.toml --unit MEMS-0001\n\n\
+    Times are seconds from the log's first message. What they hold: `isotherm-replay info` and `isotherm-replay cat`.")]
+pub(super) struct ListArgs {
+    #[command(flatten)]
+    log: LogArgs,
+    /// Take only topics of these keys, e.g. 'imu/*/raw/gyro'; repeatable
+    #[arg(long, value_name = "KEY", value_parser = key_expression)]
+    topic: Vec<OwnedKeyExpr>,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// What there is of a topic.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+struct Listed {
+    messages: u64,
+    bytes: u64,
+    first_s: f64,
+    last_s: f64,
+}
+
+/// Runs the command.
+pub(super) fn run(args: &ListArgs) -> Result<Outcome, Error> {
+    let mut messages = args.log.messages(1, None)?;
+    let mut bar = Bar::over_log(messages.progress());
+    let mut topics = BTreeMap::<String, Listed>::new();
+    let mut begin_ns = None;
+    while let Some(message) = messages.next_message()? {
+        let begin_ns = *begin_ns.get_or_insert(message.received_ns);
+        if !wanted(&args.topic, &message.topic) {
+            continue;
+        }
+        let at_s = seconds_between(begin_ns, message.received_ns);
+        let listed = topics
+            .entry(message.topic.key())
+            .or_insert_with(|| Listed { first_s: at_s, ..Listed::default() });
+        listed.messages += 1;
+        listed.bytes += message.frame.len() as u64;
+        listed.last_s = at_s;
+        bar.step(|| format!("{} topics", topics.len()));
+    }
+    bar.finish();
+    let report = messages.report();
+    let text = if args.json {
+        show::json(&serde_json::json!({ "topics": topics, "log": report }))
+    } else {
+        human(&topics)
+    };
+    print(text.as_bytes())?;
+    Ok(if report.lost_data() { Outcome::DataLoss } else { Outcome::Complete })
+}
+
+/// The distance of two moments (s), negative where the second is the earlier.
+#[expect(clippy::cast_precision_loss, reason = "shown to the millisecond")]
+fn seconds_between(from_ns: u64, to_ns: u64) -> f64 {
+    (i128::from(to_ns) - i128::from(from_ns)) as f64 / 1e9
+}
+
+fn human(topics: &BTreeMap<String, Listed>) -> String {
+    let mut table = Table::new();
+    table.load_preset(presets::NOTHING);
+    table.set_header(["topic", "messages", "bytes", "first s", "last s"]);
+    for (key, listed) in topics {
+        table.add_row([
+            key.clone(),
+            listed.messages.to_string(),
+            listed.bytes.to_string(),
+            format!("{:.3}", listed.first_s),
+            format!("{:.3}", listed.last_s),
+        ]);
+    }
+    for column in table.column_iter_mut().skip(1) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    format!("{table}\n")
+}

@@ -1,0 +1,135 @@
+//! Services of the node: standby, run and rollback of each unit.
+
+use std::time::Duration;
+
+use isotherm_bus::BusError;
+use isotherm_log::ros2::{from_cdr, to_cdr};
+use isotherm_protocol::control::{CommandOrder, CommandReply, Order};
+use isotherm_protocol::digest::Digits;
+use isotherm_protocol::key::{self, UnitId};
+use tokio::runtime::Handle;
+use zenoh::Session;
+use zenoh::bytes::ZBytes;
+use zenoh::query::{Query, Queryable};
+
+use super::{Declarer, publishing};
+use crate::attachment::Attachment;
+use crate::interface::{TRIGGER, TriggerRequest, TriggerResponse};
+use crate::mapping::UnitMapping;
+use crate::name::Kind;
+use crate::qos::Qos;
+
+/// How long a service of the project may take to answer: a rollback waits for a disk.
+const ANSWER: Duration = Duration::from_secs(5);
+
+/// What a service does.
+#[derive(Debug, Clone, Copy)]
+enum Does {
+    Standby,
+    Run,
+    Rollback,
+}
+
+impl Does {
+    const ALL: [Self; 3] = [Self::Standby, Self::Run, Self::Rollback];
+
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Standby => "standby",
+            Self::Run => "run",
+            Self::Rollback => "rollback",
+        }
+    }
+
+    fn order(self) -> Order {
+        match self {
+            Self::Standby => Order::Standby,
+            Self::Run => Order::Run { reversal: None },
+            Self::Rollback => Order::Rollback { revision: None, dry_run: false },
+        }
+    }
+}
+
+/// Declares the services of a unit: `/isotherm/<unit>/standby` and so on.
+pub(super) async fn declare(
+    declarer: &mut Declarer,
+    bus: &Session,
+    mapping: &UnitMapping,
+    name: &str,
+) -> Result<Vec<Queryable<()>>, BusError> {
+    let mut services = Vec::new();
+    for does in Does::ALL {
+        let topic = declarer.node.private(&format!("{name}/{}", does.name()));
+        declarer.endpoint(Kind::Service, &topic, TRIGGER, Qos::SERVICES).await?;
+        let key = declarer.key(&topic, TRIGGER);
+        let (bus, unit, runtime) = (bus.clone(), mapping.unit.clone(), Handle::current());
+        let answer = move |query: Query| {
+            // The service may take its time, the receive thread may not.
+            runtime.spawn(answer(query, does, bus.clone(), unit.clone()));
+        };
+        // Clients ask all that are complete.
+        let service = declarer.session.declare_queryable(&key).complete(true).callback(answer);
+        services.push(service.await.map_err(|source| BusError::Declare { key, source })?);
+    }
+    Ok(services)
+}
+
+async fn answer(query: Query, does: Does, bus: Session, unit: UnitId) {
+    let request = Attachment::parse(query.attachment().map(ZBytes::to_bytes).as_deref());
+    let payload = query.payload().map(ZBytes::to_bytes).unwrap_or_default();
+    let asked = request.map_err(|error| error.to_string()).and_then(|request| {
+        let decoded = from_cdr::<TriggerRequest>(&payload).map_err(|error| error.to_string());
+        decoded.map(|_| request)
+    });
+    let request = match asked {
+        Ok(request) => request,
+        Err(reason) => {
+            tracing::warn!(unit = unit.as_str(), service = does.name(), "a request {reason}");
+            let _ = query.reply_err(format!("the request {reason}")).await;
+            return;
+        }
+    };
+    let response = command(&bus, &unit, does, &request).await;
+    let Ok(payload) = to_cdr(&response) else { return };
+    // By number and client a client knows what is answered.
+    let attachment = Attachment { time_ns: publishing::now_ns(), ..request };
+    let key = query.key_expr().clone();
+    if let Err(error) = query.reply(key, payload).attachment(attachment.to_bytes()).await {
+        tracing::warn!(
+            unit = unit.as_str(),
+            service = does.name(),
+            "no answer: {}",
+            isotherm_bus::words(&error)
+        );
+    }
+}
+
+/// Gives the command; what came of it.
+async fn command(bus: &Session, unit: &UnitId, does: Does, request: &Attachment) -> TriggerResponse {
+    let by = format!("ros2 {}", Digits(&request.gid));
+    let order = CommandOrder { by, order: does.order() };
+    let order = serde_json::to_vec(&order).unwrap_or_default();
+    let failed = |message: String| TriggerResponse { success: false, message };
+    let replies = match bus.get(key::command(unit)).payload(order).timeout(ANSWER).await {
+        Ok(replies) => replies,
+        Err(error) => return failed(isotherm_bus::words(&error)),
+    };
+    let Ok(reply) = replies.recv_async().await else {
+        return failed(format!("no service answered within {ANSWER:?}"));
+    };
+    match reply.into_result() {
+        Ok(sample) => match serde_json::from_slice::<CommandReply>(&sample.payload().to_bytes()) {
+            Ok(reply) => TriggerResponse { success: reply.accepted, message: in_words(&reply) },
+            Err(error) => failed(format!("the service's answer is none: {error}")),
+        },
+        Err(error) => failed(String::from_utf8_lossy(&error.payload().to_bytes()).into_owned()),
+    }
+}
+
+fn in_words(reply: &CommandReply) -> String {
+    let CommandReply { unit, state, reason, swap, .. } = reply;
+    let problems = swap.iter().flat_map(|swap| &swap.problems).map(ToString::to_string);
+    let said: Vec<_> = reason.iter().cloned().chain(problems).collect();
+    let state = state.name();
+    if said.is_empty() { format!("{unit}: {state}") } else { format!("{unit}: {state}; {}", said.join("; ")) }
+}

@@ -1,0 +1,126 @@
+//! Who else is on the topics: publishers of another release or type are named, and those that leave make room.
+
+use std::collections::BTreeSet;
+use std::sync::{Mutex, PoisonError};
+
+use isotherm_bus::BusError;
+use zenoh::Session;
+use zenoh::pubsub::Subscriber;
+use zenoh::sample::{Sample, SampleKind};
+
+use crate::interface::{IMU, Interface, NO_HASH, TEMPERATURE};
+use crate::mapping::Mapping;
+use crate::name::{self, Gid, Kind, Seen};
+
+/// What is to be known of a publisher on one of the bridge's topics.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Finding {
+    /// Its release has no hashes of types: none of its messages arrives.
+    Humble,
+    /// Its type, or version of the type, is another one.
+    OtherType(String),
+    /// It publishes where corrected messages go.
+    OnOutput,
+}
+
+/// Topics that the bridge hears and speaks on.
+#[derive(Debug, Clone)]
+pub struct Topics {
+    inputs: Vec<(String, Interface)>,
+    outputs: Vec<String>,
+    /// The bridge's own node.
+    own: String,
+}
+
+impl Topics {
+    /// Those of a mapping.
+    #[must_use]
+    pub fn of(mapping: &Mapping) -> Self {
+        let units = mapping.units.iter();
+        let imu = units.clone().map(|unit| (unit.raw.clone(), IMU));
+        let temperatures = units.clone().flat_map(|unit| &unit.temperatures);
+        let temperatures = temperatures.map(|temperature| (temperature.topic.clone(), TEMPERATURE));
+        Self {
+            inputs: imu.chain(temperatures).collect(),
+            outputs: units.map(|unit| unit.corrected.clone()).collect(),
+            own: format!("{}/{}", mapping.namespace.trim_end_matches('/'), mapping.node),
+        }
+    }
+
+    /// What is to be known of something in the graph, if anything.
+    #[must_use]
+    pub fn judge(&self, seen: &Seen) -> Option<Finding> {
+        let (Kind::Publisher, Some((topic, dds, hash))) = (seen.kind, &seen.topic) else { return None };
+        if self.outputs.contains(topic) {
+            return (seen.node != self.own).then_some(Finding::OnOutput);
+        }
+        let (_, interface) = self.inputs.iter().find(|(name, _)| name == topic)?;
+        if dds != interface.dds {
+            Some(Finding::OtherType(dds.clone()))
+        } else if hash == NO_HASH {
+            Some(Finding::Humble)
+        } else {
+            (hash != interface.hash).then(|| Finding::OtherType(format!("{dds} {hash}")))
+        }
+    }
+}
+
+/// Watches the graph for as long as it is kept.
+#[derive(Debug)]
+pub struct Graph {
+    _subscriber: Subscriber<()>,
+}
+
+impl Graph {
+    /// Begins to watch. `left` hears of every publisher that leaves.
+    ///
+    /// # Errors
+    /// [`BusError::Declare`].
+    pub async fn declare(
+        session: &Session,
+        domain: u32,
+        topics: Topics,
+        left: impl Fn(Gid) + Send + Sync + 'static,
+    ) -> Result<Self, BusError> {
+        let key = name::all_tokens(domain);
+        // Each publisher is named once.
+        let named: Mutex<BTreeSet<String>> = Mutex::default();
+        let hear = move |sample: Sample| {
+            let token = sample.key_expr().as_str();
+            let Some(seen) = name::parse(token) else { return };
+            if sample.kind() == SampleKind::Delete {
+                if seen.kind == Kind::Publisher {
+                    left(name::gid(token));
+                }
+                return;
+            }
+            let Some(finding) = topics.judge(&seen) else { return };
+            if named.lock().unwrap_or_else(PoisonError::into_inner).insert(token.to_owned()) {
+                tell(&seen, &finding);
+            }
+        };
+        let subscriber = session.liveliness().declare_subscriber(&key).history(true).callback(hear);
+        let subscriber = subscriber.await.map_err(|source| BusError::Declare { key, source })?;
+        Ok(Self { _subscriber: subscriber })
+    }
+}
+
+fn tell(seen: &Seen, finding: &Finding) {
+    let (node, topic) = (&seen.node, seen.topic.as_ref().map_or("", |(topic, ..)| topic));
+    match finding {
+        Finding::Humble => tracing::warn!(
+            node,
+            topic,
+            "its publisher is of ROS 2 humble, whose keys have no hash of the type: nothing of it arrives; take jazzy or later"
+        ),
+        Finding::OtherType(is) => tracing::warn!(
+            node,
+            topic,
+            is,
+            "its publisher has another type than the mapping's topic: nothing of it arrives"
+        ),
+        Finding::OnOutput => {
+            tracing::warn!(node, topic, "it publishes where corrected messages go: subscribers get both");
+        }
+    }
+}

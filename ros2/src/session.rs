@@ -1,0 +1,55 @@
+//! The session that ROS 2 sees: a peer of their router, or a router of its own.
+
+use isotherm_bus::session::set;
+use isotherm_bus::{BusError, SessionOptions};
+use zenoh::Config;
+
+/// Where nodes look for the router.
+pub const ROUTER: &str = "tcp/127.0.0.1:7447";
+/// Where a peer listens for the others, which hear of it by gossip.
+const ANY_PORT: &str = "tcp/127.0.0.1:0";
+/// How long a connection may say nothing (ms), and how often it says something in that time: as nodes have it.
+const LEASE_MS: u32 = 60_000;
+const KEEP_ALIVE: u32 = 2;
+
+/// Where the session connects and listens.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct RosOptions {
+    /// Zenoh configuration, which is taken as it is, but for endpoints given here.
+    pub config: Option<std::path::PathBuf>,
+    /// Routers to connect to.
+    pub connect: Vec<String>,
+    /// Endpoints to listen on, which makes it a router.
+    pub listen: Vec<String>,
+}
+
+impl RosOptions {
+    /// The configuration that these options stand for.
+    ///
+    /// # Errors
+    /// As [`SessionOptions::to_config`].
+    pub fn to_config(&self) -> Result<Config, BusError> {
+        let Self { config, connect, listen } = self.clone();
+        let own = config.is_none();
+        let router = !listen.is_empty();
+        let (connect, listen) = match (own, router) {
+            (true, false) => {
+                let connect = if connect.is_empty() { vec![ROUTER.to_owned()] } else { connect };
+                (connect, vec![ANY_PORT.to_owned()])
+            }
+            _ => (connect, listen),
+        };
+        let mut config = SessionOptions { config, connect, listen, namespace: None }.to_config()?;
+        if own {
+            set(&mut config, "mode", if router { "router" } else { "peer" })?;
+            set(&mut config, "scouting/gossip/enabled", true)?;
+            set(&mut config, "transport/link/tx/lease", LEASE_MS)?;
+            set(&mut config, "transport/link/tx/keep_alive", KEEP_ALIVE)?;
+            // A router that is not there yet is waited for, as nodes do.
+            set(&mut config, "connect/timeout_ms", -1)?;
+            set(&mut config, "connect/exit_on_failure", false)?;
+            set(&mut config, "open/return_conditions/connect_scouted", false)?;
+        }
+        Ok(config)
+    }
+}
