@@ -51,6 +51,8 @@ pub(super) struct Compared {
     levels: [[f64; 2]; AXES],
 }
 
+/// Which of the rivals.
+type Pick = fn(&Rivals) -> &Vec<(Term, f64, f64)>;
 /// Squares and their number.
 type Sum = (f64, f64);
 
@@ -97,7 +99,7 @@ impl Compared {
     }
 
     /// What leaves less of an axis than the document does, in words: a mean or a cubic.
-    fn prefers(&self, axis: usize) -> Option<(&'static str, fn(&Rivals) -> &Vec<(Term, f64, f64)>)> {
+    fn prefers(&self, axis: usize) -> Option<(&'static str, Pick)> {
         let [_, mean, cubic, _, document] = self.rms.get(axis).copied().flatten()?;
         if mean.min(cubic) >= document {
             None
@@ -151,9 +153,7 @@ impl Outcome {
         let stages: Vec<Stage<'_>> =
             runs.iter().chain(judges).enumerate().map(stage).collect::<Result<_, _>>()?;
         let (fitted, judging) = stages.split_at(runs.len());
-        let rival = |of: fn(&Rivals) -> &Vec<(Term, f64, f64)>| {
-            self.document(|found| found.rivals.as_ref().map_or(&found.terms, of))
-        };
+        let rival = |of: Pick| self.document(|found| found.rivals.as_ref().map_or(&found.terms, of));
         let (cubic, with_rate) = (rival(|rivals| &rivals.cubic), rival(|rivals| &rivals.with_rate));
         Compared::of([&self.plain(), &cubic, &with_rate, document], fitted, judging, watch)
     }

@@ -8,10 +8,10 @@ use super::columns::{Branch, Term, millis};
 use super::model::{Dynamics, Spec};
 
 /// Time constants (s).
-const LADDER_S: [f64; 6] = [12.0, 30.0, 75.0, 190.0, 480.0, 1200.0];
+const LADDER_S: [f64; 7] = [5.0, 12.0, 30.0, 75.0, 190.0, 480.0, 1200.0];
 /// Shortest time constant, in grid steps; and where a step is a reading that comes seldom (s), one of them: a coil answers faster.
 const SHORTEST_GRID_STEPS: f64 = 3.0;
-const SELDOM_S: f64 = 6.0;
+const SELDOM_S: f64 = 4.0;
 /// Longest, as a share of the longest run: a longer one cannot be told from a drift with time.
 const LONGEST_SHARE: f64 = 0.2;
 /// Powers of temperature in the static bias beside lags: where the log tells lags from hysteresis, and where not; alone, likewise.

@@ -35,7 +35,7 @@ fn seldom_read(scenario: &Scenario, every_s: i64) -> Run {
 
 #[test]
 fn thermometers_that_are_read_every_ten_to_sixty_seconds_serve_a_fit() {
-    for (every_s, least) in [(10, 14.0), (30, 11.0), (60, 6.0)] {
+    for (every_s, least) in [(10, 10.0), (30, 7.0), (60, 4.0)] {
         let runs = [(101, training_profile()), (202, judging_profile())]
             .map(|of| seldom_read(&scenario(of), every_s));
         let Fitted { written, report, .. } = fitted(Method::Joint, &runs);
