@@ -2,7 +2,7 @@
 
 mod in_flight;
 mod intervals;
-mod ledger;
+mod tally;
 
 use std::fmt;
 use std::sync::Arc;
@@ -18,7 +18,7 @@ use zenoh::qos::{CongestionControl, Priority};
 use crate::{BusError, presence};
 use in_flight::InFlight;
 
-pub use ledger::Sent;
+pub use tally::Sent;
 
 /// How the frames of a unit are published.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -1,7 +1,7 @@
 //! Playing a log to the raw topics of its units.
 
 mod player;
-mod reel;
+mod playlist;
 mod report;
 mod silence;
 mod stop;
@@ -24,7 +24,7 @@ use zenoh::key_expr::OwnedKeyExpr;
 use crate::error::Error;
 use crate::pace::Speed;
 use player::Player;
-pub(crate) use reel::wanted;
+pub(crate) use playlist::wanted;
 use stop::stop_asked;
 
 pub use report::{Counts, PlayReport, Position, Returned, UnitReport};

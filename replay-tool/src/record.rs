@@ -10,10 +10,10 @@ mod files;
 mod inquiry;
 mod queue;
 mod report;
-mod scribe;
 mod services;
 mod told;
 mod topics;
+mod writer;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
@@ -36,13 +36,13 @@ use files::Files;
 use inquiry::Question;
 use queue::Queue;
 use report::{fill, finish};
-use scribe::{Scribe, Told};
 use services::{await_service, follow_services, open, start_asker};
+use writer::{FileWriter, Told};
 
 pub use queue::TopicCount;
 pub use report::{EndedBy, RecordReport};
-pub use scribe::Bounds;
 pub use topics::{TopicFilter, is_first, key_expressions};
+pub use writer::Bounds;
 
 /// How often the figures are shown.
 const WATCH_INTERVAL: Duration = Duration::from_millis(250);
@@ -173,8 +173,9 @@ async fn on_session(
         ..RecordingOptions::default()
     };
     let (tell, mut told) = unbounded_channel();
-    let scribe = Scribe::begin(Arc::clone(&queue), files, writing, options.bounds, described(options), tell)?;
-    let thread = std::thread::Builder::new().name("recording".to_owned()).spawn(move || scribe.run());
+    let writer =
+        FileWriter::begin(Arc::clone(&queue), files, writing, options.bounds, described(options), tell)?;
+    let thread = std::thread::Builder::new().name("recording".to_owned()).spawn(move || writer.run());
     let thread = thread.map_err(|source| Error::Runtime { source })?;
 
     let begun = Instant::now();

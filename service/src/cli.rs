@@ -9,12 +9,12 @@ use isotherm_document::advanced;
 use isotherm_document::program::Common;
 
 use crate::check::CheckArgs;
-use crate::console::{self, CommandArgs, Console, HistoryArgs, RollbackArgs, StatusArgs, SwapArgs, TopArgs};
 use crate::demo::DemoArgs;
 use crate::exit::Exit;
 use crate::logging::{FinishLog, LogArgs, start_writer};
+use crate::observe::web::WebArgs;
+use crate::operator::{self, CommandArgs, Console, HistoryArgs, RollbackArgs, StatusArgs, SwapArgs, TopArgs};
 use crate::signing::{KeygenArgs, SignArgs};
-use crate::web::WebArgs;
 use crate::words::{print, say};
 
 /// Corrects the raw increments of inertial units in a stream, over Zenoh
@@ -144,7 +144,7 @@ pub fn run() -> Exit {
         Command::Rollback(args) => operate(Console::Rollback(args)),
         Command::History(args) => operate(Console::History(args)),
         Command::Give(args) => operate(Console::Command(args)),
-        Command::Web(args) => crate::web::show(&args),
+        Command::Web(args) => crate::observe::web::show(&args),
         Command::Check(args) => crate::check::run(&args),
         Command::Sign(args) => crate::signing::sign(&args),
         Command::Keygen(args) => crate::signing::keygen(&args),
@@ -168,7 +168,7 @@ async fn demo(args: DemoArgs) -> Exit {
 
 /// Runs a command of the operator's side.
 fn operate(console: Console) -> Exit {
-    logged(&LogArgs::silent(), console::run(console))
+    logged(&LogArgs::silent(), operator::run(console))
 }
 
 /// Runs a command that a blocked stderr must not hold up: what it says there goes through a queue.

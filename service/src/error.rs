@@ -6,8 +6,8 @@ use isotherm_bus::BusError;
 use isotherm_protocol::document::Problem;
 use thiserror::Error;
 
+use crate::control::store::StoreError;
 use crate::exit::Exit;
-use crate::store::StoreError;
 
 /// Why the service did not start, or a command failed.
 #[derive(Debug, Error)]

@@ -4,8 +4,8 @@
 //! |---|---|
 //! | `watch` | the thread that notices a silent instance, and hears the journals of others |
 //! | `ask` | memories, histories and documents of the instance that speaks, asked for |
-//! | [`crate::unit`] `speech` | one unit: what is kept, compared and published in the other's place |
-//! | [`crate::registrar`] `carry` | histories and documents, written down here too |
+//! | [`crate::receive::unit`] `speech` | one unit: what is kept, compared and published in the other's place |
+//! | [`crate::control::swap_manager`] `carry` | histories and documents, written down here too |
 
 mod ask;
 mod watch;
@@ -20,8 +20,8 @@ use isotherm_protocol::key::UnitId;
 use isotherm_protocol::pair::{Member, Mode, PairReport};
 
 use crate::config::{PairSettings, Settings};
-use crate::intake::Intake;
-use crate::unit::{Standing, UnitActor};
+use crate::receive::intake::Intake;
+use crate::receive::unit::{Standing, UnitActor};
 pub(crate) use ask::{Asker, Questions};
 pub(crate) use watch::Watch;
 

@@ -9,11 +9,11 @@ use isotherm_bus::SessionOptions;
 use tokio::signal::unix::{SignalKind, signal};
 use zenoh::Session;
 
-use crate::calibrations::Calibrations;
 use crate::cli::ServeArgs;
 use crate::config::Settings;
+use crate::control::calibrations::Calibrations;
 use crate::exit::Exit;
-use crate::metrics::Endpoint;
+use crate::observe::metrics::Endpoint;
 use crate::service::{open_store, start_on};
 use crate::supervisor;
 use crate::words::{print_within, say};

@@ -15,20 +15,20 @@ use tokio::time::Instant;
 use zenoh::Session;
 
 use crate::ServiceError;
-use crate::calibrations::Calibrations;
 use crate::config::Settings;
-use crate::intake::Intake;
-use crate::keeper::Keeper;
-use crate::metrics::{Endpoint, Source};
+use crate::control::calibrations::Calibrations;
+use crate::control::store::{Opened, Store};
+use crate::control::swap_manager::{Found, Inbox, Opening, SwapManager, Worker};
+use crate::control::watch::{WatchSettings, Watcher};
+use crate::observe::metrics::{Endpoint, Source};
+use crate::observe::status_publisher::StatusPublisher;
+use crate::observe::totals::Totals;
+use crate::observe::web::Web;
 use crate::pair::{Asker, Pair, Watch};
-use crate::pulse::{Pulse, Stuck};
-use crate::registrar::{Desk, Found, Opening, Registrar, Work};
+use crate::receive::intake::Intake;
+use crate::receive::pulse::{Pulse, Stuck};
+use crate::receive::unit::UnitActor;
 use crate::signing::read_trusted_keys;
-use crate::store::{Opened, Store};
-use crate::totals::Totals;
-use crate::unit::UnitActor;
-use crate::watch::{WatchSettings, Watcher};
-use crate::web::Web;
 use declare::Declared;
 
 /// How long other instances may take to show themselves.
@@ -46,9 +46,9 @@ pub struct RunningService {
     pulse: Arc<Pulse>,
     watcher: Option<Watcher>,
     declared: Declared,
-    keeper: Keeper,
-    registrar: Registrar,
-    desk: Desk,
+    status_publisher: StatusPublisher,
+    swap_manager: SwapManager,
+    inbox: Inbox,
     pair: Watch,
     metrics: Option<Endpoint>,
 }
@@ -90,9 +90,9 @@ pub(crate) async fn start_on(
 ) -> Result<RunningService, ServiceError> {
     tell_keys(&settings);
     let opening = Opening::new();
-    let desk = opening.desk();
+    let inbox = opening.inbox();
     let outlets = declare::outlets(session.clone(), settings.congestion);
-    let intake = Intake::new(settings.clone(), calibrations.clone(), outlets).reporting_to(desk.clone());
+    let intake = Intake::new(settings.clone(), calibrations.clone(), outlets).reporting_to(inbox.clone());
     let intake = intake.journaling_to(declare::journal(session.clone(), settings.congestion));
     isotherm_bus::connected(&session, &settings.session, MEMBERS_LIMIT).await?;
     let pair = Pair::new(&settings, session.zid().to_string(), now_unix_ms(), members(&session).await?);
@@ -100,31 +100,33 @@ pub(crate) async fn start_on(
     let intake = Arc::new(intake.paired_with(Arc::clone(&pair)));
     let pulse = Arc::new(Pulse::new(settings.congestion));
 
-    let mut work = Work::new(&settings, Arc::clone(&intake), store, &opened);
+    let mut work = Worker::new(&settings, Arc::clone(&intake), store, &opened);
     work.take_over(&calibrations);
     work.restore();
     let found = read_folder(&mut work, &settings)?;
     let prepared = intake.prepare();
     tracing::debug!(units = prepared, "publishers and keys of units with a calibration are declared");
-    let board = work.board();
-    let source = Source::new(&settings, (Arc::clone(&intake), Arc::clone(&pair)), Arc::clone(&board));
+    let control_status = work.control_status();
+    let source =
+        Source::new(&settings, (Arc::clone(&intake), Arc::clone(&pair)), Arc::clone(&control_status));
     let source = source.feeling(Arc::clone(&pulse));
-    let registrar = Registrar::start(opening, work).map_err(ServiceError::Thread)?;
-    let keeper = Keeper::start(&session, Arc::clone(&intake), board, &pair, &settings)
-        .map_err(ServiceError::Thread)?;
+    let swap_manager = SwapManager::start(opening, work).map_err(ServiceError::Thread)?;
+    let status_publisher =
+        StatusPublisher::start(&session, Arc::clone(&intake), control_status, &pair, &settings)
+            .map_err(ServiceError::Thread)?;
     let watcher = match &settings.calibrations {
         Some(folder) => {
-            let (watch, desk) = (watch_settings(&settings), desk.clone());
-            let watcher = Watcher::start(folder, watch, found, move |event| desk.folder(event));
+            let (watch, inbox) = (watch_settings(&settings), inbox.clone());
+            let watcher = Watcher::start(folder, watch, found, move |event| inbox.folder(event));
             Some(watcher.map_err(ServiceError::Thread)?)
         }
         None => None,
     };
     // First to hear the others: what they have published of a tick that comes now is to be known.
-    let (questions, _asker) = Asker::start(&session, &pair, &intake, desk.clone());
+    let (questions, _asker) = Asker::start(&session, &pair, &intake, inbox.clone());
     let watch = Watch::start(&session, &pair, &intake, questions).await?;
     let inputs = (&pair, settings.units.as_slice(), &pulse);
-    let declared = Declared::new(&session, &intake, &keeper.bell(), &desk, inputs).await?;
+    let declared = Declared::new(&session, &intake, &status_publisher.bell(), &inbox, inputs).await?;
     let web = Web::start(&settings, &session, &intake)?;
     if let Some(metrics) = &metrics {
         metrics.open(source, web);
@@ -136,9 +138,9 @@ pub(crate) async fn start_on(
         pulse,
         watcher,
         declared,
-        keeper,
-        registrar,
-        desk,
+        status_publisher,
+        swap_manager,
+        inbox,
         pair: watch,
         metrics,
     })
@@ -201,7 +203,7 @@ fn tell_keys(settings: &Settings) {
 }
 
 /// Reads the configured folder; a bad one is survived, unless a strict start is asked for.
-fn read_folder(work: &mut Work, settings: &Settings) -> Result<Found, ServiceError> {
+fn read_folder(work: &mut Worker, settings: &Settings) -> Result<Found, ServiceError> {
     let Some(folder) = &settings.calibrations else { return Ok(Found::new()) };
     match work.read_folder() {
         Ok((_, bad)) if settings.strict_start && bad > 0 => Err(ServiceError::BadCalibrations { count: bad }),
@@ -227,20 +229,30 @@ impl RunningService {
     ///
     /// The session given to [`start`] is closed for whoever else holds it.
     pub async fn stop(self) -> Totals {
-        let Self { session, settings, intake, watcher, declared, keeper, registrar, pair, metrics, .. } =
-            self;
+        let Self {
+            session,
+            settings,
+            intake,
+            watcher,
+            declared,
+            status_publisher,
+            swap_manager,
+            pair,
+            metrics,
+            ..
+        } = self;
         metrics.iter().for_each(Endpoint::stopping);
         let deadline = Instant::now() + settings.stop_timeout;
         let left = |deadline: Instant| deadline.saturating_duration_since(Instant::now());
-        // Each of these may wait: a callback for a slow subscriber, the keeper for a callback, the registrar for a disk.
+        // Each of these may wait: a callback for a slow subscriber, the status publisher for a callback, the swap manager for a disk.
         let units = Arc::clone(&intake);
         let flush = tokio::task::spawn_blocking(move || {
             let (received, alive) = declared.undeclare();
             let paired = pair.stop();
-            let kept = keeper.stop();
+            let kept = status_publisher.stop();
             let watched = watcher.is_none_or(Watcher::stop);
             // Last of all: the first ticks of a calibration may have come with the flush.
-            let registered = registrar.stop();
+            let registered = swap_manager.stop();
             units.each_unit(UnitActor::end);
             (received && paired && kept && watched && registered, alive)
         });
@@ -269,7 +281,7 @@ impl RunningService {
     pub fn reload(&self) {
         tracing::info!("the documents of the folder are read again");
         self.watcher.iter().for_each(Watcher::reread);
-        self.desk.judge_again();
+        self.inbox.judge_again();
     }
 
     /// Whether the receive path is alive: messages are done in time, or, where none is there, its threads give signs of life.

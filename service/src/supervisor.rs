@@ -5,7 +5,7 @@ use std::time::Duration;
 use sd_notify::NotifyState;
 use tokio::time::{MissedTickBehavior, interval};
 
-use crate::pulse::Stuck;
+use crate::receive::pulse::Stuck;
 
 /// How often the receive path is looked at where nobody asks for a watchdog.
 const INTERVAL: Duration = Duration::from_secs(1);

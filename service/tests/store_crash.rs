@@ -11,7 +11,7 @@ use std::time::SystemTime;
 use isotherm_protocol::control::Schedule;
 use isotherm_protocol::history::{Acceptance, AuditEntry, AuditEvent, Source};
 use isotherm_protocol::key::UnitId;
-use isotherm_service::store::{Opened, Store, Torn};
+use isotherm_service::control::store::{Opened, Store, Torn};
 use tempfile::TempDir;
 
 /// Names the state folder to the process that [`writes_until_it_is_stopped`] is run in.
@@ -24,7 +24,7 @@ fn unit() -> UnitId {
 }
 
 /// Stores a document and accepts it as the next revision; gives the number of the entry.
-fn accept(store: &mut Store) -> Result<u64, isotherm_service::store::StoreError> {
+fn accept(store: &mut Store) -> Result<u64, isotherm_service::control::store::StoreError> {
     let revision = store.highest_revision(&unit()) + 1;
     let digest = store.put_document(format!("revision {revision}").as_bytes())?;
     let accepted = Acceptance {

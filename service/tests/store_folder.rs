@@ -11,7 +11,7 @@ use isotherm_protocol::control::Schedule;
 use isotherm_protocol::digest::Digest;
 use isotherm_protocol::history::{Acceptance, AuditEntry, AuditEvent, Source};
 use isotherm_protocol::key::UnitId;
-use isotherm_service::store::{Store, StoreError};
+use isotherm_service::control::store::{Store, StoreError};
 use tempfile::TempDir;
 
 fn unit() -> UnitId {

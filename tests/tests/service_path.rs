@@ -14,10 +14,10 @@ use isotherm_protocol::codec;
 use isotherm_protocol::document::Document;
 use isotherm_protocol::key::{self, RawStream, UnitId};
 use isotherm_protocol::raw::{AccelBatch, GyroBatch, TemperatureBatch};
-use isotherm_service::calibrations::Calibrations;
 use isotherm_service::config::Settings;
-use isotherm_service::intake::Intake;
-use isotherm_service::unit::Outlet;
+use isotherm_service::control::calibrations::Calibrations;
+use isotherm_service::receive::intake::Intake;
+use isotherm_service::receive::unit::Outlet;
 
 #[global_allocator]
 static ALLOCATOR: dhat::Alloc = dhat::Alloc;

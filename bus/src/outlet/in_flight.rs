@@ -11,7 +11,7 @@ use tokio::sync::Notify;
 use zenoh::Session;
 use zenoh::pubsub::Subscriber;
 
-use super::ledger::{Ledger, Sent};
+use super::tally::{Sent, TickTally};
 use super::{Account, GyroTicks};
 use crate::BusError;
 
@@ -21,7 +21,7 @@ use crate::BusError;
 /// passes over its ticks, and ticks that the service has announced as missing count as done.
 #[derive(Debug, Default)]
 pub(super) struct InFlight {
-    ledger: Mutex<Ledger>,
+    tally: Mutex<TickTally>,
     /// Batches that came back.
     batches: AtomicU64,
     progress: Notify,
@@ -49,27 +49,27 @@ impl InFlight {
         Ok((in_flight, subscriber))
     }
 
-    fn ledger(&self) -> MutexGuard<'_, Ledger> {
-        self.ledger.lock().unwrap_or_else(PoisonError::into_inner)
+    fn tally(&self) -> MutexGuard<'_, TickTally> {
+        self.tally.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Enters what is about to be sent.
     pub(super) fn sent(&self, ticks: GyroTicks) -> Sent {
-        self.ledger().sent(ticks)
+        self.tally().sent(ticks)
     }
 
     /// Enters what came back.
     fn came_back(&self, batch: &CorrectedBatch) {
-        let mut ledger = self.ledger();
-        batch.ticks.iter().for_each(|tick| ledger.came_back(tick));
-        drop(ledger);
+        let mut tally = self.tally();
+        batch.ticks.iter().for_each(|tick| tally.came_back(tick));
+        drop(tally);
         self.batches.fetch_add(1, Ordering::Relaxed);
         self.progress.notify_waiters();
     }
 
     /// Ticks under way.
     pub(super) fn ticks(&self) -> u64 {
-        self.ledger().under_way()
+        self.tally().under_way()
     }
 
     /// Batches that came back so far: where it stands still, nothing comes.
@@ -78,7 +78,7 @@ impl InFlight {
     }
 
     pub(super) fn account(&self) -> Account {
-        self.ledger().account()
+        self.tally().account()
     }
 
     /// Waits until fewer than `limit` ticks are under way; gives their number where nothing came back for `patience`.

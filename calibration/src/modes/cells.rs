@@ -3,13 +3,13 @@
 //! The columns are the corrector's own: static bias (T − `T_ref`)ʲ with the coefficient 1 °/h, less the bare correction. The
 //! magnetic and the slow-meander term are the same polynomials with the tick's signs, so signs times columns are theirs.
 
-mod knife;
+mod jackknife;
 
 use isotherm_correction::sample::TickFlags;
 use isotherm_log::offline::Loaded;
 use isotherm_protocol::document::{Curve, Document, Orientation, OrientationThermal, Shape};
 
-use knife::Knife;
+use jackknife::Jackknife;
 
 use crate::error::Error;
 use crate::runs::{Run, Troubles, Watch};
@@ -137,8 +137,8 @@ pub fn gather<W: Watch>(
         #[expect(clippy::cast_precision_loss, reason = "few runs")]
         let begin_s = number as f64 * BETWEEN_RUNS_S;
         let run = run.of_gyros(group);
-        let mut knife =
-            Knife::new(cut, bare, begin_s, gathered.cells.last().map_or(0, |cell| cell.stretch + 1));
+        let mut jackknife =
+            Jackknife::new(cut, bare, begin_s, gathered.cells.last().map_or(0, |cell| cell.stretch + 1));
         let troubles = run.correct_together(&loaded, watch(), |raw, ticks, unit| {
             let Some(bare) = ticks.first() else { return };
             gathered.ticks[0] += 1;
@@ -147,9 +147,9 @@ pub fn gather<W: Watch>(
                 velocity.iter_mut().zip(bare.delta_velocity).for_each(|(sum, dv)| *sum += dv);
                 force_s += bare.duration.as_s();
             }
-            knife.take(raw, ticks, unit, &mut gathered);
+            jackknife.take(raw, ticks, unit, &mut gathered);
         })?;
-        knife.close(&mut gathered);
+        jackknife.close(&mut gathered);
         gathered.troubles.extend(troubles.into_iter().next().unwrap_or_default());
     }
     gathered.force = (force_s > 0.0).then(|| velocity.map(|sum| sum / force_s));

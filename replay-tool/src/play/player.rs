@@ -16,7 +16,7 @@ use tokio::sync::mpsc::UnboundedReceiver;
 use tokio::time::{Instant, sleep_until};
 use zenoh::Session;
 
-use super::reel::{Frame, Load, Reel};
+use super::playlist::{Frame, Load, Playlist};
 use super::silence::Shared;
 use super::units::{PlayedUnit, Units};
 use super::{Acknowledge, Command, PlayOptions, Watch};
@@ -45,7 +45,7 @@ pub(super) struct Player<'a, W> {
     watch: &'a W,
     /// Whoever is at the keyboard; `None` once nobody is.
     commands: Option<UnboundedReceiver<Command>>,
-    reel: Reel<'a>,
+    playlist: Playlist<'a>,
     units: Units<'a>,
     under_way: Shared,
     /// What is to go out, by time and then by order.
@@ -91,7 +91,7 @@ impl<'a, W: Watch> Player<'a, W> {
             options,
             watch,
             commands: Some(commands),
-            reel: Reel::new(options)?,
+            playlist: Playlist::new(options)?,
             units: Units::new(options),
             under_way: Shared::default(),
             waiting: BinaryHeap::new(),
@@ -164,7 +164,7 @@ impl<'a, W: Watch> Player<'a, W> {
 
     /// Goes back to the log's beginning.
     fn rewind(&mut self) -> Result<(), Error> {
-        self.reel.rewind()?;
+        self.playlist.rewind()?;
         self.forget();
         Ok(())
     }

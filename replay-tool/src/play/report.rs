@@ -6,7 +6,7 @@ use std::time::Duration;
 use isotherm_bus::outlet::Account;
 use serde::Serialize;
 
-use super::reel::Load;
+use super::playlist::Load;
 use crate::pace::{Lateness, Speed};
 
 /// What was sent of a unit.

@@ -9,7 +9,7 @@ use isotherm_log::faults::{Departure, Faults};
 use isotherm_log::offline::unit_id;
 use isotherm_protocol::key::UnitId;
 
-use super::reel::{Cue, Frame, Load};
+use super::playlist::{Cue, Frame, Load};
 use super::report::{Counts, UnitReport};
 use super::{Acknowledge, PlayOptions};
 use crate::error::Error;

@@ -8,7 +8,7 @@ use serde::Serialize;
 use tokio::time::Instant;
 
 use super::queue::{Queue, TopicCount};
-use super::scribe::Done;
+use super::writer::Done;
 
 /// Why a recording ended.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]

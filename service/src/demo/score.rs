@@ -6,7 +6,7 @@ use std::time::Instant;
 use isotherm_correction::sample::TickFlags;
 use isotherm_protocol::corrected::{CorrectedBatch, CorrectedTick};
 
-use crate::latency::Histogram;
+use crate::receive::latency::Histogram;
 
 use super::switch::{Switch, SwitchWatch, Tick};
 use super::windows::{Mean, Windows};

@@ -10,8 +10,8 @@ use isotherm_protocol::key;
 use isotherm_protocol::status::Status;
 use zenoh::Session;
 
-use crate::calibrations::Calibrations;
 use crate::config::Settings;
+use crate::control::calibrations::Calibrations;
 use crate::service::{RunningService, start_with};
 
 use super::fleet::Member;

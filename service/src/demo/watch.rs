@@ -29,10 +29,10 @@ pub(super) async fn watch(
     fleet: &[Member],
     mut feed: UnboundedReceiver<Feed>,
 ) -> Vec<Watched> {
-    let mut desks = Desk::all(fleet);
+    let mut tallies = Tally::all(fleet);
     let mut producing = true;
     loop {
-        if !producing && desks.iter().all(|desk| desk.is_complete(consumer)) {
+        if !producing && tallies.iter().all(|tally| tally.is_complete(consumer)) {
             break;
         }
         tokio::select! {
@@ -40,42 +40,42 @@ pub(super) async fn watch(
                 let at = Instant::now();
                 // A batch is announced before it is sent, so its announcement is here already.
                 while let Ok((unit, sent)) = feed.try_recv() {
-                    desks[unit].score.send(sent);
+                    tallies[unit].score.send(sent);
                 }
                 let Some(batch) = batch else { break };
-                if let Some(desk) = desks.iter_mut().find(|desk| desk.member.id.as_str() == batch.unit) {
-                    desk.score.receive(&batch, at);
-                    desk.show(consumer);
+                if let Some(tally) = tallies.iter_mut().find(|tally| tally.member.id.as_str() == batch.unit) {
+                    tally.score.receive(&batch, at);
+                    tally.show(consumer);
                 }
             }
             announced = feed.recv(), if producing => match announced {
-                Some((unit, sent)) => desks[unit].score.send(sent),
+                Some((unit, sent)) => tallies[unit].score.send(sent),
                 None => producing = false,
             },
             () = tokio::time::sleep(PATIENCE), if !producing => break,
         }
     }
-    desks.into_iter().map(|desk| desk.finish(consumer)).collect()
+    tallies.into_iter().map(|tally| tally.finish(consumer)).collect()
 }
 
 /// One unit's account and its bar.
-struct Desk<'a> {
+struct Tally<'a> {
     member: &'a Member,
     score: Score,
     bar: ProgressBar,
 }
 
-impl<'a> Desk<'a> {
+impl<'a> Tally<'a> {
     fn all(fleet: &'a [Member]) -> Vec<Self> {
         let bars = MultiProgress::new();
         let style = ProgressStyle::with_template("{prefix:24} {bar:24} {percent:>3} % {msg}");
         let style = style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("━╸─");
-        let desk = |member: &'a Member| {
+        let tally = |member: &'a Member| {
             let bar = bars.add(ProgressBar::new(member.ticks).with_style(style.clone()));
             bar.set_prefix(format!("{} {}", member.id, member.kind.name()));
-            Desk { member, score: Score::new(member.kind.averaging_s()), bar }
+            Tally { member, score: Score::new(member.kind.averaging_s()), bar }
         };
-        fleet.iter().map(desk).collect()
+        fleet.iter().map(tally).collect()
     }
 
     fn show(&self, consumer: &Consumer) {

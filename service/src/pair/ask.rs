@@ -18,8 +18,8 @@ use zenoh::Session;
 use zenoh::sample::Sample;
 
 use super::Pair;
-use crate::intake::Intake;
-use crate::registrar::{Carried, Desk};
+use crate::control::swap_manager::{Carried, Inbox};
+use crate::receive::intake::Intake;
 
 /// How long an answer is waited for.
 const LIMIT: Duration = Duration::from_secs(2);
@@ -59,7 +59,7 @@ pub(crate) struct Asker {
     session: Session,
     pair: Arc<Pair>,
     intake: Arc<Intake>,
-    desk: Desk,
+    inbox: Inbox,
 }
 
 impl Asker {
@@ -68,11 +68,11 @@ impl Asker {
         session: &Session,
         pair: &Arc<Pair>,
         intake: &Arc<Intake>,
-        desk: Desk,
+        inbox: Inbox,
     ) -> (Questions, JoinHandle<()>) {
         let (sender, questions) = unbounded_channel();
         let asker =
-            Self { session: session.clone(), pair: Arc::clone(pair), intake: Arc::clone(intake), desk };
+            Self { session: session.clone(), pair: Arc::clone(pair), intake: Arc::clone(intake), inbox };
         (Questions(sender), tokio::spawn(asker.run(questions)))
     }
 
@@ -195,7 +195,7 @@ impl Asker {
             // A document may lie under an overlay: that is known when the overlay is there.
             for _ in 0..2 {
                 let (answer, lacking) = oneshot::channel();
-                self.desk.lacks(carried.clone(), answer);
+                self.inbox.lacks(carried.clone(), answer);
                 for digest in lacking.await.unwrap_or_default() {
                     let found = self.ask(&key::kept("*", &digest)).await;
                     let bytes = found.iter().map(|sample| sample.payload().to_bytes().into_owned());
@@ -204,7 +204,7 @@ impl Asker {
                     }
                 }
             }
-            self.desk.carry(carried);
+            self.inbox.carry(carried);
         }
     }
 }

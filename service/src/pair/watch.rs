@@ -15,9 +15,9 @@ use zenoh::{Session, Wait};
 
 use super::{Pair, Questions};
 use crate::ServiceError;
-use crate::fault::FaultKind;
-use crate::intake::Intake;
-use crate::unit::{Alarm, UnitActor, Wants};
+use crate::receive::fault::FaultKind;
+use crate::receive::intake::Intake;
+use crate::receive::unit::{Alarm, UnitActor, Wants};
 
 /// How often the units are looked at where no other instance is there.
 const ALONE: Duration = Duration::from_millis(100);

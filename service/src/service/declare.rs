@@ -16,12 +16,12 @@ use zenoh::{Session, Wait};
 
 use crate::ServiceError;
 use crate::config::chunk;
-use crate::intake::{Intake, OutletMaker};
-use crate::keeper::{Asked, Bell};
+use crate::control::swap_manager::Inbox;
+use crate::observe::status_publisher::{Asked, Bell};
 use crate::pair::Pair;
-use crate::pulse::Pulse;
-use crate::registrar::Desk;
-use crate::unit::{Journal, Outlet};
+use crate::receive::intake::{Intake, OutletMaker};
+use crate::receive::pulse::Pulse;
+use crate::receive::unit::{Journal, Outlet};
 
 /// Everything that receives.
 #[derive(Debug)]
@@ -38,10 +38,10 @@ impl Declared {
         session: &Session,
         intake: &Arc<Intake>,
         bell: &Bell,
-        desk: &Desk,
+        inbox: &Inbox,
         (pair, taken, pulse): (&Arc<Pair>, &[String], &Arc<Pulse>),
     ) -> Result<Self, ServiceError> {
-        let put = desk.clone();
+        let put = inbox.clone();
         let receipt = Receipt::declare(session).await?;
         let mut subscribers =
             vec![subscribe(session, key::ALL_CALIBRATION, move |sample| put.put(sample)).await?];
@@ -49,7 +49,7 @@ impl Declared {
         let alive = key::service_alive(&session.zid().to_string());
         let own = session.liveliness().declare_token(alive).await;
         let own = own.map_err(|source| ServiceError::Declare { key: key::ALL_SERVICES_ALIVE, source })?;
-        let [calibration, command, history, kept] = [(); 4].map(|()| desk.clone());
+        let [calibration, command, history, kept] = [(); 4].map(|()| inbox.clone());
         let ask = |asked| {
             let bell = bell.clone();
             move |query| bell.ask(asked, query)

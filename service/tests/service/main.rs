@@ -3,7 +3,7 @@
 //! | file | holds |
 //! |---|---|
 //! | `loopback` | raw in, corrected out, over real sessions |
-//! | `registrar` | swaps and commands, whichever way they come in |
+//! | `swap_manager` | swaps and commands, whichever way they come in |
 //! | `journal` | a log alone is enough for the same bits again |
 //! | `metrics` | metrics and health over HTTP |
 //! | `console_status` | what `isotherm status` and `top` show of it |
@@ -20,11 +20,11 @@
 )]
 
 mod console_status;
+mod control;
 mod journal;
 mod loopback;
 mod metrics;
 mod reach;
-mod registrar;
 mod serve_command;
 mod shipped_configuration;
 mod web;

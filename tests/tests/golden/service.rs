@@ -15,10 +15,10 @@ use isotherm_protocol::journal::{Joiner, JournalEntry, JournalEvent};
 use isotherm_protocol::key::{self, Input, UnitId};
 use isotherm_protocol::stream::Label;
 use isotherm_service::Settings;
-use isotherm_service::calibrations::{Calibrations, Change, Installable};
-use isotherm_service::intake::Intake;
-use isotherm_service::kept::KeptText;
-use isotherm_service::unit::{Journal, Outlet, UnitActor};
+use isotherm_service::control::calibrations::{Calibrations, Change, Installable};
+use isotherm_service::control::compressed::CompressedText;
+use isotherm_service::receive::intake::Intake;
+use isotherm_service::receive::unit::{Journal, Outlet, UnitActor};
 use isotherm_tests::lives::{FULL_CHANNELS, full, place, pre_launch};
 use isotherm_tests::script::{Accels, Scenario, Script, Step, UNIT};
 
@@ -95,7 +95,7 @@ fn act(actor: &mut UnitActor, event: &JournalEvent, now: Instant) -> String {
                 revision.counter,
                 Arc::new(parsed.calibration),
                 (label, *overlay),
-                KeptText::new(text),
+                CompressedText::new(text),
                 &Source::Bus,
             );
             let change = Change { next: Arc::new(next), at: *at, slew: Span::from_ns(*slew_ns) };

@@ -12,7 +12,7 @@ use isotherm_correction::reversal::ReversalParts;
 use isotherm_correction::sample::{GyroTick, LasingMode, OutputKind, TickFlags};
 use isotherm_protocol::corrected::CorrectedBatch;
 use isotherm_protocol::key::UnitId;
-use isotherm_service::fault::FaultKind;
+use isotherm_service::receive::fault::FaultKind;
 use isotherm_tests::bench::{Bench, LIMIT};
 use isotherm_tests::calibrations::{Feature, PutTerms, compile, identity, mode_reversed, polynomial};
 use isotherm_tests::data::root;

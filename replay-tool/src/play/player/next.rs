@@ -8,7 +8,7 @@ use isotherm_log::faults::Departure;
 use super::Player;
 use crate::error::Error;
 use crate::play::Watch;
-use crate::play::reel::Frame;
+use crate::play::playlist::Frame;
 
 /// Messages that are passed over before others get their turn.
 const STRIDE: u32 = 256;
@@ -50,7 +50,7 @@ impl<W: Watch> Player<'_, W> {
             if self.read_all {
                 return Ok(None);
             }
-            if let Some(cue) = self.reel.next()? {
+            if let Some(cue) = self.playlist.next()? {
                 if self.from.is_some_and(|from| cue.at_ns < from) {
                     passed_over += 1;
                     if passed_over % STRIDE == 0 {

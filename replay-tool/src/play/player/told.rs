@@ -29,7 +29,7 @@ impl<W: Watch> Player<'_, W> {
         let log_s = seconds(self.last_at.or(self.from).unwrap_or(0));
         let of_pass = match self.options.part.end {
             Some(end) => log_s / (end.as_s() - self.options.part.start.as_s()),
-            None => self.reel.share(),
+            None => self.playlist.share(),
         };
         let of_pass = if of_pass.is_finite() { of_pass.clamp(0.0, 1.0) } else { 0.0 };
         #[expect(clippy::cast_precision_loss, reason = "shares of a bar")]
@@ -61,7 +61,7 @@ impl<W: Watch> Player<'_, W> {
 
     /// What reading the log came to.
     pub(in crate::play) fn log_report(&self) -> LogReport {
-        self.reel.report()
+        self.playlist.report()
     }
 
     /// What playing came to.

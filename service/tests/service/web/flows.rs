@@ -4,7 +4,7 @@ use std::io::Write;
 
 use super::browser::{Browser, find};
 use super::stage::{Kind, Stage};
-use crate::registrar::stand::{UNIT, document};
+use crate::control::stand::{UNIT, document};
 
 /// Text of the page, of an element or of all.
 fn text_of(selector: &str) -> String {

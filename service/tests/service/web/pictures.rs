@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use super::browser::{Browser, find};
 use super::stage::{Kind, Stage};
-use crate::registrar::stand::document;
+use crate::control::stand::document;
 
 const SIZES: [(u32, u32); 2] = [(1280, 900), (400, 860)];
 

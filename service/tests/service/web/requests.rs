@@ -12,8 +12,8 @@ use isotherm_service::config::{MetricsSettings, WebSettings};
 use isotherm_service::{Settings, start};
 use serde_json::{Value, json};
 
+use crate::control::stand::{Folders, LIMIT, Stand, UNIT, assert_accepted, document};
 use crate::metrics::client::{Answer, connect, get, say};
-use crate::registrar::stand::{Folders, LIMIT, Stand, UNIT, assert_accepted, document};
 
 const TOKEN: &str = "a-token-for-tests-0123456789abcdef";
 

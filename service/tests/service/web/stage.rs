@@ -14,7 +14,7 @@ use serde_json::Value;
 use tokio::task::JoinHandle;
 use zenoh::Session;
 
-use crate::registrar::stand::{Folders, LIMIT, TICK_NS, document, unit_id};
+use crate::control::stand::{Folders, LIMIT, TICK_NS, document, unit_id};
 
 /// Ticks of a message.
 const BATCH: u64 = 10;

@@ -1,0 +1,290 @@
+//! A log as the messages that are to be played: due, filtered, in series of their own.
+
+use std::collections::{HashMap, VecDeque};
+use std::sync::Arc;
+
+use isotherm_bus::outlet::{GyroTicks, new_series};
+use isotherm_correction::units::{Span, Timestamp};
+use isotherm_log::message::{Message, Topic};
+use isotherm_log::part::{LogFiles, Messages};
+use isotherm_log::schedule::Schedule;
+use isotherm_log::source::LogReport;
+use isotherm_protocol::codec;
+use isotherm_protocol::key::{Input, RawStream, UnitId};
+use isotherm_protocol::raw::{AccelBatch, GyroBatch, HealthBatch, HealthTick, TemperatureBatch};
+use isotherm_protocol::reference::Reference;
+use zenoh::bytes::ZBytes;
+use zenoh::key_expr::{OwnedKeyExpr, keyexpr};
+
+use super::PlayOptions;
+use crate::error::Error;
+
+/// How often health readings go out, in event time.
+const HEALTH_INTERVAL: Span = Span::from_ms(1000);
+
+/// A message to be played.
+#[derive(Debug)]
+pub(super) struct Cue {
+    /// The unit in the log.
+    pub(super) unit: UnitId,
+    /// When, after the log's first message (ns).
+    pub(super) at_ns: i64,
+    /// What.
+    pub(super) frame: Arc<Frame>,
+    /// It is the first gyro batch of another series than the unit's last one.
+    pub(super) begins_series: bool,
+}
+
+/// A frame, and what it carries.
+#[derive(Debug)]
+pub(super) struct Frame {
+    /// Its topic.
+    pub(super) input: Input,
+    /// Its bytes.
+    pub(super) bytes: ZBytes,
+    /// What it carries.
+    pub(super) load: Load,
+}
+
+/// What a frame carries.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Load {
+    /// Gyro ticks.
+    Gyro(GyroTicks),
+    /// Accelerometer ticks.
+    Accel(u64),
+    /// Temperature readings.
+    Temperature(u64),
+    /// Health readings at so many times.
+    Health(u64),
+    /// A rate reference.
+    Reference,
+    /// Nothing that can be read: the service will refuse it, as it did before.
+    Unreadable,
+}
+
+/// The log, once through.
+#[derive(Debug)]
+pub(super) struct Playlist<'a> {
+    options: &'a PlayOptions,
+    messages: Messages,
+    /// How far the log was read when its first message came: to the part that is played (bytes).
+    first_bytes: Option<u64>,
+    schedule: Schedule,
+    series: SeriesNumbers,
+    /// When the units' next health readings are due, where they are given.
+    health_due: Option<Timestamp>,
+    ready: VecDeque<Cue>,
+}
+
+impl<'a> Playlist<'a> {
+    /// Opens the log.
+    pub(super) fn new(options: &'a PlayOptions) -> Result<Self, Error> {
+        let messages = options.files.open(&options.part)?;
+        let series = SeriesNumbers::from(options.series.unwrap_or_else(new_series));
+        let schedule = schedule(options);
+        let ready = VecDeque::new();
+        Ok(Self { options, messages, first_bytes: None, schedule, series, health_due: None, ready })
+    }
+
+    /// Goes back to the beginning: what follows is of new series.
+    pub(super) fn rewind(&mut self) -> Result<(), Error> {
+        self.messages = self.options.files.open(&self.options.part)?;
+        self.first_bytes = None;
+        self.schedule = schedule(self.options);
+        self.series.begin_anew();
+        self.health_due = None;
+        self.ready.clear();
+        Ok(())
+    }
+
+    /// How far the log has been read (0…1), from the beginning of the part that is played.
+    #[expect(clippy::cast_precision_loss, reason = "a share of a bar")]
+    pub(super) fn share(&self) -> f64 {
+        let progress = self.messages.progress();
+        let first = self.first_bytes.unwrap_or_else(|| progress.read());
+        let all = progress.total().saturating_sub(first).max(1);
+        progress.read().saturating_sub(first) as f64 / all as f64
+    }
+
+    /// What reading it came to.
+    pub(super) fn report(&self) -> LogReport {
+        self.messages.report()
+    }
+
+    /// The next message to be played; `None` behind the last.
+    pub(super) fn next(&mut self) -> Result<Option<Cue>, Error> {
+        loop {
+            if let Some(cue) = self.ready.pop_front() {
+                return Ok(Some(cue));
+            }
+            let Some(message) = self.messages.next_message()? else { return Ok(None) };
+            self.first_bytes.get_or_insert_with(|| self.messages.progress().read());
+            self.take(message);
+        }
+    }
+
+    /// Takes a message, where it is one to be played.
+    fn take(&mut self, message: Message) {
+        let Message { topic, received_ns, frame } = message;
+        let (unit, input) = match &topic {
+            Topic::Raw(unit, stream) => (unit.clone(), Input::Raw(*stream)),
+            Topic::Reference(unit) => (unit.clone(), Input::Reference),
+            _ => return,
+        };
+        let (load, bytes, times, begins_series) = self.load(&unit, input, frame);
+        // Its time is noted also where it is left out: a filter does not move what is left.
+        let at_ns = self.schedule.due(Some(&unit), received_ns, times.map(|(_, last)| last));
+        if let (Load::Gyro(_), Some((first, _))) = (load, times) {
+            self.report_health(&unit, at_ns, first);
+        }
+        if wanted(&self.options.topics, &topic) {
+            let frame = Arc::new(Frame { input, bytes, load });
+            self.ready.push_back(Cue { unit, at_ns, frame, begins_series });
+        }
+    }
+
+    /// What a frame carries, its bytes with a series of this player, the times of its first and last tick, and whether it
+    /// begins a series.
+    fn load(&mut self, unit: &UnitId, input: Input, frame: Vec<u8>) -> Loaded {
+        let at = Timestamp::from_ns;
+        let unreadable = (Load::Unreadable, None);
+        let (load, times) = match input {
+            Input::Raw(RawStream::Gyro) => return self.gyro(unit, frame),
+            Input::Raw(RawStream::Accel) => codec::decode::<AccelBatch>(&frame).map_or(unreadable, |batch| {
+                let ends = (batch.ticks.first().zip(batch.ticks.last()))
+                    .map(|(first, last)| (first.end_time, last.end_time));
+                (Load::Accel(batch.ticks.len() as u64), ends)
+            }),
+            Input::Raw(RawStream::Temperature) => {
+                codec::decode::<TemperatureBatch>(&frame).map_or(unreadable, |batch| {
+                    let ends = (batch.readings.first().zip(batch.readings.last()))
+                        .map(|(first, last)| (first.time, last.time));
+                    (Load::Temperature(batch.readings.len() as u64), ends)
+                })
+            }
+            Input::Raw(RawStream::Health) => {
+                codec::decode::<HealthBatch>(&frame).map_or(unreadable, |batch| {
+                    let ends = (batch.ticks.first().zip(batch.ticks.last()))
+                        .map(|(first, last)| (at(first.time_ns), at(last.time_ns)));
+                    (Load::Health(batch.ticks.len() as u64), ends)
+                })
+            }
+            Input::Reference => codec::decode::<Reference>(&frame).map_or(unreadable, |reference| {
+                (Load::Reference, Some((at(reference.start_ns), at(reference.end_ns))))
+            }),
+        };
+        (load, frame.into(), times, false)
+    }
+
+    fn gyro(&mut self, unit: &UnitId, frame: Vec<u8>) -> Loaded {
+        let Ok(mut batch) = codec::decode::<GyroBatch>(&frame) else {
+            return (Load::Unreadable, frame.into(), None, false);
+        };
+        let (Some(first), Some(last)) = (batch.ticks.first(), batch.ticks.last()) else {
+            return (Load::Unreadable, frame.into(), None, false);
+        };
+        let (series, begins) = self.series.number(unit, first.series);
+        let times = Some((first.end_time, last.end_time));
+        let ticks = GyroTicks { series, first: first.sequence, count: batch.ticks.len() as u64 };
+        batch.ticks.iter_mut().for_each(|tick| tick.series = series);
+        // What could be decoded can be encoded.
+        let bytes = codec::encode(&batch).unwrap_or(frame);
+        (Load::Gyro(ticks), bytes.into(), times, begins)
+    }
+
+    /// Adds the health readings that are due before a gyro batch.
+    fn report_health(&mut self, unit: &UnitId, at_ns: i64, time: Timestamp) {
+        if self.options.health.is_empty() || self.health_due.is_some_and(|due| time < due) {
+            return;
+        }
+        self.health_due = Some(time + HEALTH_INTERVAL);
+        let tick = HealthTick { time_ns: time.as_ns(), readings: self.options.health.clone() };
+        // Readings that were taken from a command line fit a frame: see the check of their number there.
+        let Ok(bytes) = codec::encode(&HealthBatch { ticks: vec![tick] }) else { return };
+        let input = Input::Raw(RawStream::Health);
+        if wanted(&self.options.topics, &Topic::Raw(unit.clone(), RawStream::Health)) {
+            let frame = Arc::new(Frame { input, bytes: bytes.into(), load: Load::Health(1) });
+            self.ready.push_back(Cue { unit: unit.clone(), at_ns, frame, begins_series: false });
+        }
+    }
+}
+
+/// Load, bytes, times of the first and the last tick, whether it begins a series.
+type Loaded = (Load, ZBytes, Option<(Timestamp, Timestamp)>, bool);
+
+fn schedule(options: &PlayOptions) -> Schedule {
+    match options.files {
+        LogFiles::Recordings(_) => Schedule::of_recordings(options.clock),
+        LogFiles::Text { .. } => Schedule::of_text(),
+    }
+}
+
+/// Whether messages of a topic are taken.
+pub(crate) fn wanted(topics: &[OwnedKeyExpr], topic: &Topic) -> bool {
+    if topics.is_empty() {
+        return true;
+    }
+    let key = topic.key();
+    keyexpr::new(key.as_str()).is_ok_and(|key| topics.iter().any(|wanted| wanted.intersects(key)))
+}
+
+/// Numbers for the series of a log: each of its series becomes one of this player, in the order of their first batches.
+#[derive(Debug)]
+struct SeriesNumbers {
+    next: u64,
+    // Looked up only.
+    known: HashMap<(UnitId, u64), u64>,
+    last: HashMap<UnitId, u64>,
+}
+
+impl SeriesNumbers {
+    fn from(first: u64) -> Self {
+        Self { next: first, known: HashMap::new(), last: HashMap::new() }
+    }
+
+    /// The number of a unit's series, and whether it is another than the unit's last one.
+    fn number(&mut self, unit: &UnitId, series: u64) -> (u64, bool) {
+        let number = *self.known.entry((unit.clone(), series)).or_insert_with(|| {
+            let number = self.next;
+            self.next = self.next.wrapping_add(1);
+            number
+        });
+        (number, self.last.insert(unit.clone(), number) != Some(number))
+    }
+
+    /// Whatever comes is of new series.
+    fn begin_anew(&mut self) {
+        self.known.clear();
+        self.last.clear();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_restart_stays_one_and_another_pass_is_a_new_one() {
+        let (a, b) = (UnitId::new("A").unwrap(), UnitId::new("B").unwrap());
+        let mut numbers = SeriesNumbers::from(100);
+        let first: Vec<_> = [(&a, 0), (&b, 0), (&a, 0), (&a, 900), (&a, 0), (&a, 900)]
+            .map(|(unit, series)| numbers.number(unit, series))
+            .into();
+        assert_eq!(first, [(100, true), (101, true), (100, false), (102, true), (100, true), (102, true)]);
+        numbers.begin_anew();
+        assert_eq!(numbers.number(&a, 0), (103, true));
+    }
+
+    #[test]
+    fn keys_are_filtered_as_subscribers_do() {
+        let topic = Topic::of("imu/A-1/raw/gyro");
+        let keys = |texts: &[&str]| -> Vec<_> {
+            texts.iter().map(|text| OwnedKeyExpr::new(*text).unwrap()).collect()
+        };
+        assert!(wanted(&[], &topic));
+        assert!(wanted(&keys(&["imu/*/raw/gyro"]), &topic));
+        assert!(wanted(&keys(&["imu/B/**", "imu/A-1/**"]), &topic));
+        assert!(!wanted(&keys(&["imu/*/raw/accel"]), &topic));
+    }
+}

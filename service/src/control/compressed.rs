@@ -1,0 +1,98 @@
+//! Texts and documents that are kept for long and read seldom.
+
+use std::io::{Read, Write};
+use std::sync::Arc;
+
+use flate2::Compression;
+use flate2::read::DeflateDecoder;
+use flate2::write::DeflateEncoder;
+
+/// Bytes in little room: deflated, and shared by whoever keeps them. A calibration document of a few kilobytes takes a
+/// quarter of them, which counts where there are thousands.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct CompressedBytes {
+    deflated: Arc<[u8]>,
+    length: usize,
+}
+
+impl CompressedBytes {
+    /// Keeps them.
+    #[must_use]
+    pub fn new(bytes: &[u8]) -> Self {
+        let mut encoder = DeflateEncoder::new(Vec::new(), Compression::fast());
+        // Writing to a vector does not fail.
+        let _ = encoder.write_all(bytes);
+        Self { deflated: encoder.finish().unwrap_or_default().into(), length: bytes.len() }
+    }
+
+    /// The bytes.
+    #[must_use]
+    pub fn read(&self) -> Vec<u8> {
+        let mut bytes = Vec::with_capacity(self.length);
+        // Its own, in memory: there is nothing that could be wrong with them.
+        let _ = DeflateDecoder::new(&*self.deflated).read_to_end(&mut bytes);
+        bytes
+    }
+
+    /// How many there are.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.length
+    }
+
+    /// Whether there are none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.length == 0
+    }
+}
+
+/// A text that is kept as [`CompressedBytes`].
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct CompressedText(CompressedBytes);
+
+impl CompressedText {
+    /// Keeps a text.
+    #[must_use]
+    pub fn new(text: &str) -> Self {
+        Self(CompressedBytes::new(text.as_bytes()))
+    }
+
+    /// The text.
+    #[must_use]
+    pub fn read(&self) -> String {
+        // It was one when it was kept.
+        String::from_utf8(self.0.read()).unwrap_or_default()
+    }
+
+    /// Its bytes, kept once for both.
+    #[must_use]
+    pub fn bytes(&self) -> &CompressedBytes {
+        &self.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_kept_is_read_as_it_was_and_is_small() {
+        let document = include_str!("../../../config/calibration/MEMS-0001.toml");
+        for text in ["", "°", document] {
+            let kept = CompressedText::new(text);
+            let bytes = kept.bytes();
+            assert_eq!(
+                (kept.read().as_str(), bytes.len(), bytes.is_empty()),
+                (text, text.len(), text.is_empty())
+            );
+        }
+        assert!(CompressedText::new(document).bytes().deflated.len() * 3 < document.len());
+    }
+
+    #[test]
+    fn what_is_no_text_is_kept_too() {
+        let bytes = [0xff, 0x00, 0xfe];
+        assert_eq!(CompressedBytes::new(&bytes).read(), bytes);
+    }
+}

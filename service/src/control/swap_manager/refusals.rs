@@ -1,0 +1,159 @@
+//! Refused documents: counted, told, written down once.
+
+use std::collections::VecDeque;
+use std::time::{Duration, Instant};
+
+use isotherm_protocol::control::MAX_BY;
+use isotherm_protocol::digest::Digest;
+use isotherm_protocol::document::Problem;
+use isotherm_protocol::history::{AuditEvent, MAX_PROBLEMS, Refusal, Source};
+use isotherm_protocol::key::UnitId;
+
+use super::admit::Verdict;
+use super::order::Order;
+use super::worker::Worker;
+
+/// Refusals that are remembered, so that the same one again is only counted.
+const REMEMBERED: usize = 64;
+/// Most refusals that are written down in a minute; beyond it they are counted.
+const MOST_A_MINUTE: u32 = 1000;
+const MINUTE: Duration = Duration::from_secs(60);
+
+/// What makes two refusals the same.
+type Same = (Option<UnitId>, Source, Digest);
+
+/// Refusals so far.
+#[derive(Debug, Default)]
+pub(super) struct Refusals {
+    count: u64,
+    last: VecDeque<Same>,
+    minute: Option<(Instant, u32)>,
+}
+
+impl Refusals {
+    /// How many documents were refused.
+    pub(super) fn count(&self) -> u64 {
+        self.count
+    }
+
+    /// Counts one; whether it is to be written down.
+    fn is_news(&mut self, now: Instant, same: Same) -> bool {
+        if self.last.contains(&same) {
+            return false;
+        }
+        let (start, written) = self.minute.filter(|(start, _)| now - *start < MINUTE).unwrap_or((now, 0));
+        if written == MOST_A_MINUTE {
+            return false;
+        }
+        self.minute = Some((start, written + 1));
+        if self.last.len() == REMEMBERED {
+            self.last.pop_front();
+        }
+        self.last.push_back(same);
+        true
+    }
+
+    /// A document was accepted: whatever is refused from now on is refused against another one.
+    pub(super) fn forget(&mut self, unit: &UnitId) {
+        self.last.retain(|(refused, _, _)| refused.as_ref() != Some(unit));
+    }
+}
+
+impl Worker {
+    /// Counts, tells and writes down that a document was refused.
+    pub(super) fn note_refusal(&mut self, order: &Order<'_>, verdict: &Verdict) {
+        self.count_refusal(verdict);
+        if order.options.dry_run {
+            return;
+        }
+        let digest = Digest::of(order.bytes);
+        let same = (verdict.unit.clone(), order.source.clone(), digest);
+        if !self.refusals.is_news(Instant::now(), same) {
+            return;
+        }
+        let unit = verdict.unit.as_ref();
+        let shown = unit.map(ToString::to_string).unwrap_or_default();
+        for problem in &verdict.problems {
+            tracing::error!(unit = shown, source = %order.source, "refused: {problem}");
+        }
+        // Told at every start, written down once.
+        let at_start = matches!(order.source, Source::Start { .. });
+        let before = order.source.file().and_then(|path| self.store.refused_in_folder(path));
+        if at_start && before == Some(digest) {
+            return;
+        }
+        let event = AuditEvent::Refused(Refusal {
+            source: order.source.clone(),
+            digest,
+            problems: verdict.problems.iter().take(MAX_PROBLEMS).map(ToString::to_string).collect(),
+            count: verdict.problems.len() as u64,
+            rival: false,
+        });
+        let by: String = order.options.by.chars().take(MAX_BY).collect();
+        if let Err(error) = self.append(unit, &by, event) {
+            tracing::error!(unit = shown, "the refusal is not in the audit file: {error}");
+        }
+    }
+
+    /// Writes down, once, that a file is refused because another one names its unit too.
+    pub(super) fn note_rival(&mut self, unit: &UnitId, source: Source, digest: Digest, problem: &Problem) {
+        let before = source.file().and_then(|path| self.store.rival_in_folder(path));
+        let told = matches!(source, Source::Start { .. }) && before == Some(digest);
+        if told || !self.refusals.is_news(Instant::now(), (Some(unit.clone()), source.clone(), digest)) {
+            return;
+        }
+        let problems = vec![problem.to_string()];
+        let event = AuditEvent::Refused(Refusal { source, digest, problems, count: 1, rival: true });
+        if let Err(error) = self.append(Some(unit), "", event) {
+            tracing::error!(%unit, "the refusal is not in the audit file: {error}");
+        }
+    }
+
+    /// Counts a refusal, for the status.
+    pub(super) fn count_refusal(&mut self, verdict: &Verdict) {
+        self.refusals.count += 1;
+        let Some(unit) = &verdict.unit else { return };
+        // A flood of strange serials must not fill the memory.
+        if !self.records.contains_key(unit) && self.intake.present(unit).is_none() {
+            return;
+        }
+        let record = self.records.entry(unit.clone()).or_default();
+        record.refused += 1;
+        record.last_refusal = verdict.problems.first().map(ToString::to_string);
+        let account = record.account();
+        self.intake.with(unit, |actor| actor.tell_swaps(account));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_same_refusal_again_is_no_news_until_something_was_accepted() {
+        let mut refusals = Refusals::default();
+        let now = Instant::now();
+        let unit = UnitId::new("U").unwrap();
+        let same = (Some(unit.clone()), Source::Bus, Digest([1; 32]));
+        assert!(refusals.is_news(now, same.clone()));
+        assert!(!refusals.is_news(now, same.clone()));
+        refusals.forget(&unit);
+        assert!(refusals.is_news(now, same));
+    }
+
+    #[test]
+    fn a_flood_of_refusals_is_written_down_up_to_a_limit() {
+        let mut refusals = Refusals::default();
+        let now = Instant::now();
+        let mut flood = |now| {
+            let news = (0..3000_u32).filter(|i| {
+                let mut digest = [0; 32];
+                digest[..4].copy_from_slice(&i.to_be_bytes());
+                refusals.is_news(now, (None, Source::Bus, Digest(digest)))
+            });
+            news.count()
+        };
+        assert_eq!(flood(now), 1000);
+        assert_eq!(flood(now + MINUTE), 1000, "the next minute has room again");
+    }
+}

@@ -1,0 +1,220 @@
+//! The calibration folder as it changes: tells what the content of each document has become.
+//!
+//! Editors write in place, in two goes, beside the file and rename over it, or delete it and write it anew; network
+//! shares send no events, and links change without their own folder noticing. All of that is one thing here: a thread
+//! looks at the whole folder, and a file whose state differs from the last look is restless until it has stayed the
+//! same for the settling time. Then it is read, and told if its *content* is not the one told last. Events of the file
+//! system decide nothing: they only call for a look before the next poll. So a watch that was lost, or never was
+//! granted, costs time and no change.
+//!
+//! | module | holds |
+//! |---|---|
+//! | `folder` | which files count, what a look and a reading see |
+//! | `states` | what is known and was told of each file |
+//! | `events` | events of the file system |
+//! | `signals` | how a look is asked for, and the end |
+//! | `worker` | the thread |
+
+mod events;
+mod folder;
+mod signals;
+mod states;
+mod worker;
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+
+use self::events::FsEvents;
+use self::signals::Signals;
+use self::states::FileStates;
+use self::worker::Worker;
+
+pub(crate) use self::folder::{documents_in, read_document};
+
+/// How long an ending waits for the thread, which a dead network share may hold.
+const STOP_LIMIT: Duration = Duration::from_secs(1);
+
+/// What has become of a document, or of the folder. Names of files are the folder's joined with the file's own.
+#[derive(Clone, PartialEq, Eq)]
+pub enum FolderEvent {
+    /// A file has a content that is not the one told last, or is back with any content after it was unreadable or
+    /// removed. A renamed file is changed under its new name first, and removed under its old one after the grace time.
+    Changed {
+        /// The file.
+        file: PathBuf,
+        /// Its content; of a longer file, one byte more than a document may have
+        /// ([`MAX_DOCUMENT_BYTES`](isotherm_protocol::document::MAX_DOCUMENT_BYTES)).
+        bytes: Vec<u8>,
+        /// SHA-256 of `bytes`.
+        digest: [u8; 32],
+    },
+    /// A file cannot be read: no permission, a loop of links, a pipe, a folder in its place. Told once per reason.
+    Unreadable {
+        /// The file.
+        file: PathBuf,
+        /// Why, in words that go on after "cannot be read: ".
+        reason: String,
+    },
+    /// A file that was told has been gone for longer than the grace time.
+    Removed {
+        /// The file.
+        file: PathBuf,
+    },
+    /// The folder itself cannot be read for longer than the grace time. Nothing is told of its files until it is back:
+    /// a lost network share does not remove a document. Told once per reason.
+    FolderGone {
+        /// Why, in words that go on after "cannot be read: ".
+        reason: String,
+    },
+    /// The folder can be read again; what has become of its files follows.
+    FolderBack,
+    /// The system grants no events of the folder: changes are found by the poll alone. Told once per reason.
+    Deaf {
+        /// Why.
+        reason: String,
+    },
+    /// Events come again.
+    Hearing,
+}
+
+impl fmt::Debug for FolderEvent {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            // A megabyte of numbers helps nobody.
+            Self::Changed { file, bytes, .. } => {
+                write!(f, "Changed({}, {} bytes)", file.display(), bytes.len())
+            }
+            Self::Unreadable { file, reason } => write!(f, "Unreadable({}, {reason})", file.display()),
+            Self::Removed { file } => write!(f, "Removed({})", file.display()),
+            Self::FolderGone { reason } => write!(f, "FolderGone({reason})"),
+            Self::FolderBack => f.write_str("FolderBack"),
+            Self::Deaf { reason } => write!(f, "Deaf({reason})"),
+            Self::Hearing => f.write_str("Hearing"),
+        }
+    }
+}
+
+/// What the owner knows of a file before the watcher starts, so that nothing is told twice.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Known {
+    /// It was read: SHA-256 of its bytes, cut as those of [`FolderEvent::Changed`]. Whether it was a good document does
+    /// not matter.
+    Content([u8; 32]),
+    /// It was found and could not be read.
+    Unreadable,
+}
+
+/// How the folder is watched. Durations outside 1 ms to 1 day are taken as the nearer end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct WatchSettings {
+    /// How long a file must stay the same before it is read. One that never does is read after twenty times as long,
+    /// as it is at that moment.
+    pub settle: Duration,
+    /// How long a file, or the folder, may be gone without being called so; `None` for twice `settle`.
+    pub grace: Option<Duration>,
+    /// Distance of the looks that no event asked for. At each of them up to 64 files whose state has not changed are
+    /// read and compared, in turn.
+    pub poll: Duration,
+    /// Whether events of the file system are listened to. Without them everything is found by the poll.
+    pub events: bool,
+}
+
+impl Default for WatchSettings {
+    fn default() -> Self {
+        Self { settle: Duration::from_millis(150), grace: None, poll: Duration::from_secs(5), events: true }
+    }
+}
+
+impl WatchSettings {
+    /// With every duration in its range and a grace time.
+    fn bounded(self) -> Self {
+        let bounded = |time: Duration| time.clamp(Duration::from_millis(1), Duration::from_secs(86_400));
+        let settle = bounded(self.settle);
+        let grace = Some(bounded(self.grace.unwrap_or(settle * 2)));
+        Self { settle, grace, poll: bounded(self.poll), events: self.events }
+    }
+}
+
+/// A watched folder. Ends with its thread when it is dropped.
+#[derive(Debug)]
+pub struct Watcher {
+    signals: Arc<Signals>,
+}
+
+impl Watcher {
+    /// Begins to watch the `*.toml` of a folder, hidden files and sub-folders excepted.
+    ///
+    /// `known` is what was read of them before, by the names that events give. What differs from it is told first: read
+    /// the folder, then start the watcher, and no change can fall between. `sink` is called from the watcher's own
+    /// thread, one event at a time; while it works nothing is looked at, and nothing is lost.
+    ///
+    /// # Errors
+    /// Where the system gives no thread. A folder that cannot be read is none: it is told as
+    /// [`FolderEvent::FolderGone`], and watched when it appears. Where the system grants no events, a warning is logged
+    /// and the poll does all of the work.
+    pub fn start(
+        folder: &Path,
+        settings: WatchSettings,
+        known: BTreeMap<PathBuf, Known>,
+        sink: impl Fn(FolderEvent) + Send + 'static,
+    ) -> std::io::Result<Self> {
+        Self::start_with(folder, settings, known, sink, events::listener)
+    }
+
+    /// The same with another source of events.
+    fn start_with(
+        folder: &Path,
+        settings: WatchSettings,
+        known: BTreeMap<PathBuf, Known>,
+        sink: impl Fn(FolderEvent) + Send + 'static,
+        listener: events::MakeListener,
+    ) -> std::io::Result<Self> {
+        let settings = settings.bounded();
+        let signals = Arc::new(Signals::default());
+        let events =
+            settings.events.then(|| FsEvents::new(folder, settings.poll, Arc::clone(&signals), listener));
+        let (states, folder) = (FileStates::new(settings, known), folder.to_owned());
+        let work = Worker::new(folder, settings, Arc::clone(&signals), events, states, sink);
+        std::thread::Builder::new().name("isotherm-watcher".to_owned()).spawn(move || work.run())?;
+        Ok(Self { signals })
+    }
+
+    /// Has every file read and compared with what was told of it, soon.
+    pub fn reread(&self) {
+        self.signals.reread();
+    }
+
+    /// Whether the thread is at work. It ends before [`Watcher::stop`] only where the sink panics.
+    #[must_use]
+    pub fn is_running(&self) -> bool {
+        !self.signals.has_ended()
+    }
+
+    /// Ends the watching; whether the thread ended within a second. One that a dead network share or the sink holds is
+    /// left behind, and ends when it is let go.
+    #[must_use]
+    pub fn stop(self) -> bool {
+        self.signals.stop();
+        self.signals.wait_for_end(STOP_LIMIT)
+    }
+}
+
+impl Drop for Watcher {
+    fn drop(&mut self) {
+        if self.signals.stopping() {
+            return;
+        }
+        self.signals.stop();
+        if !self.signals.wait_for_end(STOP_LIMIT) {
+            tracing::warn!(
+                "the calibration folder's watcher did not end within {STOP_LIMIT:?} and is left behind"
+            );
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,13 @@
+//! What the service shows of itself and its units.
+//!
+//! | module | holds |
+//! |---|---|
+//! | `status_publisher` | the thread for status, queries and the tail of a stream that has stopped |
+//! | `metrics` | metrics and health over HTTP |
+//! | [`web`] | the console in the browser, on the same server |
+//! | [`totals`] | what is said at the end |
+
+pub(crate) mod metrics;
+pub(crate) mod status_publisher;
+pub mod totals;
+pub mod web;

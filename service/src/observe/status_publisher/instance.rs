@@ -1,0 +1,106 @@
+//! What the service says of itself.
+
+use std::sync::Arc;
+use std::time::{Instant, SystemTime};
+
+use isotherm_protocol::digest::Digest;
+use isotherm_protocol::service_status::{MAX_UNITS, ServiceStatus, UnitSummary};
+use isotherm_protocol::status::MAX_FAULTS;
+use zenoh::Session;
+
+use crate::control::swap_manager::{ControlStatus, Posted};
+use crate::logging::dropped_lines;
+use crate::receive::fault::standing;
+use crate::receive::intake::Intake;
+
+/// When the service's status is asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Look {
+    /// In any case.
+    Always,
+    /// Where something has changed since the last time.
+    IfNews,
+    /// Likewise, where units have not.
+    IfPosted,
+}
+
+/// This instance of the service.
+pub(super) struct Instance {
+    name: String,
+    started: (Instant, i64),
+    settings_digest: Option<Digest>,
+    control_status: Arc<ControlStatus>,
+    /// What was said last, as far as a change of it is news.
+    said: Option<ServiceStatus>,
+    /// What the swap manager had posted then.
+    posted: Option<Arc<Posted>>,
+}
+
+impl Instance {
+    pub(super) fn new(
+        session: &Session,
+        settings_digest: Option<Digest>,
+        control_status: Arc<ControlStatus>,
+    ) -> Self {
+        let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+        let started_unix_ms = i64::try_from(since.as_millis()).unwrap_or(i64::MAX);
+        Self {
+            name: session.zid().to_string(),
+            started: (Instant::now(), started_unix_ms),
+            settings_digest,
+            control_status,
+            said: None,
+            posted: None,
+        }
+    }
+
+    /// Its Zenoh id as text.
+    pub(super) fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Its status, where something has changed since the last time, or in any case.
+    pub(super) fn status(&mut self, intake: &Intake, look: Look) -> Option<ServiceStatus> {
+        let posted = self.control_status.read();
+        if look == Look::IfPosted && self.posted.as_ref().is_some_and(|before| Arc::ptr_eq(before, &posted)) {
+            return None;
+        }
+        let mut units = intake.each_unit(|actor| {
+            let (state, output) = actor.doing();
+            UnitSummary { unit: actor.id().to_string(), state, output }
+        });
+        units.truncate(MAX_UNITS);
+        let news = ServiceStatus {
+            instance: self.name.clone(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            pid: Some(std::process::id()),
+            started_unix_ms: self.started.1,
+            uptime_s: 0.0,
+            units,
+            calibrations: posted.folder.clone(),
+            bad_documents: posted.bad_documents.clone(),
+            store: posted.store.clone(),
+            faults: Vec::new(),
+            settings_digest: self.settings_digest,
+            swaps_accepted: posted.accepted,
+            swaps_refused: posted.refused,
+        };
+        let before = self.posted.replace(Arc::clone(&posted));
+        let same_problems = before.is_some_and(|before| before.problems == posted.problems);
+        if look != Look::Always && self.said.as_ref() == Some(&news) && same_problems {
+            return None;
+        }
+        self.said = Some(news.clone());
+        let mut faults: Vec<_> =
+            posted.problems.iter().map(|it| standing(it.kind, it.count, it.words.clone())).collect();
+        faults.extend(intake.faults());
+        let dropped = dropped_lines();
+        if dropped > 0 {
+            let words = "log lines were dropped: stderr took none (a stopped terminal, a full pipe)";
+            faults.push(standing("log_lines_dropped", dropped, words.to_owned()));
+        }
+        faults.truncate(MAX_FAULTS);
+        // Time and faults go on all the time: no news by themselves.
+        Some(ServiceStatus { uptime_s: self.started.0.elapsed().as_secs_f64(), faults, ..news })
+    }
+}

@@ -1,0 +1,219 @@
+//! Units and services as JSON: the lines and words of `isotherm status`, as the console in the browser reads them.
+
+use std::time::Instant;
+
+use isotherm_correction::operation;
+use isotherm_correction::units::{AngularRate, STANDARD_GRAVITY_M_PER_S2};
+use isotherm_protocol::key::UnitId;
+use isotherm_protocol::service_status::ServiceStatus;
+use isotherm_protocol::status::Status;
+use serde::{Serialize, Serializer};
+
+use super::Web;
+use crate::operator::page::{
+    Level, Unit, channel_in_view, duplicates, is_running, knows_rates, late, length, range, state_word,
+};
+use crate::operator::status::unix_ms;
+use crate::operator::{Fleet, worst_first};
+
+/// All units, those that need somebody first.
+#[derive(Debug, Serialize)]
+struct Overview<'f> {
+    /// This service's name for itself.
+    instance: &'f str,
+    /// Whether swaps, rollbacks and commands are taken here.
+    write: bool,
+    /// Options with which a command reaches this service.
+    options: &'f str,
+    now_unix_ms: i64,
+    services: Vec<Service>,
+    units: Vec<Row>,
+}
+
+/// A service instance.
+#[derive(Debug, Serialize)]
+struct Service {
+    gone: bool,
+    #[serde(flatten)]
+    status: ServiceStatus,
+}
+
+/// A line of a unit.
+#[derive(Debug, Serialize)]
+struct Row {
+    unit: String,
+    instance: String,
+    level: &'static str,
+    /// What is to be noticed, the gravest first.
+    reasons: Vec<String>,
+    state: &'static str,
+    running: bool,
+    /// Revision of the calibration in force; none without one.
+    revision: Option<u64>,
+    digest: Option<String>,
+    temperature_deg_c: Option<f64>,
+    temperature_rate_deg_c_per_s: Option<f64>,
+    /// The range that the calibration was fitted over, of the channel whose temperature it is.
+    calibrated_range_deg_c: Option<[f64; 2]>,
+    /// Where all temperatures lie against theirs: inside, above, below, stale.
+    range: &'static str,
+    correction_deg_per_h: Option<f64>,
+    correction_mg: Option<f64>,
+    raw_ticks_per_s: Option<f64>,
+    p99_ns: u64,
+    gaps: u64,
+    duplicates: u64,
+    late: u64,
+    bad: u64,
+}
+
+impl Row {
+    fn of(unit: &Unit<'_>) -> Self {
+        let status = unit.status;
+        let channel = channel_in_view(status);
+        Self {
+            unit: status.unit.clone(),
+            instance: status.instance.clone(),
+            level: level(unit.level()),
+            reasons: unit.remarks().into_iter().map(|remark| remark.words).collect(),
+            state: state_word(status.state),
+            running: is_running(status.state) && unit.gone.is_none(),
+            revision: status.calibration.as_ref().map(|calibration| calibration.revision.counter),
+            digest: status.calibration.as_ref().and_then(|it| it.digest).map(|digest| digest.to_string()),
+            temperature_deg_c: channel.and_then(|channel| channel.temperature_deg_c),
+            temperature_rate_deg_c_per_s: channel.and_then(|channel| channel.rate_deg_c_per_s),
+            calibrated_range_deg_c: channel.and_then(|channel| channel.calibrated_range_deg_c),
+            range: range(status).0,
+            correction_deg_per_h: status.applied.map(|applied| {
+                AngularRate::from_rad_per_s(length(applied.angular_rate_rad_per_s)).as_deg_per_h()
+            }),
+            correction_mg: status
+                .applied
+                .map(|applied| length(applied.specific_force_m_per_s2) / STANDARD_GRAVITY_M_PER_S2 * 1e3),
+            raw_ticks_per_s: knows_rates(status).then_some(status.input_rates.gyro_ticks_per_s),
+            p99_ns: status.latency.p99_ns,
+            gaps: status.counter("gaps"),
+            duplicates: duplicates(status),
+            late: late(status),
+            bad: status.counter("bad_frames"),
+        }
+    }
+}
+
+/// One unit, as each instance sees it that has it.
+#[derive(Debug, Serialize)]
+struct Sheet<'f> {
+    now_unix_ms: i64,
+    instances: Vec<Instance<'f>>,
+}
+
+/// One unit as one instance sees it.
+#[derive(Debug, Serialize)]
+struct Instance<'f> {
+    /// Whether it is this service.
+    own: bool,
+    level: &'static str,
+    remarks: Vec<Said>,
+    /// How long nobody has answered for it (s).
+    gone_s: Option<u64>,
+    /// Commands that its state takes now, by name.
+    allowed: &'static [&'static str],
+    status: &'f Status,
+    past: Vec<Past<'f>>,
+}
+
+/// Something to be noticed.
+#[derive(Debug, Serialize)]
+struct Said {
+    level: &'static str,
+    words: String,
+}
+
+/// Temperatures some time ago.
+#[derive(Debug)]
+struct Past<'f> {
+    age_s: f64,
+    of: &'f crate::operator::page::Past,
+}
+
+impl Serialize for Past<'_> {
+    /// As a list: age (s), and the temperature of each channel (°C).
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let rounded = |value: f64| (value * 1e3).round() / 1e3;
+        let temperatures = self.of.channels.iter().map(|(_, temperature, _)| rounded(*temperature));
+        serializer.collect_seq(std::iter::once(rounded(self.age_s)).chain(temperatures))
+    }
+}
+
+impl Web {
+    /// All units and services.
+    pub(super) fn units(&self) -> serde_json::Result<String> {
+        let fleet = self.fleet();
+        let (now, now_unix_ms) = (Instant::now(), unix_ms());
+        let (services, gone) = fleet.services();
+        let services = services.into_iter().map(|status| {
+            let gone = gone.contains(&status.instance);
+            // Their names and states are told in the lines of the units.
+            Service { gone, status: ServiceStatus { units: Vec::new(), ..status } }
+        });
+        serde_json::to_string(&Overview {
+            instance: &self.instance,
+            write: self.write,
+            options: &self.options,
+            now_unix_ms,
+            services: services.collect(),
+            units: worst_first(self.seen(&fleet, now, now_unix_ms)).iter().map(Row::of).collect(),
+        })
+    }
+
+    /// Every unit that a service has; of its own no service is told when it forgets one.
+    pub(super) fn seen<'f>(&self, fleet: &'f Fleet, now: Instant, now_unix_ms: i64) -> Vec<Unit<'f>> {
+        let mut units = fleet.units(now, now_unix_ms);
+        let is_here = |serial: &str| UnitId::new(serial).is_ok_and(|unit| self.intake.has(&unit));
+        units.retain(|unit| unit.status.instance != self.instance || is_here(&unit.status.unit));
+        units
+    }
+
+    /// One unit; `None` where nobody has it.
+    pub(super) fn unit(&self, serial: &str) -> Option<serde_json::Result<String>> {
+        let fleet = self.fleet();
+        let (now, now_unix_ms) = (Instant::now(), unix_ms());
+        let units = self.seen(&fleet, now, now_unix_ms);
+        let of_serial = units.iter().filter(|unit| unit.status.unit == serial);
+        let mut instances: Vec<_> = of_serial.map(|unit| self.instance(unit, now)).collect();
+        // This service's first: its ticks can be watched.
+        instances.sort_by_key(|instance| (!instance.own, instance.gone_s.is_some()));
+        (!instances.is_empty()).then(|| serde_json::to_string(&Sheet { now_unix_ms, instances }))
+    }
+
+    fn instance<'f>(&self, unit: &Unit<'f>, now: Instant) -> Instance<'f> {
+        // Under another calibration there may have been other channels.
+        let channels = || unit.status.channels.iter().map(|channel| channel.name);
+        let same = unit.past.iter().filter(|of| of.channels.iter().map(|(name, ..)| *name).eq(channels()));
+        let past = same.map(|of| {
+            let age_s = now.saturating_duration_since(of.at).as_secs_f64();
+            Past { age_s, of }
+        });
+        let said = unit.remarks().into_iter().map(|it| Said { level: level(it.level), words: it.words });
+        Instance {
+            own: unit.status.instance == self.instance,
+            level: level(unit.level()),
+            remarks: said.collect(),
+            gone_s: unit.gone.map(|gone| gone.as_secs()),
+            allowed: operation::State::from(unit.status.state).allowed(),
+            past: past.collect(),
+            status: unit.status,
+        }
+    }
+}
+
+/// A level by its name.
+fn level(level: Level) -> &'static str {
+    match level {
+        Level::Fine => "fine",
+        Level::Note => "note",
+        Level::Warning => "warning",
+        Level::Gone => "gone",
+        Level::Fault => "fault",
+    }
+}

@@ -1,0 +1,465 @@
+//! What the receive threads do with a raw message: find its unit, have it corrected, survive whatever it is.
+
+mod units;
+
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
+use std::time::{Duration, Instant};
+
+use isotherm_protocol::codec::{self, CodecError};
+use isotherm_protocol::control::Schedule;
+use isotherm_protocol::key::{self, RawStream, UnitId};
+use isotherm_protocol::raw::{AccelBatch, GyroBatch, HealthBatch, TemperatureBatch};
+use isotherm_protocol::status::{Fault, Output, Status};
+
+use crate::config::Settings;
+use crate::control::calibrations::{Calibrations, Change, Plan};
+use crate::control::swap_manager::Inbox;
+use crate::observe::totals::Totals;
+use crate::pair::Pair;
+use crate::receive::fault::{FaultKind, FaultLog};
+use crate::receive::unit::{Journal, Outlet, Present, StreamTimeoutSettings, SwapAccount, UnitActor};
+pub use units::OutletMaker;
+use units::{Outlets, Unit, Units};
+
+/// All units, and what belongs to none.
+pub struct Intake {
+    settings: Settings,
+    /// Locked after the units, where both are.
+    calibrations: RwLock<Calibrations>,
+    outlets: Outlets,
+    /// To whom units tell what only the swap manager can write down.
+    inbox: Option<Inbox>,
+    /// Where the journals of units go.
+    journal: Option<Journal>,
+    /// Other instances.
+    pair: Option<Arc<Pair>>,
+    units: RwLock<Units>,
+    faults: Mutex<FaultLog>,
+    looked_for_room: Mutex<Option<Instant>>,
+}
+
+/// How long whoever asks something of a unit waits until it is known which instance speaks for it, and how often that is looked for.
+const LONGEST_DOUBT: Duration = Duration::from_millis(500);
+const DOUBT_INTERVAL: Duration = Duration::from_millis(5);
+/// How long a unit without a calibration is silent before another may have its place.
+const STRANGER_KEPT: Duration = Duration::from_secs(60);
+/// Shortest distance of two looks for such a unit.
+const ROOM_INTERVAL: Duration = Duration::from_millis(100);
+
+impl std::fmt::Debug for Intake {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Intake")
+            .field("units", &self.units)
+            .field("faults", &self.faults)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Intake {
+    /// An intake without units.
+    #[must_use]
+    pub fn new(settings: Settings, calibrations: Calibrations, outlets: OutletMaker) -> Self {
+        let calibrations = RwLock::new(calibrations);
+        Self {
+            settings,
+            calibrations,
+            outlets: Outlets::new(outlets),
+            inbox: None,
+            journal: None,
+            pair: None,
+            units: RwLock::default(),
+            faults: Mutex::default(),
+            looked_for_room: Mutex::default(),
+        }
+    }
+
+    /// Has every unit that appears tell the swap manager what it has to tell.
+    pub(crate) fn reporting_to(self, inbox: Inbox) -> Self {
+        Self { inbox: Some(inbox), ..self }
+    }
+
+    /// Has every unit that appears keep a journal.
+    #[must_use]
+    pub fn journaling_to(self, journal: Journal) -> Self {
+        Self { journal: Some(journal), ..self }
+    }
+
+    /// Has units be silent while another instance speaks for them.
+    pub(crate) fn paired_with(self, pair: Arc<Pair>) -> Self {
+        Self { pair: Some(pair), ..self }
+    }
+
+    /// Whether swaps and commands of a unit are this instance's.
+    pub(crate) fn speaks_for(&self, unit: &UnitId) -> bool {
+        let first = || self.pair.as_ref().is_none_or(|pair| pair.speaks_first());
+        self.with(unit, |actor| actor.speaks()).unwrap_or_else(first)
+    }
+
+    /// The same; waits where it is being found out.
+    pub(crate) fn answers_for(&self, unit: &UnitId) -> bool {
+        let since = Instant::now();
+        while since.elapsed() < LONGEST_DOUBT && self.with(unit, |actor| actor.doubts()) == Some(true) {
+            std::thread::sleep(DOUBT_INTERVAL);
+        }
+        self.speaks_for(unit)
+    }
+
+    /// This instance's name for itself: its Zenoh id as text.
+    pub(crate) fn instance(&self) -> &str {
+        self.pair.as_ref().map_or("", |pair| &pair.me().instance)
+    }
+
+    /// Another instance has published a frame of a unit.
+    pub(crate) fn hear(&self, serial: &str, frame: &[u8], now: Instant) {
+        let Some((pair, unit)) = self.pair.as_ref().zip(self.unit(serial)) else { return };
+        let standing = pair.standing();
+        guarded(&mut lock(&unit), |actor| actor.hear(frame, now, &standing));
+    }
+
+    /// Something that was to be impossible has happened.
+    pub(crate) fn alarm(&self, kind: FaultKind, words: String) {
+        self.fault(kind, || words);
+    }
+
+    /// Has a unit, seen or not, begin anew with what another instance has written down.
+    pub(crate) fn plan_again(&self, unit: &UnitId, plan: Plan) {
+        let mut calibrations = self.calibrations.write().unwrap_or_else(PoisonError::into_inner);
+        *calibrations.plan_mut(unit) = plan.clone();
+        drop(calibrations);
+        self.with(unit, |actor| actor.plan_again(plan));
+    }
+
+    /// Makes the outlet of every unit that has a calibration, as far as there is a place for it; gives how many.
+    pub(crate) fn prepare(&self) -> usize {
+        let units: Vec<_> = read(&self.calibrations).units().take(self.settings.max_units).cloned().collect();
+        let made = units.iter().filter(|unit| match self.outlets.prepare(unit) {
+            Ok(()) => true,
+            Err(error) => {
+                tracing::warn!(%unit, "no publisher yet, tried again when it appears: {error}");
+                false
+            }
+        });
+        made.count()
+    }
+
+    /// Takes one message; whether subscribers of the status should hear of it at once.
+    ///
+    /// Whatever goes wrong is counted; nothing gets out of here but the answer.
+    pub fn receive(&self, key: &str, payload: Option<&[u8]>, arrival: Instant) -> bool {
+        let Some((serial, stream)) = key::parse_raw(key) else {
+            self.fault(FaultKind::UnknownStream, || format!("{key} is no raw stream: gyro, accel or temp"));
+            return false;
+        };
+        let Some(frame) = payload else {
+            self.fault(FaultKind::Deletion, || format!("{key}: a deletion means nothing here"));
+            return false;
+        };
+        let known = self.unit(serial);
+        let Some(unit) = known.or_else(|| self.appear(serial, stream, frame, arrival)) else { return false };
+        let mut actor = lock(&unit);
+        if let Some((pair, short)) =
+            self.pair.as_ref().and_then(|pair| Some((pair, pair.has_stood_still(arrival)?)))
+        {
+            actor.follow(arrival, pair.standing().active, short);
+        }
+        guarded(&mut actor, |actor| actor.receive(stream, frame, arrival));
+        actor.is_status_due()
+    }
+
+    /// Takes one rate reference; whether subscribers of the status should hear of it at once. It makes no unit.
+    pub fn reference(&self, key: &str, payload: Option<&[u8]>, arrival: Instant) -> bool {
+        let known = key::parse_reference(key).and_then(|serial| self.unit(serial));
+        let Some(unit) = known else {
+            self.fault(FaultKind::UnknownStream, || {
+                format!("{key}: a reference for a unit that has not appeared")
+            });
+            return false;
+        };
+        let Some(frame) = payload else {
+            self.fault(FaultKind::Deletion, || format!("{key}: a deletion means nothing here"));
+            return false;
+        };
+        let mut actor = lock(&unit);
+        guarded(&mut actor, |actor| actor.reference(frame, arrival));
+        actor.is_status_due()
+    }
+
+    /// Makes the unit of a message that is its first, unless the message is bad or there are too many.
+    fn appear(&self, serial: &str, stream: RawStream, frame: &[u8], now: Instant) -> Option<Unit> {
+        let id = UnitId::new(serial)
+            .map_err(|error| self.fault(FaultKind::BadSerial, || format!("serial {serial:?} {error}")))
+            .ok()?;
+        let calibrated = read(&self.calibrations).has(&id);
+        // Rubbish on a strange serial makes no unit; on a serial with a calibration it is that unit's rubbish.
+        if !calibrated && let Err(error) = readable(stream, frame) {
+            self.fault(FaultKind::from(&error), || {
+                format!("first message of unit {id}, raw/{}: {error}", stream.chunk())
+            });
+            return None;
+        }
+        // Looked at without the right to write first: a flood of strange serials must not hold the others up.
+        if !self.has_place(&read(&self.units), calibrated) {
+            self.make_room(now);
+        }
+        let mut units = self.units.write().unwrap_or_else(PoisonError::into_inner);
+        if let Some(unit) = units.get(serial) {
+            return Some(Arc::clone(unit));
+        }
+        if !self.has_place(&units, calibrated) {
+            return self.refuse(&id);
+        }
+        let outlet = match self.outlets.take(&id) {
+            Ok(outlet) => outlet,
+            Err(error) => {
+                self.fault(FaultKind::TooManyUnits, || {
+                    format!("unit {id} is refused: no publisher: {error}")
+                });
+                return None;
+            }
+        };
+        let mut actor = self.make(&id, outlet);
+        // Read while nobody else may write the units: what is changed behind this finds the unit there.
+        let plan = read(&self.calibrations).get(&id).cloned().unwrap_or_default();
+        for change in plan.changes() {
+            actor.change(change);
+        }
+        for command in &plan.intent {
+            match actor.command(command) {
+                Ok(state) => {
+                    tracing::info!(unit = %id, %state, "{} again, as before the restart", command.name());
+                }
+                Err(refusal) => tracing::warn!(unit = %id, "as before the restart it cannot be: {refusal}"),
+            }
+        }
+        if let Some(current) = &plan.current {
+            tracing::info!(unit = %id, revision = current.revision.counter, "appeared, calibrated");
+        } else {
+            tracing::warn!(unit = %id, uncalibrated = ?self.settings.unit.uncalibrated, "appeared, no calibration");
+        }
+        let unit = Arc::new(Mutex::new(actor));
+        units.insert(id, &unit);
+        Some(unit)
+    }
+
+    /// A unit that knows nothing yet.
+    fn make(&self, id: &UnitId, outlet: Outlet) -> UnitActor {
+        let settings = self.settings.unit;
+        let pairing_window = Duration::from_nanos(settings.pairing_window.as_ns().unsigned_abs());
+        let quiet = StreamTimeoutSettings { tail_flush: self.settings.tail_flush, pairing_window };
+        let mut actor = UnitActor::new(id.clone(), settings, quiet, outlet);
+        if let Some(pair) = self.pair.as_ref().filter(|pair| !pair.speaks_first()) {
+            // Where nobody else is heard, it speaks.
+            actor.follow(Instant::now(), pair.standing().active, !pair.is_opening());
+        }
+        if let Some(inbox) = &self.inbox {
+            actor.report_to(inbox.clone());
+        }
+        if let Some(journal) = &self.journal {
+            actor.journal_to(journal.clone());
+        }
+        actor
+    }
+
+    /// Whether one more unit may appear; places for units that have a calibration are kept free for them.
+    fn has_place(&self, units: &Units, calibrated: bool) -> bool {
+        let waiting = |calibrations: &Calibrations| {
+            calibrations.units().filter(|unit| units.get(unit.as_str()).is_none()).count()
+        };
+        let limit = self.settings.max_units;
+        // Most of the time there is room for all of them, whoever has appeared.
+        units.len() < limit && (calibrated || units.len() + waiting(&read(&self.calibrations)) < limit)
+    }
+
+    /// Forgets the unit without a calibration that has been silent longest, if that is long enough: anybody can make one appear, and
+    /// it must not hold its place for ever. Looked for now and then, for a flood of strange serials is not to cost more.
+    fn make_room(&self, now: Instant) {
+        {
+            let mut looked = lock(&self.looked_for_room);
+            if looked.is_some_and(|looked| now.saturating_duration_since(looked) < ROOM_INTERVAL) {
+                return;
+            }
+            *looked = Some(now);
+        }
+        let units = read(&self.units).in_order();
+        let silent = units.iter().filter_map(|(id, unit)| {
+            // Whoever is at work on it hears of it.
+            let actor = unit.try_lock().ok()?;
+            (actor.doing().1 != Output::Calibrated).then(|| (actor.silence(now), id.clone()))
+        });
+        if let Some((silence, id)) = silent.max().filter(|(silence, _)| *silence >= STRANGER_KEPT) {
+            tracing::info!(unit = %id, "forgotten: silent for {} s, and its place is needed", silence.as_secs());
+            self.forget(&id);
+        }
+    }
+
+    /// Knows nothing more of a unit; it appears anew with its next message.
+    pub(crate) fn forget(&self, unit: &UnitId) {
+        self.calibrations.write().unwrap_or_else(PoisonError::into_inner).remove(unit);
+        self.outlets.drop_prepared(unit);
+        let gone = self.units.write().unwrap_or_else(PoisonError::into_inner).remove(unit);
+        if let Some(unit) = gone {
+            guarded(&mut lock(&unit), |actor| {
+                actor.flush();
+                actor.end();
+            });
+        }
+    }
+
+    /// Whether a unit has appeared.
+    pub(crate) fn has(&self, unit: &UnitId) -> bool {
+        read(&self.units).get(unit.as_str()).is_some()
+    }
+
+    fn refuse<T>(&self, id: &UnitId) -> Option<T> {
+        let limit = self.settings.max_units;
+        self.fault(FaultKind::TooManyUnits, || {
+            format!("unit {id} is refused: all {limit} places (max_units) are taken or kept")
+        });
+        None
+    }
+
+    /// The unit of a serial, if it has appeared.
+    fn unit(&self, serial: &str) -> Option<Unit> {
+        read(&self.units).get(serial).map(Arc::clone)
+    }
+
+    /// Counts a fault that belongs to no unit, and logs the first of its kind.
+    fn fault(&self, kind: FaultKind, words: impl FnOnce() -> String) {
+        let telling = lock(&self.faults).note(kind, 1, words);
+        if let Some(telling) = telling {
+            tracing::warn!(kind = kind.name(), "{telling}");
+        }
+    }
+
+    /// Faults that belong to no unit.
+    #[must_use]
+    pub fn faults(&self) -> Vec<Fault> {
+        lock(&self.faults).faults()
+    }
+
+    /// Has a unit, seen or not, correct with another calibration from a tick on, and tells it its account of swaps. Gives
+    /// the revision counter of a change that was waiting and is replaced.
+    pub(crate) fn change(&self, unit: &UnitId, change: Change, account: SwapAccount) -> Option<u64> {
+        let before = {
+            let mut calibrations = self.calibrations.write().unwrap_or_else(PoisonError::into_inner);
+            calibrations.plan_mut(unit).change(change.clone())
+        };
+        // Behind the entry above: a unit that appears in between has been given it.
+        match self.with(unit, |actor| {
+            actor.tell_swaps(account);
+            actor.change(change)
+        }) {
+            Some(replaced) => replaced,
+            None => before.map(|change| change.next.revision.counter),
+        }
+    }
+
+    /// Has a unit begin with what it had before the service was restarted.
+    pub(crate) fn restore(&self, unit: &UnitId, plan: Plan) {
+        if plan.changes().next().is_none() && plan.intent.is_empty() {
+            return;
+        }
+        *self.calibrations.write().unwrap_or_else(PoisonError::into_inner).plan_mut(unit) = plan;
+    }
+
+    /// The change that waits for its tick: its revision counter, and when it takes effect.
+    pub(crate) fn waiting(&self, unit: &UnitId) -> Option<(u64, Schedule)> {
+        let seen = self.with(unit, |actor| actor.waiting());
+        let planned = || read(&self.calibrations).get(unit).and_then(Plan::waiting);
+        seen.unwrap_or_else(planned)
+    }
+
+    /// Does something with one unit; `None` where it has not appeared, or the work panicked and the unit was reset.
+    pub(crate) fn with<T>(&self, unit: &UnitId, work: impl FnOnce(&mut UnitActor) -> T) -> Option<T> {
+        let unit = self.unit(unit.as_str())?;
+        let mut actor = lock(&unit);
+        guarded(&mut actor, work)
+    }
+
+    /// What a unit is like at this moment; `None` where it has not appeared.
+    #[must_use]
+    pub fn present(&self, unit: &UnitId) -> Option<Present> {
+        self.with(unit, |actor| actor.present())
+    }
+
+    /// Does something with every unit, in the order of their serials; a panic costs that unit its memory and no more.
+    pub fn each_unit<T>(&self, mut work: impl FnMut(&mut UnitActor) -> T) -> Vec<T> {
+        // Not locked meanwhile: a unit that appears must not wait for a look at all others.
+        let units = read(&self.units).in_order();
+        units.iter().filter_map(|(_, unit)| guarded(&mut lock(unit), &mut work)).collect()
+    }
+
+    /// Does something with every unit, as [`Self::each_unit`], and what is to follow with each before the next: the unit is
+    /// not locked any more then. How many had something to follow.
+    pub(crate) fn one_by_one<T>(
+        &self,
+        mut work: impl FnMut(&mut UnitActor) -> Option<T>,
+        mut then: impl FnMut(T),
+    ) -> usize {
+        let units = read(&self.units).in_order();
+        let found = units.iter().filter_map(|(_, unit)| {
+            // A statement of its own: the lock ends with it.
+            let found = guarded(&mut lock(unit), &mut work);
+            found.flatten()
+        });
+        found.map(&mut then).count()
+    }
+
+    /// Status of one unit; `instance` is the service's name for itself.
+    #[must_use]
+    pub fn status(&self, unit: &UnitId, instance: &str) -> Option<Status> {
+        self.with(unit, |actor| actor.status(instance))
+    }
+
+    /// The account so far.
+    #[must_use]
+    pub fn totals(&self) -> Totals {
+        let units = self.each_unit(|actor| (actor.id().to_string(), actor.totals()));
+        let refused = lock(&self.faults).counters().map(|counter| (counter.name, counter.value)).collect();
+        Totals { units: units.into_iter().collect(), refused, stopped_in_time: false }
+    }
+}
+
+/// Runs one unit's work; where it panics, the unit is reset and the thread goes on.
+fn guarded<T>(actor: &mut UnitActor, work: impl FnOnce(&mut UnitActor) -> T) -> Option<T> {
+    // Unwind safety: whatever state the panic leaves behind is given up by the reset.
+    match catch_unwind(AssertUnwindSafe(|| work(actor))) {
+        Ok(done) => Some(done),
+        Err(panic) => {
+            actor.reset(&words_of(panic.as_ref()));
+            None
+        }
+    }
+}
+
+/// What a panic says.
+fn words_of(panic: &(dyn Any + Send)) -> String {
+    let text =
+        panic.downcast_ref::<&str>().copied().or_else(|| panic.downcast_ref::<String>().map(String::as_str));
+    format!("panic: {}", text.unwrap_or("without words"))
+}
+
+/// Whether a frame is a batch of its stream.
+fn readable(stream: RawStream, frame: &[u8]) -> Result<(), CodecError> {
+    match stream {
+        RawStream::Gyro => codec::decode::<GyroBatch>(frame).map(drop),
+        RawStream::Accel => codec::decode::<AccelBatch>(frame).map(drop),
+        RawStream::Temperature => codec::decode::<TemperatureBatch>(frame).map(drop),
+        RawStream::Health => codec::decode::<HealthBatch>(frame).map(drop),
+    }
+}
+
+/// Locks; a panic while the lock was held has been dealt with where it happened.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Locks for reading, likewise.
+fn read<T>(lock: &RwLock<T>) -> std::sync::RwLockReadGuard<'_, T> {
+    lock.read().unwrap_or_else(PoisonError::into_inner)
+}
+
+#[cfg(test)]
+mod tests;

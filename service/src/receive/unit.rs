@@ -1,0 +1,385 @@
+//! One unit's part of the service: its stream, its calibration, its faults and its outlet.
+
+mod account;
+mod journal_writer;
+mod notices;
+mod present;
+mod producers;
+mod rates;
+mod seen;
+mod speech;
+mod stream_timeout;
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use isotherm_correction::operation::{Command, Refusal, State};
+use isotherm_correction::unit::{self, Uncalibrated, UnitSettings};
+use isotherm_protocol::codec::CodecError;
+use isotherm_protocol::control::Schedule;
+use isotherm_protocol::journal::JournalEvent;
+use isotherm_protocol::key::{Input, RawStream, UnitId};
+use isotherm_protocol::status::{self, Counter, Output};
+use isotherm_protocol::stream::UnitStream;
+
+use crate::control::calibrations::{Change, Plan};
+use crate::control::swap_manager::{Inbox, Notice};
+use crate::receive::fault::{FaultKind, FaultLog};
+use crate::receive::latency::Histogram;
+use journal_writer::JournalWriter;
+use notices::NoticeCollector;
+use producers::Producers;
+use rates::Rates;
+use speech::Speech;
+use stream_timeout::StreamTimeout;
+
+pub(crate) use account::SwapAccount;
+pub use journal_writer::{Journal, JournalOutlet};
+pub use present::Present;
+pub(crate) use seen::TickSeen;
+pub(crate) use speech::{Alarm, Standing, Wants};
+pub use stream_timeout::StreamTimeoutSettings;
+
+/// Where corrected frames go; `Err` is an output that could not be published.
+pub type Outlet = Box<dyn FnMut(Vec<u8>) -> Result<(), zenoh::Error> + Send>;
+
+/// Counters of gyro ticks that were refused, duplicates excepted. Those of the kind and number of sensors count
+/// accelerometer ticks too.
+const REFUSALS: [&str; 5] =
+    ["gyro_late", "gyro_implausible", "wrong_sensor_count", "wrong_output_kind", "bad_duration"];
+/// How long a self-test may take by the clock: one that gets no ticks ends with what it has seen.
+const LONGEST_SELF_TEST: Duration = Duration::from_secs(14);
+/// How long a unit may be silent before it counts as one that sends no more; a pre-launch calibration ends then.
+const LONGEST_SILENCE: Duration = Duration::from_secs(10);
+
+/// One unit: frames in, frames out, everything counted. Knows nothing of sessions and threads.
+pub struct UnitActor {
+    stream: UnitStream,
+    plan: Plan,
+    outlet: Outlet,
+    faults: FaultLog,
+    latency: Histogram,
+    stream_timeout: StreamTimeout,
+    rates: Rates,
+    producers: Producers,
+    notices: NoticeCollector,
+    journal_writer: JournalWriter,
+    speech: Speech,
+    account: SwapAccount,
+    /// When a frame last came that was one.
+    heard: Instant,
+    /// When a self-test began by the clock.
+    self_test_since: Option<Instant>,
+    /// Counters of streams that were given up after an alarm.
+    before_reset: Vec<Counter>,
+    status_due: bool,
+}
+
+impl std::fmt::Debug for UnitActor {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("UnitActor")
+            .field("unit", self.stream.id())
+            .field("revision", &self.stream.revision())
+            .finish_non_exhaustive()
+    }
+}
+
+impl UnitActor {
+    /// A unit that has seen nothing and has no calibration.
+    #[must_use]
+    pub fn new(
+        id: UnitId,
+        settings: UnitSettings,
+        stream_timeout: StreamTimeoutSettings,
+        outlet: Outlet,
+    ) -> Self {
+        Self {
+            stream: UnitStream::new(id, settings),
+            plan: Plan::default(),
+            outlet,
+            faults: FaultLog::default(),
+            latency: Histogram::default(),
+            stream_timeout: StreamTimeout::new(stream_timeout),
+            rates: Rates::new(Instant::now()),
+            producers: Producers::default(),
+            notices: NoticeCollector::default(),
+            journal_writer: JournalWriter::default(),
+            speech: Speech::default(),
+            account: SwapAccount::default(),
+            heard: Instant::now(),
+            self_test_since: None,
+            before_reset: Vec::new(),
+            status_due: true,
+        }
+    }
+
+    /// To whom the unit tells what only the swap manager can write down.
+    pub(crate) fn report_to(&mut self, inbox: Inbox) {
+        self.notices.report_to(inbox);
+    }
+
+    /// Has a calibration take effect at its tick: the only way by which a unit ever gets one. Gives the revision counter of
+    /// a change that was waiting and is replaced. A revision that the unit was given already is passed over.
+    pub fn change(&mut self, change: Change) -> Option<u64> {
+        if change.next.revision.counter < self.stream.next_counter() {
+            return None;
+        }
+        let replaced = self.give(&change);
+        self.plan.change(change);
+        self.status_due = true;
+        // It may have given up what went on.
+        self.look();
+        replaced
+    }
+
+    /// Hands a change to the stream.
+    fn give(&mut self, change: &Change) -> Option<u64> {
+        let Change { next, at, slew } = change;
+        let label = next.label.clone();
+        let (calibration, revision) = (Arc::clone(&next.calibration), next.revision);
+        let replaced = if label.digest.is_none() {
+            self.stream.install_as(calibration, revision, label);
+            None
+        } else {
+            let (at, slew) = ((*at).into(), *slew);
+            self.stream.schedule(unit::Change { calibration, revision: revision.counter, at, slew }, label)
+        };
+        self.journal(|_| journal_writer::changed(change));
+        replaced
+    }
+
+    /// Carries a command out before the next tick; the state that it leads to.
+    ///
+    /// # Errors
+    /// [`Refusal`]: the state is as before.
+    pub fn command(&mut self, command: &Command) -> Result<State, Refusal> {
+        let done = self.stream.command(command);
+        self.journal(|_| journal_writer::commanded(command, &done));
+        // A self-test without a calibration changes no state, and yet has a report.
+        self.status_due |= done.is_ok();
+        self.look();
+        done
+    }
+
+    /// Takes one raw frame that arrived at `arrival`, and publishes what it released.
+    pub fn receive(&mut self, stream: RawStream, frame: &[u8], arrival: Instant) {
+        if stream == RawStream::Gyro {
+            self.stream_timeout.heard(arrival);
+        }
+        self.note_frame(Input::Raw(stream), frame, arrival);
+        let taken = self.stream.receive(stream, frame);
+        if stream == RawStream::Gyro && taken.is_ok() {
+            self.producers.heard(self.stream.incoming_series(), arrival);
+        }
+        self.taken(taken, &format_args!("raw/{}", stream.chunk()), arrival);
+    }
+
+    /// Takes one frame with a rate reference that arrived at `arrival`.
+    pub fn reference(&mut self, frame: &[u8], arrival: Instant) {
+        self.note_frame(Input::Reference, frame, arrival);
+        let taken = self.stream.receive_reference(frame);
+        self.taken(taken, &"reference", arrival);
+    }
+
+    /// Publishes what a frame has released, or counts what is wrong with it.
+    fn taken(&mut self, taken: Result<(), CodecError>, topic: &dyn std::fmt::Display, arrival: Instant) {
+        self.rates.message();
+        if let Err(error) = taken {
+            self.fault(FaultKind::from(&error), 1, || format!("{topic}: {error}"));
+            return;
+        }
+        self.heard = arrival;
+        let first_output = self.latency.total() == 0;
+        if self.publish() {
+            self.latency.record(u64::try_from(arrival.elapsed().as_nanos()).unwrap_or(u64::MAX));
+            self.status_due |= first_output;
+        }
+        self.look();
+    }
+
+    /// Looks for what has changed with the last event.
+    fn look(&mut self) {
+        if self.plan.pending.is_some() && self.stream.unit().pending().is_none() {
+            self.plan.settle();
+        }
+        if self.notices.look(&mut self.stream) {
+            self.status_due = true;
+            self.self_test_since = (self.stream.unit().state() == State::SelfTest).then(Instant::now);
+        }
+    }
+
+    /// Does what only a clock can: releases what waits in a stream that has stopped, ends what gets no more ticks.
+    pub fn tend(&mut self, now: Instant) {
+        if !self.speaks() {
+            // What the clock does to the stream, the journal of the instance that speaks says.
+            self.notices.tell(&self.stream);
+            return;
+        }
+        if self.stream.is_waiting() && self.stream_timeout.is_over(now) {
+            self.flush();
+        }
+        if self.self_test_since.is_some_and(|since| now.saturating_duration_since(since) > LONGEST_SELF_TEST)
+        {
+            self.stream.expire_self_test();
+            self.journal(|_| JournalEvent::SelfTestExpired);
+            self.look();
+        }
+        if self.stream.unit().state() == State::PreLaunchCalibration
+            && self.stream_timeout.is_silent_for(now, LONGEST_SILENCE)
+        {
+            self.stream.end_pre_launch();
+            self.journal(|_| JournalEvent::PreLaunchEnded);
+            self.look();
+        }
+        self.notices.tell(&self.stream);
+    }
+
+    /// Releases and publishes what waits inside.
+    pub fn flush(&mut self) {
+        let waited = self.stream.is_waiting();
+        self.stream.flush();
+        if waited {
+            self.journal(|_| JournalEvent::Flushed);
+        }
+        self.publish();
+        self.look();
+    }
+
+    /// Publishes every corrected tick that is ready; whether there was one.
+    fn publish(&mut self) -> bool {
+        let mut published = false;
+        while let ready @ 1.. = self.stream.ready().len() {
+            // The one that the stream has written into goes away: nothing is given back for it.
+            let mut frame = Vec::new();
+            let encoded = self.stream.next_frame(&mut frame);
+            let taken = (ready - self.stream.ready().len()) as u64;
+            let sent = if encoded { self.let_out(frame) } else { Err("cannot be encoded".into()) };
+            match sent {
+                Ok(()) => published = true,
+                Err(error) => self.fault(FaultKind::Unpublished, taken, || {
+                    format!("corrected: {}", isotherm_bus::words(&error))
+                }),
+            }
+            if taken == 0 {
+                // Not to be reached: the stream says that ticks are ready and gives none. Rather lose them than loop.
+                self.reset("the stream holds ticks back");
+            }
+        }
+        published
+    }
+
+    /// Counts a fault, and logs the first of its kind; of those that follow, their number once a minute.
+    fn fault(&mut self, kind: FaultKind, count: u64, words: impl FnOnce() -> String) {
+        let Some(telling) = self.faults.note(kind, count, words) else { return };
+        self.status_due |= telling.is_first();
+        tracing::warn!(unit = %self.stream.id(), kind = kind.name(), "{telling}");
+    }
+
+    /// Gives the unit's memory up after an event thought impossible: counted as an alarm, always logged.
+    ///
+    /// Calibration, revision and state stay; a self-test or pre-launch calibration is given up.
+    pub fn reset(&mut self, cause: &str) {
+        let id = self.stream.id().clone();
+        tracing::error!(unit = %id, "alarm: {cause}; the unit starts anew");
+        self.before_reset = self.counters();
+        let state = self.stream.unit().state();
+        self.stream.begin_anew(*self.stream.unit().settings(), 0);
+        self.lose_step();
+        self.journal(journal_writer::began);
+        let plan = self.plan.clone();
+        for change in plan.changes() {
+            self.give(&change);
+        }
+        let back = match state {
+            _ if self.stream.unit().state() == state => None,
+            State::RunningWithReversal => Some(Command::Run { reversal: Some(true) }),
+            State::RunningWithoutReversal => Some(Command::Run { reversal: Some(false) }),
+            State::Standby | State::SelfTest | State::PreLaunchCalibration => Some(Command::Standby),
+        };
+        let given = back.map(|command| {
+            let done = self.stream.command(&command);
+            self.journal(|_| journal_writer::commanded(&command, &done));
+            done
+        });
+        if let Some(Err(refusal)) = given {
+            tracing::error!(unit = %self.stream.id(), "the state is not {state} any more: {refusal}");
+        }
+        let words = format!("alarm: {cause}");
+        self.faults.note(FaultKind::Alarm, 1, || words);
+        self.status_due = true;
+        self.look();
+    }
+
+    /// What is left to tell when the swap manager ends.
+    pub(crate) fn take_untold(&mut self) -> Vec<Notice> {
+        self.notices.take_untold()
+    }
+
+    /// What the unit is like at this moment.
+    #[must_use]
+    pub fn present(&self) -> Present {
+        Present::of(self.stream.unit())
+    }
+
+    /// The change that waits for its tick: its revision counter, and when it takes effect.
+    #[must_use]
+    pub fn waiting(&self) -> Option<(u64, Schedule)> {
+        self.plan.waiting()
+    }
+
+    /// Sequence number of the last tick that was corrected under the calibration in force.
+    #[must_use]
+    pub fn last_sequence(&self) -> Option<u64> {
+        self.stream.unit().observation().map(|seen| seen.sequence)
+    }
+
+    /// Whether something happened that subscribers of the status should hear of at once; asking settles it.
+    pub fn take_status_due(&mut self) -> bool {
+        std::mem::take(&mut self.status_due)
+    }
+
+    /// Whether [`UnitActor::take_status_due`] would say yes.
+    #[must_use]
+    pub fn is_status_due(&self) -> bool {
+        self.status_due
+    }
+
+    /// What the unit is doing, and what becomes of its ticks.
+    #[must_use]
+    pub fn doing(&self) -> (status::State, Output) {
+        let unit = self.stream.unit();
+        let output = match (unit.calibration(), unit.settings().uncalibrated) {
+            (Some(_), _) => Output::Calibrated,
+            (None, Uncalibrated::PassThrough) => Output::PassThrough,
+            (None, Uncalibrated::Hold) => Output::Held,
+        };
+        (unit.state().into(), output)
+    }
+
+    /// How long no good frame has come.
+    #[must_use]
+    pub fn silence(&self, now: Instant) -> Duration {
+        now.saturating_duration_since(self.heard)
+    }
+
+    /// Whether frames come.
+    #[must_use]
+    pub fn is_heard(&self, now: Instant) -> bool {
+        self.silence(now) < LONGEST_SILENCE
+    }
+
+    /// Whether something goes on whose progress should be seen more often than once a status interval.
+    #[must_use]
+    pub fn is_in_progress(&self) -> bool {
+        matches!(self.stream.unit().state(), State::SelfTest | State::PreLaunchCalibration)
+    }
+
+    /// Serial of the unit.
+    #[must_use]
+    pub fn id(&self) -> &UnitId {
+        self.stream.id()
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,118 @@
+//! What a unit says of itself: status, totals, counters.
+
+use std::time::{Instant, SystemTime};
+
+use isotherm_protocol::digest::Digest;
+use isotherm_protocol::status::{Counter, Latency, MAX_FAULTS, PreLaunchVerdict, Status, Swaps};
+use isotherm_protocol::stream::Edge;
+
+use super::{REFUSALS, UnitActor};
+use crate::observe::totals::UnitTotals;
+use crate::receive::fault::{FaultKind, standing};
+
+/// What the swap manager tells a unit of its swaps, for its status.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub(crate) struct SwapAccount {
+    /// Accepted and refused ones.
+    pub(crate) swaps: Swaps,
+    /// Overlay that the last pre-launch calibration was stored as.
+    pub(crate) overlay: Option<Digest>,
+    /// What is wrong with the calibration in force, in words; `None` where nothing is.
+    pub(crate) problem: Option<String>,
+}
+
+impl UnitActor {
+    /// Enters what the swap manager has to say of the unit's swaps.
+    pub(crate) fn tell_swaps(&mut self, account: SwapAccount) {
+        if self.account != account {
+            self.account = account;
+            self.status_due = true;
+        }
+    }
+
+    /// Counters of the stream, those before a reset included.
+    pub(super) fn counters(&self) -> Vec<Counter> {
+        let mut counters = self.stream.counters();
+        for counter in &mut counters {
+            let before = self.before_reset.iter().find(|before| before.name == counter.name);
+            counter.value += before.map_or(0, |before| before.value);
+        }
+        counters
+    }
+
+    /// Measures the input rates anew: what the status shows until the next call.
+    pub fn measure_rates(&mut self, now: Instant) {
+        let counters = self.counters();
+        self.rates.measure(now, &counters);
+        if let Some(words) = self.producers.look(&counters) {
+            self.fault(FaultKind::TwoProducers, 1, || words);
+        }
+    }
+
+    /// What the unit says of itself; `instance` is the service's name for itself.
+    #[must_use]
+    pub fn status(&self, instance: &str) -> Status {
+        let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
+        let mut status = self.stream.status(Edge {
+            instance,
+            version: env!("CARGO_PKG_VERSION"),
+            now_unix_s: now.ok().and_then(|since| i64::try_from(since.as_secs()).ok()),
+            input_rates: self.rates.rates(),
+            latency: self.latency(),
+            swaps: self.account.swaps.clone(),
+            overlay: self.account.overlay,
+            faults: self.faults.faults(),
+            last_fault: self.faults.last().map(ToOwned::to_owned),
+        });
+        status.counters = self.counters();
+        status.counters.extend(self.faults.counters());
+        if let Some(problem) = &self.account.problem {
+            status.faults.truncate(MAX_FAULTS - 1);
+            status.faults.push(standing("untrusted_calibration", 1, problem.clone()));
+        }
+        // The core knows that it was given up, not what for.
+        if let (Some(outcome), Some(reason)) = (&mut status.pre_launch_outcome, self.notices.given_up())
+            && outcome.verdict == PreLaunchVerdict::Aborted
+        {
+            outcome.verdict = PreLaunchVerdict::Refused(vec![format!("given up: {reason}")]);
+        }
+        status
+    }
+
+    /// Sum of the latencies that the status counts (ns).
+    #[must_use]
+    pub fn latency_sum_ns(&self) -> u64 {
+        self.latency.sum_ns()
+    }
+
+    fn latency(&self) -> Latency {
+        Latency {
+            p50_ns: self.latency.quantile(0.5),
+            p99_ns: self.latency.quantile(0.99),
+            p999_ns: self.latency.quantile(0.999),
+            max_ns: self.latency.quantile(1.0),
+            buckets: self.latency.buckets(),
+        }
+    }
+
+    /// The account of the unit since the service started.
+    #[must_use]
+    pub fn totals(&self) -> UnitTotals {
+        let counters = self.counters();
+        let value = |name: &str| {
+            counters.iter().find(|counter| counter.name == name).map_or(0, |counter| counter.value)
+        };
+        UnitTotals {
+            ticks_in: value("gyro_ticks_in"),
+            ticks_out: value("ticks_out"),
+            gaps: value("gaps"),
+            ticks_missed: value("ticks_missed"),
+            ticks_refused: REFUSALS.iter().map(|name| value(name)).sum(),
+            bad: self.faults.refused(),
+            unpublished: self.faults.count(FaultKind::Unpublished),
+            alarms: self.faults.count(FaultKind::Alarm),
+            added_latency_p50_ns: self.latency.quantile(0.5),
+            added_latency_p99_ns: self.latency.quantile(0.99),
+        }
+    }
+}

@@ -1,0 +1,140 @@
+//! A unit's journal: what the service does to the stream beside giving it frames, told at once and in order.
+
+use std::sync::Arc;
+
+use isotherm_correction::operation::{Command, Refusal, State};
+use isotherm_protocol::codec;
+use isotherm_protocol::journal::{JournalEntry, JournalEvent, split};
+use isotherm_protocol::key::UnitId;
+use isotherm_protocol::stream::UnitStream;
+
+use super::UnitActor;
+use crate::control::calibrations::{Change, Installable};
+use crate::control::compressed::CompressedText;
+use crate::receive::fault::FaultKind;
+
+/// Where the frames of journals go; `Err` is one that could not be published.
+pub type JournalOutlet = dyn Fn(&UnitId, Vec<u8>) -> Result<(), zenoh::Error> + Send + Sync;
+
+/// The journals of a service instance.
+#[derive(Clone)]
+pub struct Journal {
+    /// The instance: its Zenoh id as text.
+    pub instance: Arc<str>,
+    /// Where frames go.
+    pub outlet: Arc<JournalOutlet>,
+}
+
+impl std::fmt::Debug for Journal {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Journal").field("instance", &self.instance).finish_non_exhaustive()
+    }
+}
+
+/// Numbers a unit's entries. It keeps none: who was not there asks for the memory.
+#[derive(Debug, Default)]
+pub(super) struct JournalWriter {
+    journal: Option<Journal>,
+    /// Number of the last entry.
+    number: u64,
+}
+
+impl UnitActor {
+    /// Has everything told to a journal from here on; a unit that has seen nothing begins it.
+    pub(crate) fn journal_to(&mut self, journal: Journal) {
+        self.journal_writer.journal = Some(journal);
+        self.journal(began);
+    }
+
+    /// The service stops: nothing more is done to the unit.
+    pub(crate) fn end(&mut self) {
+        self.journal(|_| JournalEvent::Ended);
+    }
+
+    /// Everything that the unit's stream knows at this moment, as the journal's entry; `instance` is the service's name for
+    /// itself.
+    #[must_use]
+    pub(crate) fn memory(&self, instance: &str) -> JournalEntry {
+        let text = |next: &Arc<Installable>| next.text.as_ref().map(CompressedText::read);
+        JournalEntry {
+            unit: self.id().to_string(),
+            instance: instance.to_owned(),
+            number: self.journal_writer.number,
+            heard: self.stream.heard(),
+            event: JournalEvent::Memory {
+                memory: self.stream.memory(),
+                document: self.plan.current.as_ref().and_then(text),
+                pending: self.plan.pending.as_ref().and_then(|change| text(&change.next)),
+            },
+        }
+    }
+
+    /// Tells an event that has been applied to the stream, where there is a journal. No event takes frames in: the stream
+    /// has heard what it had heard before.
+    pub(super) fn journal(&mut self, event: impl FnOnce(&UnitStream) -> JournalEvent) {
+        // That of the instance that speaks is the unit's.
+        let Some(journal) = self.journal_writer.journal.as_ref().filter(|_| self.speaks()) else { return };
+        self.journal_writer.number += 1;
+        let entry = JournalEntry {
+            unit: self.stream.id().to_string(),
+            instance: journal.instance.as_ref().to_owned(),
+            number: self.journal_writer.number,
+            heard: self.stream.heard(),
+            event: event(&self.stream),
+        };
+        self.tell_entry(&entry);
+    }
+
+    /// Says in the journal what the stream knows.
+    pub(super) fn journal_memory(&mut self) {
+        let Some(journal) = &self.journal_writer.journal else { return };
+        let instance = Arc::clone(&journal.instance);
+        self.tell_entry(&self.memory(&instance));
+    }
+
+    fn tell_entry(&mut self, entry: &JournalEntry) {
+        let Some(journal) = &self.journal_writer.journal else { return };
+        let publish = |part| (journal.outlet)(self.stream.id(), codec::encode(&part)?);
+        let published = split(entry).into_iter().try_for_each(publish);
+        if let Err(error) = published {
+            self.fault(FaultKind::JournalUnpublished, 1, || {
+                format!(
+                    "journal, entry {} ({}): {}",
+                    entry.number,
+                    entry.event.name(),
+                    isotherm_bus::words(&error)
+                )
+            });
+        }
+    }
+}
+
+/// That the stream knows nothing.
+pub(super) fn began(stream: &UnitStream) -> JournalEvent {
+    JournalEvent::Began {
+        settings: *stream.unit().settings(),
+        highest_revision: stream.next_counter().saturating_sub(1),
+    }
+}
+
+/// That the unit was given a calibration.
+pub(super) fn changed(change: &Change) -> JournalEvent {
+    let Change { next, at, slew } = change;
+    JournalEvent::Changed {
+        revision: next.revision,
+        at: *at,
+        slew_ns: slew.as_ns(),
+        document: next.text.as_ref().map(CompressedText::read),
+        overlay: next.label.overlay,
+        source: next.label.source.clone(),
+    }
+}
+
+/// That the unit was given a command, and what came of it.
+pub(super) fn commanded(command: &Command, done: &Result<State, Refusal>) -> JournalEvent {
+    JournalEvent::Commanded {
+        command: command.clone(),
+        accepted: done.is_ok(),
+        words: done.as_ref().map_or_else(ToString::to_string, ToString::to_string),
+    }
+}

@@ -1,0 +1,192 @@
+use std::sync::Mutex;
+use std::time::Duration;
+
+use isotherm_correction::calibration::Calibration;
+use isotherm_correction::sample::{AccelTick, GyroTick, OutputKind};
+use isotherm_correction::units::{Span, Timestamp};
+use isotherm_protocol::codec::{decode, encode};
+use isotherm_protocol::corrected::{CorrectedBatch, Revision};
+use isotherm_protocol::digest::Digest;
+use isotherm_protocol::document::Document;
+use isotherm_protocol::raw::{AccelBatch, GyroBatch};
+use isotherm_protocol::stream::Label;
+
+use super::*;
+use crate::UnitTotals;
+use crate::control::calibrations::Installable;
+
+mod journal;
+
+/// Frames of a tick: three gyros or three accelerometers, ticks of 5 ms.
+fn frames(sequence: u64) -> [(RawStream, Vec<u8>); 2] {
+    let end_time = Timestamp::from_ns(i64::try_from(sequence + 1).unwrap() * 5_000_000);
+    let duration = Span::from_ms(5);
+    let readings: isotherm_correction::sample::Sensors<f64> = [1.0, 2.0, 3.0].into_iter().collect();
+    let accel = AccelTick { sequence, end_time, duration, readings: readings.clone() };
+    let gyro = GyroTick { sequence, end_time, duration, readings, ..GyroTick::default() };
+    [
+        (RawStream::Accel, encode(&AccelBatch { output: OutputKind::Counts, ticks: vec![accel] }).unwrap()),
+        (RawStream::Gyro, encode(&GyroBatch { output: OutputKind::Counts, ticks: vec![gyro] }).unwrap()),
+    ]
+}
+
+/// What an outlet was given.
+#[derive(Debug, Clone, Default)]
+struct Sink(Arc<Mutex<Vec<CorrectedBatch>>>);
+
+impl Sink {
+    fn outlet(&self) -> Outlet {
+        let taken = Arc::clone(&self.0);
+        Box::new(move |frame| {
+            taken.lock().unwrap().push(decode(&frame)?);
+            Ok(())
+        })
+    }
+
+    fn sequences(&self) -> Vec<u64> {
+        self.0.lock().unwrap().iter().flat_map(|batch| batch.ticks.iter().map(|tick| tick.sequence)).collect()
+    }
+}
+
+fn actor(outlet: Outlet) -> UnitActor {
+    let stream_timeout = StreamTimeoutSettings {
+        tail_flush: Duration::from_millis(100),
+        pairing_window: Duration::from_millis(50),
+    };
+    UnitActor::new(UnitId::new("U-1").unwrap(), UnitSettings::default(), stream_timeout, outlet)
+}
+
+fn example() -> (Arc<Calibration>, [u8; 8]) {
+    let text = include_str!("../../../../config/calibration/example-full.toml");
+    let parsed = Document::parse(text, None).unwrap();
+    (Arc::new(parsed.calibration), *parsed.digest.first_chunk().unwrap())
+}
+
+/// Gives a unit a calibration from the next tick on, as the next revision.
+fn install(actor: &mut UnitActor, calibration: Arc<Calibration>, digest: [u8; 8]) -> Revision {
+    let revision = Revision { counter: actor.stream.next_counter(), digest };
+    let next = Arc::new(Installable::plain(revision, calibration));
+    actor.change(Change { next, at: Schedule::NextTick, slew: Span::ZERO });
+    revision
+}
+
+#[test]
+fn each_tick_goes_out_with_the_frame_that_completes_it() {
+    let sink = Sink::default();
+    let mut actor = actor(sink.outlet());
+    for sequence in 0..30 {
+        for (stream, frame) in frames(sequence) {
+            actor.receive(stream, &frame, Instant::now());
+        }
+        // The first tick waits out the pairing window of 50 ms: an earlier one may still be on its way.
+        let out = if sequence < 10 { 0 } else { sequence + 1 };
+        assert_eq!(sink.sequences(), (0..out).collect::<Vec<_>>());
+    }
+    let totals = actor.totals();
+    assert_eq!((totals.ticks_in, totals.ticks_out, totals.bad, totals.unpublished), (30, 30, 0, 0));
+    assert!(totals.added_latency_p50_ns > 0);
+}
+
+#[test]
+fn a_bad_frame_is_counted_by_its_kind_and_changes_nothing_else() {
+    let (clean, dirty) = (Sink::default(), Sink::default());
+    let (mut first, mut second) = (actor(clean.outlet()), actor(dirty.outlet()));
+    for (stream, frame) in (0..20).flat_map(frames) {
+        first.receive(stream, &frame, Instant::now());
+        second.receive(stream, &[0; 3], Instant::now());
+        let mut flipped = frame.clone();
+        flipped[5] ^= 1;
+        second.receive(stream, &flipped, Instant::now());
+        second.receive(RawStream::Temperature, &frame, Instant::now());
+        second.receive(stream, &frame, Instant::now());
+    }
+    assert_eq!(*clean.0.lock().unwrap(), *dirty.0.lock().unwrap());
+    let status = second.status("test");
+    for (name, value) in
+        [("bad_frames", 120), ("bad_frames_length", 40), ("bad_frames_checksum", 40), ("bad_frames_kind", 40)]
+    {
+        let counter = status.counters.iter().find(|counter| counter.name == name);
+        assert_eq!(counter.map(|counter| counter.value), Some(value), "{name}");
+    }
+    assert_eq!(second.totals().bad, 120);
+    assert_eq!(dirty.sequences().len(), 20);
+    assert!(status.last_fault.is_some());
+}
+
+#[test]
+fn an_outlet_that_fails_costs_its_ticks_and_they_are_counted() {
+    let mut actor = actor(Box::new(|_| Err("closed".into())));
+    for (stream, frame) in (0..20).flat_map(frames) {
+        actor.receive(stream, &frame, Instant::now());
+    }
+    assert_eq!((actor.totals().ticks_in, actor.totals().unpublished), (20, 20));
+    assert_eq!(actor.status("test").last_fault.as_deref(), Some("corrected: closed"));
+}
+
+#[test]
+fn what_waits_goes_out_when_the_stream_has_stopped_and_not_before() {
+    let sink = Sink::default();
+    let mut actor = actor(sink.outlet());
+    let start = Instant::now();
+    let [_, (stream, frame)] = frames(0);
+    actor.receive(stream, &frame, start);
+    actor.tend(start + Duration::from_millis(900));
+    assert_eq!(sink.sequences(), [0; 0], "the accelerometer tick may still come");
+    actor.tend(start + Duration::from_secs(1));
+    assert_eq!(sink.sequences(), [0]);
+}
+
+#[test]
+fn a_reset_keeps_the_calibration_its_revision_and_the_counts() {
+    let sink = Sink::default();
+    let mut actor = actor(sink.outlet());
+    let (calibration, digest) = example();
+    install(&mut actor, Arc::clone(&calibration), digest);
+    let revision = install(&mut actor, calibration, digest);
+    assert_eq!((revision.counter, revision.digest), (2, digest));
+    for (stream, frame) in (0..3).flat_map(frames) {
+        actor.receive(stream, &frame, Instant::now());
+    }
+    let before = actor.totals();
+    actor.take_status_due();
+    actor.reset("a test says so");
+    assert!(actor.take_status_due());
+    assert_eq!(actor.status("test").revision(), revision);
+    assert_eq!(UnitTotals { alarms: 1, ..before }, actor.totals());
+    for (stream, frame) in (3..5).flat_map(frames) {
+        actor.receive(stream, &frame, Instant::now());
+    }
+    assert_eq!(actor.totals().ticks_in, before.ticks_in + 2);
+}
+
+#[test]
+fn a_reset_keeps_a_change_that_waits_and_the_state() {
+    let sink = Sink::default();
+    let mut actor = actor(sink.outlet());
+    let (calibration, digest) = example();
+    install(&mut actor, Arc::clone(&calibration), digest);
+    actor.command(&Command::Standby).unwrap();
+    let revision = Revision { counter: 2, digest: [9; 8] };
+    let label = Label { digest: Some(Digest([9; 32])), ..Label::default() };
+    let next = Arc::new(Installable { label, ..Installable::plain(revision, calibration) });
+    actor.change(Change { next, at: Schedule::Sequence(70), slew: Span::ZERO });
+    actor.reset("a test says so");
+    assert_eq!(actor.waiting(), Some((2, Schedule::Sequence(70))));
+    let present = actor.present();
+    assert_eq!((present.state, present.revision, present.pending), (State::Standby, 1, Some(2)));
+}
+
+#[test]
+fn a_revision_that_was_given_already_is_passed_over() {
+    let sink = Sink::default();
+    let mut actor = actor(sink.outlet());
+    let (calibration, digest) = example();
+    let revision = Revision { counter: 4, digest };
+    let next = Arc::new(Installable::plain(revision, calibration));
+    let change = Change { next, at: Schedule::NextTick, slew: Span::ZERO };
+    actor.change(change.clone());
+    actor.take_status_due();
+    assert_eq!(actor.change(change), None);
+    assert!(!actor.is_status_due());
+    assert_eq!(actor.present().revision, 4);
+}
