@@ -35,6 +35,11 @@ purity:
 python:
     .ci/run python
 
+# Kill the speaking service of a pair 100 times and stop it 50 times, with 20 units at 200 Hz; print the pauses (ten minutes;
+# ISOTHERM_PAIR=UNITS,KILLS,STOPS)
+pair:
+    cargo test --release --workspace --locked --test operators a_hundred_kills -- --ignored --nocapture
+
 # Decode 10⁸ changed frames with the C header under the sanitizers of cc (some minutes)
 fuzz-c:
     ISOTHERM_FUZZ=100000000 cargo test --release --locked -p isotherm-protocol --test versions no_frame_leads -- --nocapture

@@ -116,6 +116,7 @@ impl ClientOptions {
             connect: self.connect.clone(),
             listen: self.listen.clone(),
             namespace: self.namespace.clone(),
+            lease: None,
         };
         let said = |options: &SessionOptions| {
             options.config.is_some() || !options.connect.is_empty() || !options.listen.is_empty()

@@ -11,21 +11,25 @@
 //! |---|---|
 //! | [`session`] | options, open, locators, close |
 //! | [`endpoint`](mod@endpoint) | addresses as people write them |
+//! | [`arbiter`] | of several services, the tick that comes first |
 //! | [`client`] | the one way from a program to a service |
 //! | [`producer`] | raw ticks of a unit out, in batches |
 //! | [`outlet`] | raw frames of a unit out, bounded by what comes back; the account of it |
 //! | [`consumer`] | corrected batches in |
 //! | [`continuity`] | the rule by which a consumer notices a lost tick |
 //! | [`presence`] | waiting until the service is there |
+//! | [`inquiry`] | asking every service at once |
 //! | [`receipt`] | proof that subscribers have taken what was sent |
 //! | [`routes`] | keys whose routes Zenoh is to remember |
 //! | [`threads`] | work for the threads that receive |
 
+pub mod arbiter;
 pub mod client;
 pub mod consumer;
 pub mod continuity;
 pub mod endpoint;
 mod error;
+pub mod inquiry;
 mod obstacle;
 pub mod outlet;
 pub mod presence;
@@ -35,6 +39,7 @@ pub mod routes;
 pub mod session;
 pub mod threads;
 
+pub use arbiter::FirstWins;
 pub use client::{ClientOptions, Role};
 pub use consumer::Consumer;
 pub use continuity::Continuity;
@@ -43,4 +48,4 @@ pub use error::{BusError, Json5Problem, without_places, words};
 pub use outlet::{Outlet, OutletOptions};
 pub use producer::{Producer, ProducerOptions};
 pub use routes::DeclaredKeys;
-pub use session::{SessionOptions, close, locators, open, open_config};
+pub use session::{SessionOptions, close, connected, locators, open, open_config};

@@ -15,6 +15,12 @@ const LOOPBACK: &str = "tcp/127.0.0.1:0";
 /// How long an endpoint given as an option may stay unreachable before opening fails (ms).
 const CONNECT_TIMEOUT_MS: u32 = 10_000;
 
+/// How often it is looked whether a session is connected: Zenoh tells nobody.
+const CONNECTED_INTERVAL: Duration = Duration::from_millis(5);
+
+/// Key of the lease (ms).
+const LEASE: &str = "transport/link/tx/lease";
+
 /// How long a connection may say nothing before it is let go (ms), and how many may be about to say something: Zenoh's own 10 s and
 /// 100 let a few hundred idle connections keep every client out.
 const ACCEPT_TIMEOUT_MS: u32 = 2000;
@@ -41,6 +47,10 @@ pub struct SessionOptions {
     /// Key prefix of the site, e.g. site/a
     #[cfg_attr(feature = "clap", arg(long, value_name = "PREFIX"))]
     pub namespace: Option<String>,
+    /// How long others wait for a sign of life before they give the connection up, where a configuration does not say otherwise; until
+    /// then whoever publishes to this session with `Block` may be held up by it. `None`: Zenoh's own 10 s.
+    #[cfg_attr(feature = "clap", arg(skip))]
+    pub lease: Option<Duration>,
 }
 
 impl SessionOptions {
@@ -59,6 +69,9 @@ impl SessionOptions {
         }
         if !self.listen.is_empty() {
             set(&mut config, "listen/endpoints", read("listen", &self.listen)?)?;
+        }
+        if let Some(lease) = self.lease.filter(|_| has_default(&config, LEASE)) {
+            set(&mut config, LEASE, u64::try_from(lease.as_millis()).unwrap_or(u64::MAX))?;
         }
         if let Some(namespace) = &self.namespace {
             set(&mut config, "namespace", namespace.as_str())?;
@@ -84,6 +97,11 @@ impl SessionOptions {
             _ => format!("a router or peer at {}", endpoints.join(" or ")),
         })
     }
+}
+
+/// Whether a key of a configuration is what it is where nobody says anything.
+fn has_default(config: &Config, key: &str) -> bool {
+    config.get_json(key).ok() == Config::default().get_json(key).ok()
 }
 
 /// Endpoints as Zenoh takes them.
@@ -167,6 +185,25 @@ pub async fn open_config(config: Config) -> Result<Session, BusError> {
             Err(known.ok().flatten().unwrap_or(BusError::Open(source)))
         }
     }
+}
+
+/// Waits until a session is connected to anybody, where its options name an endpoint; no longer than `limit`.
+///
+/// # Errors
+/// As [`SessionOptions::to_config`].
+pub async fn connected(session: &Session, options: &SessionOptions, limit: Duration) -> Result<(), BusError> {
+    if endpoints(&options.to_config()?, "connect/endpoints").is_empty() {
+        return Ok(());
+    }
+    let deadline = Instant::now() + limit;
+    while Instant::now() < deadline {
+        let info = session.info();
+        if info.peers_zid().await.next().is_some() || info.routers_zid().await.next().is_some() {
+            break;
+        }
+        tokio::time::sleep(CONNECTED_INTERVAL).await;
+    }
+    Ok(())
 }
 
 /// The endpoints that others can connect to, with the ports that the system has chosen.

@@ -2278,8 +2278,11 @@ typedef struct {
     bool known;
 } isotherm_run;
 
+/* The runs before the present one that are remembered: a service may lag behind as many restarts of the producer. */
+#define ISOTHERM_RUNS_BEFORE 3
+
 typedef struct {
-    isotherm_run current, previous;
+    isotherm_run current, before[ISOTHERM_RUNS_BEFORE];
     uint64_t dropped;
 } isotherm_arbiter;
 
@@ -2306,10 +2309,14 @@ static inline bool isotherm_wins(isotherm_arbiter *arbiter, const isotherm_corre
     bool wins = true;
     if (isotherm_is_of(run, tick)) {
         wins = isotherm_first(tick) > run->sequence;
-    } else if (run->known && isotherm_is_of(&arbiter->previous, tick)) {
-        wins = false;
     } else {
-        arbiter->previous = *run;
+        for (size_t i = 0; i < ISOTHERM_RUNS_BEFORE; ++i) {
+            if (isotherm_is_of(&arbiter->before[i], tick)) wins = false;
+        }
+        if (wins) {
+            for (size_t i = ISOTHERM_RUNS_BEFORE - 1; i > 0; --i) arbiter->before[i] = arbiter->before[i - 1];
+            arbiter->before[0] = *run;
+        }
     }
     if (!wins) {
         ++arbiter->dropped;

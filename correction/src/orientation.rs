@@ -239,6 +239,13 @@ impl Orientation {
         rows.iter().take(self.sensors).map(|row| dot(row, &v)).collect()
     }
 
+    /// What one sensor reads for `v`, as [`forward`](Self::forward); 0 where there is none.
+    pub(crate) fn along(&self, sensor: usize, temperature_deg_c: f64, v: &[f64; 3]) -> f64 {
+        let excess = self.clamped(temperature_deg_c) - self.reference_deg_c;
+        let lane = self.rows.get(sensor).zip(self.slopes_per_deg_c.get(sensor));
+        lane.map_or(0.0, |(row, slope)| dot(&array::from_fn(|axis| row[axis] + slope[axis] * excess), v))
+    }
+
     /// C(T), with T clamped to the fitted range and NaN standing for the reference.
     fn rows_at(&self, temperature_deg_c: f64) -> Rows {
         let excess = self.clamped(temperature_deg_c) - self.reference_deg_c;

@@ -3,18 +3,12 @@
 //! | file | holds |
 //! |---|---|
 //! | [`scan`] | looks ahead for the journals of a recording |
-//! | [`Outline`] | where their entries stand |
-//! | [`Sequencer`] | frames and entries in the order in which the service had them |
-//! | [`Notice`] | where recorder and service did not have the same |
 //! | [`Replica`] | the stream itself |
 //! | [`stepper`] | its events one by one |
 //!
 //! What a replica gives out equals what the service published, to the bit, as long as no notice says otherwise.
 
-mod notice;
-mod outline;
 mod scan;
-mod sequencer;
 pub mod stepper;
 #[cfg(test)]
 mod tests;
@@ -28,14 +22,15 @@ use isotherm_protocol::control::Schedule;
 use isotherm_protocol::corrected::{CorrectedBatch, Revision};
 use isotherm_protocol::journal::{Joiner, JournalEntry, JournalEvent};
 use isotherm_protocol::key::{Input, UnitId};
+use isotherm_protocol::replay::input_name;
 use isotherm_protocol::stream::{Label, UnitStream};
 use serde::Serialize;
 
-pub use notice::{Notice, input_name};
-pub use outline::{Mark, MarkKind, Outline, Outlines, UnitOutline};
+pub use isotherm_protocol::replay::{
+    Deed, Mark, MarkKind, NEAR_NS, Notice, Outline, Outlines, Sequencer, UnitOutline,
+};
 pub(crate) use scan::join;
 pub use scan::scan;
-pub use sequencer::{Deed, NEAR_NS, Sequencer};
 pub use words::entry_words;
 
 use crate::message::{Message, Topic};

@@ -107,6 +107,17 @@ const MOST_OF_TICK: usize = 8 * MAX_NUMBER + 6 * size_of::<f64>() + 2 * MAX_SENS
 /// Longest form of a tick, in bytes.
 pub(crate) const MAX_TICK: usize = MOST_OF_TICK + 2 * MAX_PARITY * size_of::<f64>();
 
+/// Whether two ticks are the same to the bit, their revision's counter left out; numbers that are none are what their bits are.
+#[must_use]
+pub fn are_same(one: &CorrectedTick, other: &CorrectedTick) -> bool {
+    let bytes = |tick: &CorrectedTick| {
+        let mut bytes = Vec::with_capacity(MAX_TICK);
+        append_tick(&mut bytes, tick);
+        bytes
+    };
+    bytes(one) == bytes(other)
+}
+
 /// Appends one tick: the one place where corrected ticks become bytes.
 pub(crate) fn append_tick(frame: &mut Vec<u8>, tick: &CorrectedTick) {
     let parities = tick.gyro_parity.len() + tick.accel_parity.len();

@@ -9,11 +9,15 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use crate::digest::Digest;
+
 /// Longest serial, in bytes.
 pub const MAX_UNIT_ID: usize = 64;
 
 /// Raw topics of all units.
 pub const ALL_RAW: &str = "imu/*/raw/*";
+/// Temperature topics of all units.
+pub const ALL_TEMPERATURES: &str = "imu/*/raw/temp";
 /// Corrected topics of all units.
 pub const ALL_CORRECTED: &str = "imu/*/corrected";
 /// Status topics of all units.
@@ -36,6 +40,12 @@ pub const ALL_SERVICE_STATUS: &str = "isotherm/*/status";
 pub const ALL_CONFIGURATIONS: &str = "isotherm/*/configuration";
 /// Liveliness tokens of all service instances.
 pub const ALL_SERVICES_ALIVE: &str = "isotherm/*/alive";
+/// What all service instances say of themselves and their units, as those of a pair.
+pub const ALL_PAIRS: &str = "isotherm/*/pair";
+/// Liveliness tokens by which service instances see each other.
+pub const ALL_MEMBERS: &str = "isotherm/*/member/**";
+/// Documents and overlays in the state folders of all service instances, by digest.
+pub const ALL_KEPT: &str = "isotherm/*/kept/*";
 /// Receipts of all subscribers that give one: a service that stops asks them.
 pub const ALL_RECEIPTS: &str = "isotherm/*/receipt";
 
@@ -247,6 +257,24 @@ pub fn service_alive(instance: &str) -> String {
     format!("{SERVICE_ROOT}/{instance}/alive")
 }
 
+/// Key of what a service instance says of itself and its units: `isotherm/{instance}/pair`.
+#[must_use]
+pub fn pair(instance: &str) -> String {
+    format!("{SERVICE_ROOT}/{instance}/pair")
+}
+
+/// Key of a document or an overlay in a service instance's state folder: `isotherm/{instance}/kept/{digest}`.
+#[must_use]
+pub fn kept(instance: &str, digest: &Digest) -> String {
+    format!("{SERVICE_ROOT}/{instance}/kept/{digest}")
+}
+
+/// Reads the digest of a key of a kept document back; `None` where it is none.
+#[must_use]
+pub fn parse_kept(key: &str) -> Option<Digest> {
+    parse(SERVICE_ROOT, key)?.1.strip_prefix("kept/")?.parse().ok()
+}
+
 /// Key of the receipt of a session that subscribes: `isotherm/{session}/receipt`; the session is its Zenoh id as text.
 #[must_use]
 pub fn receipt(session: &str) -> String {
@@ -269,6 +297,12 @@ pub fn parse_configuration(key: &str) -> Option<&str> {
 #[must_use]
 pub fn parse_service_alive(key: &str) -> Option<&str> {
     parse(SERVICE_ROOT, key).filter(|(_, rest)| *rest == "alive").map(|(instance, _)| instance)
+}
+
+/// Reads the unit of any key of a unit back; `None` where it is none.
+#[must_use]
+pub fn unit_of(key: &str) -> Option<&str> {
+    parse(ROOT, key).map(|(unit, _)| unit)
 }
 
 /// Reads a raw key back; `None` where it is none.

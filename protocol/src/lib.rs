@@ -17,6 +17,8 @@
 //! | [`stream`] | frames in, frames out for one unit |
 //! | [`control`] | what operators ask of a running unit, and the answers |
 //! | [`journal`] | what acts on a unit's stream beside its frames, so that a log alone is enough to correct it again |
+//! | [`replay`] | frames and journal in the order in which a service had them; a stream that follows another one |
+//! | [`pair`] | several services of one stream: who they are, who speaks |
 //! | [`history`] | what was done to a unit: the entries of the audit file |
 //! | [`document`] | the calibration document: TOML in, validated calibration out; differences of two |
 //! | [`overlay`] | changes of a document's bias constants, such as a pre-launch calibration's; the one way in for both |
@@ -34,8 +36,10 @@ pub mod history;
 pub mod journal;
 pub mod key;
 pub mod overlay;
+pub mod pair;
 pub mod raw;
 pub mod reference;
+pub mod replay;
 pub mod service_status;
 pub mod signature;
 pub mod status;

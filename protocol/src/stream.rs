@@ -328,6 +328,12 @@ impl UnitStream {
         self.revisions.taken(revision);
     }
 
+    /// Series of the last raw gyro tick.
+    #[must_use]
+    pub fn incoming_series(&self) -> u64 {
+        self.incoming_series
+    }
+
     /// Every counter of the unit, by name.
     #[must_use]
     pub fn counters(&self) -> Vec<Counter> {

@@ -5,6 +5,7 @@
 mod effective;
 mod keys;
 mod metrics;
+mod pair;
 mod read;
 mod swap;
 mod web;
@@ -23,6 +24,7 @@ use zenoh::qos::CongestionControl;
 use crate::ServiceError;
 use crate::text::{self, read_bounded};
 pub use metrics::MetricsSettings;
+pub use pair::{PairSettings, chunk};
 pub use swap::{FolderSettings, Severity, SwapSettings};
 pub use web::WebSettings;
 
@@ -57,6 +59,10 @@ pub struct Settings {
     pub stop_timeout: Duration,
     /// What happens to corrected batches where a subscriber does not keep up.
     pub congestion: CongestionControl,
+    /// Serials of the units that are taken, with `*` for any characters; not empty.
+    pub units: Vec<String>,
+    /// Other instances for the same units.
+    pub pair: PairSettings,
     /// Where metrics and health are served.
     pub metrics: MetricsSettings,
     /// The console in the browser, beside the metrics.
@@ -82,6 +88,8 @@ impl Default for Settings {
             status_interval: Duration::from_secs(1),
             stop_timeout: Duration::from_secs(3),
             congestion: CongestionControl::Drop,
+            units: vec![pair::ALL_UNITS.to_owned()],
+            pair: PairSettings::default(),
             metrics: MetricsSettings::default(),
             web: WebSettings::default(),
             session: SessionOptions::default(),

@@ -52,6 +52,12 @@ kinds! {
     Unpublished = "ticks_unpublished",
     /// Entries of the unit's journal that could not be published.
     JournalUnpublished = "journal_entries_unpublished",
+    /// Corrected ticks of which another instance has computed other bits.
+    OtherBits = "instances_disagree",
+    /// Units whose corrected ticks two services publish that are no pair.
+    TwoSpeak = "two_services",
+    /// Units that two producers seem to publish.
+    TwoProducers = "two_producers",
     /// An event thought impossible inside one unit's processing; the unit was reset.
     Alarm = "alarms",
 }
@@ -165,7 +171,9 @@ impl FaultLog {
     /// Messages that were refused, of whatever kind.
     #[must_use]
     pub fn refused(&self) -> u64 {
-        let own = [FaultKind::Unpublished, FaultKind::Alarm];
+        use FaultKind as K;
+
+        let own = [K::Unpublished, K::Alarm, K::OtherBits, K::TwoSpeak, K::TwoProducers];
         FaultKind::ALL.iter().filter(|kind| !own.contains(kind)).map(|kind| self.count(*kind)).sum()
     }
 

@@ -16,6 +16,7 @@ use isotherm_protocol::status::{Fault, Output, Status};
 use crate::calibrations::{Calibrations, Change, Plan};
 use crate::config::Settings;
 use crate::fault::{FaultKind, FaultLog};
+use crate::pair::Pair;
 use crate::registrar::Desk;
 use crate::totals::Totals;
 use crate::unit::{Journal, Outlet, Present, QuietSettings, SwapAccount, UnitActor};
@@ -32,11 +33,16 @@ pub struct Intake {
     desk: Option<Desk>,
     /// Where the journals of units go.
     journal: Option<Journal>,
+    /// Other instances.
+    pair: Option<Arc<Pair>>,
     units: RwLock<Units>,
     faults: Mutex<FaultLog>,
     looked_for_room: Mutex<Option<Instant>>,
 }
 
+/// How long whoever asks something of a unit waits until it is known which instance speaks for it, and how often that is looked for.
+const LONGEST_DOUBT: Duration = Duration::from_millis(500);
+const DOUBT_INTERVAL: Duration = Duration::from_millis(5);
 /// How long a unit without a calibration is silent before another may have its place.
 const STRANGER_KEPT: Duration = Duration::from_secs(60);
 /// Shortest distance of two looks for such a unit.
@@ -62,6 +68,7 @@ impl Intake {
             outlets: Outlets::new(outlets),
             desk: None,
             journal: None,
+            pair: None,
             units: RwLock::default(),
             faults: Mutex::default(),
             looked_for_room: Mutex::default(),
@@ -77,6 +84,51 @@ impl Intake {
     #[must_use]
     pub fn journaling_to(self, journal: Journal) -> Self {
         Self { journal: Some(journal), ..self }
+    }
+
+    /// Has units be silent while another instance speaks for them.
+    pub(crate) fn paired_with(self, pair: Arc<Pair>) -> Self {
+        Self { pair: Some(pair), ..self }
+    }
+
+    /// Whether swaps and commands of a unit are this instance's.
+    pub(crate) fn speaks_for(&self, unit: &UnitId) -> bool {
+        let first = || self.pair.as_ref().is_none_or(|pair| pair.speaks_first());
+        self.with(unit, |actor| actor.speaks()).unwrap_or_else(first)
+    }
+
+    /// The same; waits where it is being found out.
+    pub(crate) fn answers_for(&self, unit: &UnitId) -> bool {
+        let since = Instant::now();
+        while since.elapsed() < LONGEST_DOUBT && self.with(unit, |actor| actor.doubts()) == Some(true) {
+            std::thread::sleep(DOUBT_INTERVAL);
+        }
+        self.speaks_for(unit)
+    }
+
+    /// This instance's name for itself: its Zenoh id as text.
+    pub(crate) fn instance(&self) -> &str {
+        self.pair.as_ref().map_or("", |pair| &pair.me().instance)
+    }
+
+    /// Another instance has published a frame of a unit.
+    pub(crate) fn hear(&self, serial: &str, frame: &[u8], now: Instant) {
+        let Some((pair, unit)) = self.pair.as_ref().zip(self.unit(serial)) else { return };
+        let standing = pair.standing();
+        guarded(&mut lock(&unit), |actor| actor.hear(frame, now, &standing));
+    }
+
+    /// Something that was to be impossible has happened.
+    pub(crate) fn alarm(&self, kind: FaultKind, words: String) {
+        self.fault(kind, || words);
+    }
+
+    /// Has a unit, seen or not, begin anew with what another instance has written down.
+    pub(crate) fn plan_again(&self, unit: &UnitId, plan: Plan) {
+        let mut calibrations = self.calibrations.write().unwrap_or_else(PoisonError::into_inner);
+        *calibrations.plan_mut(unit) = plan.clone();
+        drop(calibrations);
+        self.with(unit, |actor| actor.plan_again(plan));
     }
 
     /// Makes the outlet of every unit that has a calibration, as far as there is a place for it; gives how many.
@@ -107,6 +159,11 @@ impl Intake {
         let known = self.unit(serial);
         let Some(unit) = known.or_else(|| self.appear(serial, stream, frame, arrival)) else { return false };
         let mut actor = lock(&unit);
+        if let Some((pair, short)) =
+            self.pair.as_ref().and_then(|pair| Some((pair, pair.has_stood_still(arrival)?)))
+        {
+            actor.follow(arrival, pair.standing().active, short);
+        }
         guarded(&mut actor, |actor| actor.receive(stream, frame, arrival));
         actor.is_status_due()
     }
@@ -192,6 +249,10 @@ impl Intake {
         let pairing_window = Duration::from_nanos(settings.pairing_window.as_ns().unsigned_abs());
         let quiet = QuietSettings { tail_flush: self.settings.tail_flush, pairing_window };
         let mut actor = UnitActor::new(id.clone(), settings, quiet, outlet);
+        if let Some(pair) = self.pair.as_ref().filter(|pair| !pair.speaks_first()) {
+            // Where nobody else is heard, it speaks.
+            actor.follow(Instant::now(), pair.standing().active, !pair.is_opening());
+        }
         if let Some(desk) = &self.desk {
             actor.report_to(desk.clone());
         }

@@ -17,6 +17,7 @@ use zenoh::query::Query;
 
 use crate::config::Settings;
 use crate::intake::Intake;
+use crate::pair::Pair;
 use crate::registrar::Board;
 use crate::unit::UnitActor;
 use instance::{Instance, Look};
@@ -36,6 +37,8 @@ pub(crate) enum Asked {
     Memory,
     /// Configuration of the service.
     Configuration,
+    /// What the service does for which unit, as one of a pair.
+    Pair,
 }
 
 /// What the keeper is asked for.
@@ -90,6 +93,7 @@ impl Keeper {
         session: &Session,
         intake: Arc<Intake>,
         board: Arc<Board>,
+        pair: &Arc<Pair>,
         settings: &Settings,
     ) -> std::io::Result<Self> {
         let (requests, receiver) = sync_channel(WAITING_REQUESTS);
@@ -100,6 +104,7 @@ impl Keeper {
             instance,
             configuration: settings.to_toml(),
             intake,
+            pair: Arc::clone(pair),
             rung: Arc::clone(&rung),
             units_changed: true,
             status_interval: settings.status_interval,
@@ -130,6 +135,7 @@ struct Work {
     /// Effective configuration of the service.
     configuration: String,
     intake: Arc<Intake>,
+    pair: Arc<Pair>,
     rung: Arc<AtomicBool>,
     /// Some unit's status was due since the service's own was looked at.
     units_changed: bool,
@@ -192,7 +198,8 @@ impl Work {
         let name = instance.name();
         // One after the other: the statuses of thousands of units are megabytes.
         let told = intake.one_by_one(
-            |actor| is_due(actor).then(|| (actor.id().clone(), actor.status(name))),
+            // The status of a unit is that of the instance that speaks for it.
+            |actor| (is_due(actor) && actor.speaks()).then(|| (actor.id().clone(), actor.status(name))),
             |(unit, status)| {
                 if let Err(error) = outlets.unit(&unit, &status) {
                     tracing::warn!(%unit, "cannot publish the status: {}", isotherm_bus::words(&error));

@@ -15,6 +15,7 @@
 //! | [`intake`] | what the receive threads do |
 //! | [`mod@unit`] | one unit's part |
 //! | `registrar` | the one path of every swap, and commands |
+//! | `pair` | other instances for the same stream |
 //! | `keeper` | status, and what only a clock can do |
 //! | `metrics` | metrics and health over HTTP |
 //! | `pulse` | whether the receive path is alive |
@@ -48,6 +49,7 @@ pub mod kept;
 pub mod latency;
 pub mod logging;
 mod metrics;
+mod pair;
 mod pulse;
 mod registrar;
 mod serve;

@@ -25,11 +25,13 @@
 //! | `notice` | what units have to tell |
 //! | `pre_launch` | the result of a pre-launch calibration as an overlay |
 //! | `answer` | queries and their replies |
+//! | `carry` | what another instance has written down, written down here too |
 //! | `board` | what the service's own status shows |
 
 mod admit;
 mod answer;
 mod board;
+mod carry;
 mod command;
 mod compare;
 mod desk;
@@ -52,6 +54,7 @@ use std::sync::Arc;
 use std::thread::JoinHandle;
 
 pub(crate) use board::{Board, Posted, UNWRITTEN};
+pub(crate) use carry::Carried;
 pub(crate) use desk::{Desk, Notice, PreLaunchEnd};
 
 use queue::Queue;

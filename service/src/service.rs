@@ -5,9 +5,11 @@ mod declare;
 use std::net::SocketAddr;
 use std::path::Path;
 use std::sync::Arc;
+use std::time::SystemTime;
 
 use isotherm_bus::receipt;
-use isotherm_protocol::key::UnitId;
+use isotherm_protocol::key::{self, UnitId};
+use isotherm_protocol::pair::Member;
 use isotherm_protocol::status::Status;
 use tokio::time::Instant;
 use zenoh::Session;
@@ -18,6 +20,7 @@ use crate::config::Settings;
 use crate::intake::Intake;
 use crate::keeper::Keeper;
 use crate::metrics::{Endpoint, Source};
+use crate::pair::{Asker, Pair, Watch};
 use crate::pulse::{Pulse, Stuck};
 use crate::registrar::{Desk, Found, Opening, Registrar, Work};
 use crate::signing::read_trusted_keys;
@@ -27,6 +30,9 @@ use crate::unit::UnitActor;
 use crate::watch::{WatchSettings, Watcher};
 use crate::web::Web;
 use declare::Declared;
+
+/// How long other instances may take to show themselves.
+const MEMBERS_LIMIT: std::time::Duration = std::time::Duration::from_millis(500);
 
 /// The part of the time for a stop that is kept for closing the session, one in so many.
 const CLOSE_SHARE: u32 = 10;
@@ -43,6 +49,7 @@ pub struct RunningService {
     keeper: Keeper,
     registrar: Registrar,
     desk: Desk,
+    pair: Watch,
     metrics: Option<Endpoint>,
 }
 
@@ -87,7 +94,10 @@ pub(crate) async fn start_on(
     let outlets = declare::outlets(session.clone(), settings.congestion);
     let intake = Intake::new(settings.clone(), calibrations.clone(), outlets).reporting_to(desk.clone());
     let intake = intake.journaling_to(declare::journal(session.clone(), settings.congestion));
-    let intake = Arc::new(intake);
+    isotherm_bus::connected(&session, &settings.session, MEMBERS_LIMIT).await?;
+    let pair = Pair::new(&settings, session.zid().to_string(), now_unix_ms(), members(&session).await?);
+    let pair = Arc::new(pair);
+    let intake = Arc::new(intake.paired_with(Arc::clone(&pair)));
     let pulse = Arc::new(Pulse::new(settings.congestion));
 
     let mut work = Work::new(&settings, Arc::clone(&intake), store, &opened);
@@ -97,11 +107,11 @@ pub(crate) async fn start_on(
     let prepared = intake.prepare();
     tracing::debug!(units = prepared, "publishers and keys of units with a calibration are declared");
     let board = work.board();
-    let source = Source::new(&settings, Arc::clone(&intake), Arc::clone(&board), session.zid().to_string());
+    let source = Source::new(&settings, (Arc::clone(&intake), Arc::clone(&pair)), Arc::clone(&board));
     let source = source.feeling(Arc::clone(&pulse));
     let registrar = Registrar::start(opening, work).map_err(ServiceError::Thread)?;
-    let keeper =
-        Keeper::start(&session, Arc::clone(&intake), board, &settings).map_err(ServiceError::Thread)?;
+    let keeper = Keeper::start(&session, Arc::clone(&intake), board, &pair, &settings)
+        .map_err(ServiceError::Thread)?;
     let watcher = match &settings.calibrations {
         Some(folder) => {
             let (watch, desk) = (watch_settings(&settings), desk.clone());
@@ -110,7 +120,11 @@ pub(crate) async fn start_on(
         }
         None => None,
     };
-    let declared = Declared::new(&session, &intake, &keeper.bell(), &desk, &pulse).await?;
+    // First to hear the others: what they have published of a tick that comes now is to be known.
+    let (questions, _asker) = Asker::start(&session, &pair, &intake, desk.clone());
+    let watch = Watch::start(&session, &pair, &intake, questions).await?;
+    let inputs = (&pair, settings.units.as_slice(), &pulse);
+    let declared = Declared::new(&session, &intake, &keeper.bell(), &desk, inputs).await?;
     let web = Web::start(&settings, &session, &intake)?;
     if let Some(metrics) = &metrics {
         metrics.open(source, web);
@@ -125,8 +139,26 @@ pub(crate) async fn start_on(
         keeper,
         registrar,
         desk,
+        pair: watch,
         metrics,
     })
+}
+
+/// Other instances that are there.
+async fn members(session: &Session) -> Result<Vec<Member>, ServiceError> {
+    let declare = |source| ServiceError::Declare { key: key::ALL_MEMBERS, source };
+    let replies = session.liveliness().get(key::ALL_MEMBERS).timeout(MEMBERS_LIMIT).await.map_err(declare)?;
+    let mut members = Vec::new();
+    while let Ok(reply) = replies.recv_async().await {
+        members.extend(reply.into_result().ok().and_then(|sample| Member::parse(sample.key_expr().as_str())));
+    }
+    Ok(members)
+}
+
+/// The present time by the clock of this machine (ms since 1970-01-01 UTC).
+fn now_unix_ms() -> i64 {
+    let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+    i64::try_from(since.as_millis()).unwrap_or(i64::MAX)
 }
 
 /// Opens the state folder, or its stand-in.
@@ -195,7 +227,8 @@ impl RunningService {
     ///
     /// The session given to [`start`] is closed for whoever else holds it.
     pub async fn stop(self) -> Totals {
-        let Self { session, settings, intake, watcher, declared, keeper, registrar, metrics, .. } = self;
+        let Self { session, settings, intake, watcher, declared, keeper, registrar, pair, metrics, .. } =
+            self;
         metrics.iter().for_each(Endpoint::stopping);
         let deadline = Instant::now() + settings.stop_timeout;
         let left = |deadline: Instant| deadline.saturating_duration_since(Instant::now());
@@ -203,12 +236,13 @@ impl RunningService {
         let units = Arc::clone(&intake);
         let flush = tokio::task::spawn_blocking(move || {
             let (received, alive) = declared.undeclare();
+            let paired = pair.stop();
             let kept = keeper.stop();
             let watched = watcher.is_none_or(Watcher::stop);
             // Last of all: the first ticks of a calibration may have come with the flush.
             let registered = registrar.stop();
             units.each_unit(UnitActor::end);
-            (received && kept && watched && registered, alive)
+            (received && paired && kept && watched && registered, alive)
         });
         // The token is there until the session is closed: where it goes, nothing more comes.
         let (flushed, _alive) = match tokio::time::timeout_at(deadline, flush).await {

@@ -2,10 +2,12 @@
 
 mod account;
 mod present;
+mod producers;
 mod quiet;
 mod rates;
 mod scribe;
 mod seen;
+mod speech;
 mod tell;
 
 use std::sync::Arc;
@@ -16,7 +18,7 @@ use isotherm_correction::unit::{self, Uncalibrated, UnitSettings};
 use isotherm_protocol::codec::CodecError;
 use isotherm_protocol::control::Schedule;
 use isotherm_protocol::journal::JournalEvent;
-use isotherm_protocol::key::{RawStream, UnitId};
+use isotherm_protocol::key::{Input, RawStream, UnitId};
 use isotherm_protocol::status::{self, Counter, Output};
 use isotherm_protocol::stream::UnitStream;
 
@@ -24,9 +26,11 @@ use crate::calibrations::{Change, Plan};
 use crate::fault::{FaultKind, FaultLog};
 use crate::latency::Histogram;
 use crate::registrar::{Desk, Notice};
+use producers::Producers;
 use quiet::Quiet;
 use rates::Rates;
 use scribe::Scribe;
+use speech::Speech;
 use tell::Teller;
 
 pub(crate) use account::SwapAccount;
@@ -34,6 +38,7 @@ pub use present::Present;
 pub use quiet::QuietSettings;
 pub use scribe::{Journal, JournalOutlet};
 pub(crate) use seen::TickSeen;
+pub(crate) use speech::{Alarm, Standing, Wants};
 
 /// Where corrected frames go; `Err` is an output that could not be published.
 pub type Outlet = Box<dyn FnMut(Vec<u8>) -> Result<(), zenoh::Error> + Send>;
@@ -56,8 +61,10 @@ pub struct UnitActor {
     latency: Histogram,
     quiet: Quiet,
     rates: Rates,
+    producers: Producers,
     teller: Teller,
     scribe: Scribe,
+    speech: Speech,
     account: SwapAccount,
     /// When a frame last came that was one.
     heard: Instant,
@@ -89,8 +96,10 @@ impl UnitActor {
             latency: Histogram::default(),
             quiet: Quiet::new(quiet),
             rates: Rates::new(Instant::now()),
+            producers: Producers::default(),
             teller: Teller::default(),
             scribe: Scribe::default(),
+            speech: Speech::default(),
             account: SwapAccount::default(),
             heard: Instant::now(),
             self_test_since: None,
@@ -152,12 +161,17 @@ impl UnitActor {
         if stream == RawStream::Gyro {
             self.quiet.heard(arrival);
         }
+        self.note_frame(Input::Raw(stream), frame, arrival);
         let taken = self.stream.receive(stream, frame);
+        if stream == RawStream::Gyro && taken.is_ok() {
+            self.producers.heard(self.stream.incoming_series(), arrival);
+        }
         self.taken(taken, &format_args!("raw/{}", stream.chunk()), arrival);
     }
 
     /// Takes one frame with a rate reference that arrived at `arrival`.
     pub fn reference(&mut self, frame: &[u8], arrival: Instant) {
+        self.note_frame(Input::Reference, frame, arrival);
         let taken = self.stream.receive_reference(frame);
         self.taken(taken, &"reference", arrival);
     }
@@ -191,6 +205,11 @@ impl UnitActor {
 
     /// Does what only a clock can: releases what waits in a stream that has stopped, ends what gets no more ticks.
     pub fn tend(&mut self, now: Instant) {
+        if !self.speaks() {
+            // What the clock does to the stream, the journal of the instance that speaks says.
+            self.teller.tell(&self.stream);
+            return;
+        }
         if self.stream.is_waiting() && self.quiet.is_over(now) {
             self.flush();
         }
@@ -229,7 +248,7 @@ impl UnitActor {
             let mut frame = Vec::new();
             let encoded = self.stream.next_frame(&mut frame);
             let taken = (ready - self.stream.ready().len()) as u64;
-            let sent = if encoded { (self.outlet)(frame) } else { Err("cannot be encoded".into()) };
+            let sent = if encoded { self.let_out(frame) } else { Err("cannot be encoded".into()) };
             match sent {
                 Ok(()) => published = true,
                 Err(error) => self.fault(FaultKind::Unpublished, taken, || {
@@ -260,6 +279,7 @@ impl UnitActor {
         self.before_reset = self.counters();
         let state = self.stream.unit().state();
         self.stream.begin_anew(*self.stream.unit().settings(), 0);
+        self.lose_step();
         self.journal(scribe::began);
         let plan = self.plan.clone();
         for change in plan.changes() {

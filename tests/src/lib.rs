@@ -16,6 +16,7 @@ pub mod drive;
 pub mod lives;
 pub mod logs;
 pub mod operator;
+pub mod pair;
 pub mod player;
 pub mod process;
 pub mod script;

@@ -80,8 +80,17 @@ impl Service {
     /// Where it does not.
     #[must_use]
     pub fn start(arguments: &[&str]) -> Self {
+        Self::start_as_configured(&[&["--listen", "tcp/127.0.0.1:0"], arguments].concat())
+    }
+
+    /// Starts it where its configuration says.
+    ///
+    /// # Panics
+    /// Where it does not start.
+    #[must_use]
+    pub fn start_as_configured(arguments: &[&str]) -> Self {
         let mut child = Command::new(program("isotherm"))
-            .args(["serve", "--announce", "--json", "--listen", "tcp/127.0.0.1:0"])
+            .args(["serve", "--announce", "--json"])
             .args(arguments)
             .current_dir(crate::data::root())
             .stdout(Stdio::piped())
@@ -96,6 +105,15 @@ impl Service {
         Self { child, locator }
     }
 
+    /// Sends it a signal.
+    ///
+    /// # Panics
+    /// Where it cannot be sent.
+    pub fn signal(&self, signal: &str) {
+        let sent = Command::new("kill").args([&format!("-{signal}"), &self.child.id().to_string()]).status();
+        assert!(sent.is_ok_and(|status| status.success()), "SIG{signal} is sent");
+    }
+
     /// Ends it as a crash would, in the middle of whatever it does.
     pub fn kill(self) {
         drop(self);
@@ -107,8 +125,7 @@ impl Service {
     /// Where it cannot be asked.
     #[must_use]
     pub fn stop(mut self) -> (ExitStatus, String) {
-        let asked = Command::new("kill").args(["-TERM", &self.child.id().to_string()]).status();
-        assert!(asked.is_ok_and(|status| status.success()), "SIGTERM is sent");
+        self.signal("TERM");
         let mut totals = String::new();
         let stdout = self.child.stdout.as_mut().expect("stdout is piped");
         std::io::Read::read_to_string(stdout, &mut totals).expect("stdout is read");

@@ -112,6 +112,11 @@ impl Motion {
         self.gyros.iter().chain(&self.accels).all(MotionTerms::is_empty) && !self.has_positions()
     }
 
+    /// Whether an accelerometer has a second-order term.
+    pub(crate) fn has_squares(&self) -> bool {
+        self.accels.iter().any(|accel| !accel.terms.is_empty())
+    }
+
     /// Whether an accelerometer sits elsewhere than at the reference point.
     pub(crate) fn has_positions(&self) -> bool {
         self.positions_m.iter().flatten().any(|metres| *metres != 0.0)

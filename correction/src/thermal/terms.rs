@@ -152,7 +152,7 @@ impl Coefficient {
 /// Terms of one sensor, compiled.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct Terms {
-    terms: Vec<(Feature, Coefficient)>,
+    coefficients: Vec<(Feature, Coefficient)>,
     /// Of the terms that trail behind the temperature, in their order.
     trails: Vec<Trail>,
     /// Of the terms that other channels enter.
@@ -203,7 +203,7 @@ impl Terms {
                         Some(Coefficient::Branched { argument, run_up, braking })
                     }
                 };
-                compiled.terms.extend(coefficient.map(|coefficient| (term.feature, coefficient)));
+                compiled.coefficients.extend(coefficient.map(|coefficient| (term.feature, coefficient)));
                 compiled.regressors.extend(part.regressor.filter(|_| term.feature == Feature::Regressor));
                 compiled.trails.extend(match term.feature {
                     Feature::Lag => Some(Trail::lag(part.parameter, filter)),
@@ -217,12 +217,12 @@ impl Terms {
 
     /// Whether there are none.
     pub(crate) fn is_empty(&self) -> bool {
-        self.terms.is_empty()
+        self.coefficients.is_empty()
     }
 
     /// Whether one is multiplied by the specific force along a case axis.
     pub(crate) fn feel_force(&self) -> bool {
-        self.terms
+        self.coefficients
             .iter()
             .any(|(feature, _)| matches!(feature, Feature::ForceX | Feature::ForceY | Feature::ForceZ))
     }
@@ -248,7 +248,7 @@ impl Terms {
         let mut any_clamped = false;
         let mut trails = self.trails.iter().zip(trailed.iter());
         let mut regressors = self.regressors.iter();
-        for (feature, coefficient) in &self.terms {
+        for (feature, coefficient) in &self.coefficients {
             let (value, factor) = match feature {
                 Feature::Lag | Feature::Play => trails
                     .next()
@@ -271,6 +271,6 @@ impl Terms {
 
     /// Every curve whose argument is temperature and which flags the sensor outside its fitted range.
     pub(crate) fn curves_over_temperature(&self) -> impl Iterator<Item = &Curve> {
-        self.terms.iter().flat_map(|(_, coefficient)| coefficient.curves_over_temperature())
+        self.coefficients.iter().flat_map(|(_, coefficient)| coefficient.curves_over_temperature())
     }
 }

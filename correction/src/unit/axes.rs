@@ -76,7 +76,7 @@ impl Axes {
         }
     }
 
-    /// Temperature that axes which stick turn as if it were (°C): T + Σ share·(p_w[T] − T). The first of all is taken to have stood
+    /// Temperature that axes which stick turn as if it were (°C): `T + Σ share·(p_w[T] − T)`. The first of all is taken to have stood
     /// for ever.
     fn stick(&mut self, orientation: &Orientation, temperature: f64) -> f64 {
         let mut felt = temperature;

@@ -42,10 +42,8 @@ impl Unit {
     fn reports(&self, auxiliaries: bool) -> impl Iterator<Item = ChannelReport> + '_ {
         self.pipeline.active.iter().flat_map(move |active| {
             let calibration = &active.calibration;
-            let [skipped, taken] = match auxiliaries {
-                true => [calibration.temperatures, usize::MAX],
-                false => [0, calibration.temperatures],
-            };
+            let temperatures = calibration.temperatures;
+            let [skipped, taken] = if auxiliaries { [temperatures, usize::MAX] } else { [0, temperatures] };
             let reports = active.corrector.thermal().report(calibration, self.pipeline.last_end);
             reports.skip(skipped).take(taken)
         })

@@ -15,7 +15,7 @@ use isotherm_protocol::journal::{Joiner, JournalEntry, JournalPart};
 use isotherm_protocol::key::UnitId;
 use mcap::records::{Channel, Record, op};
 
-use super::outline::{Mark, Outline, Outlines, UnitOutline};
+use super::{Mark, Outline, Outlines, UnitOutline};
 use crate::error::Error;
 use crate::message::Topic;
 use crate::recording::{MAGIC, MESSAGE_ENCODING, chunk_records};

@@ -6,12 +6,13 @@ use std::time::Duration;
 use isotherm_bus::endpoint::address;
 use isotherm_correction::unit::Uncalibrated;
 use isotherm_correction::units::{AngularRate, Span, SpecificForce};
+use isotherm_protocol::pair::Mode;
 use zenoh::qos::CongestionControl;
 
 use super::Settings;
 use super::keys::{
-    Congestion, DriftEstimate, FolderKeys, InitialState, Keys, MetricsKeys, NavigationKeys, PreLaunchKeys,
-    SwapKeys, UncalibratedKey, WebKeys, ZenohKeys,
+    Congestion, DriftEstimate, FolderKeys, InitialState, Keys, MetricsKeys, ModeKey, NavigationKeys,
+    PairKeys, PreLaunchKeys, SwapKeys, UncalibratedKey, WebKeys, ZenohKeys,
 };
 
 /// What is said before the text.
@@ -62,6 +63,16 @@ impl Settings {
                 CongestionControl::Block => Congestion::Block,
                 _ => Congestion::Drop,
             }),
+            units: self.units.clone(),
+            pair: PairKeys {
+                name: self.pair.name.clone(),
+                mode: Some(match self.pair.mode {
+                    Mode::Standby => ModeKey::Standby,
+                    Mode::Active => ModeKey::Active,
+                }),
+                priority: Some(self.pair.priority),
+                takeover_ms: Some(ms(self.pair.takeover)),
+            },
             folder: FolderKeys {
                 settle_ms: Some(ms(self.folder.settle)),
                 poll_s: Some(self.folder.poll.as_secs_f64()),

@@ -47,6 +47,11 @@ pub(super) struct Keys {
     pub(super) stop_timeout_ms: Option<u32>,
     /// What happens to corrected batches where a subscriber does not keep up.
     pub(super) congestion: Option<Congestion>,
+    /// Units that are taken, by their serials.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(super) units: Vec<String>,
+    /// Other instances for the same units.
+    pub(super) pair: PairKeys,
     /// How the folder of the documents is watched.
     pub(super) folder: FolderKeys,
     /// What speaks against a swap.
@@ -93,6 +98,29 @@ pub(super) enum UncalibratedKey {
 pub(super) enum Congestion {
     Drop,
     Block,
+}
+
+#[derive(Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+#[schemars(deny_unknown_fields)]
+pub(super) struct PairKeys {
+    /// Name of this instance, for people.
+    pub(super) name: Option<String>,
+    /// What it does while another one speaks.
+    pub(super) mode: Option<ModeKey>,
+    /// Of two that speak the one with the lower priority yields.
+    pub(super) priority: Option<u8>,
+    /// How late the other's output may be.
+    #[schemars(range(min = 5, max = 10_000))]
+    pub(super) takeover_ms: Option<u32>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+#[schemars(inline)]
+pub(super) enum ModeKey {
+    Standby,
+    Active,
 }
 
 #[derive(Debug, Default, Serialize, Deserialize, JsonSchema)]

@@ -10,13 +10,15 @@ use isotherm_correction::navigation::NavigationStep;
 use isotherm_correction::prelaunch::{PreLaunchLimits, PreLaunchSettings};
 use isotherm_correction::unit::{Uncalibrated, UnitSettings};
 use isotherm_correction::units::{AngularRate, Span, SpecificForce};
-use isotherm_document::{Form, Reader};
+use isotherm_document::{Form, Reader, element};
+use isotherm_protocol::pair::{Mode, is_name};
 use zenoh::qos::CongestionControl;
 
 use super::keys::{
-    Congestion, DriftEstimate, FolderKeys, InitialState, Keys, MetricsKeys, NavigationKeys, PreLaunchKeys,
-    SwapKeys, UncalibratedKey, WebKeys, ZenohKeys,
+    Congestion, DriftEstimate, FolderKeys, InitialState, Keys, MetricsKeys, ModeKey, NavigationKeys,
+    PairKeys, PreLaunchKeys, SwapKeys, UncalibratedKey, WebKeys, ZenohKeys,
 };
+use super::pair::{ALL_UNITS, PairSettings, chunk};
 use super::swap::DAY_S;
 use super::{FolderSettings, MetricsSettings, Settings, SwapSettings, WebSettings};
 
@@ -64,6 +66,8 @@ pub(super) fn settings(r: &mut Reader<'_>, folder: &Path) -> Option<Settings> {
             Congestion::Drop => CongestionControl::Drop,
             Congestion::Block => CongestionControl::Block,
         }),
+        units: units(r, keys.units),
+        pair: pair(r, keys.pair),
         metrics: metrics(r, keys.metrics),
         web: web(r, keys.web, folder),
         session: session(r, keys.zenoh, folder),
@@ -92,6 +96,35 @@ fn existing(
         r.refuse(key, format!("is {text:?}, must be an existing {what}; looked for {}", path.display()));
     }
     Some(path)
+}
+
+fn units(r: &mut Reader<'_>, patterns: Vec<String>) -> Vec<String> {
+    for (index, pattern) in patterns.iter().enumerate() {
+        if chunk(pattern).is_none() {
+            let must_be = "a serial, such as \"ZLG-0042\", in which * stands for any characters: \"ZLG-*\"";
+            r.report(&element("units", index), format!("is {pattern:?}, must be {must_be}"));
+        }
+    }
+    if patterns.is_empty() { vec![ALL_UNITS.to_owned()] } else { patterns }
+}
+
+fn pair(r: &mut Reader<'_>, keys: PairKeys) -> PairSettings {
+    let default = PairSettings::default();
+    if let Some(name) = keys.name.as_ref().filter(|name| !is_name(name)) {
+        r.report(
+            "pair.name",
+            format!("is {name:?}, must be 1 to 32 letters A-Z a-z, digits, '.', '_' and '-'"),
+        );
+    }
+    PairSettings {
+        name: keys.name,
+        mode: keys.mode.map_or(default.mode, |mode| match mode {
+            ModeKey::Standby => Mode::Standby,
+            ModeKey::Active => Mode::Active,
+        }),
+        priority: keys.priority.unwrap_or(default.priority),
+        takeover: keys.takeover_ms.map_or(default.takeover, milliseconds),
+    }
 }
 
 fn watched(keys: &FolderKeys) -> FolderSettings {
@@ -197,6 +230,7 @@ fn session(r: &mut Reader<'_>, keys: ZenohKeys, folder: &Path) -> SessionOptions
         connect: keys.connect,
         listen: keys.listen,
         namespace: keys.namespace,
+        lease: None,
     };
     if !r.is_damaged("zenoh")
         && let Err(error) = session.to_config()

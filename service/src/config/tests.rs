@@ -3,6 +3,8 @@ use isotherm_correction::prelaunch::PreLaunchLimits;
 use isotherm_correction::unit::Uncalibrated;
 use isotherm_correction::units::{AngularRate, Span, SpecificForce};
 
+use isotherm_protocol::pair::Mode;
+
 use super::*;
 
 fn parse(text: &str) -> Result<Settings, Vec<String>> {
@@ -25,6 +27,7 @@ fn every_key_arrives_where_it_belongs() {
         calibrations = "units"
         strict_start = true
         max_units = 3
+        units = ["ZLG-*", "FOG-0001"]
         pairing_window_ms = 20
         temperature_delay_ms = 0
         uncalibrated = "hold"
@@ -59,6 +62,11 @@ fn every_key_arrives_where_it_belongs() {
         [navigation]
         ticks = 4
         coning_sculling = true
+        [pair]
+        name = "north"
+        mode = "active"
+        priority = 7
+        takeover_ms = 35
         [zenoh]
         config = "z.json5"
         connect = ["tcp/127.0.0.1:1"]
@@ -108,12 +116,20 @@ fn every_key_arrives_where_it_belongs() {
         status_interval: Duration::from_millis(200),
         stop_timeout: Duration::from_millis(1500),
         congestion: CongestionControl::Block,
+        units: vec!["ZLG-*".to_owned(), "FOG-0001".to_owned()],
+        pair: PairSettings {
+            name: Some("north".to_owned()),
+            mode: Mode::Active,
+            priority: 7,
+            takeover: Duration::from_millis(35),
+        },
         metrics: MetricsSettings { listen: Some("0.0.0.0:9464".parse().unwrap()), allow_remote: true },
         session: SessionOptions {
             config: Some(folder.path().join("z.json5")),
             connect: vec!["tcp/127.0.0.1:1".to_owned()],
             listen: vec!["tcp/127.0.0.1:0".to_owned()],
             namespace: Some("site/a".to_owned()),
+            lease: None,
         },
         ..Settings::default()
     };
@@ -125,6 +141,14 @@ fn each_problem_names_its_place_its_value_and_its_limit() {
     let cases = [
         ("max_units = 0", "1:13: max_units: is 0, must be a whole number from 1 to 16384"),
         ("\n max_units = 16385", "2:14: max_units: is 16385, must be a whole number from 1 to 16384"),
+        (
+            "units = [\"a/b\"]",
+            "1:10: units[0]: is \"a/b\", must be a serial, such as \"ZLG-0042\", in which * stands for any characters: \"ZLG-*\"",
+        ),
+        (
+            "[pair]\nname = \"a b\"",
+            "2:8: pair.name: is \"a b\", must be 1 to 32 letters A-Z a-z, digits, '.', '_' and '-'",
+        ),
         ("max_units = 1.5", "1:13: max_units: is 1.5, must be a whole number from 1 to 16384"),
         ("max_units = -1", "1:13: max_units: is -1, must be a whole number from 1 to 16384"),
         ("pairing_window_ms = 0", "1:21: pairing_window_ms: is 0, must be a whole number from 1 to 10000"),

@@ -8,6 +8,7 @@ use isotherm_bus::{BusError, ClientOptions, Role};
 use isotherm_protocol::codec::{self, Message};
 use isotherm_protocol::escape::is_unfit;
 use isotherm_protocol::key::{self, UnitId};
+use isotherm_protocol::pair::PairReport;
 use isotherm_protocol::service_status::ServiceStatus;
 use isotherm_protocol::status::Status;
 use serde::de::DeserializeOwned;
@@ -40,7 +41,7 @@ fn seconds(text: &str) -> Result<Duration, String> {
 }
 
 /// A session to ask on.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Client {
     pub(crate) session: Session,
     pub(crate) timeout: Duration,
@@ -171,6 +172,21 @@ impl Client {
         let mut services: Vec<ServiceStatus> = self.frames(key::ALL_SERVICE_STATUS).await?;
         services.sort_by(|a, b| a.instance.cmp(&b.instance));
         Ok(services)
+    }
+
+    /// What every service instance does for which unit.
+    pub(super) async fn pairs(&self) -> Result<Vec<PairReport>, ConsoleError> {
+        let answers = self.answers(key::ALL_PAIRS, "", None).await?;
+        let read = |json: &Vec<u8>| {
+            serde_json::from_slice::<PairReport>(json).map_err(|error| ConsoleError::Answer {
+                key: key::ALL_PAIRS.to_owned(),
+                reason: error.to_string(),
+            })
+        };
+        let mut reports = answers.iter().map(read).collect::<Result<Vec<_>, _>>()?;
+        reports
+            .sort_by(|a, b| (&a.member.name, &a.member.instance).cmp(&(&b.member.name, &b.member.instance)));
+        Ok(reports)
     }
 
     /// Status of one unit; `None` where it has not appeared.

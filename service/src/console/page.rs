@@ -3,13 +3,14 @@
 //! | module | holds |
 //! |---|---|
 //! | `remark` | what is to be noticed of a unit, and how grave it is |
-//! | `units`, `services` | one line a unit, one a service instance |
+//! | `units`, `services`, `pairs` | one line a unit, one a service instance, one an instance of a pair |
 //! | `sheet` | everything of one unit |
 //! | `grid`, `figure`, `tone`, `chart` | columns, numbers, colours, bars |
 
 mod chart;
 mod figure;
 mod grid;
+mod pairs;
 mod remark;
 #[cfg(test)]
 pub(crate) mod samples;
@@ -26,6 +27,7 @@ use isotherm_correction::sample::ChannelName;
 use isotherm_protocol::status::Status;
 
 pub(crate) use figure::fit;
+pub(crate) use pairs::{of_unit, pairs};
 pub(crate) use remark::{Level, is_running, knows_rates, state_word};
 pub(crate) use services::{services, tally};
 pub(crate) use sheet::sheet;

@@ -4,6 +4,7 @@ use std::io::IsTerminal;
 use std::time::SystemTime;
 
 use clap::Args;
+use isotherm_protocol::pair::PairReport;
 use isotherm_protocol::service_status::ServiceStatus;
 use isotherm_protocol::status::Status;
 use ratatui::text::Line;
@@ -60,6 +61,8 @@ pub struct StatusArgs {
 pub(crate) struct Report {
     pub(crate) services: Vec<ServiceStatus>,
     pub(crate) units: Vec<Status>,
+    /// What each instance does for which unit.
+    pub(crate) instances: Vec<PairReport>,
 }
 
 impl Report {
@@ -75,9 +78,9 @@ pub(super) async fn run(args: &StatusArgs) -> Result<Exit, ConsoleError> {
         client::unit(serial)?;
     }
     let client = Client::open(&args.client).await?;
-    let (units, services) = tokio::join!(client.statuses(), client.services());
+    let (units, services, instances) = tokio::join!(client.statuses(), client.services(), client.pairs());
     client.close().await;
-    let mut report = Report { units: units?, services: or_none(services)? };
+    let mut report = Report { units: units?, services: or_none(services)?, instances: or_none(instances)? };
     select(&mut report, &args.units)?;
     if args.json {
         return Ok(print(&report.to_json(), Exit::Ok));
@@ -91,10 +94,8 @@ pub(super) async fn run(args: &StatusArgs) -> Result<Exit, ConsoleError> {
 }
 
 /// Services before 0.2 tell nothing of themselves.
-pub(super) fn or_none(
-    services: Result<Vec<ServiceStatus>, ConsoleError>,
-) -> Result<Vec<ServiceStatus>, ConsoleError> {
-    match services {
+pub(super) fn or_none<T>(answers: Result<Vec<T>, ConsoleError>) -> Result<Vec<T>, ConsoleError> {
+    match answers {
         Err(ConsoleError::NoAnswer { .. }) => Ok(Vec::new()),
         other => other,
     }
@@ -139,6 +140,7 @@ fn unit<'a>(report: &'a Report, status: &'a Status) -> (Unit<'a>, Option<&'a Ser
 fn table(report: &Report, columns: usize) -> Vec<Line<'static>> {
     let units: Vec<Unit<'_>> = report.units.iter().map(|status| unit(report, status).0).collect();
     let mut lines = page::services(&report.services, &[], columns);
+    lines.extend(page::pairs(&report.instances, columns));
     lines.push(page::tally(&units, columns));
     if !units.is_empty() {
         let grid = page::units(&units, columns);
@@ -157,6 +159,7 @@ fn pages(report: &Report, columns: usize) -> Vec<Line<'static>> {
         }
         let (unit, service) = unit(report, status);
         lines.extend(page::sheet(&unit, service, columns));
+        lines.extend(page::of_unit(&report.instances, &status.unit));
     }
     lines
 }
@@ -183,7 +186,8 @@ mod tests {
     fn units_are_chosen_with_their_services_and_an_unknown_one_is_named() {
         let units = samples::fleet(8);
         let other = ServiceStatus { instance: "other".to_owned(), ..ServiceStatus::default() };
-        let mut report = Report { services: vec![samples::service(&units), other], units };
+        let services = vec![samples::service(&units), other];
+        let mut report = Report { services, units, instances: Vec::new() };
         let serial = |serial: &str| [serial.to_owned()];
         let error = select(&mut report, &serial("ZLG-9999")).unwrap_err().to_string();
         assert!(error.contains("no unit ZLG-9999; it has ZLG-0001, ZLG-0002"), "{error}");
@@ -196,7 +200,8 @@ mod tests {
     #[test]
     fn faults_are_dated_by_the_clock_of_the_service() {
         let units = vec![samples::faulty("ZLG-0005")];
-        let report = Report { services: vec![samples::service(&units)], units };
+        let services = vec![samples::service(&units)];
+        let report = Report { services, units, instances: Vec::new() };
         let text = tone::text(&table(&report, TABLE_COLUMNS), false);
         assert!(text.contains("! 1 faulty") && text.contains("last 3 s ago"), "{text}");
     }

@@ -15,6 +15,13 @@ impl Work {
         match asked {
             Asked::Status => self.answer_status(query),
             Asked::Memory => self.answer_memory(query),
+            Asked::Pair => {
+                let key = key::pair(self.instance.name());
+                if takes_in(query, &key) {
+                    let report = serde_json::to_vec(&self.pair.report(&self.intake));
+                    reply(query, &key, report.map_err(Into::into));
+                }
+            }
             Asked::Configuration => {
                 let key = key::configuration(self.instance.name());
                 if takes_in(query, &key) {
@@ -29,7 +36,7 @@ impl Work {
         let instance = self.instance.name();
         let statuses = self.intake.each_unit(|actor| {
             let key = key::status(actor.id());
-            takes_in(query, &key).then(|| (key, codec::encode(&actor.status(instance))))
+            (actor.speaks() && takes_in(query, &key)).then(|| (key, codec::encode(&actor.status(instance))))
         });
         let mut replies: Vec<_> = statuses.into_iter().flatten().collect();
         let key = key::service_status(instance);
@@ -48,7 +55,7 @@ impl Work {
         let instance = self.instance.name();
         let units = self.intake.each_unit(|actor| {
             let unit = actor.id();
-            takes_in(query, &key::journal(unit)).then(|| unit.clone())
+            (actor.speaks() && takes_in(query, &key::journal(unit))).then(|| unit.clone())
         });
         for unit in units.into_iter().flatten() {
             // A unit that has just started anew is asked once more by whoever misses its answer.

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use isotherm_protocol::pair::UnitRole;
 use isotherm_protocol::service_status::UnitSummary;
 use isotherm_protocol::status::{Fault, Output, State, Status};
 use serde::Serialize;
@@ -13,6 +14,7 @@ use super::health::{HeldBack, Kind, Reason, STOPPING, Seen, Watch};
 use crate::config::Settings;
 use crate::intake::Intake;
 use crate::logging::dropped_lines;
+use crate::pair::Pair;
 use crate::pulse::{Pulse, Stuck};
 use crate::registrar::{Board, Posted, UNWRITTEN};
 use crate::unit::UnitActor;
@@ -21,6 +23,7 @@ use crate::unit::UnitActor;
 #[derive(Debug)]
 pub(crate) struct Source {
     intake: Arc<Intake>,
+    pair: Arc<Pair>,
     board: Arc<Board>,
     instance: String,
     started: Instant,
@@ -38,6 +41,8 @@ pub(super) struct Look {
     pub(super) uptime_s: f64,
     /// Whether nothing speaks against its health.
     pub(super) healthy: bool,
+    /// Instances for the same units, this one included.
+    pub(super) instances: u64,
     /// Faults that belong to no unit.
     pub(super) faults: Vec<Fault>,
     /// Log lines dropped so far.
@@ -55,6 +60,8 @@ pub(super) struct Look {
 pub(super) struct UnitLook {
     /// What it says of itself.
     pub(super) status: Status,
+    /// What this instance does for it.
+    pub(super) role: UnitRole,
     /// Sum of the latencies that its histogram counts (ns).
     pub(super) latency_sum_ns: u64,
     /// Whether raw ticks come and no corrected ones go out.
@@ -85,6 +92,7 @@ impl Look {
             instance: "starting".to_owned(),
             uptime_s: uptime.as_secs_f64(),
             healthy: false,
+            instances: 1,
             faults: Vec::new(),
             log_lines_dropped: dropped_lines(),
             posted: Arc::default(),
@@ -127,11 +135,17 @@ impl Verdict {
 }
 
 impl Source {
-    /// A service whose units are in `intake`; `instance` is its name for itself.
-    pub(crate) fn new(settings: &Settings, intake: Arc<Intake>, board: Arc<Board>, instance: String) -> Self {
+    /// A service whose units are in `intake`, among others.
+    pub(crate) fn new(
+        settings: &Settings,
+        (intake, pair): (Arc<Intake>, Arc<Pair>),
+        board: Arc<Board>,
+    ) -> Self {
+        let instance = pair.me().instance.clone();
         let window = settings.unit.pairing_window.as_ns().unsigned_abs();
         Self {
             intake,
+            pair,
             board,
             instance,
             started: Instant::now(),
@@ -167,22 +181,23 @@ impl Source {
 
     /// Looks at everything.
     pub(super) fn look(&self, watch: &mut Watch, stopping: bool) -> Look {
-        let units = self
-            .intake
-            .each_unit(|actor| (seen(actor), actor.status(&self.instance), actor.latency_sum_ns()));
+        let units = self.intake.each_unit(|actor| {
+            (seen(actor), (actor.status(&self.instance), actor.role()), actor.latency_sum_ns())
+        });
         let now = Instant::now();
-        let units = units.into_iter().map(|(seen, status, latency_sum_ns)| {
+        let units = units.into_iter().map(|(seen, (status, role), latency_sum_ns)| {
             if let Some(seen) = seen {
                 watch.see(now, &status.unit, seen);
             }
             let stalled = watch.stall(now, &status.unit, self.held_back).is_some();
-            UnitLook { status, latency_sum_ns, stalled }
+            UnitLook { status, role, latency_sum_ns, stalled }
         });
         let units = units.collect();
         Look {
             instance: self.instance.clone(),
             uptime_s: self.started.elapsed().as_secs_f64(),
             healthy: self.reasons(now, watch, stopping).is_empty(),
+            instances: self.pair.others().len() as u64 + 1,
             faults: self.intake.faults(),
             log_lines_dropped: dropped_lines(),
             posted: self.board.read(),

@@ -14,6 +14,7 @@ use super::*;
 use crate::calibrations::Calibrations;
 use crate::config::Settings;
 use crate::intake::{Intake, OutletMaker};
+use crate::pair::Pair;
 use crate::registrar::Board;
 use checker::Page;
 use client::{connect, get, read};
@@ -38,6 +39,10 @@ fn on_loopback() -> MetricsSettings {
     MetricsSettings { listen: Some("127.0.0.1:0".parse().unwrap()), allow_remote: false }
 }
 
+fn pair(settings: &Settings) -> Arc<Pair> {
+    Arc::new(Pair::new(settings, "test".to_owned(), 0, Vec::new()))
+}
+
 impl Stand {
     async fn new(outlets: OutletMaker, watch: Watch, limits: Limits) -> Self {
         let mut settings = Settings::default();
@@ -51,7 +56,7 @@ impl Stand {
         let intake = Arc::new(Intake::new(settings.clone(), calibrations, outlets));
         let endpoint = Endpoint::start_within(&on_loopback(), String::new(), watch, limits).await;
         let endpoint = endpoint.unwrap().unwrap();
-        let source = Source::new(&settings, Arc::clone(&intake), Arc::<Board>::default(), "test".to_owned());
+        let source = Source::new(&settings, (Arc::clone(&intake), pair(&settings)), Arc::<Board>::default());
         endpoint.open(source, None);
         Self { intake, endpoint, shape, sequence: 0 }
     }
@@ -316,7 +321,7 @@ fn fleet(document: &str, units: usize, ticks: u64) -> Arc<Intake> {
 fn two_hundred(document: &str) -> (String, Duration) {
     let intake = fleet(document, 200, 40);
     let settings = Settings::default();
-    let source = Source::new(&settings, Arc::clone(&intake), Arc::<Board>::default(), "test".to_owned());
+    let source = Source::new(&settings, (Arc::clone(&intake), pair(&settings)), Arc::<Board>::default());
     let mut watch = Watch::default();
     let (mut text, mut shortest) = (String::new(), Duration::MAX);
     for _ in 0..5 {

@@ -28,6 +28,8 @@ impl Work {
             Ok((unit, SwapOptions::parse(query.parameters().as_str()).map_err(|e| e.to_string())?))
         });
         match asked {
+            // The instance that speaks answers.
+            Ok((unit, _)) if !self.intake.answers_for(&unit) => {}
             Ok((unit, options)) => {
                 let reply = self.bus_swap(&unit, &payload.to_bytes(), options);
                 answer_json(query, &key::calibration(&unit), &reply);
@@ -47,6 +49,9 @@ impl Work {
             tracing::warn!("{key} names no unit: the document is passed over");
             return;
         };
+        if !self.intake.answers_for(&unit) {
+            return;
+        }
         let attachment = sample.attachment().map(|bytes| bytes.to_bytes().into_owned()).unwrap_or_default();
         let options = String::from_utf8(attachment).map_err(|error| error.to_string());
         let options = options.and_then(|text| SwapOptions::parse(&text).map_err(|error| error.to_string()));
@@ -74,12 +79,18 @@ impl Work {
         let mut told = false;
         for (unit, record) in &self.records {
             let key = key::calibration(unit);
-            if let Some(written) = record.written().filter(|_| is_asked(query, &key)) {
+            if !is_asked(query, &key) || !self.intake.speaks_for(unit) {
+                continue;
+            }
+            if let Some(written) = record.written() {
                 answer(query, &key, written.text.read().into_bytes(), Encoding::TEXT_PLAIN);
                 told = true;
             }
         }
-        if !told && let Ok(unit) = one_unit(query, key::parse_calibration) {
+        if !told
+            && let Ok(unit) = one_unit(query, key::parse_calibration)
+            && self.intake.speaks_for(&unit)
+        {
             refuse(query, &format!("unit {unit} has no calibration document"));
         }
     }
@@ -89,6 +100,7 @@ impl Work {
         let payload = query.payload().map(|bytes| bytes.to_bytes().into_owned()).unwrap_or_default();
         let asked = one_unit(query, key::parse_command).and_then(|unit| Ok((unit, read_order(&payload)?)));
         match asked {
+            Ok((unit, _)) if !self.intake.answers_for(&unit) => {}
             Ok((unit, order)) => match self.command(&unit, &order) {
                 Some(reply) => answer_json(query, &key::command(&unit), &reply),
                 None => refuse(query, &format!("unit {unit} has not appeared: nothing was received of it")),
@@ -107,7 +119,7 @@ impl Work {
         let units = one.map_or_else(|| self.records.keys().cloned().collect(), |unit| vec![unit]);
         for unit in units {
             let key = key::history(&unit);
-            if !is_asked(query, &key) {
+            if !is_asked(query, &key) || !self.intake.speaks_for(&unit) {
                 continue;
             }
             match self.store.history(Some(&unit), limit) {
@@ -137,7 +149,7 @@ fn answer_json(query: &Query, key: &str, reply: &impl Serialize) {
     }
 }
 
-fn answer(query: &Query, key: &str, bytes: Vec<u8>, encoding: Encoding) {
+pub(super) fn answer(query: &Query, key: &str, bytes: Vec<u8>, encoding: Encoding) {
     if let Err(error) = query.reply(key, bytes).encoding(encoding).wait() {
         tracing::warn!("cannot answer on {key}: {}", isotherm_bus::words(&error));
     }

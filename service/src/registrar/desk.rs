@@ -3,12 +3,16 @@
 use std::sync::Arc;
 
 use isotherm_correction::prelaunch::Outcome;
+use isotherm_protocol::digest::Digest;
+use isotherm_protocol::journal::JournalEntry;
 use isotherm_protocol::key::{self, UnitId};
 use isotherm_protocol::stream::InForce;
+use tokio::sync::oneshot;
 use zenoh::Wait;
 use zenoh::query::Query;
 use zenoh::sample::Sample;
 
+use super::carry::Carried;
 use super::queue::{Queue, Refused};
 use crate::watch::FolderEvent;
 
@@ -29,6 +33,12 @@ pub(super) enum Request {
     Notice(UnitId, Notice),
     /// Judge the documents of the folder again that are not taken.
     JudgeAgain,
+    /// A query on `isotherm/*/kept/*`.
+    Kept(Query),
+    /// What another instance has written down; what of it is lacking here.
+    Lacks(Carried, oneshot::Sender<Vec<Digest>>),
+    /// What another instance has written down.
+    Carry(Carried),
 }
 
 /// What a unit has to tell.
@@ -38,6 +48,10 @@ pub(crate) enum Notice {
     InForce(InForce),
     /// A pre-launch calibration has ended.
     PreLaunch(PreLaunchEnd),
+    /// Another instance, whose place this one has taken, gave the unit a calibration: its journal's entry.
+    Followed(Box<JournalEntry>),
+    /// This instance speaks for the unit from here on.
+    Speaks,
 }
 
 /// A pre-launch calibration that has ended.
@@ -90,6 +104,22 @@ impl Desk {
         self.ask(unit, Request::History(query), bytes);
     }
 
+    /// Hands a query on `isotherm/*/kept/*` over.
+    pub(crate) fn kept(&self, query: Query) {
+        let bytes = length(&query);
+        self.ask(None, Request::Kept(query), bytes);
+    }
+
+    /// Asks which documents are lacking here; where there is no room, no answer comes.
+    pub(crate) fn lacks(&self, carried: Carried, answer: oneshot::Sender<Vec<Digest>>) {
+        let _ = self.0.tell(Request::Lacks(carried, answer));
+    }
+
+    /// Hands over what another instance has written down; where there is no room, it comes again with the next.
+    pub(crate) fn carry(&self, carried: Carried) {
+        let _ = self.0.tell(Request::Carry(carried));
+    }
+
     /// Hands an event of the folder over; waits for its turn, on the watcher's own thread.
     pub(crate) fn folder(&self, event: FolderEvent) {
         self.0.tell_in_turn(Request::Folder(event));
@@ -121,7 +151,11 @@ impl Desk {
             Refused::Ended => "the service is ending",
         };
         tracing::warn!(unit = shown, "a swap, command or question is refused: {why}");
-        if let Request::Calibration(query) | Request::Command(query) | Request::History(query) = request {
+        if let Request::Calibration(query)
+        | Request::Command(query)
+        | Request::History(query)
+        | Request::Kept(query) = request
+        {
             let words = format!("refused: {why}; nothing has changed, try again");
             // The asker may have gone.
             let _ = query.reply_err(words).wait();

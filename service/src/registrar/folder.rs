@@ -209,6 +209,11 @@ impl Work {
             self.refuse_rivals(&unit, &files, at_start);
             return false;
         }
+        let named = self.folder.files.get(path).and_then(|file| file.unit.clone());
+        if named.is_some_and(|unit| !self.intake.speaks_for(&unit)) {
+            tracing::info!("{} is left to the instance that speaks for its unit", path.display());
+            return true;
+        }
         let problems = self.swap_file(path, read, at_start);
         let good = problems.is_empty();
         if let Some(file) = self.folder.files.get_mut(path) {

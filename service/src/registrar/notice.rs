@@ -13,13 +13,18 @@ impl Work {
         match notice {
             Notice::InForce(first) => {
                 let revision = first.revision.counter;
-                tracing::info!(%unit, revision, sequence = first.sequence, "calibration in force");
-                let event = AuditEvent::InForce(FirstTick {
+                let tick = FirstTick {
                     revision,
                     series: first.series,
                     first_sequence: first.sequence,
                     first_end_time_ns: first.end_time_ns,
-                });
+                };
+                if !self.intake.speaks_for(unit) {
+                    self.leave_unclaimed(unit, tick);
+                    return;
+                }
+                tracing::info!(%unit, revision, sequence = first.sequence, "calibration in force");
+                let event = AuditEvent::InForce(tick);
                 if let Err(error) = self.append(Some(unit), "", event) {
                     tracing::error!(%unit, revision, "the first tick is not in the audit file: {error}");
                 }
@@ -28,7 +33,11 @@ impl Work {
                     self.intake.with(unit, |actor| actor.tell_swaps(account));
                 }
             }
-            Notice::PreLaunch(end) => self.pre_launch_ended(unit, &end),
+            // Where another instance speaks, that one stores the result.
+            Notice::PreLaunch(end) if self.intake.speaks_for(unit) => self.pre_launch_ended(unit, &end),
+            Notice::PreLaunch(_) => {}
+            Notice::Followed(entry) => self.note_followed(unit, &entry),
+            Notice::Speaks => self.claim(unit),
         }
     }
 }

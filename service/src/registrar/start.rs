@@ -49,55 +49,58 @@ impl Work {
     pub(crate) fn restore(&mut self) {
         let units: Vec<_> = self.store.units().cloned().collect();
         for unit in units {
-            let mut record = Record { counter: self.store.highest_revision(&unit), ..Record::default() };
-            let orders = self.store.intent(&unit).into_iter().flat_map(Intent::orders);
-            // What was carried out once is understood.
-            let intent = orders.filter_map(|order| self.core_command(&order).ok()).collect();
-            let mut plan = Plan { intent, ..Plan::default() };
-            let sets: Vec<_> = self.store.good_sets(&unit).cloned().collect();
-            for set in sets {
-                let written = match written(&self.store, &set) {
-                    Ok(written) => written,
-                    Err(problems) => {
-                        for problem in problems {
-                            tracing::error!(%unit, revision = set.revision, "cannot be put in force again: {problem}");
-                        }
-                        continue;
-                    }
-                };
-                let (written, label, calibration) = written;
-                let next = Installable::of_document(
-                    set.revision,
-                    Arc::clone(&calibration),
-                    (label, set.overlay),
-                    written.text.clone(),
-                    &set.source,
-                );
-                let next = Arc::new(next);
-                if record.active.is_none() {
-                    record.untrusted = self.distrust(&unit, set.revision, &written);
-                }
-                record.active.get_or_insert(Active {
-                    revision: set.revision,
-                    calibration,
-                    written: Some(written),
-                });
-                // One that still waited for its tick goes on waiting, over the one before.
-                if !set.in_force && set.schedule != Schedule::NextTick && plan.pending.is_none() {
-                    let slew =
-                        Span::from_ns(i64::try_from(set.slew_ms).unwrap_or(0).saturating_mul(1_000_000));
-                    plan.pending = Some(Change { next, at: set.schedule, slew });
-                } else {
-                    plan.current = Some(next);
-                    break;
-                }
-            }
+            let (record, plan) = self.restored(&unit);
             if let Some(active) = &record.active {
                 tracing::info!(%unit, revision = active.revision, "last good calibration restored");
             }
             self.intake.restore(&unit, plan);
             self.records.insert(unit, record);
         }
+    }
+
+    /// What the state folder says of a unit.
+    pub(super) fn restored(&self, unit: &UnitId) -> (Record, Plan) {
+        let mut record = Record { counter: self.store.highest_revision(unit), ..Record::default() };
+        let orders = self.store.intent(unit).into_iter().flat_map(Intent::orders);
+        // What was carried out once is understood.
+        let intent = orders.filter_map(|order| self.core_command(&order).ok()).collect();
+        let mut plan = Plan { intent, ..Plan::default() };
+        for set in self.store.good_sets(unit) {
+            let (written, label, calibration) = match written(&self.store, set) {
+                Ok(written) => written,
+                Err(problems) => {
+                    for problem in problems {
+                        tracing::error!(%unit, revision = set.revision, "cannot be put in force again: {problem}");
+                    }
+                    continue;
+                }
+            };
+            let next = Installable::of_document(
+                set.revision,
+                Arc::clone(&calibration),
+                (label, set.overlay),
+                written.text.clone(),
+                &set.source,
+            );
+            let next = Arc::new(next);
+            if record.active.is_none() {
+                record.untrusted = self.distrust(unit, set.revision, &written);
+            }
+            record.active.get_or_insert(Active {
+                revision: set.revision,
+                calibration,
+                written: Some(written),
+            });
+            // One that still waited for its tick goes on waiting, over the one before.
+            if !set.in_force && set.schedule != Schedule::NextTick && plan.pending.is_none() {
+                let slew = Span::from_ns(i64::try_from(set.slew_ms).unwrap_or(0).saturating_mul(1_000_000));
+                plan.pending = Some(Change { next, at: set.schedule, slew });
+            } else {
+                plan.current = Some(next);
+                break;
+            }
+        }
+        (record, plan)
     }
 
     /// Takes what stands in the folder as far as it has changed since it was last seen. The second value is how many

@@ -215,6 +215,9 @@ impl Work {
         let Judged { unit, reading, layers, source, changed, schedule, slew, .. } = judged;
         let record = self.records.get(unit);
         let highest = record.map_or(0, |record| record.counter).max(self.store.highest_revision(unit));
+        // Another instance may have given the unit more than came here in time.
+        let given = self.intake.with(unit, |actor| actor.highest_revision()).unwrap_or(0);
+        let highest = highest.max(given);
         let base = self.in_force(unit).and_then(|active| active.written.as_ref());
         Acceptance {
             revision: highest + 1,

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant, SystemTime};
 
 use isotherm_correction::prelaunch::PreLaunchSettings;
 use isotherm_protocol::document::Problem;
-use isotherm_protocol::history::AuditEvent;
+use isotherm_protocol::history::{AuditEvent, FirstTick};
 use isotherm_protocol::key::UnitId;
 
 use super::board::Board;
@@ -41,6 +41,8 @@ pub(crate) struct Work {
     pub(super) losses: Vec<(Option<UnitId>, String)>,
     /// Documents that were found good and are to be written down together; `None` where each goes by itself.
     pub(super) group: Option<Vec<Judged>>,
+    /// First ticks that another instance is to write down, and has not yet.
+    pub(super) unclaimed: Vec<(UnitId, FirstTick)>,
     /// Files whose documents could not be written down, and why.
     pub(super) unwritten: Vec<(String, Problem)>,
     /// When such a file is tried again.
@@ -70,6 +72,7 @@ impl Work {
             lost: None,
             losses: losses(opened),
             group: None,
+            unclaimed: Vec::new(),
             unwritten: Vec::new(),
             next_retry: Instant::now(),
             retrying: false,
@@ -159,6 +162,9 @@ impl Work {
             Request::History(query) => self.answer_history(&query),
             Request::Notice(unit, notice) => self.note(&unit, notice),
             Request::JudgeAgain => self.judge_bad_again(),
+            Request::Kept(query) => self.answer_kept(&query),
+            Request::Lacks(carried, answer) => drop(answer.send(self.lacking(&carried))),
+            Request::Carry(carried) => self.carry(&carried),
         }
     }
 

@@ -6,6 +6,7 @@ use std::time::Instant;
 use isotherm_bus::DeclaredKeys;
 use isotherm_bus::receipt::Receipt;
 use isotherm_protocol::key::{self, RawStream, UnitId};
+use zenoh::key_expr::{OwnedKeyExpr, keyexpr};
 use zenoh::liveliness::LivelinessToken;
 use zenoh::pubsub::Subscriber;
 use zenoh::qos::{CongestionControl, Priority};
@@ -14,8 +15,10 @@ use zenoh::sample::{Locality, Sample, SampleKind};
 use zenoh::{Session, Wait};
 
 use crate::ServiceError;
+use crate::config::chunk;
 use crate::intake::{Intake, OutletMaker};
 use crate::keeper::{Asked, Bell};
+use crate::pair::Pair;
 use crate::pulse::Pulse;
 use crate::registrar::Desk;
 use crate::unit::{Journal, Outlet};
@@ -26,7 +29,7 @@ pub(super) struct Declared {
     subscribers: Vec<Subscriber<()>>,
     queryables: Vec<Queryable<()>>,
     receipt: Receipt,
-    alive: LivelinessToken,
+    alive: [LivelinessToken; 2],
 }
 
 impl Declared {
@@ -36,21 +39,17 @@ impl Declared {
         intake: &Arc<Intake>,
         bell: &Bell,
         desk: &Desk,
-        pulse: &Arc<Pulse>,
+        (pair, taken, pulse): (&Arc<Pair>, &[String], &Arc<Pulse>),
     ) -> Result<Self, ServiceError> {
-        let raw = take(intake, bell, pulse, Intake::receive);
-        let reference = take(intake, bell, pulse, Intake::reference);
         let put = desk.clone();
         let receipt = Receipt::declare(session).await?;
-        let subscribers = vec![
-            subscribe(session, key::ALL_RAW, raw).await?,
-            subscribe(session, key::ALL_REFERENCE, reference).await?,
-            subscribe(session, key::ALL_CALIBRATION, move |sample| put.put(sample)).await?,
-        ];
+        let mut subscribers =
+            vec![subscribe(session, key::ALL_CALIBRATION, move |sample| put.put(sample)).await?];
+        subscribers.extend(inputs(session, (intake, bell, pulse), taken, pair).await?);
         let alive = key::service_alive(&session.zid().to_string());
-        let token = session.liveliness().declare_token(alive).await;
-        let token = token.map_err(|source| ServiceError::Declare { key: key::ALL_SERVICES_ALIVE, source })?;
-        let [calibration, command, history] = [(); 3].map(|()| desk.clone());
+        let own = session.liveliness().declare_token(alive).await;
+        let own = own.map_err(|source| ServiceError::Declare { key: key::ALL_SERVICES_ALIVE, source })?;
+        let [calibration, command, history, kept] = [(); 4].map(|()| desk.clone());
         let ask = |asked| {
             let bell = bell.clone();
             move |query| bell.ask(asked, query)
@@ -61,15 +60,20 @@ impl Declared {
             answer(session, key::ALL_HISTORY, move |query| history.history(query)).await?,
             answer(session, key::ALL_CONFIGURATIONS, ask(Asked::Configuration)).await?,
             answer(session, key::ALL_JOURNALS, ask(Asked::Memory)).await?,
+            answer(session, key::ALL_KEPT, move |query| kept.kept(query)).await?,
+            answer(session, key::ALL_PAIRS, ask(Asked::Pair)).await?,
             answer(session, key::ALL_SERVICE_STATUS, ask(Asked::Status)).await?,
             answer(session, key::ALL_STATUS, ask(Asked::Status)).await?,
         ];
-        Ok(Self { subscribers, queryables, receipt, alive: token })
+        // Whoever sees it may ask.
+        let member = session.liveliness().declare_token(pair.me().token()).await;
+        let member = member.map_err(|source| ServiceError::Declare { key: key::ALL_MEMBERS, source })?;
+        Ok(Self { subscribers, queryables, receipt, alive: [own, member] })
     }
 
     /// Ends it, and waits for what is being received; whether that went well. The token stays until it is dropped: where it goes,
     /// nothing more comes from this service.
-    pub(super) fn undeclare(self) -> (bool, LivelinessToken) {
+    pub(super) fn undeclare(self) -> (bool, [LivelinessToken; 2]) {
         let Self { subscribers, queryables, receipt, alive } = self;
         // Every one of them, whatever became of the others.
         let received = subscribers.into_iter().map(|it| it.undeclare().wait_callbacks().wait().is_ok());
@@ -133,6 +137,66 @@ fn take(
             bell.status_due();
         }
     }
+}
+
+/// Subscribes to what comes in of the units that are taken. Where those are not all, temperatures are heard of every unit: they come
+/// seldom, and tell which units nobody takes.
+async fn inputs(
+    session: &Session,
+    (intake, bell, pulse): (&Arc<Intake>, &Bell, &Arc<Pulse>),
+    taken: &[String],
+    pair: &Arc<Pair>,
+) -> Result<Vec<Subscriber<()>>, ServiceError> {
+    let raw = take(intake, bell, pulse, Intake::receive);
+    let reference = take(intake, bell, pulse, Intake::reference);
+    let chunks: Vec<_> = taken.iter().filter_map(|pattern| chunk(pattern)).collect();
+    if chunks.iter().any(|chunk| chunk.as_str() == "*") {
+        let raw = subscribe(session, key::ALL_RAW, raw).await?;
+        return Ok(vec![raw, subscribe(session, key::ALL_REFERENCE, reference).await?]);
+    }
+    let (raw, reference) = (Arc::new(raw), Arc::new(reference));
+    let mut subscribers = Vec::new();
+    for (index, chunk) in chunks.iter().enumerate() {
+        // Two patterns may take one unit: the first of them does.
+        let before = chunks.get(..index).unwrap_or_default().to_vec();
+        let (raw, reference) = (Arc::clone(&raw), Arc::clone(&reference));
+        let key = format!("imu/{chunk}/*/*");
+        let declare = session.declare_subscriber(key).allowed_origin(Locality::Remote);
+        let others = before.clone();
+        let inputs = declare.callback(move |sample| {
+            if !is_of(&others, &sample) && key::parse_raw(sample.key_expr().as_str()).is_some() {
+                raw(sample);
+            }
+        });
+        subscribers.push(inputs.await.map_err(|source| ServiceError::Declare { key: key::ALL_RAW, source })?);
+        let declare = session.declare_subscriber(format!("imu/{chunk}/reference"));
+        let references = declare.allowed_origin(Locality::Remote).callback(move |sample| {
+            if !is_of(&before, &sample) {
+                reference(sample);
+            }
+        });
+        let declared = references.await;
+        subscribers
+            .push(declared.map_err(|source| ServiceError::Declare { key: key::ALL_REFERENCE, source })?);
+    }
+    let pair = Arc::clone(pair);
+    subscribers.push(
+        subscribe(session, key::ALL_TEMPERATURES, move |sample| {
+            if let Some((serial, _)) = key::parse_raw(sample.key_expr().as_str())
+                && !is_of(&chunks, &sample)
+            {
+                pair.pass_over(serial);
+            }
+        })
+        .await?,
+    );
+    Ok(subscribers)
+}
+
+/// Whether a message is of a unit that one of the patterns takes.
+fn is_of(chunks: &[OwnedKeyExpr], sample: &Sample) -> bool {
+    let serial = key::unit_of(sample.key_expr().as_str()).and_then(|serial| keyexpr::new(serial).ok());
+    serial.is_some_and(|serial| chunks.iter().any(|chunk| chunk.intersects(serial)))
 }
 
 async fn subscribe(

@@ -44,6 +44,9 @@ impl UnitActor {
     pub fn measure_rates(&mut self, now: Instant) {
         let counters = self.counters();
         self.rates.measure(now, &counters);
+        if let Some(words) = self.producers.look(&counters) {
+            self.fault(FaultKind::TwoProducers, 1, || words);
+        }
     }
 
     /// What the unit says of itself; `instance` is the service's name for itself.

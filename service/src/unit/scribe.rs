@@ -72,7 +72,8 @@ impl UnitActor {
     /// Tells an event that has been applied to the stream, where there is a journal. No event takes frames in: the stream
     /// has heard what it had heard before.
     pub(super) fn journal(&mut self, event: impl FnOnce(&UnitStream) -> JournalEvent) {
-        let Some(journal) = &self.scribe.journal else { return };
+        // That of the instance that speaks is the unit's.
+        let Some(journal) = self.scribe.journal.as_ref().filter(|_| self.speaks()) else { return };
         self.scribe.number += 1;
         let entry = JournalEntry {
             unit: self.stream.id().to_string(),
@@ -81,8 +82,20 @@ impl UnitActor {
             heard: self.stream.heard(),
             event: event(&self.stream),
         };
+        self.tell_entry(&entry);
+    }
+
+    /// Says in the journal what the stream knows.
+    pub(super) fn journal_memory(&mut self) {
+        let Some(journal) = &self.scribe.journal else { return };
+        let instance = Arc::clone(&journal.instance);
+        self.tell_entry(&self.memory(&instance));
+    }
+
+    fn tell_entry(&mut self, entry: &JournalEntry) {
+        let Some(journal) = &self.scribe.journal else { return };
         let publish = |part| (journal.outlet)(self.stream.id(), codec::encode(&part)?);
-        let published = split(&entry).into_iter().try_for_each(publish);
+        let published = split(entry).into_iter().try_for_each(publish);
         if let Err(error) = published {
             self.fault(FaultKind::JournalUnpublished, 1, || {
                 format!(

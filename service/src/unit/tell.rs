@@ -76,6 +76,11 @@ impl Teller {
         }));
     }
 
+    /// Something else is to be told.
+    pub(super) fn push(&mut self, notice: Notice) {
+        self.untold.push_back(notice);
+    }
+
     /// Hands over what is untold, as far as it is taken.
     pub(super) fn tell(&mut self, stream: &UnitStream) {
         let Some(desk) = &self.desk else {

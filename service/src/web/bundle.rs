@@ -73,12 +73,13 @@ impl Web {
         let mut units = worst_first(self.seen(&fleet, Instant::now(), unix_ms()));
         units.retain(|it| unit.is_none_or(|unit| unit == it.status.unit));
         let mut lines = page::services(&services, &gone, COLUMNS);
+        lines.extend(page::pairs(&fleet.pairs, COLUMNS));
         lines.push(page::tally(&units, COLUMNS));
         let grid = page::units(&units, COLUMNS);
         lines.push(grid.head);
         lines.extend(grid.lines);
         let units = units.iter().map(|it| it.status.clone()).collect();
-        (tone::text(&lines, false), Report { services, units })
+        (tone::text(&lines, false), Report { services, units, instances: fleet.pairs.clone() })
     }
 }
 

@@ -10,6 +10,7 @@
 mod broken_documents;
 mod documents;
 mod kill_9;
+mod pair;
 mod recipes;
 mod stand;
 mod states;

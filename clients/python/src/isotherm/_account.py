@@ -14,6 +14,7 @@ _RESTART = TICK_FLAGS["RESTART"]
 _MOST = (1 << 64) - 1
 _LONGEST_NS = 10**10
 _MOST_STEPS = 1 << 20
+_RUNS_BEFORE = 3
 
 
 def _follows(ticks: Array) -> bool:
@@ -98,7 +99,8 @@ class FirstWins:
 
     def __init__(self) -> None:
         self._current: _Run | None = None
-        self._previous: _Run | None = None
+        #: Those before it, the newest first: a service may lag behind as many restarts of the producer.
+        self._before: list[_Run] = []
         #: Outputs dropped because they, or a part of them, had been used.
         self.dropped = 0
 
@@ -151,10 +153,10 @@ class FirstWins:
             if _first(tick) <= current.sequence:
                 self.dropped += 1
                 return False
-        elif current is not None and self._previous is not None and self._previous.has(tick):
+        elif any(run.has(tick) for run in self._before):
             self.dropped += 1
             return False
-        else:
-            self._previous = current
+        elif current is not None:
+            self._before = [current, *self._before][:_RUNS_BEFORE]
         self._current = _Run(int(tick["sequence"]), int(tick["end_time_ns"]))
         return True

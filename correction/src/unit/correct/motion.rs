@@ -156,7 +156,7 @@ impl Corrector {
         let (terms, duration_s) = (self.accel_terms::<N>(shares), raw.duration.as_s());
         let along = |lane| felt(&terms, calibration.accel_output, lane, readings[lane], duration_s);
         let mut forces: [f64; N] = array::from_fn(along);
-        self.remove_squares(shares, &mut forces);
+        self.remove_squares(calibration, shares, &mut forces);
         let (Some(orientation), Some(axes)) = (&calibration.accel_orientation, &mut self.thermal.accel_axes)
         else {
             return;
@@ -177,14 +177,22 @@ impl Corrector {
         out: &CorrectedTick,
         forces: &mut [f64; N],
     ) {
-        self.remove_squares(shares, forces);
+        self.remove_squares(calibration, shares, forces);
         if self.motions(calibration).any(Motion::has_positions) {
             self.remove_size_effect(calibration, missed, out, forces);
         }
     }
 
     /// m = f + K2·f² has the solution f = 2m/(1 + √(1 + 4·K2·m)) next to m.
-    fn remove_squares<const N: usize>(&self, shares: &Shares, forces: &mut [f64; N]) {
+    fn remove_squares<const N: usize>(
+        &self,
+        calibration: &Calibration,
+        shares: &Shares,
+        forces: &mut [f64; N],
+    ) {
+        if !self.motions(calibration).any(Motion::has_squares) {
+            return;
+        }
         let [second_order] = self.accel_motion::<N>(shares);
         *forces = array::from_fn(|lane| {
             let root = libm::sqrt((1.0 + 4.0 * second_order[lane] * forces[lane]).max(0.0));
@@ -217,7 +225,7 @@ impl Corrector {
                 old.map_or(here, |(old, share)| between(here, narrow::<N>(&old[axis])[lane], share))
             });
             let felt = plus(cross(rate, cross(rate, position)), cross(acceleration, position));
-            forces[lane] -= orientation.forward(temperature, felt).get(lane).copied().unwrap_or_default();
+            forces[lane] -= orientation.along(lane, temperature, &felt);
         }
     }
 

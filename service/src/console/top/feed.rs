@@ -1,16 +1,23 @@
 //! What comes over the session: statuses, and who is there.
 
+use std::time::Duration;
+
 use isotherm_protocol::codec::{self, Message};
 use isotherm_protocol::key;
+use isotherm_protocol::pair::PairReport;
 use isotherm_protocol::service_status::ServiceStatus;
 use isotherm_protocol::status::Status;
 use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
+use tokio::task::JoinHandle;
 use zenoh::pubsub::Subscriber;
 use zenoh::sample::{Sample, SampleKind};
 
 use crate::console::ConsoleError;
 use crate::console::client::Client;
 use crate::console::status::or_none;
+
+/// How often it is asked who speaks for which unit.
+const PAIRS_INTERVAL: Duration = Duration::from_secs(1);
 
 /// Something new.
 #[derive(Debug)]
@@ -23,6 +30,8 @@ pub(crate) enum News {
     UnitAlive(String, bool),
     /// So has a service instance.
     ServiceAlive(String, bool),
+    /// What every service instance does for which unit.
+    Pairs(Vec<PairReport>),
     /// A status that is not understood.
     NotUnderstood,
 }
@@ -34,6 +43,7 @@ type Unread = Box<dyn FnOnce() -> News + Send>;
 #[derive(Debug)]
 pub(crate) struct Feed {
     news: UnboundedReceiver<Unread>,
+    pairs: JoinHandle<()>,
     // Dropping them ends the subscriptions.
     _subscribers: [Subscriber<()>; 4],
 }
@@ -57,7 +67,8 @@ impl Feed {
         let known = or_none(instances)?.into_iter().map(|status| News::Service(Box::new(status)));
         let known = known.chain(statuses?.into_iter().map(|status| News::Unit(Box::new(status))));
         known.for_each(|news| drop(sender.send(Box::new(|| news))));
-        Ok(Self { news, _subscribers: [units, services, units_alive, services_alive] })
+        let pairs = tokio::spawn(ask_pairs(client.clone(), sender));
+        Ok(Self { news, pairs, _subscribers: [units, services, units_alive, services_alive] })
     }
 
     /// The next news; `None` once the session is gone.
@@ -68,6 +79,24 @@ impl Feed {
     /// News that have come already.
     pub(crate) fn next_now(&mut self) -> Option<News> {
         self.news.try_recv().ok().map(|read| read())
+    }
+}
+
+impl Drop for Feed {
+    fn drop(&mut self) {
+        self.pairs.abort();
+    }
+}
+
+/// Asks time and again who speaks for which unit.
+async fn ask_pairs(client: Client, sender: UnboundedSender<Unread>) {
+    loop {
+        if let Ok(reports) = client.pairs().await
+            && sender.send(Box::new(|| News::Pairs(reports))).is_err()
+        {
+            return;
+        }
+        tokio::time::sleep(PAIRS_INTERVAL).await;
     }
 }
 

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::{Duration, Instant};
 
+use isotherm_protocol::pair::PairReport;
 use isotherm_protocol::service_status::ServiceStatus;
 use isotherm_protocol::status::{Output, State, Status};
 
@@ -33,6 +34,8 @@ pub(super) type Key = (String, String);
 pub(crate) struct Fleet {
     units: BTreeMap<Key, Row>,
     services: BTreeMap<String, Instance>,
+    /// Who speaks for which unit.
+    pub(crate) pairs: Vec<PairReport>,
     /// Statuses that were not understood.
     pub(super) not_understood: u64,
 }
@@ -96,6 +99,7 @@ impl Fleet {
             }
             News::UnitAlive(serial, alive) => self.unit_alive(&serial, alive, now),
             News::ServiceAlive(instance, alive) => self.service_alive(&instance, alive, now),
+            News::Pairs(reports) => self.pairs = reports,
             News::NotUnderstood => self.not_understood += 1,
         }
     }

@@ -41,6 +41,27 @@ pub(super) const FAMILIES: &[Family] = &[
         samples: |look, out| out.whole(&[], look.units.len() as u64),
     },
     Family {
+        name: "isotherm_instances",
+        unit: "",
+        kind: Type::Gauge,
+        labels: &[],
+        help: "Service instances for the same units that this one sees, itself included",
+        samples: |look, out| out.whole(&[], look.instances),
+    },
+    Family {
+        name: "isotherm_pair_alarms",
+        unit: "",
+        kind: Type::Counter,
+        labels: &["kind"],
+        help: "Ticks of which another instance computed other bits, units that two services publish: alarm on any",
+        samples: |look, out| {
+            [FaultKind::OtherBits, FaultKind::TwoSpeak].into_iter().try_for_each(|kind| {
+                let fault = look.faults.iter().find(|fault| fault.kind == kind.name());
+                out.counter(&[kind.name()], fault.map_or(0, |fault| fault.count))
+            })
+        },
+    },
+    Family {
         name: "isotherm_refused_messages",
         unit: "",
         kind: Type::Counter,
@@ -114,5 +135,7 @@ pub(super) const FAMILIES: &[Family] = &[
 
 /// Whether it is a message that was refused; the others are a unit's own.
 fn is_refusal(kind: FaultKind) -> bool {
-    !matches!(kind, FaultKind::Unpublished | FaultKind::Alarm)
+    use FaultKind as K;
+
+    !matches!(kind, K::Unpublished | K::Alarm | K::OtherBits | K::TwoSpeak | K::TwoProducers)
 }

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use isotherm_correction::operation::State;
+use isotherm_protocol::pair::Role;
 use isotherm_protocol::status::{ChannelStatus, LatencyBucket, Output, Place, SensorKind};
 
 use super::super::page::{Samples, Type};
@@ -42,6 +43,38 @@ pub(super) const FAMILIES: &[Family] = &[
                 outputs.try_for_each(|(name, output)| out.flag(&[unit, name], output == look.status.output))
             })
         },
+    },
+    Family {
+        name: "isotherm_unit_speaking",
+        unit: "",
+        kind: Type::Gauge,
+        labels: &["unit"],
+        help: "1 if this instance publishes the unit's ticks, 0 if it stands by for another",
+        samples: |look, out| each(look, |unit, look| out.flag(&[unit], look.role.role == Role::Speaking)),
+    },
+    Family {
+        name: "isotherm_unit_takeovers",
+        unit: "",
+        kind: Type::Counter,
+        labels: &["unit"],
+        help: "Times that this instance began to speak in another's place",
+        samples: |look, out| each(look, |unit, look| out.counter(&[unit], look.role.takeovers)),
+    },
+    Family {
+        name: "isotherm_unit_ticks_compared",
+        unit: "",
+        kind: Type::Counter,
+        labels: &["unit"],
+        help: "Corrected ticks of another instance whose bits were compared with this one's",
+        samples: |look, out| each(look, |unit, look| out.counter(&[unit], look.role.ticks_compared)),
+    },
+    Family {
+        name: "isotherm_unit_ticks_differing",
+        unit: "",
+        kind: Type::Counter,
+        labels: &["unit"],
+        help: "Those that were others: alarm on any",
+        samples: |look, out| each(look, |unit, look| out.counter(&[unit], look.role.ticks_differing)),
     },
     Family {
         name: "isotherm_unit_stalled",
@@ -301,8 +334,9 @@ fn concerns_units(kind: FaultKind) -> bool {
         | K::Body
         | K::Unpublished
         | K::JournalUnpublished
+        | K::TwoProducers
         | K::Alarm => true,
-        K::UnknownStream | K::BadSerial | K::Deletion | K::TooManyUnits => false,
+        K::UnknownStream | K::BadSerial | K::Deletion | K::TooManyUnits | K::OtherBits | K::TwoSpeak => false,
     }
 }
 

@@ -15,9 +15,9 @@ mod copies;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
-use isotherm_protocol::journal::JournalEntry;
-use isotherm_protocol::key::Input;
-use isotherm_protocol::stream::Heard;
+use crate::journal::JournalEntry;
+use crate::key::Input;
+use crate::stream::Heard;
 
 use anchor::Search;
 use copies::Copies;

@@ -5,11 +5,11 @@
 
 use std::collections::VecDeque;
 
-use isotherm_protocol::key::Input;
+use crate::key::Input;
 
 use super::{Deed, Frame, NEAR_NS, Sequencer};
-use crate::replica::notice::Notice;
-use crate::replica::outline::Mark;
+use crate::replay::notice::Notice;
+use crate::replay::outline::Mark;
 
 /// Frames that are set aside, by [`Input::index`].
 #[derive(Debug, Default)]

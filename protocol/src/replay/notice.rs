@@ -3,7 +3,7 @@
 use std::fmt;
 use std::sync::Arc;
 
-use isotherm_protocol::key::{Input, RawStream};
+use crate::key::{Input, RawStream};
 use serde::{Serialize, Serializer};
 
 /// Where recorder and service did not have the same, or what could not be done.

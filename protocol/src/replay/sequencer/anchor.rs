@@ -3,13 +3,13 @@
 
 use std::collections::VecDeque;
 
-use isotherm_protocol::codec;
-use isotherm_protocol::key::{Input, RawStream};
-use isotherm_protocol::raw::GyroBatch;
+use crate::codec;
+use crate::key::{Input, RawStream};
+use crate::raw::GyroBatch;
 
 use super::copies::Copies;
 use super::{Frame, NEAR_NS, Sequencer};
-use crate::replica::outline::{Mark, MarkKind};
+use crate::replay::outline::{Mark, MarkKind};
 
 /// How long before an entry that a stream begins with frames are kept for it (ns).
 const KEPT_NS: u64 = 5_000_000_000;

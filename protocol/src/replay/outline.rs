@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use isotherm_protocol::journal::{JournalEntry, JournalEvent};
-use isotherm_protocol::key::{Input, UnitId};
-use isotherm_protocol::stream::Heard;
+use crate::journal::{JournalEntry, JournalEvent};
+use crate::key::{Input, UnitId};
+use crate::stream::Heard;
 
 /// Kind of an entry, as far as its place hangs on it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

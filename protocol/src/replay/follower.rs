@@ -1,0 +1,350 @@
+//! A stream that stays, to the bit, what another service's is, while frames and journal come.
+//!
+//! Frames are given to the stream at once: whoever has to go on in the other's place has no time to catch up. An entry of the journal
+//! that comes later than the frames behind its place takes the stream back to where it was before, by its memory, and frames and
+//! entries are given again in the service's order ([`Sequencer`]).
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use isotherm_correction::unit::UnitSettings;
+
+use super::{Deed, Mark, Outline, Sequencer};
+use crate::journal::{JournalEntry, JournalEvent};
+use crate::key::{Input, RawStream, UnitId};
+use crate::stream::{Heard, UnitStream};
+
+/// How far apart the stream's own memories are taken (ns): an entry may be as late as that.
+const APART_NS: u64 = 1_000_000_000;
+/// The input by which it is known which frames came before a memory.
+const GYRO: Input = Input::Raw(RawStream::Gyro);
+/// How much later than a memory the last frame may come that the memory has heard (ns).
+const LONGEST_LAG_NS: u64 = 300_000_000;
+/// How long an entry may wait for frames that the other service has heard (ns).
+const LONGEST_WAIT_NS: u64 = 1_000_000_000;
+/// Most frames that wait for a memory, and most that are kept between two; beyond them the oldest go, and the memory is asked for anew.
+pub const MAX_WAITING: usize = 1 << 15;
+/// Most entries that wait for a memory.
+const MAX_ENTRIES: usize = 1024;
+
+/// What the stream knew at some time.
+#[derive(Debug)]
+struct Anchor {
+    /// As an entry of the other service's journal: the stream knows what that one knew.
+    entry: JournalEntry,
+    at_ns: u64,
+    /// How many frames had come.
+    frames: u64,
+}
+
+/// A frame that may have to be given again.
+#[derive(Debug)]
+struct Frame {
+    input: Input,
+    at_ns: u64,
+    bytes: Box<[u8]>,
+}
+
+/// A stream that takes the place of the present one.
+#[derive(Debug)]
+pub struct Rebuilt {
+    /// The stream.
+    pub stream: UnitStream,
+    /// The corrected frames that it has made again, the oldest first.
+    pub frames: Vec<Vec<u8>>,
+    /// Whether frames and entries were those that the other service had, as far as is known.
+    pub exact: bool,
+}
+
+/// Follows one unit at one other service.
+#[derive(Debug)]
+pub struct Follower {
+    unit: UnitId,
+    /// Memories of the stream, the oldest first; none before the other's memory is there.
+    anchors: VecDeque<Anchor>,
+    /// The memory that is to be gone on from.
+    memory: Option<(JournalEntry, u64)>,
+    frames: VecDeque<Frame>,
+    /// How many frames came before the first of [`Self::frames`].
+    gone: u64,
+    /// Behind the first anchor, by number; while there is no memory those of every instance.
+    entries: Vec<(JournalEntry, u64)>,
+    /// How many of [`Self::entries`] the stream was not given.
+    waiting: usize,
+}
+
+impl Follower {
+    /// One that has no memory of the other service yet.
+    #[must_use]
+    pub fn new(unit: UnitId) -> Self {
+        Self {
+            unit,
+            anchors: VecDeque::new(),
+            memory: None,
+            frames: VecDeque::new(),
+            gone: 0,
+            entries: Vec::new(),
+            waiting: 0,
+        }
+    }
+
+    /// Whether the stream is what the other's is, as far as is known.
+    #[must_use]
+    pub fn has_joined(&self) -> bool {
+        !self.anchors.is_empty()
+    }
+
+    /// Whether a memory is there that is not gone on from yet.
+    #[must_use]
+    pub fn has_memory(&self) -> bool {
+        self.memory.is_some()
+    }
+
+    /// Whether entries wait for their frames.
+    #[must_use]
+    pub fn is_waiting(&self) -> bool {
+        self.waiting > 0
+    }
+
+    /// The memory must be taken anew.
+    pub fn lose(&mut self) {
+        self.anchors.clear();
+        self.memory = None;
+        // Entries behind the next memory may have come already.
+        self.waiting = 0;
+    }
+
+    /// Notes a frame that the stream is given.
+    pub fn frame(&mut self, input: Input, now_ns: u64, bytes: &[u8]) {
+        if self.frames.len() == MAX_WAITING {
+            self.frames.pop_front();
+            self.gone += 1;
+            if self.anchors.front().is_some_and(|anchor| anchor.frames < self.gone) {
+                self.lose();
+            }
+        }
+        self.frames.push_back(Frame { input, at_ns: now_ns, bytes: bytes.into() });
+    }
+
+    /// Takes the answer to a question for the memory, or an entry of the journal. Whether it is of use.
+    pub fn entry(&mut self, entry: JournalEntry, now_ns: u64) -> bool {
+        // The service ends, the unit's stream does not.
+        if entry.unit != self.unit.as_str() || entry.event == JournalEvent::Ended {
+            return false;
+        }
+        if matches!(entry.event, JournalEvent::Memory { .. }) {
+            let same = self.anchors.back().is_some_and(|anchor| anchor.entry.instance == entry.instance);
+            if !same {
+                self.lose();
+                self.entries.retain(|(other, _)| is_behind(other, &entry));
+                self.memory = Some((entry, now_ns));
+            }
+            return !same;
+        }
+        if self.anchors.front().is_some_and(|anchor| anchor.entry.instance != entry.instance) {
+            return false;
+        }
+        let place = self.entries.partition_point(|(other, _)| other.number <= entry.number);
+        let known = place.checked_sub(1).and_then(|before| self.entries.get(before));
+        let known =
+            known.is_some_and(|(other, _)| other.number == entry.number && other.instance == entry.instance);
+        let in_memory = self.anchors.front().is_some_and(|anchor| !is_behind(&entry, &anchor.entry));
+        if known || in_memory {
+            return false;
+        }
+        if self.entries.len() == MAX_ENTRIES {
+            self.entries.remove(0);
+        }
+        self.entries.insert(place.min(self.entries.len()), (entry, now_ns));
+        self.waiting += usize::from(self.has_joined());
+        true
+    }
+
+    /// Goes on as far as it can: from a memory that has come, or from an entry whose frames have come. `own` is the stream as it
+    /// is; what is given back takes its place. The second value says that the memory must be asked for anew.
+    pub fn advance(&mut self, own: &UnitStream, now_ns: u64) -> (Option<Rebuilt>, bool) {
+        if let Some((memory, at_ns)) = self.memory.clone() {
+            let anchor = Anchor { entry: memory, at_ns, frames: self.gone };
+            // Where the last gyro frame that the other had heard did not come, some behind it may be missing too.
+            if !self.has_last_gyro_frame(&anchor.entry) {
+                return (None, now_ns > at_ns.saturating_add(LONGEST_LAG_NS));
+            }
+            let rebuilt = self.rebuild(&anchor, false);
+            let Some(made) = &rebuilt else {
+                return (None, now_ns > at_ns.saturating_add(4 * super::NEAR_NS));
+            };
+            // The stream's own from here on: which frames were in the other's memory need not be found out again.
+            let last = self.entries.iter().rfind(|(entry, _)| is_behind(entry, &anchor.entry));
+            let number = last.map_or(anchor.entry.number, |(entry, _)| entry.number);
+            self.memory = None;
+            self.waiting = 0;
+            self.entries.clear();
+            self.remember(&made.stream, (&anchor.entry.instance, number), now_ns);
+            return (rebuilt, false);
+        }
+        if self.anchors.is_empty() {
+            return (None, false);
+        }
+        if self.waiting == 0 {
+            if self.anchors.back().is_some_and(|anchor| anchor.at_ns.saturating_add(APART_NS) <= now_ns) {
+                let last =
+                    self.anchors.back().map(|anchor| (anchor.entry.instance.clone(), anchor.entry.number));
+                let (instance, before) = last.unwrap_or_default();
+                let number = self.entries.last().map_or(before, |(entry, _)| entry.number);
+                self.remember(own, (&instance, number), now_ns);
+            }
+            return (None, false);
+        }
+        let first = self.entries.len().saturating_sub(self.waiting);
+        let late = |(_, at_ns): &(JournalEntry, u64)| at_ns.saturating_add(LONGEST_WAIT_NS) < now_ns;
+        let Some(last) = self.entries.last() else { return (None, false) };
+        if !reaches(&own.heard(), &last.0.heard) {
+            let stuck = self.entries.iter().skip(first).any(late);
+            if stuck {
+                self.lose();
+            }
+            return (None, stuck);
+        }
+        // Back to before the first of them.
+        let before = self.entries.get(first).map(|(entry, _)| entry.heard);
+        while let (Some(anchor), Some(before)) = (self.anchors.back(), &before) {
+            if reaches(before, &anchor.entry.heard) {
+                break;
+            }
+            self.anchors.pop_back();
+        }
+        let Some(anchor) = self.anchors.pop_back() else {
+            self.lose();
+            return (None, true);
+        };
+        let rebuilt = self.rebuild(&anchor, true);
+        self.anchors.push_back(anchor);
+        self.waiting = 0;
+        let stuck = !rebuilt.as_ref().is_some_and(|rebuilt| rebuilt.exact);
+        if stuck {
+            self.lose();
+        }
+        (rebuilt, stuck)
+    }
+
+    fn has_last_gyro_frame(&self, memory: &JournalEntry) -> bool {
+        let Some(heard) = memory.heard.get(GYRO.index()).filter(|heard| heard.frames > 0) else {
+            return true;
+        };
+        let is_it = |frame: &Frame| {
+            let mut own = Heard::default();
+            own.note(&frame.bytes);
+            frame.input == GYRO && own.crc == heard.crc
+        };
+        self.frames.iter().rev().any(is_it)
+    }
+
+    /// Takes the stream's own memory, and gives up what is older than the one before it.
+    fn remember(&mut self, own: &UnitStream, (instance, number): (&str, u64), now_ns: u64) {
+        let event = JournalEvent::Memory { memory: own.memory(), document: None, pending: None };
+        let (unit, instance, heard) = (self.unit.to_string(), instance.to_owned(), own.heard());
+        let entry = JournalEntry { unit, instance, number, heard, event };
+        let frames = self.gone + self.frames.len() as u64;
+        self.anchors.push_back(Anchor { entry, at_ns: now_ns, frames });
+        while self.anchors.len() > 2 {
+            self.anchors.pop_front();
+        }
+        let Some(oldest) = self.anchors.front() else { return };
+        let (first, number) = (oldest.frames, oldest.entry.number);
+        while self.gone < first && self.frames.pop_front().is_some() {
+            self.gone += 1;
+        }
+        self.entries.retain(|(entry, _)| entry.number > number);
+    }
+
+    /// A stream that goes on from a memory with all frames and entries behind it; `None` where it is not certain yet which of the
+    /// frames were in the memory. With `at_once` that is not waited for.
+    fn rebuild(&self, anchor: &Anchor, at_once: bool) -> Option<Rebuilt> {
+        let mark = Mark::of(&anchor.entry, anchor.at_ns);
+        let behind: Vec<_> =
+            self.entries.iter().filter(|(entry, _)| is_behind(entry, &anchor.entry)).cloned().collect();
+        let marks = behind.iter().map(|(entry, at_ns)| Mark::of(entry, *at_ns));
+        let mut sequencer = Sequencer::new(Outline::new(std::iter::once(mark).chain(marks).collect()));
+        let skipped = usize::try_from(anchor.frames.saturating_sub(self.gone)).unwrap_or(usize::MAX);
+        let mut left = behind.len() + 1;
+        sequencer.entry(anchor.entry.clone(), anchor.at_ns);
+        for (entry, at_ns) in behind {
+            sequencer.entry(entry, at_ns);
+        }
+        for Frame { input, at_ns, bytes } in self.frames.iter().skip(skipped) {
+            sequencer.frame(*input, *at_ns, bytes.to_vec());
+        }
+        if at_once {
+            sequencer.finish();
+        }
+        let mut made = Made { stream: None, frames: Vec::new(), exact: true };
+        while let Some(deed) = sequencer.next_deed() {
+            left -= usize::from(matches!(deed, Deed::Entry { .. }));
+            made.take(&self.unit, deed);
+        }
+        let Made { stream, frames, exact } = made;
+        let stream = stream.filter(|_| left == 0)?;
+        Some(Rebuilt { stream, frames, exact })
+    }
+
+    /// The instance that is followed.
+    #[must_use]
+    pub fn instance(&self) -> Option<Arc<str>> {
+        self.anchors.back().map(|anchor| anchor.entry.instance.as_str().into())
+    }
+}
+
+/// Whether an entry is of the same journal as a memory and stands behind it.
+fn is_behind(entry: &JournalEntry, memory: &JournalEntry) -> bool {
+    entry.instance == memory.instance && entry.number > memory.number
+}
+
+/// Whether a stream has been given all that an entry says, by number.
+fn reaches(own: &[Heard; Input::ALL.len()], want: &[Heard; Input::ALL.len()]) -> bool {
+    own.iter().zip(want).all(|(own, want)| own.frames >= want.frames)
+}
+
+/// A stream that is being made.
+struct Made {
+    stream: Option<UnitStream>,
+    frames: Vec<Vec<u8>>,
+    exact: bool,
+}
+
+impl Made {
+    fn take(&mut self, unit: &UnitId, deed: Deed) {
+        match deed {
+            Deed::Frame { input, frame, .. } => {
+                if let Some(stream) = &mut self.stream {
+                    // A frame that cannot be read is counted by the stream, there as here.
+                    let _ = stream.take(input, &frame);
+                }
+            }
+            Deed::Entry { entry, anchor, .. } => {
+                let fresh = || UnitStream::new(unit.clone(), UnitSettings::default());
+                if anchor {
+                    self.stream = Some(fresh());
+                }
+                let done = self.stream.get_or_insert_with(fresh).carry_out(&entry.event);
+                self.exact &= done.is_ok();
+                if anchor && done.is_err() {
+                    self.stream = None;
+                }
+            }
+            Deed::Notice(_) => self.exact = false,
+        }
+        let Some(stream) = &mut self.stream else { return };
+        loop {
+            let mut frame = Vec::new();
+            if !stream.next_frame(&mut frame) {
+                break;
+            }
+            self.frames.push(frame);
+        }
+        // Asked for by the service after every frame; it is part of the memory.
+        while stream.take_in_force().is_some() {}
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,61 @@
+//! Other instances for the same units, and which units those are.
+
+use std::time::Duration;
+
+use isotherm_protocol::pair::Mode;
+use zenoh::key_expr::OwnedKeyExpr;
+
+/// What an operator can set of a pair.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PairSettings {
+    /// Name of this instance; `None`: the first characters of its Zenoh id.
+    pub name: Option<String>,
+    /// What it does while another one speaks.
+    pub mode: Mode,
+    /// Of two that speak the one with the lower priority yields.
+    pub priority: u8,
+    /// How late the other's output may be (5 ms…10 s).
+    pub takeover: Duration,
+}
+
+impl Default for PairSettings {
+    fn default() -> Self {
+        Self { name: None, mode: Mode::Standby, priority: 0, takeover: Duration::from_millis(20) }
+    }
+}
+
+/// All units.
+pub(super) const ALL_UNITS: &str = "*";
+
+/// The chunk of a key for which a pattern of serials stands: `ZLG-*` is `ZLG-$*` in Zenoh; `None` where it is no such pattern.
+#[must_use]
+pub fn chunk(pattern: &str) -> Option<OwnedKeyExpr> {
+    let fits = |c: char| c.is_ascii_alphanumeric() || "._-*".contains(c);
+    if pattern.is_empty() || !pattern.chars().all(fits) || pattern.contains("**") {
+        return None;
+    }
+    let chunk = if pattern == ALL_UNITS { pattern.to_owned() } else { pattern.replace('*', "$*") };
+    OwnedKeyExpr::new(chunk).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_star_stands_for_any_characters_of_a_serial() {
+        for (pattern, fits, does_not) in [
+            ("ZLG-*", "ZLG-0042", "FOG-0042"),
+            ("*-0042", "ZLG-0042", "ZLG-0043"),
+            ("ZLG-0042", "ZLG-0042", "ZLG-00421"),
+        ] {
+            let chunk = chunk(pattern).unwrap();
+            let includes = |serial: &str| chunk.intersects(&OwnedKeyExpr::new(serial.to_owned()).unwrap());
+            assert!(includes(fits) && !includes(does_not), "{pattern}");
+        }
+        assert!(chunk("*").is_some());
+        for pattern in ["", "a/b", "**", "a**", "$*", "a b"] {
+            assert_eq!(chunk(pattern), None, "{pattern}");
+        }
+    }
+}

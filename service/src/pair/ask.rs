@@ -1,0 +1,210 @@
+//! What a standby asks of the instance that speaks: memories of units, histories, documents.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use isotherm_bus::inquiry::{ask_all, memories};
+use isotherm_protocol::codec;
+use isotherm_protocol::digest::Digest;
+use isotherm_protocol::history::AuditEntry;
+use isotherm_protocol::journal::{Joiner, JournalPart};
+use isotherm_protocol::key::{self, UnitId};
+use isotherm_protocol::pair::{PairReport, Role};
+use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
+use tokio::sync::oneshot;
+use tokio::task::JoinHandle;
+use zenoh::Session;
+use zenoh::sample::Sample;
+
+use super::Pair;
+use crate::intake::Intake;
+use crate::registrar::{Carried, Desk};
+
+/// How long an answer is waited for.
+const LIMIT: Duration = Duration::from_secs(2);
+/// How long after an entry of the journal histories are asked for: by then what follows from it is in the audit file, as a rule; and
+/// once more, for the first tick of a calibration.
+const DELAYS: [Duration; 2] = [Duration::from_millis(200), Duration::from_millis(1500)];
+/// Entries of a history that are asked for.
+const ENTRIES: u32 = 1000;
+
+/// What is asked for.
+#[derive(Debug)]
+enum Question {
+    Memory(UnitId),
+    /// Of one unit, or of all.
+    Records(Option<UnitId>),
+}
+
+/// Where questions are handed in.
+#[derive(Debug, Clone)]
+pub(crate) struct Questions(UnboundedSender<Question>);
+
+impl Questions {
+    /// The memory of a unit.
+    pub(super) fn memory(&self, unit: UnitId) {
+        let _ = self.0.send(Question::Memory(unit));
+    }
+
+    /// The histories of a unit, or of all, and the documents in them.
+    pub(super) fn records(&self, unit: Option<UnitId>) {
+        let _ = self.0.send(Question::Records(unit));
+    }
+}
+
+/// The task that asks; it ends with the last [`Questions`].
+#[derive(Debug)]
+pub(crate) struct Asker {
+    session: Session,
+    pair: Arc<Pair>,
+    intake: Arc<Intake>,
+    desk: Desk,
+}
+
+impl Asker {
+    /// Starts it. The first it finds out is which units other instances speak for.
+    pub(crate) fn start(
+        session: &Session,
+        pair: &Arc<Pair>,
+        intake: &Arc<Intake>,
+        desk: Desk,
+    ) -> (Questions, JoinHandle<()>) {
+        let (sender, questions) = unbounded_channel();
+        let asker =
+            Self { session: session.clone(), pair: Arc::clone(pair), intake: Arc::clone(intake), desk };
+        (Questions(sender), tokio::spawn(asker.run(questions)))
+    }
+
+    async fn run(self, mut questions: UnboundedReceiver<Question>) {
+        if self.pair.is_opening() {
+            self.records(None).await;
+            let spoken = self.spoken().await;
+            self.pair.opened(&self.intake, &spoken);
+        }
+        // Histories are asked for when no entry has come for a while.
+        let mut due: BTreeMap<Option<UnitId>, Vec<Instant>> = BTreeMap::new();
+        loop {
+            let next = due.values().flatten().min().copied();
+            let wait =
+                next.map_or(Duration::from_secs(3600), |next| next.saturating_duration_since(Instant::now()));
+            let mut units = BTreeSet::new();
+            match tokio::time::timeout(wait, questions.recv()).await {
+                Ok(None) => break,
+                Ok(Some(question)) => {
+                    let mut question = Some(question);
+                    while let Some(asked) = question {
+                        match asked {
+                            Question::Memory(unit) => drop(units.insert(unit)),
+                            Question::Records(unit) => {
+                                let now = Instant::now();
+                                due.entry(unit).or_default().extend(DELAYS.map(|delay| now + delay));
+                            }
+                        }
+                        question = questions.try_recv().ok();
+                    }
+                }
+                Err(_) => {
+                    let now = Instant::now();
+                    let ripe: Vec<_> = due
+                        .iter()
+                        .filter(|(_, at)| at.iter().any(|at| *at <= now))
+                        .map(|(unit, _)| unit.clone())
+                        .collect();
+                    for unit in ripe {
+                        if let Some(at) = due.get_mut(&unit) {
+                            at.retain(|at| *at > now);
+                        }
+                        self.records(unit).await;
+                    }
+                    due.retain(|_, at| !at.is_empty());
+                }
+            }
+            if !units.is_empty() {
+                self.memories(&units).await;
+            }
+        }
+    }
+
+    /// What others answer on a key; those of this instance are left out.
+    async fn ask(&self, selector: &str) -> Vec<Sample> {
+        let own = format!("isotherm/{}/", self.pair.me().instance);
+        match ask_all(&self.session, selector, LIMIT).await {
+            Ok((replies, _)) => {
+                let samples = replies.into_iter().filter_map(|reply| reply.into_result().ok());
+                samples.filter(|sample| !sample.key_expr().as_str().starts_with(&own)).collect()
+            }
+            Err(error) => {
+                tracing::warn!("{error}");
+                Vec::new()
+            }
+        }
+    }
+
+    /// Units that others speak for.
+    async fn spoken(&self) -> BTreeSet<UnitId> {
+        let answers = self.ask(key::ALL_PAIRS).await;
+        let reports = answers
+            .iter()
+            .filter_map(|sample| serde_json::from_slice::<PairReport>(&sample.payload().to_bytes()).ok());
+        let units = reports.flat_map(|report| report.units).filter(|unit| unit.role == Role::Speaking);
+        units.filter_map(|unit| UnitId::new(&unit.unit).ok()).collect()
+    }
+
+    /// Has units go on from the memory of the instance that speaks for them.
+    async fn memories(&self, units: &BTreeSet<UnitId>) {
+        let all = units.len() > 8;
+        let selectors: Vec<_> =
+            if all { vec![key::ALL_JOURNALS.to_owned()] } else { units.iter().map(key::journal).collect() };
+        for selector in selectors {
+            let samples = self.ask(&selector).await;
+            for (_, frames) in memories(&samples) {
+                let mut joiner = Joiner::new();
+                let parts = frames.iter().filter_map(|frame| codec::decode::<JournalPart>(frame).ok());
+                let entry = parts.filter_map(|part| joiner.join(part).ok().flatten()).last();
+                let Some(entry) = entry.filter(|entry| entry.instance != self.pair.me().instance) else {
+                    continue;
+                };
+                let Some(unit) = UnitId::new(&entry.unit).ok().filter(|unit| units.contains(unit)) else {
+                    continue;
+                };
+                let standing = self.pair.standing();
+                self.intake.with(&unit, |actor| {
+                    if !actor.speaks() {
+                        actor.hear_journal(entry, Instant::now(), &standing);
+                    }
+                });
+            }
+        }
+    }
+
+    /// Has histories and documents written down here too.
+    async fn records(&self, unit: Option<UnitId>) {
+        let selector = unit.as_ref().map_or(key::ALL_HISTORY.to_owned(), key::history);
+        let samples = self.ask(&format!("{selector}?limit={ENTRIES}")).await;
+        for sample in samples {
+            let serial = key::parse_history(sample.key_expr().as_str());
+            let Some(unit) = serial.and_then(|serial| UnitId::new(serial).ok()) else { continue };
+            let Ok(entries) = serde_json::from_slice::<Vec<AuditEntry>>(&sample.payload().to_bytes()) else {
+                continue;
+            };
+            if self.intake.speaks_for(&unit) {
+                continue;
+            }
+            let mut carried = Carried { unit, entries, kept: BTreeMap::new() };
+            // A document may lie under an overlay: that is known when the overlay is there.
+            for _ in 0..2 {
+                let (answer, lacking) = oneshot::channel();
+                self.desk.lacks(carried.clone(), answer);
+                for digest in lacking.await.unwrap_or_default() {
+                    let found = self.ask(&key::kept("*", &digest)).await;
+                    let bytes = found.iter().map(|sample| sample.payload().to_bytes().into_owned());
+                    if let Some(bytes) = bytes.into_iter().find(|bytes| Digest::of(bytes) == digest) {
+                        carried.kept.insert(digest, bytes);
+                    }
+                }
+            }
+            self.desk.carry(carried);
+        }
+    }
+}

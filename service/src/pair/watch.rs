@@ -1,0 +1,215 @@
+//! The thread that looks after units that another instance speaks for.
+
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use isotherm_protocol::codec;
+use isotherm_protocol::journal::{Joiner, JournalEntry, JournalEvent, JournalPart};
+use isotherm_protocol::key::{self, UnitId};
+use isotherm_protocol::pair::Member;
+use zenoh::pubsub::Subscriber;
+use zenoh::sample::{Locality, Sample, SampleKind};
+use zenoh::{Session, Wait};
+
+use super::{Pair, Questions};
+use crate::ServiceError;
+use crate::fault::FaultKind;
+use crate::intake::Intake;
+use crate::unit::{Alarm, UnitActor, Wants};
+
+/// How often the units are looked at where no other instance is there.
+const ALONE: Duration = Duration::from_millis(100);
+/// Shortest and longest interval where one is.
+const INTERVAL: [Duration; 2] = [Duration::from_millis(1), Duration::from_millis(5)];
+
+/// What the thread hears.
+#[derive(Debug)]
+enum Event {
+    /// An instance has come.
+    Came(Member),
+    /// An instance has gone.
+    Gone(String),
+    /// A part of another instance's journal.
+    Journal(Vec<u8>),
+    /// End.
+    Stop,
+}
+
+/// The running watch.
+#[derive(Debug)]
+pub(crate) struct Watch {
+    events: Sender<Event>,
+    thread: JoinHandle<()>,
+    subscribers: Vec<Subscriber<()>>,
+}
+
+impl Watch {
+    /// Subscribes to what other instances publish, and starts the thread.
+    pub(crate) async fn start(
+        session: &Session,
+        pair: &Arc<Pair>,
+        intake: &Arc<Intake>,
+        questions: Questions,
+    ) -> Result<Self, ServiceError> {
+        let (events, receiver) = channel();
+        let declare = |key: &'static str| move |source| ServiceError::Declare { key, source };
+        let hears = Arc::clone(intake);
+        let corrected = session
+            .declare_subscriber(key::ALL_CORRECTED)
+            .allowed_origin(Locality::Remote)
+            .callback(move |sample| {
+                let key = sample.key_expr();
+                if let Some(serial) = key::parse_corrected(key.as_str()) {
+                    hears.hear(serial, &sample.payload().to_bytes(), Instant::now());
+                }
+            })
+            .await
+            .map_err(declare(key::ALL_CORRECTED))?;
+        let told = events.clone();
+        let journals = session
+            .declare_subscriber(key::ALL_JOURNALS)
+            .allowed_origin(Locality::Remote)
+            .callback(move |sample| {
+                let _ = told.send(Event::Journal(sample.payload().to_bytes().into_owned()));
+            })
+            .await
+            .map_err(declare(key::ALL_JOURNALS))?;
+        let told = events.clone();
+        let members = session
+            .liveliness()
+            .declare_subscriber(key::ALL_MEMBERS)
+            .history(true)
+            .callback(move |sample: Sample| {
+                let Some(member) = Member::parse(sample.key_expr().as_str()) else { return };
+                let came = sample.kind() == SampleKind::Put;
+                let event = if came { Event::Came(member) } else { Event::Gone(member.instance) };
+                let _ = told.send(event);
+            })
+            .await
+            .map_err(declare(key::ALL_MEMBERS))?;
+        let work = Work {
+            pair: Arc::clone(pair),
+            intake: Arc::clone(intake),
+            joiner: Joiner::new(),
+            interval: (pair.takeover / 4).clamp(INTERVAL[0], INTERVAL[1]),
+            questions,
+        };
+        let thread = std::thread::Builder::new()
+            .name("isotherm-pair".to_owned())
+            .spawn(move || work.run(&receiver))
+            .map_err(ServiceError::Thread)?;
+        Ok(Self { events, thread, subscribers: vec![corrected, journals, members] })
+    }
+
+    /// Ends it; whether it ended in order.
+    pub(crate) fn stop(self) -> bool {
+        let undeclared = self.subscribers.into_iter().map(|it| it.undeclare().wait().is_ok());
+        let undeclared = undeclared.fold(true, |all, one| all & one);
+        undeclared & self.events.send(Event::Stop).is_ok() & self.thread.join().is_ok()
+    }
+}
+
+/// What the thread works with.
+struct Work {
+    pair: Arc<Pair>,
+    intake: Arc<Intake>,
+    joiner: Joiner,
+    interval: Duration,
+    questions: Questions,
+}
+
+impl Work {
+    fn run(mut self, events: &Receiver<Event>) {
+        let mut next = Instant::now();
+        loop {
+            match events.recv_timeout(next.saturating_duration_since(Instant::now())) {
+                Ok(Event::Stop) | Err(RecvTimeoutError::Disconnected) => break,
+                Ok(event) => {
+                    self.take(event);
+                    next = next.min(Instant::now() + self.interval);
+                }
+                Err(RecvTimeoutError::Timeout) => {
+                    let now = Instant::now();
+                    self.look(now);
+                    next = now + if self.pair.has_others() { self.interval } else { ALONE };
+                }
+            }
+        }
+    }
+
+    fn take(&mut self, event: Event) {
+        match event {
+            Event::Came(member) => {
+                let (name, mode, priority) = (member.name.clone(), member.mode.name(), member.priority);
+                if self.pair.come(member) {
+                    tracing::info!(name, mode, priority, "another service instance is there");
+                    self.questions.records(None);
+                    self.intake.each_unit(UnitActor::introduce);
+                }
+                self.look(Instant::now());
+            }
+            Event::Gone(instance) => {
+                if self.pair.go(&instance) {
+                    tracing::warn!(instance, "the other service instance, or the connection to it, is gone");
+                }
+                self.look(Instant::now());
+            }
+            Event::Journal(frame) => {
+                // What is no part of an entry, or of an incomplete one, is found missing by its number.
+                let entry = codec::decode::<JournalPart>(&frame).ok();
+                let entry = entry.and_then(|part| self.joiner.join(part).ok().flatten());
+                if let Some(entry) = entry {
+                    self.entry(entry);
+                }
+            }
+            Event::Stop => {}
+        }
+    }
+
+    /// An entry of another instance's journal.
+    fn entry(&self, entry: JournalEntry) {
+        let Ok(unit) = UnitId::new(&entry.unit) else { return };
+        let is_written_down =
+            matches!(entry.event, JournalEvent::Changed { .. } | JournalEvent::Commanded { .. });
+        let standing = self.pair.standing();
+        self.intake.with(&unit, |actor| actor.hear_journal(entry, Instant::now(), &standing));
+        if is_written_down {
+            self.questions.records(Some(unit));
+        }
+    }
+
+    /// Looks at every unit.
+    fn look(&self, now: Instant) {
+        let still = self.pair.look(now);
+        let standing = self.pair.standing();
+        let looked = self.intake.each_unit(|actor| {
+            if let Some(short) = still.filter(|_| actor.speaks()) {
+                actor.follow(now, standing.active, short);
+            }
+            let Wants { memory, spoke, alarm } = actor.watch_speech(now, &standing);
+            (memory || spoke || alarm.is_some()).then(|| (actor.id().clone(), memory, spoke, alarm))
+        });
+        if still.is_some() {
+            tracing::warn!("this process stood still: it listens whether another instance speaks");
+        }
+        let mut spoken = Vec::new();
+        for (unit, memory, spoke, alarm) in looked.into_iter().flatten() {
+            if memory {
+                self.questions.memory(unit.clone());
+            }
+            match alarm {
+                Some(Alarm::OtherBits(words)) => self.intake.alarm(FaultKind::OtherBits, words),
+                Some(Alarm::TwoSpeak(words)) => self.intake.alarm(FaultKind::TwoSpeak, words),
+                None => {}
+            }
+            if spoke {
+                spoken.push(unit.to_string());
+            }
+        }
+        if !spoken.is_empty() {
+            tracing::warn!(units = spoken.join(" "), "this instance speaks from here on, in another's place");
+        }
+    }
+}

@@ -1,0 +1,207 @@
+//! Histories and documents of the instance that speaks, written down here too: a state folder that was looked after by a standby is
+//! as complete as the other's.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::time::SystemTime;
+
+use isotherm_protocol::control::Order;
+use isotherm_protocol::digest::Digest;
+use isotherm_protocol::history::{Acceptance, AuditEntry, AuditEvent, FirstTick, Source};
+use isotherm_protocol::journal::{JournalEntry, JournalEvent};
+use isotherm_protocol::key::{self, UnitId};
+use isotherm_protocol::overlay::{Overlay, is_overlay};
+use zenoh::bytes::Encoding;
+use zenoh::query::Query;
+
+use super::answer::answer;
+use super::command::PreLaunchRun;
+use super::work::Work;
+use crate::store::StoreError;
+
+/// Entries of a unit that are looked through for those that are there already.
+const LOOKED_THROUGH: usize = 10_000;
+
+/// What another instance has written down of a unit.
+#[derive(Debug, Clone)]
+pub(crate) struct Carried {
+    pub(crate) unit: UnitId,
+    /// Oldest first.
+    pub(crate) entries: Vec<AuditEntry>,
+    /// Documents and overlays, by their digests.
+    pub(crate) kept: BTreeMap<Digest, Vec<u8>>,
+}
+
+impl Work {
+    /// Documents and overlays that entries name and that are neither here nor carried with them.
+    pub(super) fn lacking(&self, carried: &Carried) -> Vec<Digest> {
+        let Carried { entries, kept, .. } = carried;
+        let accepted = entries.iter().filter_map(|entry| match &entry.event {
+            AuditEvent::Accepted(accepted) => Some([Some(accepted.digest), accepted.overlay]),
+            _ => None,
+        });
+        let sets = entries.iter().flat_map(|entry| match &entry.event {
+            AuditEvent::CarriedUnit(unit) => unit.sets.as_slice(),
+            _ => &[],
+        });
+        let named = accepted.chain(sets.map(|set| [Some(set.digest), set.overlay])).flatten().flatten();
+        let below = kept.values().filter_map(|bytes| overlay(bytes)?.overlay_of.parse().ok());
+        let lacking: BTreeSet<Digest> = named.chain(below).collect();
+        lacking.into_iter().filter(|digest| !kept.contains_key(digest) && !self.holds(digest)).collect()
+    }
+
+    fn holds(&self, digest: &Digest) -> bool {
+        let held = |found: Result<Option<Vec<u8>>, StoreError>| found.is_ok_and(|bytes| bytes.is_some());
+        held(self.store.document(digest)) || held(self.store.overlay(digest))
+    }
+
+    /// Writes down what is not here yet, and has the unit's plan be what it says; nothing of a unit that this instance speaks for.
+    pub(super) fn carry(&mut self, carried: &Carried) {
+        let Carried { unit, entries, kept } = carried;
+        if self.intake.speaks_for(unit) {
+            return;
+        }
+        let done = kept.values().try_for_each(|bytes| {
+            let put = if overlay(bytes).is_some() {
+                self.store.put_overlay(bytes)
+            } else {
+                self.store.put_document(bytes)
+            };
+            put.map(drop)
+        });
+        let done = done.and_then(|()| self.carry_entries(unit, entries));
+        match done {
+            Ok(0) => return,
+            Ok(count) => {
+                tracing::debug!(%unit, count, "entries of the other instance's audit file are written down here too");
+            }
+            Err(error) => {
+                tracing::error!(%unit, "the other instance's history is not written down here: {error}");
+                return;
+            }
+        }
+        let (record, plan) = self.restored(unit);
+        let before = self.records.get(unit).map(|record| (record.accepted, record.refused));
+        let (accepted, refused) = before.unwrap_or_default();
+        self.records.insert(unit.clone(), super::record::Record { accepted, refused, ..record });
+        self.note_run(unit, entries);
+        self.intake.plan_again(unit, plan);
+    }
+
+    fn carry_entries(&mut self, unit: &UnitId, entries: &[AuditEntry]) -> Result<usize, StoreError> {
+        let own = self.store.history(Some(unit), LOOKED_THROUGH)?;
+        let is_here = |entry: &AuditEntry| {
+            own.iter().any(|own| own.time == entry.time && own.by == entry.by && own.event == entry.event)
+        };
+        let mut fresh: Vec<&AuditEntry> = entries.iter().filter(|entry| !is_here(entry)).collect();
+        // What holds there holds here, whatever was accepted here before.
+        let last = entries.iter().rfind(|entry| matches!(entry.event, AuditEvent::Accepted(_)));
+        if let Some((entry, AuditEvent::Accepted(accepted))) = last.map(|entry| (entry, &entry.event)) {
+            let good = self.store.last_good(unit);
+            let same =
+                good.is_some_and(|good| (good.revision, good.digest) == (accepted.revision, accepted.digest));
+            let comes = fresh.iter().any(|fresh| matches!(fresh.event, AuditEvent::Accepted(_)));
+            if !same && !comes {
+                fresh.push(entry);
+            }
+        }
+        for entry in &fresh {
+            if let AuditEvent::InForce(first) = &entry.event {
+                self.unclaimed.retain(|(of, unclaimed)| of != unit || unclaimed.revision != first.revision);
+            }
+            self.entries =
+                self.store.append(entry.time.system_time(), Some(unit), &entry.by, entry.event.clone())?;
+        }
+        Ok(fresh.len())
+    }
+
+    /// A pre-launch calibration that goes on: its result is to be stored as it was asked for, whoever stores it.
+    fn note_run(&mut self, unit: &UnitId, entries: &[AuditEntry]) {
+        let commands = entries.iter().filter_map(|entry| match &entry.event {
+            AuditEvent::Command(record) if record.accepted || record.order.is_none() => Some((entry, record)),
+            _ => None,
+        });
+        let run = commands.fold(None, |run, (entry, record)| match &record.order {
+            Some(Order::PreLaunch(order)) => Some(PreLaunchRun { order: *order, by: entry.by.clone() }),
+            Some(Order::Abort) => None,
+            None if record.command == "pre-launch ended" => None,
+            _ => run,
+        });
+        if let Some(record) = self.records.get_mut(unit) {
+            record.pre_launch = run;
+        }
+    }
+
+    /// The first tick of a revision, while another instance speaks: that one writes it down, and where it does not any more, this one
+    /// does when it speaks.
+    pub(super) fn leave_unclaimed(&mut self, unit: &UnitId, first: FirstTick) {
+        self.unclaimed.retain(|(of, _)| of != unit);
+        self.unclaimed.push((unit.clone(), first));
+    }
+
+    /// This instance speaks for a unit from here on.
+    pub(super) fn claim(&mut self, unit: &UnitId) {
+        let (mine, others) = std::mem::take(&mut self.unclaimed).into_iter().partition(|(of, _)| of == unit);
+        self.unclaimed = others;
+        let mine: Vec<(UnitId, FirstTick)> = mine;
+        for (_, first) in mine {
+            if let Err(error) = self.append(Some(unit), "", AuditEvent::InForce(first)) {
+                tracing::error!(%unit, "the first tick is not in the audit file: {error}");
+            }
+        }
+    }
+
+    /// A calibration that the unit was given by the instance whose place this one has taken: written down where that one's history
+    /// did not come in time.
+    pub(super) fn note_followed(&mut self, unit: &UnitId, entry: &JournalEntry) {
+        let JournalEvent::Changed { revision, at, slew_ns, document: Some(document), source, .. } =
+            &entry.event
+        else {
+            return;
+        };
+        if revision.counter <= self.store.highest_revision(unit) {
+            return;
+        }
+        let base =
+            self.in_force(unit).and_then(|active| active.written.as_ref()).map(|written| written.digest);
+        let stored = self.store.put_document(document.as_bytes()).and_then(|digest| {
+            let accepted = Acceptance {
+                revision: revision.counter,
+                digest,
+                overlay: None,
+                source: Source::Bus,
+                base,
+                changed: vec![format!(
+                    "from the journal of instance {}, which had it from: {source}",
+                    entry.instance
+                )],
+                schedule: *at,
+                slew_ms: u64::try_from(slew_ns / 1_000_000).unwrap_or(0),
+            };
+            self.entries =
+                self.store.append(SystemTime::now(), Some(unit), "", AuditEvent::Accepted(accepted))?;
+            Ok(())
+        });
+        if let Err(error) = stored {
+            tracing::error!(%unit, revision = revision.counter, "what is in force is not in the audit file: {error}");
+            return;
+        }
+        let (record, plan) = self.restored(unit);
+        self.records.insert(unit.clone(), record);
+        self.intake.plan_again(unit, plan);
+    }
+
+    /// A query on `isotherm/*/kept/*`: a document or an overlay by its digest; none is no answer.
+    pub(super) fn answer_kept(&self, query: &Query) {
+        let Some(digest) = key::parse_kept(query.key_expr().as_str()) else { return };
+        let found = [self.store.document(&digest), self.store.overlay(&digest)];
+        if let Some(bytes) = found.into_iter().find_map(|found| found.ok().flatten()) {
+            answer(query, &key::kept(self.intake.instance(), &digest), bytes, Encoding::TEXT_PLAIN);
+        }
+    }
+}
+
+/// The overlay that a text is, if it is one.
+fn overlay(bytes: &[u8]) -> Option<Overlay> {
+    let text = std::str::from_utf8(bytes).ok().filter(|text| is_overlay(text))?;
+    Some(Overlay::parse(text, None).ok()?.overlay)
+}

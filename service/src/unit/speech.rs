@@ -1,0 +1,363 @@
+//! Whether a unit's corrected ticks go out: at once, or only where the instance that speaks for it is silent.
+//!
+//! While another instance speaks, what is computed here is kept for a while: to be compared with what that one publishes, and to be
+//! published in its place from the last tick on that was heard of it.
+
+mod kept;
+
+use std::time::{Duration, Instant};
+
+use isotherm_correction::operation::State;
+use isotherm_protocol::codec;
+use isotherm_protocol::corrected::CorrectedBatch;
+use isotherm_protocol::journal::{JournalEntry, JournalEvent};
+use isotherm_protocol::key::Input;
+use isotherm_protocol::pair::{Role, UnitRole};
+use isotherm_protocol::replay::Follower;
+
+use super::{Plan, UnitActor};
+use crate::registrar::Notice;
+use kept::Kept;
+
+/// How often the memory is asked for while none comes.
+const ASK_INTERVAL: Duration = Duration::from_millis(250);
+/// How long nothing of any other instance must be seen before one that has not joined speaks: both may have lost the network, and
+/// the other may be the one that went on.
+const LONELY: Duration = Duration::from_secs(5);
+/// How long two speak at once before that is an alarm.
+const DOUBLED: Duration = Duration::from_secs(1);
+/// Entries of the journal that are remembered until they are in the audit file.
+const MOST_CHANGES: usize = 8;
+
+/// How the instance stands to the others, as a unit needs to know it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Standing {
+    /// How late the other's output may be.
+    pub(crate) takeover: Duration,
+    /// Whether corrected ticks go out while another instance speaks, too.
+    pub(crate) active: bool,
+    /// Whether some other instance goes before this one.
+    pub(crate) yields: bool,
+    /// Since when no other instance is seen; `None` where one is.
+    pub(crate) alone_since: Option<Instant>,
+}
+
+/// What a unit wants of its surroundings after a look.
+#[derive(Debug, Default)]
+pub(crate) struct Wants {
+    /// The memory of the instance that speaks.
+    pub(crate) memory: bool,
+    /// It has begun to speak.
+    pub(crate) spoke: bool,
+    /// What is wrong, in words.
+    pub(crate) alarm: Option<Alarm>,
+}
+
+/// What was to be impossible.
+#[derive(Debug)]
+pub(crate) enum Alarm {
+    /// Another instance computed other bits.
+    OtherBits(String),
+    /// Two instances publish the unit that are not configured to.
+    TwoSpeak(String),
+}
+
+/// Where the output of a unit goes, and what is known of the other instance's.
+#[derive(Debug, Default)]
+pub(super) struct Speech {
+    following: Option<Box<Following>>,
+    compared: u64,
+    differing: u64,
+    takeovers: u64,
+    last_difference: Option<String>,
+    /// Since when another instance publishes ticks that this one has published.
+    doubled: Option<(Instant, Instant)>,
+    two_told: bool,
+    /// The journal has to say what the stream knows: another instance's said it until now.
+    memory_due: bool,
+}
+
+/// While another instance speaks.
+#[derive(Debug)]
+struct Following {
+    follower: Follower,
+    since: Instant,
+    kept: Kept,
+    asked: Option<Instant>,
+    /// The stream is what it was when the unit still spoke: it need not have joined to speak again.
+    doubt: bool,
+    also_out: bool,
+    /// Calibrations that came with the journal, the newest last.
+    changes: Vec<JournalEntry>,
+}
+
+impl Following {
+    fn ns(&self, now: Instant) -> u64 {
+        u64::try_from(now.saturating_duration_since(self.since).as_nanos()).unwrap_or(u64::MAX)
+    }
+}
+
+impl UnitActor {
+    /// Another instance speaks for the unit, or may do so: nothing goes out from here on. With `doubt` the unit goes on to speak where
+    /// nothing is heard.
+    pub(crate) fn follow(&mut self, now: Instant, active: bool, doubt: bool) {
+        if self.speech.following.is_some() {
+            return;
+        }
+        let follower = Follower::new(self.stream.id().clone());
+        self.speech.doubled = None;
+        self.speech.memory_due = false;
+        self.speech.following = Some(Box::new(Following {
+            follower,
+            since: now,
+            kept: Kept::default(),
+            asked: None,
+            doubt,
+            also_out: active && doubt,
+            changes: Vec::new(),
+        }));
+        self.status_due = true;
+    }
+
+    /// Highest revision counter that the unit was given.
+    #[must_use]
+    pub(crate) fn highest_revision(&self) -> u64 {
+        self.stream.next_counter().saturating_sub(1)
+    }
+
+    /// Whether it is being found out if another instance speaks.
+    #[must_use]
+    pub(crate) fn doubts(&self) -> bool {
+        self.speech.following.as_ref().is_some_and(|following| following.doubt)
+    }
+
+    /// Whether this instance publishes the unit's ticks, and swaps and commands are its own.
+    #[must_use]
+    pub fn speaks(&self) -> bool {
+        self.speech.following.is_none()
+    }
+
+    /// Notes a frame before the stream is given it.
+    pub(super) fn note_frame(&mut self, input: Input, frame: &[u8], arrival: Instant) {
+        if let Some(following) = &mut self.speech.following {
+            let ns = following.ns(arrival);
+            following.follower.frame(input, ns, frame);
+        }
+    }
+
+    /// Where a corrected frame goes.
+    pub(super) fn let_out(&mut self, frame: Vec<u8>) -> Result<(), zenoh::Error> {
+        let Some(following) = &mut self.speech.following else { return (self.outlet)(frame) };
+        let out = if following.also_out { (self.outlet)(frame.clone()) } else { Ok(()) };
+        following.kept.computed(frame, Instant::now());
+        out
+    }
+
+    /// Another instance has published a frame of the unit.
+    pub(crate) fn hear(&mut self, frame: &[u8], now: Instant, standing: &Standing) {
+        let Ok(batch) = codec::decode::<CorrectedBatch>(frame) else { return };
+        if let Some(following) = &mut self.speech.following {
+            following.kept.heard(batch, now);
+            // It speaks, and what it knows is what counts.
+            following.doubt = false;
+            return;
+        }
+        if standing.active {
+            return;
+        }
+        let (Some(tick), Some(own)) = (batch.ticks.last(), self.stream.unit().observation()) else { return };
+        let behind_ns = tick.end_time.as_ns().saturating_sub(own.end_time.as_ns());
+        let limit_ns = i64::try_from(standing.takeover.as_nanos()).unwrap_or(i64::MAX);
+        let (ahead, keeps_up) = (behind_ns > limit_ns, behind_ns >= -limit_ns);
+        let state = self.stream.unit().state();
+        if !matches!(state, State::RunningWithReversal | State::RunningWithoutReversal) {
+            // Silent on purpose: the other is told.
+            self.speech.memory_due |= standing.alone_since.is_none();
+        } else if standing.alone_since.is_none() && (ahead || (standing.yields && keeps_up)) {
+            tracing::info!(unit = %self.stream.id(), sequence = tick.sequence, "another instance speaks: standby");
+            self.follow(now, false, false);
+            if let Some(following) = &mut self.speech.following {
+                following.kept.heard(batch, now);
+            }
+        } else if keeps_up {
+            // Until one of the two has yielded.
+            let first =
+                self.speech.doubled.filter(|(_, last)| now.saturating_duration_since(*last) < DOUBLED);
+            self.speech.doubled = Some((first.map_or(now, |(first, _)| first), now));
+        }
+    }
+
+    /// Takes an entry of another instance's journal, or its memory.
+    pub(crate) fn hear_journal(&mut self, entry: JournalEntry, now: Instant, standing: &Standing) {
+        // Another instance speaks too, and goes before this one.
+        if matches!(entry.event, JournalEvent::Memory { .. }) && standing.yields && self.speaks() {
+            self.follow(now, standing.active, false);
+        }
+        let Some(following) = &mut self.speech.following else { return };
+        let ns = following.ns(now);
+        let change = matches!(entry.event, JournalEvent::Changed { .. }).then(|| entry.clone());
+        if following.follower.entry(entry, ns) {
+            following.changes.extend(change);
+            let beyond = following.changes.len().saturating_sub(MOST_CHANGES);
+            following.changes.drain(..beyond);
+        }
+        self.catch_up(now);
+    }
+
+    /// Goes on as the journal says, as far as frames and entries have come.
+    fn catch_up(&mut self, now: Instant) {
+        let Some(following) = &mut self.speech.following else { return };
+        let ns = following.ns(now);
+        let had_joined = following.follower.has_joined();
+        let (rebuilt, stuck) = following.follower.advance(&self.stream, ns);
+        if stuck {
+            following.follower.lose();
+            following.asked = None;
+        }
+        let Some(rebuilt) = rebuilt else { return };
+        if !rebuilt.exact {
+            tracing::debug!(unit = %self.stream.id(), "what the other instance had heard is not known to the last frame");
+        }
+        following.kept.replace(rebuilt.frames, had_joined, now);
+        self.stream = rebuilt.stream;
+        if !had_joined && following.follower.has_joined() {
+            tracing::info!(unit = %self.stream.id(), revision = self.stream.revision().counter, "in step with the instance that speaks");
+        }
+        self.status_due = true;
+        self.look();
+    }
+
+    /// Looks at the unit as the clock goes on.
+    pub(crate) fn watch_speech(&mut self, now: Instant, standing: &Standing) -> Wants {
+        let mut wants = Wants::default();
+        if self.speech.following.is_none() {
+            wants.alarm = self.two_speak(now);
+            self.tell_memory();
+            return wants;
+        }
+        self.catch_up(now);
+        let Some(following) = &mut self.speech.following else { return wants };
+        let joined = following.follower.has_joined();
+        following.also_out = standing.active && joined;
+        let settled = following.kept.settle(now, joined && !following.follower.is_waiting());
+        self.speech.compared += settled.compared;
+        self.speech.differing += settled.differing;
+        if let Some((tick, words)) = settled.difference {
+            let series = self.stream.incoming_series();
+            let words = format!("unit {}, series {series}, sequence {tick}: {words}", self.stream.id());
+            self.speech.last_difference = Some(words.clone());
+            wants.alarm = Some(Alarm::OtherBits(words));
+            following.follower.lose();
+            following.asked = None;
+        } else if settled.missed {
+            following.follower.lose();
+            following.asked = None;
+        }
+        let alone = standing.alone_since.map(|since| now.saturating_duration_since(since));
+        let late = following.kept.is_late(now, standing.takeover);
+        // Nor does a unit that sends nothing wait for ever.
+        let still_silent = now.saturating_duration_since(following.since) > standing.takeover * 2;
+        let lonely = alone.is_some_and(|alone| alone >= LONELY) || following.kept.is_silent(now, LONELY);
+        let is_due = lonely
+            || (joined && (alone.is_some() || late))
+            // Where the other was lost with the doubt, it may be the other that went on.
+            || (following.doubt && alone.is_none() && (late || still_silent));
+        if is_due {
+            wants.spoke = !following.doubt;
+            self.speak(now, standing.takeover);
+            return wants;
+        }
+        let ask = !joined && !following.doubt && !following.follower.has_memory();
+        if ask && following.asked.is_none_or(|asked| now.saturating_duration_since(asked) >= ASK_INTERVAL) {
+            following.asked = Some(now);
+            wants.memory = true;
+        }
+        wants
+    }
+
+    /// Publishes from here on, beginning behind the last tick that was heard of another instance. What that one published within the
+    /// last `overlap` is published again: of what it sent at its end, some may have come here and nowhere else.
+    pub(crate) fn speak(&mut self, now: Instant, overlap: Duration) {
+        let Some(following) = self.speech.following.take() else { return };
+        let Following { mut kept, doubt, changes, also_out, .. } = *following;
+        if !also_out {
+            for frame in kept.take_from(now, overlap) {
+                if let Err(error) = (self.outlet)(frame) {
+                    self.fault(crate::fault::FaultKind::Unpublished, 1, || {
+                        format!("corrected: {}", isotherm_bus::words(&error))
+                    });
+                }
+            }
+        }
+        if !doubt {
+            self.speech.takeovers += 1;
+            self.speech.memory_due = true;
+        }
+        for change in changes {
+            self.teller.push(Notice::Followed(Box::new(change)));
+        }
+        self.teller.push(Notice::Speaks);
+        self.status_due = true;
+        self.look();
+    }
+
+    /// Has the journal say what the stream knows: instances that speak find out about one another by it.
+    pub(crate) fn introduce(&mut self) {
+        self.speech.memory_due = self.speaks();
+    }
+
+    /// Puts what a unit was last given in the place of what this instance had given it.
+    pub(crate) fn plan_again(&mut self, plan: Plan) {
+        self.plan = plan;
+    }
+
+    /// Says in the journal what the stream knows, where another instance's journal went before.
+    fn tell_memory(&mut self) {
+        if std::mem::take(&mut self.speech.memory_due) {
+            self.journal_memory();
+        }
+    }
+
+    fn two_speak(&mut self, now: Instant) -> Option<Alarm> {
+        let (first, last) = self.speech.doubled?;
+        let lasts = now.saturating_duration_since(last) < DOUBLED;
+        if !lasts {
+            (self.speech.doubled, self.speech.two_told) = (None, false);
+            return None;
+        }
+        let long = last.saturating_duration_since(first) >= DOUBLED;
+        (long && !std::mem::replace(&mut self.speech.two_told, true)).then(|| {
+            Alarm::TwoSpeak(format!(
+                "unit {}: another service publishes its corrected ticks too",
+                self.stream.id()
+            ))
+        })
+    }
+
+    /// What the instance does for the unit.
+    #[must_use]
+    pub(crate) fn role(&self) -> UnitRole {
+        let Speech { following, compared, differing, takeovers, last_difference, .. } = &self.speech;
+        let role = match following {
+            None => Role::Speaking,
+            Some(following) if following.follower.has_joined() || following.doubt => Role::Standby,
+            Some(_) => Role::Joining,
+        };
+        UnitRole {
+            unit: self.stream.id().to_string(),
+            role,
+            ticks_compared: *compared,
+            ticks_differing: *differing,
+            takeovers: *takeovers,
+            last_difference: last_difference.clone(),
+        }
+    }
+
+    /// The stream has started anew after an alarm: what it was is not known any more.
+    pub(super) fn lose_step(&mut self) {
+        if let Some(following) = &mut self.speech.following {
+            following.follower.lose();
+            (following.asked, following.doubt) = (None, false);
+        }
+    }
+}

@@ -1,0 +1,207 @@
+//! Corrected frames that were computed and not published, beside what another instance has published.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::time::{Duration, Instant};
+
+use isotherm_protocol::codec;
+use isotherm_protocol::corrected::{CorrectedBatch, CorrectedTick, Revision, are_same};
+
+/// How old a tick is when it is compared: entries of the journal may come later than the ticks behind them.
+const SETTLED: Duration = Duration::from_millis(500);
+/// How long a tick that was heard waits for its like.
+const LONGEST_WAIT: Duration = Duration::from_secs(3);
+
+/// A tick by the end of its time and its number: enough to tell it from those of other runs of the producer.
+type Id = (i64, u64);
+
+fn id(tick: &CorrectedTick) -> Id {
+    (tick.end_time.as_ns(), tick.sequence)
+}
+
+/// A frame that was computed here.
+#[derive(Debug)]
+struct Frame {
+    bytes: Vec<u8>,
+    ids: Vec<Id>,
+    at: Instant,
+    /// The other instance has published it, or a later one.
+    heard: bool,
+}
+
+/// A tick that was heard.
+#[derive(Debug)]
+struct Heard {
+    tick: CorrectedTick,
+    revision: Revision,
+    at: Instant,
+}
+
+/// What came of comparing.
+#[derive(Debug, Default)]
+pub(super) struct Settled {
+    /// Ticks compared.
+    pub(super) compared: u64,
+    /// Those that were others.
+    pub(super) differing: u64,
+    /// The first of them: its sequence number, and in what it differs.
+    pub(super) difference: Option<(u64, String)>,
+    /// Ticks were heard that were not computed here.
+    pub(super) missed: bool,
+}
+
+/// The frames, the oldest first.
+#[derive(Debug, Default)]
+pub(super) struct Kept {
+    frames: VecDeque<Frame>,
+    heard: BTreeMap<Id, Heard>,
+    last_heard: Option<Id>,
+    /// When something was last heard, or else first computed.
+    heard_at: Option<Instant>,
+    /// Ticks that were heard before this time are not compared: the stream had not joined.
+    since: Option<Instant>,
+}
+
+impl Kept {
+    /// A frame was computed.
+    pub(super) fn computed(&mut self, bytes: Vec<u8>, now: Instant) {
+        let batch = codec::decode::<CorrectedBatch>(&bytes);
+        let ids: Vec<_> = batch.map(|batch| batch.ticks.iter().map(id).collect()).unwrap_or_default();
+        let heard = ids.iter().any(|id| self.was_heard(id));
+        self.heard_at.get_or_insert(now);
+        self.frames.push_back(Frame { bytes, ids, at: now, heard });
+        if heard {
+            self.frames.iter_mut().for_each(|frame| frame.heard = true);
+        }
+    }
+
+    /// Whether a tick was heard: a line that is behind hears what it computes later.
+    fn was_heard(&self, id: &Id) -> bool {
+        self.heard.contains_key(id) || self.last_heard == Some(*id)
+    }
+
+    /// The other instance has published a batch.
+    pub(super) fn heard(&mut self, batch: CorrectedBatch, now: Instant) {
+        let revision = batch.revision;
+        let Some(last) = batch.ticks.last().map(id) else { return };
+        let own = self.frames.iter().rposition(|frame| frame.ids.contains(&last));
+        for frame in self.frames.iter_mut().take(own.map_or(0, |own| own + 1)) {
+            frame.heard = true;
+        }
+        (self.last_heard, self.heard_at) = (Some(last), Some(now));
+        for tick in batch.ticks {
+            self.heard.insert(id(&tick), Heard { tick, revision, at: now });
+        }
+    }
+
+    /// The stream has been taken back: these are the frames that it has made again. Of a stream that had not joined before, nothing
+    /// that was heard until now is compared.
+    pub(super) fn replace(&mut self, frames: Vec<Vec<u8>>, had_joined: bool, now: Instant) {
+        let before = std::mem::take(&mut self.frames);
+        let mut times: BTreeMap<Id, (Instant, bool)> = BTreeMap::new();
+        for frame in &before {
+            times.extend(frame.ids.iter().map(|id| (*id, (frame.at, frame.heard))));
+        }
+        if !had_joined {
+            self.since = Some(now);
+        }
+        for bytes in frames {
+            let Ok(batch) = codec::decode::<CorrectedBatch>(&bytes) else { continue };
+            let ids: Vec<_> = batch.ticks.iter().map(id).collect();
+            let known = ids.iter().rev().find_map(|id| times.get(id).copied());
+            // What is older than all that was kept has been compared.
+            if known.is_none() && self.frames.is_empty() && !before.is_empty() {
+                continue;
+            }
+            let (at, was_heard) = known.unwrap_or((now, false));
+            let heard = was_heard || ids.iter().any(|id| self.was_heard(id));
+            self.frames.push_back(Frame { bytes, ids, at, heard });
+        }
+        let last = self.frames.iter().rposition(|frame| frame.heard);
+        for frame in self.frames.iter_mut().take(last.unwrap_or(0)) {
+            frame.heard = true;
+        }
+    }
+
+    /// Whether a frame waits to be heard for longer than that.
+    pub(super) fn is_late(&self, now: Instant, limit: Duration) -> bool {
+        let waiting = self.frames.iter().rev().take_while(|frame| !frame.heard).last();
+        waiting.is_some_and(|frame| now.saturating_duration_since(frame.at) > limit)
+    }
+
+    /// Whether frames were computed and nothing was heard for that long.
+    pub(super) fn is_silent(&self, now: Instant, limit: Duration) -> bool {
+        let last = self.heard_at.or_else(|| self.frames.front().map(|frame| frame.at));
+        let computes = self.frames.back().is_some_and(|frame| !frame.heard);
+        computes && last.is_some_and(|last| now.saturating_duration_since(last) >= limit)
+    }
+
+    /// Compares what is old enough, where the stream is `in_step`, and gives it up.
+    pub(super) fn settle(&mut self, now: Instant, in_step: bool) -> Settled {
+        let mut settled = Settled::default();
+        let age = |at: Instant| now.saturating_duration_since(at);
+        while self
+            .frames
+            .front()
+            .is_some_and(|frame| age(frame.at) >= SETTLED && (frame.heard || age(frame.at) >= LONGEST_WAIT))
+        {
+            let Some(frame) = self.frames.pop_front() else { break };
+            let Ok(batch) = codec::decode::<CorrectedBatch>(&frame.bytes) else { continue };
+            for tick in &batch.ticks {
+                let Some(heard) = self.heard.remove(&id(tick)) else { continue };
+                if !in_step || self.since.is_some_and(|since| heard.at < since) {
+                    continue;
+                }
+                settled.compared += 1;
+                if heard.revision == batch.revision && are_same(&heard.tick, tick) {
+                    continue;
+                }
+                settled.differing += 1;
+                let words = || difference(tick, batch.revision, &heard);
+                settled.difference.get_or_insert_with(|| (tick.sequence, words()));
+            }
+        }
+        let newest = self.frames.back().and_then(|frame| frame.ids.last()).map(|(end, _)| *end);
+        let since = self.since;
+        self.heard.retain(|(end, _), heard| {
+            let old = age(heard.at) >= LONGEST_WAIT;
+            let passed = newest.is_some_and(|newest| newest > *end)
+                && since.is_some_and(|since| heard.at > since + SETTLED);
+            settled.missed |= old && passed && in_step;
+            !old
+        });
+        settled
+    }
+
+    /// The frames that were not heard, and those that were heard within the last `overlap`, to be published.
+    pub(super) fn take_from(&mut self, now: Instant, overlap: Duration) -> Vec<Vec<u8>> {
+        let frames = std::mem::take(&mut self.frames).into_iter();
+        let recent = |frame: &Frame| !frame.heard || now.saturating_duration_since(frame.at) <= overlap * 2;
+        frames.filter(recent).map(|frame| frame.bytes).collect()
+    }
+}
+
+/// In what a tick differs from the one that was heard, in words.
+fn difference(own: &CorrectedTick, revision: Revision, heard: &Heard) -> String {
+    if revision != heard.revision {
+        return format!("revision {} here, {} there", revision.counter, heard.revision.counter);
+    }
+    let there = &heard.tick;
+    let arrays = [
+        ("delta_angle_rad", own.delta_angle, there.delta_angle),
+        ("delta_velocity_m_per_s", own.delta_velocity, there.delta_velocity),
+    ];
+    for (name, own, there) in arrays {
+        if let Some((own, there)) =
+            own.iter().zip(&there).find(|(own, there)| own.to_bits() != there.to_bits())
+        {
+            return format!("{name} {own:e} here, {there:e} there");
+        }
+    }
+    format!(
+        "flags {:#06x}, missed {} here, {:#06x}, {} there",
+        own.flags.bits(),
+        own.missed,
+        there.flags.bits(),
+        there.missed
+    )
+}
