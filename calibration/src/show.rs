@@ -140,8 +140,8 @@ pub(crate) fn steady(written: &Written, temperature: f64, ramp_deg_c_per_min: f6
     let state = ThermalState { temperature, rate: ramp_deg_c_per_min / 60.0, ..ThermalState::default() };
     // An auxiliary channel has no temperature: what rests on it is left out.
     let calibration = &written.loaded.calibration;
-    let known = |name| calibration.channels().iter().any(|channel| channel.name() == name);
-    calibration.steady(|name| known(name).then_some(state), None)
+    let channels = calibration.channels();
+    calibration.steady(|name| channels.iter().any(|channel| channel.name() == name).then_some(state), None)
 }
 
 /// The sums of all terms.

@@ -2,7 +2,7 @@
 //! temperature, a cubic with Ṫ.
 
 use isotherm_log::offline::Loaded;
-use isotherm_log::plot::page::Table as Rows;
+use isotherm_pages::Table as Rows;
 use isotherm_protocol::document::{Document, Sample};
 
 use super::columns::Term;
