@@ -7,6 +7,7 @@ pub mod terms;
 
 use isotherm_correction::calibration::Steady;
 use isotherm_correction::channel::ThermalState;
+use isotherm_correction::sample::ChannelName;
 use isotherm_correction::units::{AngularRate, SpecificForce};
 use serde_json::{Value, json};
 
@@ -140,8 +141,8 @@ pub(crate) fn steady(written: &Written, temperature: f64, ramp_deg_c_per_min: f6
     let state = ThermalState { temperature, rate: ramp_deg_c_per_min / 60.0, ..ThermalState::default() };
     // An auxiliary channel has no temperature: what rests on it is left out.
     let calibration = &written.loaded.calibration;
-    let channels = calibration.channels();
-    calibration.steady(|name| channels.iter().any(|channel| channel.name() == name).then_some(state), None)
+    let known = |name: &ChannelName| calibration.channels().iter().any(|channel| channel.name() == name);
+    calibration.steady(|name| known(name).then_some(state), None)
 }
 
 /// The sums of all terms.
