@@ -69,6 +69,7 @@ pub enum ServiceWait {
 
 /// What is recorded, and how.
 #[derive(Debug, Clone)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a switch of its own")]
 pub struct RecordOptions {
     /// Where it is written to; with rotation, `-0001` and so on is added to the name.
     pub out: PathBuf,
