@@ -1,5 +1,6 @@
 //! What the receive threads do with a raw message: find its unit, have it corrected, survive whatever it is.
 
+mod paired;
 mod units;
 
 use std::any::Any;
@@ -40,9 +41,6 @@ pub struct Intake {
     looked_for_room: Mutex<Option<Instant>>,
 }
 
-/// How long whoever asks something of a unit waits until it is known which instance speaks for it, and how often that is looked for.
-const LONGEST_DOUBT: Duration = Duration::from_millis(500);
-const DOUBT_INTERVAL: Duration = Duration::from_millis(5);
 /// How long a unit without a calibration is silent before another may have its place.
 const STRANGER_KEPT: Duration = Duration::from_secs(60);
 /// Shortest distance of two looks for such a unit.
@@ -84,51 +82,6 @@ impl Intake {
     #[must_use]
     pub fn journaling_to(self, journal: Journal) -> Self {
         Self { journal: Some(journal), ..self }
-    }
-
-    /// Has units be silent while another instance speaks for them.
-    pub(crate) fn paired_with(self, pair: Arc<Pair>) -> Self {
-        Self { pair: Some(pair), ..self }
-    }
-
-    /// Whether swaps and commands of a unit are this instance's.
-    pub(crate) fn speaks_for(&self, unit: &UnitId) -> bool {
-        let first = || self.pair.as_ref().is_none_or(|pair| pair.speaks_first());
-        self.with(unit, |actor| actor.speaks()).unwrap_or_else(first)
-    }
-
-    /// The same; waits where it is being found out.
-    pub(crate) fn answers_for(&self, unit: &UnitId) -> bool {
-        let since = Instant::now();
-        while since.elapsed() < LONGEST_DOUBT && self.with(unit, |actor| actor.doubts()) == Some(true) {
-            std::thread::sleep(DOUBT_INTERVAL);
-        }
-        self.speaks_for(unit)
-    }
-
-    /// This instance's name for itself: its Zenoh id as text.
-    pub(crate) fn instance(&self) -> &str {
-        self.pair.as_ref().map_or("", |pair| &pair.me().instance)
-    }
-
-    /// Another instance has published a frame of a unit.
-    pub(crate) fn hear(&self, serial: &str, frame: &[u8], now: Instant) {
-        let Some((pair, unit)) = self.pair.as_ref().zip(self.unit(serial)) else { return };
-        let standing = pair.standing();
-        guarded(&mut lock(&unit), |actor| actor.hear(frame, now, &standing));
-    }
-
-    /// Something that was to be impossible has happened.
-    pub(crate) fn alarm(&self, kind: FaultKind, words: String) {
-        self.fault(kind, || words);
-    }
-
-    /// Has a unit, seen or not, begin anew with what another instance has written down.
-    pub(crate) fn plan_again(&self, unit: &UnitId, plan: Plan) {
-        let mut calibrations = self.calibrations.write().unwrap_or_else(PoisonError::into_inner);
-        *calibrations.plan_mut(unit) = plan.clone();
-        drop(calibrations);
-        self.with(unit, |actor| actor.plan_again(plan));
     }
 
     /// Makes the outlet of every unit that has a calibration, as far as there is a place for it; gives how many.

@@ -1,0 +1,62 @@
+//! What units have to do with other instances.
+
+use std::sync::{Arc, PoisonError};
+use std::time::{Duration, Instant};
+
+use isotherm_protocol::key::UnitId;
+
+use super::{Intake, guarded, lock};
+use crate::control::calibrations::Plan;
+use crate::receive::fault::FaultKind;
+use crate::pair::Pair;
+
+/// How long whoever asks something of a unit waits until it is known which instance speaks for it, and how often that is looked for.
+const LONGEST_DOUBT: Duration = Duration::from_millis(500);
+const DOUBT_INTERVAL: Duration = Duration::from_millis(5);
+
+impl Intake {
+    /// Has units be silent while another instance speaks for them.
+    pub(crate) fn paired_with(self, pair: Arc<Pair>) -> Self {
+        Self { pair: Some(pair), ..self }
+    }
+
+    /// Whether swaps and commands of a unit are this instance's.
+    pub(crate) fn speaks_for(&self, unit: &UnitId) -> bool {
+        let first = || self.pair.as_ref().is_none_or(|pair| pair.speaks_first());
+        self.with(unit, |actor| actor.speaks()).unwrap_or_else(first)
+    }
+
+    /// The same; waits where it is being found out.
+    pub(crate) fn answers_for(&self, unit: &UnitId) -> bool {
+        let since = Instant::now();
+        while since.elapsed() < LONGEST_DOUBT && self.with(unit, |actor| actor.doubts()) == Some(true) {
+            std::thread::sleep(DOUBT_INTERVAL);
+        }
+        self.speaks_for(unit)
+    }
+
+    /// This instance's name for itself: its Zenoh id as text.
+    pub(crate) fn instance(&self) -> &str {
+        self.pair.as_ref().map_or("", |pair| &pair.me().instance)
+    }
+
+    /// Another instance has published a frame of a unit.
+    pub(crate) fn hear(&self, serial: &str, frame: &[u8], now: Instant) {
+        let Some((pair, unit)) = self.pair.as_ref().zip(self.unit(serial)) else { return };
+        let standing = pair.standing();
+        guarded(&mut lock(&unit), |actor| actor.hear(frame, now, &standing));
+    }
+
+    /// Something that was to be impossible has happened.
+    pub(crate) fn alarm(&self, kind: FaultKind, words: String) {
+        self.fault(kind, || words);
+    }
+
+    /// Has a unit, seen or not, begin anew with what another instance has written down.
+    pub(crate) fn plan_again(&self, unit: &UnitId, plan: Plan) {
+        let mut calibrations = self.calibrations.write().unwrap_or_else(PoisonError::into_inner);
+        *calibrations.plan_mut(unit) = plan.clone();
+        drop(calibrations);
+        self.with(unit, |actor| actor.plan_again(plan));
+    }
+}
