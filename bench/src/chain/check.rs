@@ -156,6 +156,7 @@ mod tests {
             keep: 10,
             format: Format::Raw,
             state: false,
+            web: false,
             declare_keys: false,
         };
         let instrument = Instrument::simulate(1000).unwrap();

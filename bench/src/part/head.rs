@@ -91,6 +91,7 @@ mod tests {
             keep: 3,
             format: Format::Raw,
             state: false,
+            web: false,
             declare_keys: false,
         }
     }

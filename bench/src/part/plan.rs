@@ -34,6 +34,7 @@ pub(crate) enum Format {
 
 /// A plan of one round, the same for all its parts.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a thing of its own that a part does or not")]
 pub(crate) struct Plan {
     /// Units.
     pub(crate) units: usize,
