@@ -39,8 +39,6 @@ pub(crate) enum Role {
 /// What a part says when it is ready.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, serde::Deserialize)]
 pub(crate) struct Ready {
-    /// Always true.
-    pub(crate) ready: bool,
     /// Where it listens.
     pub(crate) locators: Vec<String>,
     /// Where it answers over HTTP, if it does.

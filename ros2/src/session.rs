@@ -39,7 +39,8 @@ impl RosOptions {
             }
             _ => (connect, listen),
         };
-        let mut config = SessionOptions { config, connect, listen, namespace: None }.to_config()?;
+        let mut config =
+            SessionOptions { config, connect, listen, namespace: None, lease: None }.to_config()?;
         if own {
             set(&mut config, "mode", if router { "router" } else { "peer" })?;
             set(&mut config, "scouting/gossip/enabled", true)?;

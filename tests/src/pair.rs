@@ -1,6 +1,6 @@
 //! Two services for one stream, in processes of their own, with producers and a subscriber that are connected to both.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -321,7 +321,7 @@ impl Ears {
         let (mut account, mut arbiter) = (Account::default(), FirstWins::new());
         let expected: BTreeMap<_, _> =
             made.expected.iter().map(|(revision, tick)| (tick.sequence, (revision, tick))).collect();
-        let mut used = BTreeMap::new();
+        let mut used = BTreeSet::new();
         for Came { revision, tick, .. } in self.of(made.unit()) {
             let right = expected
                 .get(&tick.sequence)
@@ -340,14 +340,13 @@ impl Ears {
             }
             if arbiter.wins(&tick) {
                 account.used += 1;
-                used.insert(tick.sequence, ());
+                used.insert(tick.sequence);
             }
         }
         account.doubled = arbiter.dropped();
-        let last = used.last_key_value().map_or(0, |(last, ())| *last);
+        let last = used.last().copied().unwrap_or(0);
         account.lost =
-            expected.keys().filter(|sequence| **sequence <= last && !used.contains_key(sequence)).count()
-                as u64;
+            expected.keys().filter(|sequence| **sequence <= last && !used.contains(sequence)).count() as u64;
         account
     }
 

@@ -32,7 +32,7 @@ pub(crate) fn run(plan: &Plan) -> Result<(), Error> {
     // Last of all: where it answers, the subscription is known. The query ends where it is dropped.
     let answers = session.declare_queryable(key::ALL_STATUS).callback(drop).wait();
     let _answers = answers.map_err(|error| Error::zenoh("relay", &error))?;
-    say(&Ready { ready: true, locators: isotherm_bus::locators(&session), metrics: None })?;
+    say(&Ready { locators: isotherm_bus::locators(&session), metrics: None })?;
     while hear().is_some() {}
     Ok(())
 }

@@ -74,7 +74,7 @@ pub(crate) fn run(plan: &Plan) -> Result<(), Error> {
         .wait();
     let _subscriber = subscriber.map_err(|error| Error::zenoh("sink", &error))?;
     wait_for_middle(&session)?;
-    say(&Ready { ready: true, locators: Vec::new(), metrics: None })?;
+    say(&Ready { locators: Vec::new(), metrics: None })?;
     let of_each = |messages: u64| messages * plan.units as u64 * plan.batch as u64;
     if hear().is_none() {
         return Ok(());
@@ -87,7 +87,7 @@ pub(crate) fn run(plan: &Plan) -> Result<(), Error> {
         return Err(Error::Part { part: "sink", what });
     }
     lock(&book).begin();
-    say(&Ready { ready: true, locators: Vec::new(), metrics: None })?;
+    say(&Ready { locators: Vec::new(), metrics: None })?;
     // How many messages of each unit the source has sent behind the prelude.
     let Some(line) = hear() else { return Ok(()) };
     let sent: u64 = line.parse().unwrap_or(0);

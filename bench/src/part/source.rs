@@ -52,13 +52,13 @@ pub(crate) fn run(plan: &Plan) -> Result<(), Error> {
     }
     // The pages are there before the clock runs.
     let mut sent = vec![u64::MAX; plan.units * plan.messages];
-    say(&Ready { ready: true, locators: Vec::new(), metrics: None })?;
+    say(&Ready { locators: Vec::new(), metrics: None })?;
     if hear().is_none() {
         return Ok(());
     }
     let rest = bursts.split_off(plan.prelude.min(bursts.len()));
     prelude(&units, bursts)?;
-    say(&Ready { ready: true, locators: Vec::new(), metrics: None })?;
+    say(&Ready { locators: Vec::new(), metrics: None })?;
     if hear().is_none() {
         return Ok(());
     }

@@ -65,7 +65,9 @@ pub(super) async fn ask(
                 unanswered.push(format!("{expression}: no answer, or only a part of it, within {limit:?}"));
             }
             if keys == key::ALL_JOURNALS {
-                memories(&samples).into_iter().for_each(|(key, frames)| queue.memory(&key, frames));
+                for (key, frames) in memories(&samples) {
+                    queue.memory(&key, frames);
+                }
             } else {
                 attach(queue, keys, &samples);
             }

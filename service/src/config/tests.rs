@@ -18,61 +18,63 @@ fn an_empty_configuration_is_the_default() {
     assert_eq!(parse("[navigation]\n[zenoh]\n"), Ok(Settings::default()));
 }
 
+/// Each key with a value that is not its default.
+const EVERY_KEY: &str = r#"
+calibrations = "units"
+strict_start = true
+max_units = 3
+units = ["ZLG-*", "FOG-0001"]
+pairing_window_ms = 20
+temperature_delay_ms = 0
+uncalibrated = "hold"
+tail_flush_ms = 250
+status_interval_ms = 200
+stop_timeout_ms = 1_500
+congestion = "block"
+state = "state/of/this"
+initial_state = "standby"
+drift_estimate = "subtract"
+reference_delay_ms = 200
+folder = { settle_ms = 20, poll_s = 0.5 }
+metrics = { listen = "0.0.0.0:9464", allow_remote = true }
+[swap]
+max_age_days = 10
+age = "refuse"
+outside_range = "refuse"
+max_jump_deg_per_h = 3600
+max_jump_mg = 0.5
+jump = "warn"
+old_schema = "refuse"
+slew_ms = 1500
+require_signature = true
+trusted_keys = "units"
+[pre_launch]
+duration_s = 300
+max_static_change_deg_per_h = 3600
+max_magnetic_change_deg_per_h = 7200
+max_imbalance = 0.5
+min_time_per_mode_s = 30
+min_good_share = 0.25
+[navigation]
+ticks = 4
+coning_sculling = true
+[pair]
+name = "north"
+mode = "active"
+priority = 7
+takeover_ms = 35
+[zenoh]
+config = "z.json5"
+connect = ["tcp/127.0.0.1:1"]
+listen = ["tcp/127.0.0.1:0"]
+namespace = "site/a"
+"#;
+
 #[test]
 fn every_key_arrives_where_it_belongs() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::create_dir(folder.path().join("units")).unwrap();
     std::fs::write(folder.path().join("z.json5"), "{ mode: 'client' }").unwrap();
-    let text = r#"
-        calibrations = "units"
-        strict_start = true
-        max_units = 3
-        units = ["ZLG-*", "FOG-0001"]
-        pairing_window_ms = 20
-        temperature_delay_ms = 0
-        uncalibrated = "hold"
-        tail_flush_ms = 250
-        status_interval_ms = 200
-        stop_timeout_ms = 1_500
-        congestion = "block"
-        state = "state/of/this"
-        initial_state = "standby"
-        drift_estimate = "subtract"
-        reference_delay_ms = 200
-        folder = { settle_ms = 20, poll_s = 0.5 }
-        metrics = { listen = "0.0.0.0:9464", allow_remote = true }
-        [swap]
-        max_age_days = 10
-        age = "refuse"
-        outside_range = "refuse"
-        max_jump_deg_per_h = 3600
-        max_jump_mg = 0.5
-        jump = "warn"
-        old_schema = "refuse"
-        slew_ms = 1500
-        require_signature = true
-        trusted_keys = "units"
-        [pre_launch]
-        duration_s = 300
-        max_static_change_deg_per_h = 3600
-        max_magnetic_change_deg_per_h = 7200
-        max_imbalance = 0.5
-        min_time_per_mode_s = 30
-        min_good_share = 0.25
-        [navigation]
-        ticks = 4
-        coning_sculling = true
-        [pair]
-        name = "north"
-        mode = "active"
-        priority = 7
-        takeover_ms = 35
-        [zenoh]
-        config = "z.json5"
-        connect = ["tcp/127.0.0.1:1"]
-        listen = ["tcp/127.0.0.1:0"]
-        namespace = "site/a"
-    "#;
     let expected = Settings {
         calibrations: Some(folder.path().join("units")),
         strict_start: true,
@@ -133,7 +135,7 @@ fn every_key_arrives_where_it_belongs() {
         },
         ..Settings::default()
     };
-    assert_eq!(Settings::parse(text, &folder.path().join("service.toml")), Ok(expected));
+    assert_eq!(Settings::parse(EVERY_KEY, &folder.path().join("service.toml")), Ok(expected));
 }
 
 #[test]

@@ -19,7 +19,10 @@ fn frame(sequence: u64) -> Vec<u8> {
         sequence,
         end_time: Timestamp::from_ns(i64::try_from(sequence * TICK_NS).unwrap()),
         duration: Span::from_ms(5),
-        readings: [1.0, 2.0, 3.0].map(|reading| reading + sequence as f64).into_iter().collect(),
+        readings: [1, 2, 3]
+            .map(|reading| f64::from(u32::try_from(sequence).unwrap() + reading))
+            .into_iter()
+            .collect(),
         ..GyroTick::default()
     };
     codec::encode(&GyroBatch { output: OutputKind::Counts, ticks: vec![tick] }).unwrap()

@@ -7,8 +7,8 @@ use isotherm_protocol::key::UnitId;
 
 use super::{Intake, guarded, lock};
 use crate::control::calibrations::Plan;
-use crate::receive::fault::FaultKind;
 use crate::pair::Pair;
+use crate::receive::fault::FaultKind;
 
 /// How long whoever asks something of a unit waits until it is known which instance speaks for it, and how often that is looked for.
 const LONGEST_DOUBT: Duration = Duration::from_millis(500);
