@@ -46,7 +46,8 @@ fn i6_a_hundred_thousand_ticks_allocate_nothing() {
     }
 }
 
-fn blocks_of_a_hundred_thousand_ticks(watched: Watched) -> (u64, u64) {
+/// A unit of five gyros with terms of every kind.
+fn unit(watched: Watched) -> Unit {
     let mut parts = identity();
     parts.channels.push(channel("board"));
     parts.reversal = Some(ReversalParts::default());
@@ -81,7 +82,11 @@ fn blocks_of_a_hundred_thousand_ticks(watched: Watched) -> (u64, u64) {
     };
     let mut unit = Unit::new(settings);
     unit.install(compile(&parts), 1);
+    unit
+}
 
+fn blocks_of_a_hundred_thousand_ticks(watched: Watched) -> (u64, u64) {
+    let mut unit = unit(watched);
     // Who is watched at rest turns by next to nothing.
     let rate = if matches!(watched, Watched::Plainly) { 1.0 } else { 1e-6 };
     // Every event is made beforehand: what is counted is the core's alone. A gap, a duplicate, a switch and a broken

@@ -192,7 +192,7 @@ impl Scene {
         let account =
             self.stand.consumer.continuity(&isotherm_protocol::key::UnitId::new(BASE_UNIT).unwrap());
         assert!(account.is_whole() && account.ticks == self.played, "{account:?}");
-        self.stand.stop().await;
+        Box::pin(self.stand.stop()).await;
         let entries = audit(&self.folders.state);
         let accepted = entries.iter().filter(|entry| matches!(entry.event, AuditEvent::Accepted(_)));
         assert_eq!(accepted.count(), 1);

@@ -104,7 +104,7 @@ impl Stand {
         speaker(&self.session).await
     }
 
-    async fn restart(&mut self, index: usize) {
+    fn restart(&mut self, index: usize) {
         tokio::task::block_in_place(|| self.pair.restart(index));
     }
 
@@ -169,7 +169,7 @@ impl Stand {
         // Who speaks now takes swaps, and counts on.
         self.swap(self.units() - 1).await;
         match mishap {
-            Mishap::Killed => self.restart(speaking).await,
+            Mishap::Killed => self.restart(speaking),
             Mishap::Stopped => self.pair.signal(speaking, "CONT"),
         }
         until_paired(&self.session, self.units()).await;
