@@ -101,6 +101,6 @@ mod tests {
     #[test]
     fn completions_name_the_commands() {
         let script = run(&["program", "completions", "bash"]).unwrap();
-        assert!(String::from_utf8(script).unwrap().contains("program__act"));
+        assert!(String::from_utf8(script).unwrap().contains("program__subcmd__act"));
     }
 }

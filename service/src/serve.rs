@@ -26,9 +26,6 @@ const PRINT_LIMIT: Duration = Duration::from_secs(1);
 const FIRST_WORD: Duration = Duration::from_secs(2);
 const FURTHER_WORDS: Duration = Duration::from_secs(60);
 
-/// How long a service that stands still (SIGSTOP, a machine without a breath) may hold up whoever publishes to it with `Block`.
-const LEASE: Duration = Duration::from_millis(500);
-
 /// SIGXFSZ, sent where a write would make a file longer than the process may (`ulimit -f`, `LimitFSIZE=`).
 const FILE_TOO_LONG: SignalKind = SignalKind::from_raw(25);
 
@@ -93,7 +90,6 @@ fn settings(args: &ServeArgs) -> Result<Settings, ServiceError> {
         configured.namespace.clone_from(&given.namespace);
     }
     configured.listen_by_default();
-    configured.lease.get_or_insert(LEASE);
     Ok(settings)
 }
 

@@ -87,7 +87,8 @@ impl Pair {
              {{link: {{tx: {{queue: {{batching: {{time_limit: 0}}, size: {{real_time: 16}}}}}}}}}}}}"
         );
         std::fs::write(&zenoh, config).expect("written");
-        let extra = self.extra.replace("[pair]", &format!("[pair]\nname = \"{}\"", NAMES[index]));
+        let extra =
+            self.extra.replace("[pair]", &format!("[pair]\nlease_ms = 500\nname = \"{}\"", NAMES[index]));
         let text = format!(
             "calibrations = \"documents\"\nstate = \"state-{index}\"\n{extra}\n[zenoh]\nconfig = \"peer-{index}.json5\"\n"
         );

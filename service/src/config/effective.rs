@@ -72,6 +72,7 @@ impl Settings {
                 }),
                 priority: Some(self.pair.priority),
                 takeover_ms: Some(ms(self.pair.takeover)),
+                lease_ms: self.session.lease.map(ms),
             },
             folder: FolderKeys {
                 settle_ms: Some(ms(self.folder.settle)),

@@ -67,10 +67,10 @@ pub(super) fn settings(r: &mut Reader<'_>, folder: &Path) -> Option<Settings> {
             Congestion::Block => CongestionControl::Block,
         }),
         units: units(r, keys.units),
+        session: session(r, keys.zenoh, keys.pair.lease_ms, folder),
         pair: pair(r, keys.pair),
         metrics: metrics(r, keys.metrics),
         web: web(r, keys.web, folder),
-        session: session(r, keys.zenoh, folder),
         digest: None,
     };
     settings.listen_for_web();
@@ -224,13 +224,13 @@ fn web(r: &mut Reader<'_>, keys: WebKeys, folder: &Path) -> WebSettings {
 }
 
 /// Reads `[zenoh]` and tries the configuration that it stands for.
-fn session(r: &mut Reader<'_>, keys: ZenohKeys, folder: &Path) -> SessionOptions {
+fn session(r: &mut Reader<'_>, keys: ZenohKeys, lease_ms: Option<u32>, folder: &Path) -> SessionOptions {
     let session = SessionOptions {
         config: existing(r, "zenoh.config", keys.config, folder, Path::is_file, "file"),
         connect: keys.connect,
         listen: keys.listen,
         namespace: keys.namespace,
-        lease: None,
+        lease: lease_ms.map(milliseconds),
     };
     if !r.is_damaged("zenoh")
         && let Err(error) = session.to_config()

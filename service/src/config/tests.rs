@@ -63,6 +63,7 @@ name = "north"
 mode = "active"
 priority = 7
 takeover_ms = 35
+lease_ms = 400
 [zenoh]
 config = "z.json5"
 connect = ["tcp/127.0.0.1:1"]
@@ -131,7 +132,7 @@ fn every_key_arrives_where_it_belongs() {
             connect: vec!["tcp/127.0.0.1:1".to_owned()],
             listen: vec!["tcp/127.0.0.1:0".to_owned()],
             namespace: Some("site/a".to_owned()),
-            lease: None,
+            lease: Some(Duration::from_millis(400)),
         },
         ..Settings::default()
     };

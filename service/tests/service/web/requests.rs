@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use flate2::read::GzDecoder;
 use isotherm_bus::{SessionOptions, locators, open};
 use isotherm_protocol::history::AuditEvent;
+use isotherm_protocol::pair::Mode;
 use isotherm_service::config::{MetricsSettings, WebSettings};
 use isotherm_service::{Settings, start};
 use serde_json::{Value, json};
@@ -411,11 +412,17 @@ async fn both_services_that_have_a_unit_are_shown() {
     let (folders, others) = (Folders::new(), Folders::new());
     folders.put("u.toml", &document(UNIT, 1.0));
     others.put("u.toml", &document(UNIT, 1.0));
-    let (mut stand, address) = stand(&folders, false).await;
+    // Both speak, and so both say how the unit is.
+    let active = |mut settings: Settings| {
+        settings.pair.mode = Mode::Active;
+        settings
+    };
+    let mut stand = Stand::start(active(settings(&folders, false))).await;
+    let address = stand.service.metrics().unwrap();
     // To the first, and to who sends and asks: peers pass nothing on.
     let connect = [locators(stand.service.session()), locators(&stand.session)].concat();
     let session = open(&SessionOptions { connect, ..SessionOptions::default() }).await.unwrap();
-    let second = start(others.settings(), session).await.unwrap();
+    let second = start(active(others.settings()), session).await.unwrap();
     let own = stand.service.session().zid().to_string();
     let deadline = Instant::now() + LIMIT;
     let sheet = loop {
