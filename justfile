@@ -38,7 +38,7 @@ python:
 # Kill the speaking service of a pair 100 times and stop it 50 times, with 20 units at 200 Hz; print the pauses (ten minutes;
 # ISOTHERM_PAIR=UNITS,KILLS,STOPS)
 pair:
-    cargo test --release --workspace --locked --test operators a_hundred_kills -- --ignored --nocapture
+    cargo test --release --workspace --locked --test operators pair:: -- --ignored --nocapture
 
 # Decode 10⁸ changed frames with the C header under the sanitizers of cc (some minutes)
 fuzz-c:

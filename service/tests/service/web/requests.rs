@@ -8,7 +8,6 @@ use std::time::{Duration, Instant};
 use flate2::read::GzDecoder;
 use isotherm_bus::{SessionOptions, locators, open};
 use isotherm_protocol::history::AuditEvent;
-use isotherm_protocol::pair::Mode;
 use isotherm_service::config::{MetricsSettings, WebSettings};
 use isotherm_service::{Settings, start};
 use serde_json::{Value, json};
@@ -408,41 +407,31 @@ async fn one_download_has_everything_for_a_fault_report_and_no_token() {
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 4)]
-async fn both_services_that_have_a_unit_are_shown() {
+async fn a_second_service_is_shown_and_says_nothing_of_the_unit_while_it_stands_by() {
     let (folders, others) = (Folders::new(), Folders::new());
     folders.put("u.toml", &document(UNIT, 1.0));
     others.put("u.toml", &document(UNIT, 1.0));
-    // Both speak, and so both say how the unit is.
-    let active = |mut settings: Settings| {
-        settings.pair.mode = Mode::Active;
-        settings
-    };
-    let mut stand = Stand::start(active(settings(&folders, false))).await;
-    let address = stand.service.metrics().unwrap();
+    let (mut stand, address) = stand(&folders, false).await;
     // To the first, and to who sends and asks: peers pass nothing on.
     let connect = [locators(stand.service.session()), locators(&stand.session)].concat();
     let session = open(&SessionOptions { connect, ..SessionOptions::default() }).await.unwrap();
-    let second = start(active(others.settings()), session).await.unwrap();
-    let own = stand.service.session().zid().to_string();
+    let second = start(others.settings(), session).await.unwrap();
     let deadline = Instant::now() + LIMIT;
-    let sheet = loop {
+    let units = loop {
         stand.send(UNIT, 5).await;
-        let answer = read(address, &format!("/api/unit/{UNIT}"));
-        if answer.status == 200 && answer.json()["instances"].as_array().unwrap().len() == 2 {
-            break answer.json();
+        let answer = read(address, "/api/units");
+        let (status, units) = (answer.status, answer.json());
+        if status == 200 && units["services"].as_array().unwrap().len() == 2 {
+            break units;
         }
         assert!(Instant::now() < deadline, "{answer:?}");
         tokio::time::sleep(Duration::from_millis(50)).await;
     };
-    assert_eq!(sheet["instances"][0]["status"]["instance"], own, "its own first");
-    assert_eq!((&sheet["instances"][0]["own"], &sheet["instances"][1]["own"]), (&true.into(), &false.into()));
-    let units = read(address, "/api/units").json();
-    assert_eq!(units["units"].as_array().unwrap().iter().filter(|row| row["unit"] == UNIT).count(), 2);
-    assert_eq!(units["services"].as_array().unwrap().len(), 2);
+    assert_eq!(units["units"].as_array().unwrap().iter().filter(|row| row["unit"] == UNIT).count(), 1);
+    let own = stand.service.session().zid().to_string();
+    let sheet = read(address, &format!("/api/unit/{UNIT}")).json();
+    assert_eq!(sheet["instances"].as_array().unwrap().len(), 1);
+    assert_eq!(sheet["instances"][0]["status"]["instance"], own);
     second.stop().await;
-    until(address, |sheet| {
-        let instances = sheet["instances"].as_array().unwrap();
-        instances.len() == 1 || instances[1]["gone_s"].is_u64()
-    });
     stand.service.stop().await;
 }
