@@ -43,7 +43,7 @@ pub(crate) fn say_lines(lines: impl Display) {
     to_stderr(format!("{}\n", escaped_lines(&lines.to_string())));
 }
 
-/// Prints a result as [`print`] does, and goes on without it where stdout takes nothing for so long: a terminal that is
+/// Prints a result as [`print()`] does, and goes on without it where stdout takes nothing for so long: a terminal that is
 /// stopped or a full pipe must not hold up the end of a service.
 #[must_use]
 pub fn print_within(limit: Duration, text: String, exit: Exit) -> Exit {
