@@ -142,20 +142,17 @@ impl ChainArgs {
                 })
             }));
         }
-        if self.measure.contains(&Measure::Swap) {
-            let units = usize_of(&self.units, 100);
+        // What goes on beside the ticks, and how many units it takes to show.
+        for (measure, few) in [(Measure::Swap, 100), (Measure::Console, 200)] {
+            if !self.measure.contains(&measure) {
+                continue;
+            }
             let rate = self.rate.first().copied().unwrap_or(200);
-            cases.extend(units.into_iter().map(|units| {
-                let without = Case::paced(units, rate, 1, if self.quick { 2.0 } else { seconds.max(4.0) });
-                (Measure::Swap, vec![without.clone(), Case { swaps: true, ..without }])
-            }));
-        }
-        if self.measure.contains(&Measure::Console) {
-            let units = usize_of(&self.units, 200);
-            let rate = self.rate.first().copied().unwrap_or(200);
-            cases.extend(units.into_iter().map(|units| {
-                let without = Case::paced(units, rate, 1, if self.quick { 2.0 } else { seconds.max(4.0) });
-                (Measure::Console, vec![without.clone(), Case { pages: true, ..without }])
+            let lasting = if self.quick { 2.0 } else { seconds.max(4.0) };
+            cases.extend(usize_of(&self.units, few).into_iter().map(|units| {
+                let without = Case::paced(units, rate, 1, lasting);
+                let (swaps, pages) = (measure == Measure::Swap, measure == Measure::Console);
+                (measure, vec![without.clone(), Case { swaps, pages, ..without }])
             }));
         }
         cases
