@@ -35,10 +35,10 @@ purity:
 python:
     .ci/run python
 
-# Kill the speaking service of a pair 100 times and stop it 50 times, with 20 units at 200 Hz; print the pauses (ten minutes;
-# ISOTHERM_PAIR=UNITS,KILLS,STOPS)
+# Kill the speaking service of a pair 100 times, stop it 50 times, cut the links of one 50 times, with 20 units at 200 Hz; print the
+# pauses (a quarter of an hour; ISOTHERM_PAIR=UNITS,KILLS,STOPS,CUTS)
 pair:
-    cargo test --release --workspace --locked --test operators pair:: -- --ignored --nocapture
+    cargo test --release --workspace --locked --test operators pair:: -- --include-ignored --nocapture --test-threads=1
 
 # Decode 10⁸ changed frames with the C header under the sanitizers of cc (some minutes)
 fuzz-c:

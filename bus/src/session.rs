@@ -1,12 +1,13 @@
 //! Opening and closing sessions.
 
+use std::net::ToSocketAddrs;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
 use zenoh::{Config, Session, Wait};
 
-use crate::endpoint::{DEFAULT_ENDPOINT, endpoint};
+use crate::endpoint::{DEFAULT_ENDPOINT, address, endpoint, host_and_port};
 use crate::{BusError, obstacle};
 
 /// Where a session listens and connects when neither options nor a configuration say so.
@@ -20,6 +21,9 @@ const CONNECTED_INTERVAL: Duration = Duration::from_millis(5);
 
 /// Key of the lease (ms).
 const LEASE: &str = "transport/link/tx/lease";
+/// Key of how often a connection is tried again, and the shortest and longest distance of trials where the lease is set (ms).
+const RETRY: &str = "connect/retry";
+const RETRY_MS: [u32; 2] = [100, 500];
 
 /// How long a connection may say nothing before it is let go (ms), and how many may be about to say something: Zenoh's own 10 s and
 /// 100 let a few hundred idle connections keep every client out.
@@ -72,6 +76,14 @@ impl SessionOptions {
         }
         if let Some(lease) = self.lease.filter(|_| has_default(&config, LEASE)) {
             set(&mut config, LEASE, u64::try_from(lease.as_millis()).unwrap_or(u64::MAX))?;
+            if has_default(&config, RETRY) {
+                // Who is given up so soon is looked for as soon.
+                let [init, max] = RETRY_MS;
+                let retry = serde_json::json!({
+                    "period_init_ms": init, "period_max_ms": max, "period_increase_factor": 2.0,
+                });
+                set(&mut config, RETRY, retry)?;
+            }
         }
         if let Some(namespace) = &self.namespace {
             set(&mut config, "namespace", namespace.as_str())?;
@@ -187,23 +199,35 @@ pub async fn open_config(config: Config) -> Result<Session, BusError> {
     }
 }
 
-/// Waits until a session is connected to anybody, where its options name an endpoint; no longer than `limit`.
+/// Waits until a session is connected to every endpoint that its options name; no longer than `limit`.
 ///
 /// # Errors
 /// As [`SessionOptions::to_config`].
 pub async fn connected(session: &Session, options: &SessionOptions, limit: Duration) -> Result<(), BusError> {
-    if endpoints(&options.to_config()?, "connect/endpoints").is_empty() {
-        return Ok(());
-    }
+    let wanted: Vec<_> = endpoints(&options.to_config()?, "connect/endpoints")
+        .iter()
+        .map(|endpoint| reached(endpoint))
+        .collect();
     let deadline = Instant::now() + limit;
     while Instant::now() < deadline {
-        let info = session.info();
-        if info.peers_zid().await.next().is_some() || info.routers_zid().await.next().is_some() {
+        let links: Vec<_> = session.info().links().await.map(|link| link.dst().to_string()).collect();
+        // A connection from elsewhere says nothing: producers may find this session before it finds the others.
+        if wanted.iter().all(|any_of| any_of.iter().any(|endpoint| links.contains(endpoint))) {
             break;
         }
         tokio::time::sleep(CONNECTED_INTERVAL).await;
     }
     Ok(())
+}
+
+/// What a link to an endpoint may be called: its host name stands for one of these addresses.
+fn reached(endpoint: &str) -> Vec<String> {
+    let bare = address(endpoint);
+    let named = host_and_port(endpoint).zip(bare.split_once('/'));
+    let addresses = named.and_then(|(host_and_port, (protocol, _))| {
+        Some(host_and_port.to_socket_addrs().ok()?.map(|address| format!("{protocol}/{address}")).collect())
+    });
+    addresses.unwrap_or_else(|| vec![bare.to_owned()])
 }
 
 /// The endpoints that others can connect to, with the ports that the system has chosen.

@@ -21,7 +21,7 @@ use isotherm_protocol::pair::{Member, Mode, PairReport};
 
 use crate::config::{PairSettings, Settings};
 use crate::receive::intake::Intake;
-use crate::receive::unit::{Standing, UnitActor};
+use crate::receive::unit::{Footing, Standing, UnitActor};
 pub(crate) use ask::{Asker, Questions};
 pub(crate) use watch::Watch;
 
@@ -47,6 +47,10 @@ pub(crate) struct Pair {
     start: Instant,
     /// When the watch last looked (µs since the start).
     beat: AtomicU64,
+    /// For how long the process stood still before, where the units were not told yet (µs).
+    still_us: AtomicU64,
+    /// Whether there were others once.
+    was_accompanied: AtomicBool,
     passed_over: Mutex<BTreeMap<String, Instant>>,
 }
 
@@ -70,10 +74,12 @@ impl Pair {
             takes: settings.units.clone(),
             opening: AtomicBool::new(!others.is_empty()),
             accompanied: AtomicBool::new(!others.is_empty()),
+            was_accompanied: AtomicBool::new(!others.is_empty()),
             others: RwLock::new(others.into_iter().map(|other| (other.instance.clone(), other)).collect()),
             alone_since: Mutex::new(alone),
             start: Instant::now(),
             beat: AtomicU64::new(0),
+            still_us: AtomicU64::new(0),
             passed_over: Mutex::default(),
         }
     }
@@ -100,8 +106,11 @@ impl Pair {
         }
         *self.alone_since.lock().unwrap_or_else(PoisonError::into_inner) = None;
         let mut others = self.others.write().unwrap_or_else(PoisonError::into_inner);
-        // Looked seldom while it was alone.
-        self.beat.store(self.since_start_us(Instant::now()), Ordering::Release);
+        if !self.accompanied.load(Ordering::Acquire) {
+            // Looked seldom while it was alone.
+            self.beat.store(self.since_start_us(Instant::now()), Ordering::Release);
+        }
+        self.was_accompanied.store(true, Ordering::Release);
         self.accompanied.store(true, Ordering::Release);
         others.insert(member.instance.clone(), member).is_none()
     }
@@ -111,6 +120,8 @@ impl Pair {
         let mut others = self.others.write().unwrap_or_else(PoisonError::into_inner);
         let gone = others.remove(instance).is_some();
         if gone && others.is_empty() {
+            // Whoever stood still for longer than the lease finds the others gone before it looks again.
+            self.still_us.fetch_max(self.stands_still_us(Instant::now()), Ordering::AcqRel);
             self.accompanied.store(false, Ordering::Release);
             *self.alone_since.lock().unwrap_or_else(PoisonError::into_inner) = Some(Instant::now());
         }
@@ -140,25 +151,42 @@ impl Pair {
             active: self.me.mode == Mode::Active,
             yields: self.yields(),
             alone_since: *self.alone_since.lock().unwrap_or_else(PoisonError::into_inner),
+            deserted: !self.has_others() && self.was_accompanied.load(Ordering::Acquire),
         }
     }
 
     /// Where this process has stood still for so long that another instance may speak in its place by now: whether it was so short that no
     /// connection was lost by it.
     pub(crate) fn has_stood_still(&self, now: Instant) -> Option<bool> {
-        if !self.has_others() {
-            return None;
-        }
-        let still_us = self.since_start_us(now).saturating_sub(self.beat.load(Ordering::Acquire));
-        let still = Duration::from_micros(still_us);
-        (still > self.takeover + self.takeover / 2).then_some(still < SHORT)
+        let before_us = self.still_us.load(Ordering::Acquire);
+        let still_us = if self.has_others() { before_us.max(self.stands_still_us(now)) } else { before_us };
+        (still_us > 0).then_some(Duration::from_micros(still_us) < SHORT)
     }
 
-    /// The watch looks; whether it has stood still before.
+    /// For how long nobody has looked, where that is too long; else 0 (µs).
+    fn stands_still_us(&self, now: Instant) -> u64 {
+        let still_us = self.since_start_us(now).saturating_sub(self.beat.load(Ordering::Acquire));
+        if Duration::from_micros(still_us) > self.takeover + self.takeover / 2 { still_us } else { 0 }
+    }
+
+    /// The watch looks; whether it has stood still before. It holds for other threads until the units are [`Self::told`].
     fn look(&self, now: Instant) -> Option<bool> {
         let still = self.has_stood_still(now);
+        if still.is_some() {
+            self.still_us.fetch_max(self.stands_still_us(now), Ordering::AcqRel);
+        }
         self.beat.store(self.since_start_us(now), Ordering::Release);
         still
+    }
+
+    /// The units know that the process stood still.
+    fn told(&self) {
+        self.still_us.store(0, Ordering::Release);
+    }
+
+    /// What a unit stands on after the process stood still.
+    pub(crate) fn footing(short: bool) -> Footing {
+        if short { Footing::Doubt } else { Footing::Nothing }
     }
 
     fn since_start_us(&self, now: Instant) -> u64 {
@@ -200,5 +228,42 @@ impl Pair {
             units: intake.each_unit(|actor| actor.role()),
             passed_over: passed_over.keys().cloned().collect(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn other() -> Member {
+        let group = Pair::new(&Settings::default(), "me".to_owned(), 2, Vec::new()).me.group;
+        let (instance, name) = ("other".to_owned(), "other".to_owned());
+        Member { instance, name, mode: Mode::Standby, priority: 0, started_unix_ms: 1, group }
+    }
+
+    #[test]
+    fn whoever_stood_still_knows_it_though_the_others_are_gone_when_it_looks() {
+        let pair = Pair::new(&Settings::default(), "me".to_owned(), 2, vec![other()]);
+        let start = Instant::now();
+        assert_eq!(pair.look(start), None);
+        std::thread::sleep(Duration::from_millis(40));
+        // The lease is over: it hears of that first.
+        assert!(pair.go("other"));
+        assert!(!pair.has_others());
+        assert_eq!(pair.has_stood_still(Instant::now()), Some(true), "a receive thread");
+        assert_eq!(pair.look(Instant::now()), Some(true));
+        assert_eq!(pair.has_stood_still(Instant::now()), Some(true), "until the units are told");
+        pair.told();
+        assert_eq!(pair.look(Instant::now()), None);
+        assert!(pair.standing().deserted);
+    }
+
+    #[test]
+    fn an_instance_that_comes_does_not_hide_that_this_one_stood_still() {
+        let pair = Pair::new(&Settings::default(), "me".to_owned(), 2, vec![other()]);
+        pair.look(Instant::now());
+        std::thread::sleep(Duration::from_millis(40));
+        pair.come(Member { instance: "third".to_owned(), ..other() });
+        assert_eq!(pair.look(Instant::now()), Some(true));
     }
 }

@@ -19,6 +19,7 @@ pub mod operator;
 pub mod pair;
 pub mod player;
 pub mod process;
+pub mod proxy;
 pub mod script;
 pub mod simulated;
 pub mod streams;

@@ -24,6 +24,7 @@ use zenoh::pubsub::Subscriber;
 
 use crate::bench::LIMIT;
 use crate::process::Service;
+use crate::proxy::{Fault, Proxy, Switch};
 
 /// What is appended to an endpoint, so that a service that was restarted is found again at once.
 const AGAIN: &str = "#retry_period_init_ms=50;retry_period_max_ms=100";
@@ -39,6 +40,9 @@ pub struct Pair {
     pub services: [Option<Service>; 2],
     addresses: [String; 2],
     extra: String,
+    /// In front of the first, for the second alone, and in front of the second for everybody else.
+    proxies: [Proxy; 2],
+    switch: Switch,
 }
 
 impl Pair {
@@ -56,12 +60,10 @@ impl Pair {
             let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
             format!("tcp/{}", listener.local_addr().expect("an address"))
         };
-        let mut pair = Self {
-            folder: folder.to_owned(),
-            services: [None, None],
-            addresses: [free(), free()],
-            extra: extra.to_owned(),
-        };
+        let (addresses, switch) = ([free(), free()], Switch::default());
+        let proxies = [0, 1].map(|index: usize| Proxy::start(&addresses[index], &switch));
+        let (folder, extra) = (folder.to_owned(), extra.to_owned());
+        let mut pair = Self { folder, services: [None, None], addresses, extra, proxies, switch };
         pair.restart(0);
         pair.restart(1);
         pair
@@ -78,7 +80,7 @@ impl Pair {
     /// # Panics
     /// Where it does not start.
     pub fn restart(&mut self, index: usize) {
-        let (own, other) = (&self.addresses[index], &self.addresses[1 - index]);
+        let (own, other) = (&self.addresses[index], &self.proxies[1 - index].endpoint);
         let file = self.folder.join(format!("service-{index}.toml"));
         let zenoh = self.folder.join(format!("peer-{index}.json5"));
         let config = format!(
@@ -111,12 +113,18 @@ impl Pair {
         self.services[index].as_ref().expect("it is alive").signal(signal);
     }
 
+    /// Does something to all connections of the second instance.
+    pub fn trouble(&self, fault: Fault) {
+        self.switch.set(fault);
+    }
+
     /// A session that is connected to both.
     ///
     /// # Panics
     /// Where it cannot be opened.
     pub async fn session(&self) -> Session {
-        let connect = self.addresses.iter().map(|address| format!("{address}{AGAIN}")).collect();
+        let addresses = [&self.addresses[0], &self.proxies[1].endpoint];
+        let connect = addresses.iter().map(|address| format!("{address}{AGAIN}")).collect();
         let session =
             open(&SessionOptions { connect, ..SessionOptions::default() }).await.expect("a session");
         let deadline = Instant::now() + LIMIT;
@@ -143,12 +151,47 @@ pub async fn reports(session: &Session) -> Vec<PairReport> {
 /// # Panics
 /// Where that does not come.
 pub async fn until_paired(session: &Session, units: usize) {
+    let is_pair = |reports: &[PairReport]| {
+        let count =
+            |role| reports.iter().flat_map(|report| &report.units).filter(|unit| unit.role == role).count();
+        reports.len() == 2 && count(Role::Speaking) == units && count(Role::Standby) == units
+    };
+    until(session, is_pair).await;
+}
+
+/// Waits until an instance speaks for every unit.
+///
+/// # Panics
+/// Where that does not come.
+pub async fn until_speaks(session: &Session, index: usize, units: usize) {
+    let speaks = |report: &PairReport| {
+        let speaking = report.units.iter().filter(|unit| unit.role == Role::Speaking);
+        report.member.name == NAMES[index] && speaking.count() == units
+    };
+    until(session, |reports| reports.iter().any(speaks)).await;
+}
+
+/// Waits until the instance that stands by has compared so many ticks of every unit.
+///
+/// # Panics
+/// Where that does not come.
+pub async fn until_compared(session: &Session, units: usize, ticks: u64) {
+    let has = |reports: &[PairReport]| {
+        let all = reports.iter().flat_map(|report| &report.units);
+        all.filter(|unit| unit.role == Role::Standby && unit.ticks_compared >= ticks).count() == units
+    };
+    until(session, has).await;
+}
+
+/// Waits until what the instances say of themselves is as it should be.
+///
+/// # Panics
+/// Where that does not come.
+pub async fn until(session: &Session, is: impl Fn(&[PairReport]) -> bool) {
     let deadline = Instant::now() + LIMIT;
     loop {
         let reports = reports(session).await;
-        let count =
-            |role| reports.iter().flat_map(|report| &report.units).filter(|unit| unit.role == role).count();
-        if reports.len() == 2 && count(Role::Speaking) == units && count(Role::Standby) == units {
+        if is(&reports) {
             return;
         }
         assert!(Instant::now() < deadline, "{reports:#?}");

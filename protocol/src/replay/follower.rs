@@ -173,6 +173,11 @@ impl Follower {
             let Some(made) = &rebuilt else {
                 return (None, now_ns > at_ns.saturating_add(4 * super::NEAR_NS));
             };
+            if !made.exact {
+                // Entries behind the memory follow frames that did not come here.
+                self.lose();
+                return (None, true);
+            }
             // The stream's own from here on: which frames were in the other's memory need not be found out again.
             let last = self.entries.iter().rfind(|(entry, _)| is_behind(entry, &anchor.entry));
             let number = last.map_or(anchor.entry.number, |(entry, _)| entry.number);
@@ -228,15 +233,28 @@ impl Follower {
     }
 
     fn has_last_gyro_frame(&self, memory: &JournalEntry) -> bool {
-        let Some(heard) = memory.heard.get(GYRO.index()).filter(|heard| heard.frames > 0) else {
-            return true;
-        };
-        let is_it = |frame: &Frame| {
+        let heard = memory.heard.get(GYRO.index());
+        heard.is_none_or(|heard| heard.frames == 0) || self.last_heard(memory, GYRO).is_some()
+    }
+
+    /// Place of the last frame of an input that a memory has heard.
+    fn last_heard(&self, memory: &JournalEntry, input: Input) -> Option<usize> {
+        let heard = memory.heard.get(input.index()).filter(|heard| heard.frames > 0)?;
+        self.frames.iter().rposition(|frame| {
             let mut own = Heard::default();
             own.note(&frame.bytes);
-            frame.input == GYRO && own.crc == heard.crc
-        };
-        self.frames.iter().rev().any(is_it)
+            frame.input == input && own.crc == heard.crc
+        })
+    }
+
+    /// For each input, how many of the frames are older than what a memory has heard though it names none of them: the connection was
+    /// lost in between, and they came before the last gyro frame that is in the memory.
+    fn older(&self, memory: &JournalEntry) -> [usize; Input::ALL.len()] {
+        let gyro = self.last_heard(memory, GYRO).unwrap_or(0);
+        Input::ALL.map(|input| {
+            let heard = memory.heard.get(input.index()).is_some_and(|heard| heard.frames > 0);
+            if heard && self.last_heard(memory, input).is_none() { gyro } else { 0 }
+        })
     }
 
     /// Takes the stream's own memory, and gives up what is older than the one before it.
@@ -271,7 +289,12 @@ impl Follower {
         for (entry, at_ns) in behind {
             sequencer.entry(entry, at_ns);
         }
-        for Frame { input, at_ns, bytes } in self.frames.iter().skip(skipped) {
+        // The stream's own memories have heard what came before them.
+        let older = if at_once { [0; Input::ALL.len()] } else { self.older(&anchor.entry) };
+        for (place, Frame { input, at_ns, bytes }) in self.frames.iter().enumerate().skip(skipped) {
+            if older.get(input.index()).is_some_and(|older| place < *older) {
+                continue;
+            }
             sequencer.frame(*input, *at_ns, bytes.to_vec());
         }
         if at_once {

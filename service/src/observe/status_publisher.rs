@@ -159,8 +159,12 @@ impl Work {
             }
             let now = Instant::now();
             if now >= next_look {
+                // A process that stood still knows nothing of streams that have stopped.
+                let still = self.pair.has_stood_still(now).is_some();
                 self.publish(|actor| {
-                    actor.tend(now);
+                    if !still {
+                        actor.tend(now);
+                    }
                     actor.take_status_due()
                 });
                 self.publish_own(false);

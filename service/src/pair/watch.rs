@@ -186,12 +186,13 @@ impl Work {
         let standing = self.pair.standing();
         let looked = self.intake.each_unit(|actor| {
             if let Some(short) = still.filter(|_| actor.speaks()) {
-                actor.follow(now, standing.active, short);
+                actor.follow(now, standing.active, Pair::footing(short));
             }
             let Wants { memory, spoke, alarm } = actor.watch_speech(now, &standing);
             (memory || spoke || alarm.is_some()).then(|| (actor.id().clone(), memory, spoke, alarm))
         });
         if still.is_some() {
+            self.pair.told();
             tracing::warn!("this process stood still: it listens whether another instance speaks");
         }
         let mut spoken = Vec::new();

@@ -20,7 +20,9 @@ use crate::control::swap_manager::Inbox;
 use crate::observe::totals::Totals;
 use crate::pair::Pair;
 use crate::receive::fault::{FaultKind, FaultLog};
-use crate::receive::unit::{Journal, Outlet, Present, StreamTimeoutSettings, SwapAccount, UnitActor};
+use crate::receive::unit::{
+    Footing, Journal, Outlet, Present, StreamTimeoutSettings, SwapAccount, UnitActor,
+};
 pub use units::OutletMaker;
 use units::{Outlets, Unit, Units};
 
@@ -115,7 +117,7 @@ impl Intake {
         if let Some((pair, short)) =
             self.pair.as_ref().and_then(|pair| Some((pair, pair.has_stood_still(arrival)?)))
         {
-            actor.follow(arrival, pair.standing().active, short);
+            actor.follow(arrival, pair.standing().active, Pair::footing(short));
         }
         guarded(&mut actor, |actor| actor.receive(stream, frame, arrival));
         actor.is_status_due()
@@ -204,7 +206,8 @@ impl Intake {
         let mut actor = UnitActor::new(id.clone(), settings, quiet, outlet);
         if let Some(pair) = self.pair.as_ref().filter(|pair| !pair.speaks_first()) {
             // Where nobody else is heard, it speaks.
-            actor.follow(Instant::now(), pair.standing().active, !pair.is_opening());
+            let footing = if pair.is_opening() { Footing::Nothing } else { Footing::Doubt };
+            actor.follow(Instant::now(), pair.standing().active, footing);
         }
         if let Some(inbox) = &self.inbox {
             actor.report_to(inbox.clone());

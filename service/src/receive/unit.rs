@@ -37,7 +37,7 @@ pub(crate) use account::SwapAccount;
 pub use journal_writer::{Journal, JournalOutlet};
 pub use present::Present;
 pub(crate) use seen::TickSeen;
-pub(crate) use speech::{Alarm, Standing, Wants};
+pub(crate) use speech::{Alarm, Footing, Standing, Wants};
 pub use stream_timeout::StreamTimeoutSettings;
 
 /// Where corrected frames go; `Err` is an output that could not be published.
@@ -164,6 +164,9 @@ impl UnitActor {
     /// Takes one raw frame that arrived at `arrival`, and publishes what it released.
     pub fn receive(&mut self, stream: RawStream, frame: &[u8], arrival: Instant) {
         if stream == RawStream::Gyro {
+            if self.speech.uncertain {
+                self.hear_again(frame, arrival);
+            }
             self.stream_timeout.heard(arrival);
         }
         self.note_frame(Input::Raw(stream), frame, arrival);

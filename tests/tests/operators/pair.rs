@@ -7,22 +7,25 @@ use isotherm_bus::close;
 use isotherm_correction::unit::At;
 use isotherm_protocol::control::{Schedule, SwapOptions, SwapOutcome};
 use isotherm_protocol::history::AuditEvent;
-use isotherm_protocol::pair::Role;
 use isotherm_simulator::Scenario;
 use isotherm_simulator::presets::zeeman_rest;
 use isotherm_tests::bench::LIMIT;
 use isotherm_tests::dice::Dice;
 use isotherm_tests::operator::{Operator, audit};
-use isotherm_tests::pair::{Ears, Made, Pair, reports, speaker, until_paired};
+use isotherm_tests::pair::{Ears, Made, Pair, reports, speaker, until_compared, until_paired, until_speaks};
+use isotherm_tests::proxy::Fault;
 use tokio::sync::Mutex;
 use tokio::task::JoinHandle;
 use zenoh::Session;
+use zenoh::qos::CongestionControl;
 
 use crate::documents::{base, valid};
 
 const TICK: Duration = Duration::from_millis(5);
 /// How far ahead a swap is scheduled, in ticks: both services have heard of it by then.
 const AHEAD: u64 = 40;
+/// How long an instance of the pair may be silent before others give the connection up.
+const LEASE: Duration = Duration::from_millis(500);
 
 /// Both services, what is produced for them, and who hears them.
 struct Stand {
@@ -153,6 +156,8 @@ fn configuration(more: &str) -> String {
 enum Mishap {
     Killed,
     Stopped,
+    /// Its connections, where it is the second.
+    Link(Fault),
 }
 
 impl Stand {
@@ -162,15 +167,21 @@ impl Stand {
         match mishap {
             Mishap::Killed => self.pair.kill(speaking),
             Mishap::Stopped => self.pair.signal(speaking, "STOP"),
+            Mishap::Link(fault) => self.pair.trouble(fault),
         }
-        tokio::time::sleep(Duration::from_millis(600)).await;
+        if matches!(mishap, Mishap::Link(_)) && speaking == 0 {
+            self.until_lost(mishap).await;
+        } else {
+            until_speaks(&self.session, 1 - speaking, self.units()).await;
+            self.until_lost(mishap).await;
+        }
         let pause = self.pause_since(at).await;
-        assert_eq!(self.speaker().await, 1 - speaking);
         // Who speaks now takes swaps, and counts on.
         self.swap(self.units() - 1).await;
         match mishap {
             Mishap::Killed => self.restart(speaking),
             Mishap::Stopped => self.pair.signal(speaking, "CONT"),
+            Mishap::Link(_) => self.pair.trouble(Fault::None),
         }
         until_paired(&self.session, self.units()).await;
         self.swap(0).await;
@@ -178,50 +189,143 @@ impl Stand {
     }
 }
 
+impl Stand {
+    /// Waits until the connections of an instance are gone, or have been slow for as long as that would take.
+    async fn until_lost(&self, mishap: Mishap) {
+        let slow = mishap == Mishap::Link(Fault::Throttle);
+        let (begin, deadline) = (Instant::now(), Instant::now() + LIMIT);
+        while self.session.info().peers_zid().await.count() > 1 && !(slow && begin.elapsed() > LEASE * 2) {
+            assert!(Instant::now() < deadline, "{mishap:?}: still connected");
+            tokio::time::sleep(Duration::from_millis(5)).await;
+        }
+    }
+
+    /// Has the second instance speak: the one whose connections can be troubled.
+    async fn second_speaks(&mut self) {
+        until_compared(&self.session, self.units(), 50).await;
+        while self.speaker().await == 0 {
+            self.suffer(Mishap::Killed).await;
+        }
+    }
+
+    async fn nothing_differs(&self) {
+        let compared: Vec<_> =
+            reports(&self.session).await.into_iter().flat_map(|report| report.units).collect();
+        assert!(compared.iter().all(|unit| unit.ticks_differing == 0), "{compared:#?}");
+    }
+}
+
 #[tokio::test(flavor = "multi_thread")]
-#[ignore = "one run in two has a tick that says GAP where the other service saw none: just pair"]
+#[ignore = "2 of 10 runs fail: a standby that is joining waits 1.5 s; one did not end: just pair"]
 async fn a_killed_and_a_stopped_service_are_not_missed() {
     let mut stand = Stand::start(2, &configuration("")).await;
-    tokio::time::sleep(Duration::from_secs(1)).await;
+    until_compared(&stand.session, 2, 50).await;
     stand.swap(0).await;
-    for mishap in [Mishap::Killed, Mishap::Stopped, Mishap::Killed, Mishap::Stopped] {
+    for mishap in [Mishap::Killed, Mishap::Stopped] {
         let pause = stand.suffer(mishap).await;
         println!("{mishap:?}: longest pause {pause:?}");
         assert!(pause < Duration::from_secs(1), "{pause:?}");
-        tokio::time::sleep(Duration::from_millis(1200)).await;
     }
-    let compared: Vec<_> =
-        reports(&stand.session).await.into_iter().flat_map(|report| report.units).collect();
-    assert!(compared.iter().all(|unit| unit.ticks_differing == 0), "{compared:#?}");
-    assert!(
-        compared.iter().any(|unit| unit.role == Role::Standby && unit.ticks_compared > 50),
-        "{compared:#?}"
-    );
+    until_compared(&stand.session, 2, 50).await;
+    stand.nothing_differs().await;
     // What was done is in both state folders, whoever did it.
-    tokio::time::sleep(Duration::from_secs(2)).await;
-    let histories = [0, 1].map(|index| {
-        let entries = audit(&stand.pair.state(index)).into_iter();
-        let accepted = entries.filter_map(|entry| match entry.event {
-            AuditEvent::Accepted(accepted) => Some((entry.unit, accepted.revision, accepted.digest)),
-            _ => None,
-        });
-        accepted.collect::<std::collections::BTreeSet<_>>()
-    });
-    assert_eq!(histories[0], histories[1]);
-    assert_eq!(histories[0].len() as u64, stand.revisions.iter().sum::<u64>());
+    let deadline = Instant::now() + LIMIT;
+    loop {
+        let histories = [0, 1].map(|index| accepted(&stand, index));
+        let whole = histories[0].len() as u64 == stand.revisions.iter().sum::<u64>();
+        if whole && histories[0] == histories[1] {
+            break;
+        }
+        assert!(Instant::now() < deadline, "{histories:#?}");
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
     println!("doubled {}", stand.end().await);
 }
 
-/// `ISOTHERM_PAIR=UNITS,KILLS,STOPS` makes it shorter.
+/// What the audit file of an instance says was accepted: unit, revision, digest.
+fn accepted(stand: &Stand, index: usize) -> std::collections::BTreeSet<(Option<String>, u64, String)> {
+    let entries = audit(&stand.pair.state(index)).into_iter();
+    let accepted = entries.filter_map(|entry| match entry.event {
+        AuditEvent::Accepted(accepted) => Some((entry.unit, accepted.revision, accepted.digest.to_string())),
+        _ => None,
+    });
+    accepted.collect()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+#[ignore = "1 of 2 runs fails: a standby that is joining speaks with other bits: just pair"]
+async fn a_cut_link_loses_nothing() {
+    let mut stand = Stand::start(1, &configuration("")).await;
+    stand.second_speaks().await;
+    for fault in faults() {
+        let pause = stand.suffer(Mishap::Link(fault)).await;
+        println!("{fault:?} of the speaking instance's connections: longest pause {pause:?}");
+        stand.suffer(Mishap::Link(fault)).await;
+        println!("{fault:?} of the standby's connections: longest pause {pause:?}");
+        stand.second_speaks().await;
+    }
+    stand.nothing_differs().await;
+    println!("doubled {}", stand.end().await);
+}
+
+/// `ISOTHERM_PAIR` asks for all of them.
+fn faults() -> Vec<Fault> {
+    let all = [Fault::Cut, Fault::Stall, Fault::HalfOpen, Fault::Throttle];
+    if std::env::var_os("ISOTHERM_PAIR").is_some() { all.into() } else { vec![Fault::Cut] }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+#[ignore = "both speak, neither follows: just pair"]
+async fn of_two_active_services_either_may_be_killed_without_a_pause() {
+    let mut stand = Stand::start(1, &configuration("mode = \"active\"")).await;
+    until_compared(&stand.session, 1, 50).await;
+    let pause = stand.suffer(Mishap::Killed).await;
+    println!("active, killed: longest pause {pause:?}");
+    until_compared(&stand.session, 1, 50).await;
+    stand.nothing_differs().await;
+    // Both publish: a subscriber that takes the first of each tick drops the others, and counts them.
+    let doubled = stand.end().await;
+    assert!(doubled > 100, "{doubled}");
+}
+
+/// A source that publishes with `Block` is held by a stopped service no longer than by the lease of that service.
+#[tokio::test(flavor = "multi_thread")]
+#[ignore = "a full queue holds the source 5 s: just pair"]
+async fn a_stopped_service_holds_no_source_for_longer_than_its_lease() {
+    let stand = Stand::start(1, &configuration("")).await;
+    let stopped = 1 - stand.speaker().await;
+    let source = stand.pair.session().await;
+    let publisher =
+        source.declare_publisher("imu/PAIR-00/raw/health").congestion_control(CongestionControl::Block);
+    let publisher = publisher.await.unwrap();
+    stand.pair.signal(stopped, "STOP");
+    let (begin, mut longest) = (Instant::now(), Duration::ZERO);
+    while begin.elapsed() < Duration::from_secs(2) {
+        let at = Instant::now();
+        // No health reading: refused and counted, but it fills what is between the two.
+        publisher.put(vec![0_u8; 60_000]).await.unwrap();
+        longest = longest.max(at.elapsed());
+    }
+    println!("longest put {longest:?}");
+    assert!(longest > Duration::from_millis(100), "the source was not held at all: {longest:?}");
+    assert!(longest < Duration::from_millis(1500), "{longest:?}");
+    stand.pair.signal(stopped, "CONT");
+    until_paired(&stand.session, 1).await;
+    close(source, LIMIT).await.unwrap();
+}
+
+/// `ISOTHERM_PAIR=UNITS,KILLS,STOPS,CUTS` makes it shorter.
 #[tokio::test(flavor = "multi_thread")]
 #[ignore = "takes ten minutes: just pair"]
-async fn a_hundred_kills_and_fifty_stops_lose_nothing() {
-    let sizes = std::env::var("ISOTHERM_PAIR").unwrap_or_else(|_| "20,100,50".to_owned());
+async fn a_hundred_kills_fifty_stops_and_fifty_cuts_lose_nothing() {
+    let sizes = std::env::var("ISOTHERM_PAIR").unwrap_or_else(|_| "20,100,50,50".to_owned());
     let sizes: Vec<usize> = sizes.split(',').map(|size| size.parse().expect("a number")).collect();
-    let [units, kills, stops] = sizes[..] else { panic!("ISOTHERM_PAIR=UNITS,KILLS,STOPS") };
+    let [units, kills, stops, cuts] = sizes[..] else { panic!("ISOTHERM_PAIR=UNITS,KILLS,STOPS,CUTS") };
     let mut stand = Stand::start(units, &configuration("")).await;
-    tokio::time::sleep(Duration::from_secs(1)).await;
-    for (mishap, count) in [(Mishap::Killed, kills), (Mishap::Stopped, stops)] {
+    until_compared(&stand.session, units, 50).await;
+    for (mishap, count) in
+        [(Mishap::Killed, kills), (Mishap::Stopped, stops), (Mishap::Link(Fault::Cut), cuts)]
+    {
         let mut pauses = Vec::new();
         for _ in 0..count {
             let moment = stand.dice.below(1000);
@@ -238,12 +342,6 @@ async fn a_hundred_kills_and_fifty_stops_lose_nothing() {
             pauses.last()
         );
     }
-    let differing: u64 = reports(&stand.session)
-        .await
-        .iter()
-        .flat_map(|report| &report.units)
-        .map(|unit| unit.ticks_differing)
-        .sum();
-    assert_eq!(differing, 0);
+    stand.nothing_differs().await;
     println!("doubled {}", stand.end().await);
 }

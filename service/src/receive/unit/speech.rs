@@ -13,6 +13,7 @@ use isotherm_protocol::corrected::CorrectedBatch;
 use isotherm_protocol::journal::{JournalEntry, JournalEvent};
 use isotherm_protocol::key::Input;
 use isotherm_protocol::pair::{Role, UnitRole};
+use isotherm_protocol::raw::GyroBatch;
 use isotherm_protocol::replay::Follower;
 
 use super::{Plan, UnitActor};
@@ -21,9 +22,13 @@ use kept::Kept;
 
 /// How often the memory is asked for while none comes.
 const ASK_INTERVAL: Duration = Duration::from_millis(250);
-/// How long nothing of any other instance must be seen before one that has not joined speaks: both may have lost the network, and
-/// the other may be the one that went on.
-const LONELY: Duration = Duration::from_secs(5);
+/// How long nothing of any other instance must be seen before one that lacks something speaks: both may have lost the network, and
+/// the other may be the one that went on. Longer than it takes to connect again once the network is back.
+const LONELY: Duration = Duration::from_millis(1500);
+/// The same for one that lacks nothing and goes before all others: two that have yielded to each other.
+const MUTUAL: Duration = Duration::from_millis(100);
+/// How long after the other instance is lost what the producer sent before may still come.
+const LATE: Duration = Duration::from_millis(50);
 /// How long two speak at once before that is an alarm.
 const DOUBLED: Duration = Duration::from_secs(1);
 /// Entries of the journal that are remembered until they are in the audit file.
@@ -40,6 +45,21 @@ pub(crate) struct Standing {
     pub(crate) yields: bool,
     /// Since when no other instance is seen; `None` where one is.
     pub(crate) alone_since: Option<Instant>,
+    /// Whether another instance was seen once, and none is now.
+    pub(crate) deserted: bool,
+}
+
+/// What a unit's stream is worth when it begins to follow.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Footing {
+    /// It may lack what the other instance has heard.
+    Nothing,
+    /// It lacks nothing, and speaks again where nobody is heard.
+    Doubt,
+    /// It lacks nothing; another instance speaks.
+    All,
+    /// It has lost the other instance and its producer: the network, as far as it can know.
+    Isolated,
 }
 
 /// What a unit wants of its surroundings after a look.
@@ -75,10 +95,15 @@ pub(super) struct Speech {
     two_told: bool,
     /// The journal has to say what the stream knows: another instance's said it until now.
     memory_due: bool,
+    /// When the last other instance was lost.
+    lost_at: Option<Instant>,
+    /// The connection to the producer may have gone with the other instance: gyro ticks may be missing here that it has.
+    pub(super) uncertain: bool,
 }
 
 /// While another instance speaks.
 #[derive(Debug)]
+#[expect(clippy::struct_excessive_bools, reason = "each is known, or not, without the others")]
 struct Following {
     follower: Follower,
     since: Instant,
@@ -86,21 +111,33 @@ struct Following {
     asked: Option<Instant>,
     /// The stream is what it was when the unit still spoke: it need not have joined to speak again.
     doubt: bool,
+    /// It lacks nothing, as far as is known.
+    intact: bool,
+    /// Neither the other instance nor the producer is heard: swaps and commands are taken, for this may be the only one left.
+    isolated: bool,
+    /// Since when it has listened for others.
+    listens: Instant,
     also_out: bool,
     /// Calibrations that came with the journal, the newest last.
     changes: Vec<JournalEntry>,
 }
 
 impl Following {
+    /// The other's memory must be taken anew.
+    fn lose(&mut self) {
+        self.follower.lose();
+        (self.asked, self.intact) = (None, false);
+    }
+
     fn ns(&self, now: Instant) -> u64 {
         u64::try_from(now.saturating_duration_since(self.since).as_nanos()).unwrap_or(u64::MAX)
     }
 }
 
 impl UnitActor {
-    /// Another instance speaks for the unit, or may do so: nothing goes out from here on. With `doubt` the unit goes on to speak where
-    /// nothing is heard.
-    pub(crate) fn follow(&mut self, now: Instant, active: bool, doubt: bool) {
+    /// Another instance speaks for the unit, or may do so: nothing goes out from here on.
+    pub(crate) fn follow(&mut self, now: Instant, active: bool, footing: Footing) {
+        let doubt = footing == Footing::Doubt;
         if self.speech.following.is_some() {
             return;
         }
@@ -113,10 +150,32 @@ impl UnitActor {
             kept: Kept::default(),
             asked: None,
             doubt,
+            intact: footing != Footing::Nothing,
+            isolated: footing == Footing::Isolated,
+            listens: now,
             also_out: active && doubt,
             changes: Vec::new(),
         }));
         self.status_due = true;
+    }
+
+    /// The producer is heard after the other instance was lost. Where no tick is missing an isolated unit speaks on, as soon as nobody
+    /// else is heard; what is missing here another instance may have published.
+    pub(super) fn hear_again(&mut self, frame: &[u8], now: Instant) {
+        self.speech.uncertain = self.speech.lost_at.is_some_and(|since| now < since + LATE);
+        let first = codec::decode::<GyroBatch>(frame).ok().and_then(|batch| batch.ticks.into_iter().next());
+        let Some(first) = first else { return };
+        let last = self.stream.unit().observation().map(|seen| seen.sequence);
+        let same = first.series == self.stream.incoming_series();
+        let lacks = same && last.is_some_and(|last| first.sequence > last.saturating_add(1));
+        match &mut self.speech.following {
+            None if lacks => self.follow(now, false, Footing::Nothing),
+            Some(following) if following.isolated => {
+                (following.isolated, following.listens) = (false, now);
+                (following.doubt, following.intact) = (!lacks, !lacks);
+            }
+            _ => {}
+        }
     }
 
     /// Highest revision counter that the unit was given.
@@ -134,7 +193,7 @@ impl UnitActor {
     /// Whether this instance publishes the unit's ticks, and swaps and commands are its own.
     #[must_use]
     pub fn speaks(&self) -> bool {
-        self.speech.following.is_none()
+        self.speech.following.as_ref().is_none_or(|following| following.isolated)
     }
 
     /// Notes a frame before the stream is given it.
@@ -147,10 +206,17 @@ impl UnitActor {
 
     /// Where a corrected frame goes.
     pub(super) fn let_out(&mut self, frame: Vec<u8>) -> Result<(), zenoh::Error> {
-        let Some(following) = &mut self.speech.following else { return (self.outlet)(frame) };
-        let out = if following.also_out { (self.outlet)(frame.clone()) } else { Ok(()) };
-        following.kept.computed(frame, Instant::now());
-        out
+        // What an isolated unit gives out is the end of a stream that has stopped.
+        let following = self.speech.following.as_mut().filter(|following| !following.isolated);
+        let Some(following) = following else { return (self.outlet)(frame) };
+        let copy = following.also_out.then(|| frame.clone());
+        if following.kept.computed(frame, Instant::now()) && copy.is_some() {
+            // What is missing here the other may have: it says nothing until it has the other's memory.
+            following.also_out = false;
+            following.lose();
+            return Ok(());
+        }
+        copy.map_or(Ok(()), |frame| (self.outlet)(frame))
     }
 
     /// Another instance has published a frame of the unit.
@@ -159,7 +225,7 @@ impl UnitActor {
         if let Some(following) = &mut self.speech.following {
             following.kept.heard(batch, now);
             // It speaks, and what it knows is what counts.
-            following.doubt = false;
+            (following.doubt, following.isolated) = (false, false);
             return;
         }
         if standing.active {
@@ -175,7 +241,8 @@ impl UnitActor {
             self.speech.memory_due |= standing.alone_since.is_none();
         } else if standing.alone_since.is_none() && (ahead || (standing.yields && keeps_up)) {
             tracing::info!(unit = %self.stream.id(), sequence = tick.sequence, "another instance speaks: standby");
-            self.follow(now, false, false);
+            let footing = if self.speech.uncertain { Footing::Nothing } else { Footing::All };
+            self.follow(now, false, footing);
             if let Some(following) = &mut self.speech.following {
                 following.kept.heard(batch, now);
             }
@@ -191,7 +258,7 @@ impl UnitActor {
     pub(crate) fn hear_journal(&mut self, entry: JournalEntry, now: Instant, standing: &Standing) {
         // Another instance speaks too, and goes before this one.
         if matches!(entry.event, JournalEvent::Memory { .. }) && standing.yields && self.speaks() {
-            self.follow(now, standing.active, false);
+            self.follow(now, standing.active, Footing::All);
         }
         let Some(following) = &mut self.speech.following else { return };
         let ns = following.ns(now);
@@ -211,14 +278,14 @@ impl UnitActor {
         let had_joined = following.follower.has_joined();
         let (rebuilt, stuck) = following.follower.advance(&self.stream, ns);
         if stuck {
-            following.follower.lose();
-            following.asked = None;
+            following.lose();
         }
         let Some(rebuilt) = rebuilt else { return };
         if !rebuilt.exact {
             tracing::debug!(unit = %self.stream.id(), "what the other instance had heard is not known to the last frame");
         }
         following.kept.replace(rebuilt.frames, had_joined, now);
+        (following.isolated, following.intact) = (false, true);
         self.stream = rebuilt.stream;
         if !had_joined && following.follower.has_joined() {
             tracing::info!(unit = %self.stream.id(), revision = self.stream.revision().counter, "in step with the instance that speaks");
@@ -230,7 +297,17 @@ impl UnitActor {
     /// Looks at the unit as the clock goes on.
     pub(crate) fn watch_speech(&mut self, now: Instant, standing: &Standing) -> Wants {
         let mut wants = Wants::default();
+        let lost_at = standing.alone_since.filter(|_| standing.deserted);
+        if lost_at.is_some() && std::mem::replace(&mut self.speech.lost_at, lost_at) != lost_at {
+            self.speech.uncertain = true;
+        }
         if self.speech.following.is_none() {
+            if standing.deserted && self.stream_timeout.is_over(now) {
+                tracing::info!(unit = %self.stream.id(), "neither the other instance nor the producer is heard: standby");
+                self.follow(now, standing.active, Footing::Isolated);
+                self.speech.uncertain = true;
+                return wants;
+            }
             wants.alarm = self.two_speak(now);
             self.tell_memory();
             return wants;
@@ -247,27 +324,27 @@ impl UnitActor {
             let words = format!("unit {}, series {series}, sequence {tick}: {words}", self.stream.id());
             self.speech.last_difference = Some(words.clone());
             wants.alarm = Some(Alarm::OtherBits(words));
-            following.follower.lose();
-            following.asked = None;
+            following.lose();
         } else if settled.missed {
-            following.follower.lose();
-            following.asked = None;
+            following.lose();
         }
-        let alone = standing.alone_since.map(|since| now.saturating_duration_since(since));
+        // Of a network that comes back, the producer may be heard first.
+        let alone =
+            standing.alone_since.map(|since| now.saturating_duration_since(since.max(following.listens)));
+        let mutual = following.intact && !standing.yields && alone.is_none();
+        let silence = if mutual { MUTUAL } else { LONELY };
         let late = following.kept.is_late(now, standing.takeover);
         // Nor does a unit that sends nothing wait for ever.
-        let still_silent = now.saturating_duration_since(following.since) > standing.takeover * 2;
-        let lonely = alone.is_some_and(|alone| alone >= LONELY) || following.kept.is_silent(now, LONELY);
-        let is_due = lonely
-            || (joined && (alone.is_some() || late))
-            // Where the other was lost with the doubt, it may be the other that went on.
-            || (following.doubt && alone.is_none() && (late || still_silent));
-        if is_due {
+        let still_silent = now.saturating_duration_since(following.listens) > standing.takeover * 2;
+        let lonely = alone.is_some_and(|alone| alone >= LONELY) || following.kept.is_silent(now, silence);
+        let is_due =
+            lonely || (joined && (alone.is_some() || late)) || (following.doubt && (late || still_silent));
+        if is_due && !following.isolated {
             wants.spoke = !following.doubt;
             self.speak(now, standing.takeover);
             return wants;
         }
-        let ask = !joined && !following.doubt && !following.follower.has_memory();
+        let ask = !joined && !following.doubt && !following.isolated && !following.follower.has_memory();
         if ask && following.asked.is_none_or(|asked| now.saturating_duration_since(asked) >= ASK_INTERVAL) {
             following.asked = Some(now);
             wants.memory = true;
@@ -303,7 +380,7 @@ impl UnitActor {
 
     /// Has the journal say what the stream knows: instances that speak find out about one another by it.
     pub(crate) fn introduce(&mut self) {
-        self.speech.memory_due = self.speaks();
+        self.speech.memory_due = self.speech.following.is_none() && !self.speech.uncertain;
     }
 
     /// Puts what a unit was last given in the place of what this instance had given it.
@@ -340,6 +417,7 @@ impl UnitActor {
         let Speech { following, compared, differing, takeovers, last_difference, .. } = &self.speech;
         let role = match following {
             None => Role::Speaking,
+            Some(following) if following.isolated => Role::Speaking,
             Some(following) if following.follower.has_joined() || following.doubt => Role::Standby,
             Some(_) => Role::Joining,
         };
@@ -356,8 +434,8 @@ impl UnitActor {
     /// The stream has started anew after an alarm: what it was is not known any more.
     pub(super) fn lose_step(&mut self) {
         if let Some(following) = &mut self.speech.following {
-            following.follower.lose();
-            (following.asked, following.doubt) = (None, false);
+            following.lose();
+            following.doubt = false;
         }
     }
 }

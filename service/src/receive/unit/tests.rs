@@ -16,6 +16,7 @@ use crate::UnitTotals;
 use crate::control::calibrations::Installable;
 
 mod journal;
+mod speech;
 
 /// Frames of a tick: three gyros or three accelerometers, ticks of 5 ms.
 fn frames(sequence: u64) -> [(RawStream, Vec<u8>); 2] {

@@ -62,16 +62,17 @@ pub(super) struct Kept {
 }
 
 impl Kept {
-    /// A frame was computed.
-    pub(super) fn computed(&mut self, bytes: Vec<u8>, now: Instant) {
-        let batch = codec::decode::<CorrectedBatch>(&bytes);
-        let ids: Vec<_> = batch.map(|batch| batch.ticks.iter().map(id).collect()).unwrap_or_default();
+    /// A frame was computed; whether it says that ticks are missing.
+    pub(super) fn computed(&mut self, bytes: Vec<u8>, now: Instant) -> bool {
+        let ticks = codec::decode::<CorrectedBatch>(&bytes).map(|batch| batch.ticks).unwrap_or_default();
+        let ids: Vec<_> = ticks.iter().map(id).collect();
         let heard = ids.iter().any(|id| self.was_heard(id));
         self.heard_at.get_or_insert(now);
         self.frames.push_back(Frame { bytes, ids, at: now, heard });
         if heard {
             self.frames.iter_mut().for_each(|frame| frame.heard = true);
         }
+        ticks.iter().any(|tick| tick.missed > 0)
     }
 
     /// Whether a tick was heard: a line that is behind hears what it computes later.
@@ -155,6 +156,11 @@ impl Kept {
                 if heard.revision == batch.revision && are_same(&heard.tick, tick) {
                     continue;
                 }
+                if heard.tick.missed != tick.missed {
+                    // One of the two lacks what the other has: no other bits, and the one that speaks holds.
+                    settled.missed = true;
+                    continue;
+                }
                 settled.differing += 1;
                 let words = || difference(tick, batch.revision, &heard);
                 settled.difference.get_or_insert_with(|| (tick.sequence, words()));
@@ -172,11 +178,24 @@ impl Kept {
         settled
     }
 
-    /// The frames that were not heard, and those that were heard within the last `overlap`, to be published.
+    /// The frames that were not heard, and those that were heard within the last `overlap`, to be published. What the other published
+    /// otherwise is not said again.
     pub(super) fn take_from(&mut self, now: Instant, overlap: Duration) -> Vec<Vec<u8>> {
         let frames = std::mem::take(&mut self.frames).into_iter();
-        let recent = |frame: &Frame| !frame.heard || now.saturating_duration_since(frame.at) <= overlap * 2;
-        frames.filter(recent).map(|frame| frame.bytes).collect()
+        let recent = |frame: &Frame| now.saturating_duration_since(frame.at) <= overlap * 2;
+        let due = frames.filter(|frame| !frame.heard || (recent(frame) && self.agrees(frame)));
+        due.map(|frame| frame.bytes).collect()
+    }
+
+    /// Whether a frame is what was heard, as far as it was.
+    fn agrees(&self, frame: &Frame) -> bool {
+        let Ok(batch) = codec::decode::<CorrectedBatch>(&frame.bytes) else { return false };
+        let heard = |tick: &CorrectedTick| self.heard.get(&id(tick)).map(|heard| (heard, tick.clone()));
+        batch
+            .ticks
+            .iter()
+            .filter_map(heard)
+            .all(|(heard, tick)| heard.revision == batch.revision && are_same(&heard.tick, &tick))
     }
 }
 

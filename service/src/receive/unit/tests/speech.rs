@@ -1,0 +1,73 @@
+//! Who has lost the other instance does not say what that one may contradict.
+
+use super::*;
+
+const TAKEOVER: Duration = Duration::from_millis(20);
+
+fn ms(ms: u64) -> Duration {
+    Duration::from_millis(ms)
+}
+
+fn lost(at: Instant) -> Standing {
+    Standing { takeover: TAKEOVER, active: false, yields: false, alone_since: Some(at), deserted: true }
+}
+
+fn give(actor: &mut UnitActor, sequences: std::ops::Range<u64>, arrival: Instant) {
+    for sequence in sequences {
+        for (stream, frame) in frames(sequence) {
+            actor.receive(stream, &frame, arrival);
+        }
+    }
+}
+
+/// A unit that has published thirty ticks, and lost the other instance 10 ms later.
+fn deserted() -> (UnitActor, Sink, Instant) {
+    let (sink, start) = (Sink::default(), Instant::now());
+    let mut actor = actor(sink.outlet());
+    give(&mut actor, 0..30, start);
+    assert_eq!(sink.sequences(), (0..30).collect::<Vec<_>>());
+    assert!(!actor.watch_speech(start + ms(10), &lost(start + ms(10))).spoke);
+    (actor, sink, start)
+}
+
+#[test]
+fn what_came_behind_a_hole_waits_until_the_other_instance_would_be_there() {
+    let (mut actor, sink, start) = deserted();
+    give(&mut actor, 40..80, start + ms(40));
+    assert!(!actor.speaks());
+    assert!(!actor.watch_speech(start + ms(1000), &lost(start + ms(10))).spoke);
+    assert_eq!(sink.sequences(), (0..30).collect::<Vec<_>>(), "nothing that another may contradict");
+    // Nobody is there: late is better than never.
+    assert!(actor.watch_speech(start + ms(2000), &lost(start + ms(10))).spoke);
+    assert_eq!(sink.sequences(), (0..30).chain(40..80).collect::<Vec<_>>());
+}
+
+#[test]
+fn a_stream_without_a_hole_goes_on_at_once() {
+    let (mut actor, sink, start) = deserted();
+    give(&mut actor, 30..80, start + ms(90));
+    assert!(actor.speaks());
+    assert_eq!(sink.sequences(), (0..80).collect::<Vec<_>>());
+}
+
+#[test]
+fn an_isolated_unit_listens_shortly_and_speaks_on_where_nothing_is_missing() {
+    let (mut actor, sink, start) = deserted();
+    let standing = lost(start + ms(10));
+    actor.watch_speech(start + ms(1200), &standing);
+    assert!(actor.speaks(), "swaps and commands are its own: it may be the only one");
+    give(&mut actor, 30..40, start + ms(1300));
+    assert_eq!((actor.speaks(), sink.sequences().len()), (false, 30));
+    actor.watch_speech(start + ms(1300) + TAKEOVER * 3, &standing);
+    assert_eq!((actor.speaks(), sink.sequences()), (true, (0..40).collect::<Vec<_>>()));
+}
+
+#[test]
+fn an_isolated_unit_that_lacks_ticks_says_nothing_of_them() {
+    let (mut actor, sink, start) = deserted();
+    let standing = lost(start + ms(10));
+    actor.watch_speech(start + ms(1200), &standing);
+    give(&mut actor, 130..180, start + ms(1300));
+    actor.watch_speech(start + ms(1500), &standing);
+    assert_eq!((actor.speaks(), sink.sequences().len()), (false, 30));
+}
