@@ -144,9 +144,8 @@ impl ConvertArgs {
         }
         let documents = self.calibration.iter().map(|path| document(path)).collect::<Result<_, _>>()?;
         let mut sources: Vec<_> = vec![("log".to_owned(), names(&log.log))];
-        sources.extend(
-            log.mapping.as_ref().map(|mapping| ("mapping".to_owned(), mapping.display().to_string())),
-        );
+        sources
+            .extend(log.mapping_file().map(|mapping| ("mapping".to_owned(), mapping.display().to_string())));
         Ok(Conversion {
             files,
             part: log.part()?,
