@@ -1,5 +1,7 @@
 //! Simulated rate-table runs through the whole procedure.
 
+mod over_temperature;
+
 use isotherm_correction::earth::Place;
 use isotherm_log::offline::unit_id;
 use isotherm_log::text::LogEvent;
