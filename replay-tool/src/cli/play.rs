@@ -33,8 +33,8 @@ const MAX_COPIES: u32 = 999;
 #[derive(Debug, Args)]
 #[command(after_help = "Example, with `isotherm serve` running:\n  \
     isotherm-replay simulate --preset mems-chamber --duration 60 --out mems.csv\n  \
-    isotherm-replay play mems.csv --mapping mems.mapping.toml --unit MEMS-0001 --speed max\n  \
-    isotherm-replay play mems.csv -m mems.mapping.toml -u MEMS --speed max --batch 10 \
+    isotherm-replay play mems.csv --unit MEMS-0001 --speed max\n  \
+    isotherm-replay play mems.csv -u MEMS --speed max --batch 10 \
     --copies 20 --seed 1 --loss 0.01 --duplicate 0.01 --reorder 0.01\n\n\
     At any speed, ticks are sent no further ahead of what comes back corrected than --in-flight, so that none is lost.\n\
     Keys, where input and standard error are a terminal: space pauses and goes on; n or → (paused) plays up to the next gyro\n\
