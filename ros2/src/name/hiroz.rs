@@ -1,4 +1,4 @@
-//! The frozen tokens by the rules of another implementation: `hiroz-protocol` 0.2 (ZettaScale), as its source and tests state them
+//! The frozen tokens by the rules of another implementation: `hiroz-protocol` 0.2 (`ZettaScale`), as its source and tests state them
 //! (`format/rmw_zenoh.rs`, `tests/key_expr.rs`, `tests/qos.rs`). Its code does not run here: it would bring a second build of Zenoh.
 
 use serde_json::Value;
