@@ -114,7 +114,7 @@ async fn serve(args: ServeArgs) -> Result<Option<Totals>, ServiceError> {
 
     let state = open_store(settings.state.as_deref())?;
     let awaited = settings.session.awaited()?;
-    let metrics = Endpoint::start(&settings, awaited.clone()).await?;
+    let metrics = Endpoint::start(&settings.metrics, awaited.clone()).await?;
     let session = tokio::select! {
         session = open_session(settings.session.clone(), &awaited) => session?,
         // There is nothing to flush.

@@ -76,7 +76,7 @@ pub async fn start_with(
     session: Session,
 ) -> Result<RunningService, ServiceError> {
     let state = open_store(settings.state.as_deref())?;
-    let metrics = Endpoint::start(&settings, "its units".to_owned()).await?;
+    let metrics = Endpoint::start(&settings.metrics, "its units".to_owned()).await?;
     start_on(settings, calibrations, state, metrics, session).await
 }
 

@@ -222,7 +222,7 @@ pub(super) struct WebKeys {
     pub(super) enabled: Option<bool>,
     /// Whether it may change anything.
     pub(super) write: Option<bool>,
-    /// Further names under which it and the metrics may be asked for.
+    /// Further names under which browsers may ask for it.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(super) hosts: Vec<String>,
     /// File of the token.

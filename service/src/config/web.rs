@@ -9,7 +9,7 @@ pub struct WebSettings {
     pub enabled: bool,
     /// Whether it may change anything: swaps, rollbacks, commands.
     pub write: bool,
-    /// Names beside the address under which it and the metrics may be asked for, without a port.
+    /// Names beside loopback under which browsers may ask for it, without a port.
     pub hosts: Vec<String>,
     /// File of the token; `None` for `web-token` in the state folder, and a new one at each start where there is none.
     pub token_file: Option<PathBuf>,

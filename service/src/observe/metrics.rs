@@ -6,7 +6,6 @@
 //! | module | holds |
 //! |---|---|
 //! | `http` | connections, requests and their limits |
-//! | `hosts` | names under which it may be asked for |
 //! | `source` | what is looked at: one look at every unit |
 //! | `families` | every metric: name, meaning, and where its value comes from |
 //! | `page` | a look as `OpenMetrics` text |
@@ -21,7 +20,6 @@
 
 mod families;
 mod health;
-pub(crate) mod hosts;
 pub(crate) mod http;
 mod page;
 mod source;
@@ -38,12 +36,11 @@ use tokio::sync::Mutex;
 use tokio::task::JoinHandle;
 
 use crate::ServiceError;
-use crate::config::Settings;
+use crate::config::MetricsSettings;
 use crate::observe::web::Web;
 pub(crate) use source::Source;
 
 use health::{STOPPING, Watch};
-use hosts::Hosts;
 
 /// How long a request, or what hinders it, may take.
 #[derive(Debug, Clone, Copy)]
@@ -83,19 +80,22 @@ impl Endpoint {
     ///
     /// # Errors
     /// [`ServiceError::Metrics`] where others could reach it and that is not allowed, or it cannot be had.
-    pub(crate) async fn start(settings: &Settings, waits_for: String) -> Result<Option<Self>, ServiceError> {
+    pub(crate) async fn start(
+        settings: &MetricsSettings,
+        waits_for: String,
+    ) -> Result<Option<Self>, ServiceError> {
         Self::start_within(settings, waits_for, Watch::default(), Limits::default()).await
     }
 
     async fn start_within(
-        settings: &Settings,
+        settings: &MetricsSettings,
         waits_for: String,
         watch: Watch,
         limits: Limits,
     ) -> Result<Option<Self>, ServiceError> {
-        let Some(address) = settings.metrics.listen else { return Ok(None) };
+        let Some(address) = settings.listen else { return Ok(None) };
         let refused = |source| ServiceError::Metrics { address, source };
-        if !settings.metrics.admits(address) {
+        if !settings.admits(address) {
             let words =
                 "other machines could reach it; take 127.0.0.1, or set allow_remote = true in [metrics]";
             return Err(refused(io::Error::other(words)));
@@ -105,7 +105,6 @@ impl Endpoint {
         let exporter = Arc::new(Exporter {
             source: OnceLock::new(),
             web: OnceLock::new(),
-            hosts: Hosts::new(&settings.web.hosts),
             waits_for,
             started: Instant::now(),
             watch: Arc::new(Mutex::new(watch)),
@@ -173,8 +172,6 @@ struct Exporter {
     source: OnceLock<Source>,
     /// The console in the browser, likewise.
     web: OnceLock<Web>,
-    /// Names under which both may be asked for.
-    hosts: Hosts,
     /// What it waits for until then.
     waits_for: String,
     started: Instant,

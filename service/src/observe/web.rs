@@ -2,7 +2,7 @@
 //!
 //! | module | holds |
 //! |---|---|
-//! | `guard` | who may ask: origin, token |
+//! | `guard` | who may ask: host, origin, token |
 //! | `api` | what is answered to which request |
 //! | `view` | units and services as JSON |
 //! | `live` | ticks of one unit as they go by |
@@ -88,7 +88,7 @@ impl Web {
         let fleet = Arc::default();
         let feeding = tokio::spawn(feed(Arc::clone(&client), Arc::clone(&fleet)));
         Ok(Some(Self {
-            guard: Guard::new(&token),
+            guard: Guard::new(&token, &settings.web.hosts),
             write: settings.web.write,
             intake: Arc::clone(intake),
             instance: session.zid().to_string(),

@@ -10,8 +10,7 @@ use std::time::Duration;
 use http_body_util::Full;
 use hyper::body::{Bytes, Incoming};
 use hyper::header::{
-    ACCEPT, ACCEPT_ENCODING, ALLOW, CACHE_CONTROL, CONTENT_ENCODING, CONTENT_TYPE, HOST, HeaderMap,
-    HeaderName,
+    ACCEPT, ACCEPT_ENCODING, ALLOW, CACHE_CONTROL, CONTENT_ENCODING, CONTENT_TYPE, HeaderMap, HeaderName,
 };
 use hyper::http::HeaderValue;
 use hyper::server::conn::http1;
@@ -118,24 +117,18 @@ async fn answer(
 ) -> Result<Answer, Infallible> {
     // Of HEAD hyper sends the head alone.
     let reads = [Method::GET, Method::HEAD].contains(request.method());
-    let host = exporter.hosts.asked(request.headers(), local);
-    // A browser always names the host; a probe that names none is no page of another site.
-    let foreign = host.as_ref().err().copied().filter(|_| request.headers().contains_key(HOST));
-    let answer = match (request.uri().path(), foreign) {
-        ("/metrics" | "/healthz" | "/livez" | "/readyz", Some((status, words))) => {
-            text(status, PLAIN, format!("{words}\n"))
-        }
-        ("/metrics", _) if reads => metrics(&request, exporter).await,
-        ("/healthz", _) if reads => healthz(exporter).await,
-        ("/livez", _) if reads => livez(exporter),
-        ("/readyz", _) if reads => readyz(exporter),
-        ("/metrics" | "/healthz" | "/livez" | "/readyz", None) => {
+    let answer = match request.uri().path() {
+        "/metrics" if reads => metrics(&request, exporter).await,
+        "/healthz" if reads => healthz(exporter).await,
+        "/livez" if reads => livez(exporter),
+        "/readyz" if reads => readyz(exporter),
+        "/metrics" | "/healthz" | "/livez" | "/readyz" => {
             let mut answer = text(StatusCode::METHOD_NOT_ALLOWED, PLAIN, "only GET and HEAD\n");
             answer.headers_mut().insert(ALLOW, HeaderValue::from_static("GET, HEAD"));
             answer
         }
         _ => match exporter.web.get() {
-            Some(web) => web.answer(request, host).await,
+            Some(web) => web.answer(request, local).await,
             None => None,
         }
         .unwrap_or_else(|| {

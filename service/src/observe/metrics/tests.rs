@@ -11,13 +11,13 @@ use isotherm_protocol::key::UnitId;
 use isotherm_protocol::raw::{AccelBatch, GyroBatch, TemperatureBatch};
 
 use super::*;
-use crate::config::{MetricsSettings, Settings};
+use crate::config::Settings;
 use crate::control::calibrations::Calibrations;
 use crate::control::swap_manager::ControlStatus;
 use crate::pair::Pair;
 use crate::receive::intake::{Intake, OutletMaker};
 use checker::Page;
-use client::{connect, get, read, say};
+use client::{connect, get, read};
 
 #[path = "../../../tests/service/metrics/checker.rs"]
 mod checker;
@@ -35,12 +35,8 @@ struct Stand {
     sequence: u64,
 }
 
-fn listening(listen: Option<SocketAddr>, allow_remote: bool) -> Settings {
-    Settings { metrics: MetricsSettings { listen, allow_remote }, ..Settings::default() }
-}
-
-fn on_loopback() -> Settings {
-    listening(Some("127.0.0.1:0".parse().unwrap()), false)
+fn on_loopback() -> MetricsSettings {
+    MetricsSettings { listen: Some("127.0.0.1:0".parse().unwrap()), allow_remote: false }
 }
 
 fn pair(settings: &Settings) -> Arc<Pair> {
@@ -276,11 +272,11 @@ async fn a_connection_ends_at_its_limit_whatever_goes_on() {
 #[tokio::test]
 async fn an_address_that_others_could_reach_is_not_taken() {
     let listen = Some("0.0.0.0:0".parse().unwrap());
-    let start = async |settings: Settings| Endpoint::start(&settings, String::new()).await;
-    let error = start(listening(listen, false)).await.unwrap_err();
+    let start = async |settings| Endpoint::start(&settings, String::new()).await;
+    let error = start(MetricsSettings { listen, allow_remote: false }).await.unwrap_err();
     assert!(error.to_string().contains("0.0.0.0:0") && error.to_string().contains("allow_remote"), "{error}");
-    assert!(start(listening(listen, true)).await.unwrap().is_some());
-    assert!(start(Settings::default()).await.unwrap().is_none());
+    assert!(start(MetricsSettings { listen, allow_remote: true }).await.unwrap().is_some());
+    assert!(start(MetricsSettings::default()).await.unwrap().is_none());
 }
 
 /// Units, all of one document, that have corrected some ticks.
@@ -365,26 +361,5 @@ fn a_page_of_two_hundred_units_is_whole_quick_and_of_bounded_size() {
         assert!(text.len() < 2_000_000, "{}", text.len());
         // Generous: other tests keep the machine busy.
         assert!(time < Duration::from_secs(1), "{time:?}");
-    }
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn a_page_of_another_site_reads_nothing_under_a_name_of_its_own() {
-    let mut settings = on_loopback();
-    settings.web.hosts = vec!["bench.example".to_owned()];
-    let endpoint = Endpoint::start(&settings, String::new()).await.unwrap().unwrap();
-    let address = endpoint.address();
-    let status = |path: &str, host: &str| say(address, &format!("GET {path} HTTP/1.1\r\n{host}\r\n")).status;
-    for path in ["/metrics", "/livez", "/readyz", "/healthz"] {
-        let own = status(path, &format!("Host: {address}\r\n"));
-        assert!([200, 503].contains(&own), "{path}: {own}");
-        assert_eq!(status(path, "Host: bench.example:80\r\n"), own, "{path}");
-        for strange in ["Host: evil.example\r\n", "Host: 127.0.0.1.evil.example\r\n", "Host: x@localhost\r\n"]
-        {
-            assert_eq!(status(path, strange), 421, "{path}, {strange}");
-        }
-        // Probes of HTTP/1.0 name no host, browsers always do.
-        let probe = say(address, &format!("GET {path} HTTP/1.0\r\n\r\n"));
-        assert_eq!(probe.status, own, "{path}");
     }
 }

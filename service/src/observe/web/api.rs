@@ -13,9 +13,8 @@ use isotherm_protocol::key::{self, UnitId};
 use serde::Deserialize;
 use serde_json::json;
 
-use super::guard::Guard;
+use super::guard::{Guard, Refusal};
 use super::{Web, assets, live};
-use crate::observe::metrics::hosts::Refusal;
 use crate::observe::metrics::http::{Answer, JSON, packed, text};
 use crate::operator::ConsoleError;
 
@@ -94,11 +93,11 @@ impl<'p> Route<'p> {
 }
 
 impl Web {
-    /// Answers a request to a host, where it may be asked for under that name; `None` for what is not the console's.
+    /// Answers a request that came to the address `local`; `None` for what is not the console's.
     pub(crate) async fn answer(
         &self,
         request: Request<Incoming>,
-        host: Result<String, Refusal>,
+        local: std::net::SocketAddr,
     ) -> Option<Answer> {
         let path = request.uri().path().to_owned();
         let asset = assets::find(&path);
@@ -106,7 +105,7 @@ impl Web {
         if asset.is_none() && !path.starts_with("/api/") {
             return None;
         }
-        let mut answer = match host {
+        let mut answer = match self.guard.host(request.headers(), local) {
             Err(refusal) => refused(refusal),
             Ok(host) => match (asset, route) {
                 (Some(asset), _) if is_read(request.method()) => {

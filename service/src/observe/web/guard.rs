@@ -1,30 +1,54 @@
-//! Who may ask: no page of another site, and nobody without the token. The host is known by then: `metrics::hosts`.
+//! Who may ask: no page of another site, whatever name it has the browser believe, and nobody without the token.
+
+use std::net::{IpAddr, SocketAddr};
 
 use hyper::StatusCode;
-use hyper::header::{AUTHORIZATION, CONTENT_TYPE, HeaderMap, HeaderName, ORIGIN};
+use hyper::header::{AUTHORIZATION, CONTENT_TYPE, HOST, HeaderMap, HeaderName, ORIGIN};
 use hyper::http::HeaderValue;
+use hyper::http::uri::Authority;
 use isotherm_protocol::digest::Digest;
-
-use crate::observe::metrics::hosts::{Refusal, one};
 
 /// What browsers say of where a request comes from.
 const FETCH_SITE: HeaderName = HeaderName::from_static("sec-fetch-site");
+
+/// Why a request is not answered.
+pub(super) type Refusal = (StatusCode, &'static str);
 
 /// Tells who may ask from who may not.
 pub(super) struct Guard {
     /// Compared instead of the token: how long that takes says nothing of the token.
     token: Digest,
+    hosts: Vec<String>,
 }
 
 impl std::fmt::Debug for Guard {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Guard").finish_non_exhaustive()
+        f.debug_struct("Guard").field("hosts", &self.hosts).finish_non_exhaustive()
     }
 }
 
 impl Guard {
-    pub(super) fn new(token: &str) -> Self {
-        Self { token: Digest::of(token.as_bytes()) }
+    pub(super) fn new(token: &str, hosts: &[String]) -> Self {
+        let hosts = hosts.iter().map(|host| host.to_ascii_lowercase()).collect();
+        Self { token: Digest::of(token.as_bytes()), hosts }
+    }
+
+    /// The host, with its port, that the asker believes to speak to, where that is this service: a name that somebody else has the
+    /// browser resolve to this address (DNS rebinding) is none of it. `local` is the address that was connected to.
+    pub(super) fn host(&self, headers: &HeaderMap, local: SocketAddr) -> Result<String, Refusal> {
+        let refused = (StatusCode::MISDIRECTED_REQUEST, "this host is not served: [web] hosts can name it");
+        let host = one(headers, &HOST).ok_or(refused)?.to_ascii_lowercase();
+        let authority: Authority = host.parse().map_err(|_| refused)?;
+        let name = authority.host();
+        let ip = local.ip().to_canonical();
+        let own = match ip {
+            IpAddr::V4(ip) => name == ip.to_string(),
+            IpAddr::V6(ip) => name == format!("[{ip}]"),
+        };
+        let loopback = ip.is_loopback() && ["localhost", "127.0.0.1", "[::1]"].contains(&name);
+        let known = own || loopback || self.hosts.iter().any(|host| host == name);
+        // "name@host" is a host to some and a name to others.
+        if known && !host.contains('@') { Ok(host) } else { Err(refused) }
     }
 
     /// Whether somebody with the token asks, and no page of another site.
@@ -74,6 +98,13 @@ fn is_own(headers: &HeaderMap, host: &str) -> bool {
     })
 }
 
+/// A header that is there once.
+fn one<'h>(headers: &'h HeaderMap, name: &HeaderName) -> Option<&'h str> {
+    let mut values = headers.get_all(name).iter();
+    let value = values.next()?;
+    if values.next().is_some() { None } else { value.to_str().ok() }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -88,8 +119,46 @@ mod tests {
         headers
     }
 
+    fn host(host: &str, local: &str) -> bool {
+        let guard = Guard::new(TOKEN, &["Bench.example".to_owned(), "[fd00::7]".to_owned()]);
+        guard.host(&headers(&[("host", host)]), local.parse().unwrap()).is_ok()
+    }
+
+    #[test]
+    fn only_hosts_that_are_known_are_served() {
+        for known in
+            ["127.0.0.1:9464", "localhost:9000", "LOCALHOST", "[::1]:80", "bench.example", "[FD00::7]:1"]
+        {
+            assert!(host(known, "127.0.0.1:9464"), "{known}");
+            assert!(host(known, "[::1]:9464"), "{known}");
+        }
+        for strange in [
+            "evil.example",
+            "127.0.0.1.evil.example:9464",
+            "localhost.evil.example",
+            "",
+            "127.0.0.2:1",
+            "0.0.0.0:9464",
+            "x@localhost",
+            "localhost@evil.example",
+            "localhost:80:80",
+            "bench.example.",
+            "[::2]",
+            "2130706433",
+        ] {
+            assert!(!host(strange, "127.0.0.1:9464"), "{strange}");
+        }
+        assert!(host("10.0.0.7:9464", "10.0.0.7:9464"));
+        assert!(!host("localhost:9464", "10.0.0.7:9464"), "another machine's localhost is not this one");
+        assert!(host("10.0.0.7", "[::ffff:10.0.0.7]:9464"));
+        let guard = Guard::new(TOKEN, &[]);
+        let twice = headers(&[("host", "localhost"), ("host", "evil.example")]);
+        assert!(guard.host(&twice, "127.0.0.1:1".parse().unwrap()).is_err());
+        assert!(guard.host(&headers(&[]), "127.0.0.1:1".parse().unwrap()).is_err());
+    }
+
     fn caller(lines: &[(&'static str, &str)]) -> u16 {
-        let guard = Guard::new(TOKEN);
+        let guard = Guard::new(TOKEN, &[]);
         guard.caller(&headers(lines), "localhost:9464").map_or_else(|(status, _)| status.as_u16(), |()| 200)
     }
 
