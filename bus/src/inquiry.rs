@@ -8,7 +8,7 @@ use isotherm_protocol::journal::JournalPart;
 use tokio::sync::mpsc::unbounded_channel;
 use tokio::time::{Instant, timeout, timeout_at};
 use zenoh::Session;
-use zenoh::query::{ConsolidationMode, QueryTarget, Reply};
+use zenoh::query::{ConsolidationMode, Querier, QueryTarget, Reply};
 use zenoh::sample::Sample;
 
 use crate::BusError;
@@ -43,6 +43,34 @@ pub async fn ask_all(
     Ok((all, in_time))
 }
 
+/// A querier of all who answer `key`, each within `limit`, once one of them is there; `None` where nobody is within `limit`.
+///
+/// # Errors
+/// [`BusError::Declare`].
+pub(crate) async fn querier_matched(
+    session: &Session,
+    key: &str,
+    limit: Duration,
+) -> Result<Option<Querier<'static>>, BusError> {
+    let deadline = Instant::now() + limit;
+    let declare = |source| BusError::Declare { key: key.to_owned(), source };
+    let querier = session
+        .declare_querier(key.to_owned())
+        .target(QueryTarget::All)
+        .consolidation(ConsolidationMode::None)
+        .timeout(limit)
+        .await
+        .map_err(declare)?;
+    let listener = querier.matching_listener().await.map_err(declare)?;
+    let mut matching = querier.matching_status().await.map_err(declare)?.matching();
+    while !matching {
+        let Ok(Ok(status)) = timeout_at(deadline, listener.recv_async()).await else { return Ok(None) };
+        matching = status.matching();
+    }
+    drop(listener);
+    Ok(Some(querier))
+}
+
 /// Why a question has no answer.
 #[derive(Debug)]
 pub enum Unanswered {
@@ -67,20 +95,8 @@ pub async fn ask(
 ) -> Result<Vec<Vec<u8>>, Unanswered> {
     let deadline = Instant::now() + limit;
     let declare = |source| Unanswered::Bus(BusError::Declare { key: key.to_owned(), source });
-    let querier = session
-        .declare_querier(key.to_owned())
-        .target(QueryTarget::All)
-        .consolidation(ConsolidationMode::None)
-        .timeout(limit)
-        .await
-        .map_err(declare)?;
-    let listener = querier.matching_listener().await.map_err(declare)?;
-    let mut matching = querier.matching_status().await.map_err(declare)?.matching();
-    while !matching {
-        let status = timeout_at(deadline, listener.recv_async()).await;
-        let Ok(Ok(status)) = status else { return Err(Unanswered::Silence) };
-        matching = status.matching();
-    }
+    let querier = querier_matched(session, key, limit).await.map_err(Unanswered::Bus)?;
+    let querier = querier.ok_or(Unanswered::Silence)?;
     let mut get = querier.get().parameters(parameters);
     if let Some(payload) = payload {
         get = get.payload(payload);
