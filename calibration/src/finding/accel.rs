@@ -2,6 +2,7 @@
 
 use std::fmt::{self, Display, Formatter};
 
+use super::words::AXES;
 use crate::drift::figures::{fixed, short};
 
 /// What was found of an accelerometer. Temperatures are in °C, forces in m/s², angles in ″.
@@ -112,7 +113,7 @@ impl Display for AccelKind {
             Self::MadeWorse { axis } => write!(
                 f,
                 "the output along {} would become worse: did the unit stand as --pitch and --roll say?",
-                ["x", "y", "z"].get(*axis).copied().unwrap_or_default()
+                AXES.get(*axis).copied().unwrap_or_default()
             ),
             Self::AxisMoved { deg_c, logs: [before, after], turn: [turn, sigma] } => write!(
                 f,

@@ -7,7 +7,7 @@ use crate::drift::figures::{counted, fixed, short};
 use crate::modes::document::main_axis;
 use crate::rates::plateaus::Plateau;
 
-const AXES: [&str; 3] = ["x", "y", "z"];
+pub(super) const AXES: [&str; 3] = ["x", "y", "z"];
 /// Plateaus that are listed at most, and the share of the fastest one below which one is not worth telling.
 const MOST: usize = 12;
 const SEEN: f64 = 0.01;

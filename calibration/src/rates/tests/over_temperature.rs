@@ -1,58 +1,22 @@
 //! Runs at several temperatures.
 
-use isotherm_log::offline::unit_id;
-use isotherm_log::text::LogEvent;
 use isotherm_protocol::document::Document;
-use isotherm_simulator::chamber::Profile;
+use isotherm_simulator::Scenario;
 use isotherm_simulator::instrument::Gyros;
-use isotherm_simulator::motion::Path;
-use isotherm_simulator::presets::mems_chamber;
-use isotherm_simulator::{Scenario, Simulation};
 
-use super::super::make::{Wanted, make};
 use super::super::steps::listed;
-use super::{AXES, RATES, STEP_S, place};
+use super::{AXES, RATES, made_from, place, quiet, run_of};
 use crate::finding::Kind;
 use crate::runs::Run;
 
 /// A run of steps at a temperature of the chamber, of gyros whose axes turn and whose scale changes with it.
 fn run_at(seed: u64, axis: [f64; 3], deg_c: f64) -> Run {
-    let mut events = Vec::new();
-    let mut offset = 0_u64;
-    for (number, rate) in RATES.iter().flat_map(|rate| [0.0, *rate]).enumerate() {
-        let mut scenario = at(seed.wrapping_mul(1000) + u64::try_from(number).unwrap(), deg_c);
-        scenario.start_ns = i64::try_from(number).unwrap() * 10_000_000_000;
-        if rate != 0.0 {
-            scenario.motion.path = Path::ConstantRate { axis, rate_deg_per_s: rate };
-        }
-        let mut last = 0;
-        for step in Simulation::new(&scenario).unwrap() {
-            let mut tick = step.gyro;
-            last = tick.sequence + 1;
-            tick.sequence += offset;
-            let readings = step.temperatures.into_iter();
-            events.extend(
-                readings
-                    .filter(|reading| number == 0 || reading.time.as_ns() > scenario.start_ns)
-                    .map(LogEvent::Temperature),
-            );
-            events.push(LogEvent::Gyro { output: scenario.instrument.gyros.output_kind(), tick });
-        }
-        offset += last;
-    }
-    Run::of_events(format!("at {deg_c}"), unit_id("MEMS-0001").unwrap(), events)
+    run_of(&format!("at {deg_c}"), (seed, axis), |seed| at(seed, deg_c), |reading| reading)
 }
 
 /// The unit in a chamber of this temperature, with its thermometers.
 fn at(seed: u64, deg_c: f64) -> Scenario {
-    let mut scenario =
-        Scenario { chamber: Profile::constant(deg_c), duration_s: STEP_S, ..mems_chamber(seed) };
-    scenario.instrument.thermal_step_s = 1.0;
-    if let Gyros::Mems(gyros) = &mut scenario.instrument.gyros {
-        for gyro in gyros {
-            gyro.noise.angle_random_walk_rad_per_sqrt_s *= 0.1;
-        }
-    }
+    let mut scenario = quiet(seed, deg_c);
     for (sensor, row) in scenario.instrument.gyro_orientation.rows_per_k.iter_mut().enumerate() {
         // Some ″/°C, another one for every gyro.
         *row = [0.0; 3];
@@ -86,19 +50,7 @@ fn several_temperatures_give_the_slopes_of_axes_and_weights() {
     let axes = ["x", "y", "z"].map(str::to_owned);
     let axes: Vec<String> = axes.iter().cycle().take(9).cloned().collect();
     let steps = listed(&axes, [&RATES, &[]], [9, 0]).unwrap();
-    let base = warm_base();
-    let place = place();
-    let wanted = Wanted {
-        runs: &runs,
-        judge: &[],
-        steps: &steps,
-        scale_known: true,
-        base: &base,
-        place: &place,
-        table_ppm: 0.0,
-        with_bias: false,
-    };
-    let made = make(&wanted, || ()).unwrap();
+    let made = made_from(&warm_base(), &runs, &steps, &place()).unwrap();
     let over = made.over_temperature.as_ref().unwrap();
     assert_eq!(over.levels.len(), 3);
     let scenario = at(0, 20.0);
@@ -144,18 +96,7 @@ fn a_temperature_that_does_not_tell_all_axes_is_told_and_counts_with_the_others(
         .collect();
     let axes = ["x", "y", "z", "x"].map(str::to_owned);
     let steps = listed(&axes, [&RATES, &[]], [4, 0]).unwrap();
-    let (base, place) = (warm_base(), place());
-    let wanted = Wanted {
-        runs: &runs,
-        judge: &[],
-        steps: &steps,
-        scale_known: true,
-        base: &base,
-        place: &place,
-        table_ppm: 0.0,
-        with_bias: false,
-    };
-    let made = make(&wanted, || ()).unwrap();
+    let made = made_from(&warm_base(), &runs, &steps, &place()).unwrap();
     assert!(made.over_temperature.is_none());
     let told = made.warnings.iter().any(|found| matches!(found.kind, Kind::NotEachTemperature { .. }));
     assert!(told, "{:?}", made.warnings);
