@@ -20,7 +20,7 @@ pub struct Outgoing {
     length: usize,
     /// What stood before its ticks: so will the next one begin, mostly until a temperature was read.
     head: Vec<u8>,
-    head_of: Option<(HeadKey, usize)>,
+    head_of: Option<HeadKey>,
     /// Ticks are kept as they are, and written when a frame is asked for.
     as_ticks: bool,
     ticks: Vec<CorrectedTick>,
@@ -43,13 +43,14 @@ struct Frame {
     last: Last,
 }
 
-/// What a head follows from, beside the number of ticks.
+/// What a head follows from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct HeadKey {
+struct HeadKey {
     /// Counter of the revision.
-    pub(super) revision: u64,
+    revision: u64,
     /// State of the temperatures.
-    pub(super) temperatures: u64,
+    temperatures: u64,
+    ticks: usize,
 }
 
 /// The last of some ticks.
@@ -129,7 +130,7 @@ impl Outgoing {
             self.open = frame;
             return None;
         }
-        let head_of = Some((HeadKey { revision: frame.last.revision, temperatures }, frame.count));
+        let head_of = Some(HeadKey { revision: frame.last.revision, temperatures, ticks: frame.count });
         if self.head_of != head_of {
             self.head_of = head_of;
             self.head.clear();
