@@ -1,4 +1,4 @@
-//! Asking every service at once, and waiting for all that is answered.
+//! Asking services, and waiting for what they answer.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -6,9 +6,9 @@ use std::time::Duration;
 use isotherm_protocol::codec;
 use isotherm_protocol::journal::JournalPart;
 use tokio::sync::mpsc::unbounded_channel;
-use tokio::time::timeout;
+use tokio::time::{Instant, timeout, timeout_at};
 use zenoh::Session;
-use zenoh::query::{ConsolidationMode, QueryTarget, Reply};
+use zenoh::query::{ConsolidationMode, Querier, QueryTarget, Reply};
 use zenoh::sample::Sample;
 
 use crate::BusError;
@@ -41,6 +41,82 @@ pub async fn ask_all(
     });
     let in_time = collected.await.is_ok();
     Ok((all, in_time))
+}
+
+/// A querier of all who answer `key`, each within `limit`, once one of them is there; `None` where nobody is within `limit`.
+///
+/// # Errors
+/// [`BusError::Declare`].
+pub(crate) async fn querier_matched(
+    session: &Session,
+    key: &str,
+    limit: Duration,
+) -> Result<Option<Querier<'static>>, BusError> {
+    let deadline = Instant::now() + limit;
+    let declare = |source| BusError::Declare { key: key.to_owned(), source };
+    let querier = session
+        .declare_querier(key.to_owned())
+        .target(QueryTarget::All)
+        .consolidation(ConsolidationMode::None)
+        .timeout(limit)
+        .await
+        .map_err(declare)?;
+    let listener = querier.matching_listener().await.map_err(declare)?;
+    let mut matching = querier.matching_status().await.map_err(declare)?.matching();
+    while !matching {
+        let Ok(Ok(status)) = timeout_at(deadline, listener.recv_async()).await else { return Ok(None) };
+        matching = status.matching();
+    }
+    drop(listener);
+    Ok(Some(querier))
+}
+
+/// Why a question has no answer.
+#[derive(Debug)]
+pub enum Unanswered {
+    /// It cannot be asked.
+    Bus(BusError),
+    /// Nobody answered in time.
+    Silence,
+    /// The service answers with an error: its words.
+    Refused(String),
+}
+
+/// Every answer to a question, once somebody is there to answer it; all within `limit`.
+///
+/// # Errors
+/// [`Unanswered`].
+pub async fn ask(
+    session: &Session,
+    key: &str,
+    parameters: &str,
+    payload: Option<&[u8]>,
+    limit: Duration,
+) -> Result<Vec<Vec<u8>>, Unanswered> {
+    let deadline = Instant::now() + limit;
+    let declare = |source| Unanswered::Bus(BusError::Declare { key: key.to_owned(), source });
+    let querier = querier_matched(session, key, limit).await.map_err(Unanswered::Bus)?;
+    let querier = querier.ok_or(Unanswered::Silence)?;
+    let mut get = querier.get().parameters(parameters);
+    if let Some(payload) = payload {
+        get = get.payload(payload);
+    }
+    let replies = get.await.map_err(declare)?;
+    let mut answers = Vec::new();
+    loop {
+        match timeout_at(deadline, replies.recv_async()).await {
+            Ok(Ok(reply)) => match reply.into_result() {
+                Ok(sample) => answers.push(sample.payload().to_bytes().into_owned()),
+                Err(error) => {
+                    let words = String::from_utf8_lossy(&error.payload().to_bytes()).into_owned();
+                    return Err(Unanswered::Refused(words));
+                }
+            },
+            Err(_) if answers.is_empty() => return Err(Unanswered::Silence),
+            // The end of the answers, or of the time for them.
+            Ok(Err(_)) | Err(_) => return Ok(answers),
+        }
+    }
 }
 
 /// The frames of each memory among the answers of journals, whole and in the order of their parts, with the key that they came on.

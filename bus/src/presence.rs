@@ -11,10 +11,10 @@ use tokio::sync::Notify;
 use tokio::time::{Instant, timeout_at};
 use zenoh::Session;
 use zenoh::pubsub::{Publisher, Subscriber};
-use zenoh::query::{ConsolidationMode, QueryTarget};
 use zenoh::sample::{Sample, SampleKind};
 
 use crate::BusError;
+use crate::inquiry::querier_matched;
 
 /// Waits until a service answers on the status topic of all units.
 ///
@@ -39,24 +39,7 @@ async fn wait_for_answer(session: &Session, key: &str, limit: Duration) -> Resul
     let declare = |source| BusError::Declare { key: key.to_owned(), source };
     let missing = || BusError::NoService { key: key.to_owned(), waited: limit };
     let deadline = Instant::now() + limit;
-
-    let querier = session
-        .declare_querier(key.to_owned())
-        .target(QueryTarget::All)
-        .consolidation(ConsolidationMode::None)
-        .timeout(limit)
-        .await
-        .map_err(declare)?;
-    let listener = querier.matching_listener().await.map_err(declare)?;
-    if !querier.matching_status().await.map_err(declare)?.matching() {
-        loop {
-            match timeout_at(deadline, listener.recv_async()).await {
-                Ok(Ok(status)) if status.matching() => break,
-                Ok(Ok(_)) => {}
-                Ok(Err(_)) | Err(_) => return Err(missing()),
-            }
-        }
-    }
+    let querier = querier_matched(session, key, limit).await?.ok_or_else(missing)?;
     let replies = querier.get().await.map_err(declare)?;
     // A service without units replies nothing; the end of the replies is the answer.
     loop {

@@ -2,6 +2,7 @@
 
 mod bar;
 mod batch;
+mod board;
 mod diff;
 mod drift;
 mod impact;
@@ -41,6 +42,7 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Board(board::BoardArgs),
     Diff(diff::DiffArgs),
     Drift(drift::DriftArgs),
     Impact(impact::ImpactArgs),
@@ -59,6 +61,7 @@ enum Command {
 /// Runs the command that the arguments name.
 fn run(cli: Cli) -> Result<(), Error> {
     match cli.command {
+        Command::Board(args) => args.run(),
         Command::Diff(args) => args.run(),
         Command::Drift(args) => args.run(),
         Command::Impact(args) => args.run(),

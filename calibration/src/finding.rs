@@ -1,7 +1,10 @@
 //! What can be wrong with logs, or is worth telling of them: a kind with its numbers, and its place. Words for it are made in one place,
 //! `finding/words.rs`; whoever decides, and whoever tests, looks at the kind.
 
+mod accel;
 mod words;
+
+pub use accel::AccelKind;
 
 use crate::rates::plateaus::Plateau;
 use crate::swapped::Looks;
@@ -22,6 +25,8 @@ pub struct Place {
     pub log: Option<usize>,
     /// Name of the gyro.
     pub gyro: Option<String>,
+    /// Name of the accelerometer.
+    pub accel: Option<String>,
 }
 
 /// What was found. Rates are in °/s, windows in s since the beginning of the log, shares of one.
@@ -181,6 +186,13 @@ pub enum Kind {
         /// The axis, 0…2.
         axis: usize,
     },
+    /// The table was at several temperatures, and the steps of one of them do not tell weights and axes of all gyros.
+    NotEachTemperature {
+        /// The temperature (°C).
+        deg_c: f64,
+    },
+    /// Something of an accelerometer.
+    Accel(AccelKind),
     /// What the correction of some logs passed over, in its words.
     Passed {
         /// The sentence.
@@ -201,13 +213,22 @@ impl Kind {
     /// In a log.
     #[must_use]
     pub fn in_log(self, log: usize) -> Finding {
-        Finding { place: Place { log: Some(log), gyro: None }, kind: self }
+        Finding { place: Place { log: Some(log), ..Place::default() }, kind: self }
     }
 
     /// Of a gyro.
     #[must_use]
     pub fn of_gyro(self, name: &str) -> Finding {
-        Finding { place: Place { log: None, gyro: Some(name.to_owned()) }, kind: self }
+        Finding { place: Place { gyro: Some(name.to_owned()), ..Place::default() }, kind: self }
+    }
+}
+
+impl AccelKind {
+    /// Of an accelerometer.
+    #[must_use]
+    pub fn of(self, name: &str) -> Finding {
+        let place = Place { accel: Some(name.to_owned()), ..Place::default() };
+        Finding { place, kind: Kind::Accel(self) }
     }
 }
 

@@ -18,6 +18,7 @@
 //! | [`swapped`] | columns that look swapped |
 //! | [`validate`] | a document judged on other logs |
 //! | [`positions`], [`tumble`] | accelerometers on a stand; a unit tumbled by hand |
+//! | [`board`] | ratio of the accelerometers' board from two-position cycles |
 //! | [`modes`] | drift polynomials and switch parameters of a mode-reversed laser gyro |
 //! | [`rates`] | scale factor, asymmetry, linearity and axes from a rate table |
 //! | [`thermal`] | bias over temperature from runs at rest |
@@ -25,6 +26,7 @@
 //! | [`error`], [`cli`] | what can go wrong; the command line |
 
 pub mod allan;
+pub mod board;
 pub mod cli;
 pub mod diff;
 pub mod drift;

@@ -9,6 +9,7 @@
 //! | [`model`], [`fit`] | the outputs as a function of what is to be found; finding it |
 //! | [`temperature`], [`doubts`], [`measure`] | levels and channels; what is doubtful about a result, and about its unit of measure |
 //! | [`analysis`], [`document`], [`provenance`], [`judged`], [`report`], [`charts`] | from runs to a result; as a document, with where it comes from; what it leaves; in words and diagrams |
+//! | [`hysteresis`] | axes that do not come back after a thermal cycle |
 //! | [`budget`] | what a planned calibration will come to |
 //! | `sense` | which way sensors point beside what is stated |
 
@@ -21,6 +22,7 @@ pub mod doubts;
 pub mod faults;
 pub mod fit;
 pub mod gravity;
+pub mod hysteresis;
 pub mod judged;
 pub mod matching;
 pub mod measure;

@@ -8,6 +8,7 @@
 //! | [`matching`], `checks`, `attitude` | which plateau is which step; whether the unit turned and stood as stated |
 //! | [`earth`] | Earth rate in a case that turns |
 //! | [`solve`] | least squares over the steps, one gyro at a time |
+//! | [`over_temperature`], `figure` | axes and scale factors over several temperatures, beside the accelerometers' |
 //! | [`make`], [`document`] | the whole procedure; the document |
 
 mod attitude;
@@ -15,10 +16,12 @@ pub mod bins;
 mod checks;
 pub mod document;
 pub mod earth;
+mod figure;
 mod judge;
 pub mod make;
 pub mod matching;
 mod measure;
+pub mod over_temperature;
 pub mod plateaus;
 mod read;
 mod report;

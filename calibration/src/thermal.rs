@@ -43,7 +43,7 @@ pub mod select;
 pub mod sequential;
 pub mod settings;
 pub mod stand;
-mod target;
+pub(crate) mod target;
 pub mod thermometer;
 mod told;
 

@@ -26,7 +26,7 @@ pub struct ThermalFilterParts {
     pub smoothing_s: f64,
     /// h of the three-point backward differences (s); rounded to whole grid points, at least one.
     pub derivative_step_s: f64,
-    /// Age at which a temperature counts as stale (s).
+    /// Age at which a temperature counts as stale (s). A silence that is also longer than h/2 starts the channel anew.
     pub stale_after_s: f64,
     /// Half width of the blend between run-up and braking, in Ṫ·T̈ (°C²/s³).
     pub branch_dead_band: f64,
@@ -63,6 +63,16 @@ impl ThermalFilter {
         #[expect(clippy::cast_precision_loss, reason = "at most MAX_GRID_POINTS")]
         let points = self.derivative_points as f64;
         points * self.grid_step.as_s()
+    }
+
+    /// Longest silence that a straight line bridges: the stale limit, or h/2 where that is longer.
+    ///
+    /// Readings on both sides hold the line: over a silence G it errs by at most T̈·G²/8, always to the same side. With G = h/2 that
+    /// moves Ṫ by at most T̈·h/16 and T̈ by a quarter. Starting anew would lose both whole, for the warm-up.
+    fn longest_bridged(&self) -> Span {
+        #[expect(clippy::cast_possible_wrap, reason = "at most MAX_GRID_POINTS")]
+        let points = self.derivative_points as i64;
+        self.stale_after.max(Span::from_ns(self.grid_step.as_ns().saturating_mul(points) / 2))
     }
 
     /// Grid points after a (re)start until the second derivative rests on readings alone.
@@ -135,7 +145,7 @@ pub struct ThermalState {
 pub enum Verdict {
     /// Taken; the channel moved on by this many grid points (0 where it lies between two).
     Taken(usize),
-    /// Taken as the first of a new series: after turn-on, a restart or a long silence.
+    /// Taken as the first of a new series: after turn-on, a restart or a silence that nothing bridges.
     Restarted,
     /// Not finite, out of the sensor's range or a spike: the last value is held.
     Rejected,
@@ -239,7 +249,7 @@ impl ChannelMemory {
             return Verdict::Restarted;
         };
         let (from, to) = (last_time.as_ns().div_euclid(step), time.as_ns().div_euclid(step));
-        if time.since(last_time) > filter.stale_after {
+        if time.since(last_time) > filter.longest_bridged() {
             self.refill(filter, temperature);
             on_point(&self.state);
             return Verdict::Restarted;
@@ -394,6 +404,54 @@ mod tests {
             }
         }
         assert_eq!(early.state(), late.state());
+    }
+
+    /// Stale after 3 s, h = 20 s: 3.5 s without a reading once cost the 85 s of a warm-up.
+    #[test]
+    fn a_silence_of_half_a_derivative_step_is_bridged_though_stale() {
+        let filter = ThermalFilter::new(&ThermalFilterParts {
+            grid_step_s: 1.0,
+            smoothing_s: 5.0,
+            derivative_step_s: 20.0,
+            stale_after_s: 3.0,
+            branch_dead_band: 1e-9,
+            assumed_deg_c: 20.0,
+        });
+        // A chamber's ramp that bends: 3 °C/min, and 1 °C/min faster each minute.
+        let celsius = |t: f64| 20.0 + 0.05 * t + 0.5 * t * t / 3600.0;
+        let acceleration = 1.0 / 3600.0;
+        let series = |silence: f64| {
+            let mut memory = ChannelMemory::new(&filter);
+            let mut verdict = Verdict::Restarted;
+            for i in 0_u32..300 {
+                let t = f64::from(i);
+                if t <= 150.0 || t >= 150.0 + silence {
+                    let time = Timestamp::from_ns(Span::from_s(t).as_ns());
+                    verdict = memory.read(&channel(), &filter, time, (celsius(t) - 10.0) / 20.0, |_| {});
+                    if t > 150.0 {
+                        return (memory, verdict, i);
+                    }
+                }
+            }
+            (memory, verdict, 300)
+        };
+        for silence in [1.0, 4.0, 10.0] {
+            let (memory, verdict, i) = series(silence);
+            let state = memory.state().unwrap();
+            assert_eq!(verdict, Verdict::Taken(usize::try_from(i - 150).unwrap()));
+            assert!(!memory.warming_up(&filter), "{silence} s");
+            // Smoothing delays by two points; the line may add T̈·h/16.
+            let rate = 0.05 + acceleration * (f64::from(i) - 2.0);
+            assert!(
+                (state.rate - rate).abs() <= acceleration * 20.0 / 16.0,
+                "{silence} s: {state:?}, {rate}"
+            );
+            let after = Timestamp::from_ns(Span::from_s(150.0 + silence).as_ns());
+            let (before, ..) = series(f64::INFINITY);
+            assert_eq!(before.stale(&filter, after), silence > 3.0, "{silence} s");
+        }
+        let (memory, verdict, _) = series(11.0);
+        assert_eq!((verdict, memory.warming_up(&filter)), (Verdict::Restarted, true));
     }
 
     #[test]

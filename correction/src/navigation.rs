@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::sample::{CorrectedTick, SensorFlags, Sensors, TickFlags};
 use crate::units::Span;
-use crate::vector::plus;
+use crate::vector::{cross, plus};
 
 /// Most ticks of one step.
 pub const MAX_STEP_TICKS: u16 = 1000;
@@ -236,11 +236,6 @@ fn rotation(angle: [f64; 3], velocity: [f64; 3]) -> [f64; 3] {
     let once = cross(angle, velocity);
     let twice = cross(angle, once);
     plus(once.map(|c| c * first), twice.map(|c| c * second))
-}
-
-/// Vector product.
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 #[cfg(test)]

@@ -239,11 +239,16 @@ impl Orientation {
         rows.iter().take(self.sensors).map(|row| dot(row, &v)).collect()
     }
 
-    /// What one sensor reads for `v`, as [`forward`](Self::forward); 0 where there is none.
-    pub(crate) fn along(&self, sensor: usize, temperature_deg_c: f64, v: &[f64; 3]) -> f64 {
+    /// What each sensor reads for a vector of its own, whose axes are lanes, as [`forward`](Self::forward); 0 where there is none.
+    #[inline]
+    pub(crate) fn along<const N: usize>(&self, temperature_deg_c: f64, v: &[[f64; N]; 3]) -> [f64; N] {
         let excess = self.clamped(temperature_deg_c) - self.reference_deg_c;
-        let lane = self.rows.get(sensor).zip(self.slopes_per_deg_c.get(sensor));
-        lane.map_or(0.0, |(row, slope)| dot(&array::from_fn(|axis| row[axis] + slope[axis] * excess), v))
+        let (rows, slopes) = (&self.rows, &self.slopes_per_deg_c);
+        let axis = |axis: usize| -> [f64; N] {
+            array::from_fn(|lane| (rows[lane][axis] + slopes[lane][axis] * excess) * v[axis][lane])
+        };
+        let [x, y, z] = [axis(0), axis(1), axis(2)];
+        array::from_fn(|lane| x[lane] + y[lane] + z[lane])
     }
 
     /// C(T), with T clamped to the fitted range and NaN standing for the reference.

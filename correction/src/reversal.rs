@@ -101,7 +101,12 @@ impl Substitution {
     /// For terms that need to know before [`tick`](Self::tick) is called (the perimeter servo).
     #[must_use]
     pub fn is_lost(&self, reversal: &Reversal, input: &TickInput) -> bool {
-        self.left_from(*reversal, input) > 0
+        (self.left > 0 || self.may_switch(input)) && self.left_from(*reversal, input) > 0
+    }
+
+    /// Whether a tick says anything of a switch.
+    fn may_switch(&self, input: &TickInput) -> bool {
+        input.switch_command || input.mode != self.mode
     }
 
     /// Whether no transition is running and no angle waits to be restored.
@@ -120,6 +125,13 @@ impl Substitution {
     /// are missing before it the switch may have come later than the gap's start, so all n are counted
     /// from here. Ticks missing inside a transition count as ticks of it.
     pub fn tick(&mut self, reversal: &Reversal, input: TickInput, increments: &mut [f64]) -> TickFlags {
+        if self.is_settled() && !input.restart && !self.may_switch(&input) {
+            self.change_due = false;
+            if let Some(reading) = Reading::new(input.end_time, input.duration, increments) {
+                self.history.push(reading);
+            }
+            return TickFlags::empty();
+        }
         let mut flags = TickFlags::empty();
         if input.restart {
             if !(self.lost.is_empty() && self.pending.is_none()) {

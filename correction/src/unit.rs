@@ -186,12 +186,12 @@ impl Unit {
     /// Gives out a tick that is the next, where its accelerometers are at hand; whether they were.
     #[inline]
     fn pass_next<E: FnMut(&CorrectedTick) + ?Sized>(&mut self, tick: &GyroTick, emit: &mut E) -> bool {
-        let accel = self.accels.meets(tick, &mut self.pipeline.counters);
-        let met = accel.is_some();
+        let met = self.accels.meets(tick, &mut self.pipeline.counters);
         if !met && self.pipeline.expects_accels() {
             return false;
         }
         self.gyros.passed(tick);
+        let accel = self.accels.front().filter(|_| met);
         self.pipeline.begin(tick, false);
         self.pipeline.pass(Released { tick, missed: 0, restart: false }, true, accel, emit);
         self.accels.gyro_released(tick.end_time, met);
@@ -199,13 +199,20 @@ impl Unit {
     }
 
     /// Gives out every tick that waits and need not wait any longer.
+    #[inline]
     fn release<E: FnMut(&CorrectedTick) + ?Sized>(&mut self, flushing: bool, emit: &mut E) {
+        if !self.gyros.is_empty() {
+            self.release_waiting(flushing, emit);
+        }
+    }
+
+    fn release_waiting<E: FnMut(&CorrectedTick) + ?Sized>(&mut self, flushing: bool, emit: &mut E) {
         let window = self.pipeline.settings.pairing_window;
         while let Some(front) = self.gyros.front(window, flushing) {
             if front.restart {
                 self.accels.starts_anew(front.tick.end_time, &mut self.pipeline.counters);
             }
-            let met = self.accels.meets(front.tick, &mut self.pipeline.counters).is_some();
+            let met = self.accels.meets(front.tick, &mut self.pipeline.counters);
             if !met && self.pipeline.expects_accels() && !front.expired {
                 return;
             }

@@ -9,7 +9,7 @@ mod meaning;
 #[cfg(test)]
 mod tests;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 pub use encoding::Encoding;
 use isotherm_correction::sample::{ChannelName, OutputKind};
@@ -294,6 +294,26 @@ impl Mapping {
     /// Every problem that the mapping has, in the order of its lines.
     pub fn parse(text: &str, file: &str) -> Result<Self, Vec<Problem>> {
         meaning::parse(text, file)
+    }
+
+    /// Where the mapping of a log stands by default: `zeeman.csv.gz` has `zeeman.mapping.toml` beside it.
+    #[must_use]
+    pub fn path_beside(log: &Path) -> PathBuf {
+        let plain = if log.extension().is_some_and(|extension| extension == "gz") {
+            log.with_extension("")
+        } else {
+            log.to_owned()
+        };
+        plain.with_extension("mapping.toml")
+    }
+
+    /// The mapping's file of a text log: the one given, else the one beside the log's first file where there is one.
+    #[must_use]
+    pub fn path_of(given: Option<&Path>, log: &[PathBuf]) -> Option<PathBuf> {
+        given.map(Path::to_owned).or_else(|| {
+            let beside = Self::path_beside(log.first()?);
+            beside.is_file().then_some(beside)
+        })
     }
 }
 

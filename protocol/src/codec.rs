@@ -21,7 +21,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 use thiserror::Error;
 
 pub(crate) use reader::{Body, Stretch};
-pub(crate) use writer::{MAX_NUMBER, Writer, append};
+pub(crate) use writer::{MAX_NUMBER, Writer, append, append_text};
 
 use crate::version::Versions;
 
@@ -33,7 +33,7 @@ pub const MAX_TICKS: usize = 4096;
 const HEADER: usize = 2;
 /// CRC-32 behind.
 const CHECKSUM: usize = 4;
-/// What is read at once (bytes): 255 and the longest step from there.
+/// What is read or written at once (bytes): 255 and the longest step from there.
 pub(crate) const WINDOW: usize = 272;
 /// Highest bit of each byte: set where a number goes on behind it.
 const GOES_ON: u64 = 0x8080_8080_8080_8080;

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 pub use isotherm_correction::sample::CorrectedTick;
 
-use crate::codec::{CodecError, Kind, MAX_NUMBER, MAX_TICKS, Message, append, bounded, whole};
+use crate::codec::{CodecError, Kind, MAX_NUMBER, MAX_TICKS, Message, append, append_text, bounded, whole};
 use crate::raw::MAX_CHANNELS;
 use crate::version::{self, Versions};
 
@@ -85,27 +85,25 @@ impl<'a, T: Iterator<Item = (&'a ChannelName, [f64; 2])> + Clone> Head<'a, T> {
     /// Appends it to a frame.
     pub(crate) fn append(self, frame: &mut Vec<u8>) {
         let Self { unit, revision, temperatures, ticks } = self;
-        let (count, names) =
-            temperatures.clone().fold((0, 0), |(count, names), (name, _)| (count + 1, names + name.len()));
-        let numbers = (count + 4) * MAX_NUMBER + (2 * count + 1) * size_of::<f64>();
-        append(frame, unit.len() + names + numbers, |to| {
-            to.text(unit);
+        append_text(frame, unit);
+        append(frame, |to| {
             to.u64(revision.counter);
             to.bytes(revision.digest);
-            to.length(count);
-            for (channel, state) in temperatures {
-                to.text(channel);
-                to.f64s(&state);
-            }
-            to.length(ticks);
+            to.length(temperatures.clone().count());
         });
+        for (channel, state) in temperatures {
+            append_text(frame, channel);
+            append(frame, |to| to.f64s(&state));
+        }
+        append(frame, |to| to.length(ticks));
     }
 }
 
-/// Longest form of a tick without its parity, in bytes.
-const MOST_OF_TICK: usize = 8 * MAX_NUMBER + 6 * size_of::<f64>() + 2 * MAX_SENSORS + 4;
 /// Longest form of a tick, in bytes.
-pub(crate) const MAX_TICK: usize = MOST_OF_TICK + 2 * MAX_PARITY * size_of::<f64>();
+pub(crate) const MAX_TICK: usize =
+    8 * MAX_NUMBER + 6 * size_of::<f64>() + 2 * MAX_SENSORS + 4 + 2 * MAX_PARITY * size_of::<f64>();
+// It is written in one part.
+const _: () = assert!(MAX_TICK <= 255);
 
 /// Whether two ticks are the same to the bit, their revision's counter left out; numbers that are none are what their bits are.
 #[must_use]
@@ -120,8 +118,7 @@ pub fn are_same(one: &CorrectedTick, other: &CorrectedTick) -> bool {
 
 /// Appends one tick: the one place where corrected ticks become bytes.
 pub(crate) fn append_tick(frame: &mut Vec<u8>, tick: &CorrectedTick) {
-    let parities = tick.gyro_parity.len() + tick.accel_parity.len();
-    append(frame, MOST_OF_TICK + parities * size_of::<f64>(), |to| {
+    append(frame, |to| {
         to.u64(tick.sequence);
         to.i64(tick.end_time.as_ns());
         to.u64(tick.duration.as_ns().unsigned_abs());

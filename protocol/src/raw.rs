@@ -33,8 +33,10 @@ pub type GyroBatch = RawBatch<GyroTick>;
 /// Raw accelerometer ticks.
 pub type AccelBatch = RawBatch<AccelTick>;
 
-/// Most bytes of a tick: its times, lengths and modes, and three numbers for each sensor.
-const MOST_BYTES: usize = (8 + 3 * MAX_SENSORS) * MAX_NUMBER;
+/// Most bytes of a tick: its times, lengths and modes, a reading of each sensor and two half-period counts.
+const MOST_BYTES: usize = 8 * MAX_NUMBER + MAX_SENSORS * (size_of::<f64>() + 2 * 5);
+// It is written in one part.
+const _: () = assert!(MOST_BYTES <= 255);
 /// Fewest bytes of a tick: its times, kind and number of readings.
 const FEWEST_BYTES: usize = 4;
 
@@ -50,7 +52,7 @@ impl<T: RawTick> Message for RawBatch<T> {
 
     fn write_body(&self, frame: &mut Vec<u8>) -> Result<(), CodecError> {
         let first = self.ticks.first().map(RawTick::parts);
-        append(frame, 3 * MAX_NUMBER, |to| {
+        append(frame, |to| {
             to.u64(first.map_or(0, |first| first.sequence));
             if T::HAS_SERIES {
                 to.u64(first.map_or(0, |first| first.series));
@@ -59,7 +61,7 @@ impl<T: RawTick> Message for RawBatch<T> {
         });
         for (index, tick) in self.ticks.iter().enumerate() {
             let mut fits = true;
-            append(frame, MOST_BYTES, |to| {
+            append(frame, |to| {
                 let Parts { times: (end_time, duration), readings, .. } = tick.parts();
                 to.i64(end_time.as_ns());
                 to.u64(duration.as_ns().unsigned_abs());

@@ -35,7 +35,7 @@ pub use revisions::InForce;
 use revisions::Revisions;
 
 use crate::codec::{self, CodecError};
-use crate::corrected::Revision;
+use crate::corrected::{Head, Revision};
 use crate::key::{Input, RawStream, UnitId};
 use crate::raw::{self, HealthBatch};
 use crate::reference::Reference;
@@ -140,6 +140,7 @@ impl UnitStream {
 
     fn change(&mut self, change: Change, revision: Revision, label: Label) -> Option<u64> {
         self.revisions.give(revision, label, change.slew);
+        self.outgoing.forget_head();
         let replaced = self.watching_pre_launch(|unit| unit.schedule(change));
         let in_force = self.unit.calibration().map(|(_, counter)| counter);
         let pending = self.unit.pending().map(|(counter, _)| counter);
@@ -301,10 +302,12 @@ impl UnitStream {
             return false;
         }
         let Self { id, unit, revisions, outgoing, .. } = self;
-        let temperatures = unit.temperatures().take(raw::MAX_CHANNELS);
-        let temperatures = temperatures.map(|(name, state)| (name, [state.temperature, state.rate]));
-        let revision = |counter| revisions.revision(counter);
-        let last = outgoing.next_frame(frame, id.as_str(), revision, temperatures);
+        let last = outgoing.next_frame(frame, unit.temperature_changes(), |head, counter, ticks| {
+            let temperatures = unit.temperatures().take(raw::MAX_CHANNELS);
+            let temperatures = temperatures.map(|(name, state)| (name, [state.temperature, state.rate]));
+            let revision = revisions.revision(counter);
+            Head { unit: id.as_str(), revision, temperatures, ticks }.append(head);
+        });
         self.note_taken(last);
         last.is_some()
     }

@@ -153,4 +153,6 @@ fn plain(chunk: &str) -> String {
 }
 
 #[cfg(test)]
+mod hiroz;
+#[cfg(test)]
 mod tests;

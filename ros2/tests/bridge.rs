@@ -34,6 +34,9 @@ use zenoh::pubsub::{Publisher, Subscriber};
 use zenoh::qos::CongestionControl;
 use zenoh::query::QueryTarget;
 
+#[path = "bridge/elsewhere.rs"]
+mod elsewhere;
+
 /// Every wait ends here at the latest.
 const LIMIT: Duration = Duration::from_secs(60);
 const UNIT: &str = "MEMS-0001";
@@ -56,24 +59,33 @@ struct Bridge {
     ready: Value,
 }
 
+/// Writes the shipped mapping, but for what must not be lost here, documents and a configuration of the service.
+fn prepare(folder: &Path) {
+    let mapping = std::fs::read_to_string(root().join("config/ros2.toml")).unwrap();
+    let changed = mapping.replace("history = \"keep_last\"", "history = \"keep_all\"");
+    assert_ne!(changed, mapping);
+    std::fs::write(folder.join("ros2.toml"), changed).unwrap();
+    std::fs::create_dir_all(folder.join("units")).unwrap();
+    let document = std::fs::read_to_string(root().join(format!("config/calibration/{UNIT}.toml"))).unwrap();
+    for unit in [UNIT, NATIVE] {
+        let own = document.replace(&format!("unit = \"{UNIT}\""), &format!("unit = \"{unit}\""));
+        std::fs::write(folder.join(format!("units/{unit}.toml")), own).unwrap();
+    }
+    std::fs::write(folder.join("service.toml"), "calibrations = \"units\"\ncongestion = \"block\"\n")
+        .unwrap();
+}
+
 impl Bridge {
-    /// Starts it with the shipped mapping, but for what must not be lost here.
+    /// Starts it with a service in its process.
     fn start(folder: &Path, arguments: &[&str]) -> Self {
-        let mapping = std::fs::read_to_string(root().join("config/ros2.toml")).unwrap();
-        let changed = mapping.replace("history = \"keep_last\"", "history = \"keep_all\"");
-        assert_ne!(changed, mapping);
-        std::fs::write(folder.join("ros2.toml"), changed).unwrap();
-        std::fs::create_dir_all(folder.join("units")).unwrap();
-        let document =
-            std::fs::read_to_string(root().join(format!("config/calibration/{UNIT}.toml"))).unwrap();
-        for unit in [UNIT, NATIVE] {
-            let own = document.replace(&format!("unit = \"{UNIT}\""), &format!("unit = \"{unit}\""));
-            std::fs::write(folder.join(format!("units/{unit}.toml")), own).unwrap();
-        }
-        std::fs::write(folder.join("service.toml"), "calibrations = \"units\"\ncongestion = \"block\"\n")
-            .unwrap();
+        prepare(folder);
+        Self::launch(folder, &[&["--config", "service.toml"], arguments].concat())
+    }
+
+    /// Starts it in a folder that is prepared.
+    fn launch(folder: &Path, arguments: &[&str]) -> Self {
         let mut child = Command::new(env!("CARGO_BIN_EXE_isotherm-ros"))
-            .args(["bridge", "ros2.toml", "--config", "service.toml", "--announce", "--json"])
+            .args(["bridge", "ros2.toml", "--announce", "--json"])
             .args(["--log-level", "error", "--domain", "7"])
             .args(arguments)
             .current_dir(folder)

@@ -135,7 +135,8 @@ impl PositionsArgs {
             ("--scale", self.planned.scale),
         ];
         positive.into_iter().try_for_each(|(name, value)| above_0(name, value))?;
-        for (name, value) in [("--run-out", self.run_out), ("--settle", self.settle)] {
+        let planned = ("--hysteresis", self.planned.hysteresis);
+        for (name, value) in [("--run-out", self.run_out), ("--settle", self.settle), planned] {
             if !(value.is_finite() && value >= 0.0) {
                 return Err(Error::Usage(format!("{name} is {value}, must be a number, 0 or above")));
             }

@@ -32,7 +32,7 @@ pub(crate) struct LogArgs {
 /// How logs are read.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct Reading {
-    /// Column mapping of a text log (TOML); ready ones are in config/mappings
+    /// Column mapping of a text log (TOML) (default: LOG with .mapping.toml); ready ones are in config/mappings
     #[arg(long, short, value_name = "FILE")]
     pub(crate) mapping: Option<PathBuf>,
     /// The unit, where a recording has several; of a text log its serial (default: that of the document)
@@ -157,8 +157,8 @@ impl Reading {
     }
 
     fn text_mapping(&self, logs: &[PathBuf]) -> Result<Mapping, Error> {
-        if let Some(mapping) = &self.mapping {
-            return Ok(Mapping::load(mapping)?);
+        if let Some(mapping) = Mapping::path_of(self.mapping.as_deref(), logs) {
+            return Ok(Mapping::load(&mapping)?);
         }
         for path in logs {
             let about =

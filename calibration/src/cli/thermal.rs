@@ -14,7 +14,7 @@ use crate::error::Error;
 use crate::provenance::{command_line, origin};
 use crate::report::FitReport;
 use crate::thermal::{Fitted, Method, Settings, Terms, fit};
-use stands::StandArgs;
+pub(super) use stands::StandArgs;
 
 /// Bias and scale factor over temperature from chamber runs of units at rest or on a rate table
 #[derive(Debug, Args)]
@@ -71,6 +71,8 @@ pub(super) struct ThermalArgs {
 enum MethodArg {
     /// Plateaus first, then rate, then acceleration of the temperature (the paper's)
     Sequential,
+    /// Plateaus, then the rate alone (what the paper compares with)
+    Rate,
     /// All terms at once, as much of each as holds on stretches that were left out
     #[value(alias = "lag")]
     Joint,
@@ -172,6 +174,7 @@ impl ThermalArgs {
         Ok(Settings {
             method: match self.method {
                 MethodArg::Sequential => Method::Sequential,
+                MethodArg::Rate => Method::Rate,
                 MethodArg::Joint => Method::Joint,
             },
             terms: if self.terms == TermsArg::All { Terms::All } else { Terms::Auto },

@@ -7,7 +7,7 @@ use crate::drift::figures::{counted, fixed, short};
 use crate::modes::document::main_axis;
 use crate::rates::plateaus::Plateau;
 
-const AXES: [&str; 3] = ["x", "y", "z"];
+pub(super) const AXES: [&str; 3] = ["x", "y", "z"];
 /// Plateaus that are listed at most, and the share of the fastest one below which one is not worth telling.
 const MOST: usize = 12;
 const SEEN: f64 = 0.01;
@@ -23,6 +23,9 @@ impl Display for Place {
         if let Some(log) = self.log {
             write!(f, "log {}: ", log + 1)?;
         }
+        if let Some(name) = &self.accel {
+            write!(f, "accelerometer {name}: ")?;
+        }
         self.gyro.as_ref().map_or(Ok(()), |gyro| write!(f, "gyro {gyro}: "))
     }
 }
@@ -31,6 +34,12 @@ impl Display for Kind {
     #[expect(clippy::too_many_lines, reason = "one sentence for each kind")]
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         match self {
+            Self::Accel(kind) => kind.fmt(f),
+            Self::NotEachTemperature { deg_c } => write!(
+                f,
+                "the steps at {} °C do not turn about three axes: no change over temperature is fitted, and all temperatures count as one",
+                fixed(*deg_c, 1)
+            ),
             Self::NoStepStated { log } => {
                 write!(f, "no step is stated of {log}: name it in --steps, or leave it out")
             }

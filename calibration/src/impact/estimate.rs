@@ -97,3 +97,9 @@ pub fn residual(
 pub fn without_trend(parts: &DriftParts) -> DriftParts {
     DriftParts { trend_sigma_rad_per_s2: 0.0, ..*parts }
 }
+
+/// The same parts without the Markov part.
+#[must_use]
+pub fn trend_alone(parts: &DriftParts) -> DriftParts {
+    DriftParts { sigma_rad_per_s: 0.0, ..*parts }
+}

@@ -7,8 +7,9 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::ins::Errors;
+use super::models::{Choice, TABLE_3, table_3, table_3_gains};
 use super::monte_carlo::Spread;
-use super::scenario::{Care, Course, Figures, Voyage};
+use super::scenario::{CARES, Care, Course, Figures, Voyage};
 use crate::drift::DEG_PER_H_IN_RAD_PER_S;
 use crate::drift::figures::{short, table};
 
@@ -54,6 +55,8 @@ pub struct Report {
     pub rows: Vec<Row>,
     /// What is to be said.
     pub notes: Vec<String>,
+    /// Which model of the drift the log's calibration bears out, by gyro; empty without a log.
+    pub choices: Vec<Choice>,
 }
 
 impl Row {
@@ -75,7 +78,7 @@ impl Report {
             let row = self.rows.iter().find(|row| row.case == worst.case && row.course.care == care);
             row.map(Row::judged).unwrap_or_default()
         };
-        let (held, without, with) = (of(Care::Held), of(Care::WithoutTrend), of(Care::WithTrend));
+        let [held, without, with, alone] = CARES.map(of);
         let middle = if self.seeds > 0 { "in the middle of all seeds " } else { "" };
         let gain = without.radial_largest_m / with.radial_largest_m.max(f64::MIN_POSITIVE);
         let judgement = if without.radial_largest_m <= 0.0 && with.radial_largest_m <= 0.0 {
@@ -87,6 +90,7 @@ impl Report {
         } else {
             format!("the trend state costs {:.1}×: its trend_sigma is too large for this gyro", 1.0 / gain)
         };
+        let judgement = format!("{judgement}; {} with the trend alone", distance(alone.radial_largest_m));
         let hours = short(self.voyage.hours);
         // Seeded drifts are held at what they are, without noise: no procedure comes that far.
         if self.seeds > 0
@@ -143,10 +147,22 @@ impl Report {
     pub fn to_text(&self) -> String {
         let (head, rows) = self.rows();
         let mut text = format!("{}\n\n{}\n\n{}\n", self.verdict(), self.circumstances(), table(&head, &rows));
-        for note in &self.notes {
+        for note in self.notes.iter().chain(&self.said_of_models()) {
             let _ = writeln!(text, "\n{note}");
         }
         text
+    }
+
+    /// Which model the log bears out, and what 002 has of the two.
+    fn said_of_models(&self) -> Vec<String> {
+        let [least, median, most] = table_3_gains();
+        let paper = format!(
+            "002's table 3, {} starts of six gyros: its model with trend, which has no Markov part, cuts the position error {least:.0}…{most:.0}×, \
+             {median:.1}× in the middle. It does worse where the drift has one: let the likelihood of a log choose.",
+            TABLE_3.len()
+        );
+        let chosen = self.choices.iter().map(Choice::words);
+        chosen.chain([paper]).collect()
     }
 
     /// Everything as JSON; the curves too.
@@ -187,6 +203,8 @@ impl Report {
             "columns_of_points": ["hours", "heading_arcmin", "north_m", "east_m", "radial_m"],
             "rows": rows,
             "notes": self.notes,
+            "models": self.choices,
+            "table_3": TABLE_3.map(|row| json!({ "gyro": row.gyro, "start": row.start, "existing_km": row.existing_km, "trend_km": row.trend_km })),
         })
     }
 
@@ -198,7 +216,7 @@ impl Report {
         page.paragraph(&self.circumstances());
         let (head, rows) = self.rows();
         page.table(&Table { head, rows });
-        self.notes.iter().for_each(|note| page.paragraph(note));
+        self.notes.iter().chain(&self.said_of_models()).for_each(|note| page.paragraph(note));
         let mut cases: Vec<&str> = self.rows.iter().map(|row| row.case.as_str()).collect();
         cases.dedup();
         for case in cases {
@@ -208,13 +226,19 @@ impl Report {
             }
             page.chart(&self.chart(case));
         }
+        page.heading("Position errors of real gyros in 002, table 3");
+        page.table(&table_3());
         page.to_html()
     }
 
     fn chart(&self, case: &str) -> Chart {
         let curves = |of: &dyn Fn(&Course) -> Vec<(f64, f64)>| {
-            let rows =
-                self.rows.iter().filter(|row| row.case == case).zip([Ink::Third, Ink::Second, Ink::First]);
+            let rows = self.rows.iter().filter(|row| row.case == case).zip([
+                Ink::Third,
+                Ink::Second,
+                Ink::First,
+                Ink::Fourth,
+            ]);
             let curve = |(row, ink): (&Row, Ink)| Series {
                 name: row.course.care.words().to_owned(),
                 ink,

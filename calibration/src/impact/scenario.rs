@@ -2,7 +2,7 @@
 
 use isotherm_correction::drift::DriftParts;
 
-use super::estimate::{Aiding, TICK_S, residual, without_trend};
+use super::estimate::{Aiding, TICK_S, residual, trend_alone, without_trend};
 use super::ins::{Errors, Ins};
 use crate::error::Error;
 
@@ -49,10 +49,12 @@ pub enum Care {
     WithoutTrend,
     /// The estimator with it.
     WithTrend,
+    /// The estimator with a constant and its trend, without a Markov part: 002's new model.
+    TrendAlone,
 }
 
 /// All of them, in the order of the tables.
-pub const CARES: [Care; 3] = [Care::Held, Care::WithoutTrend, Care::WithTrend];
+pub const CARES: [Care; 4] = [Care::Held, Care::WithoutTrend, Care::WithTrend, Care::TrendAlone];
 
 impl Care {
     /// In words.
@@ -62,6 +64,7 @@ impl Care {
             Self::Held => "held at its last value",
             Self::WithoutTrend => "estimator without trend state",
             Self::WithTrend => "estimator with trend state",
+            Self::TrendAlone => "estimator with trend state, without Markov part",
         }
     }
 }
@@ -131,14 +134,17 @@ impl Voyage {
                 let less = |drift: &[f64; 3]| [drift[0] - held[0], drift[1] - held[1], drift[2] - held[2]];
                 drift.truth.iter().map(less).collect()
             }
-            Care::WithoutTrend | Care::WithTrend => {
+            Care::WithoutTrend | Care::WithTrend | Care::TrendAlone => {
                 let aiding = Aiding {
                     calibration_ticks: departure,
                     level_afterwards: self.log_aids_level,
                     reference_sigma_rad_per_s: self.reference_sigma_rad_per_s,
                 };
-                let parts =
-                    if care == Care::WithTrend { *parts } else { parts.each_ref().map(without_trend) };
+                let parts = match care {
+                    Care::WithTrend => *parts,
+                    Care::TrendAlone => parts.each_ref().map(trend_alone),
+                    Care::Held | Care::WithoutTrend => parts.each_ref().map(without_trend),
+                };
                 residual(&drift.truth, &drift.measured, &parts, &aiding).map_err(Error::Refused)?
             }
         };

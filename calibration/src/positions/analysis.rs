@@ -7,6 +7,7 @@ use super::doubts::{
 };
 use super::faults;
 use super::fit::{Fit, Positions, Weights, guesses};
+use super::hysteresis::{Return, returns};
 use super::matching::{Matched, matched};
 use super::model::{Degrees, Taken};
 use super::plan::Plan;
@@ -72,6 +73,8 @@ pub struct Analysis {
     pub weights: Weights,
     /// Factor by which all standard errors are widened.
     pub widened: f64,
+    /// The axes at temperatures that were left and come back to.
+    pub returns: Vec<Return>,
     /// What is to be said.
     pub warnings: Vec<String>,
 }
@@ -148,9 +151,17 @@ pub fn analyse(tracks: &[Track], document: &Document, settings: &Settings) -> Re
     turned(best, document, settings.gravity, &mut warnings);
     warnings.extend(measures(best, document, settings, &own));
     let of_level = (0..levels_deg_c.len()).map(|level| one_level(&all, level)).collect();
-    let poses = poses.into_iter().zip(&level_of).map(|((pose, position), level)| (pose, position, *level));
+    let poses: Vec<(Pose, usize, usize)> =
+        poses.into_iter().zip(&level_of).map(|((pose, position), level)| (pose, position, *level)).collect();
+    let returns = returns(&all, &poses, &found, &levels_deg_c);
+    let names: Vec<String> = tracks.iter().map(|track| track.run.clone()).collect();
+    for (sensor, kind) in returns.iter().filter_map(|back| back.finding(&names)) {
+        let own = document.accel.as_ref().and_then(|accel| accel.sensor.get(sensor));
+        let name = own.map_or_else(|| sensor.to_string(), |own| own.name.clone());
+        warnings.push(kind.of(&name).to_string());
+    }
     let analysis = Analysis {
-        poses: poses.collect(),
+        poses,
         taken,
         levels_deg_c,
         fit: found,
@@ -164,6 +175,7 @@ pub fn analyse(tracks: &[Track], document: &Document, settings: &Settings) -> Re
         channels,
         weights,
         widened,
+        returns,
         warnings,
     };
     sound(&analysis)?;

@@ -6,6 +6,7 @@ use toml::Table;
 
 use super::analysis::{Analysis, Settings};
 use super::budget::ARCSEC_PER_RAD;
+use super::hysteresis::Return;
 use super::model::SMALL;
 use crate::error::Error;
 use crate::report::{FitReport, Sigmas};
@@ -61,7 +62,7 @@ pub fn details(analysis: &Analysis, settings: &Settings, report: &FitReport) -> 
         .row_iter()
         .map(|row| row.iter().map(|c| tidy(c * analysis.widened * analysis.widened)).collect())
         .collect();
-    let about = json!({
+    let mut about = json!({
         "gravity_m_per_s2": settings.gravity,
         "positions": analysis.poses.len(),
         "temperatures_deg_c": analysis.levels_deg_c.iter().filter(|t| t.is_finite()).collect::<Vec<_>>(),
@@ -79,7 +80,19 @@ pub fn details(analysis: &Analysis, settings: &Settings, report: &FitReport) -> 
         "axes_covariance_arcsec2": covariance,
         "relative_scale_sigma": scale_sigmas(analysis),
     });
+    if let (false, Some(about)) = (analysis.returns.is_empty(), about.as_object_mut()) {
+        about.insert("hysteresis".to_owned(), hysteresis(analysis).into());
+    }
     Table::try_from(about).map_err(|error| Error::Document(vec![error.to_string()]))
+}
+
+/// Turns of the axes (″) over thermal cycles, with their standard errors.
+fn hysteresis(analysis: &Analysis) -> Vec<serde_json::Value> {
+    let of = |back: &Return| {
+        let [turn, sigma] = [0, 1].map(|i| back.turns.iter().map(|turn| tidy(turn[i])).collect::<Vec<f64>>());
+        json!({ "temperature_deg_c": tidy(back.deg_c), "turn_arcsec": turn, "sigma_arcsec": sigma, "accident": tidy(back.accident) })
+    };
+    analysis.returns.iter().map(of).collect()
 }
 
 /// Standard errors of scale factors, biases and axes, for what compares documents.

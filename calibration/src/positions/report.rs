@@ -8,6 +8,7 @@ use super::budget::ARCSEC_PER_RAD;
 use super::charts::{AXES, across, axes_chart, bend, left_chart, shown};
 use super::doubts::LARGEST_LEFT_SHARE;
 use super::fit::Fit;
+use super::hysteresis::Return;
 use super::judged::{Judgement, curves, lengths};
 use crate::drift::figures::{counted, fixed, per_deg_c, short, six};
 use crate::report::{Coefficient, Curve, Figure, FitReport, Verdict, output_unit};
@@ -54,7 +55,22 @@ pub fn report(
         report.tables.push(("Axes by temperature, ″".to_owned(), level_rows(analysis, settings, &names)));
         report.charts.push(("Axes over temperature".to_owned(), axes_chart(analysis, settings, &names)));
     }
+    if !analysis.returns.is_empty() {
+        let table = return_rows(analysis, &names, inside.runs);
+        report.tables.push(("Axes after a thermal cycle: turn, ″".to_owned(), table));
+    }
     report
+}
+
+/// By how much the axes turned from one visit of a temperature to the next.
+fn return_rows(analysis: &Analysis, names: &[String], runs: &[String]) -> Table {
+    let head = ["°C", "before", "after"].map(str::to_owned).into_iter().chain(names.iter().cloned());
+    let row = |back: &Return| {
+        let logs = back.runs.map(|run| runs.get(run).cloned().unwrap_or_default());
+        let turns = back.turns.iter().map(|[turn, sigma]| format!("{turn:.1} ± {sigma:.1}"));
+        std::iter::once(fixed(back.deg_c, 1)).chain(logs).chain(turns).collect()
+    };
+    Table { head: head.collect(), rows: analysis.returns.iter().map(row).collect() }
 }
 
 /// Words where far too much is left of |f| − g: no set of coefficients holds for these logs.

@@ -219,7 +219,7 @@ pub(super) fn board_ratio(document: &Document, sensor: usize, pose: &Pose) -> f6
 
 /// Temperatures that are far enough apart to be several: the number of each one's level, and the levels' means.
 #[expect(clippy::cast_precision_loss, reason = "positions")]
-pub(super) fn levels(temperatures: &[f64]) -> (Vec<usize>, Vec<f64>) {
+pub(crate) fn levels(temperatures: &[f64]) -> (Vec<usize>, Vec<f64>) {
     let mut order: Vec<usize> = (0..temperatures.len()).collect();
     order.sort_by(|a, b| temperatures[*a].total_cmp(&temperatures[*b]));
     let mut level_of = vec![0; temperatures.len()];
@@ -240,6 +240,6 @@ pub(super) fn levels(temperatures: &[f64]) -> (Vec<usize>, Vec<f64>) {
 }
 
 /// A reference in whole degrees: 20 °C where that is in the range, else its middle.
-pub(super) fn reference(low: f64, high: f64) -> f64 {
+pub(crate) fn reference(low: f64, high: f64) -> f64 {
     if low <= 20.0 && high >= 20.0 { 20.0 } else { (0.5 * (low + high)).round() }
 }

@@ -1,5 +1,6 @@
 //! A run as short means of the rates along the gyros' own input axes, under the document that it starts from.
 
+use std::collections::BTreeMap;
 use std::slice;
 
 use isotherm_log::offline::Loaded;
@@ -39,8 +40,10 @@ pub struct Binned {
     pub bins: Vec<Bin>,
     /// Mean specific force over the first second (m/s²), for levelling; `None` without accelerometers.
     pub first_force: Option<[f64; 3]>,
-    /// Mean temperature that the orientation follows (°C), and mean temperatures of all channels by name.
+    /// Mean temperature that the orientation follows (°C).
     pub axes_deg_c: Option<f64>,
+    /// Mean temperatures of the channels (°C).
+    pub channels_deg_c: BTreeMap<String, f64>,
     /// Mean temperature of all channels (°C).
     pub temperature_deg_c: Option<f64>,
     /// What the correction passed over.
@@ -110,6 +113,11 @@ fn of_group(run: &Run, document: &Document, group: [usize; 3], watch: impl Watch
     Ok(Binned {
         first_force: (felt_s > 0.0).then(|| velocity.map(|sum| sum / felt_s)),
         axes_deg_c: document.gyro.orientation.thermal.as_ref().and_then(of_axes),
+        channels_deg_c: table
+            .temperature_deg_c
+            .iter()
+            .filter_map(|(name, column)| Some((name.clone(), mean(column.iter().copied())?)))
+            .collect(),
         temperature_deg_c: mean(table.temperature_deg_c.values().flatten().copied()),
         troubles: table.troubles,
         bins,

@@ -7,6 +7,7 @@ use isotherm_protocol::document::{
 use toml::{Table, Value};
 
 use super::make::Made;
+use super::over_temperature::Level;
 use super::solve::GyroRates;
 use crate::finding::Kind;
 use crate::report::Sigmas;
@@ -115,7 +116,24 @@ pub fn details(made: &Made) -> Table {
     let gyros = made.gyros.iter().zip(&made.written.document.gyro.sensor).zip(&made.walk);
     let gyros = gyros.map(|((found, sensor), walk)| Value::Table(of_gyro(&sensor.name, found, *walk)));
     table.insert("gyro".into(), Value::Array(gyros.collect()));
+    if let Some(over) = &made.over_temperature {
+        table.insert("over_temperature".into(), Value::Array(over.levels.iter().map(of_level).collect()));
+    }
     table
+}
+
+/// The axes at one temperature, with their standard errors.
+fn of_level(level: &Level) -> Value {
+    let rows = |of: &dyn Fn(&GyroRates) -> [f64; 3]| {
+        let row = |found: &GyroRates| Value::Array(of(found).map(|x| tidy(x).into()).to_vec());
+        Value::Array(level.gyros.iter().map(row).collect())
+    };
+    let mut table = Table::new();
+    table.insert("temperature_deg_c".into(), tidy(level.deg_c).into());
+    table.insert("axis".into(), rows(&|found| found.axis.unwrap_or_default()));
+    let arcsec = |found: &GyroRates| found.axis_sigma.map(|sigma| Angle::from_rad(sigma).as_arcsec());
+    table.insert("sigma_arcsec".into(), rows(&arcsec));
+    Value::Table(table)
 }
 
 fn of_gyro(name: &str, found: &Result<GyroRates, Kind>, walk: f64) -> Table {

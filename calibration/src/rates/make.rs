@@ -9,6 +9,7 @@ use super::document;
 use super::judge::{errors, verdicts};
 use super::matching::Matched;
 use super::measure::{earth_in_bins, first_gains, points, true_rates, white};
+use super::over_temperature::OverTemperature;
 use super::read::{Turned, read, whole_turns};
 use super::solve::{GyroRates, solve};
 use super::steps::Step;
@@ -77,6 +78,8 @@ pub struct Made {
     pub verdicts: Vec<Verdict>,
     /// Mean temperature of each run (°C).
     pub temperatures_deg_c: Vec<f64>,
+    /// Axes and scale factors over temperature, where there are several.
+    pub over_temperature: Option<OverTemperature>,
     /// What is to be said.
     pub warnings: Vec<Finding>,
 }
@@ -117,6 +120,19 @@ pub fn make<W: Watch>(wanted: &Wanted<'_>, mut watch: impl FnMut() -> W) -> Resu
             }
         }
     }
+    let over_temperature = match OverTemperature::of(wanted, &runs, &rates, &walk) {
+        Ok(found) => found,
+        Err(deg_c) => {
+            warnings.push(Kind::NotEachTemperature { deg_c }.into());
+            None
+        }
+    };
+    if let Some(over) = &over_temperature {
+        for (sensor, found) in gyros.iter_mut().enumerate() {
+            let points = over.at_reference(wanted, (&runs, &rates), sensor, &walk);
+            *found = solve(&points, axes_of(wanted.base, sensor));
+        }
+    }
     let flat: Vec<[f64; 3]> = rates.iter().flatten().copied().collect();
     let mut doubted = Vec::new();
     for (sensor, found) in gyros.iter_mut().enumerate() {
@@ -150,6 +166,7 @@ pub fn make<W: Watch>(wanted: &Wanted<'_>, mut watch: impl FnMut() -> W) -> Resu
         walk,
         verdicts: Vec::new(),
         temperatures_deg_c: temperatures,
+        over_temperature,
         warnings,
     };
     made.settle(wanted, axes_deg_c, &doubted, &mut watch)?;
@@ -240,7 +257,12 @@ impl Made {
         axes_deg_c: Option<f64>,
         watch: &mut impl FnMut() -> W,
     ) -> Result<(), Error> {
-        let document = document::fitted(wanted.base, &self.gyros, axes_deg_c, wanted.with_bias);
+        // What was fitted at the reference needs no slopes to come there.
+        let axes_deg_c = axes_deg_c.filter(|_| self.over_temperature.is_none());
+        let mut document = document::fitted(wanted.base, &self.gyros, axes_deg_c, wanted.with_bias);
+        if let Some(over) = &self.over_temperature {
+            over.put(&mut document, &self.gyros);
+        }
         self.written = Written::of(&document)?;
         self.judge(wanted, 1, watch)
     }

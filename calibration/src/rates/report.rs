@@ -3,10 +3,13 @@
 use isotherm_correction::units::Angle;
 use isotherm_pages::{Axis, Chart, Content, Form, Ink, Panel, Samples, Series, Table};
 
+use super::figure;
 use super::make::{Made, Measured};
+use super::over_temperature::OverTemperature;
 use super::solve::GyroRates;
-use crate::drift::figures::{counted, fixed, short};
+use crate::drift::figures::{counted, fixed, per_deg_c, short};
 use crate::finding::Kind;
+use crate::modes::document::main_axis;
 use crate::report::words::{gyros, together};
 use crate::report::{Coefficient, FitReport};
 
@@ -62,6 +65,9 @@ pub(super) fn report(made: &Made) -> FitReport {
     report.warnings.extend(together(&told));
     report.warnings.extend(widened(made));
     report.warnings.extend(other_weights(made));
+    if let Some(over) = &made.over_temperature {
+        over_temperature(made, over, &mut report);
+    }
     if !made.judged.is_empty() {
         let steps = counted(made.judged.len(), "step", "steps");
         report.notes.push(format!("Out of sample: {steps} of the judging logs."));
@@ -69,6 +75,42 @@ pub(super) fn report(made: &Made) -> FitReport {
     }
     report.charts.push(("Linearity".to_owned(), chart(made)));
     report
+}
+
+/// Slopes of axes and scale factors, with the figure beside the accelerometers.
+fn over_temperature(made: &Made, over: &OverTemperature, report: &mut FitReport) {
+    let document = &made.written.document;
+    report.notes.push(format!(
+        "Axes and scale factors at {} temperatures; weights, axes and linearity are those at {} °C.",
+        over.levels.len(),
+        short(over.reference_deg_c)
+    ));
+    for (sensor, line) in document.gyro.sensor.iter().zip(&over.lines) {
+        let mut add = |what: String, unit: String, value: f64, sigma: f64| {
+            report.coefficients.push(Coefficient::new(
+                format!("gyro {} {what}", sensor.name),
+                unit,
+                value,
+                Some(sigma),
+            ));
+        };
+        for (power, (value, sigma)) in line.scale_ppm.iter().zip(&line.scale_sigma_ppm).enumerate() {
+            add(
+                format!("increment weight error, power {}", power + 1),
+                per_deg_c("ppm", power + 1),
+                *value,
+                *sigma,
+            );
+        }
+        let main = main_axis(&line.axis);
+        for along in (0..3).filter(|along| *along != main) {
+            let arcsec = |rad: f64| Angle::from_rad(rad).as_arcsec();
+            let name = format!("C1 along {}", ["x", "y", "z"][along]);
+            add(name, per_deg_c("″", 1), arcsec(line.slope[along]), arcsec(line.slope_sigma[along]));
+        }
+    }
+    report.tables.push(("Axes by temperature, ″".to_owned(), figure::table(over, document)));
+    report.charts.push(("Axes over temperature".to_owned(), figure::chart(over, document)));
 }
 
 /// Errors of the steps that the fit has not seen, by case axis.

@@ -1,5 +1,7 @@
 //! Simulated rate-table runs through the whole procedure.
 
+mod over_temperature;
+
 use isotherm_correction::earth::Place;
 use isotherm_log::offline::unit_id;
 use isotherm_log::text::LogEvent;
@@ -21,12 +23,10 @@ use crate::runs::Run;
 const RATES: [f64; 6] = [36.0, -36.0, 72.0, -72.0, 144.0, -144.0];
 const STEP_S: f64 = 10.0;
 
-fn scenario(seed: u64) -> Scenario {
-    let mut scenario = mems_chamber(seed);
-    scenario.chamber = Profile::constant(25.0);
-    scenario.duration_s = STEP_S;
-    scenario.instrument.accelerometers = None;
-    scenario.instrument.thermometers.channels.clear();
+/// The unit in a chamber of this temperature, with a tenth of its noise.
+fn quiet(seed: u64, deg_c: f64) -> Scenario {
+    let mut scenario =
+        Scenario { chamber: Profile::constant(deg_c), duration_s: STEP_S, ..mems_chamber(seed) };
     scenario.instrument.thermal_step_s = 1.0;
     if let Gyros::Mems(gyros) = &mut scenario.instrument.gyros {
         for gyro in gyros {
@@ -36,19 +36,43 @@ fn scenario(seed: u64) -> Scenario {
     scenario
 }
 
+/// Its gyros alone.
+fn scenario(seed: u64) -> Scenario {
+    let mut scenario = quiet(seed, 25.0);
+    scenario.instrument.accelerometers = None;
+    scenario.instrument.thermometers.channels.clear();
+    scenario
+}
+
 /// A run: rest, then each rate, with a rest between them; `distort` changes the readings.
 fn run(seed: u64, axis: [f64; 3], distort: impl Fn(f64) -> f64) -> Run {
+    run_of("table", (seed, axis), scenario, distort)
+}
+
+/// The same of any scenario that a seed makes, with the readings of its thermometers.
+fn run_of(
+    name: &str,
+    (seed, axis): (u64, [f64; 3]),
+    of_seed: impl Fn(u64) -> Scenario,
+    distort: impl Fn(f64) -> f64,
+) -> Run {
     let mut events = Vec::new();
     let mut offset = 0_u64;
     let rests = RATES.iter().flat_map(|rate| [0.0, *rate]);
     for (number, rate) in rests.enumerate() {
-        let mut scenario = scenario(seed.wrapping_mul(1000) + u64::try_from(number).unwrap());
+        let mut scenario = of_seed(seed.wrapping_mul(1000) + u64::try_from(number).unwrap());
         scenario.start_ns = i64::try_from(number).unwrap() * 10_000_000_000;
         if rate != 0.0 {
             scenario.motion.path = Path::ConstantRate { axis, rate_deg_per_s: rate };
         }
         let mut last = 0;
         for step in Simulation::new(&scenario).unwrap() {
+            let readings = step.temperatures.into_iter();
+            events.extend(
+                readings
+                    .filter(|reading| number == 0 || reading.time.as_ns() > scenario.start_ns)
+                    .map(LogEvent::Temperature),
+            );
             let mut tick = step.gyro;
             last = tick.sequence + 1;
             tick.sequence += offset;
@@ -57,7 +81,7 @@ fn run(seed: u64, axis: [f64; 3], distort: impl Fn(f64) -> f64) -> Run {
         }
         offset += last;
     }
-    Run::of_events("table".to_owned(), unit_id("MEMS-0001").unwrap(), events)
+    Run::of_events(name.to_owned(), unit_id("MEMS-0001").unwrap(), events)
 }
 
 const AXES: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
@@ -75,17 +99,12 @@ fn steps(runs: usize) -> Vec<Step> {
 }
 
 fn made(runs: &[Run], steps: &[Step], place: &[Place]) -> Result<Made, Error> {
-    let base = base();
-    let given = Wanted {
-        runs,
-        judge: &[],
-        steps,
-        scale_known: true,
-        base: &base,
-        place,
-        table_ppm: 0.0,
-        with_bias: false,
-    };
+    made_from(&base(), runs, steps, place)
+}
+
+fn made_from(base: &Document, runs: &[Run], steps: &[Step], place: &[Place]) -> Result<Made, Error> {
+    let given =
+        Wanted { runs, judge: &[], steps, scale_known: true, base, place, table_ppm: 0.0, with_bias: false };
     make(&given, || ())
 }
 

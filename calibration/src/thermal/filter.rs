@@ -15,7 +15,7 @@ use super::select::Target;
 use super::settings::{Method, Settings};
 use crate::error::Error;
 
-/// For the sequential method, whose derivatives know nothing of lags: smoothing, its delay being all the lag that there is, and
+/// For the stepwise methods, whose derivatives know nothing of lags: smoothing, its delay being all the lag that there is, and
 /// derivative step (s).
 const SLOW_SMOOTHINGS_S: [f64; 8] = [15.0, 40.0, 90.0, 180.0, 250.0, 400.0, 650.0, 1000.0];
 const DERIVATIVE_STEPS_S: [f64; 2] = [20.0, 40.0];
@@ -32,7 +32,7 @@ pub(super) fn choose_filter(
     histories: &BTreeMap<String, Known>,
     settings: &Settings,
 ) -> Result<Filter, Error> {
-    let sequential = settings.method == Method::Sequential;
+    let sequential = settings.method.is_stepwise();
     let longest_s = longest_run_s(samples);
     let trials = match settings.smoothing_s {
         None if sequential => {
@@ -63,7 +63,9 @@ pub(super) fn choose_filter(
             }
             let mut spec = Spec { degree: 4, ..Spec::default() };
             if known.history.both_directions() {
-                spec.dynamics = Dynamics { name: String::new(), terms: vec![rate, acceleration] };
+                let terms =
+                    if settings.method == Method::Rate { vec![rate] } else { vec![rate, acceleration] };
+                spec.dynamics = Dynamics { name: String::new(), terms };
             }
             columns.make(&spec.terms(true))?;
             for (_, target) in alive.filter(|(sensor, _)| sensor.gyro) {

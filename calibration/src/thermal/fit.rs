@@ -213,9 +213,10 @@ fn sensors_of<'a>(
     for (sensor, _) in dead {
         outcome.add(sensor, &basis, Found::dead(sensor.dead.as_deref().unwrap_or_default()));
     }
-    if outcome.settings.method == Method::Sequential {
+    let method = outcome.settings.method;
+    if method.is_stepwise() {
         for (sensor, target) in alive {
-            let found = step_by_step(&mut columns, (sensor, target), known)?;
+            let found = step_by_step(&mut columns, (sensor, target), known, method)?;
             outcome.add(sensor, &basis, found);
         }
         return Ok(());
@@ -234,16 +235,18 @@ fn step_by_step(
     columns: &mut Columns<'_>,
     (sensor, target): (&Sensor, &Target),
     known: &Known,
+    method: Method,
 ) -> Result<Found, Error> {
     let history = &known.history;
     if !history.both_directions() {
         return Ok(Found::refused(
-            "the temperature goes one way only: the sequential method needs ramps both ways",
+            "the temperature goes one way only: methods sequential and rate need ramps both ways",
         ));
     }
     let grid = columns.basis().filter.grid_step_s;
     let steps = if sensor.gyro {
-        sequential::gyro_terms().to_vec()
+        let steps = if method == Method::Rate { 1 } else { 2 };
+        sequential::gyro_terms().into_iter().take(steps).collect()
     } else {
         vec![lags(&[(3.0 * grid).max(10.0)], 0).terms]
     };

@@ -57,7 +57,15 @@ impl Found {
 
     pub(super) fn sequential(terms: Vec<(Term, f64, f64)>, left: f64, mean: f64) -> Self {
         if left <= WORTH_IT * mean {
-            return Self { terms, words: "plateaus, then Ṫ±, then T̈±".to_owned(), ..Self::default() };
+            let mut words = "plateaus".to_owned();
+            let has = |is: fn(Term) -> bool| terms.iter().any(|(term, ..)| is(*term));
+            let steps = [
+                (", then Ṫ±", has(|term| matches!(term, Term::Rate(..)))),
+                (", then T̈±", has(|term| matches!(term, Term::Acceleration(..)))),
+                (", then a lag", has(|term| matches!(term, Term::Lag(..)))),
+            ];
+            steps.iter().filter(|(_, has)| *has).for_each(|(step, _)| words.push_str(step));
+            return Self { terms, words, ..Self::default() };
         }
         Self::refused(&format!(
             "nothing beats its mean: the terms leave {left:.3e}, the mean {mean:.3e}, in sample"

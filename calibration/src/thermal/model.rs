@@ -164,7 +164,8 @@ pub fn put_gyro(sensor: &mut GyroSensor, basis: &Basis, found: &[(Term, f64)]) {
     if let Some(error) = scale_error(found) {
         let old = sensor.increment_weight_error.take();
         let old = old.unwrap_or_else(|| Curve::new(Shape::Constant { value: 0.0 }));
-        sensor.increment_weight_error = Some(put(&old, basis, &error, Holds::Error));
+        sensor.increment_weight_error =
+            Some(put(&old, (basis.reference_deg_c, basis.range_deg_c), &error, Holds::Error));
     }
 }
 
@@ -202,7 +203,8 @@ pub fn put_accel(sensor: &mut AccelSensor, basis: &Basis, found: &[(Term, f64)])
     };
     sensor.lag = taus(found).into_iter().filter_map(lag).collect();
     if let Some(error) = scale_error(found) {
-        sensor.scale_factor = put(&sensor.scale_factor, basis, &error, Holds::Factor);
+        sensor.scale_factor =
+            put(&sensor.scale_factor, (basis.reference_deg_c, basis.range_deg_c), &error, Holds::Factor);
     }
 }
 

@@ -12,7 +12,6 @@
 use isotherm_correction::units::STANDARD_GRAVITY_M_PER_S2;
 use isotherm_protocol::document::{Argument, Curve, Quantity, Shape};
 
-use super::columns::Basis;
 use crate::drift::figures::short;
 use crate::lsq::weighted::once;
 use crate::written::tidy;
@@ -148,15 +147,19 @@ impl Holds {
     }
 }
 
-/// A curve with a scale factor error (ppm, by powers about the basis' reference) put in.
+/// A curve with a scale factor error (ppm, by powers about a reference, over a range of temperature) put in.
 ///
 /// Polynomials stay polynomials and splines keep their knots; what has no such form over the fitted range becomes straight lines
 /// between knots near enough.
 #[must_use]
-pub fn put<Q: Quantity>(old: &Curve<Q>, basis: &Basis, s: &[f64], how: Holds) -> Curve<Q> {
-    let range = basis.range_deg_c;
+pub fn put<Q: Quantity>(
+    old: &Curve<Q>,
+    (reference_deg_c, range): (f64, [f64; 2]),
+    s: &[f64],
+    how: Holds,
+) -> Curve<Q> {
     let at = |t: f64| {
-        let away = t.clamp(range[0], range[1]) - basis.reference_deg_c;
+        let away = t.clamp(range[0], range[1]) - reference_deg_c;
         s.iter().rev().fold(0.0, |sum, c| sum * away + c)
     };
     let about_reference = match old.shape() {
@@ -164,7 +167,7 @@ pub fn put<Q: Quantity>(old: &Curve<Q>, basis: &Basis, s: &[f64], how: Holds) ->
         Shape::Polynomial { reference, coefficients, range: own }
             if own[0] <= range[0] && own[1] >= range[1] =>
         {
-            Some(moved(coefficients, basis.reference_deg_c - reference))
+            Some(moved(coefficients, reference_deg_c - reference))
         }
         _ => None,
     };
@@ -172,7 +175,7 @@ pub fn put<Q: Quantity>(old: &Curve<Q>, basis: &Basis, s: &[f64], how: Holds) ->
         .map(|old| how.polynomial(&old, s))
         .filter(|new| new.len() <= MOST_COEFFICIENTS)
         .map(|new| Shape::Polynomial {
-            reference: basis.reference_deg_c,
+            reference: reference_deg_c,
             coefficients: new.into_iter().map(tidy).collect(),
             range,
         });
@@ -204,26 +207,11 @@ fn moved(coefficients: &[f64], by: f64) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
-    use isotherm_protocol::document::{Channel, Filter, Relative, ScaleFactor, Unit};
+    use isotherm_protocol::document::{Relative, ScaleFactor, Unit};
 
     use super::*;
 
-    fn basis() -> Basis {
-        let channel = Channel {
-            name: "imu".to_owned(),
-            conversion_deg_c: vec![0.0, 1.0],
-            range_deg_c: [-100.0, 200.0],
-            spike_limit_deg_c: 1.0,
-        };
-        let filter = Filter {
-            grid_step_s: 1.0,
-            smoothing_s: 5.0,
-            derivative_step_s: 5.0,
-            stale_after_s: 10.0,
-            branch_dead_band_deg_c2_per_s3: None,
-        };
-        Basis { channel, filter, reference_deg_c: 10.0, range_deg_c: [-40.0, 60.0] }
-    }
+    const OVER: (f64, [f64; 2]) = (10.0, [-40.0, 60.0]);
 
     #[test]
     fn the_product_is_the_same_function_in_every_form() {
@@ -240,7 +228,7 @@ mod tests {
             [(wide, 1e-12), (narrow, 1e-6), (lines, 1e-6), (Shape::Constant { value: 0.1 }, 1e-12)]
         {
             let old: Curve<ScaleFactor> = Curve::new(shape).in_unit(Unit::VPerMPerS2);
-            let new = put(&old, &basis(), &s, Holds::Factor);
+            let new = put(&old, OVER, &s, Holds::Factor);
             assert_eq!(new.unit(), Unit::VPerMPerS2);
             for t in [-40.0, -31.0, -7.3, 0.0, 10.0, 44.4, 60.0] {
                 let away = t - 10.0;
@@ -251,7 +239,7 @@ mod tests {
             }
         }
         let old: Curve<Relative> = Curve::new(Shape::Constant { value: 500.0 });
-        let new = put(&old, &basis(), &s, Holds::Error);
+        let new = put(&old, OVER, &s, Holds::Error);
         let got = 1.0 + 1e-6 * new.shape().at(30.0).unwrap();
         let wanted = (1.0 + 500e-6) * (1.0 + 1e-6 * (300.0 + 400.0 - 40.0));
         assert!((got - wanted).abs() < 1e-12);

@@ -9,6 +9,8 @@ use super::stand::{Site, Stand};
 pub enum Method {
     /// 000: the static bias from the plateaus, then the rate's share, then the acceleration's, one after the other.
     Sequential,
+    /// The method that 000 compares with: as [`Method::Sequential`], without the acceleration's share of gyros.
+    Rate,
     /// All terms at once: static bias, lags on a ladder of time constants with gains that follow temperature, T̈.
     Joint,
 }
@@ -19,8 +21,15 @@ impl Method {
     pub const fn name(self) -> &'static str {
         match self {
             Self::Sequential => "sequential",
+            Self::Rate => "rate",
             Self::Joint => "joint",
         }
+    }
+
+    /// Whether static bias and what follows the change are found one after the other.
+    #[must_use]
+    pub const fn is_stepwise(self) -> bool {
+        matches!(self, Self::Sequential | Self::Rate)
     }
 }
 

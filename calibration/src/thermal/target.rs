@@ -159,7 +159,7 @@ pub(super) fn target(
 }
 
 /// Input axis of a sensor in each window of a run, turned with temperature as the document says.
-fn axes<P>(orientation: &Orientation<P>, sensor: usize, run: &Samples) -> Vec<[f64; 3]> {
+pub(crate) fn axes<P>(orientation: &Orientation<P>, sensor: usize, run: &Samples) -> Vec<[f64; 3]> {
     let row = orientation.rows.get(sensor).copied().unwrap_or_default();
     let thermal = orientation.thermal.as_ref();
     let slopes = thermal.and_then(|thermal| Some((thermal, thermal.slopes_arcsec_per_deg_c.get(sensor)?)));

@@ -13,20 +13,27 @@ const LARGEST_SHARE: f64 = 0.8;
 /// Bias and three coefficients.
 const COEFFICIENTS: usize = 4;
 
-/// What was found of one gyro.
+/// What a gyro reads at rest, as a linear function of the specific force.
 #[derive(Debug, Clone, PartialEq)]
-pub struct GyroDrift {
+pub struct Response {
     /// Reading without specific force (rad/s of the log).
     pub bias: f64,
     /// Reading by specific force along the case axes (rad/s of the log per m/s²).
     pub by_force: [f64; 3],
     /// Standard errors of the four.
     pub sigma: [f64; COEFFICIENTS],
+}
+
+/// What was found of one gyro.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GyroDrift {
+    /// Its response.
+    pub response: Response,
     /// Readings about their mean, and what is left of them in poses that the fit has not seen (rad/s of the log).
     pub sizes: [Size; 2],
 }
 
-impl GyroDrift {
+impl Response {
     /// What the gyro reads at a specific force (m/s², in case axes).
     #[must_use]
     pub fn reading(&self, force: [f64; 3]) -> f64 {
@@ -36,7 +43,7 @@ impl GyroDrift {
 
 /// Fits one gyro over the poses of `among`; `force` has the specific force of each pose. `None` where the poses do not tell.
 #[must_use]
-pub fn fit(poses: &[Pose], force: &[[f64; 3]], gyro: usize, among: &[usize]) -> Option<GyroDrift> {
+pub fn fit(poses: &[Pose], force: &[[f64; 3]], gyro: usize, among: &[usize]) -> Option<Response> {
     // A mean over twice the time has half the variance.
     let weight = |pose: usize| poses[pose].duration_s.sqrt();
     let row = |row: usize, column: usize| match column {
@@ -52,8 +59,7 @@ pub fn fit(poses: &[Pose], force: &[[f64; 3]], gyro: usize, among: &[usize]) -> 
     let degrees = among.len().checked_sub(COEFFICIENTS).filter(|degrees| *degrees > 0)? as f64;
     let deviation = (found.chi_square() / degrees).sqrt();
     let sigma = std::array::from_fn(|index| found.sigma(index) * deviation);
-    let sizes = [Size::default(); 2];
-    Some(GyroDrift { bias: c[0], by_force: [c[1], c[2], c[3]], sigma, sizes })
+    Some(Response { bias: c[0], by_force: [c[1], c[2], c[3]], sigma })
 }
 
 /// Fits every gyro, and judges each by poses that its fit has not seen: those of `alike` are left out together with a pose.
@@ -67,7 +73,7 @@ pub fn judged(
     let all: Vec<usize> = (0..poses.len()).collect();
     [0, 1, 2].map(|gyro| {
         let reading = |pose: usize| poses[pose].gyro(gyro);
-        let found = fit(poses, force, gyro, &all).ok_or("the poses do not span the directions of gravity")?;
+        let response = fit(poses, force, gyro, &all).ok_or("the poses do not span the directions of gravity")?;
         let mean = Size::of(&all.iter().map(|pose| reading(*pose)).collect::<Vec<_>>()).mean;
         let about_mean: Vec<f64> = all.iter().map(|pose| reading(*pose) - mean).collect();
         let left = all.iter().filter_map(|pose| {
@@ -85,6 +91,6 @@ pub fn judged(
                 100.0 * LARGEST_SHARE
             ));
         }
-        Ok(GyroDrift { sizes, ..found })
+        Ok(GyroDrift { response, sizes })
     })
 }

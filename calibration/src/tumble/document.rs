@@ -60,13 +60,13 @@ fn gyros(
         sensor.increment_weight_rad_per_rad = Some(tidy(weight / (1.0 + error.unwrap_or(0.0) * 1e-6)));
         let deg_per_h = |of_log: f64| AngularRate::from_rad_per_s(weight * of_log).as_deg_per_h();
         let drift = acceleration[index].as_ref().ok();
-        let rest = deg_per_h(drift.map_or(found.rest[index], |drift| drift.bias));
+        let rest = deg_per_h(drift.map_or(found.rest[index], |drift| drift.response.bias));
         if let Some(drift) = drift {
             let along = |per_force: f64| {
                 let value = tidy(deg_per_h(per_force * STANDARD_GRAVITY_M_PER_S2));
                 Some(Curve::new(Shape::Constant { value }))
             };
-            let [x, y, z] = drift.by_force.map(along);
+            let [x, y, z] = drift.response.by_force.map(along);
             sensor.acceleration_sensitive_drift = Some(AlongAxes { x, y, z });
         }
         let there = sensor.static_bias.take();

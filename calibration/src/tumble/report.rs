@@ -173,7 +173,7 @@ fn rows(tumble: &Tumble, after: &Left) -> Table {
 
 /// Reading of a gyro at rest without specific force, or its mean over the poses where that is not known (rad/s of the log).
 fn rest(tumble: &Tumble, gyro: &GyroFit, axis: usize) -> f64 {
-    tumble.acceleration[axis].as_ref().map_or(gyro.rest[axis], |drift| drift.bias)
+    tumble.acceleration[axis].as_ref().map_or(gyro.rest[axis], |drift| drift.response.bias)
 }
 
 /// Drift of a gyro by the specific force along a case axis and its standard error ((°/h)/g).
@@ -181,7 +181,10 @@ fn deg_per_h_per_g(tumble: &Tumble, gyro: usize, along: usize) -> Option<[f64; 2
     let weight = tumble.gyro.as_ref().ok()?.weight[gyro];
     let drift = tumble.acceleration[gyro].as_ref().ok()?;
     let per_g = |value: f64| AngularRate::from_rad_per_s(value * STANDARD_GRAVITY_M_PER_S2).as_deg_per_h();
-    Some([per_g(weight * drift.by_force[along]), per_g((weight * drift.sigma[1 + along]).abs())])
+    Some([
+        per_g(weight * drift.response.by_force[along]),
+        per_g((weight * drift.response.sigma[1 + along]).abs()),
+    ])
 }
 
 /// What the gyros read at rest, about their mean and with what follows acceleration taken off.

@@ -117,10 +117,12 @@ fn impact_sails_the_drift_of_a_log() {
     let document = folder.path().join("unit.toml").display().to_string();
     Written::of(&unit).unwrap().save(Path::new(&document), false).unwrap();
     let sail = |log: &str, more: &[&str]| {
-        json(&[&["impact", log, "--calibration-hours", "1", "--json"], more].concat())["rows"].clone()
+        let report = json(&[&["impact", log, "--calibration-hours", "1", "--json"], more].concat());
+        assert_eq!(report["models"].as_array().unwrap().len(), 3, "each gyro's calibration chooses a model");
+        report["rows"].clone()
     };
     let by_csv = sail(&csv, &[]);
-    assert_eq!(by_csv.as_array().unwrap().len(), 3);
+    assert_eq!(by_csv.as_array().unwrap().len(), 4);
     for row in by_csv.as_array().unwrap() {
         let radial = row["figures"]["radial_largest_m"].as_f64().unwrap();
         assert!(radial > 0.0 && radial < 20_000.0, "{row}");

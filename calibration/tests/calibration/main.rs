@@ -28,6 +28,7 @@
 
 mod agreement;
 mod bad_logs;
+mod board;
 mod command;
 mod documents;
 mod drift;

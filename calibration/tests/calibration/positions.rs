@@ -99,6 +99,51 @@ fn linear_and_quadratic_axes_over_temperature_are_recovered() {
     assert!((found.widened - 1.0).abs() < 1e-12, "the quadratic form describes it: {}", found.widened);
 }
 
+#[test]
+fn axes_that_do_not_come_back_after_a_cycle_are_told_with_their_turn() {
+    use isotherm_calibration::finding::AccelKind;
+    let plan = Plan::twelve();
+    let document = Written::of(&stand::document()).unwrap();
+    let level = stand::true_rows(&stand::instrument(), 20.0);
+    let (mut still, mut turns) = (0, Vec::new());
+    for seed in 0..12 {
+        for moved in [0.0, 30.0 * ARCSEC] {
+            let errors = quick(seed).errors;
+            let (mut runs, mut rows) = (Vec::new(), Vec::new());
+            for (index, deg_c) in [20.0, 60.0, 20.0].into_iter().enumerate() {
+                let mut axes = level;
+                if index == 2 {
+                    // The second accelerometer has turned towards z.
+                    axes[1][2] += moved;
+                }
+                let how = Stand { errors, ..quick(seed * 10 + index as u64 + 3) };
+                let order: Vec<usize> = (0..12).collect();
+                let (events, held) = stand::log(&stand::with_axes(&axes), deg_c, &plan, &order, &how);
+                let name = format!("run {index}");
+                rows.extend(times(&plan, &name, &held).rows);
+                runs.push(stand::run(&name, events));
+            }
+            let settings = settings(plan.clone(), Some(Times { rows }));
+            let found = analyse(&tracks(&runs, &document), &document.document, &settings).unwrap();
+            let [back] = found.returns.as_slice() else { panic!("{:?}", found.returns) };
+            assert_eq!(back.runs, [0, 2]);
+            let names = ["run 0", "run 1", "run 2"].map(str::to_owned);
+            match back.finding(&names) {
+                None => still += usize::from(moved == 0.0),
+                Some((sensor, AccelKind::AxisMoved { deg_c, turn: [turn, sigma], logs })) => {
+                    assert!(moved > 0.0 && sensor == 1, "{turn} ± {sigma}″");
+                    assert!((deg_c - 22.0).abs() < 1.0 && logs == ["run 0", "run 2"], "{deg_c}");
+                    turns.push((turn - 30.0) / sigma);
+                }
+                Some(other) => panic!("{other:?}"),
+            }
+        }
+    }
+    assert_eq!((still, turns.len()), (12, 12));
+    let rms = (turns.iter().map(|x| x * x).sum::<f64>() / 12.0).sqrt();
+    assert!((0.4..1.7).contains(&rms), "{turns:?}");
+}
+
 /// Turns between the positions, poses found in the log, at 10 Hz.
 fn driven(seed: u64) -> Stand {
     Stand { tick_ns: 100_000_000, hold_s: 14.0, turn_deg_per_s: Some(15.0), ..quick(seed) }

@@ -96,9 +96,12 @@ fn together(report: &FitReport) -> [f64; 2] {
 #[test]
 fn methods_reach_what_they_must_on_a_simulated_coil() {
     let runs = preset();
-    let wanted = [(Method::Sequential, 6.0, 2.4), (Method::Joint, 15.0, 6.0)];
+    let wanted = [(Method::Rate, 2.0, 1.2), (Method::Sequential, 6.0, 2.4), (Method::Joint, 15.0, 6.0)];
     for (method, rms, peak_to_peak) in wanted {
-        let report = fitted(method, &runs).report;
+        let Fitted { report, written, .. } = fitted(method, &runs);
+        let gyros = &written.document.gyro.sensor;
+        assert_eq!(gyros.iter().all(|gyro| gyro.thermal_rate.is_some()), method != Method::Joint);
+        assert!(method != Method::Rate || gyros.iter().all(|gyro| gyro.thermal_acceleration.is_none()));
         println!("{method:?}: {:.1?} times smaller, together {:.1?}", factors(&report), together(&report));
         println!("{}", report.headline());
         let reached = together(&report);

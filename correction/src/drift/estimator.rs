@@ -9,7 +9,7 @@ use super::gyro::{DriftEstimate, GRID, GyroDrift};
 use super::reference::{Reference, ReferenceCounters, ReferenceRefusal, Waiting};
 use super::ring::{Covered, cell_end};
 use crate::observation::{GyroLanes, Observation};
-use crate::sample::{SensorFlags, Sensors};
+use crate::sample::{MAX_SENSORS, SensorFlags, Sensors};
 use crate::units::{Span, Timestamp};
 
 /// Settings of an estimator that are not part of the calibration.
@@ -136,21 +136,31 @@ impl DriftEstimator {
         restart: bool,
         project: &dyn Fn([f64; 3]) -> Sensors<f64>,
     ) {
-        if !self.is_idle() {
-            self.go_on(end_time, restart, project);
+        if self.is_idle() {
+            return;
         }
-    }
-
-    /// Goes on where there are gyros to follow.
-    fn go_on(&mut self, end_time: Timestamp, restart: bool, project: &dyn Fn([f64; 3]) -> Sensors<f64>) {
         let grid = end_time.cell(GRID);
         if restart {
             self.restart(end_time, grid);
         } else if grid != self.grid || self.now.is_none() {
-            self.gyros.iter_mut().flatten().for_each(|gyro| gyro.draw(grid));
+            self.draw(grid);
         }
         self.grid = grid;
         self.now = Some(end_time);
+        if !self.waiting.references.is_empty() {
+            self.take_effective(end_time, project);
+        }
+    }
+
+    /// Draws every gyro's line over a grid cell.
+    #[cold]
+    fn draw(&mut self, grid: i64) {
+        self.gyros.iter_mut().flatten().for_each(|gyro| gyro.draw(grid));
+    }
+
+    /// Applies every reference that takes effect before the tick that ends at `end_time`.
+    #[cold]
+    fn take_effective(&mut self, end_time: Timestamp, project: &dyn Fn([f64; 3]) -> Sensors<f64>) {
         let Some(observed_until) = self.observed_until else { return };
         let delay = self.settings.delay;
         let due = |r: &Reference| r.end + delay < end_time && cell_end(r.end) <= observed_until;
@@ -188,6 +198,7 @@ impl DriftEstimator {
 
     /// The producer restarted: its readings are forgotten, the estimate goes on by prediction. Where time stepped back,
     /// nobody knows how long the producer was away, and the estimate starts anew about its constant part.
+    #[cold]
     fn restart(&mut self, end_time: Timestamp, grid: i64) {
         let last = self.now.replace(end_time);
         let goes_on = last.is_none_or(|last| last < end_time);
@@ -222,15 +233,13 @@ impl DriftEstimator {
         let start = end - observation.duration;
         let covered = Covered::new(start, end);
         let GyroLanes { count, rate, bias, flags, .. } = &observation.gyros;
-        let lanes = rate.iter().zip(bias).zip(flags).take(*count);
-        for (gyro, ((rate, bias), flags)) in self.gyros.iter_mut().zip(lanes) {
+        for (lane, gyro) in self.gyros.iter_mut().enumerate().take(MAX_SENSORS.min(*count)) {
             let Some(gyro) = gyro else { continue };
             gyro.filter.start(start);
-            gyro.ring.reach(&covered);
-            let residual = rate - bias;
-            if observation.settled && flags.contains(SensorFlags::VALID) && residual.is_finite() {
-                gyro.ring.add(&covered, residual);
-            }
+            let residual = rate[lane] - bias[lane];
+            let counts =
+                observation.settled & flags[lane].contains(SensorFlags::VALID) & residual.is_finite();
+            gyro.ring.take(&covered, counts.then_some(residual));
         }
         self.observed_until = Some(end);
     }

@@ -61,7 +61,9 @@ pub(super) struct Covered {
 impl Covered {
     /// Of a tick from `start` to `end`.
     pub(super) fn new(start: Timestamp, end: Timestamp) -> Self {
-        let (first, last) = (start.cell(CELL), last_number(end));
+        let last = last_number(end);
+        // Mostly within one cell.
+        let first = if start >= Timestamp::of_cell(last, CELL) { last } else { start.cell(CELL) };
         Self { start, end, first, last, slot: slot(last), in_last_s: overlap(last, start, end).as_s() }
     }
 }
@@ -84,12 +86,22 @@ impl Ring {
         self.newest = None;
     }
 
-    /// Makes room up to the last cell of a tick, without anything observed.
-    pub(super) fn reach(&mut self, tick: &Covered) {
-        let number = tick.last;
-        if self.newest == Some(number) {
-            return;
+    /// Shares the mean rate (rad/s) of a tick out to the cells that it covers; `None` where nothing was observed.
+    #[inline]
+    pub(super) fn take(&mut self, tick: &Covered, rate: Option<f64>) {
+        if self.newest != Some(tick.last) {
+            self.reach(tick.last);
         }
+        let Some(rate) = rate else { return };
+        if tick.first != tick.last || self.newest != Some(tick.last) {
+            return self.share_out(tick, rate);
+        }
+        self.gain(tick.slot, tick.in_last_s, rate);
+    }
+
+    /// Makes room up to a cell, without anything observed.
+    #[cold]
+    fn reach(&mut self, number: i64) {
         let before = self.newest.unwrap_or(i64::MIN);
         let oldest_new = before.saturating_add(1).max(number.saturating_sub(i64::from(RING_CELLS) - 1));
         for new in oldest_new..=number {
@@ -100,8 +112,9 @@ impl Ring {
         self.newest = Some(before.max(number));
     }
 
-    /// Shares the mean rate (rad/s) of a tick out to the cells that it covers. Call [`reach`](Self::reach) first.
-    pub(super) fn add(&mut self, tick: &Covered, rate: f64) {
+    /// Likewise for a tick that covers several cells, or one of before.
+    #[cold]
+    fn share_out(&mut self, tick: &Covered, rate: f64) {
         let oldest = self.oldest();
         for number in tick.first.max(oldest)..tick.last {
             self.gain(slot(number), overlap(number, tick.start, tick.end).as_s(), rate);
@@ -111,6 +124,7 @@ impl Ring {
         }
     }
 
+    #[inline]
     fn gain(&mut self, slot: usize, covered_s: f64, rate: f64) {
         if let Some(cell) = self.cells.get_mut(slot) {
             cell.angle_rad += rate * covered_s;

@@ -35,9 +35,8 @@ impl Reading {
             return None;
         }
         let mut rates = [f64::NAN; MAX_SENSORS];
-        for (rate, increment) in rates.iter_mut().zip(increments) {
-            *rate = increment / duration.as_s();
-        }
+        let duration_s = duration.as_s();
+        rates.iter_mut().zip(increments).for_each(|(rate, increment)| *rate = increment / duration_s);
         Some(Self { end_time, duration, rates })
     }
 

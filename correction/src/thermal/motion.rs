@@ -112,6 +112,11 @@ impl Motion {
         self.gyros.iter().chain(&self.accels).all(MotionTerms::is_empty) && !self.has_positions()
     }
 
+    /// Whether a gyro's weight follows its rate.
+    pub(crate) fn has_curves(&self) -> bool {
+        self.gyros.iter().any(|gyro| gyro.over_rate.is_some())
+    }
+
     /// Whether an accelerometer has a second-order term.
     pub(crate) fn has_squares(&self) -> bool {
         self.accels.iter().any(|accel| !accel.terms.is_empty())

@@ -219,11 +219,14 @@ impl Corrector {
         out.accel_parity.clear();
         out.flags = if self.thermal.warming_up { TickFlags::WARM_UP } else { TickFlags::empty() };
         let shares = self.thermal.paces.shares(raw.end_time);
-        if self.moves {
-            self.note_force::<N>(calibration, tick, &shares);
+        let felt = self.accels_feel::<N>(calibration, tick, &shares, counters, out);
+        if let Some(felt) = felt.as_ref().filter(|felt| self.moves & felt.within) {
+            self.note_force(calibration, &felt.forces, raw.end_time);
         }
         self.gyros::<N>(calibration, tick, &shares, counters, out);
-        self.accels::<N>(calibration, tick, &shares, counters, out);
+        if let Some(felt) = &felt {
+            self.resolve_force(calibration, felt, missed, counters, out);
+        }
 
         let per_second = 1.0 / raw.duration.as_s();
         let seen = &mut self.seen;

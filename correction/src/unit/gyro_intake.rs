@@ -163,10 +163,13 @@ impl GyroIntake {
     /// Ends a batch: call it behind the last tick of each. Only what was admitted counts; a refused tick's broken
     /// time would keep the others waiting for ever.
     pub(super) fn end_batch(&mut self) {
-        let mut end = None;
-        if self.pending.is_empty() && self.pending.capacity() > LONGEST_KEPT {
-            self.pending = VecDeque::new();
+        if self.pending.is_empty() {
+            if self.pending.capacity() > LONGEST_KEPT {
+                self.pending = VecDeque::new();
+            }
+            return;
         }
+        let mut end = None;
         for pending in self.pending.iter_mut().rev() {
             if self.batch == 0 {
                 break;

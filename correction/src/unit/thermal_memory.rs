@@ -87,6 +87,9 @@ pub(super) struct ThermalMemory {
     pub(super) accel_footing: Footing,
     /// Whether any channel is still warming up.
     pub(super) warming_up: bool,
+    /// How often the channels' states may have changed, those under calibrations before included: for whoever keeps what it made of them.
+    #[serde(skip)]
+    pub(super) changes: u64,
 }
 
 impl ThermalMemory {
@@ -123,6 +126,7 @@ impl ThermalMemory {
             gyro_footing: Footing::default(),
             accel_footing: Footing::default(),
             warming_up: false,
+            changes: before.map_or(0, |(_, memory)| memory.changes + 1),
             paces,
         };
         for index in 0..memory.channels.len() {
@@ -195,6 +199,7 @@ impl ThermalMemory {
         end_time: Timestamp,
         counters: &mut Counters,
     ) {
+        self.changes += 1;
         while let Some(reading) = waiting.pop_before(end_time, delay) {
             self.read(calibration, &reading, delay, counters);
         }
@@ -295,6 +300,7 @@ impl ThermalMemory {
 
     /// Forgets time, after a step of the producer's clock.
     pub(super) fn restart(&mut self, calibration: &Calibration) {
+        self.changes += 1;
         self.channels.iter_mut().for_each(ChannelMemory::restart);
         self.updated.iter_mut().for_each(|updated| *updated = None);
         self.gyros.settle();

@@ -55,6 +55,12 @@ impl Unit {
         active.flat_map(|active| active.corrector.thermal().temperatures(&active.calibration))
     }
 
+    /// How often [`temperatures`](Self::temperatures) may have changed since the unit was made or read back.
+    #[must_use]
+    pub fn temperature_changes(&self) -> u64 {
+        self.pipeline.active.as_ref().map_or(0, |active| active.corrector.thermal().changes)
+    }
+
     /// Whether ticks wait for their accelerometer tick, a missing neighbour, or the end of a navigation step.
     #[must_use]
     pub fn is_waiting(&self) -> bool {

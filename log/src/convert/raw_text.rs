@@ -55,6 +55,43 @@ impl RawColumns {
         }
     }
 
+    /// The columns of a log that was written here, by its header; `whole` says of a column whether all its numbers are whole, as counts
+    /// are. A channel has the name that its column has.
+    pub(crate) fn of_header(header: &[String], whole: impl Fn(usize) -> bool) -> Option<Self> {
+        let channel = |name: &String| {
+            let channel = name.strip_prefix("temperature_")?;
+            Some((ChannelName::from(channel).ok()?, name.clone()))
+        };
+        let has = |column: &str| header.iter().any(|name| name == column);
+        let shape = |kind: &str, half_periods| {
+            let is_sensor =
+                |name: &String| name.strip_prefix(kind).is_some_and(|number| number.parse::<usize>().is_ok());
+            let mut sensors = header.iter().enumerate().filter(|(_, name)| is_sensor(name));
+            let (count, counts) = (sensors.clone().count(), sensors.all(|(index, _)| whole(index)));
+            (count > 0).then_some(Shape { counts, sensors: count, half_periods })
+        };
+        let columns = Self {
+            unit: String::new(),
+            gyro: shape("gyro_", has("half_positive_1"))?,
+            accel: shape("accel_", false),
+            mode: has("mode"),
+            meander: has("meander"),
+            channels: header.iter().filter_map(channel).collect(),
+        };
+        (columns.names() == header).then_some(columns)
+    }
+
+    /// What the log holds, in a line.
+    pub(crate) fn words(&self) -> String {
+        let sensors = |shape: Shape, kind: &str| {
+            format!("{} {kind} ({})", shape.sensors, if shape.counts { "counts" } else { "means" })
+        };
+        let mut words = vec![sensors(self.gyro, "gyros")];
+        words.extend(self.accel.map(|shape| sensors(shape, "accelerometers")));
+        words.push(format!("{} temperature channels", self.channels.len()));
+        words.join(", ")
+    }
+
     /// Names of the columns.
     fn names(&self) -> Vec<String> {
         let mut names = vec!["end_time_ns".to_owned()];
@@ -81,10 +118,18 @@ impl RawColumns {
     /// The mapping that reads the log back.
     #[must_use]
     pub fn mapping(&self) -> String {
+        let unit = &self.unit;
+        format!(
+            "# Reads a log of unit {unit} that isotherm-replay wrote.\nversion = 1\n{}",
+            self.file_text("", false)
+        )
+    }
+
+    /// A file's part of a mapping; `name`, the line that names it, may be empty.
+    pub(crate) fn file_text(&self, name: &str, skip_bad_rows: bool) -> String {
+        let bad = if skip_bad_rows { "on_bad_row = \"skip\"\n" } else { "" };
         let mut text = format!(
-            "# Reads a log of unit {} that `isotherm-replay convert` wrote beside this file.\nversion = 1\n\n[[file]]\n\
-             delimiter = \"comma\"\nheader = true\n\n[file.time]\ncolumn = \"end_time_ns\"\nunit = \"ns\"\n",
-            self.unit
+            "\n[[file]]\n{name}delimiter = \"comma\"\nheader = true\n{bad}\n[file.time]\ncolumn = \"end_time_ns\"\nunit = \"ns\"\n"
         );
         text.push_str(&section("gyro", "rad_per_s", self.gyro));
         if self.mode {

@@ -7,8 +7,9 @@ use super::clock::{UNITS_NS, rate_in, unit_of};
 use super::figures::{Figures, usual_size};
 use super::layout::{self, Found};
 use super::names::{Kind, Meaning, meaning};
-use super::written::{FileText, Sensors, Temperature, Time};
+use super::written::{FileText, Sensors, Temperature, Time, name_line};
 use super::{Hints, Proposal, Question, refuse};
+use crate::convert::raw_text::RawColumns;
 use crate::error::Error;
 
 /// Standard gravity in the units that an accelerometer may have.
@@ -30,8 +31,16 @@ pub fn propose(paths: &[impl AsRef<Path>], hints: &Hints) -> Result<Proposal, Er
         let found = layout::find(path.as_ref(), hints)?;
         let figures = Figures::of(path.as_ref(), &found)?;
         let file = File { name, found: &found, figures: &figures, hints };
-        let text = file.text(paths.len() > 1, &mut proposal);
-        proposal.mapping.push_str(&text.text());
+        let several = paths.len() > 1;
+        let text = match file.own() {
+            Some(columns) => {
+                proposal.notes.push(format!("{name}: written by isotherm-replay: {}", columns.words()));
+                let line = if several { name_line(name) } else { String::new() };
+                columns.file_text(&line, hints.skip_bad_rows)
+            }
+            None => file.text(several, &mut proposal).text(),
+        };
+        proposal.mapping.push_str(&text);
     }
     let has_gyros = proposal.mapping.contains("[file.gyro]");
     if !has_gyros && !proposal.open.iter().any(|open| matches!(open, Question::Columns { .. })) {
@@ -67,6 +76,21 @@ type Axes<'m> = [Option<(usize, &'m Meaning)>; 3];
 type Meanings = Vec<(usize, Meaning)>;
 
 impl<'a> File<'a> {
+    /// The columns of a log that `simulate` or `convert` wrote, where nothing else is said of it. Means have a fraction, if of zero.
+    fn own(self) -> Option<RawColumns> {
+        let header = self.found.header.as_ref().filter(|_| self.found.by_name)?;
+        let said = Hints { skip_bad_rows: self.hints.skip_bad_rows, ..Hints::default() };
+        let fraction = |index| {
+            let cells = self.found.rows.iter().filter_map(|row| row.split(',').nth(index));
+            cells.into_iter().any(|cell| cell.contains('.'))
+        };
+        let whole = |index: usize| {
+            let column = self.figures.columns.get(index);
+            column.is_some_and(|column| column.numbers > 0 && column.fractions == 0) && !fraction(index)
+        };
+        (*self.hints == said).then(|| RawColumns::of_header(header, whole)).flatten()
+    }
+
     fn text(self, named: bool, proposal: &mut Proposal) -> FileText<'a> {
         let Found { encoding, delimiter, decimal_mark, .. } = self.found;
         let header = if self.found.header.is_some() { "a header" } else { "no header" };

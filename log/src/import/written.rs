@@ -44,6 +44,11 @@ pub(super) struct FileText<'a> {
     pub(super) temperatures: Vec<Temperature>,
 }
 
+/// The line that names a file.
+pub(super) fn name_line(name: &str) -> String {
+    format!("name = {}\n", quoted(name))
+}
+
 /// A text as TOML writes it.
 fn quoted(text: &str) -> String {
     toml::Value::String(text.to_owned()).to_string()
@@ -59,7 +64,7 @@ impl FileText<'_> {
             let _ = writeln!(text, "{words}");
         };
         if let Some(name) = &self.name {
-            line(format_args!("name = {}", quoted(name)));
+            line(format_args!("{}", name_line(name).trim_end()));
         }
         if found.encoding != Encoding::Utf8 {
             line(format_args!("encoding = \"{}\"", found.encoding.word()));

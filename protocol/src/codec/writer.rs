@@ -2,46 +2,46 @@
 
 use isotherm_correction::sample::LasingMode;
 
-use super::GOES_ON;
+use super::{GOES_ON, WINDOW};
 
-/// Room at the end of a frame. What does not fit is left out: whoever asks for room asks for enough.
+/// Room at the end of a frame that has its full length always, so that no number in it has to ask whether it fits.
 #[derive(Debug)]
 pub struct Writer<'a> {
-    room: &'a mut [u8],
-    at: usize,
+    room: &'a mut [u8; WINDOW],
+    /// How far it has been written. As a `u8` it never leaves the window, and 255 bytes are more than any part of a message has.
+    at: u8,
 }
 
 /// Most bytes of a number.
 pub(crate) const MAX_NUMBER: usize = 10;
 
-/// Appends a part of at most `most` bytes to a frame.
+/// Appends a part of at most 255 bytes to a frame.
 #[inline]
-pub(crate) fn append(frame: &mut Vec<u8>, most: usize, write: impl FnOnce(&mut Writer<'_>)) {
+pub(crate) fn append(frame: &mut Vec<u8>, write: impl FnOnce(&mut Writer<'_>)) {
     let before = frame.len();
-    // Numbers are written as whole words, which reach beyond their last byte.
-    frame.resize(before + most + size_of::<u64>(), 0);
-    let mut writer = Writer { room: frame.get_mut(before..).unwrap_or_default(), at: 0 };
-    write(&mut writer);
-    let written = writer.at;
-    frame.truncate(before + written);
+    frame.resize(before + WINDOW, 0);
+    if let Some(room) = frame.last_chunk_mut() {
+        let mut writer = Writer { room, at: 0 };
+        write(&mut writer);
+        let written = usize::from(writer.at);
+        frame.truncate(before + written);
+    }
+}
+
+/// Appends a text of any length.
+pub(crate) fn append_text(frame: &mut Vec<u8>, text: &str) {
+    append(frame, |to| to.length(text.len()));
+    frame.extend_from_slice(text.as_bytes());
 }
 
 impl Writer<'_> {
     /// Writes bytes, of which the first `length` count.
     #[inline]
-    fn put<const N: usize>(&mut self, bytes: [u8; N], length: usize) {
-        if let Some(place) = self.room.get_mut(self.at..self.at + N) {
-            place.copy_from_slice(&bytes);
-            self.at += length;
-        }
-    }
-
-    /// Writes a text.
-    pub(crate) fn text(&mut self, text: &str) {
-        self.length(text.len());
-        if let Some(place) = self.room.get_mut(self.at..self.at + text.len()) {
-            place.copy_from_slice(text.as_bytes());
-            self.at += text.len();
+    fn put<const N: usize>(&mut self, bytes: [u8; N], length: u8) {
+        let rest = self.room.get_mut(usize::from(self.at)..);
+        if let Some(place) = rest.and_then(|rest| rest.first_chunk_mut()) {
+            *place = bytes;
+            self.at = self.at.wrapping_add(length);
         }
     }
 
@@ -67,13 +67,13 @@ impl Writer<'_> {
         let bits = bits & 0x0000_3fff_0000_3fff | (bits & 0x0fff_c000_0fff_c000) << 2;
         let bits = bits & 0x007f_007f_007f_007f | (bits & 0x3f80_3f80_3f80_3f80) << 1;
         if highest == 0 {
-            let behind = number.ilog2() / 7;
-            self.put((bits | GOES_ON & ((1 << (8 * behind)) - 1)).to_le_bytes(), behind as usize + 1);
+            let [behind, ..] = (number.ilog2() / 7).to_le_bytes();
+            self.put((bits | GOES_ON & ((1 << (8 * behind)) - 1)).to_le_bytes(), behind + 1);
         } else {
             // Nanoseconds since 1970 have nine bytes.
             self.bytes((bits | GOES_ON).to_le_bytes());
             let last = highest >> 7;
-            self.put([highest & 0x7f | last << 7, last], usize::from(1 + last));
+            self.put([highest & 0x7f | last << 7, last], 1 + last);
         }
     }
 
@@ -122,10 +122,10 @@ mod tests {
         for number in powers.flat_map(|power| [power - 1, power, power | 1, power.wrapping_mul(255), !power])
         {
             let mut frame = vec![9];
-            append(&mut frame, MAX_NUMBER, |to| to.u64(number));
-            append(&mut frame, MAX_NUMBER, |to| to.i64(number.cast_signed()));
+            append(&mut frame, |to| to.u64(number));
+            append(&mut frame, |to| to.i64(number.cast_signed()));
             let small = i32::from_le_bytes(*number.to_le_bytes().first_chunk().unwrap());
-            append(&mut frame, MAX_NUMBER, |to| to.i32(small));
+            append(&mut frame, |to| to.i32(small));
             let expected = postcard::to_allocvec(&(9_u8, number, number.cast_signed(), small)).unwrap();
             assert_eq!(frame, expected, "{number:#x}");
         }
@@ -135,9 +135,9 @@ mod tests {
     fn modes_and_texts_are_those_of_postcard() {
         let mut frame = Vec::new();
         let modes = [None, Some(LasingMode::Plus), Some(LasingMode::Minus)];
-        append(&mut frame, 2 * modes.len(), |to| modes.into_iter().for_each(|mode| to.mode(mode)));
+        append(&mut frame, |to| modes.into_iter().for_each(|mode| to.mode(mode)));
         let text = "катушка ".repeat(40);
-        append(&mut frame, MAX_NUMBER + text.len(), |to| to.text(&text));
+        append_text(&mut frame, &text);
         assert_eq!(frame, postcard::to_allocvec(&(modes, text)).unwrap());
     }
 }

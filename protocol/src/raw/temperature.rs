@@ -4,7 +4,7 @@ use arrayvec::ArrayVec;
 use isotherm_correction::sample::{ChannelName, TemperatureReading};
 use isotherm_correction::units::Timestamp;
 
-use crate::codec::{self, Body, CodecError, Kind, MAX_NUMBER, MAX_TICKS, Message, append};
+use crate::codec::{self, Body, CodecError, Kind, MAX_TICKS, Message, append, append_text};
 use crate::version::{self, Versions};
 
 /// Most temperature channels in one batch.
@@ -65,14 +65,11 @@ impl Message for TemperatureBatch {
     }
 
     fn write_body(&self, frame: &mut Vec<u8>) -> Result<(), CodecError> {
-        let names: usize = self.channels().map(|channel| MAX_NUMBER + channel.len()).sum();
-        append(frame, names + 2 * MAX_NUMBER, |to| {
-            to.length(self.channels().count());
-            self.channels().for_each(|channel| to.text(channel));
-            to.length(self.ticks().count());
-        });
+        append(frame, |to| to.length(self.channels().count()));
+        self.channels().for_each(|channel| append_text(frame, channel));
+        append(frame, |to| to.length(self.ticks().count()));
         for tick in self.ticks() {
-            append(frame, 2 * MAX_NUMBER + tick.len() * size_of::<f64>(), |to| {
+            append(frame, |to| {
                 to.i64(tick.first().map_or(0, |reading| reading.time.as_ns()));
                 to.length(tick.len());
                 for reading in tick {

@@ -2,11 +2,11 @@
 
 use std::collections::VecDeque;
 
-use isotherm_correction::sample::{ChannelName, CorrectedTick};
+use isotherm_correction::sample::CorrectedTick;
 use serde::{Deserialize, Serialize};
 
-use crate::codec::{MAX_FRAME, MAX_TICKS, begin, seal};
-use crate::corrected::{CorrectedBatch, Head, MAX_TICK, Revision, append_tick};
+use crate::codec::{MAX_FRAME, MAX_TICKS, WINDOW, begin, seal};
+use crate::corrected::{CorrectedBatch, MAX_TICK, append_tick};
 use crate::raw::MAX_CHANNELS;
 
 /// Corrected ticks that have not been taken yet.
@@ -16,9 +16,11 @@ pub struct Outgoing {
     /// Frames that nothing can be added to; mostly none.
     full: VecDeque<Frame>,
     open: Frame,
-    /// Lengths of the last frame and of what stood before its ticks, in bytes: the next one is likely to be as long.
+    /// Length of the last frame in bytes: the next one is likely to be as long.
     length: usize,
-    head: usize,
+    /// What stood before its ticks: so will the next one begin, mostly until a temperature was read.
+    head: Vec<u8>,
+    head_of: Option<HeadKey>,
     /// Ticks are kept as they are, and written when a frame is asked for.
     as_ticks: bool,
     ticks: Vec<CorrectedTick>,
@@ -39,6 +41,16 @@ struct Frame {
     room: usize,
     count: usize,
     last: Last,
+}
+
+/// What a head follows from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct HeadKey {
+    /// Counter of the revision.
+    revision: u64,
+    /// State of the temperatures.
+    temperatures: u64,
+    ticks: usize,
 }
 
 /// The last of some ticks.
@@ -91,9 +103,9 @@ impl Outgoing {
         if self.open.count == 0 {
             // One allocation for a frame like the last, and what writing wants behind its end.
             self.open.bytes.clear();
-            self.open.bytes.reserve(self.length + self.length / 8 + self.head + MAX_TICK);
-            self.open.bytes.resize(self.head, 0);
-            self.open.room = self.head;
+            self.open.bytes.reserve(self.length + self.length / 8 + WINDOW);
+            self.open.bytes.extend_from_slice(&self.head);
+            self.open.room = self.head.len();
         }
         append_tick(&mut self.open.bytes, tick);
         self.open.count += 1;
@@ -101,13 +113,12 @@ impl Outgoing {
     }
 
     /// Makes the next frame, all of one revision, in the place of `into`, whose capacity is kept for the one after it; its
-    /// last tick.
-    pub(super) fn next_frame<'a>(
+    /// last tick. `write_head` appends the head of a frame of so many ticks of a revision; `temperatures` says in which state they are.
+    pub(super) fn next_frame(
         &mut self,
         into: &mut Vec<u8>,
-        unit: &'a str,
-        revision: impl FnOnce(u64) -> Revision,
-        temperatures: impl Iterator<Item = (&'a ChannelName, [f64; 2])> + Clone,
+        temperatures: u64,
+        write_head: impl FnOnce(&mut Vec<u8>, u64, usize),
     ) -> Option<Last> {
         if !self.ticks.is_empty() {
             let mut ticks = std::mem::take(&mut self.ticks);
@@ -119,17 +130,16 @@ impl Outgoing {
             self.open = frame;
             return None;
         }
-        let end = frame.bytes.len();
-        begin::<CorrectedBatch>(&mut frame.bytes);
-        let revision = revision(frame.last.revision);
-        Head { unit, revision, temperatures, ticks: frame.count }.append(&mut frame.bytes);
-        self.head = frame.bytes.len() - end;
-        if self.head == frame.room {
-            frame.bytes.copy_within(end.., 0);
-            frame.bytes.truncate(end);
-        } else {
-            frame.bytes.drain(..frame.room);
-            frame.bytes.rotate_right(self.head);
+        let head_of = Some(HeadKey { revision: frame.last.revision, temperatures, ticks: frame.count });
+        if self.head_of != head_of {
+            self.head_of = head_of;
+            self.head.clear();
+            begin::<CorrectedBatch>(&mut self.head);
+            write_head(&mut self.head, frame.last.revision, frame.count);
+        }
+        match frame.bytes.get_mut(..frame.room) {
+            Some(room) if room.len() == self.head.len() => room.copy_from_slice(&self.head),
+            _ => drop(frame.bytes.splice(..frame.room, self.head.iter().copied())),
         }
         seal(&mut frame.bytes);
         self.length = frame.bytes.len();
@@ -138,6 +148,11 @@ impl Outgoing {
             self.open.bytes = frame.bytes;
         }
         Some(frame.last)
+    }
+
+    /// Forgets the head of the last frame: a revision's counter may mean another one.
+    pub(super) fn forget_head(&mut self) {
+        self.head_of = None;
     }
 
     /// Takes all ticks as they are.

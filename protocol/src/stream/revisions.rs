@@ -44,13 +44,16 @@ pub(super) struct Revisions {
     highest: u64,
     /// Counter of the last output that was released.
     released: u64,
+    /// That of the last one known to have made ticks: no memory, only a shorter way.
+    #[serde(skip)]
+    made_ticks: Option<u64>,
     in_force: VecDeque<InForce>,
 }
 
 impl Revisions {
     /// None yet; counters go on behind `highest`.
     pub(super) fn new(highest: u64) -> Self {
-        Self { given: VecDeque::new(), highest, released: 0, in_force: VecDeque::new() }
+        Self { given: VecDeque::new(), highest, released: 0, made_ticks: None, in_force: VecDeque::new() }
     }
 
     /// Counter of the next one.
@@ -64,6 +67,7 @@ impl Revisions {
         // Mostly the only one.
         self.given.reserve_exact(1);
         self.given.push_back(Given { revision, label, slew, made_ticks: false });
+        self.made_ticks = None;
     }
 
     /// That of a counter; the latest where a counter was given twice.
@@ -78,6 +82,10 @@ impl Revisions {
 
     /// Ticks were corrected while this counter was in force.
     pub(super) fn made_ticks(&mut self, counter: u64) {
+        if self.made_ticks == Some(counter) {
+            return;
+        }
+        self.made_ticks = Some(counter);
         if let Some(given) = self.given.iter_mut().rfind(|given| given.revision.counter == counter) {
             given.made_ticks = true;
         }

@@ -128,6 +128,45 @@ fn a_swap_at_a_sequence_number_is_announced_and_takes_effect_there() {
 }
 
 #[test]
+fn every_frame_says_the_temperatures_and_the_revision_of_its_own_ticks() {
+    let (mut stream, (calibration, label)) = (stream(), full());
+    let mut seen = Vec::new();
+    for sequence in 0..900 {
+        if sequence == 100 || sequence == 700 {
+            // The second has the counter of the first, and another digest.
+            let mut digest = Digest([0; 32]);
+            digest.0[0] = u8::try_from(sequence / 100).unwrap();
+            let label = Label { digest: Some(digest), ..label.clone() };
+            let calibration = Arc::clone(&calibration);
+            stream.schedule(Change { calibration, revision: 1, at: At::NextTick, slew: Span::ZERO }, label);
+        }
+        if sequence == 500 {
+            let time = Timestamp::from_ns(end(sequence).as_ns() - TICK_NS);
+            let channel = ChannelName::from("coil").unwrap();
+            let readings = vec![TemperatureReading { channel, time, raw: 25.1 }];
+            let batch = TemperatureBatch { readings };
+            stream.receive(RawStream::Temperature, &encode(&batch).unwrap()).unwrap();
+        }
+        tick(&mut stream, 7, sequence);
+        for batch in batches(&mut stream) {
+            let said = batch
+                .temperatures
+                .iter()
+                .map(|applied| (applied.channel, applied.temperature_deg_c.to_bits()));
+            let said: Vec<_> = said.collect();
+            let known =
+                stream.unit().temperatures().map(|(name, state)| (*name, state.temperature.to_bits()));
+            assert_eq!(said, known.collect::<Vec<_>>(), "tick {sequence}");
+            assert_eq!(batch.revision, stream.revision(), "tick {sequence}");
+            if seen.last() != Some(&(said.clone(), batch.revision)) {
+                seen.push((said, batch.revision));
+            }
+        }
+    }
+    assert!(seen.len() >= 4, "temperatures and revisions come and change: {seen:?}");
+}
+
+#[test]
 fn swaps_without_ticks_leave_nothing_behind() {
     let mut stream = stream();
     let (calibration, label) = full();

@@ -24,7 +24,7 @@ use crate::play::wanted;
 #[derive(Debug, Args)]
 #[command(after_help = "Example, in two steps:\n  \
     isotherm-replay simulate --preset mems-chamber --duration 60 --out mems.csv\n  \
-    isotherm-replay cat mems.csv --mapping mems.mapping.toml --unit MEMS-0001 --topic 'imu/*/raw/temp' --limit 2\n\n\
+    isotherm-replay cat mems.csv --unit MEMS-0001 --topic 'imu/*/raw/temp' --limit 2\n\n\
     Each line has `topic`, `received_ns` and `message`, whose fields are those of docs/wire.md; or `error`, where a frame cannot\n\
     be read (exit code 3).")]
 pub(super) struct CatArgs {

@@ -18,7 +18,7 @@ use crate::error::Error;
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     isotherm-replay simulate --preset mems-chamber --duration 60 --out mems.csv\n  \
-    isotherm-replay convert mems.csv --mapping mems.mapping.toml --unit MEMS-0001 --out mems.mcap\n  \
+    isotherm-replay convert mems.csv --unit MEMS-0001 --out mems.mcap\n  \
     isotherm-replay convert mems.mcap --to text --out text\n  \
     isotherm-replay convert mems.mcap --to ros2 --out bag --calibration config/calibration/MEMS-0001.toml\n  \
     isotherm-replay convert mems.mcap --to parquet --out tables\n\n\
@@ -144,9 +144,8 @@ impl ConvertArgs {
         }
         let documents = self.calibration.iter().map(|path| document(path)).collect::<Result<_, _>>()?;
         let mut sources: Vec<_> = vec![("log".to_owned(), names(&log.log))];
-        sources.extend(
-            log.mapping.as_ref().map(|mapping| ("mapping".to_owned(), mapping.display().to_string())),
-        );
+        sources
+            .extend(log.mapping_file().map(|mapping| ("mapping".to_owned(), mapping.display().to_string())));
         Ok(Conversion {
             files,
             part: log.part()?,

@@ -20,7 +20,7 @@ use crate::output::Format;
 #[derive(Debug, Args)]
 #[command(after_help = "Example, in two steps:\n  \
     isotherm-replay simulate --preset mems-chamber --duration 60 --out mems.csv\n  \
-    isotherm-replay correct mems.csv --mapping mems.mapping.toml --calibration config/calibration/MEMS-0001.toml --out corrected.csv\n\n\
+    isotherm-replay correct mems.csv --calibration config/calibration/MEMS-0001.toml --out corrected.csv\n\n\
     The CSV's columns are named with their units; its numbers read back to the bit.\n\n\
     A recording is corrected by its own journal, all units at once: each with the calibrations, swaps and commands that it had \
     in the service, at the same ticks: `isotherm-replay correct session.mcap`. Where it has the corrected ticks of the service \

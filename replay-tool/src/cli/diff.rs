@@ -26,8 +26,8 @@ use crate::progress::Bar;
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  \
     isotherm-replay simulate --preset mems-chamber --duration 60 --out mems.csv\n  \
-    isotherm-replay correct mems.csv --mapping mems.mapping.toml --calibration config/calibration/MEMS-0001.toml --out a.csv\n  \
-    isotherm-replay correct mems.csv --mapping mems.mapping.toml --calibration config/calibration/MEMS-0001.toml --out b.csv\n  \
+    isotherm-replay correct mems.csv --calibration config/calibration/MEMS-0001.toml --out a.csv\n  \
+    isotherm-replay correct mems.csv --calibration config/calibration/MEMS-0001.toml --out b.csv\n  \
     isotherm-replay diff a.csv b.csv\n\n\
     A log is a recording (MCAP) with corrected ticks, or a CSV or wire file of `isotherm-replay correct`. Ticks are known by \
     their sequence number and end, and compared to the bit unless a tolerance is given.\n\n\

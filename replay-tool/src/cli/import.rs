@@ -99,13 +99,13 @@ impl ImportArgs {
         }
     }
 
-    /// A file beside the first of the log, with another ending.
-    fn beside(&self, ending: &str) -> PathBuf {
-        let first = self.log.first().cloned().unwrap_or_default();
-        let name = first.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-        let name = name.strip_suffix(".gz").unwrap_or(&name);
-        let stem = Path::new(name).file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        first.with_file_name(stem + ending)
+    fn first(&self) -> &Path {
+        self.log.first().map_or(Path::new(""), PathBuf::as_path)
+    }
+
+    /// The page of the first plot, beside the mapping of the log.
+    fn page(&self) -> PathBuf {
+        Mapping::path_beside(self.first()).with_extension("").with_extension("html")
     }
 
     /// The log as the other commands take it.
@@ -123,8 +123,8 @@ impl ImportArgs {
 
 /// Runs the command.
 pub(super) fn run(args: &ImportArgs) -> Result<Outcome, Error> {
-    let out = args.out.clone().unwrap_or_else(|| args.beside(".mapping.toml"));
-    let page = (!args.no_plot).then(|| args.plot.clone().unwrap_or_else(|| args.beside(".html")));
+    let out = args.out.clone().unwrap_or_else(|| Mapping::path_beside(args.first()));
+    let page = (!args.no_plot).then(|| args.plot.clone().unwrap_or_else(|| args.page()));
     let inputs: Vec<_> = args.log.iter().map(PathBuf::as_path).collect();
     for path in std::iter::once(&out).chain(&page) {
         refuse_overwriting(path, &inputs)?;

@@ -22,7 +22,7 @@ const UNNAMED: &str = "log";
 #[derive(Debug, Args)]
 #[command(after_help = "Example, in two steps:\n  \
     isotherm-replay simulate --preset mems-chamber --duration 60 --out mems.csv\n  \
-    isotherm-replay info mems.csv --mapping mems.mapping.toml\n\n\
+    isotherm-replay info mems.csv\n\n\
     Memory does not grow with the length of the log. Exit code 3: the log is cut short, or rows of it could not be read.")]
 pub(super) struct InfoArgs {
     #[command(flatten)]

@@ -17,7 +17,7 @@ use crate::progress::Bar;
 #[derive(Debug, Args)]
 #[command(after_help = "Example, in two steps:\n  \
     isotherm-replay simulate --preset mems-chamber --duration 60 --out mems.csv\n  \
-    isotherm-replay list mems.csv --mapping mems.mapping.toml --unit MEMS-0001\n\n\
+    isotherm-replay list mems.csv --unit MEMS-0001\n\n\
     Times are seconds from the log's first message. What they hold: `isotherm-replay info` and `isotherm-replay cat`.")]
 pub(super) struct ListArgs {
     #[command(flatten)]

@@ -20,7 +20,7 @@ pub(crate) struct LogArgs {
     /// Recordings, read in sequence; or the files of one text log in the mapping's order, or their folder
     #[arg(required = true, value_name = "LOG")]
     pub(crate) log: Vec<PathBuf>,
-    /// Column mapping of a text log (TOML); `isotherm-replay import` makes one
+    /// Column mapping of a text log (default: LOG with .mapping.toml, as `isotherm-replay import` writes it)
     #[arg(long, short, value_name = "FILE")]
     pub(crate) mapping: Option<PathBuf>,
     /// Unit serial, repeatable (default: all). Text log: the serial to assign
@@ -127,22 +127,32 @@ impl LogArgs {
         Ok(Window::new(LogReader::open(&self.text_mapping()?, &self.log)?, part.start, duration))
     }
 
+    /// The file of a text log's mapping: the one given, else the one beside the log.
+    pub(crate) fn mapping_file(&self) -> Option<PathBuf> {
+        if are_recordings(&self.log).unwrap_or_default() {
+            return None;
+        }
+        Mapping::path_of(self.mapping.as_deref(), &self.log)
+    }
+
     /// The mapping of a text log.
     fn text_mapping(&self) -> Result<Mapping, Error> {
-        if let Some(mapping) = &self.mapping {
-            return Ok(Mapping::load(mapping)?);
+        if let Some(mapping) = self.mapping_file() {
+            return Ok(Mapping::load(&mapping)?);
         }
         for path in &self.log {
             std::fs::metadata(path).map_err(|source| Error::file(path, "open the log", source))?;
         }
-        let log = self.log.first().map(|path| path.display().to_string()).unwrap_or_default();
+        let first = self.log.first().cloned().unwrap_or_default();
+        let (log, beside) = (first.display(), Mapping::path_beside(&first));
+        let beside = beside.display();
         Err(Error::Usage(format!(
-            "{log} is no recording, and a text log needs --mapping FILE: `isotherm-replay import {log}` makes one, ready ones are in config/mappings"
+            "{log} is no recording, and a text log needs --mapping FILE or {beside}: `isotherm-replay import {log}` makes one, ready ones are in config/mappings"
         )))
     }
 
     /// Every file that is read, for outputs that must not fall on one.
     pub(crate) fn inputs(&self) -> Vec<PathBuf> {
-        self.log.iter().chain(&self.mapping).cloned().collect()
+        self.log.iter().cloned().chain(self.mapping_file()).collect()
     }
 }

@@ -33,8 +33,8 @@ const MAX_COPIES: u32 = 999;
 #[derive(Debug, Args)]
 #[command(after_help = "Example, with `isotherm serve` running:\n  \
     isotherm-replay simulate --preset mems-chamber --duration 60 --out mems.csv\n  \
-    isotherm-replay play mems.csv --mapping mems.mapping.toml --unit MEMS-0001 --speed max\n  \
-    isotherm-replay play mems.csv -m mems.mapping.toml -u MEMS --speed max --batch 10 \
+    isotherm-replay play mems.csv --unit MEMS-0001 --speed max\n  \
+    isotherm-replay play mems.csv -u MEMS --speed max --batch 10 \
     --copies 20 --seed 1 --loss 0.01 --duplicate 0.01 --reorder 0.01\n\n\
     At any speed, ticks are sent no further ahead of what comes back corrected than --in-flight, so that none is lost.\n\
     Keys, where input and standard error are a terminal: space pauses and goes on; n or → (paused) plays up to the next gyro\n\
@@ -57,9 +57,9 @@ pub(super) struct PlayArgs {
     /// Take only messages of these keys, e.g. 'imu/*/raw/gyro'; may be given several times
     #[arg(long, value_name = "KEY", value_parser = key_expression, hide_short_help = true)]
     topic: Vec<OwnedKeyExpr>,
-    /// Play a unit of the log under another serial; may be given several times
-    #[arg(long = "as", value_name = "OLD=NEW", value_parser = renaming)]
-    names: Vec<(UnitId, UnitId)>,
+    /// Play a unit of the log on the topics of another; may be given several times
+    #[arg(long, value_name = "UNIT=UNIT", value_parser = remapping)]
+    remap: Vec<(UnitId, UnitId)>,
     /// Play each unit as so many: SERIAL-001, SERIAL-002 and so on
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_COPIES)), hide_short_help = true)]
     copies: Option<u32>,
@@ -127,9 +127,10 @@ fn health_reading(text: &str) -> Result<HealthReading, String> {
     Ok(HealthReading { name, value })
 }
 
-/// Reads `OLD=NEW`.
-fn renaming(text: &str) -> Result<(UnitId, UnitId), String> {
-    let (old, new) = text.split_once('=').ok_or("must be OLD=NEW")?;
+/// Reads `UNIT=UNIT`.
+fn remapping(text: &str) -> Result<(UnitId, UnitId), String> {
+    let (old, new) =
+        text.split_once('=').ok_or("must be UNIT=UNIT: the serial in the log, the serial to play it as")?;
     let unit = |serial: &str| UnitId::new(serial).map_err(|error| format!("{serial:?} {error}"));
     Ok((unit(old)?, unit(new)?))
 }
@@ -157,9 +158,9 @@ impl PlayArgs {
             return Err(Error::Usage(format!("--health is given {given} times, may be {MAX_HEALTH} times")));
         }
         let mut names = BTreeMap::new();
-        for (old, new) in &self.names {
+        for (old, new) in &self.remap {
             if names.insert(old.clone(), new.clone()).is_some() {
-                return Err(Error::Usage(format!("--as names {old} twice")));
+                return Err(Error::Usage(format!("--remap names {old} twice")));
             }
         }
         Ok(PlayOptions {

@@ -28,7 +28,7 @@ const UNNAMED: &str = "log";
 #[derive(Debug, Args)]
 #[command(after_help = "Example, in two steps:\n  \
     isotherm-replay simulate --preset mems-chamber --duration 60 --out mems.csv\n  \
-    isotherm-replay plot mems.csv --mapping mems.mapping.toml --calibration config/calibration/MEMS-0001.toml --out mems.html\n\n\
+    isotherm-replay plot mems.csv --calibration config/calibration/MEMS-0001.toml --out mems.html\n\n\
     The file needs no network and nothing beside it. Two logs: isotherm-replay plot a.mcap --beside b.mcap --out both.html")]
 pub(super) struct PlotArgs {
     #[command(flatten)]

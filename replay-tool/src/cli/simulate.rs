@@ -15,6 +15,7 @@ use crate::error::Error;
 use crate::progress::Bar;
 use crate::simulated::{Columns, LogWriter, write_truth, write_truth_header};
 use isotherm_log::file::{read_small_text, refuse_overwriting};
+use isotherm_log::mapping::Mapping;
 
 /// Simulate a log, with the mapping that reads it back beside it
 #[derive(Debug, Args)]
@@ -166,7 +167,7 @@ pub(super) fn run(args: &SimulateArgs) -> Result<Outcome, Error> {
     let simulation = Simulation::new(&scenario)
         .map_err(|errors| Error::Scenario(errors.0.iter().map(|error| format!("{name}{error}")).collect()))?;
 
-    let mapping = mapping_path(out);
+    let mapping = Mapping::path_beside(out);
     args.refuse_overwriting(out, &mapping)?;
     let mut log = create(out)?;
     std::fs::write(&mapping, columns.mapping()).map_err(|source| Error::file(&mapping, "write", source))?;
@@ -219,16 +220,6 @@ fn human(report: &Report) -> String {
     ];
     rows.extend(report.truth.iter().map(|truth| ("truth", truth.clone())));
     show::table(&rows)
-}
-
-/// Where the mapping of a log goes: `zeeman.csv.gz` has `zeeman.mapping.toml`.
-fn mapping_path(log: &Path) -> PathBuf {
-    let plain = if log.extension().is_some_and(|extension| extension == "gz") {
-        log.with_extension("")
-    } else {
-        log.into()
-    };
-    plain.with_extension("mapping.toml")
 }
 
 /// A file, compressed where its name says so.

@@ -23,7 +23,7 @@ const HELP: &str = "Enter: next event · number, Enter: so many · s SEQ: to gyr
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  \
     isotherm-replay simulate --preset mems-chamber --duration 10 --out mems.csv\n  \
-    isotherm-replay step mems.csv --mapping mems.mapping.toml --calibration config/calibration/MEMS-0001.toml --from 100 --count 3\n\n\
+    isotherm-replay step mems.csv --calibration config/calibration/MEMS-0001.toml --from 100 --count 3\n\n\
     Without --from, --count and --json, on a terminal, it stops behind each event: Enter for the next, a number and Enter for so \
     many, s SEQ to go to gyro tick SEQ, q to end.\n\n\
     A recording is gone through by its own journal, as `isotherm-replay correct` does.")]

@@ -69,7 +69,7 @@ impl<'a> Units<'a> {
             if !self.serials.insert(unit.clone()) {
                 return Err(Error::Usage(format!(
                     "{of} of the log would be played as {unit}, and so is another of its units: give one of them another \
-                     name by --as"
+                     by --remap"
                 )));
             }
             let faults = (!self.options.faults.is_none())

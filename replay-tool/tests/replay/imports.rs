@@ -483,3 +483,26 @@ fn with_data_the_proposals_are_the_ready_mappings() {
         assert_eq!(proposed.files[1].accel, ready.files[1].accel);
     }
 }
+
+#[test]
+fn a_log_of_ones_own_is_recognised_as_its_own_mapping_says_it() {
+    for (preset, words) in [
+        ("zeeman-sine", "3 gyros (counts), 3 accelerometers (counts), 8 temperature channels"),
+        ("fibre-optic-judging", "3 gyros (means), 3 accelerometers (counts), 8 temperature channels"),
+        ("mems-chamber", "3 gyros (means), 3 accelerometers (means), 8 temperature channels"),
+        ("skewed-six", "6 gyros (means), 6 accelerometers (means), 14 temperature channels"),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let simulated =
+            replay(folder.path(), &["simulate", "--preset", preset, "--duration", "12", "--out", "own.csv"]);
+        check(&simulated, 0, "");
+        let path = folder.path().join("own.mapping.toml");
+        let read = || Mapping::parse(&std::fs::read_to_string(&path).unwrap(), "own.mapping.toml").unwrap();
+        let own = read();
+        let imported = replay(folder.path(), &["import", "own.csv", "--no-plot", "--overwrite", "--json"]);
+        check(&imported, 0, "");
+        let report: Value = serde_json::from_str(&stdout(&imported)).unwrap();
+        assert_eq!(report["notes"][0], format!("own.csv: written by isotherm-replay: {words}"), "{preset}");
+        assert_eq!(read(), own, "{preset}");
+    }
+}

@@ -16,6 +16,7 @@ mod correct_diff_step;
 mod examples;
 mod imports;
 mod info_plot;
+mod octave;
 mod python_recordings;
 mod real_logs;
 mod record;

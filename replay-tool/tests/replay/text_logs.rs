@@ -123,6 +123,18 @@ fn what_may_be_passed_over_is_counted_and_a_known_gap_is_announced() {
 }
 
 #[test]
+fn a_mapping_beside_its_log_needs_no_option() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name);
+    fs::write(file("log.csv"), ROWS).unwrap();
+    fs::write(file("log.mapping.toml"), mapping("delimiter = \"semicolon\"", "")).unwrap();
+    fs::write(file("other.toml"), mapping("delimiter = \"comma\"", "")).unwrap();
+    let info = |arguments: &[&str]| replay(folder.path(), &[&["info"], arguments].concat()).status.code();
+    assert_eq!(info(&["log.csv"]), Some(0));
+    assert_eq!(info(&["log.csv", "--mapping", "other.toml"]), Some(1), "an option overrules the file beside");
+}
+
+#[test]
 fn play_refuses_a_log_before_it_opens_a_session() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();

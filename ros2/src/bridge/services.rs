@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use isotherm_bus::BusError;
+use isotherm_bus::inquiry::{Unanswered, ask};
 use isotherm_log::ros2::{from_cdr, to_cdr};
 use isotherm_protocol::control::{CommandOrder, CommandReply, Order};
 use isotherm_protocol::digest::Digits;
@@ -110,19 +111,17 @@ async fn command(bus: &Session, unit: &UnitId, does: Does, request: &Attachment)
     let order = CommandOrder { by, order: does.order() };
     let order = serde_json::to_vec(&order).unwrap_or_default();
     let failed = |message: String| TriggerResponse { success: false, message };
-    let replies = match bus.get(key::command(unit)).payload(order).timeout(ANSWER).await {
-        Ok(replies) => replies,
-        Err(error) => return failed(isotherm_bus::words(&error)),
+    let key = key::command(unit);
+    let answers = match ask(bus, key.as_ref(), "", Some(&order), ANSWER).await {
+        Ok(answers) => answers,
+        Err(Unanswered::Bus(error)) => return failed(error.to_string()),
+        Err(Unanswered::Silence) => return failed(format!("no service answered within {ANSWER:?}")),
+        Err(Unanswered::Refused(words)) => return failed(words),
     };
-    let Ok(reply) = replies.recv_async().await else {
-        return failed(format!("no service answered within {ANSWER:?}"));
-    };
-    match reply.into_result() {
-        Ok(sample) => match serde_json::from_slice::<CommandReply>(&sample.payload().to_bytes()) {
-            Ok(reply) => TriggerResponse { success: reply.accepted, message: in_words(&reply) },
-            Err(error) => failed(format!("the service's answer is none: {error}")),
-        },
-        Err(error) => failed(String::from_utf8_lossy(&error.payload().to_bytes()).into_owned()),
+    match answers.first().map(|answer| serde_json::from_slice::<CommandReply>(answer)) {
+        Some(Ok(reply)) => TriggerResponse { success: reply.accepted, message: in_words(&reply) },
+        Some(Err(error)) => failed(format!("the service's answer is none: {error}")),
+        None => failed("the service went away before it answered".to_owned()),
     }
 }
 

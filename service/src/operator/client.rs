@@ -4,6 +4,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use clap::Args;
+use isotherm_bus::inquiry::{Unanswered, ask};
 use isotherm_bus::{BusError, ClientOptions, Role};
 use isotherm_protocol::codec::{self, Message};
 use isotherm_protocol::escape::is_unfit;
@@ -12,9 +13,7 @@ use isotherm_protocol::pair::PairReport;
 use isotherm_protocol::service_status::ServiceStatus;
 use isotherm_protocol::status::Status;
 use serde::de::DeserializeOwned;
-use tokio::time::{Instant, timeout_at};
 use zenoh::Session;
-use zenoh::query::{ConsolidationMode, QueryTarget};
 
 use super::ConsoleError;
 use crate::text::read_bounded;
@@ -84,43 +83,11 @@ impl Client {
         parameters: &str,
         payload: Option<&[u8]>,
     ) -> Result<Vec<Vec<u8>>, ConsoleError> {
-        let deadline = Instant::now() + self.timeout;
-        let declare = Self::declare(key);
-        let querier = self
-            .session
-            .declare_querier(key.to_owned())
-            .target(QueryTarget::All)
-            .consolidation(ConsolidationMode::None)
-            .timeout(self.timeout)
-            .await
-            .map_err(&declare)?;
-        let listener = querier.matching_listener().await.map_err(&declare)?;
-        let mut matching = querier.matching_status().await.map_err(&declare)?.matching();
-        while !matching {
-            let status = timeout_at(deadline, listener.recv_async()).await;
-            let Ok(Ok(status)) = status else { return Err(self.no_answer(key)) };
-            matching = status.matching();
-        }
-        let mut get = querier.get().parameters(parameters);
-        if let Some(payload) = payload {
-            get = get.payload(payload);
-        }
-        let replies = get.await.map_err(&declare)?;
-        let mut answers = Vec::new();
-        loop {
-            match timeout_at(deadline, replies.recv_async()).await {
-                Ok(Ok(reply)) => match reply.into_result() {
-                    Ok(sample) => answers.push(sample.payload().to_bytes().into_owned()),
-                    Err(error) => {
-                        let words = String::from_utf8_lossy(&error.payload().to_bytes()).into_owned();
-                        return Err(ConsoleError::Refused(words));
-                    }
-                },
-                Err(_) if answers.is_empty() => return Err(self.no_answer(key)),
-                // The end of the answers, or of the time for them.
-                Ok(Err(_)) | Err(_) => return Ok(answers),
-            }
-        }
+        ask(&self.session, key, parameters, payload, self.timeout).await.map_err(|why| match why {
+            Unanswered::Bus(error) => error.into(),
+            Unanswered::Silence => self.no_answer(key),
+            Unanswered::Refused(words) => ConsoleError::Refused(words),
+        })
     }
 
     /// The first answer to a question, as text.

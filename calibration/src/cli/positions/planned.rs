@@ -28,6 +28,10 @@ pub(super) struct PlannedArgs {
     /// Planned: how fast an axis turns (″/°C); quartz 1.5, silicon up to 6
     #[arg(long, value_name = "ARCSEC", default_value_t = 1.5, requires = "budget")]
     pub(super) axis_rate: f64,
+    /// Planned: hysteresis of an axis over thermal cycles (″); quartz 5 to 15, silicon 15 to 60, or as measured by a run that comes back to a
+    /// temperature
+    #[arg(long, value_name = "ARCSEC", default_value_t = 5.0, requires = "budget")]
+    pub(super) hysteresis: f64,
 }
 
 impl PlannedArgs {
@@ -45,6 +49,7 @@ impl PlannedArgs {
             temperature_deg_c: pair(&self.temperatures),
             temperature_error_deg_c: self.temperature_error,
             axis_arcsec_per_deg_c: self.axis_rate,
+            hysteresis_arcsec: self.hysteresis,
         }
     }
 }

@@ -12,7 +12,7 @@ const RATES_DEG_PER_S: [f64; 2] = [1.0, 10_000.0];
 
 /// Place, attitude and turning: each option once for all logs, or once for each.
 #[derive(Debug, Clone, Args)]
-pub(super) struct StandArgs {
+pub(in crate::cli) struct StandArgs {
     /// Geodetic latitude (°, north positive): the Earth's rate is removed from the gyros
     #[arg(long, value_name = "DEG", requires = "heading", allow_negative_numbers = true)]
     latitude: Option<f64>,
@@ -41,7 +41,7 @@ pub(super) struct StandArgs {
 
 impl StandArgs {
     /// One for each of so many runs, and then for each of so many that judge; none where nothing is stated.
-    pub(super) fn stands(&self, runs: usize, judges: usize) -> Result<Vec<Stand>, Error> {
+    pub(in crate::cli) fn stands(&self, runs: usize, judges: usize) -> Result<Vec<Stand>, Error> {
         let all = runs + judges;
         let counts = [
             ("--heading", self.heading.len()),

@@ -17,10 +17,7 @@ fn fed(from_s: f64, to_s: f64, tick: Span, rate: impl Fn(f64) -> Option<f64>) ->
     while end <= at(to_s) {
         let start = end - tick;
         let covered = Covered::new(start, end);
-        ring.reach(&covered);
-        if let Some(rate) = rate(0.5 * (start.seconds_from(at(0.0)) + end.seconds_from(at(0.0)))) {
-            ring.add(&covered, rate);
-        }
+        ring.take(&covered, rate(0.5 * (start.seconds_from(at(0.0)) + end.seconds_from(at(0.0)))));
         end = end + tick;
     }
     ring
@@ -101,8 +98,7 @@ fn a_clock_that_counts_durations_differently_changes_no_rate() {
         // Ends every 5 ms, durations half a per cent short.
         let end = Timestamp::from_ns(k * 5_000_000);
         let covered = Covered::new(end - Span::from_ns(4_975_000), end);
-        ring.reach(&covered);
-        ring.add(&covered, 7e-5);
+        ring.take(&covered, Some(7e-5));
     }
     let mean = ring.mean(&span(1.0, 61.0)).unwrap();
     assert!((mean.rate / 7e-5 - 1.0).abs() < 1e-12, "{mean:?}");
@@ -114,8 +110,7 @@ fn times_at_the_ends_of_the_clock_are_survived() {
     for ns in [i64::MIN, i64::MIN + 1, -1, 0, 1, i64::MAX - 1, i64::MAX] {
         let end = Timestamp::from_ns(ns);
         let covered = Covered::new(end - TICK, end);
-        ring.reach(&covered);
-        ring.add(&covered, 1.0);
+        ring.take(&covered, Some(1.0));
         ring.mean(&Reference { start: end - Span::from_ms(1000), end, angular_rate: [0.0; 3], sigma: 0.0 })
             .ok();
         cell_end(end);

@@ -6,6 +6,7 @@ use super::patch::{Patch, SOUND, within};
 use super::{Corrector, OnItsWay, of_sensors};
 use crate::calibration::Calibration;
 use crate::lanes::{narrow, put};
+use crate::orientation::SensorMask;
 use crate::sample::{CorrectedTick, MAX_SENSORS, MIN_SENSORS, OutputKind, SensorFlags, TickFlags};
 use crate::thermal::Shares;
 use crate::unit::counters::Counters;
@@ -13,9 +14,20 @@ use crate::unit::counters::Counters;
 /// Terms of the accelerometers at a tick: S and 1/K, and r of their boards.
 pub(super) type AccelTerms<const N: usize> = ([[f64; N]; 2], [[f64; N]; 1]);
 
+/// Specific force along the input axes in a tick (m/s²), a lane for each accelerometer.
+pub(super) struct Felt<const N: usize> {
+    pub(super) forces: [f64; N],
+    /// Accelerometers whose reading counts.
+    usable: SensorMask,
+    /// Whether every reading is a number below its limit.
+    pub(super) within: bool,
+    /// Measured duration of their tick (s).
+    duration_s: f64,
+}
+
 /// Specific force along the input axis of one accelerometer (m/s²) that reads this over a tick (models §3).
 #[inline]
-pub(super) fn felt<const N: usize>(
+fn felt<const N: usize>(
     ([bias, per_scale_factor], [ratio]): &AccelTerms<N>,
     output: OutputKind,
     lane: usize,
@@ -43,29 +55,28 @@ impl Corrector {
         (terms, board)
     }
 
-    /// Corrects the accelerometers' readings of a tick.
+    /// What the accelerometers feel in a tick; `None` without accelerometers, or without their tick.
     #[inline]
-    pub(super) fn accels<const N: usize>(
+    pub(super) fn accels_feel<const N: usize>(
         &mut self,
         calibration: &Calibration,
         tick: &OnItsWay<'_>,
         shares: &Shares,
         counters: &mut Counters,
         out: &mut CorrectedTick,
-    ) {
+    ) -> Option<Felt<N>> {
         let count = calibration.accels.len();
         self.seen.specific_force = None;
         self.seen.accels.count = 0;
-        let (Some(orientation), Some(axes)) = (&calibration.accel_orientation, &self.thermal.accel_axes)
-        else {
+        let Some(axes) = &self.thermal.accel_axes else {
             out.accel_flags.clear();
-            return;
+            return None;
         };
         let Some(raw) = tick.accel else {
             out.accel_flags = of_sensors([SensorFlags::empty(); MAX_SENSORS], count);
             out.flags |= TickFlags::ACCELEROMETER_MISSING | TickFlags::VELOCITY_INVALID;
             counters.accel_missing += 1;
-            return;
+            return None;
         };
         // The corrected tick has the gyro tick's time.
         let (time, duration_s) = (out.end_time, raw.duration.as_s());
@@ -77,7 +88,8 @@ impl Corrector {
 
         let mut usable = axes.included();
         let footing = &self.thermal.accel_footing;
-        let flags = if footing.is_sound(time) & within(readings, narrow(&calibration.accel_limits)) {
+        let within = within(readings, narrow(&calibration.accel_limits));
+        let flags = if footing.is_sound(time) & within {
             put(&mut self.last_forces, forces);
             self.accel_health.note_sound();
             SOUND
@@ -101,10 +113,30 @@ impl Corrector {
         seen.flags = flags;
         out.accel_flags = of_sensors(flags, count);
         if self.moves {
-            self.accels_in_motion(calibration, (shares, tick.released.missed), out, &mut forces);
+            self.remove_squares(calibration, shares, &mut forces);
         }
+        Some(Felt { forces, usable, within, duration_s })
+    }
 
-        let Some(axes) = &mut self.thermal.accel_axes else { return };
+    /// Resolves what the accelerometers feel in case axes, and watches its parity.
+    #[inline]
+    pub(super) fn resolve_force<const N: usize>(
+        &mut self,
+        calibration: &Calibration,
+        felt: &Felt<N>,
+        missed: u64,
+        counters: &mut Counters,
+        out: &mut CorrectedTick,
+    ) {
+        let &Felt { mut forces, usable, duration_s, .. } = felt;
+        if self.moves {
+            self.remove_size_effect(calibration, missed, out, &mut forces);
+        }
+        let time = out.end_time;
+        let (Some(orientation), Some(axes)) = (&calibration.accel_orientation, &mut self.thermal.accel_axes)
+        else {
+            return;
+        };
         let excluded = orientation.sensors() > MIN_SENSORS
             && axes.watch(
                 orientation,

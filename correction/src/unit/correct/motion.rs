@@ -5,9 +5,7 @@ use core::array;
 
 use serde::{Deserialize, Serialize};
 
-use super::accels::felt;
-use super::patch::within;
-use super::{Corrector, OnItsWay};
+use super::Corrector;
 use crate::calibration::Calibration;
 use crate::lanes::{Lanes, narrow};
 use crate::orientation::SensorMask;
@@ -15,7 +13,7 @@ use crate::sample::{CorrectedTick, MAX_SENSORS, TickFlags};
 use crate::thermal::{Bank, Motion, Shares};
 use crate::unit::slew::between;
 use crate::units::{Span, Timestamp};
-use crate::vector::{cross, minus, plus};
+use crate::vector::{cross_lanes, minus, plus};
 
 /// What was in use when a swap took effect, for a slew away from it.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -108,7 +106,7 @@ impl Corrector {
 
     /// Adds to the gyros' biases (rad/s) what follows motion; `rates` are those that the gyros read (rad/s), before any bias is
     /// subtracted. Gives the gyros whose rate is outside the range of its curve.
-    #[cold]
+    #[inline(never)]
     pub(super) fn gyros_in_motion<const N: usize>(
         &self,
         calibration: &Calibration,
@@ -117,74 +115,67 @@ impl Corrector {
         bias: &mut [f64; N],
     ) -> SensorMask {
         let [x, y, z, asymmetry] = self.gyro_motion::<N>(shares);
-        let force = self.motion.force;
-        let mut clamped = SensorMask::NONE;
-        for lane in 0..calibration.gyros.len().min(N) {
+        let (force, mut clamped, mut errors) = (self.motion.force, SensorMask::NONE, [0.0; N]);
+        if self.motions(calibration).any(Motion::has_curves) {
+            clamped = self.errors_over_rate(calibration, rates, &mut errors);
+        }
+        *bias = array::from_fn(|lane| {
+            let by_force = x[lane] * force[0] + y[lane] * force[1] + z[lane] * force[2];
             let rate = rates[lane];
+            bias[lane] + (by_force - asymmetry[lane] * rate.abs() - errors[lane] * rate)
+        });
+        clamped
+    }
+
+    /// Relative errors of the gyros' weights at their rates (rad/s), and the gyros whose rate is outside the range of its curve.
+    fn errors_over_rate<const N: usize>(
+        &self,
+        calibration: &Calibration,
+        rates: &[f64; N],
+        errors: &mut [f64; N],
+    ) -> SensorMask {
+        let mut clamped = SensorMask::NONE;
+        for (lane, (rate, error)) in rates.iter().zip(errors).enumerate().take(calibration.gyros.len()) {
             let over_rate = |motion: Option<&Motion>| {
-                motion?.gyros.get(lane)?.over_rate.as_ref().map(|curve| curve.at(rate))
+                motion?.gyros.get(lane)?.over_rate.as_ref().map(|curve| curve.at(*rate))
             };
             let here = over_rate(calibration.motion.as_deref());
             clamped = clamped.set(lane, here.is_some_and(|error| error.clamped));
-            let error = here.map_or(0.0, |error| error.value);
-            let error = self.slewing().map_or(error, |slewing| {
+            let new = here.map_or(0.0, |error| error.value);
+            *error = self.slewing().map_or(new, |slewing| {
                 let old = over_rate(slewing.from.motion.as_ref().map(|old| &old.motion));
-                between(error, old.map_or(0.0, |error| error.value), slewing.share)
+                between(new, old.map_or(0.0, |error| error.value), slewing.share)
             });
-            let by_force = x[lane] * force[0] + y[lane] * force[1] + z[lane] * force[2];
-            bias[lane] += by_force - asymmetry[lane] * rate.abs() - error * rate;
         }
         clamped
     }
 
-    /// Notes the specific force of a tick in case axes for the gyros that drift with it; where it is not to be had, the last one stands.
-    #[cold]
+    /// Notes the specific force of a tick in case axes, from what the accelerometers feel (m/s²), for the gyros that drift with it; where
+    /// it is not to be had, the last one stands.
+    #[inline(never)]
     pub(super) fn note_force<const N: usize>(
         &mut self,
         calibration: &Calibration,
-        tick: &OnItsWay<'_>,
-        shares: &Shares,
+        forces: &[f64; N],
+        time: Timestamp,
     ) {
         if !self.motions(calibration).any(|motion| motion.feels_force) {
             return;
         }
-        let Some(raw) = tick.accel else { return };
-        let readings = narrow::<N>(&raw.readings);
-        if !within(readings, narrow(&calibration.accel_limits)) {
-            return;
-        }
-        let (terms, duration_s) = (self.accel_terms::<N>(shares), raw.duration.as_s());
-        let along = |lane| felt(&terms, calibration.accel_output, lane, readings[lane], duration_s);
-        let mut forces: [f64; N] = array::from_fn(along);
-        self.remove_squares(calibration, shares, &mut forces);
         let (Some(orientation), Some(axes)) = (&calibration.accel_orientation, &mut self.thermal.accel_axes)
         else {
             return;
         };
-        let time = tick.released.tick.end_time;
-        let (force, trusted) = axes.resolve(orientation, axes.included(), &forces, time);
+        let (force, trusted) = axes.resolve(orientation, axes.included(), forces, time);
         if trusted {
             self.motion.force = force;
         }
     }
 
-    /// Takes out of the forces that the accelerometers feel (m/s²) what follows motion.
-    #[cold]
-    pub(super) fn accels_in_motion<const N: usize>(
-        &mut self,
-        calibration: &Calibration,
-        (shares, missed): (&Shares, u64),
-        out: &CorrectedTick,
-        forces: &mut [f64; N],
-    ) {
-        self.remove_squares(calibration, shares, forces);
-        if self.motions(calibration).any(Motion::has_positions) {
-            self.remove_size_effect(calibration, missed, out, forces);
-        }
-    }
-
-    /// m = f + K2·f² has the solution f = 2m/(1 + √(1 + 4·K2·m)) next to m.
-    fn remove_squares<const N: usize>(
+    /// Takes second-order terms out of the forces that the accelerometers feel (m/s²): m = f + K2·f² has the solution
+    /// f = 2m/(1 + √(1 + 4·K2·m)) next to m.
+    #[inline(never)]
+    pub(super) fn remove_squares<const N: usize>(
         &self,
         calibration: &Calibration,
         shares: &Shares,
@@ -201,13 +192,17 @@ impl Corrector {
     }
 
     /// Takes out what accelerometers feel for sitting elsewhere: ω × (ω × r) + α × r along the input axis.
-    fn remove_size_effect<const N: usize>(
+    #[inline(never)]
+    pub(super) fn remove_size_effect<const N: usize>(
         &mut self,
         calibration: &Calibration,
         missed: u64,
         out: &CorrectedTick,
         forces: &mut [f64; N],
     ) {
+        if !self.motions(calibration).any(Motion::has_positions) {
+            return;
+        }
         let new = calibration.motion.as_deref().map(|motion| &motion.positions_m);
         let old = self.slewing().and_then(|slewing| {
             let old = slewing.from.motion.as_ref()?;
@@ -218,15 +213,20 @@ impl Corrector {
         else {
             return;
         };
-        let temperature = axes.temperature_deg_c(out.end_time);
-        for lane in 0..calibration.accels.len().min(N) {
-            let position: [f64; 3] = array::from_fn(|axis| {
-                let here = new.map_or(0.0, |positions| positions[axis][lane]);
-                old.map_or(here, |(old, share)| between(here, narrow::<N>(&old[axis])[lane], share))
-            });
-            let felt = plus(cross(rate, cross(rate, position)), cross(acceleration, position));
-            forces[lane] -= orientation.along(lane, temperature, &felt);
-        }
+        let positions: [[f64; N]; 3] = array::from_fn(|axis| {
+            let mut here = new.map_or([0.0; N], |positions| *narrow(&positions[axis]));
+            if let Some((old, share)) = &old {
+                let old = narrow::<N>(&old[axis]);
+                here = array::from_fn(|lane| between(here[lane], old[lane], *share));
+            }
+            here
+        });
+        let turned = cross_lanes(rate, &cross_lanes(rate, &positions));
+        let hastened = cross_lanes(acceleration, &positions);
+        let felt: [[f64; N]; 3] =
+            array::from_fn(|axis| array::from_fn(|lane| turned[axis][lane] + hastened[axis][lane]));
+        let along = orientation.along(axes.temperature_deg_c(out.end_time), &felt);
+        *forces = array::from_fn(|lane| forces[lane] - along[lane]);
     }
 
     /// Angular rate (rad/s) and acceleration (rad/s²) of a tick, in case axes. A tick that carries the restored angle of a mode switch

@@ -63,7 +63,8 @@ pub(super) fn run(args: &CorrectArgs) -> Result<Outcome, Error> {
     }
     let mut events = args.log.events()?;
     if let Some(out) = &args.out {
-        let inputs = events.inner().paths().iter().chain(&args.log.mapping).map(PathBuf::as_path);
+        let mapping = args.log.mapping_file();
+        let inputs = events.inner().paths().iter().chain(&mapping).map(PathBuf::as_path);
         refuse_overwriting(out, &inputs.chain([calibration]).collect::<Vec<_>>())?;
     }
     let mut output = args.out.as_deref().map(Output::create).transpose()?;

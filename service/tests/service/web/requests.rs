@@ -421,7 +421,10 @@ async fn a_second_service_is_shown_and_says_nothing_of_the_unit_while_it_stands_
         stand.send(UNIT, 5).await;
         let answer = read(address, "/api/units");
         let (status, units) = (answer.status, answer.json());
-        if status == 200 && units["services"].as_array().unwrap().len() == 2 {
+        let sheet = read(address, &format!("/api/unit/{UNIT}"));
+        let shown =
+            sheet.status == 200 && sheet.json()["instances"].as_array().is_some_and(|all| !all.is_empty());
+        if status == 200 && shown && units["services"].as_array().unwrap().len() == 2 {
             break units;
         }
         assert!(Instant::now() < deadline, "{answer:?}");

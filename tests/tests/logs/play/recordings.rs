@@ -136,7 +136,7 @@ async fn a_recording_is_played_as_it_was_received() {
 
     // Twice over, one unit under another name: the second pass is of series that none had before.
     let arguments =
-        [log, "--speed", "max", "--loop=2", "--unit", "A", "--as", "A=Z-9", "--topic", "imu/*/raw/*"];
+        [log, "--speed", "max", "--loop=2", "--unit", "A", "--remap", "A=Z-9", "--topic", "imu/*/raw/*"];
     let (again, heard_twice) = Listener::new().await.play(&arguments).await;
     assert_eq!((&again["passes"], &again["units"][0]["unit"]), (&Value::from(2), &Value::from("Z-9")));
     let renamed = |(key, frame): &(String, Vec<u8>)| {

@@ -1,0 +1,170 @@
+//! How the drifts are sailed: stated ones, seeded ones, that of a log.
+
+use isotherm_correction::drift::DriftParts;
+use isotherm_correction::units::AngularRate;
+
+use super::{Gyro, ImpactArgs, sizes};
+use crate::cli::bar::Bar;
+use crate::drift::HOUR_S;
+use crate::error::Error;
+use crate::impact::estimate::TICK_S;
+use crate::impact::logged;
+use crate::impact::models::Choice;
+use crate::impact::monte_carlo::{Voyages, sail_all};
+use crate::impact::report::{Report, Row};
+use crate::impact::scenario::{CARES, Drift, Voyage};
+use crate::runs::cut::Cut;
+
+/// Seeds where nobody says.
+const SEEDS: u32 = 50;
+
+/// A case: which gyros have the drift, in words.
+struct Case {
+    name: String,
+    share: [f64; 3],
+}
+
+impl ImpactArgs {
+    fn cases(&self) -> Vec<Case> {
+        let of = |name: &str, share| Case { name: name.to_owned(), share };
+        let (x, y) = (of("level gyro x", [1.0, 0.0, 0.0]), of("level gyro y", [0.0, 1.0, 0.0]));
+        let z = of("azimuth gyro z", [0.0, 0.0, 1.0]);
+        match self.gyro.unwrap_or(Gyro::Each) {
+            Gyro::X => vec![x],
+            Gyro::Y => vec![y],
+            Gyro::Z => vec![z],
+            Gyro::Each => vec![x, y, z],
+            Gyro::All => vec![of("all gyros", [1.0; 3])],
+        }
+    }
+
+    /// A drift without noise: what comes out is what the drift adds to all other errors.
+    pub(super) fn sail_stated(&self, voyage: &Voyage, parts: &[DriftParts; 3]) -> Result<Report, Error> {
+        let (trend, constant) = (self.trend.unwrap_or(0.0), self.constant.unwrap_or(0.0));
+        let rate = |tick: usize| {
+            #[expect(clippy::cast_precision_loss, reason = "ticks of some weeks")]
+            let hours = (tick as f64 + 0.5) * TICK_S / HOUR_S;
+            let after = if tick < voyage.calibration_ticks() { 0.0 } else { constant };
+            AngularRate::from_deg_per_h(trend * hours + after).as_rad_per_s()
+        };
+        let ramp: Vec<f64> = (0..voyage.ticks()).map(rate).collect();
+        let mut rows = Vec::new();
+        for case in self.cases() {
+            let truth: Vec<[f64; 3]> = ramp.iter().map(|rate| case.share.map(|share| share * rate)).collect();
+            let held = truth.get(voyage.calibration_ticks().saturating_sub(1)).copied().unwrap_or_default();
+            let drift = Drift { measured: truth.clone(), truth, held };
+            for care in CARES {
+                let course = voyage.sail(care, &drift, parts)?;
+                rows.push(Row { case: case.name.clone(), course, spread: None });
+            }
+        }
+        let source = match (self.trend, self.constant) {
+            (Some(trend), None) => format!("A trend of {trend} °/h² and nothing else"),
+            (None, Some(constant)) => format!("A constant of {constant} °/h from departure on"),
+            _ => format!("A trend of {trend} °/h² and a constant of {constant} °/h from departure on"),
+        };
+        let notes = vec![
+            "Without noise: what the drift adds to every other error. 002 has 1460 m, 2850 m and 0.14′, 0.28′ for trends of 0.00008 \
+             and 0.00016 °/h² of the azimuth gyro, and less than 20 m for a level one, whose drift its filter follows through the \
+             velocity log; it does not say at what latitude."
+                .to_owned(),
+        ];
+        Ok(Report { voyage: *voyage, source, seeds: 0, rows, notes, choices: Vec::new() })
+    }
+
+    pub(super) fn sail_seeds(&self, voyage: &Voyage, parts: &[DriftParts; 3]) -> Result<Report, Error> {
+        let count = self.seeds.unwrap_or(SEEDS);
+        let seeds: Vec<u64> = (0..count).map(|index| self.seed.wrapping_add(u64::from(index))).collect();
+        let slope = AngularRate::from_deg_per_h(self.trend.unwrap_or(0.0)).as_rad_per_s() / HOUR_S;
+        let on_top = match self.gyro.unwrap_or(Gyro::All) {
+            Gyro::X => [slope, 0.0, 0.0],
+            Gyro::Y => [0.0, slope, 0.0],
+            Gyro::Z => [0.0, 0.0, slope],
+            Gyro::Each | Gyro::All => [slope; 3],
+        };
+        let bar = Bar::at_work("sailing");
+        let sailed = sail_all(voyage, parts, on_top, &seeds);
+        bar.finish();
+        let Voyages { first, spread } = sailed?;
+        let rows = first.into_iter().zip(spread);
+        let rows =
+            rows.map(|(course, spread)| Row { case: "all gyros".to_owned(), course, spread: Some(spread) });
+        let trend =
+            self.trend.map(|trend| format!(", with a trend of {trend} °/h² on top")).unwrap_or_default();
+        let from = self.document.as_ref().map_or_else(
+            || "gyros of the size of tables 1 and 2 of 002".to_owned(),
+            |path| format!("gyros as {} states them", path.display()),
+        );
+        let source = format!("Drifts of {count} seeds from {}, {from}{trend}", self.seed);
+        let mut notes =
+            vec!["Figures are the middle of all seeds, and what 95 % of them stay below.".to_owned()];
+        notes.push(
+            "A drift that is held at its last value is held at what it truly is at departure, which no measurement gives: the row is a \
+             bound. The estimators see the drift through the angle random walk of the gyros and the noise of the references."
+                .to_owned(),
+        );
+        if parts.iter().all(|gyro| gyro.sigma_rad_per_s == 0.0 && gyro.trend_sigma_rad_per_s2 == 0.0) {
+            notes.push(
+                "These gyros have a constant part only, neither a slow drift nor a trend: held, it leaves nothing, and the trend state \
+                 has nothing to do."
+                    .to_owned(),
+            );
+        }
+        Ok(Report {
+            voyage: *voyage,
+            source,
+            seeds: seeds.len(),
+            rows: rows.collect(),
+            notes,
+            choices: Vec::new(),
+        })
+    }
+
+    pub(super) fn sail_log(
+        &self,
+        voyage: &mut Voyage,
+        parts: &[DriftParts; 3],
+        cut: &Cut,
+    ) -> Result<Report, Error> {
+        let mut columns = self.columns(&self.log, cut)?;
+        let words: Vec<String> = cut.words().map(str::to_owned).into_iter().collect();
+        let (drift, mut notes) = logged::drift(&mut columns, voyage, &self.otherwise(parts))
+            .map_err(|error| error.beside(&words))?;
+        notes.extend(words);
+        if *parts == [sizes(); 3] {
+            notes.push(
+                "The estimators expect gyros of the size of tables 1 and 2 of 002: no document states what the drift of these is."
+                    .to_owned(),
+            );
+        }
+        notes.push(
+            "Taken as a platform's gyros x and y level, z up or down. The mean over the calibration, Earth's rate included, is taken \
+             out; what is held is the mean of its last hour."
+                .to_owned(),
+        );
+        let mut rows = Vec::new();
+        for care in CARES {
+            rows.push(Row {
+                case: "as logged".to_owned(),
+                course: voyage.sail(care, &drift, parts)?,
+                spread: None,
+            });
+        }
+        let source = format!("The log of unit {}", columns.unit);
+        let choices = Choice::of(&drift, voyage);
+        Ok(Report { voyage: *voyage, source, seeds: 0, rows, notes, choices })
+    }
+
+    /// What can be done where the log is shorter than the calibration.
+    fn otherwise(&self, parts: &[DriftParts; 3]) -> String {
+        match &self.document {
+            None => "say how large the drift is with --calibration or --trend instead of the log".to_owned(),
+            Some(path) if *parts == [sizes(); 3] => format!(
+                "say how large the drift is with --trend instead of the log: {} has no [gyro.sensor.drift], which isotherm-calibrate \
+                 drift --calibration puts in",
+                path.display()
+            ),
+            Some(path) => format!("leave the log out: {} says how large the drift is", path.display()),
+        }
+    }
+}
