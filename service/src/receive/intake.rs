@@ -205,9 +205,8 @@ impl Intake {
         let quiet = StreamTimeoutSettings { tail_flush: self.settings.tail_flush, pairing_window };
         let mut actor = UnitActor::new(id.clone(), settings, quiet, outlet);
         if let Some(pair) = self.pair.as_ref().filter(|pair| !pair.speaks_first()) {
-            // Where nobody else is heard, it speaks.
-            let footing = if pair.is_opening() { Footing::Nothing } else { Footing::Doubt };
-            actor.follow(Instant::now(), pair.standing().active, footing);
+            // The others may have heard more of it; where none speaks it does, after a while.
+            actor.follow(Instant::now(), pair.standing().active, Footing::Nothing);
         }
         if let Some(inbox) = &self.inbox {
             actor.report_to(inbox.clone());

@@ -231,7 +231,14 @@ impl UnitActor {
         if standing.active {
             return;
         }
-        let (Some(tick), Some(own)) = (batch.ticks.last(), self.stream.unit().observation()) else { return };
+        let Some(tick) = batch.ticks.last() else { return };
+        let Some(own) = self.stream.unit().observation() else {
+            // Without a calibration there is nothing to keep up with.
+            if standing.yields && standing.alone_since.is_none() {
+                self.follow(now, false, Footing::Nothing);
+            }
+            return;
+        };
         let behind_ns = tick.end_time.as_ns().saturating_sub(own.end_time.as_ns());
         let limit_ns = i64::try_from(standing.takeover.as_nanos()).unwrap_or(i64::MAX);
         let (ahead, keeps_up) = (behind_ns > limit_ns, behind_ns >= -limit_ns);
