@@ -24,6 +24,8 @@ const LEASE: &str = "transport/link/tx/lease";
 /// Key of how often a connection is tried again, and the shortest and longest distance of trials where the lease is set (ms).
 const RETRY: &str = "connect/retry";
 const RETRY_MS: [u32; 2] = [100, 500];
+/// Key of how long a put that blocks may wait before the connection is closed (µs): the lease ends a connection, not the waiting.
+const LONGEST_PUT: &str = "transport/link/tx/queue/congestion_control/block/wait_before_close";
 
 /// How long a connection may say nothing before it is let go (ms), and how many may be about to say something: Zenoh's own 10 s and
 /// 100 let a few hundred idle connections keep every client out.
@@ -51,8 +53,8 @@ pub struct SessionOptions {
     /// Key prefix of the site, e.g. site/a
     #[cfg_attr(feature = "clap", arg(long, value_name = "PREFIX"))]
     pub namespace: Option<String>,
-    /// How long others wait for a sign of life before they give the connection up, where a configuration does not say otherwise; until
-    /// then whoever publishes to this session with `Block` may be held up by it. `None`: Zenoh's own 10 s.
+    /// How long others wait for a sign of life before they close the connection, and how long a put with `Block` waits for others,
+    /// where a configuration does not say otherwise. `None`: Zenoh's own 10 s and 5 s.
     #[cfg_attr(feature = "clap", arg(skip))]
     pub lease: Option<Duration>,
 }
@@ -76,6 +78,9 @@ impl SessionOptions {
         }
         if let Some(lease) = self.lease.filter(|_| has_default(&config, LEASE)) {
             set(&mut config, LEASE, u64::try_from(lease.as_millis()).unwrap_or(u64::MAX))?;
+            if has_default(&config, LONGEST_PUT) {
+                set(&mut config, LONGEST_PUT, i64::try_from(lease.as_micros()).unwrap_or(i64::MAX))?;
+            }
             if has_default(&config, RETRY) {
                 // Who is given up so soon is looked for as soon.
                 let [init, max] = RETRY_MS;

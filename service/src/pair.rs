@@ -233,7 +233,16 @@ impl Pair {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
+    use isotherm_correction::sample::{GyroTick, OutputKind};
+    use isotherm_correction::units::{Span, Timestamp};
+    use isotherm_protocol::codec::encode;
+    use isotherm_protocol::raw::GyroBatch;
+
     use super::*;
+    use crate::control::calibrations::Calibrations;
+    use crate::receive::intake::OutletMaker;
 
     fn other() -> Member {
         let group = Pair::new(&Settings::default(), "me".to_owned(), 2, Vec::new()).me.group;
@@ -265,5 +274,35 @@ mod tests {
         std::thread::sleep(Duration::from_millis(40));
         pair.come(Member { instance: "third".to_owned(), ..other() });
         assert_eq!(pair.look(Instant::now()), Some(true));
+    }
+
+    #[test]
+    fn a_unit_that_appears_beside_another_instance_waits_for_what_that_one_knows() {
+        let pair = Arc::new(Pair::new(&Settings::default(), "me".to_owned(), 2, vec![other()]));
+        let published = Arc::new(AtomicU64::new(0));
+        let count = Arc::clone(&published);
+        let outlets: OutletMaker = Box::new(move |_| {
+            let count = Arc::clone(&count);
+            Ok(Box::new(move |_| Ok(drop(count.fetch_add(1, Ordering::Relaxed)))))
+        });
+        let intake = Intake::new(Settings::default(), Calibrations::default(), outlets);
+        let intake = intake.paired_with(Arc::clone(&pair));
+        pair.opened(&intake, &BTreeSet::new());
+        let start = Instant::now();
+        for sequence in 0..20 {
+            let end_time = Timestamp::from_ns(i64::try_from(sequence).unwrap() * 5_000_000);
+            let readings = [1.0, 2.0, 3.0].into_iter().collect();
+            let tick =
+                GyroTick { sequence, end_time, duration: Span::from_ms(5), readings, ..GyroTick::default() };
+            let frame = encode(&GyroBatch { output: OutputKind::Counts, ticks: vec![tick] }).unwrap();
+            intake.receive("imu/U/raw/gyro", Some(&frame), start);
+        }
+        let speaks_after = |ms| {
+            let now = start + Duration::from_millis(ms);
+            intake.each_unit(|actor| actor.watch_speech(now, &pair.standing()).spoke)
+        };
+        assert_eq!((speaks_after(100), published.load(Ordering::Relaxed)), (vec![false], 0));
+        assert_eq!(speaks_after(2500), [true], "nobody else speaks");
+        assert!(published.load(Ordering::Relaxed) > 0);
     }
 }

@@ -123,10 +123,18 @@ impl Pair {
     /// # Panics
     /// Where it cannot be opened.
     pub async fn session(&self) -> Session {
+        self.session_with(None).await
+    }
+
+    /// The same with a lease of its own.
+    ///
+    /// # Panics
+    /// Where it cannot be opened.
+    pub async fn session_with(&self, lease: Option<Duration>) -> Session {
         let addresses = [&self.addresses[0], &self.proxies[1].endpoint];
         let connect = addresses.iter().map(|address| format!("{address}{AGAIN}")).collect();
         let session =
-            open(&SessionOptions { connect, ..SessionOptions::default() }).await.expect("a session");
+            open(&SessionOptions { connect, lease, ..SessionOptions::default() }).await.expect("a session");
         let deadline = Instant::now() + LIMIT;
         while session.info().peers_zid().await.count() < 2 {
             assert!(Instant::now() < deadline, "connected to both");

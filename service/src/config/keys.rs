@@ -113,7 +113,8 @@ pub(super) struct PairKeys {
     /// How late the other's output may be.
     #[schemars(range(min = 5, max = 10_000))]
     pub(super) takeover_ms: Option<u32>,
-    /// How long this process may stand still before others close their connections to it; left out: Zenoh's.
+    /// How long this process may stand still before others close their connections to it, and how long a put of its own may block;
+    /// left out: Zenoh's.
     #[schemars(range(min = 100, max = 60_000))]
     pub(super) lease_ms: Option<u32>,
 }

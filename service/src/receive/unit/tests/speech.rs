@@ -71,3 +71,17 @@ fn an_isolated_unit_that_lacks_ticks_says_nothing_of_them() {
     actor.watch_speech(start + ms(1500), &standing);
     assert_eq!((actor.speaks(), sink.sequences().len()), (false, 30));
 }
+
+#[test]
+fn a_unit_without_a_calibration_follows_whoever_goes_before_it() {
+    for yields in [true, false] {
+        let (mut other, heard, now) = deserted();
+        give(&mut other, 30..40, now);
+        let (mut actor, ..) = deserted();
+        let standing =
+            Standing { takeover: TAKEOVER, active: false, yields, alone_since: None, deserted: false };
+        let batch = heard.0.lock().unwrap().last().cloned().unwrap();
+        actor.hear(&encode(&batch).unwrap(), now, &standing);
+        assert_eq!(actor.speaks(), !yields);
+    }
+}
