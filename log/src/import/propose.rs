@@ -35,7 +35,7 @@ pub fn propose(paths: &[impl AsRef<Path>], hints: &Hints) -> Result<Proposal, Er
         let text = match file.own() {
             Some(columns) => {
                 proposal.notes.push(format!("{name}: written by isotherm-replay: {}", columns.words()));
-                let line = if several { name_line(name) } else { String::new() };
+                let line = if several { name_line(name) + "\n" } else { String::new() };
                 columns.file_text(&line, hints.skip_bad_rows)
             }
             None => file.text(several, &mut proposal).text(),

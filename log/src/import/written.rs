@@ -44,9 +44,9 @@ pub(super) struct FileText<'a> {
     pub(super) temperatures: Vec<Temperature>,
 }
 
-/// The line that names a file.
+/// The line that names a file, without its end.
 pub(super) fn name_line(name: &str) -> String {
-    format!("name = {}\n", quoted(name))
+    format!("name = {}", quoted(name))
 }
 
 /// A text as TOML writes it.
@@ -64,7 +64,7 @@ impl FileText<'_> {
             let _ = writeln!(text, "{words}");
         };
         if let Some(name) = &self.name {
-            line(format_args!("{}", name_line(name).trim_end()));
+            line(format_args!("{}", name_line(name)));
         }
         if found.encoding != Encoding::Utf8 {
             line(format_args!("encoding = \"{}\"", found.encoding.word()));

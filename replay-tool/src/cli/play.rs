@@ -3,7 +3,7 @@
 mod screen;
 mod tables;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use clap::Args;
@@ -12,6 +12,7 @@ use isotherm_bus::outlet::least_in_flight;
 use isotherm_correction::sample::ChannelName;
 use isotherm_correction::units::Span;
 use isotherm_log::faults::FaultOptions;
+use isotherm_log::message::Topic;
 use isotherm_log::schedule::Clock;
 use isotherm_log::source::LogReport;
 use isotherm_protocol::key::UnitId;
@@ -23,7 +24,7 @@ use super::{LogArgs, Outcome, print, seconds, show};
 use crate::error::Error;
 use crate::keyboard::Keyboard;
 use crate::pace::Speed;
-use crate::play::{Acknowledge, PlayOptions, PlayReport, play};
+use crate::play::{Acknowledge, PlayOptions, PlayReport, play, wanted};
 use screen::Screen;
 
 /// Most copies of a unit.
@@ -218,11 +219,33 @@ impl PlayArgs {
     }
 }
 
+/// Opens the log, and refuses another serial for a unit that it does not have: a misspelt one would leave the unit on its own topics,
+/// where the instrument itself may be.
+fn check_names(options: &PlayOptions) -> Result<(), Error> {
+    let mut messages = options.files.open(&options.part)?;
+    let (mut missing, mut units): (BTreeSet<_>, BTreeSet<_>) =
+        (options.names.keys().collect(), BTreeSet::new());
+    // Up to the first message of the last one: mostly the log's first second.
+    while !missing.is_empty() {
+        let Some(message) = messages.next_message()? else { break };
+        if let Topic::Raw(unit, _) | Topic::Reference(unit) = &message.topic
+            && wanted(&options.topics, &message.topic)
+        {
+            missing.remove(unit);
+            units.insert(unit.to_string());
+        }
+    }
+    let Some(missing) = missing.first() else { return Ok(()) };
+    let units: Vec<_> = units.iter().map(String::as_str).collect();
+    let has = if units.is_empty() { "none".to_owned() } else { tables::list(&units) };
+    Err(Error::Usage(format!("--remap names {missing}, but there is no such unit to play; units: {has}")))
+}
+
 /// Runs the command.
 pub(super) fn run(args: &PlayArgs) -> Result<Outcome, Error> {
     let options = args.options()?;
     // A log that cannot be read is said before a session is opened.
-    drop(options.files.open(&options.part)?);
+    check_names(&options)?;
     let runtime = tokio::runtime::Runtime::new().map_err(|source| Error::Runtime { source })?;
     let (sender, commands) = tokio::sync::mpsc::unbounded_channel();
     let keyboard = Keyboard::listen(sender);

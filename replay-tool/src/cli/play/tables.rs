@@ -33,7 +33,7 @@ pub(super) fn warnings(play: &PlayReport) -> Vec<String> {
 }
 
 /// Serials, not all where they are many.
-fn list(units: &[&str]) -> String {
+pub(super) fn list(units: &[&str]) -> String {
     match units.len().checked_sub(LISTED) {
         Some(more) if more > 0 => format!("{} and {more} more", units[..LISTED].join(", ")),
         _ => units.join(", "),

@@ -150,6 +150,23 @@ async fn a_recording_is_played_as_it_was_received() {
     assert!(series(&heard_twice) > series(&heard));
 }
 
+#[test]
+fn another_serial_for_a_unit_that_is_not_played_is_refused_before_anything_is_sent() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("log.mcap");
+    record(&path, &messages());
+    let log = path.to_str().unwrap();
+    let refused = |more: &[&str]| {
+        let output = begin(&[&[log, "--remap", "C=Z-9"], more].concat()).wait_with_output().unwrap();
+        assert_eq!(output.status.code(), Some(2));
+        String::from_utf8(output.stderr).unwrap()
+    };
+    let words = refused(&["--remap", "A=Z-8"]);
+    assert!(words.contains("--remap names C, but there is no such unit to play; units: A, B\n"), "{words}");
+    let words = refused(&["--unit", "B"]);
+    assert!(words.ends_with("units: B\n"), "{words}");
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn a_part_of_a_recording_keeps_its_time_by_either_clock() {
     let folder = tempfile::tempdir().unwrap();
