@@ -13,6 +13,7 @@ import queue
 import struct
 import subprocess
 import sys
+import tempfile
 import time
 import types
 import unittest
@@ -216,12 +217,24 @@ class Live(unittest.TestCase):
         HASHES.update({of["type"]: of["hash"] for it in vectors["nodes"] for of in it["endpoints"]})
         program, mapping, calibrations = sys.argv[2:5]
         command = [program, "bridge", mapping, "--calibration", calibrations, "--listen", "127.0.0.1:0", "--announce", "--json"]
-        self.program = subprocess.Popen([*command, "--domain", "0"], stdout=subprocess.PIPE, text=True)
+        self.log = tempfile.NamedTemporaryFile("w+", encoding="utf-8")
+        self.addCleanup(self.log.close)
+        self.program = subprocess.Popen([*command, "--domain", "0"], stdout=subprocess.PIPE, stderr=self.log, text=True)
         self.addCleanup(self.program.stdout.close)
         self.addCleanup(self.program.wait, LIMIT)
         self.addCleanup(self.program.terminate)
         self.node = Node(json.loads(self.program.stdout.readline())["ros"][0])
         self.addCleanup(self.node.session.close)
+
+    def test_a_publisher_of_humble_and_one_of_another_type_are_named(self):
+        warned = lambda words: lambda: words in pathlib.Path(self.log.name).read_text(encoding="utf-8")
+        for hashed, words in (("TypeHashNotSupported", "of ROS 2 humble"), ("RIHS01_" + 64 * "0", "has another type")):
+            self.assertFalse(warned(words)())
+            of = entity.EndpointEntity(
+                self.node.node, 90, entity.EntityKind.PUBLISHER, "/imu/data_raw", "sensor_msgs::msg::dds_::Imu_", hashed, "1:2:1,10:,:,:,,"
+            )
+            self.node.token(keyexpr.endpoint_liveliness_keyexpr(of))
+            wait(warned(words), f"warning {words!r}")
 
     def header(self, tick, frame="imu_link"):
         ns = START_NS + tick * TICK_NS

@@ -22,21 +22,26 @@ _F64 = struct.Struct("<d")
 
 def read_varint(data: bytes, at: int, bits: int) -> tuple[int, int]:
     """An unsigned number of at most `bits` bits, and the place after it."""
-    value = shift = 0
-    while True:
-        try:
-            byte = data[at]
-        except IndexError:
-            raise Refused("the body ends too early") from None
+    try:
+        byte = data[at]
         at += 1
-        value |= (byte & 0x7F) << shift
-        shift += 7
-        if value >> bits:
-            raise Refused(f"a number has more than {bits} bits")
         if byte < 0x80:
-            return value, at
-        if shift >= bits:
-            raise Refused(f"a number of {bits} bits has more than {-(-bits // 7)} bytes")
+            return byte, at
+        value, shift = byte & 0x7F, 7
+        while shift < bits:
+            byte = data[at]
+            at += 1
+            value |= (byte & 0x7F) << shift
+            if byte < 0x80:
+                if value >> bits:
+                    break
+                return value, at
+            shift += 7
+    except IndexError:
+        raise Refused("the body ends too early") from None
+    if value >> bits:
+        raise Refused(f"a number has more than {bits} bits")
+    raise Refused(f"a number of {bits} bits has more than {-(-bits // 7)} bytes")
 
 
 def _write_varint(out: bytearray, value: int) -> None:
@@ -158,6 +163,10 @@ def _list(form: Any, least: int, most: int, counted: bool) -> tuple[Reader, Writ
         if form == "u8":
             end = take(data, at, count)
             return list(data[at:end]), end
+        if form == "f64":
+            # At once: a reading is a few numbers, and a function for each costs more than they do.
+            end = take(data, at, 8 * count)
+            return list(struct.unpack_from(f"<{count}d", data, at)), end
         items = []
         for _ in range(count):
             item, at = read_item(data, at)
@@ -179,10 +188,15 @@ def _option(form: Any) -> tuple[Reader, Writer]:
     read_item, write_item = codec(form)
 
     def read(data: bytes, at: int) -> tuple[Any, int]:
-        end = take(data, at, 1)
-        if data[at] > 1:
-            raise Refused(f"an optional value begins with {data[at]}, must be 0 or 1")
-        return read_item(data, end) if data[at] else (None, end)
+        try:
+            present = data[at]
+        except IndexError:
+            raise Refused("the body ends too early") from None
+        if present == 0:
+            return None, at + 1
+        if present > 1:
+            raise Refused(f"an optional value begins with {present}, must be 0 or 1")
+        return read_item(data, at + 1)
 
     def write(out: bytearray, value: Any) -> None:
         out.append(int(value is not None))
