@@ -283,7 +283,10 @@ mod tests {
         let count = Arc::clone(&published);
         let outlets: OutletMaker = Box::new(move |_| {
             let count = Arc::clone(&count);
-            Ok(Box::new(move |_| Ok(drop(count.fetch_add(1, Ordering::Relaxed)))))
+            Ok(Box::new(move |_| {
+                count.fetch_add(1, Ordering::Relaxed);
+                Ok(())
+            }))
         });
         let intake = Intake::new(Settings::default(), Calibrations::default(), outlets);
         let intake = intake.paired_with(Arc::clone(&pair));

@@ -122,6 +122,11 @@ impl GyroIntake {
             && self.pending.is_empty()
     }
 
+    /// Sequence number of the newest tick that was admitted.
+    pub(super) fn newest_sequence(&self) -> Option<u64> {
+        self.newest.map(|newest| newest.sequence)
+    }
+
     /// Remembers a tick that [is the next](Self::is_next) and did not wait.
     #[inline]
     pub(super) fn passed(&mut self, tick: &GyroTick) {

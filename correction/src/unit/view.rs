@@ -73,6 +73,12 @@ impl Unit {
         self.gyros.len()
     }
 
+    /// Sequence number of the newest gyro tick that was taken, corrected or waiting; `None` before the first.
+    #[must_use]
+    pub fn newest_sequence(&self) -> Option<u64> {
+        self.gyros.newest_sequence()
+    }
+
     /// The settings it was made with.
     #[must_use]
     pub fn settings(&self) -> &UnitSettings {

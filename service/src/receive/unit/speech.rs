@@ -165,7 +165,7 @@ impl UnitActor {
         self.speech.uncertain = self.speech.lost_at.is_some_and(|since| now < since + LATE);
         let first = codec::decode::<GyroBatch>(frame).ok().and_then(|batch| batch.ticks.into_iter().next());
         let Some(first) = first else { return };
-        let last = self.stream.unit().observation().map(|seen| seen.sequence);
+        let last = self.stream.unit().newest_sequence();
         let same = first.series == self.stream.incoming_series();
         let lacks = same && last.is_some_and(|last| first.sequence > last.saturating_add(1));
         match &mut self.speech.following {
