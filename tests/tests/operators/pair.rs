@@ -175,12 +175,10 @@ impl Stand {
             Mishap::Stopped => self.pair.signal(speaking, "STOP"),
             Mishap::Link(fault) => self.pair.trouble(fault),
         }
-        if matches!(mishap, Mishap::Link(_)) && speaking == 0 {
-            self.until_lost(mishap).await;
-        } else {
+        if !matches!(mishap, Mishap::Link(_)) || speaking == 1 {
             until_speaks(&self.session, 1 - speaking, self.units()).await;
-            self.until_lost(mishap).await;
         }
+        self.until_lost(mishap).await;
         let pause = self.pause_since(at).await;
         // Who speaks now takes swaps, and counts on.
         self.swap(self.units() - 1).await;
@@ -193,9 +191,7 @@ impl Stand {
         self.swap(0).await;
         pause
     }
-}
 
-impl Stand {
     /// Waits until the connections of an instance are gone, or have been slow for as long as that would take.
     async fn until_lost(&self, mishap: Mishap) {
         let slow = mishap == Mishap::Link(Fault::Throttle);
@@ -264,7 +260,7 @@ async fn a_cut_link_loses_nothing() {
     for fault in faults() {
         let pause = stand.suffer(Mishap::Link(fault)).await;
         println!("{fault:?} of the speaking instance's connections: longest pause {pause:?}");
-        stand.suffer(Mishap::Link(fault)).await;
+        let pause = stand.suffer(Mishap::Link(fault)).await;
         println!("{fault:?} of the standby's connections: longest pause {pause:?}");
         stand.second_speaks().await;
     }
