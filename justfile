@@ -40,6 +40,10 @@ python:
 pair:
     cargo test --release --workspace --locked --test operators pair:: -- --include-ignored --nocapture --test-threads=1
 
+# Fuzz every reader, 10⁸ executions each (hours; ISOTHERM_FUZZ_SECONDS=N: seconds each; fuzz/run TARGET: one)
+fuzz: fuzz-c
+    fuzz/run
+
 # Decode 10⁸ changed frames with the C header under the sanitizers of cc (some minutes)
 fuzz-c:
     ISOTHERM_FUZZ=100000000 cargo test --release --locked -p isotherm-protocol --test versions no_frame_leads -- --nocapture
@@ -47,6 +51,11 @@ fuzz-c:
 # Send 100 000 Imu messages through ROS 2's keys and the service; compare the latency with the project's own topics
 ros-loop:
     ISOTHERM_ROS_MESSAGES=100000 cargo test --release --locked --workspace --test bridge -- --nocapture --test-threads=1
+
+# Have hiroz, another implementation of ROS 2 over Zenoh, drive the bridge (with a build of its own, some ten minutes)
+ros-peer:
+    cargo build --release --locked --bin isotherm-ros
+    cargo run --release --locked --manifest-path ros2/peer/Cargo.toml --target-dir target/ros-peer -- target/release/isotherm-ros 2000
 
 # Measure how fast the clients decode: Python, and C with cc (after `just python`)
 bench-clients:

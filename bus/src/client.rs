@@ -10,6 +10,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use zenoh::{Config, Session};
 
+use crate::certificate::common_name;
 use crate::endpoint::{DEFAULT_ENDPOINT, endpoint};
 use crate::session::{endpoints, set};
 use crate::{BusError, SessionOptions, obstacle};
@@ -57,6 +58,7 @@ pub enum Role {
 pub struct Way {
     config: Config,
     tried: Vec<String>,
+    name: Option<String>,
 }
 
 /// What the file of a user may say.
@@ -164,7 +166,8 @@ impl SessionOptions {
             tried if tried.is_empty() => endpoints(&config, "listen/endpoints"),
             tried => tried,
         };
-        Ok(Way { config, tried })
+        let name = common_name(&config);
+        Ok(Way { config, tried, name })
     }
 }
 
@@ -173,6 +176,12 @@ impl Way {
     #[must_use]
     pub fn tried(&self) -> &[String] {
         &self.tried
+    }
+
+    /// Common name of the certificate that is shown there; `None` without one.
+    #[must_use]
+    pub fn name(&self) -> Option<&str> {
+        self.name.as_deref()
     }
 
     /// Opens a session within the limit, again and again where nothing listens yet; what is waited for is said once.

@@ -24,6 +24,7 @@
 //! | [`threads`] | work for the threads that receive |
 
 pub mod arbiter;
+mod certificate;
 pub mod client;
 pub mod consumer;
 pub mod continuity;

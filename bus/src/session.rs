@@ -103,6 +103,16 @@ impl SessionOptions {
         }
     }
 
+    /// Whether a session with these options lets through only what its access control allows; a client leaves that to its router.
+    ///
+    /// # Errors
+    /// As [`Self::to_config`].
+    pub fn has_access_control(&self) -> Result<bool, BusError> {
+        let config = self.to_config()?;
+        let is = |key, value| config.get_json(key).is_ok_and(|found| found == value);
+        Ok(is("access_control/enabled", "true") || is("mode", "\"client\""))
+    }
+
     /// What an opening session may have to wait for, in words: "a router or peer at tcp/127.0.0.1:7447".
     ///
     /// # Errors

@@ -74,6 +74,7 @@ fn corrected(serial: &str, raw: &GyroBatch) -> CorrectedBatch {
         unit: serial.to_owned(),
         revision: Revision::default(),
         temperatures: ArrayVec::new(),
+        sigmas: Vec::new(),
         ticks: ticks.collect(),
     }
 }

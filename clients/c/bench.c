@@ -13,9 +13,9 @@
 int main(void) {
     static uint8_t frame[ISOTHERM_MAX_FRAME_BYTES];
     const size_t length = fread(frame, 1, sizeof frame, stdin);
-    isotherm_corrected_batch batch;
+    isotherm_corrected_batch_2 batch;
     isotherm_corrected_tick tick;
-    const isotherm_result result = isotherm_decode_corrected_batch(frame, length, &batch);
+    const isotherm_result result = isotherm_decode_corrected(frame, length, &batch);
     if (result != ISOTHERM_OK || batch.ticks.count != TICKS) {
         fprintf(stderr, "stdin: no frame of %u ticks: %s\n", TICKS, isotherm_words(result));
         return 1;
@@ -23,7 +23,7 @@ int main(void) {
     double sum = 0;
     const clock_t start = clock();
     for (uint32_t round = 0; round < ROUNDS; ++round) {
-        if (isotherm_decode_corrected_batch(frame, length, &batch) != ISOTHERM_OK) return 1;
+        if (isotherm_decode_corrected(frame, length, &batch) != ISOTHERM_OK) return 1;
         while (isotherm_next_corrected_tick(&batch.ticks, &tick)) sum += (double)tick.delta_angle_rad[2];
     }
     const double seconds = (double)(clock() - start) / CLOCKS_PER_SEC;

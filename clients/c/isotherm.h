@@ -1,8 +1,8 @@
 /*
  * Isotherm's wire messages in C99: one header, no allocation, no I/O, no library but string.h.
  *
- *     isotherm_corrected_batch batch;
- *     if (isotherm_decode_corrected_batch(frame, length, &batch) == ISOTHERM_OK) {
+ *     isotherm_corrected_batch_2 batch;
+ *     if (isotherm_decode_corrected(frame, length, &batch) == ISOTHERM_OK) {
  *         isotherm_corrected_tick tick;
  *         while (isotherm_next_corrected_tick(&batch.ticks, &tick)) use(tick.delta_angle_rad);
  *     }
@@ -523,6 +523,27 @@ typedef struct {
     isotherm_applied_temperature temperatures[16];
     isotherm_list ticks;
 } isotherm_corrected_batch;
+
+typedef struct {
+    uint16_t from_tick;
+    isotherm_real angle_noise_rad[3];
+    isotherm_real angle_restoration_rad[3];
+    isotherm_real angle_calibration_rad[3];
+    isotherm_real angle_clamping_rad[3];
+    isotherm_real velocity_noise_m_per_s[3];
+    isotherm_real velocity_restoration_m_per_s[3];
+    isotherm_real velocity_calibration_m_per_s[3];
+    isotherm_real velocity_clamping_m_per_s[3];
+} isotherm_sigma;
+
+typedef struct {
+    isotherm_view unit;
+    isotherm_revision revision;
+    uint32_t temperatures_count;
+    isotherm_applied_temperature temperatures[16];
+    isotherm_list ticks;
+    isotherm_list sigmas;
+} isotherm_corrected_batch_2;
 
 typedef enum {
     ISOTHERM_STATE_STANDBY,
@@ -1156,6 +1177,69 @@ static inline bool isotherm_read_corrected_batch(isotherm_cursor *c, isotherm_co
         if (!isotherm_read_corrected_tick(c, &item)) return false;
     }
     o->ticks.end = c->at;
+    return true;
+}
+
+static inline bool isotherm_read_sigma(isotherm_cursor *c, isotherm_sigma *o) {
+    memset(o, 0, sizeof *o);
+    if (!isotherm_get_u16(c, &o->from_tick)) return false;
+    for (uint32_t i = 0; i < 3; ++i) {
+        if (!isotherm_get_real(c, &o->angle_noise_rad[i])) return false;
+    }
+    for (uint32_t i = 0; i < 3; ++i) {
+        if (!isotherm_get_real(c, &o->angle_restoration_rad[i])) return false;
+    }
+    for (uint32_t i = 0; i < 3; ++i) {
+        if (!isotherm_get_real(c, &o->angle_calibration_rad[i])) return false;
+    }
+    for (uint32_t i = 0; i < 3; ++i) {
+        if (!isotherm_get_real(c, &o->angle_clamping_rad[i])) return false;
+    }
+    for (uint32_t i = 0; i < 3; ++i) {
+        if (!isotherm_get_real(c, &o->velocity_noise_m_per_s[i])) return false;
+    }
+    for (uint32_t i = 0; i < 3; ++i) {
+        if (!isotherm_get_real(c, &o->velocity_restoration_m_per_s[i])) return false;
+    }
+    for (uint32_t i = 0; i < 3; ++i) {
+        if (!isotherm_get_real(c, &o->velocity_calibration_m_per_s[i])) return false;
+    }
+    for (uint32_t i = 0; i < 3; ++i) {
+        if (!isotherm_get_real(c, &o->velocity_clamping_m_per_s[i])) return false;
+    }
+    return true;
+}
+
+static inline bool isotherm_next_sigma(isotherm_list *list, isotherm_sigma *item) {
+    isotherm_cursor c = {list->at, list->end};
+    if (list->count == 0 || !isotherm_read_sigma(&c, item)) return false;
+    list->at = c.at;
+    --list->count;
+    return true;
+}
+
+static inline bool isotherm_read_corrected_batch_2(isotherm_cursor *c, isotherm_corrected_batch_2 *o) {
+    memset(o, 0, sizeof *o);
+    if (!isotherm_get_text(c, 1048576u, &o->unit)) return false;
+    if (!isotherm_read_revision(c, &o->revision)) return false;
+    if (!isotherm_get_count(c, 0u, 16u, &o->temperatures_count)) return false;
+    for (uint32_t i = 0; i < o->temperatures_count; ++i) {
+        if (!isotherm_read_applied_temperature(c, &o->temperatures[i])) return false;
+    }
+    if (!isotherm_get_count(c, 1u, 4096u, &o->ticks.count)) return false;
+    o->ticks.at = c->at;
+    for (uint32_t i = 0; i < o->ticks.count; ++i) {
+        isotherm_corrected_tick item;
+        if (!isotherm_read_corrected_tick(c, &item)) return false;
+    }
+    o->ticks.end = c->at;
+    if (!isotherm_get_count(c, 1u, 4096u, &o->sigmas.count)) return false;
+    o->sigmas.at = c->at;
+    for (uint32_t i = 0; i < o->sigmas.count; ++i) {
+        isotherm_sigma item;
+        if (!isotherm_read_sigma(c, &item)) return false;
+    }
+    o->sigmas.end = c->at;
     return true;
 }
 
@@ -2071,6 +2155,16 @@ static inline isotherm_result isotherm_decode_corrected_batch(const uint8_t *fra
     return ISOTHERM_OK;
 }
 
+/* Version 2 of kind 4; what `o` holds after an error means nothing. */
+static inline isotherm_result isotherm_decode_corrected_batch_2(const uint8_t *frame, size_t length, isotherm_corrected_batch_2 *o) {
+    isotherm_cursor c;
+    const isotherm_result opened = isotherm_open(frame, length, ISOTHERM_KIND_CORRECTED, 2u, &c);
+    if (opened != ISOTHERM_OK) return opened;
+    if (!isotherm_read_corrected_batch_2(&c, o)) return ISOTHERM_BODY;
+    if (c.at != c.end) return ISOTHERM_LEFT_OVER;
+    return ISOTHERM_OK;
+}
+
 /* Version 1 of kind 5; what `o` holds after an error means nothing. */
 static inline isotherm_result isotherm_decode_status_1(const uint8_t *frame, size_t length, isotherm_status_1 *o) {
     isotherm_cursor c;
@@ -2133,6 +2227,21 @@ static inline isotherm_result isotherm_decode_journal_part(const uint8_t *frame,
     return ISOTHERM_OK;
 }
 /* generated: end of frames */
+
+/* A corrected batch of any version; one without standard errors has no `sigmas`. */
+static inline isotherm_result isotherm_decode_corrected(const uint8_t *frame, size_t length, isotherm_corrected_batch_2 *o) {
+    if (isotherm_version(frame, length) != 1) return isotherm_decode_corrected_batch_2(frame, length, o);
+    isotherm_corrected_batch plain;
+    const isotherm_result result = isotherm_decode_corrected_batch(frame, length, &plain);
+    if (result != ISOTHERM_OK) return result;
+    memset(o, 0, sizeof *o);
+    o->unit = plain.unit;
+    o->revision = plain.revision;
+    o->temperatures_count = plain.temperatures_count;
+    memcpy(o->temperatures, plain.temperatures, sizeof o->temperatures);
+    o->ticks = plain.ticks;
+    return ISOTHERM_OK;
+}
 
 /*
  * Writing a raw batch: begin with the number of ticks, add each, end. A producer has an isotherm_writer and a buffer; a gyro tick

@@ -7,7 +7,8 @@ function units = isotherm(path)
 %
 %   units(k).unit is a serial; units(k).sequence, .end_time_ns, .duration_ns, .ticks, .missed, .mode (1, -1, 0: none), .flags,
 %   .revision have a row for each output, .delta_angle_rad and .delta_velocity_m_per_s three columns, .gyro_flags and .accel_flags
-%   eight, of which .gyros and .accels count. Bits and fields: docs/wire.md. Frames that cannot be read are passed over with a
+%   eight, of which .gyros and .accels count; .angle_sigma_rad and .velocity_sigma_m_per_s have twelve: x, y, z by noise, by
+%   restoration, by calibration, by clamping; NaN where unknown or not asked for. Bits and fields: docs/wire.md. Frames that cannot be read are passed over with a
 %   warning that says how many and why. Recordings compressed with zstd need the program zstd on the path.
   [~, ~, extension] = fileparts(path);
   if strcmp(extension, '.parquet')
@@ -137,7 +138,7 @@ function [unit, out] = decode(frame)
   count = numel(frame);
   if count < 6 || count > 1048576, refuse('a frame of %d bytes', count); end
   if frame(1) ~= 4, refuse('kind %d, not 4', frame(1)); end
-  if frame(2) ~= 1, refuse('version %d is not known here', frame(2)); end
+  if frame(2) ~= 1 && frame(2) ~= 2, refuse('version %d is not known here', frame(2)); end
   if number(frame(end - 3:end)) ~= crc32(frame(1:end - 4)), refuse('the checksum does not fit'); end
   body = frame(3:end - 4);
   [length, at] = varint(body, 1, 64);
@@ -161,11 +162,26 @@ function [unit, out] = decode(frame)
     [parts{end + 1}, at] = alike(body, at, left);
     left = left - numel(parts{end}.sequence);
   end
+  ticks = sum(cellfun(@(part) numel(part.sequence), parts));
+  angle = NaN(ticks, 12); velocity = NaN(ticks, 12);
+  if frame(2) == 2
+    [runs, at] = varint(body, at, 64);
+    if runs < 1 || runs > 4096, refuse('%d runs of standard errors', runs); end
+    for k = 1:double(runs)
+      [from, at] = varint(body, at, 16);
+      numbers = at;
+      at = skip(body, at, 192);
+      numbers = typecast(body(numbers:at - 1), 'double');
+      angle(double(from) + 1:ticks, :) = repmat(numbers(1:12), max(0, ticks - double(from)), 1);
+      velocity(double(from) + 1:ticks, :) = repmat(numbers(13:24), max(0, ticks - double(from)), 1);
+    end
+  end
   if at <= numel(body), refuse('%d bytes are left over', numel(body) - at + 1); end
   for name = fieldnames(parts{1})'
     columns = cellfun(@(part) part.(name{1}), parts, 'UniformOutput', false);
     out.(name{1}) = vertcat(columns{:});
   end
+  out.angle_sigma_rad = angle; out.velocity_sigma_m_per_s = velocity;
   out.revision = repmat(revision, numel(out.sequence), 1);
 end
 

@@ -147,6 +147,28 @@ export interface CorrectedBatch {
   ticks: Array<CorrectedTick>;
 }
 
+export interface CorrectedBatch2 {
+  unit: string;
+  revision: Revision;
+  temperatures: Array<AppliedTemperature>;
+  ticks: Array<CorrectedTick>;
+  /** each from its tick up to the next one's */
+  sigmas: Array<Sigma>;
+}
+
+export interface Sigma {
+  /** index of its first tick in the batch */
+  from_tick: number;
+  angle_noise_rad: Array<number | null>;
+  angle_restoration_rad: Array<number | null>;
+  angle_calibration_rad: Array<number | null>;
+  angle_clamping_rad: Array<number | null>;
+  velocity_noise_m_per_s: Array<number | null>;
+  velocity_restoration_m_per_s: Array<number | null>;
+  velocity_calibration_m_per_s: Array<number | null>;
+  velocity_clamping_m_per_s: Array<number | null>;
+}
+
 export interface AppliedTemperature {
   channel: string;
   temperature_deg_c: number | null;

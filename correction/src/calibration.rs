@@ -36,6 +36,7 @@ use crate::operation::SelfTestParts;
 use crate::orientation::Orientation;
 use crate::reversal::Reversal;
 use crate::sample::OutputKind;
+use crate::sigma::SigmaModel;
 use crate::thermal::{AccelModel, GyroModel, Motion, Trends};
 
 /// A validated coefficient set; immutable, shared by pointer.
@@ -68,6 +69,8 @@ pub struct Calibration {
     pub(crate) motion: Option<Box<Motion>>,
     /// `None` where no gyro has a trend.
     pub(crate) trends: Option<Box<Trends>>,
+    /// `None` where σ of the outputs is not asked for.
+    pub(crate) sigma: Option<Box<SigmaModel>>,
     /// The longest time that a gyro's perimeter servo takes to settle (s); `None` where no gyro has one.
     pub(crate) servos_settle_s: Option<f64>,
 }

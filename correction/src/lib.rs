@@ -23,6 +23,7 @@
 //! | [`orientation`] | input axes to case axes, parity residuals, exclusion of a failed sensor |
 //! | [`reversal`] | the four-step substitution over a mode switch |
 //! | [`servo`] | the perimeter-servo transient after a mode switch |
+//! | [`sigma`] | standard errors of the outputs by cause |
 //! | [`navigation`] | sums of ticks with coning and sculling terms |
 //! | [`operation`] | the unit's states, commands and self-test (models §7) |
 //! | [`observation`] | one tick after its correction, for those who watch the unit |
@@ -56,6 +57,7 @@ pub mod rest;
 pub mod reversal;
 pub mod sample;
 pub mod servo;
+pub mod sigma;
 pub mod stated;
 pub mod thermal;
 pub mod unit;

@@ -17,9 +17,12 @@
 //! terms both are plain sums of the ticks' own increments. The preceding increment is carried from step to step
 //! and dropped at a gap.
 
+use alloc::boxed::Box;
+
 use serde::{Deserialize, Serialize};
 
 use crate::sample::{CorrectedTick, SensorFlags, Sensors, TickFlags};
+use crate::sigma::Sigma;
 use crate::units::Span;
 use crate::vector::{cross, plus};
 
@@ -96,6 +99,8 @@ pub struct StepSum {
     sculling: [f64; 3],
     /// Increments of the tick before: Δα (rad) and Δν (m/s); zero where there is none next to it.
     last: ([f64; 3], [f64; 3]),
+    /// Standard errors of the open step, which a tick's form leaves out.
+    errors: Option<Box<Sigma>>,
 }
 
 impl StepSum {
@@ -153,6 +158,10 @@ impl StepSum {
         self.sculling = plus(self.sculling, sculling.map(|c| c / 2.0));
         self.last = (tick.delta_angle, tick.delta_velocity);
 
+        if let Some(errors) = tick.sigma.as_deref() {
+            let sum = self.errors.as_deref().map_or(*errors, |sum| sum.plus(errors));
+            **self.errors.get_or_insert_default() = sum;
+        }
         let full = if let Some(open) = &mut self.open {
             add(open, tick);
             open.ticks >= step.ticks
@@ -180,6 +189,7 @@ impl StepSum {
             return;
         };
         sum.revision = self.revision;
+        sum.sigma = self.errors.take();
         if step.coning_sculling && !sum.flags.contains(TickFlags::UNCALIBRATED) {
             let rotated = rotation(sum.delta_angle, sum.delta_velocity);
             sum.delta_velocity = plus(sum.delta_velocity, plus(rotated, sculling));

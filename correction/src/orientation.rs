@@ -19,7 +19,8 @@ use core::array;
 use arrayvec::ArrayVec;
 use serde::{Deserialize, Serialize};
 
-use linear::{Rows, condition_number, is_conditioned, orthonormal_columns};
+pub(crate) use linear::Rows;
+use linear::{condition_number, is_conditioned, orthonormal_columns};
 
 pub use parity::{ISOLATION_RATIO, ParityCheck, ParityVerdict};
 pub use parts::{
@@ -29,6 +30,7 @@ pub use parts::{
 use crate::lanes;
 use crate::sample::{MAX_SENSORS, MIN_SENSORS, Sensors};
 use crate::thermal::MAX_PLAYS;
+use crate::vector::dot;
 
 /// Which sensors of a kind take part: bit i for sensor i.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
@@ -252,7 +254,7 @@ impl Orientation {
     }
 
     /// C(T), with T clamped to the fitted range and NaN standing for the reference.
-    fn rows_at(&self, temperature_deg_c: f64) -> Rows {
+    pub(crate) fn rows_at(&self, temperature_deg_c: f64) -> Rows {
         let excess = self.clamped(temperature_deg_c) - self.reference_deg_c;
         let mut rows = self.rows;
         for (row, slope) in rows.iter_mut().zip(&self.slopes_per_deg_c) {
@@ -302,11 +304,6 @@ fn masked(mut rows: Rows, mask: SensorMask) -> Rows {
     rows
 }
 
-/// Scalar product.
-fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
 /// A compiled C(T)⁺.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Inverse {
@@ -317,6 +314,13 @@ pub struct Inverse {
 }
 
 impl Inverse {
+    /// What one unit of a sensor's reading gives along the case axes; nothing of one that takes no part.
+    #[must_use]
+    pub fn column(&self, sensor: usize) -> [f64; 3] {
+        let [x, y, z, _] = self.columns.get(sensor).copied().unwrap_or_default();
+        [x, y, z]
+    }
+
     /// v = C⁺·s (unit of `readings`).
     ///
     /// A sensor outside the mask is not looked at, so its reading may be anything, NaN too. Readings that are

@@ -15,6 +15,7 @@
 mod fit;
 mod history;
 mod parts;
+mod restoration;
 mod window;
 
 use arrayvec::ArrayVec;
@@ -27,6 +28,7 @@ pub use parts::{
     FitWindow, MAX_FIT_DEGREE, MAX_FIT_READINGS, MAX_PREDICT_DEGREE, MAX_TRANSITION_TICKS, Reversal,
     ReversalError, ReversalParts, TRANSITION_RANGE_S, Transition,
 };
+pub(crate) use restoration::{Gain, Restoration};
 pub use window::MIN_ADAPTIVE_READINGS;
 
 use crate::later::Later;

@@ -1,9 +1,12 @@
 //! What goes into a unit and what comes out: raw ticks, temperature readings, corrected ticks and flags.
 
+use alloc::boxed::Box;
+
 use arrayvec::{ArrayString, ArrayVec};
 use bitflags::bitflags;
 use serde::{Deserialize, Serialize};
 
+use crate::sigma::Sigma;
 use crate::units::{Span, Timestamp};
 
 /// Fewest sensors of a kind that can resolve three axes.
@@ -216,6 +219,9 @@ pub struct CorrectedTick {
     /// Counter of the calibration revision that made this tick; 0 while uncalibrated. A batch says it once for all its ticks.
     #[serde(skip)]
     pub revision: u64,
+    /// Standard errors of the increments, where the calibration asks for them. A batch says them for runs of ticks.
+    #[serde(skip)]
+    pub sigma: Option<Box<Sigma>>,
 }
 
 /// Fields of a corrected tick as the plain numbers that they are on the wire.

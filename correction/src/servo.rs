@@ -157,7 +157,7 @@ impl ServoMemory {
         let mean_hz = tick.half_periods.map_or(f64::NAN, |counts| mean_hz(counts, tick.duration.as_s()));
         let (mut mean_left_hz, mut transient) = (mean_hz, Transient::Settled);
         if self.is_running(servo.settle_time_s(), middle) {
-            let unbalance = libm::tanh(tick.duration.as_s() / (2.0 * servo.time_constant_s));
+            let unbalance = servo.unbalance(tick.duration);
             let found = self.excess(sensor, servo, tick, (middle, mean_hz), unbalance);
             let excess = found.unwrap_or(Excess { sign: 1.0, hz: 0.0, taken_hz: 0.0 });
             mean_left_hz -= excess.sign * (unbalance * excess.hz);

@@ -19,6 +19,18 @@ pub fn escaped_lines(text: &str) -> Cow<'_, str> {
     replaced(text, |c| is_unfit(c) && !matches!(c, '\n' | '\t'))
 }
 
+/// A text on one line of at most so many characters: of a longer one the beginning and an ellipsis.
+#[must_use]
+pub fn clipped(text: &str, longest: usize) -> String {
+    // Each character of a text becomes at least one.
+    let end = text.char_indices().nth(longest).map_or(text.len(), |(end, _)| end);
+    let shown = escaped(text.get(..end).unwrap_or_default());
+    if end == text.len() && shown.chars().nth(longest).is_none() {
+        return shown.into_owned();
+    }
+    shown.chars().take(longest.saturating_sub(1)).chain(['…']).collect()
+}
+
 /// What something says of itself, [`escaped`].
 #[must_use]
 pub fn shown(of: &impl Display) -> String {
@@ -56,6 +68,20 @@ fn replaced(text: &str, unfit: impl Fn(char) -> bool) -> Cow<'_, str> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_long_text_ends_in_an_ellipsis() {
+        for (text, longest, clipped_text) in [
+            ("abc", 3, "abc"),
+            ("abcd", 3, "ab…"),
+            ("ééé", 3, "ééé"),
+            ("é\né", 3, "é\\…"),
+            ("\n", 2, "\\n"),
+            ("", 0, ""),
+        ] {
+            assert_eq!(clipped(text, longest), clipped_text);
+        }
+    }
 
     #[test]
     fn what_would_forge_a_line_or_turn_a_name_round_is_shown_by_its_code() {

@@ -39,7 +39,7 @@ use crate::message::{Message, Topic};
 use crate::recording::{Attachment, Metadata};
 use crate::source::LogReport;
 
-pub use corrected::{AppliedInfo, CorrectedInfo, RevisionInfo};
+pub use corrected::{AppliedInfo, CorrectedInfo, RevisionInfo, SigmaInfo};
 pub use files::{ChunksInfo, FileInfo};
 pub use histogram::Spread;
 pub use journal::{CommandInfo, JournalInfo, StateInfo, StatusInfo, SwapInfo};

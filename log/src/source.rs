@@ -8,7 +8,7 @@ use std::sync::atomic::AtomicU64;
 use arrayvec::ArrayVec;
 use isotherm_correction::units::Span;
 use isotherm_protocol::codec;
-use isotherm_protocol::corrected::{CorrectedBatch, Revision};
+use isotherm_protocol::corrected::{CorrectedBatch, Revision, SigmaRun};
 use isotherm_protocol::key::UnitId;
 use isotherm_protocol::raw::{Batcher, RawFrame};
 use serde::Serialize;
@@ -185,6 +185,7 @@ impl CorrectedCsv {
                         digest: last.digest.unwrap_or_default(),
                     },
                     temperatures: ArrayVec::new(),
+                    sigmas: SigmaRun::of(same.iter().map(|tick| &tick.tick)),
                     ticks: same.iter().map(|tick| tick.tick.clone()).collect(),
                 };
                 let frame = codec::encode(&batch)

@@ -77,7 +77,12 @@ pub trait Message: Sized {
         Ok(())
     }
 
-    /// Appends the body, in the current version.
+    /// Version that this message is written in.
+    fn version(&self) -> u8 {
+        Self::VERSIONS.current
+    }
+
+    /// Appends the body, in [that version](Message::version).
     ///
     /// # Errors
     /// [`CodecError`] where a value has no form on the wire.
@@ -225,7 +230,7 @@ pub enum CodecError {
 pub fn encode_into<M: Message>(message: &M, frame: &mut Vec<u8>) -> Result<(), CodecError> {
     message.check()?;
     frame.clear();
-    begin::<M>(frame);
+    begin::<M>(frame, message.version());
     message.write_body(frame)?;
     seal(frame);
     if frame.len() > MAX_FRAME {
@@ -235,8 +240,8 @@ pub fn encode_into<M: Message>(message: &M, frame: &mut Vec<u8>) -> Result<(), C
 }
 
 /// Appends kind and version.
-pub(crate) fn begin<M: Message>(frame: &mut Vec<u8>) {
-    frame.extend([M::KIND as u8, M::VERSIONS.current]);
+pub(crate) fn begin<M: Message>(frame: &mut Vec<u8>, version: u8) {
+    frame.extend([M::KIND as u8, version]);
 }
 
 /// Appends the checksum of everything before.

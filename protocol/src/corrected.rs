@@ -1,14 +1,18 @@
 //! Corrected batches: what a navigation computer subscribes to.
 
+mod sigma;
+
 use arrayvec::ArrayVec;
 use isotherm_correction::sample::{ChannelName, MAX_PARITY, MAX_SENSORS};
 use serde::{Deserialize, Serialize};
 
 pub use isotherm_correction::sample::CorrectedTick;
+pub use sigma::SigmaRun;
+pub(crate) use sigma::{MAX_RUN, append as append_sigmas, spread};
 
 use crate::codec::{CodecError, Kind, MAX_NUMBER, MAX_TICKS, Message, append, append_text, bounded, whole};
 use crate::raw::MAX_CHANNELS;
-use crate::version::{self, Versions};
+use crate::version::{CORRECTED, Versions};
 
 /// Which calibration made an output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash, Serialize, Deserialize)]
@@ -43,15 +47,45 @@ pub struct CorrectedBatch {
     /// 1…4096 ticks in order.
     #[serde(deserialize_with = "bounded::<_, _, MAX_TICKS>")]
     pub ticks: Vec<CorrectedTick>,
+    /// Standard errors of the ticks' increments, for runs of ticks; none where the calibration does not ask for them. Each tick
+    /// has its own once they have been decoded.
+    #[serde(default, skip_serializing_if = "Vec::is_empty", deserialize_with = "bounded::<_, _, MAX_TICKS>")]
+    pub sigmas: Vec<SigmaRun>,
+}
+
+/// A batch without standard errors, as version 1 has it.
+#[derive(Deserialize)]
+struct Plain {
+    unit: String,
+    revision: Revision,
+    temperatures: ArrayVec<AppliedTemperature, MAX_CHANNELS>,
+    #[serde(deserialize_with = "bounded::<_, _, MAX_TICKS>")]
+    ticks: Vec<CorrectedTick>,
+}
+
+impl From<Plain> for CorrectedBatch {
+    fn from(Plain { unit, revision, temperatures, ticks }: Plain) -> Self {
+        Self { unit, revision, temperatures, ticks, sigmas: Vec::new() }
+    }
 }
 
 impl Message for CorrectedBatch {
     const KIND: Kind = Kind::Corrected;
-    const VERSIONS: Versions = version::CORRECTED;
+    const VERSIONS: Versions = CORRECTED;
 
     fn check(&self) -> Result<(), CodecError> {
         let count = self.ticks.len();
-        if (1..=MAX_TICKS).contains(&count) { Ok(()) } else { Err(CodecError::Ticks { count }) }
+        if !(1..=MAX_TICKS).contains(&count) {
+            return Err(CodecError::Ticks { count });
+        }
+        if self.sigmas.len() > MAX_TICKS {
+            return Err(CodecError::Value { field: "sigmas", must_be: "at most 4096 runs" });
+        }
+        Ok(())
+    }
+
+    fn version(&self) -> u8 {
+        version(&self.sigmas)
     }
 
     fn write_body(&self, frame: &mut Vec<u8>) -> Result<(), CodecError> {
@@ -61,15 +95,29 @@ impl Message for CorrectedBatch {
         let (unit, revision, ticks) = (self.unit.as_str(), self.revision, self.ticks.len());
         Head { unit, revision, temperatures, ticks }.append(frame);
         self.ticks.iter().for_each(|tick| append_tick(frame, tick));
+        sigma::append(frame, &self.sigmas);
         Ok(())
     }
 
-    fn read_body(_: u8, body: &[u8]) -> Result<Self, CodecError> {
-        let mut batch: Self = whole(body)?;
+    fn read_body(version: u8, body: &[u8]) -> Result<Self, CodecError> {
+        let mut batch: Self =
+            if version == WITHOUT_SIGMA { whole::<Plain>(body)?.into() } else { whole(body)? };
+        if version != WITHOUT_SIGMA && batch.sigmas.is_empty() {
+            return Err(CodecError::Malformed);
+        }
+        spread(&batch.sigmas, &mut batch.ticks);
         batch.ticks.iter_mut().for_each(|tick| tick.revision = batch.revision.counter);
         batch.check()?;
         Ok(batch)
     }
+}
+
+/// Version of a batch that has no standard errors.
+const WITHOUT_SIGMA: u8 = 1;
+
+/// Version of a batch with these standard errors.
+pub(crate) fn version(sigmas: &[SigmaRun]) -> u8 {
+    if sigmas.is_empty() { WITHOUT_SIGMA } else { CORRECTED.current }
 }
 
 /// What stands before the ticks of a batch.
@@ -105,12 +153,13 @@ pub(crate) const MAX_TICK: usize =
 // It is written in one part.
 const _: () = assert!(MAX_TICK <= 255);
 
-/// Whether two ticks are the same to the bit, their revision's counter left out; numbers that are none are what their bits are.
+/// Whether two ticks are the same to the bit, standard errors included and their revision's counter left out; numbers that are none are what their bits are.
 #[must_use]
 pub fn are_same(one: &CorrectedTick, other: &CorrectedTick) -> bool {
     let bytes = |tick: &CorrectedTick| {
         let mut bytes = Vec::with_capacity(MAX_TICK);
         append_tick(&mut bytes, tick);
+        sigma::append(&mut bytes, &SigmaRun::of([tick]));
         bytes
     };
     bytes(one) == bytes(other)
@@ -172,6 +221,7 @@ mod tests {
                 gyro_parity: numbers[6..].iter().copied().take(gyro_parity).collect(),
                 accel_parity: numbers[11..].iter().copied().take(accel_parity).collect(),
                 revision: 0,
+                sigma: None,
             }
         }
     }

@@ -51,11 +51,12 @@ pub use curve::{
 pub use difference::{difference, lost_sections};
 pub use measure::{Argument, Unit};
 pub use types::{
-    Accel, AccelHysteresis, AccelLag, AccelOrientation, AccelOutput, AccelParity, AccelRegressor,
-    AccelSensor, AlongAxes, Auxiliary, AxesHysteresis, Branches, Channel, Created, Document, Drift, Filter,
-    FitWindow, Gyro, GyroOrientation, GyroOutput, GyroParity, GyroSensor, Hysteresis, Lag, Log, Measure,
-    ModeReversal, Orientation, OrientationThermal, Origin, Regressor, Residual, Sample, SelfTest,
-    SelfTestCounter, SelfTestVoltage, Servo, ServoKind, Temperature, Trend,
+    Accel, AccelBiasSigma, AccelHysteresis, AccelLag, AccelOrientation, AccelOutput, AccelParity,
+    AccelRegressor, AccelSensor, AccelSigma, AlongAxes, Auxiliary, AxesHysteresis, Branches, Channel,
+    Created, Document, Drift, Filter, FitWindow, Gyro, GyroBiasSigma, GyroOrientation, GyroOutput,
+    GyroParity, GyroSensor, GyroSigma, Hysteresis, Lag, Log, Measure, ModeReversal, Orientation,
+    OrientationThermal, Origin, Regressor, Residual, Sample, SelfTest, SelfTestCounter, SelfTestVoltage,
+    Servo, ServoKind, Temperature, Trend,
 };
 
 /// Oldest version of the document's form that is still read.

@@ -1,8 +1,10 @@
 //! What was done to a unit: the entries of the audit file, which operators are sent as JSON too.
 //!
-//! One entry is one line of JSON; [`AuditEntry::to_line`] and [`AuditEntry::from_line`] write and read it with its checksum.
-//! Unknown fields are skipped, so that an older reader understands a newer file as far as it can.
+//! One entry is one line of JSON; [`AuditEntry::to_line`] and [`AuditEntry::from_line`] write and read it with its checksum, and
+//! [`chain`] makes the lines a chain of digests. Unknown fields are skipped, so that an older reader understands a newer file
+//! as far as it can.
 
+pub mod chain;
 mod line;
 mod time;
 mod words;

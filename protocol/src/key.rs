@@ -9,6 +9,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use crate::control::MAX_BY;
 use crate::digest::Digest;
 
 /// Longest serial, in bytes.
@@ -24,8 +25,12 @@ pub const ALL_CORRECTED: &str = "imu/*/corrected";
 pub const ALL_STATUS: &str = "imu/*/status";
 /// Calibration documents of all units: queries and puts.
 pub const ALL_CALIBRATION: &str = "imu/*/calibration";
+/// The same on keys that end in the name of who asks.
+pub const ALL_CALIBRATION_BY: &str = "imu/*/calibration/*";
 /// Commands to all units.
 pub const ALL_COMMAND: &str = "imu/*/command";
+/// The same on keys that end in the name of who asks.
+pub const ALL_COMMAND_BY: &str = "imu/*/command/*";
 /// Histories of all units.
 pub const ALL_HISTORY: &str = "imu/*/history";
 /// Journals of all units.
@@ -239,6 +244,29 @@ topics! {
     "a unit's liveliness token", "alive", unit_alive, parse_unit_alive;
 }
 
+/// Key of an order that ends in the name of who asks: access control can say who may use which; `None` for a name that no key can
+/// carry.
+#[must_use]
+pub fn by(order: &str, name: &str) -> Option<String> {
+    is_name(name).then(|| format!("{order}/{name}"))
+}
+
+/// Key of an order without the name of who asks, and that name, where it has one.
+#[must_use]
+pub fn asker(key: &str) -> (&str, Option<&str>) {
+    let named = |(order, name)| {
+        let is_order = parse_calibration(order).or_else(|| parse_command(order)).is_some();
+        (is_order && is_name(name)).then_some((order, Some(name)))
+    };
+    key.rsplit_once('/').and_then(named).unwrap_or((key, None))
+}
+
+/// Whether a name fits in a key, and in the audit file.
+fn is_name(name: &str) -> bool {
+    let unfit = |c: char| c.is_control() || "/*$#?".contains(c);
+    (1..=MAX_BY).contains(&name.chars().count()) && !name.contains(unfit)
+}
+
 /// Key of a service instance's status: `isotherm/{instance}/status`; the instance is its Zenoh id as text.
 #[must_use]
 pub fn service_status(instance: &str) -> String {
@@ -364,5 +392,20 @@ mod tests {
         }
         assert!(UnitId::new("").is_err());
         assert!(UnitId::new(&"x".repeat(MAX_UNIT_ID + 1)).is_err());
+    }
+
+    #[test]
+    fn an_order_carries_the_name_of_who_asks() {
+        let unit = UnitId::new("ZLG-0042").unwrap();
+        for order in [calibration(&unit), command(&unit)] {
+            assert_eq!(asker(&order), (&*order, None));
+            assert_eq!(asker(&by(&order, "ann of the bench").unwrap()), (&*order, Some("ann of the bench")));
+            for name in ["", "*", "$*", "a/b", "a\n", &"x".repeat(65)] {
+                assert_eq!(by(&order, name), None, "{name:?}");
+            }
+            let anybody = format!("{order}/*");
+            assert_eq!(asker(&anybody), (&*anybody, None), "whoever it is for, it is nobody's");
+        }
+        assert_eq!(asker("imu/ZLG-0042/raw/gyro"), ("imu/ZLG-0042/raw/gyro", None));
     }
 }

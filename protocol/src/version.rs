@@ -39,8 +39,8 @@ pub const RAW_GYRO: Versions = Versions { min: 1, current: 1 };
 pub const RAW_ACCEL: Versions = Versions { min: 1, current: 1 };
 /// Of the raw temperature batch.
 pub const RAW_TEMPERATURE: Versions = Versions { min: 1, current: 1 };
-/// Of the corrected batch.
-pub const CORRECTED: Versions = Versions { min: 1, current: 1 };
+/// Of the corrected batch. 2: with standard errors; a batch without them is still written as 1.
+pub const CORRECTED: Versions = Versions { min: 1, current: 2 };
 /// Of the unit's status. 2: states, sensors, swaps, drift, self-test, pre-launch calibration, latencies.
 pub const STATUS: Versions = Versions { min: 1, current: 2 };
 /// Of the raw health batch.

@@ -1,16 +1,12 @@
 //! Covariances of what goes out: the noise that a calibration document states, about the case axes.
 
+use isotherm_correction::orientation::{Orientation, OrientationParts, SensorMask};
+use isotherm_correction::sigma::Causes;
 use isotherm_log::ros2::UNKNOWN;
-use isotherm_protocol::document::{Document, Orientation};
+use isotherm_protocol::document::Document;
 use isotherm_protocol::status::DriftStatus;
-use nalgebra::{DMatrix, Matrix3, MatrixXx3};
 
 use crate::mapping::UnitMapping;
-
-/// °/h in rad/s.
-const DEG_PER_H: f64 = std::f64::consts::PI / 180.0 / 3600.0;
-/// °/√h in rad/√s.
-const DEG_PER_SQRT_H: f64 = std::f64::consts::PI / 180.0 / 60.0;
 
 /// Noise of a unit's corrected output under one calibration.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -37,19 +33,20 @@ impl Noise {
     #[must_use]
     pub fn of(document: &Document, digest: [u8; 8], mapping: &UnitMapping) -> Self {
         let square = |value: f64| value * value;
-        let stated = document.gyro.sensor.iter().map(|gyro| {
+        let parts = document.to_parts();
+        let stated = parts.gyros.iter().map(|gyro| {
             let drift = gyro.drift.as_ref()?;
-            let slow = square(drift.initial_sigma_deg_per_h) + square(drift.sigma_deg_per_h);
-            Some((square(drift.angle_random_walk_deg_per_sqrt_h * DEG_PER_SQRT_H), slow * square(DEG_PER_H)))
+            let slow = square(drift.initial_sigma_rad_per_s) + square(drift.sigma_rad_per_s);
+            Some((square(drift.angle_random_walk_rad_per_sqrt_s), slow))
         });
         let otherwise = mapping.gyro.random_walk.map(|walk| (square(walk), 0.0));
         let gyro: Option<Vec<_>> = stated.map(|stated| stated.or(otherwise)).collect();
-        let accel = document.accel.as_ref().zip(mapping.accel.and_then(|accel| accel.random_walk));
+        let accel = parts.accel_orientation.zip(mapping.accel.and_then(|accel| accel.random_walk));
         Self {
             digest,
-            gyro: gyro.and_then(|noise| Resolved::new(&document.gyro.orientation, noise)),
-            accel: accel.and_then(|(accel, walk)| {
-                Resolved::new(&accel.orientation, vec![(square(walk), 0.0); accel.sensor.len()])
+            gyro: gyro.and_then(|noise| Resolved::new(&parts.gyro_orientation, noise)),
+            accel: accel.and_then(|(orientation, walk)| {
+                Resolved::new(&orientation, vec![(square(walk), 0.0); orientation.rows.len()])
             }),
         }
     }
@@ -76,20 +73,19 @@ impl Noise {
     }
 }
 
+/// Covariance of a mean over a tick from what its batch says of its increments (rad or m/s); `None` where that is unknown.
+#[must_use]
+pub fn stated(increments: &Causes, duration_s: f64) -> Option<[f64; 9]> {
+    let [x, y, z] = increments.variance().map(|variance| variance / (duration_s * duration_s));
+    (x + y + z).is_finite().then_some([x, 0.0, 0.0, 0.0, y, 0.0, 0.0, 0.0, z])
+}
+
 impl Resolved {
-    /// `None` where the axes do not resolve, which no document in force has.
-    fn new<P>(orientation: &Orientation<P>, noise: Vec<(f64, f64)>) -> Option<Self> {
-        let rows = &orientation.rows;
-        let axes = MatrixXx3::from_fn(rows.len(), |row, column| {
-            rows.get(row).and_then(|axis| axis.get(column)).copied().unwrap_or_default()
-        });
-        let weights = DMatrix::from_fn(rows.len(), rows.len(), |row, column| {
-            let weight = orientation.weights.as_ref().and_then(|weights| weights.get(row)).copied();
-            if row == column { weight.unwrap_or(1.0) } else { 0.0 }
-        });
-        let normal: Matrix3<f64> = axes.transpose() * &weights * &axes;
-        let inverse = normal.try_inverse()? * axes.transpose() * weights;
-        let columns = inverse.column_iter().map(|column| [column.x, column.y, column.z]).collect();
+    /// At the axes' reference temperature; `None` where they do not resolve, which no document in force has.
+    fn new(orientation: &OrientationParts, noise: Vec<(f64, f64)>) -> Option<Self> {
+        let compiled = Orientation::new(orientation).ok()?;
+        let inverse = compiled.inverse(f64::NAN, SensorMask::all(compiled.sensors()))?;
+        let columns = (0..compiled.sensors()).map(|sensor| inverse.column(sensor)).collect();
         let (white, slow) = noise.into_iter().unzip();
         Some(Self { columns, white, slow })
     }

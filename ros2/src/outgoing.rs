@@ -1,11 +1,12 @@
 //! From corrected ticks to messages of ROS 2.
 
 use isotherm_correction::sample::{CorrectedTick, TickFlags};
+use isotherm_correction::sigma::{Causes, Sigma};
 use isotherm_log::mapping::Marks;
 use isotherm_log::ros2::{Header, Imu, NOT_MEASURED, time};
 
 use crate::mapping::UnitMapping;
-use crate::noise::Noise;
+use crate::noise::{Noise, stated};
 
 /// Why a tick makes no message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -44,9 +45,16 @@ pub fn message(
         imu.linear_acceleration_covariance = NOT_MEASURED;
     }
     let duration_s = tick.duration.as_s();
+    let said = |of: fn(&Sigma) -> Causes| stated(&of(tick.sigma.as_deref()?), duration_s);
     for (covariance, known) in [
-        (&mut imu.angular_velocity_covariance, noise.rate(duration_s)),
-        (&mut imu.linear_acceleration_covariance, noise.force(duration_s)),
+        (
+            &mut imu.angular_velocity_covariance,
+            said(|sigma| sigma.angle).unwrap_or_else(|| noise.rate(duration_s)),
+        ),
+        (
+            &mut imu.linear_acceleration_covariance,
+            said(|sigma| sigma.velocity).unwrap_or_else(|| noise.force(duration_s)),
+        ),
     ] {
         if *covariance != NOT_MEASURED {
             *covariance = known;

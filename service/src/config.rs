@@ -69,6 +69,8 @@ pub struct Settings {
     pub web: WebSettings,
     /// How to open the Zenoh session.
     pub session: SessionOptions,
+    /// Whether swaps and commands are taken only on keys that end in the name of who asks, which access control vouches for.
+    pub certified_names: bool,
     /// SHA-256 of the configuration's text; `None` without one.
     pub digest: Option<Digest>,
 }
@@ -93,6 +95,7 @@ impl Default for Settings {
             metrics: MetricsSettings::default(),
             web: WebSettings::default(),
             session: SessionOptions::default(),
+            certified_names: false,
             digest: None,
         }
     }

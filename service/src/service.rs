@@ -89,6 +89,11 @@ pub(crate) async fn start_on(
     session: Session,
 ) -> Result<RunningService, ServiceError> {
     tell_keys(&settings);
+    if settings.certified_names && !settings.session.has_access_control()? {
+        tracing::warn!(
+            "certified_names is set, but the Zenoh configuration has no access control: whoever connects may use any name"
+        );
+    }
     let opening = Opening::new();
     let inbox = opening.inbox();
     let outlets = declare::outlets(session.clone(), settings.congestion);

@@ -66,6 +66,7 @@ pub fn plain_gyro() -> GyroParts {
         trend: None,
         servo: None,
         drift: None,
+        sigma: None,
     }
 }
 
@@ -80,6 +81,7 @@ pub fn plain_accel() -> AccelParts {
         board_ratio: None,
         position_m: [0.0; 3],
         input_limit: 1e6,
+        sigma: None,
     }
 }
 

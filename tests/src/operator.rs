@@ -10,6 +10,7 @@ use isotherm_protocol::history::AuditEntry;
 use isotherm_protocol::key::{self, UnitId};
 use isotherm_protocol::service_status::ServiceStatus;
 use isotherm_protocol::status::Status;
+use isotherm_service::control::store::verify;
 use serde_json::Value;
 use zenoh::Session;
 
@@ -186,6 +187,8 @@ pub fn audit(state: &Path) -> Vec<AuditEntry> {
     for (number, entry) in (1..).zip(&entries) {
         assert_eq!(entry.number, number, "numbers are consecutive");
     }
+    let chain = verify(state, None).expect("the audit file is there");
+    assert!(chain.holds && chain.entries >= entries.len() as u64, "{:?}", chain.breaks);
     entries
 }
 

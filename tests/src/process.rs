@@ -1,7 +1,7 @@
 //! The project's programs as separate processes.
 
 use std::io::{BufRead, BufReader};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Output, Stdio};
 use std::sync::Once;
 
@@ -89,10 +89,19 @@ impl Service {
     /// Where it does not start.
     #[must_use]
     pub fn start_as_configured(arguments: &[&str]) -> Self {
+        Self::start_in(&crate::data::root(), arguments)
+    }
+
+    /// The same, in another folder.
+    ///
+    /// # Panics
+    /// Where it does not start.
+    #[must_use]
+    pub fn start_in(folder: &Path, arguments: &[&str]) -> Self {
         let mut child = Command::new(program("isotherm"))
             .args(["serve", "--announce", "--json"])
             .args(arguments)
-            .current_dir(crate::data::root())
+            .current_dir(folder)
             .stdout(Stdio::piped())
             .spawn()
             .expect("the service starts");

@@ -210,6 +210,7 @@ mod tests {
             revision: Revision::default(),
             temperatures: ArrayVec::default(),
             ticks,
+            sigmas: Vec::new(),
         };
         let right = codec::encode(&batch(ticks.clone())).unwrap();
         assert_eq!(corrected(0, &sent, &frame(&right)).unwrap(), Ok(()));

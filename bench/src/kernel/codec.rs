@@ -92,6 +92,7 @@ impl Encode {
             revision: Revision { counter: 1, digest: [7; 8] },
             temperatures: ArrayVec::new(),
             ticks: ticks.to_vec(),
+            sigmas: Vec::new(),
         });
         let name = format!("encode corrected, batches of {size}");
         Ok(Self { name, batches: batches.collect(), room: Vec::new() })

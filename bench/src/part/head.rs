@@ -109,6 +109,7 @@ mod tests {
             revision: Revision { counter: 1000, digest: [9; 8] },
             temperatures: ArrayVec::new(),
             ticks: vec![tick.clone(), tick],
+            sigmas: Vec::new(),
         };
         let frame = codec::encode(&batch).unwrap();
         assert_eq!(read(Format::Corrected, &frame), Some(Head { first: 300, ticks: 2, revision: 1000 }));

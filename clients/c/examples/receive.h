@@ -12,8 +12,8 @@ typedef struct {
 
 /* Takes one frame: says what it holds, or why it is refused; the stream goes on. */
 static void receive(receiver *r, const uint8_t *frame, size_t length) {
-    isotherm_corrected_batch batch;
-    const isotherm_result result = isotherm_decode_corrected_batch(frame, length, &batch);
+    isotherm_corrected_batch_2 batch;
+    const isotherm_result result = isotherm_decode_corrected(frame, length, &batch);
     if (result != ISOTHERM_OK) {
         ++r->refused;
         fprintf(stderr, "a frame of %zu bytes is refused: %s\n", length, isotherm_words(result));

@@ -11,7 +11,7 @@ import unittest
 
 import isotherm
 import numpy as np
-from common import LIMIT_S, REPLAY, ROOT
+from common import LIMIT_S, REPLAY, ROOT, vectors
 
 UNIT = "MEMS-0001"
 DOCUMENT = ROOT / f"config/calibration/{UNIT}.toml"
@@ -38,6 +38,11 @@ class Files(unittest.TestCase):
         done = subprocess.run([REPLAY, *arguments], cwd=cls.folder, capture_output=True, text=True, timeout=LIMIT_S)
         if done.returncode != 0:
             raise RuntimeError(f"isotherm-replay {' '.join(arguments)}: {done.stderr}")
+
+    @classmethod
+    def octave(cls, script: str) -> "subprocess.CompletedProcess[str]":
+        command = ["octave-cli", "--quiet", "--no-gui", "--path", str(ROOT / "clients/matlab"), "--eval", script]
+        return subprocess.run(command, cwd=cls.folder, capture_output=True, text=True, timeout=LIMIT_S)
 
     def table(self, name: str) -> "list[dict[str, str]]":
         with open(self.folder / name, newline="", encoding="utf-8") as file:
@@ -158,9 +163,7 @@ class Files(unittest.TestCase):
               end
             end
         """ % ", ".join(f"'{path}'" for path in paths)
-        place = str(ROOT / "clients/matlab")
-        command = ["octave-cli", "--quiet", "--no-gui", "--path", place, "--eval", script]
-        done = subprocess.run(command, cwd=self.folder, capture_output=True, text=True, timeout=LIMIT_S)
+        done = self.octave(script)
         lines = done.stdout.splitlines()
         decoder = isotherm.CorrectedDecoder()
         for path in paths:
@@ -176,6 +179,40 @@ class Files(unittest.TestCase):
                 numbers = [*tick["delta_angle_rad"], *tick["delta_velocity_m_per_s"]]
                 self.assertEqual([float(word) for word in words[10:]], [float(value) for value in numbers])
         self.assertRegex(done.stderr, "broken.wire: 3 of .* frames cannot be read")
+
+    @unittest.skipUnless(shutil.which("octave-cli"), "octave-cli not found (Debian: apt install octave)")
+    def test_octave_takes_and_refuses_the_frozen_frames(self) -> None:
+        frozen = vectors()
+        for number, vector in enumerate(frozen):
+            frame = vector.frame
+            (self.folder / f"frozen-{number}.wire").write_bytes(len(frame).to_bytes(4, "little") + frame)
+        script = """
+            for k = 0:%d
+              lastwarn('');
+              u = isotherm(sprintf('frozen-%%d.wire', k));
+              if isempty(u)
+                printf('refused: %%s\\n', lastwarn());
+              else
+                printf('%%s', strtrim(disp(u.sequence(end))));
+                printf(' %%.17g', u.angle_sigma_rad(end, :), u.velocity_sigma_m_per_s(end, :));
+                printf('\\n');
+              end
+            end
+        """ % (len(frozen) - 1)
+        done = self.octave(script)
+        lines = done.stdout.splitlines()
+        self.assertEqual(len(lines), len(frozen), done.stderr)
+        decoder = isotherm.CorrectedDecoder()
+        for vector, line in zip(frozen, lines):
+            with self.subTest(vector.name):
+                if vector.kind != isotherm.CORRECTED or vector.message is None:
+                    self.assertRegex(line, "^refused: .* 1 of 1 frames cannot be read")
+                    continue
+                tick = decoder.decode(vector.frame).ticks[-1]
+                sequence, *sigmas = line.split()
+                self.assertEqual(int(sequence), tick["sequence"])
+                expected = [*tick["angle_sigma_rad"].ravel(), *tick["velocity_sigma_m_per_s"].ravel()]
+                np.testing.assert_array_equal([float(sigma) for sigma in sigmas], expected)
 
     def test_a_plot_shows_both_quantities(self) -> None:
         import matplotlib

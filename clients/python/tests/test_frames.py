@@ -55,7 +55,7 @@ class Frames(unittest.TestCase):
         cases = [
             (frame[:5], "5 bytes, must have 6"),
             (bytes([1]) + frame[1:], "kind 1, its key promises 4"),
-            (with_checksum(bytes([4, 9]) + frame[2:-4]), "version 9, this package knows 1 to 1: update it"),
+            (with_checksum(bytes([4, 9]) + frame[2:-4]), "version 9, this package knows 1 to 2: update it"),
             (frame[:-1] + bytes([frame[-1] ^ 1]), "the checksum is"),
             (with_checksum(frame[:-5]), "ends too early"),
             (with_checksum(frame[:-4] + b"\0"), "1 bytes are left over"),
@@ -100,6 +100,11 @@ class Arrays(unittest.TestCase):
             for name in ("gyro_parity_rad_per_s", "accel_parity_m_per_s2"):
                 self.assertEqual(bits(row[name][: len(tick[name])]), bits(tick[name]))
                 self.assertTrue(np.isnan(row[name][len(tick[name]) :]).all())
+        for index, row in enumerate(batch.ticks):
+            runs = [run for run in plain.get("sigmas", []) if run["from_tick"] <= index]
+            stated = list(runs[-1].values())[1:] if runs else [[np.nan] * 3] * 8
+            found = [*row["angle_sigma_rad"], *row["velocity_sigma_m_per_s"]]
+            self.assertEqual([bits(causes) for causes in found], [bits(causes) for causes in stated])
         return True
 
     def test_arrays_hold_what_the_frozen_frames_say(self) -> None:

@@ -140,6 +140,10 @@ class OneService(unittest.TestCase):
         with self.assertRaisesRegex(isotherm.NotAccepted, "abort"):
             self.bus.command("MEMS-0001", "abort")
         self.assertEqual(self.bus.status("MEMS-0001")["MEMS-0001"]["state"], "standby")
+        with isotherm.connect(self.service.endpoint, timeout_s=LIMIT_S, name="eve") as named:
+            self.assertEqual(named.calibration("MEMS-0001"), document)
+            named.command("MEMS-0001", "standby")
+        self.assertEqual(self.bus.history("MEMS-0001", limit=1)[0]["by"], "eve")
         entries = self.bus.history("MEMS-0001", limit=10)
         self.assertIn("a;n=n%", [entry.get("by") for entry in entries])
         (service,) = self.bus.services().values()

@@ -14,9 +14,10 @@ use crate::channel::{Channel, ChannelParts, MAX_GRID_POINTS, ThermalFilter, Ther
 use crate::drift::DriftModel;
 use crate::lanes::Lanes;
 use crate::reversal::{Reversal, ReversalError};
-use crate::sample::{MAX_SENSORS, MIN_SENSORS};
+use crate::sample::{MAX_SENSORS, MIN_SENSORS, OutputKind};
 use crate::servo::Servo;
-use crate::thermal::{Motion, MotionTerms, Trends};
+use crate::sigma::SigmaModel;
+use crate::thermal::{AccelModel, GyroModel, Motion, MotionTerms, Trends};
 
 use checker::{Checker, HUGE};
 pub use self_test::MAX_SELF_TEST_READINGS;
@@ -94,6 +95,7 @@ pub(super) fn compile(parts: &CalibrationParts) -> Result<Calibration, Vec<Defec
                 accels_in_motion,
                 parts.accels.iter().map(|accel| accel.position_m),
             ),
+            sigma: sigma_model(parts, &models, &accels).map(Box::new),
             trends: Trends::of(&models).map(Box::new),
             servos_settle_s: servos.map(Servo::settle_time_s).reduce(f64::max),
             gyros: models,
@@ -109,6 +111,18 @@ pub(super) fn compile(parts: &CalibrationParts) -> Result<Calibration, Vec<Defec
         }),
         _ => Err(core::mem::take(&mut checker.defects)),
     }
+}
+
+/// What is stated of the sensors' errors; a count is worth as much as it is at the assumed temperature.
+fn sigma_model(parts: &CalibrationParts, gyros: &[GyroModel], accels: &[AccelModel]) -> Option<SigmaModel> {
+    let counted = |output, size: Option<f64>| size.filter(|_| output == OutputKind::Counts).map(f64::abs);
+    let gyro = |lane: usize| counted(parts.gyro_output, gyros.get(lane).map(|gyro| gyro.increment_weight));
+    let assumed_deg_c = parts.filter.assumed_deg_c;
+    let accel = |lane: usize| {
+        let accel: Option<&AccelModel> = accels.get(lane);
+        counted(parts.accel_output, accel.map(|accel| 1.0 / accel.scale_factor.at(assumed_deg_c).value))
+    };
+    SigmaModel::of(&parts.gyros, &parts.accels, [&gyro, &accel])
 }
 
 /// A lane for each sensor; infinite where there is none.

@@ -98,6 +98,11 @@ pub enum DefectKind {
         /// Its index.
         other: usize,
     },
+    /// Correlations that no numbers can have.
+    #[error(
+        "is no correlation of as many σ: it must be symmetric, have 1 in its diagonal, and make no variance negative"
+    )]
+    NoCovariance,
     /// A name without a letter.
     #[error("is empty, must be a name")]
     NoName,

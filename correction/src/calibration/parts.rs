@@ -12,6 +12,7 @@ use crate::orientation::OrientationParts;
 use crate::reversal::ReversalParts;
 use crate::sample::OutputKind;
 use crate::servo::ServoParts;
+use crate::sigma::SigmaParts;
 use crate::thermal::Feature;
 
 /// All parts of one unit's calibration.
@@ -65,6 +66,8 @@ pub struct GyroParts {
     pub servo: Option<ServoParts>,
     /// What the drift estimator is to expect; `None`: it is not run for this gyro.
     pub drift: Option<DriftParts>,
+    /// Its standard errors; where a sensor states any, σ goes out with every output.
+    pub sigma: Option<SigmaParts>,
 }
 
 /// The argument of a branched coefficient.
@@ -213,4 +216,6 @@ pub struct AccelParts {
     pub position_m: [f64; 3],
     /// Outputs of this magnitude and above are flagged overrange (counts per tick, or output units).
     pub input_limit: f64,
+    /// Its standard errors.
+    pub sigma: Option<SigmaParts>,
 }

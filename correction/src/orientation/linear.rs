@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, SMatrix};
 use crate::sample::{MAX_PARITY, MAX_SENSORS};
 
 /// N rows of three, the unused ones zero.
-pub(super) type Rows = [[f64; 3]; MAX_SENSORS];
+pub(crate) type Rows = [[f64; 3]; MAX_SENSORS];
 /// Upper triangle of a 3×3 matrix, by rows.
 pub(super) type Triangle = [[f64; 3]; 3];
 

@@ -37,6 +37,7 @@ pub(crate) fn calibration(output: OutputKind, count: f64, accels: bool) -> Calib
         trend: None,
         servo: None,
         drift: None,
+        sigma: None,
     };
     let accel = AccelParts {
         channel: None,
@@ -50,6 +51,7 @@ pub(crate) fn calibration(output: OutputKind, count: f64, accels: bool) -> Calib
         board_ratio: None,
         position_m: [0.0; 3],
         input_limit: 1e9,
+        sigma: None,
     };
     let parts = CalibrationParts {
         filter: ThermalFilterParts {

@@ -45,6 +45,11 @@ impl Reading {
         mid_time_s(self.end_time, self.duration, origin)
     }
 
+    /// When it began and ended.
+    pub(super) fn ends(&self) -> (Timestamp, Timestamp) {
+        (self.end_time - self.duration, self.end_time)
+    }
+
     /// [abscissa, rate] of one sensor, where it has a finite rate.
     pub(super) fn point(&self, at: f64, sensor: usize) -> Option<[f64; 2]> {
         let rate = self.rates.get(sensor).copied().filter(|rate| rate.is_finite());

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::curve::{Curve, CurveError, CurveParts};
 use crate::stated::{OutOfRange, outside};
+use crate::units::Span;
 
 /// Shortest and longest time constant of a servo (s).
 pub const TIME_CONSTANT_RANGE_S: [f64; 2] = [1e-4, 1e3];
@@ -85,6 +86,11 @@ impl Servo {
                 Err(errors)
             }
         }
+    }
+
+    /// Share by which the halves of a tick of a duration do not cancel: tanh(Δt/2τ).
+    pub(crate) fn unbalance(&self, duration: Span) -> f64 {
+        libm::tanh(duration.as_s() / (2.0 * self.time_constant_s))
     }
 
     /// Time after the transition from which nothing is subtracted (s).

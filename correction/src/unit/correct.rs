@@ -9,6 +9,7 @@ mod accels;
 mod gyros;
 mod motion;
 mod patch;
+mod sigma;
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;

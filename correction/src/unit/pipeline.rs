@@ -1,6 +1,7 @@
 //! Ticks in their order go through the corrector and out: what fits the calibration, when a change takes effect, and what is
 //! announced with a tick.
 
+use alloc::boxed::Box;
 use alloc::sync::Arc;
 
 use serde::{Deserialize, Serialize};
@@ -16,6 +17,7 @@ use crate::calibration::Calibration;
 use crate::drift::DriftSettings;
 use crate::navigation::StepSum;
 use crate::sample::{AccelTick, CorrectedTick, GyroTick, OutputKind, TemperatureReading, TickFlags};
+use crate::sigma::SigmaMemory;
 use crate::units::{Span, Timestamp};
 
 /// A calibration in force, with the memory that belongs to it.
@@ -25,6 +27,8 @@ pub(super) struct Active {
     pub(super) calibration: Arc<Calibration>,
     pub(super) corrector: Corrector,
     pub(super) revision: u64,
+    /// `None` where σ is not asked for.
+    sigma: Option<Box<SigmaMemory>>,
 }
 
 /// A gyro tick that has left its intake: the next of its series, or the first of a new one.
@@ -85,13 +89,18 @@ impl Pipeline {
         let since_turn_on_s = self.turn_on.map_or(0.0, |turn_on| self.last_end.seconds_from(turn_on));
         // A unit that has given nothing out has nothing to move away from.
         let slew = if self.turn_on.is_some() { slew } else { Span::ZERO };
-        let kept = self.active.take().map(|active| (active.calibration, active.corrector));
+        let (kept, kept_sigma) =
+            self.active.take().map(|active| ((active.calibration, active.corrector), active.sigma)).unzip();
         let UnitSettings { reference_delay: delay, subtract_drift: subtract, .. } = self.settings;
         let drift = DriftSettings { delay, subtract };
         let takeover = Takeover { now: self.last_end, since_turn_on_s, slew, drift };
         let corrector = Corrector::new(&calibration, kept, takeover);
         self.operating.calibration_changed(&calibration);
-        self.active = Some(Active { calibration, corrector, revision });
+        // Ticks without σ must not go out with that of the last one.
+        self.corrected.sigma = None;
+        let kept = kept_sigma.flatten();
+        let sigma = calibration.sigma.as_ref().map(|_| kept.unwrap_or_default());
+        self.active = Some(Active { calibration, corrector, revision, sigma });
     }
 
     /// Takes temperature readings, which wait for the first tick that is to feel them.
@@ -210,6 +219,15 @@ impl Pipeline {
                 let (counters, out) = (&mut self.counters, &mut self.corrected);
                 active.corrector.correct(&active.calibration, &tick, waiting, counters, out);
                 self.corrected.revision = active.revision;
+                if let Some(memory) = &mut active.sigma {
+                    sigma(
+                        memory,
+                        &active.corrector,
+                        &active.calibration,
+                        &mut self.corrected,
+                        tick.since_turn_on_s,
+                    );
+                }
                 if self.operating.watches() {
                     watch(&mut self.operating, active, self.last_end);
                 }
@@ -242,6 +260,20 @@ impl Pipeline {
         self.counters.ticks_out += 1;
         self.steps.push(&self.settings.navigation, &self.corrected, emit);
     }
+}
+
+/// Says how far off a corrected tick may be.
+#[cold]
+fn sigma(
+    memory: &mut SigmaMemory,
+    corrector: &Corrector,
+    calibration: &Calibration,
+    out: &mut CorrectedTick,
+    since_turn_on_s: f64,
+) {
+    let Some(model) = calibration.sigma.as_deref() else { return };
+    let sigma = corrector.sigma(memory, (calibration, model), out, since_turn_on_s);
+    **out.sigma.get_or_insert_default() = sigma;
 }
 
 /// Shows a corrected tick to those who watch the unit.

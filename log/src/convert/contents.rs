@@ -59,6 +59,8 @@ pub struct CorrectedShape {
     pub gyro_parity: usize,
     /// Parity residuals of the accelerometers.
     pub accel_parity: usize,
+    /// Whether there are standard errors.
+    pub sigma: bool,
 }
 
 /// What a log holds of one unit.
@@ -165,6 +167,7 @@ impl UnitContents {
             shape.accels = shape.accels.max(tick.accel_flags.len());
             shape.gyro_parity = shape.gyro_parity.max(tick.gyro_parity.len());
             shape.accel_parity = shape.accel_parity.max(tick.accel_parity.len());
+            shape.sigma |= tick.sigma.is_some();
         }
     }
 }

@@ -16,7 +16,7 @@ use super::tick::LogTick;
 use crate::error::Error;
 use crate::file::begins_with;
 use crate::message::{Message, Topic};
-use crate::offline::rows::{HEADER, read_tick};
+use crate::offline::rows::{FIRST_COLUMNS, read_tick};
 use crate::offline::unit_id;
 use crate::part::{LogFiles, Messages, Part};
 use crate::progress::Progress;
@@ -80,7 +80,7 @@ impl Read for Counted {
 /// Whether a file is a CSV of corrected ticks, which does not say of which unit it is.
 #[must_use]
 pub fn is_csv(path: &Path) -> bool {
-    begins_with(path, HEADER.as_bytes())
+    begins_with(path, FIRST_COLUMNS.as_bytes())
 }
 
 impl CorrectedLog {
@@ -210,7 +210,7 @@ fn read_rows(lines: &mut impl BufRead, line: &mut u64) -> io::Result<Vec<LogTick
         }
         *line += 1;
         let row = row.trim_end();
-        if *line == 1 && row == HEADER {
+        if *line == 1 && row.starts_with(FIRST_COLUMNS) {
             continue;
         }
         let tick = read_tick(row).map_err(|words| io::Error::other(format!("line {line}: {words}")))?;

@@ -2,6 +2,7 @@
 
 use isotherm_correction::sample::{CorrectedTick, LasingMode, SensorFlags};
 use isotherm_correction::units::{AngularRate, SpecificForce};
+use isotherm_protocol::corrected::SigmaRun;
 use serde::Serialize;
 
 /// A corrected tick of a log, and what the log says of the calibration that made it.
@@ -106,6 +107,10 @@ pub fn differences(a: &LogTick, b: &LogTick, tolerance: &Tolerance) -> Vec<Field
     let limit = tolerance.velocity_m_per_s / seconds;
     found.numbers("accel_parity", "m_per_s2", (&a.accel_parity, &b.accel_parity), limit, &force);
     found.plain("revision", a.revision, b.revision);
+    found.words("sigma", SigmaRun::of([a]), SigmaRun::of([b]), |runs| match &*runs {
+        [run] => format!("{:?} rad, {:?} m/s", run.sigma().angle.all(), run.sigma().velocity.all()),
+        _ => "none".to_owned(),
+    });
     found.fields
 }
 
@@ -125,6 +130,7 @@ pub fn identical(a: &LogTick, b: &LogTick) -> bool {
         && a.accel_flags == b.accel_flags
         && same(&a.gyro_parity, &b.gyro_parity)
         && same(&a.accel_parity, &b.accel_parity)
+        && (a.sigma.is_none() && b.sigma.is_none() || SigmaRun::of([a]) == SigmaRun::of([b]))
 }
 
 /// Differences being gathered.

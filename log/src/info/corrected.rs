@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use isotherm_correction::sample::{SensorFlags, TickFlags};
+use isotherm_correction::sigma::Causes;
 use isotherm_protocol::corrected::{CorrectedBatch, Revision};
 use serde::Serialize;
 
@@ -32,6 +33,36 @@ pub struct AppliedInfo {
     pub max_rate_deg_c_per_s: f64,
 }
 
+/// Standard errors of one kind of increment, from all causes together.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct SigmaInfo {
+    /// Outputs that state them about or along all three axes.
+    pub outputs: u64,
+    /// Outputs with an axis whose standard error is unknown.
+    pub unknown: u64,
+    /// Root of the mean variance of each axis over the first ones (rad or m/s).
+    pub rms: [f64; 3],
+}
+
+impl SigmaInfo {
+    #[expect(clippy::cast_precision_loss, reason = "no log has 2⁵³ outputs")]
+    fn take(&mut self, causes: &Causes) {
+        let variance = causes.variance();
+        if variance.iter().any(|variance| variance.is_nan()) {
+            self.unknown += 1;
+            return;
+        }
+        self.outputs += 1;
+        let mean = self.rms.iter_mut().zip(variance);
+        mean.for_each(|(mean, variance)| *mean += (variance - *mean) / self.outputs as f64);
+    }
+
+    /// From mean variances to their roots.
+    fn finish(&mut self) {
+        self.rms = self.rms.map(f64::sqrt);
+    }
+}
+
 /// What the corrected ticks come to.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct CorrectedInfo {
@@ -55,6 +86,12 @@ pub struct CorrectedInfo {
     pub revision_changes: u64,
     /// Temperatures applied, by channel.
     pub temperatures: BTreeMap<String, AppliedInfo>,
+    /// Standard errors of the angle increments (rad), where any are stated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub angle_sigma_rad: Option<SigmaInfo>,
+    /// Of the velocity increments (m/s).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub velocity_sigma_m_per_s: Option<SigmaInfo>,
 }
 
 /// Follows the corrected ticks.
@@ -90,6 +127,10 @@ impl CorrectedSurvey {
             let sensors = tick.gyro_flags.iter().chain(&tick.accel_flags);
             let any = sensors.fold(0, |bits, flags| bits | flags.bits()) & !SensorFlags::VALID.bits();
             count(&mut self.sensor_flags, u16::from(any));
+            if let Some(sigma) = tick.sigma.as_deref() {
+                info.angle_sigma_rad.get_or_insert_default().take(&sigma.angle);
+                info.velocity_sigma_m_per_s.get_or_insert_default().take(&sigma.velocity);
+            }
         }
         for applied in &batch.temperatures {
             let (value, rate) = (applied.temperature_deg_c, applied.rate_deg_c_per_s.abs());
@@ -112,6 +153,8 @@ impl CorrectedSurvey {
         info.flags = named(flags, &self.flags);
         let flags = SensorFlags::all().iter_names().map(|(name, flag)| (name, u16::from(flag.bits())));
         info.sensor_flags = named(flags, &self.sensor_flags);
+        let sigmas = [&mut info.angle_sigma_rad, &mut info.velocity_sigma_m_per_s];
+        sigmas.into_iter().flatten().for_each(SigmaInfo::finish);
         (info.outputs > 0).then_some(info)
     }
 }

@@ -1,8 +1,9 @@
 //! Logs with known gaps, duplicates, late messages and jitter.
 
 use isotherm_correction::sample as core;
+use isotherm_correction::sigma::{Causes, Sigma};
 use isotherm_correction::units::{Span, Timestamp};
-use isotherm_protocol::corrected::Revision;
+use isotherm_protocol::corrected::{Revision, SigmaRun};
 use isotherm_protocol::journal::{JournalEntry, JournalEvent, split};
 
 use super::*;
@@ -64,6 +65,7 @@ fn corrected(sequences: &[u64], missed: u64, counter: u64) -> Message {
         unit: unit().to_string(),
         revision: Revision { counter, digest: [7; 8] },
         temperatures: std::iter::empty().collect(),
+        sigmas: Vec::new(),
         ticks: sequences.iter().map(tick).collect(),
     };
     let frame = codec::encode(&batch).unwrap();
@@ -155,6 +157,29 @@ fn corrected_ticks_show_gaps_flags_and_revisions() {
     assert_eq!((firsts.as_slice(), unit.revision_changes), ([(1, 0), (2, 10)].as_slice(), 1));
     let order = topic(&info, "imu/ZLG-0001/corrected").order.unwrap();
     assert_eq!((order.gaps.count, order.gaps.missing_ticks), (1, 5));
+}
+
+#[test]
+fn standard_errors_are_summed_up_and_the_unknown_counted() {
+    let axes = |noise: [f64; 3], calibration: [f64; 3]| Causes { noise, calibration, ..Causes::default() };
+    let known = Sigma { angle: axes([3.0, 0.0, 1.0], [4.0, 2.0, 0.0]), velocity: Causes::UNKNOWN };
+    let quiet = Sigma { angle: Causes::default(), velocity: Causes::UNKNOWN };
+    let mut message = corrected(&[0, 1, 2], 0, 1);
+    let mut batch: CorrectedBatch = codec::decode(&message.frame).unwrap();
+    batch.ticks[0].sigma = Some(Box::new(known));
+    batch.ticks[1].sigma = Some(Box::new(quiet));
+    batch.ticks[2].sigma = Some(Box::new(Sigma::UNKNOWN));
+    batch.sigmas = SigmaRun::of(&batch.ticks);
+    message.frame = codec::encode(&batch).unwrap();
+    let info = info_of(&[message, corrected(&[3], 0, 1)]);
+    let unit = info.units["ZLG-0001"].corrected.as_ref().unwrap();
+    let angle = unit.angle_sigma_rad.unwrap();
+    assert_eq!((angle.outputs, angle.unknown), (2, 1));
+    for (rms, expected) in angle.rms.into_iter().zip([12.5_f64.sqrt(), 2.0_f64.sqrt(), 0.5_f64.sqrt()]) {
+        assert!((rms - expected).abs() < 1e-12, "{:?}", angle.rms);
+    }
+    let velocity = unit.velocity_sigma_m_per_s.unwrap();
+    assert_eq!((velocity.outputs, velocity.unknown), (0, 3));
 }
 
 #[test]

@@ -79,6 +79,7 @@ mod tests {
                 unit: "A-1".to_owned(),
                 revision: Revision { counter: 1, digest: [7; 8] },
                 temperatures: std::iter::empty().collect(),
+                sigmas: Vec::new(),
                 ticks: (first..first + 100).map(tick).collect(),
             };
             published.push(codec::encode(&batch).unwrap());

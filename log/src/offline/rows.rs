@@ -14,6 +14,7 @@
 //! | `flags`, `gyro_flags`, `accel_flags` | bits, as on the wire |
 //! | `gyro_parity_rad_per_s`, `accel_parity_m_per_s2` | N − 3 residuals |
 //! | `revision` | counter of the calibration; 0 while there is none |
+//! | `angle_sigma_rad`, `velocity_sigma_m_per_s` | standard errors by cause (noise, restoration, calibration, clamping) and axis: 12 numbers, NaN where unknown, or empty |
 //!
 //! The wire format is one frame of `docs/wire.md` after the other, each behind its length: four bytes, little-endian.
 
@@ -21,13 +22,22 @@ use std::fmt::Debug;
 use std::io::{self, Write};
 use std::str::FromStr;
 
+use arrayvec::ArrayVec;
 use isotherm_correction::sample::{CorrectedTick, LasingMode, SensorFlags, TickFlags};
+use isotherm_correction::sigma::{Causes, Sigma};
 use isotherm_correction::units::{Span, Timestamp};
 
 /// Names of the columns.
 pub const HEADER: &str = "sequence,end_time_ns,duration_ns,ticks,missed,delta_angle_x_rad,delta_angle_y_rad,\
     delta_angle_z_rad,delta_velocity_x_m_per_s,delta_velocity_y_m_per_s,delta_velocity_z_m_per_s,mode,flags,\
-    gyro_flags,accel_flags,gyro_parity_rad_per_s,accel_parity_m_per_s2,revision";
+    gyro_flags,accel_flags,gyro_parity_rad_per_s,accel_parity_m_per_s2,revision,angle_sigma_rad,\
+    velocity_sigma_m_per_s";
+/// The columns that every header begins with: files of before there were standard errors have no more.
+pub const FIRST_COLUMNS: &str =
+    match HEADER.split_at_checked(HEADER.len() - ",angle_sigma_rad,velocity_sigma_m_per_s".len()) {
+        Some((first, _)) => first,
+        None => HEADER,
+    };
 
 /// Writes the header line of the CSV.
 ///
@@ -57,7 +67,13 @@ pub fn write_tick(writer: &mut dyn Write, tick: &CorrectedTick) -> io::Result<()
     write_cell(writer, tick.accel_flags.iter().map(SensorFlags::bits))?;
     write_cell(writer, tick.gyro_parity.iter())?;
     write_cell(writer, tick.accel_parity.iter())?;
-    writeln!(writer, ",{}", tick.revision)
+    write!(writer, ",{}", tick.revision)?;
+    let sigma = tick.sigma.as_deref();
+    for causes in [sigma.map(|sigma| sigma.angle), sigma.map(|sigma| sigma.velocity)] {
+        let all = causes.map(|causes| causes.all());
+        write_cell(writer, all.iter().flatten().flatten())?;
+    }
+    writeln!(writer)
 }
 
 /// Writes a cell of several values.
@@ -111,6 +127,7 @@ pub fn read_tick(row: &str) -> Result<CorrectedTick, String> {
     cells.values(|residual| tick.gyro_parity.try_push(residual).is_ok())?;
     cells.values(|residual| tick.accel_parity.try_push(residual).is_ok())?;
     tick.revision = cells.value()?;
+    tick.sigma = cells.sigma()?;
     match cells.cells.next() {
         Some(extra) => Err(format!("there is {extra:?} behind the last column")),
         None => Ok(tick),
@@ -135,6 +152,28 @@ impl<'r> Cells<'r> {
         cell.parse().map_err(|_| format!("column {column} has {cell:?}, which cannot be read"))
     }
 
+    /// Standard errors; none in rows without, or of a file written before there were any.
+    fn sigma(&mut self) -> Result<Option<Box<Sigma>>, String> {
+        if self.cells.clone().next().is_none() {
+            return Ok(None);
+        }
+        let (angle, velocity) = (self.causes()?, self.causes()?);
+        Ok(angle.zip(velocity).map(|(angle, velocity)| Box::new(Sigma { angle, velocity })))
+    }
+
+    fn causes(&mut self) -> Result<Option<Causes>, String> {
+        let mut all = ArrayVec::<f64, 12>::new();
+        let column = self.names.clone().next().unwrap_or_default();
+        self.values(|sigma| all.try_push(sigma).is_ok())?;
+        match all.as_chunks() {
+            ([], []) => Ok(None),
+            (&[noise, restoration, calibration, clamping], []) => {
+                Ok(Some(Causes { noise, restoration, calibration, clamping }))
+            }
+            _ => Err(format!("column {column} has {} numbers, must be 12 or none", all.len())),
+        }
+    }
+
     fn values<T: FromStr>(&mut self, mut push: impl FnMut(T) -> bool) -> Result<(), String> {
         let (column, cell) = self.cell()?;
         for text in cell.split(' ').filter(|text| !text.is_empty()) {
@@ -154,6 +193,13 @@ mod tests {
 
     use super::*;
 
+    const CAUSES: Causes = Causes {
+        noise: [1e-9, 0.1 + 0.2, 5e-324],
+        restoration: [0.0; 3],
+        calibration: [1.0, 2.0, 3.0],
+        clamping: [0.5; 3],
+    };
+
     #[test]
     fn a_row_reads_back_to_the_bit() {
         let tick = CorrectedTick {
@@ -171,6 +217,7 @@ mod tests {
             gyro_parity: [1e-9, -2.5].into_iter().collect(),
             accel_parity: [].into_iter().collect(),
             revision: 3,
+            sigma: Some(Box::new(Sigma { angle: CAUSES, velocity: Causes::default() })),
         };
         let mut row = Vec::new();
         write_tick(&mut row, &tick).unwrap();
@@ -183,6 +230,7 @@ mod tests {
             ("1,2,3", "column ticks is missing"),
             (&row.replace("-1,", "2,"), "must be 1, -1 or empty"),
             (&format!("{},9", row.trim_end()), "behind the last column"),
+            (&row.replace("0.5 0.5 0.5", "0.5"), "column angle_sigma_rad has 10 numbers, must be 12 or none"),
         ] {
             let error = read_tick(bad.trim_end()).unwrap_err();
             assert!(error.contains(words), "{error}");

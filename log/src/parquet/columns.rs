@@ -128,6 +128,12 @@ pub(super) fn corrected_columns(shape: CorrectedShape) -> Vec<Column> {
     let parity = |n| sparse(format!("accel_parity_{n}_m_per_s2"), Kind::Double);
     columns.extend((0..shape.accel_parity).map(parity));
     columns.extend([full("revision", U64), full("calibration_digest", Kind::Text)]);
+    for (increment, unit) in [("angle", "rad"), ("velocity", "m_per_s")].into_iter().filter(|_| shape.sigma) {
+        for cause in ["noise", "restoration", "calibration", "clamping"] {
+            let column = |axis| sparse(format!("{increment}_{cause}_sigma_{axis}_{unit}"), Kind::Double);
+            columns.extend(AXES.map(column));
+        }
+    }
     columns
 }
 

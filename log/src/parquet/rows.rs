@@ -123,7 +123,8 @@ pub(super) fn write_corrected(
     let digest = hex(&batch.revision.digest);
     for tick in &batch.ticks {
         let cells = corrected_cells(received_ns, tick, shape);
-        table.push(cells.chain([batch.revision.counter.into(), Cell::Text(&digest)]))?;
+        let cells = cells.chain([batch.revision.counter.into(), Cell::Text(&digest)]);
+        table.push(cells.chain(sigma(tick, shape)))?;
     }
     Ok(())
 }
@@ -153,6 +154,13 @@ fn corrected_cells<'a>(
         .chain(flags(&tick.accel_flags, shape.accels))
         .chain(parity(&tick.gyro_parity, shape.gyro_parity))
         .chain(parity(&tick.accel_parity, shape.accel_parity))
+}
+
+/// Standard errors: all of the angle, then of the velocity.
+fn sigma<'a>(tick: &CorrectedTick, shape: CorrectedShape) -> impl Iterator<Item = Cell<'a>> + use<'a> {
+    let causes = tick.sigma.iter().flat_map(|sigma| [sigma.angle, sigma.velocity]);
+    let cells: Vec<_> = causes.flat_map(|causes| causes.all()).flatten().map(Cell::from).collect();
+    padded(cells.into_iter(), if shape.sigma { 24 } else { 0 })
 }
 
 /// A row per channel.

@@ -105,12 +105,14 @@ fn streams_have_columns_for_every_shape_of_tick() {
         gyro_parity: [0.25].into_iter().collect(),
         accel_parity: [].into_iter().collect(),
         revision: 4,
+        sigma: None,
     };
     let revision = Revision { counter: 4, digest: [0xab; 8] };
     let corrected = CorrectedBatch {
         unit: "A-1".to_owned(),
         revision,
         temperatures: [].into_iter().collect(),
+        sigmas: Vec::new(),
         ticks: vec![tick],
     };
     let frame = |topic: &str, frame| Message { topic: Topic::of(topic), received_ns: 1, frame };

@@ -38,6 +38,7 @@ fn recording(
             unit: unit.to_string(),
             revision: Revision { counter: 1 + u64::from(first >= change), digest: [0xab; 8] },
             temperatures: std::iter::empty().collect(),
+            sigmas: Vec::new(),
             ticks: (first..(first + 10).min(ticks.end)).map(tick).collect(),
         };
         let frame = codec::encode(&batch).unwrap();
@@ -134,6 +135,7 @@ fn ten_million_ticks_make_a_bounded_page() {
             unit: unit.to_string(),
             revision: Revision::default(),
             temperatures: std::iter::empty().collect(),
+            sigmas: Vec::new(),
             ticks: (first..(first + 256).min(ticks)).map(tick).collect(),
         };
         codec::encode_into(&batch, &mut frame).unwrap();

@@ -2,17 +2,17 @@
 
 use std::collections::{HashMap, VecDeque};
 use std::fs::File;
-use std::io::{self, Read};
+use std::io::{self, Read, Seek};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use mcap::McapError;
-use mcap::records::Record;
+use mcap::records::{Record, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use serde::Serialize;
 
-use super::record::{LONGEST_RECORD, parse};
+use super::record::{LONGEST_RECORD, chunk_records, parse};
 use super::skip::{Front, pass_over};
 use super::{Attachment, CHANNELS, MESSAGE_ENCODING, Metadata, view};
 use crate::error::Error;
@@ -37,6 +37,9 @@ impl RecordingReport {
     }
 }
 
+/// Bytes that are read at once.
+const BLOCK: usize = 1 << 16;
+
 /// Reads the messages of one or several recordings, one after the other, as they were written.
 ///
 /// A file that ends in the middle, as after a kill, is read to its last whole chunk; the report says so.
@@ -57,7 +60,7 @@ struct Opened {
     path: PathBuf,
     file: File,
     reader: LinearReader,
-    /// From the part that was passed over.
+    /// From the part that was passed over, then from the last chunk.
     found: VecDeque<Found>,
     /// What each channel carries.
     topics: HashMap<u16, Carries>,
@@ -187,7 +190,7 @@ impl Opened {
         }
         let options = LinearReaderOptions::default()
             .with_skip_start_magic(true)
-            .with_prevalidate_chunk_crcs(true)
+            .with_emit_chunks(true)
             .with_record_length_limit(LONGEST_RECORD);
         let reader = LinearReader::new_with_options(options);
         let mut front = Front { at: length as u64, ..Front::default() };
@@ -216,9 +219,19 @@ impl Opened {
             };
             match event.map_err(stop)? {
                 LinearReadEvent::ReadRequest(need) => {
-                    let count = self.file.read(self.reader.insert(need.max(1 << 16))).map_err(Stop::Io)?;
+                    let room = self.room_for(need).map_err(Stop::Io)?;
+                    let count = self.file.read(self.reader.insert(room)).map_err(Stop::Io)?;
                     read.fetch_add(count as u64, Ordering::Relaxed);
                     self.reader.notify_read(count);
+                }
+                // All of its records or none: the library's own walk through a chunk goes on behind its end.
+                LinearReadEvent::Record { opcode: op::CHUNK, data } => {
+                    for record in chunk_records(data).map_err(stop)? {
+                        self.found.extend(take(record, &mut self.topics, &mut self.ended));
+                    }
+                    if let Some(found) = self.found.pop_front() {
+                        return Ok(Some(found));
+                    }
                 }
                 LinearReadEvent::Record { opcode, data } => {
                     let record = parse(opcode, data).map_err(stop)?;
@@ -228,6 +241,17 @@ impl Opened {
                 }
             }
         }
+    }
+}
+
+impl Opened {
+    /// Room for what the library wants to read next, no more than the file has: a length in it may be damaged.
+    fn room_for(&mut self, need: usize) -> io::Result<usize> {
+        if need <= BLOCK {
+            return Ok(BLOCK);
+        }
+        let left = self.file.metadata()?.len().saturating_sub(self.file.stream_position()?);
+        Ok(need.min(usize::try_from(left).unwrap_or(usize::MAX)).max(BLOCK))
     }
 }
 

@@ -27,6 +27,9 @@ pub(super) fn parse(opcode: u8, data: &[u8]) -> Result<Record<'_>, McapError> {
 /// # Errors
 /// Those of the library; where a length or its CRC is wrong.
 pub(crate) fn chunk_records(data: &[u8]) -> Result<Vec<Record<'static>>, McapError> {
+    if chunk_length(data) != Some(data.len()) {
+        return Err(McapError::UnexpectedEoc);
+    }
     // Not the library's own reader of chunks: it takes every length in a damaged one for true, and memory for it.
     let options = LinearReaderOptions::default()
         .with_skip_start_magic(true)
@@ -47,6 +50,14 @@ pub(crate) fn chunk_records(data: &[u8]) -> Result<Vec<Record<'static>>, McapErr
         }
     }
     Ok(records)
+}
+
+/// How long a chunk says that it is: behind its end the library would go on.
+fn chunk_length(data: &[u8]) -> Option<usize> {
+    let compression = u32::from_le_bytes(*data.get(28..)?.first_chunk()?);
+    let records = usize::try_from(compression).ok()?.checked_add(32)?;
+    let length = u64::from_le_bytes(*data.get(records..)?.first_chunk()?);
+    records.checked_add(8)?.checked_add(usize::try_from(length).ok()?)
 }
 
 /// How long an attachment says that it is.
@@ -106,5 +117,14 @@ mod tests {
             assert!(chunk_records(&chunk(&records)).is_err(), "{length}");
         }
         assert!(chunk_records(&chunk(&[])).is_ok_and(|records| records.is_empty()));
+        // A record that goes on behind the chunk's own end.
+        let mut record = vec![op::HEADER];
+        record.extend(8_u64.to_le_bytes());
+        record.extend([0; 8]);
+        let whole = chunk(&record);
+        assert!(chunk_records(&whole).is_ok_and(|records| records.len() == 1));
+        let mut short = whole;
+        short[32] -= 4;
+        assert!(chunk_records(&short).is_err());
     }
 }

@@ -110,6 +110,34 @@ fn what_was_written_is_read_back() {
 }
 
 #[test]
+fn a_record_longer_than_its_chunk_is_not_read_on_behind_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mcap");
+    let mut writer =
+        RecordingWriter::create(&path, RecordingOptions { compress: false, ..Default::default() }).unwrap();
+    messages()[..3].iter().for_each(|message| writer.write(message).unwrap());
+    writer.finish().unwrap();
+    let mut bytes = std::fs::read(&path).unwrap();
+    let length = |bytes: &[u8], at: usize| {
+        usize::try_from(u64::from_le_bytes(bytes[at + 1..at + 9].try_into().unwrap())).unwrap()
+    };
+    let mut chunk = MAGIC.len();
+    while bytes[chunk] != mcap::records::op::CHUNK {
+        chunk += 9 + length(&bytes, chunk);
+    }
+    // Without a checksum nobody notices that its last record has grown.
+    bytes[chunk + 9 + 24..chunk + 9 + 28].fill(0);
+    let (mut last, end) = (chunk + 9 + 40, chunk + 9 + length(&bytes, chunk));
+    while last + 9 + length(&bytes, last) < end {
+        last += 9 + length(&bytes, last);
+    }
+    bytes[last + 1] += 20;
+    std::fs::write(&path, &bytes).unwrap();
+    let (back, reader) = read(&[&path]);
+    assert!(back.is_empty() && reader.report().lost_data(), "{back:?} {:?}", reader.report());
+}
+
+#[test]
 fn a_file_cut_anywhere_is_read_to_its_last_whole_chunk() {
     let folder = tempfile::tempdir().unwrap();
     let (whole, cut, other) =

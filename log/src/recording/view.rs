@@ -5,7 +5,8 @@
 
 use std::collections::BTreeMap;
 
-use isotherm_correction::sample::{LasingMode, TickFlags};
+use isotherm_correction::sample::{CorrectedTick, LasingMode, TickFlags};
+use isotherm_correction::sigma::{Causes, Sigma};
 use isotherm_correction::units::{AngularRate, Timestamp};
 use isotherm_protocol::codec;
 use isotherm_protocol::corrected::CorrectedBatch;
@@ -100,6 +101,8 @@ fn corrected() -> Value {
         "missed": integer("Raw gyro ticks missing before this one"),
         "angular_rate_deg_per_h": axes("Mean angular rate over the tick (°/h); absent where it is not known"),
         "specific_force_m_per_s2": axes("Mean specific force over the tick (m/s²); absent where it is not known"),
+        "angular_rate_sigma_deg_per_h": axes("Standard error of the former; absent where it is not asked for or not known"),
+        "specific_force_sigma_m_per_s2": axes("Likewise"),
         "mode": integer("Lasing mode: 1, -1; 0: none"),
         "flags": integer("Flags of the tick, as in docs/wire.md"),
         "revision": integer("Revision of the calibration; 0: uncalibrated"),
@@ -143,6 +146,10 @@ struct Corrected {
     angular_rate_deg_per_h: Option<Axes>,
     #[serde(skip_serializing_if = "Option::is_none")]
     specific_force_m_per_s2: Option<Axes>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    angular_rate_sigma_deg_per_h: Option<Axes>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    specific_force_sigma_m_per_s2: Option<Axes>,
     mode: i8,
     flags: u16,
     revision: u64,
@@ -174,6 +181,12 @@ struct Temperature<'a> {
     raw: BTreeMap<&'a str, f64>,
 }
 
+/// Standard errors of the means over a tick from all causes together (per second).
+fn sigma(tick: &CorrectedTick, of: impl Fn(&Sigma) -> Causes) -> Option<[f64; 3]> {
+    let variance = of(tick.sigma.as_deref()?).variance();
+    Some(variance.map(|variance| variance.sqrt() / tick.duration.as_s()))
+}
+
 /// What is shown of a message; nothing of one that cannot be read.
 pub(super) fn points(message: &Message) -> Vec<Point> {
     let frame = &message.frame;
@@ -191,6 +204,10 @@ pub(super) fn points(message: &Message) -> Vec<Point> {
                         missed: tick.missed,
                         angular_rate_deg_per_h: rate.filter(|_| known).map(deg_per_h).and_then(Axes::of),
                         specific_force_m_per_s2: force.filter(|_| known).and_then(Axes::of),
+                        angular_rate_sigma_deg_per_h: sigma(tick, |sigma| sigma.angle)
+                            .map(deg_per_h)
+                            .and_then(Axes::of),
+                        specific_force_sigma_m_per_s2: sigma(tick, |sigma| sigma.velocity).and_then(Axes::of),
                         mode: tick.mode.map_or(0, |mode| if mode == LasingMode::Plus { 1 } else { -1 }),
                         flags: tick.flags.bits(),
                         revision: tick.revision,

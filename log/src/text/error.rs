@@ -2,7 +2,11 @@
 
 use std::io;
 
+use isotherm_document::escape::clipped;
 use thiserror::Error;
+
+/// What of a column's name is shown, in characters.
+const LONGEST_NAME: usize = 80;
 
 /// What is wrong with a log; boxed, because it is rare and large.
 #[derive(Debug, Error)]
@@ -171,7 +175,8 @@ impl LogFault {
     /// The cell that is to blame and its value.
     fn subject(&self) -> String {
         let Some((number, name)) = &self.cell else { return String::new() };
-        let name = name.as_ref().map(|name| format!(" {name:?}")).unwrap_or_default();
+        let name = name.as_ref().map(|name| format!(" \"{}\"", clipped(name, LONGEST_NAME)));
+        let name = name.unwrap_or_default();
         let value = match self.reason {
             Reason::MissingCell { .. } | Reason::Empty => String::new(),
             _ => format!("{:?} ", self.value),

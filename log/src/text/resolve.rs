@@ -1,12 +1,16 @@
 //! A file's mapping with every column as an index.
 
 use isotherm_correction::sample::{ChannelName, OutputKind, Sensors};
+use isotherm_document::escape::clipped;
 
 use super::error::Reason;
 use crate::mapping::{
     Column, Conversion, FileMapping, ModeMapping, StatusMapping, SwitchMapping, TickMapping, TimeColumn,
     TimeUnit,
 };
+
+/// What of a header is shown, in characters.
+const LONGEST_HEADER: usize = 300;
 
 /// A column of times or durations.
 #[derive(Debug, Clone, Copy)]
@@ -225,6 +229,9 @@ fn find(column: &Column, header: &[String]) -> Result<usize, Reason> {
     match (found.next(), found.next()) {
         (Some(index), None) => Ok(index),
         (Some(_), Some(_)) => Err(Reason::AmbiguousColumn { name: name.clone() }),
-        (None, _) => Err(Reason::NoSuchColumn { name: name.clone(), header: header.join(", ") }),
+        (None, _) => {
+            let header = clipped(&header.join(", "), LONGEST_HEADER);
+            Err(Reason::NoSuchColumn { name: name.clone(), header })
+        }
     }
 }

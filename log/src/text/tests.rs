@@ -220,6 +220,8 @@ fn files_that_are_no_such_log_are_refused() {
     )
     .unwrap();
     assert!(error(&named, b"a,b\n1,2\n").to_string().contains("no column \"x\", it has a, b"));
+    let words = error(&named, format!("{}\n1,2\n", "a\u{1b},".repeat(2000)).as_bytes()).to_string();
+    assert!(words.len() < 800 && !words.contains('\u{1b}'), "{words}");
     assert!(error(&named, b"x,x\n1,2\n").to_string().contains("more than once"));
     assert!(error(&named, b"").to_string().contains("ends before its header"));
     assert!(error(&named, b"\xff\xfex\0\n\0").to_string().contains("UTF-16"));

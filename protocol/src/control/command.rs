@@ -3,7 +3,12 @@
 use isotherm_correction::operation::State;
 use serde::{Deserialize, Serialize};
 
+use super::MAX_BY;
 use super::swap::SwapReply;
+use crate::escape::clipped;
+
+/// What of an error of JSON is shown, in characters.
+const LONGEST_SHOWN: usize = 300;
 
 /// A command and who gives it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -14,6 +19,31 @@ pub struct CommandOrder {
     /// What is to be done.
     #[serde(flatten)]
     pub order: Order,
+}
+
+impl CommandOrder {
+    /// Reads what a query carries.
+    ///
+    /// # Errors
+    /// What is wrong with it, in words.
+    pub fn read(json: &[u8]) -> Result<Self, String> {
+        // It repeats what it does not understand.
+        let unreadable = |error: serde_json::Error| {
+            format!("the command cannot be read: {}", clipped(&error.to_string(), LONGEST_SHOWN))
+        };
+        let value: serde_json::Value = serde_json::from_slice(json).map_err(unreadable)?;
+        // A number would be taken for the place of a command in the list of all.
+        if !value.get("command").is_some_and(serde_json::Value::is_string) {
+            return Err("the command cannot be read: \"command\" must be the name of a command".to_owned());
+        }
+        let order: Self = serde_json::from_value(value).map_err(unreadable)?;
+        if order.by.chars().count() > MAX_BY || order.by.chars().any(char::is_control) {
+            return Err(format!(
+                "by must have at most {MAX_BY} characters, none of them a control character"
+            ));
+        }
+        Ok(order)
+    }
 }
 
 /// What a unit can be told to do (models §7).
@@ -134,11 +164,17 @@ mod tests {
             ),
         ];
         for (json, order) in cases {
-            let read: CommandOrder = serde_json::from_str(json).unwrap_or_else(|e| panic!("{json}: {e}"));
+            let read = CommandOrder::read(json.as_bytes()).unwrap_or_else(|e| panic!("{json}: {e}"));
             assert_eq!(read.order, order);
             let again = serde_json::from_str(&serde_json::to_string(&read).unwrap_or_default());
             assert_eq!(again.ok(), Some(read));
         }
-        assert!(serde_json::from_str::<CommandOrder>(r#"{"command":"explode"}"#).is_err());
+        assert!(CommandOrder::read(br#"{"command":"explode"}"#).is_err());
+        assert!(
+            CommandOrder::read(br#"{"command":3}"#).is_err_and(|words| words.contains("must be the name"))
+        );
+        assert!(CommandOrder::read(br#"{"command":"run","by":"a\nb"}"#).is_err());
+        let unknown = format!(r#"{{"command":"{}"}}"#, "x".repeat(4000));
+        assert!(CommandOrder::read(unknown.as_bytes()).is_err_and(|words| words.len() < 400));
     }
 }

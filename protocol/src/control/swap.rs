@@ -7,7 +7,10 @@ use thiserror::Error;
 
 use super::MAX_BY;
 use crate::document::Problem;
+use crate::escape::clipped;
 
+/// What of a name or a value is repeated in an error, in characters.
+const LONGEST_SHOWN: usize = 80;
 /// Longest slew of a swap (s).
 const MAX_SLEW_S: f64 = 3600.0;
 
@@ -43,7 +46,7 @@ pub struct SwapOptions {
 
 /// A parameter that is not understood.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[error("parameter {name} is {value:?}, must be {must_be}")]
+#[error("parameter {} is \"{}\", must be {must_be}", clipped(.name, LONGEST_SHOWN), clipped(.value, LONGEST_SHOWN))]
 pub struct OptionsError {
     /// Its name.
     pub name: String,
@@ -275,6 +278,12 @@ mod tests {
         ] {
             assert_eq!(SwapOptions::parse(parameters).unwrap_err().name, name, "{parameters}");
         }
-        assert!(SwapOptions::parse(&format!("by={}", "x".repeat(65))).is_err());
+        let error = SwapOptions::parse(&format!("by={}\n", "x".repeat(2000))).unwrap_err().to_string();
+        assert!(error.len() < 200 && !error.contains('\n'), "{error}");
+        let name = SwapOptions::parse(&"a\nb".repeat(2000)).unwrap_err().to_string();
+        assert!(
+            name.starts_with("parameter a\\nba\\n") && name.len() < 300 && !name.contains('\n'),
+            "{name}"
+        );
     }
 }

@@ -1,5 +1,7 @@
 //! Document → the core's parts: names become indices, the file's units become SI.
 
+mod sigma;
+
 use isotherm_correction::calibration::{
     AccelParts, CalibrationParts, GyroParts, Source, TermParts, TrendParts,
 };
@@ -121,6 +123,7 @@ impl Document {
             trend: sensor.trend.as_ref().map(trend),
             servo: sensor.servo.as_ref().map(servo),
             drift: sensor.drift.as_ref().map(drift),
+            sigma: sigma::of_gyro(sensor),
         }
     }
 
@@ -138,6 +141,7 @@ impl Document {
             position_m: sensor.position_m.unwrap_or_default(),
             board_ratio: sensor.board_ratio_error.as_ref().map(|curve| curve.to_parts(1.0)),
             input_limit: input_limit.unwrap_or(NO_LIMIT),
+            sigma: sigma::of_accel(sensor),
         }
     }
 }

@@ -70,6 +70,7 @@ fn key(document: &Document, defect: &Defect) -> &'static str {
         (Section::GyroOrientation | Section::AccelOrientation, "plays") => "thermal.hysteresis",
         (Section::GyroOrientation | Section::AccelOrientation, "row") => "rows",
         (Section::GyroOrientation | Section::AccelOrientation, "weight") => "weights",
+        (Section::Gyro(_) | Section::Accel(_), "sigma.bias.correlation") => "sigma.bias.correlation_ratio",
         (Section::Gyro(_), "trend.coefficients") => "trend.coefficients_deg_per_h",
         (Section::Gyro(_), "trend.interval_s") => "trend.interval_h",
         (Section::Gyro(_), "sigma_rad_per_s") => "drift.sigma_deg_per_h",

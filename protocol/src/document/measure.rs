@@ -224,7 +224,12 @@ impl Argument {
 
 /// Spellings at the end of a key that state its unit, the longest first, with the symbol for readers.
 #[cfg(test)]
-const KEY_UNITS: [(&str, &str); 26] = [
+const KEY_UNITS: [(&str, &str); 34] = [
+    ("_m_per_s2_per_sqrt_h", "(m/s²)/√h"),
+    ("_deg_per_h_per_sqrt_h", "(°/h)/√h"),
+    ("_m_per_s_per_sqrt_h", "(m/s)/√h"),
+    ("_deg_per_h_per_deg_c", "(°/h)/°C"),
+    ("_m_per_s2_per_deg_c", "(m/s²)/°C"),
     ("_arcsec_per_deg_c", "″/°C"),
     ("_arcsec_per_count", "″/count"),
     ("_counts_per_tick", "counts/tick"),
@@ -237,6 +242,9 @@ const KEY_UNITS: [(&str, &str); 26] = [
     ("_deg_per_h", "°/h"),
     ("_deg_per_s", "°/s"),
     ("_m_per_s2", "m/s²"),
+    ("_m_per_s", "m/s"),
+    ("_arcsec", "″"),
+    ("_ppm", "10⁻⁶"),
     ("_readings", "readings"),
     ("_readings_before", "readings"),
     ("_readings_after", "readings"),

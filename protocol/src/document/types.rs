@@ -9,6 +9,7 @@ mod drift;
 mod gyro;
 mod origin;
 mod self_test;
+mod sigma;
 
 pub use accel::{
     Accel, AccelHysteresis, AccelLag, AccelOrientation, AccelOutput, AccelParity, AccelRegressor, AccelSensor,
@@ -20,6 +21,7 @@ pub use gyro::{
 };
 pub use origin::{Created, Log, Measure, Origin, Residual, Sample};
 pub use self_test::{SelfTest, SelfTestCounter, SelfTestVoltage};
+pub use sigma::{AccelBiasSigma, AccelSigma, GyroBiasSigma, GyroSigma};
 
 use isotherm_correction::reversal::{ReversalParts, Transition};
 use isotherm_correction::units::Span;

@@ -9,10 +9,13 @@ use serde::Deserialize;
 use thiserror::Error;
 
 use super::AuditEntry;
+use crate::escape::clipped;
 
 /// Longest line, its line feed included.
 pub const MAX_LINE_BYTES: usize = 1 << 17;
 
+/// What of an error of JSON is shown, in characters: it repeats what it does not understand.
+const LONGEST_WORDS: usize = 300;
 /// What stands before the checksum's digits.
 const BEFORE: &str = ",\"crc\":\"";
 /// What stands behind them.
@@ -56,19 +59,20 @@ struct Head {
 }
 
 impl AuditEntry {
-    /// The entry as a line, line feed included.
+    /// The entry as a line without a digest, line feed included; [`Chain::line`](super::chain::Chain::line) writes one with it.
     ///
     /// # Errors
     /// [`LineError::Length`] for an entry that was not [`bounded`](Self::bounded) and is too long.
     pub fn to_line(&self) -> Result<String, LineError> {
-        let mut line = serde_json::to_string(self)
-            .map_err(|error| LineError::Entry { words: error.to_string(), number: Some(self.number) })?;
-        let crc = crc32fast::hash(line.as_bytes());
-        // The closing brace comes back behind the checksum.
-        line.pop();
-        // Writing to a string cannot fail.
-        let _ = writeln!(line, "{BEFORE}{crc:08x}{BEHIND}");
-        if line.len() > MAX_LINE_BYTES { Err(LineError::Length { bytes: line.len() }) } else { Ok(line) }
+        sealed(self.to_json()?)
+    }
+
+    pub(super) fn to_json(&self) -> Result<String, LineError> {
+        let unwritable = |error: serde_json::Error| LineError::Entry {
+            words: error.to_string(),
+            number: Some(self.number),
+        };
+        serde_json::to_string(self).map_err(unwritable)
     }
 
     /// Reads a line, with or without its line feed.
@@ -79,7 +83,7 @@ impl AuditEntry {
         let json = checked(line)?;
         serde_json::from_str(&json).map_err(|error| {
             let number = serde_json::from_str::<Head>(&json).ok().map(|head| head.number);
-            LineError::Entry { words: error.to_string(), number }
+            LineError::Entry { words: clipped(&error.to_string(), LONGEST_WORDS), number }
         })
     }
 
@@ -90,8 +94,19 @@ impl AuditEntry {
     }
 }
 
+/// JSON as a line, with its checksum.
+pub(super) fn sealed(json: String) -> Result<String, LineError> {
+    let crc = crc32fast::hash(json.as_bytes());
+    let mut line = json;
+    // The closing brace comes back behind the checksum.
+    line.pop();
+    // Writing to a string cannot fail.
+    let _ = writeln!(line, "{BEFORE}{crc:08x}{BEHIND}");
+    if line.len() > MAX_LINE_BYTES { Err(LineError::Length { bytes: line.len() }) } else { Ok(line) }
+}
+
 /// The line without its checksum, if that fits.
-fn checked(line: &[u8]) -> Result<String, LineError> {
+pub(super) fn checked(line: &[u8]) -> Result<String, LineError> {
     if line.len() > MAX_LINE_BYTES {
         return Err(LineError::Length { bytes: line.len() });
     }

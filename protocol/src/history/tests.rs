@@ -287,3 +287,24 @@ fn what_an_operator_wants_follows_from_the_commands_that_were_carried_out() {
     intent.note(&record("", Some(Order::EndRest), true));
     assert_eq!(intent.orders().collect::<Vec<_>>(), [Order::Standby]);
 }
+
+#[test]
+fn what_is_not_understood_is_repeated_in_few_words_and_numbers_come_back_to_the_bit() {
+    let record = CommandRecord {
+        command: "rest".to_owned(),
+        accepted: true,
+        reason: None,
+        state_before: "run".to_owned(),
+        state_after: "run".to_owned(),
+        last_sequence: None,
+        order: resting().rest.map(|place| Order::Rest(PlaceOrder { heading_deg: -1.1e29, ..place })),
+    };
+    let rest = entry(AuditEvent::Command(record));
+    let line = rest.to_line().unwrap();
+    assert_eq!(AuditEntry::from_line(line.as_bytes()), Ok(rest), "{line}");
+    let json = format!(r#"{{"number":12,"time":"2030-01-01T00:00:00.000Z","event":"{}"}}"#, "x".repeat(9000));
+    let crc = crc32fast::hash(json.as_bytes());
+    let line = format!("{},\"crc\":\"{crc:08x}\"}}", json.strip_suffix('}').unwrap());
+    let words = AuditEntry::from_line(line.as_bytes()).unwrap_err().to_string();
+    assert!(words.len() < 500, "{words}");
+}

@@ -1,6 +1,5 @@
 //! Entries in words, and texts cut to what an entry may hold.
 
-use std::borrow::Cow;
 use std::fmt;
 
 use super::{
@@ -8,7 +7,7 @@ use super::{
 };
 use crate::control::{MAX_BY, Schedule};
 use crate::digest::Digest;
-use crate::escape::escaped;
+use crate::escape::clipped;
 
 /// Longest line of what has changed, in characters.
 const MAX_CHANGE: usize = 160;
@@ -81,14 +80,9 @@ impl AuditEvent {
     }
 }
 
-/// Cuts a text to a number of characters, the last an ellipsis, and shows control characters by their codes.
+/// Cuts a text to a number of characters, and shows control characters by their codes.
 fn clip(text: &mut String, longest: usize) {
-    if let Cow::Owned(shown) = escaped(text) {
-        *text = shown;
-    }
-    if text.chars().count() > longest {
-        *text = text.chars().take(longest.saturating_sub(1)).chain(['…']).collect();
-    }
+    *text = clipped(text, longest);
 }
 
 /// Cuts the path of a source.

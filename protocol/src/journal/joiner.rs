@@ -6,6 +6,8 @@ use thiserror::Error;
 
 use super::{JournalEntry, JournalPart};
 use crate::codec::{CodecError, Message};
+use crate::escape::clipped;
+use crate::key::MAX_UNIT_ID;
 
 /// Most entries of which some parts are there and others are not.
 pub const MAX_OPEN_ENTRIES: usize = 256;
@@ -17,7 +19,7 @@ pub const MAX_OPEN_BYTES: usize = 64 << 20;
 #[non_exhaustive]
 pub enum JoinError {
     /// The part is none by itself.
-    #[error("journal of unit {unit}, entry {number}: {error}")]
+    #[error("journal of unit {}, entry {number}: {error}", shown(.unit))]
     Part {
         /// Serial of the unit.
         unit: String,
@@ -28,7 +30,8 @@ pub enum JoinError {
     },
     /// The part before it did not come.
     #[error(
-        "journal of unit {unit}, entry {number}: part {got} of {parts} has come, part {need} was to come: it is lost"
+        "journal of unit {}, entry {number}: part {got} of {parts} has come, part {need} was to come: it is lost",
+        shown(.unit)
     )]
     Missing {
         /// Serial of the unit.
@@ -44,8 +47,9 @@ pub enum JoinError {
     },
     /// Too many entries are incomplete.
     #[error(
-        "journal of unit {unit}, entry {number}: the incomplete entries would be more than {MAX_OPEN_ENTRIES}, or longer \
-         than {MAX_OPEN_BYTES} bytes together"
+        "journal of unit {}, entry {number}: the incomplete entries would be more than {MAX_OPEN_ENTRIES}, or longer \
+         than {MAX_OPEN_BYTES} bytes together",
+        shown(.unit)
     )]
     TooMuch {
         /// Serial of the unit.
@@ -54,7 +58,7 @@ pub enum JoinError {
         number: u64,
     },
     /// The parts together are no entry.
-    #[error("journal of unit {unit}, entry {number}: the parts together are no entry")]
+    #[error("journal of unit {}, entry {number}: the parts together are no entry", shown(.unit))]
     Malformed {
         /// Serial of the unit.
         unit: String,
@@ -62,7 +66,11 @@ pub enum JoinError {
         number: u64,
     },
     /// The entry is another one than its parts say.
-    #[error("journal of unit {unit}, entry {number}: the parts hold entry {got_number} of unit {got_unit}")]
+    #[error(
+        "journal of unit {}, entry {number}: the parts hold entry {got_number} of unit {}",
+        shown(.unit),
+        shown(.got_unit)
+    )]
     Other {
         /// Serial of the unit, as the parts say.
         unit: String,
@@ -75,6 +83,11 @@ pub enum JoinError {
     },
 }
 
+/// A serial as far as it may be one.
+fn shown(unit: &str) -> String {
+    clipped(unit, MAX_UNIT_ID)
+}
+
 /// An entry of which some parts are there.
 #[derive(Debug)]
 struct Open {
@@ -83,6 +96,11 @@ struct Open {
     /// The part that is to come.
     next: u32,
     bytes: Vec<u8>,
+}
+
+/// What it takes in memory (bytes): nobody has looked at the names yet.
+fn size((instance, unit): &(String, String), open: &Open) -> usize {
+    instance.len() + unit.len() + open.bytes.len()
 }
 
 /// Puts the parts of entries together: of any number of units, those of one unit in the order in which they were sent.
@@ -134,12 +152,14 @@ impl Joiner {
         let Open { mut bytes, .. } = open;
         bytes.extend(more);
         if got + 1 < parts {
-            if self.open.len() >= MAX_OPEN_ENTRIES || self.bytes + bytes.len() > MAX_OPEN_BYTES {
+            let open = Open { number, parts, next: got + 1, bytes };
+            let size = size(&place, &open);
+            if self.open.len() >= MAX_OPEN_ENTRIES || self.bytes + size > MAX_OPEN_BYTES {
                 self.given_up += 1;
                 return Err(JoinError::TooMuch { unit: unit(), number });
             }
-            self.bytes += bytes.len();
-            self.open.insert(place, Open { number, parts, next: got + 1, bytes });
+            self.bytes += size;
+            self.open.insert(place, open);
             return Ok(None);
         }
         let Ok((entry, [])) = postcard::take_from_bytes::<JournalEntry>(&bytes) else {
@@ -161,7 +181,7 @@ impl Joiner {
     /// Takes an open entry out.
     fn close(&mut self, place: &(String, String)) -> Option<Open> {
         let open = self.open.remove(place)?;
-        self.bytes -= open.bytes.len();
+        self.bytes -= size(place, &open);
         Some(open)
     }
 }

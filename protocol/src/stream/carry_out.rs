@@ -12,7 +12,13 @@ use crate::control::Schedule;
 use crate::corrected::Revision;
 use crate::digest::{Digest, Digits};
 use crate::document::{Document, Problem};
+use crate::escape::clipped;
 use crate::journal::JournalEvent;
+
+/// Most problems of a document that an error repeats.
+const MAX_SHOWN: usize = 3;
+/// What of each is shown, in characters.
+const LONGEST_SHOWN: usize = 200;
 
 /// Why an event of a journal cannot be carried out; the stream is as before, unless it is said otherwise.
 #[derive(Debug, Clone, PartialEq, Error)]
@@ -80,8 +86,12 @@ pub enum JournalError {
     },
 }
 
+/// The first problems of a document, and how many there are beside them.
 fn words(problems: &[Problem]) -> String {
-    problems.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ")
+    let (shown, others) = problems.split_at(problems.len().min(MAX_SHOWN));
+    let shown: Vec<_> = shown.iter().map(|problem| clipped(&problem.to_string(), LONGEST_SHOWN)).collect();
+    let others = if others.is_empty() { String::new() } else { format!("; and {} more", others.len()) };
+    format!("{}{others}", shown.join("; "))
 }
 
 fn outcome(accepted: bool) -> &'static str {

@@ -3,10 +3,13 @@
 use std::collections::VecDeque;
 
 use isotherm_correction::sample::CorrectedTick;
+use isotherm_correction::sigma::Sigma;
 use serde::{Deserialize, Serialize};
 
 use crate::codec::{MAX_FRAME, MAX_TICKS, WINDOW, begin, seal};
-use crate::corrected::{CorrectedBatch, MAX_TICK, append_tick};
+use crate::corrected::{
+    CorrectedBatch, MAX_RUN, MAX_TICK, SigmaRun, append_sigmas, append_tick, spread, version,
+};
 use crate::raw::MAX_CHANNELS;
 
 /// Corrected ticks that have not been taken yet.
@@ -27,10 +30,13 @@ pub struct Outgoing {
 }
 
 /// What a memory has of them: each tick and its revision.
-type Waiting = Vec<(CorrectedTick, u64)>;
+type Waiting = Vec<(CorrectedTick, u64, Option<Sigma>)>;
 
 // Full frames are never too long for their reader: the parts of a head have fewer bytes than a tick.
-const _: () = assert!((MAX_TICKS + MAX_CHANNELS + 4) * MAX_TICK < MAX_FRAME);
+const _: () = assert!((MAX_TICKS + MAX_CHANNELS + 4) * MAX_TICK + MAX_RUNS * MAX_RUN < MAX_FRAME);
+
+/// Most runs of standard errors in a frame: one more begins another frame.
+const MAX_RUNS: usize = 512;
 
 /// A frame whose ticks are written and whose head is not.
 #[derive(Debug, Default, Clone)]
@@ -41,11 +47,15 @@ struct Frame {
     room: usize,
     count: usize,
     last: Last,
+    /// Standard errors of the ticks, where they have any.
+    sigmas: Vec<SigmaRun>,
 }
 
 /// What a head follows from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct HeadKey {
+    /// Version of the batch.
+    version: u8,
     /// Counter of the revision.
     revision: u64,
     /// State of the temperatures.
@@ -103,6 +113,7 @@ impl Outgoing {
         if self.open.count == 0 {
             // One allocation for a frame like the last, and what writing wants behind its end.
             self.open.bytes.clear();
+            self.open.sigmas.clear();
             self.open.bytes.reserve(self.length + self.length / 8 + WINDOW);
             self.open.bytes.extend_from_slice(&self.head);
             self.open.room = self.head.len();
@@ -110,6 +121,18 @@ impl Outgoing {
         append_tick(&mut self.open.bytes, tick);
         self.open.count += 1;
         self.open.last = Last::of(tick);
+        if let Some(sigma) = tick.sigma.as_deref() {
+            self.note_sigma(sigma);
+        }
+    }
+
+    /// Puts the standard errors of the tick just written behind those of the ones before it.
+    #[cold]
+    fn note_sigma(&mut self, sigma: &Sigma) {
+        SigmaRun::push(&mut self.open.sigmas, self.open.count - 1, sigma);
+        if self.open.sigmas.len() == MAX_RUNS {
+            self.full.push_back(std::mem::take(&mut self.open));
+        }
     }
 
     /// Makes the next frame, all of one revision, in the place of `into`, whose capacity is kept for the one after it; its
@@ -130,17 +153,19 @@ impl Outgoing {
             self.open = frame;
             return None;
         }
-        let head_of = Some(HeadKey { revision: frame.last.revision, temperatures, ticks: frame.count });
-        if self.head_of != head_of {
-            self.head_of = head_of;
+        let version = version(&frame.sigmas);
+        let key = HeadKey { version, revision: frame.last.revision, temperatures, ticks: frame.count };
+        if self.head_of != Some(key) {
+            self.head_of = Some(key);
             self.head.clear();
-            begin::<CorrectedBatch>(&mut self.head);
+            begin::<CorrectedBatch>(&mut self.head, version);
             write_head(&mut self.head, frame.last.revision, frame.count);
         }
         match frame.bytes.get_mut(..frame.room) {
             Some(room) if room.len() == self.head.len() => room.copy_from_slice(&self.head),
             _ => drop(frame.bytes.splice(..frame.room, self.head.iter().copied())),
         }
+        append_sigmas(&mut frame.bytes, &frame.sigmas);
         seal(&mut frame.bytes);
         self.length = frame.bytes.len();
         std::mem::swap(into, &mut frame.bytes);
@@ -182,13 +207,16 @@ impl Outgoing {
 
 impl Frame {
     /// The ticks, read back.
-    fn ticks(&self) -> impl Iterator<Item = CorrectedTick> {
+    fn ticks(&self) -> Vec<CorrectedTick> {
         let mut rest = self.bytes.get(self.room..).unwrap_or_default();
-        (0..self.count).map_while(move |_| {
+        let ticks = (0..self.count).map_while(|_| {
             let (tick, behind) = postcard::take_from_bytes::<CorrectedTick>(rest).ok()?;
             rest = behind;
             Some(CorrectedTick { revision: self.last.revision, ..tick })
-        })
+        });
+        let mut ticks: Vec<_> = ticks.collect();
+        spread(&self.sigmas, &mut ticks);
+        ticks
     }
 }
 
@@ -201,15 +229,16 @@ impl Last {
 impl From<Outgoing> for Waiting {
     fn from(outgoing: Outgoing) -> Self {
         let ticks = outgoing.frames().flat_map(Frame::ticks).chain(outgoing.ticks.iter().cloned());
-        ticks.map(|tick| (CorrectedTick { revision: 0, ..tick.clone() }, tick.revision)).collect()
+        let plain = |tick: &CorrectedTick| CorrectedTick { revision: 0, sigma: None, ..tick.clone() };
+        ticks.map(|tick| (plain(&tick), tick.revision, tick.sigma.as_deref().copied())).collect()
     }
 }
 
 impl From<Waiting> for Outgoing {
     fn from(waiting: Waiting) -> Self {
         let mut outgoing = Self::default();
-        for (tick, revision) in waiting {
-            outgoing.push(&CorrectedTick { revision, ..tick });
+        for (tick, revision, sigma) in waiting {
+            outgoing.push(&CorrectedTick { revision, sigma: sigma.map(Box::new), ..tick });
         }
         outgoing
     }

@@ -11,6 +11,7 @@ use crate::control::Schedule;
 use crate::corrected::CorrectedBatch;
 use crate::digest::Digest;
 use crate::document::Document;
+use crate::journal::JournalEvent;
 use crate::raw::{AccelBatch, GyroBatch};
 use crate::raw::{HealthReading as WireReading, HealthTick, TemperatureBatch};
 use crate::status::{Output, Place, PreLaunchVerdict, SensorKind, State as WireState, Status};
@@ -376,4 +377,18 @@ fn a_unit_in_standby_says_so_and_the_first_output_of_a_revision_comes_later() {
     let first = stream.take_in_force().unwrap();
     assert_eq!((first.revision.counter, first.sequence), (1, 30));
     assert_eq!(batches(&mut stream).first().unwrap().ticks.first().unwrap().missed, 30);
+}
+
+#[test]
+fn a_document_that_is_none_is_refused_in_few_words() {
+    let event = JournalEvent::Changed {
+        revision: Revision { counter: 1, digest: [0; 8] },
+        at: Schedule::NextTick,
+        slew_ns: 0,
+        document: Some("schema = 1\n".repeat(300)),
+        overlay: None,
+        source: "a test".to_owned(),
+    };
+    let words = stream().carry_out(&event).unwrap_err().to_string();
+    assert!(words.ends_with(" more") && words.len() < 800 && !words.contains('\n'), "{words}");
 }

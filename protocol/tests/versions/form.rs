@@ -105,6 +105,28 @@ pub(super) struct CorrectedBatch {
     pub(super) ticks: Vec<CorrectedTick>,
 }
 
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Sigma {
+    pub(super) from_tick: u16,
+    pub(super) angle_noise_rad: [f64; 3],
+    pub(super) angle_restoration_rad: [f64; 3],
+    pub(super) angle_calibration_rad: [f64; 3],
+    pub(super) angle_clamping_rad: [f64; 3],
+    pub(super) velocity_noise_m_per_s: [f64; 3],
+    pub(super) velocity_restoration_m_per_s: [f64; 3],
+    pub(super) velocity_calibration_m_per_s: [f64; 3],
+    pub(super) velocity_clamping_m_per_s: [f64; 3],
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct CorrectedBatch2 {
+    pub(super) unit: String,
+    pub(super) revision: Revision,
+    pub(super) temperatures: ArrayVec<AppliedTemperature, MAX_CHANNELS>,
+    pub(super) ticks: Vec<CorrectedTick>,
+    pub(super) sigmas: Vec<Sigma>,
+}
+
 impl Readings {
     pub(super) fn len(&self) -> usize {
         self.values().len()
@@ -217,13 +239,45 @@ impl Form for CorrectedBatch {
             gyro_parity: tick.gyro_parity_rad_per_s.clone(),
             accel_parity: tick.accel_parity_m_per_s2.clone(),
             revision: self.revision.counter,
+            sigma: None,
         };
         corrected::CorrectedBatch {
             unit: self.unit.clone(),
             revision: self.revision,
             temperatures: self.temperatures.clone(),
             ticks: self.ticks.iter().map(tick).collect(),
+            sigmas: Vec::new(),
         }
+    }
+
+    fn is_written(&self) -> bool {
+        self.ticks.iter().all(|tick| fits(tick.duration_ns))
+    }
+}
+
+impl Form for CorrectedBatch2 {
+    type Message = corrected::CorrectedBatch;
+
+    fn message(&self) -> Self::Message {
+        let Self { unit, revision, temperatures, ticks, .. } = self.clone();
+        let mut batch = CorrectedBatch { unit, revision, temperatures, ticks }.message();
+        let run = |sigma: &Sigma| corrected::SigmaRun {
+            from_tick: sigma.from_tick,
+            angle_noise_rad: sigma.angle_noise_rad,
+            angle_restoration_rad: sigma.angle_restoration_rad,
+            angle_calibration_rad: sigma.angle_calibration_rad,
+            angle_clamping_rad: sigma.angle_clamping_rad,
+            velocity_noise_m_per_s: sigma.velocity_noise_m_per_s,
+            velocity_restoration_m_per_s: sigma.velocity_restoration_m_per_s,
+            velocity_calibration_m_per_s: sigma.velocity_calibration_m_per_s,
+            velocity_clamping_m_per_s: sigma.velocity_clamping_m_per_s,
+        };
+        batch.sigmas = self.sigmas.iter().map(run).collect();
+        for (index, tick) in batch.ticks.iter_mut().enumerate() {
+            let last = batch.sigmas.iter().rev().find(|run| usize::from(run.from_tick) <= index);
+            tick.sigma = last.map(|run| Box::new(run.sigma()));
+        }
+        batch
     }
 
     fn is_written(&self) -> bool {

@@ -56,7 +56,7 @@ fn a_simulated_log_is_corrected_and_summed_up() {
     let csv = fs::read_to_string(folder.path().join("corrected.csv")).unwrap();
     let mut lines = csv.lines();
     let header: Vec<_> = lines.next().unwrap().split(',').collect();
-    assert_eq!((header.len(), header[5]), (18, "delta_angle_x_rad"));
+    assert_eq!((header.len(), header[5]), (20, "delta_angle_x_rad"));
     let sum: f64 = lines.map(|line| line.split(',').nth(10).unwrap().parse::<f64>().unwrap()).sum();
     assert_eq!((sum / 10.0).to_bits(), force.to_bits(), "the file holds what the summary sums, to the bit");
     assert_eq!(fs::read_to_string(folder.path().join("truth.csv")).unwrap().lines().count(), 1001);

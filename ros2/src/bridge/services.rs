@@ -79,8 +79,9 @@ async fn answer(query: Query, does: Does, bus: Session, unit: UnitId) {
     let request = Attachment::parse(query.attachment().map(ZBytes::to_bytes).as_deref());
     let payload = query.payload().map(ZBytes::to_bytes).unwrap_or_default();
     let asked = request.map_err(|error| error.to_string()).and_then(|request| {
-        let decoded = from_cdr::<TriggerRequest>(&payload).map_err(|error| error.to_string());
-        decoded.map(|_| request)
+        // Some leave out the byte of a message without fields, as hiroz 0.2 does.
+        let decoded = from_cdr::<TriggerRequest>(&payload).map(drop).or_else(|_| from_cdr::<()>(&payload));
+        decoded.map(|()| request).map_err(|error| error.to_string())
     });
     let request = match asked {
         Ok(request) => request,

@@ -87,6 +87,7 @@ impl Settings {
                 max_jump_mg: Some(swap.max_jump_m_per_s2.map_or(0.0, milli_g)),
                 jump: Some(swap.jump),
                 old_schema: Some(swap.old_schema),
+                downgrade: Some(swap.downgrade),
                 slew_ms: Some(span_ms(swap.slew)),
                 require_signature: Some(swap.require_signature),
                 trusted_keys: swap.trusted_keys.as_deref().map(text),
@@ -118,6 +119,7 @@ impl Settings {
                 connect: session.connect.iter().map(|endpoint| address(endpoint).to_owned()).collect(),
                 listen: session.listen.iter().map(|endpoint| address(endpoint).to_owned()).collect(),
                 namespace: session.namespace.clone(),
+                certified_names: Some(self.certified_names),
             },
         }
     }

@@ -163,6 +163,8 @@ pub(super) struct SwapKeys {
     /// Time over which a swap is made where nothing else is asked for.
     #[schemars(range(max = 3_600_000))]
     pub(super) slew_ms: Option<u32>,
+    /// What follows where the document was created before the one in force.
+    pub(super) downgrade: Option<Severity>,
     /// Whether a document without a signature of a trusted key is refused.
     pub(super) require_signature: Option<bool>,
     /// Folder of the trusted public keys.
@@ -247,4 +249,6 @@ pub(super) struct ZenohKeys {
     /// Prefix of every key.
     #[schemars(length(min = 1))]
     pub(super) namespace: Option<String>,
+    /// Whether swaps and commands are taken only on keys that end in the name of who asks.
+    pub(super) certified_names: Option<bool>,
 }

@@ -19,7 +19,7 @@ use super::keys::{
     PairKeys, PreLaunchKeys, SwapKeys, UncalibratedKey, WebKeys, ZenohKeys,
 };
 use super::pair::{ALL_UNITS, PairSettings, chunk};
-use super::swap::DAY_S;
+use super::swap::{DAY_S, Severity};
 use super::{FolderSettings, MetricsSettings, Settings, SwapSettings, WebSettings};
 
 static FORM: LazyLock<Form> = LazyLock::new(Form::of::<Keys>);
@@ -67,6 +67,7 @@ pub(super) fn settings(r: &mut Reader<'_>, folder: &Path) -> Option<Settings> {
             Congestion::Block => CongestionControl::Block,
         }),
         units: units(r, keys.units),
+        certified_names: keys.zenoh.certified_names.unwrap_or(default.certified_names),
         session: session(r, keys.zenoh, keys.pair.lease_ms, folder),
         pair: pair(r, keys.pair),
         metrics: metrics(r, keys.metrics),
@@ -152,6 +153,12 @@ fn swap(r: &mut Reader<'_>, keys: SwapKeys, folder: &Path) -> SwapSettings {
             .map(|limit| SpecificForce::from_g(limit * 1e-3).as_m_per_s2()),
         jump: keys.jump.unwrap_or(default.jump),
         old_schema: keys.old_schema.unwrap_or(default.old_schema),
+        // Where a signature is asked for, an old one must not do.
+        downgrade: keys.downgrade.unwrap_or(if require_signature {
+            Severity::Refuse
+        } else {
+            default.downgrade
+        }),
         slew: keys.slew_ms.map_or(default.slew, Span::from_ms),
         require_signature,
         trusted_keys: existing(r, "swap.trusted_keys", keys.trusted_keys, folder, Path::is_dir, "folder"),

@@ -35,6 +35,8 @@ pub struct SwapSettings {
     pub jump: Severity,
     /// What follows where the document is of an older schema version than this release writes.
     pub old_schema: Severity,
+    /// What follows where the document was created before the one in force.
+    pub downgrade: Severity,
     /// Time over which a swap is made where nothing else is asked for (0…1 h).
     pub slew: Span,
     /// Whether a document without a signature of a trusted key is refused.
@@ -53,6 +55,7 @@ impl Default for SwapSettings {
             max_jump_m_per_s2: None,
             jump: Severity::Refuse,
             old_schema: Severity::Warn,
+            downgrade: Severity::Warn,
             slew: Span::ZERO,
             require_signature: false,
             trusted_keys: None,

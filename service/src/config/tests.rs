@@ -45,6 +45,7 @@ max_jump_deg_per_h = 3600
 max_jump_mg = 0.5
 jump = "warn"
 old_schema = "refuse"
+downgrade = "warn"
 slew_ms = 1500
 require_signature = true
 trusted_keys = "units"
@@ -69,6 +70,7 @@ config = "z.json5"
 connect = ["tcp/127.0.0.1:1"]
 listen = ["tcp/127.0.0.1:0"]
 namespace = "site/a"
+certified_names = true
 "#;
 
 #[test]
@@ -89,6 +91,7 @@ fn every_key_arrives_where_it_belongs() {
             max_jump_m_per_s2: Some(SpecificForce::from_g(5e-4).as_m_per_s2()),
             jump: Severity::Warn,
             old_schema: Severity::Refuse,
+            downgrade: Severity::Warn,
             slew: Span::from_ms(1500),
             require_signature: true,
             trusted_keys: Some(folder.path().join("units")),
@@ -127,6 +130,7 @@ fn every_key_arrives_where_it_belongs() {
             takeover: Duration::from_millis(35),
         },
         metrics: MetricsSettings { listen: Some("0.0.0.0:9464".parse().unwrap()), allow_remote: true },
+        certified_names: true,
         session: SessionOptions {
             config: Some(folder.path().join("z.json5")),
             connect: vec!["tcp/127.0.0.1:1".to_owned()],
@@ -255,4 +259,16 @@ fn a_configuration_of_nothing_but_errors_is_refused_at_once() {
     let broken = "=\n".repeat(1 << 19);
     let problems = Settings::parse(&broken, Path::new("s.toml")).unwrap_err();
     assert!(!problems.is_empty() && problems.len() <= 257, "{}", problems.len());
+}
+
+#[test]
+fn where_signatures_are_required_an_older_document_is_refused_unless_it_is_said_otherwise() {
+    let folder = tempfile::tempdir().unwrap();
+    let downgrade = |keys: &str| {
+        let text = format!("[swap]\ntrusted_keys = \".\"\n{keys}");
+        Settings::parse(&text, &folder.path().join("service.toml")).unwrap().swap.downgrade
+    };
+    assert_eq!(downgrade(""), Severity::Warn);
+    assert_eq!(downgrade("require_signature = true"), Severity::Refuse);
+    assert_eq!(downgrade("require_signature = true\ndowngrade = \"warn\""), Severity::Warn);
 }

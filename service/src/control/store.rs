@@ -3,7 +3,7 @@
 //! | file | holds |
 //! |---|---|
 //! | `lock` | who uses the folder; locked while the service lives |
-//! | `audit.jsonl` | every swap, refusal and command, one JSON object a line ([`AuditEntry`]) |
+//! | `audit.jsonl` | every swap, refusal and command, one JSON object a line ([`AuditEntry`]), chained by digests |
 //! | `audit-<number>.jsonl` | full audit files, by the number of their last entry; never written to again |
 //! | `audit.torn-<n>` | last lines that a crash has cut in mid-write |
 //! | `documents/<sha256>.toml` | every calibration document that was accepted |
@@ -27,9 +27,11 @@ mod mark;
 mod opened;
 mod retention;
 mod scan;
+mod verify;
 
 pub use error::StoreError;
 pub use opened::{Cut, Damage, Emptied, Gap, LostRevision, Opened, Torn};
+pub use verify::{Break, Verification, verify};
 
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -116,6 +118,8 @@ impl Store {
         let kept = documents.count();
         if has_older || (opened.entries == 0 && kept > 0) {
             mark.lose(folder).map_err(unmarked)?;
+            // The numbers of what is lost are missed.
+            next_number = next_number.max(Mark::last_entry(folder).unwrap_or(0).saturating_add(1));
             let (folder, floor) = (folder.to_owned(), mark.floor);
             opened.emptied = Some(Emptied { folder, documents: kept, has_older, floor });
         // The last line alone may be missing after a crash in mid-write.
@@ -267,8 +271,10 @@ impl Store {
             numbered.map(|(number, (unit, by, event))| entry(number, time, unit, by, event)).collect();
         match &mut self.journal {
             Journal::Folder { log, .. } => {
-                let lines: Result<Vec<_>, _> = entries.iter().map(AuditEntry::to_line).collect();
+                let mut chain = log.chain;
+                let lines: Result<Vec<_>, _> = entries.iter().map(|entry| chain.line(entry)).collect();
                 log.append(&lines?.concat())?;
+                log.chain = chain;
             }
             Journal::Memory(recent) => {
                 recent.extend(entries.iter().cloned());

@@ -55,7 +55,7 @@ use std::thread::JoinHandle;
 
 pub(crate) use carry::Carried;
 pub(crate) use control_status::{ControlStatus, Posted, UNWRITTEN};
-pub(crate) use inbox::{Inbox, Notice, PreLaunchEnd};
+pub(crate) use inbox::{Inbox, Notice, Origin, PreLaunchEnd};
 
 use queue::Queue;
 pub(crate) use start::Found;

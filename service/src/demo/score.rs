@@ -184,6 +184,7 @@ mod tests {
             unit: "A".into(),
             revision: Revision::default(),
             temperatures: std::iter::empty().collect(),
+            sigmas: Vec::new(),
             ticks: sequences.iter().map(tick).collect(),
         }
     }

@@ -45,19 +45,22 @@ pub(crate) struct Client {
     pub(crate) session: Session,
     pub(crate) timeout: Duration,
     tried: String,
+    /// Who asks, by the certificate.
+    name: Option<String>,
 }
 
 impl Client {
     /// On a session that is open.
     pub(crate) fn on(session: Session, timeout: Duration) -> Self {
-        Self { session, timeout, tried: "this service".to_owned() }
+        Self { session, timeout, tried: "this service".to_owned(), name: None }
     }
 
     /// Opens the session.
     pub(super) async fn open(args: &ClientArgs) -> Result<Self, ConsoleError> {
         let way = args.session.way(Role::Peer)?;
         let session = way.open(args.timeout).await?;
-        Ok(Self { session, timeout: args.timeout, tried: way.tried().join(", ") })
+        let (tried, name) = (way.tried().join(", "), way.name().map(ToOwned::to_owned));
+        Ok(Self { session, timeout: args.timeout, tried, name })
     }
 
     /// Ends the session.
@@ -72,8 +75,20 @@ impl Client {
         move |source| BusError::Declare { key: key.clone(), source }.into()
     }
 
-    fn no_answer(&self, key: &str) -> ConsoleError {
-        ConsoleError::NoAnswer { key: key.to_owned(), waited: self.timeout, tried: self.tried.clone() }
+    /// Key of an order: it ends in the name of the certificate, where there is one, for access control to judge.
+    pub(super) fn order(&self, key: String) -> String {
+        self.name.as_ref().and_then(|name| key::by(&key, name)).unwrap_or(key)
+    }
+
+    async fn no_answer(&self, key: &str) -> ConsoleError {
+        let (key, waited, tried) = (key.to_owned(), self.timeout, self.tried.clone());
+        match &self.name {
+            // Zenoh drops what access control does not allow, and tells nobody.
+            Some(name) if self.session.info().links().await.next().is_some() => {
+                ConsoleError::NotAllowed { key, waited, tried, name: name.clone() }
+            }
+            _ => ConsoleError::NoAnswer { key, waited, tried },
+        }
     }
 
     /// Every answer to a question, once somebody is there to answer it.
@@ -83,11 +98,12 @@ impl Client {
         parameters: &str,
         payload: Option<&[u8]>,
     ) -> Result<Vec<Vec<u8>>, ConsoleError> {
-        ask(&self.session, key, parameters, payload, self.timeout).await.map_err(|why| match why {
-            Unanswered::Bus(error) => error.into(),
-            Unanswered::Silence => self.no_answer(key),
-            Unanswered::Refused(words) => ConsoleError::Refused(words),
-        })
+        match ask(&self.session, key, parameters, payload, self.timeout).await {
+            Ok(answers) => Ok(answers),
+            Err(Unanswered::Bus(error)) => Err(error.into()),
+            Err(Unanswered::Silence) => Err(self.no_answer(key).await),
+            Err(Unanswered::Refused(words)) => Err(ConsoleError::Refused(words)),
+        }
     }
 
     /// The first answer to a question, as text.
@@ -98,7 +114,7 @@ impl Client {
         payload: Option<&[u8]>,
     ) -> Result<String, ConsoleError> {
         let first = self.answers(key, parameters, payload).await?.into_iter().next();
-        let bytes = first.ok_or_else(|| self.no_answer(key))?;
+        let Some(bytes) = first else { return Err(self.no_answer(key).await) };
         String::from_utf8(bytes)
             .map_err(|error| ConsoleError::Answer { key: key.to_owned(), reason: error.to_string() })
     }

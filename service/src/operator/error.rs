@@ -7,6 +7,7 @@ use isotherm_bus::BusError;
 use isotherm_protocol::key::UnitIdError;
 use thiserror::Error;
 
+use crate::control::store::StoreError;
 use crate::exit::Exit;
 
 /// Why an operator's command failed.
@@ -16,6 +17,9 @@ pub enum ConsoleError {
     /// The session cannot be opened, or something cannot be declared on it.
     #[error(transparent)]
     Bus(#[from] BusError),
+    /// The audit files cannot be read.
+    #[error(transparent)]
+    Store(#[from] StoreError),
     /// Nobody answers on a key.
     #[error(
         "no service answers at {tried} within {}.{} s: is one running there, and under the same --namespace? Else say where it is: \
@@ -29,6 +33,22 @@ pub enum ConsoleError {
         waited: Duration,
         /// Where it was looked for.
         tried: String,
+    },
+    /// Nobody answers on a key, though the connection stands.
+    #[error(
+        "nobody at {tried} answers {name} on {key} within {}.{} s, though the connection stands: does the service's access control let \
+         the certificate of {name} ask there? Else no service runs there, or under another --namespace",
+        waited.as_secs(), waited.subsec_millis() / 100
+    )]
+    NotAllowed {
+        /// The key.
+        key: String,
+        /// How long it was waited for.
+        waited: Duration,
+        /// Where it was looked for.
+        tried: String,
+        /// Common name of the certificate.
+        name: String,
     },
     /// The service is there, the unit is not.
     #[error("the service knows no unit {unit}; it has {}", known(units))]

@@ -1,14 +1,18 @@
-//! `history`: what was done to a unit, by whom, when, from where.
+//! `history`: what was done to a unit, by whom, when, from where; and whether the audit file still says what was written.
+
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use isotherm_protocol::control::Schedule;
+use isotherm_protocol::digest::Digest;
 use isotherm_protocol::history::{AuditEntry, AuditEvent, Source};
 use isotherm_protocol::key;
 
 use super::client::{self, Client, ClientArgs};
 use super::{ConsoleError, show};
+use crate::control::store::verify;
 use crate::exit::Exit;
-use crate::words::print;
+use crate::words::{print, say};
 
 /// Most entries that are asked for.
 const MOST_ENTRIES: u32 = 10_000;
@@ -26,10 +30,18 @@ const INDENT: &str = "        ";
 Examples:
   isotherm history ZLG-0001
   isotherm history ZLG-0001 --all --limit 100
-  isotherm history ZLG-0001 --json | jq '.[0]'")]
+  isotherm history ZLG-0001 --json | jq '.[0]'
+  isotherm history --verify /var/lib/isotherm")]
 pub struct HistoryArgs {
     /// Serial of the unit
-    pub unit: String,
+    #[arg(required_unless_present = "verify")]
+    pub unit: Option<String>,
+    /// Verify the chain of the audit files in this state folder instead; no service is asked
+    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["unit", "limit", "all"])]
+    pub verify: Option<PathBuf>,
+    /// Digest of an entry that an earlier `--verify` has printed: the entry must still be there
+    #[arg(long, value_name = "DIGEST", requires = "verify")]
+    pub noted: Option<Digest>,
     /// Most entries, the newest first
     #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_ENTRIES)))]
     pub limit: u32,
@@ -44,9 +56,25 @@ pub struct HistoryArgs {
     pub client: ClientArgs,
 }
 
+/// Says whether the audit files of a folder are what was written.
+fn verified(folder: &Path, args: &HistoryArgs) -> Result<Exit, ConsoleError> {
+    let found = verify(folder, args.noted)?;
+    let exit = if found.holds { Exit::Ok } else { Exit::Failed };
+    if args.json {
+        return Ok(print(&(serde_json::to_string_pretty(&found).unwrap_or_default() + "\n"), exit));
+    }
+    for broken in &found.breaks {
+        say(format_args!("{broken}"));
+    }
+    Ok(print(&found.to_string(), exit))
+}
+
 /// Prints a unit's history.
 pub(super) async fn run(args: &HistoryArgs) -> Result<Exit, ConsoleError> {
-    let unit = client::unit(&args.unit)?;
+    if let Some(folder) = &args.verify {
+        return verified(folder, args);
+    }
+    let unit = client::unit(args.unit.as_deref().unwrap_or_default())?;
     let client = Client::open(&args.client).await?;
     // Calibrations stand among the other entries, how far apart nobody knows.
     let parameters = format!("limit={}", if args.all { args.limit } else { MOST_ENTRIES });

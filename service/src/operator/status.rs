@@ -96,7 +96,7 @@ pub(super) async fn run(args: &StatusArgs) -> Result<Exit, ConsoleError> {
 /// Services before 0.2 tell nothing of themselves.
 pub(super) fn or_none<T>(answers: Result<Vec<T>, ConsoleError>) -> Result<Vec<T>, ConsoleError> {
     match answers {
-        Err(ConsoleError::NoAnswer { .. }) => Ok(Vec::new()),
+        Err(ConsoleError::NoAnswer { .. } | ConsoleError::NotAllowed { .. }) => Ok(Vec::new()),
         other => other,
     }
 }

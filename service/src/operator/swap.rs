@@ -105,12 +105,12 @@ impl Wish {
         match self {
             Self::Document { text, options } => {
                 let options = SwapOptions { dry_run, ..options.clone() };
-                client.json(&key::calibration(unit), &options.to_parameters(), Some(text)).await
+                client.json(&client.order(key::calibration(unit)), &options.to_parameters(), Some(text)).await
             }
             Self::Rollback { revision, by } => {
                 let order = Order::Rollback { revision: *revision, dry_run };
                 let order = serde_json::to_vec(&CommandOrder { by: by.clone(), order }).unwrap_or_default();
-                let key = key::command(unit);
+                let key = client.order(key::command(unit));
                 let reply: CommandReply = client.json(&key, "", Some(&order)).await?;
                 let reason = reply.reason.unwrap_or_else(|| "refused without a reason".to_owned());
                 reply.swap.ok_or(ConsoleError::Refused(reason))

@@ -93,7 +93,7 @@ impl Watch {
             pair: Arc::clone(pair),
             intake: Arc::clone(intake),
             joiner: Joiner::new(),
-            interval: (pair.takeover / 4).clamp(INTERVAL[0], INTERVAL[1]),
+            interval: (pair.takeover / 10).clamp(INTERVAL[0], INTERVAL[1]),
             questions,
         };
         let thread = std::thread::Builder::new()
@@ -186,7 +186,7 @@ impl Work {
         let standing = self.pair.standing();
         let looked = self.intake.each_unit(|actor| {
             if let Some(short) = still.filter(|_| actor.speaks()) {
-                actor.follow(now, standing.active, Pair::footing(short));
+                actor.follow(now, Pair::footing(short));
             }
             let Wants { memory, spoke, alarm } = actor.watch_speech(now, &standing);
             (memory || spoke || alarm.is_some()).then(|| (actor.id().clone(), memory, spoke, alarm))

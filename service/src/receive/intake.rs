@@ -114,10 +114,8 @@ impl Intake {
         let known = self.unit(serial);
         let Some(unit) = known.or_else(|| self.appear(serial, stream, frame, arrival)) else { return false };
         let mut actor = lock(&unit);
-        if let Some((pair, short)) =
-            self.pair.as_ref().and_then(|pair| Some((pair, pair.has_stood_still(arrival)?)))
-        {
-            actor.follow(arrival, pair.standing().active, Pair::footing(short));
+        if let Some(short) = self.pair.as_ref().and_then(|pair| pair.has_stood_still(arrival)) {
+            actor.follow(arrival, Pair::footing(short));
         }
         guarded(&mut actor, |actor| actor.receive(stream, frame, arrival));
         actor.is_status_due()
@@ -204,9 +202,9 @@ impl Intake {
         let pairing_window = Duration::from_nanos(settings.pairing_window.as_ns().unsigned_abs());
         let quiet = StreamTimeoutSettings { tail_flush: self.settings.tail_flush, pairing_window };
         let mut actor = UnitActor::new(id.clone(), settings, quiet, outlet);
-        if let Some(pair) = self.pair.as_ref().filter(|pair| !pair.speaks_first()) {
+        if self.pair.as_ref().is_some_and(|pair| !pair.speaks_first()) {
             // The others may have heard more of it; where none speaks it does, after a while.
-            actor.follow(Instant::now(), pair.standing().active, Footing::Nothing);
+            actor.follow(Instant::now(), Footing::Nothing);
         }
         if let Some(inbox) = &self.inbox {
             actor.report_to(inbox.clone());

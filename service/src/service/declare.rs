@@ -16,7 +16,7 @@ use zenoh::{Session, Wait};
 
 use crate::ServiceError;
 use crate::config::chunk;
-use crate::control::swap_manager::Inbox;
+use crate::control::swap_manager::{Inbox, Origin};
 use crate::observe::status_publisher::{Asked, Bell};
 use crate::pair::Pair;
 use crate::receive::intake::{Intake, OutletMaker};
@@ -41,22 +41,23 @@ impl Declared {
         inbox: &Inbox,
         (pair, taken, pulse): (&Arc<Pair>, &[String], &Arc<Pulse>),
     ) -> Result<Self, ServiceError> {
-        let put = inbox.clone();
         let receipt = Receipt::declare(session).await?;
-        let mut subscribers =
-            vec![subscribe(session, key::ALL_CALIBRATION, move |sample| put.put(sample)).await?];
+        let mut subscribers = Vec::new();
+        for key in [key::ALL_CALIBRATION, key::ALL_CALIBRATION_BY] {
+            let put = inbox.clone();
+            subscribers.push(subscribe(session, key, move |sample| put.put(sample)).await?);
+        }
         subscribers.extend(inputs(session, (intake, bell, pulse), taken, pair).await?);
         let alive = key::service_alive(&session.zid().to_string());
         let own = session.liveliness().declare_token(alive).await;
         let own = own.map_err(|source| ServiceError::Declare { key: key::ALL_SERVICES_ALIVE, source })?;
-        let [calibration, command, history, kept] = [(); 4].map(|()| inbox.clone());
+        let [history, kept] = [(); 2].map(|()| inbox.clone());
         let ask = |asked| {
             let bell = bell.clone();
             move |query| bell.ask(asked, query)
         };
-        let queryables = vec![
-            answer(session, key::ALL_CALIBRATION, move |query| calibration.calibration(query)).await?,
-            answer(session, key::ALL_COMMAND, move |query| command.command(query)).await?,
+        let mut queryables = orders(session, inbox).await?;
+        queryables.extend([
             answer(session, key::ALL_HISTORY, move |query| history.history(query)).await?,
             answer(session, key::ALL_CONFIGURATIONS, ask(Asked::Configuration)).await?,
             answer(session, key::ALL_JOURNALS, ask(Asked::Memory)).await?,
@@ -64,7 +65,7 @@ impl Declared {
             answer(session, key::ALL_PAIRS, ask(Asked::Pair)).await?,
             answer(session, key::ALL_SERVICE_STATUS, ask(Asked::Status)).await?,
             answer(session, key::ALL_STATUS, ask(Asked::Status)).await?,
-        ];
+        ]);
         // Whoever sees it may ask.
         let member = session.liveliness().declare_token(pair.me().token()).await;
         let member = member.map_err(|source| ServiceError::Declare { key: key::ALL_MEMBERS, source })?;
@@ -208,11 +209,42 @@ async fn subscribe(
     subscriber.await.map_err(|source| ServiceError::Declare { key, source })
 }
 
+/// Takes what may change a unit: from other processes, on keys with the name of who asks and without, and from the console in this one.
+async fn orders(session: &Session, inbox: &Inbox) -> Result<Vec<Queryable<()>>, ServiceError> {
+    let (bus, own) = ((Locality::Remote, Origin::Bus), (Locality::SessionLocal, Origin::Console));
+    let mut queryables = Vec::new();
+    for (key, (from, origin)) in [
+        (key::ALL_CALIBRATION, bus),
+        (key::ALL_CALIBRATION, own),
+        (key::ALL_CALIBRATION_BY, bus),
+        (key::ALL_COMMAND, bus),
+        (key::ALL_COMMAND, own),
+        (key::ALL_COMMAND_BY, bus),
+    ] {
+        let inbox = inbox.clone();
+        let is_command = [key::ALL_COMMAND, key::ALL_COMMAND_BY].contains(&key);
+        let take = move |query| {
+            if is_command { inbox.command(query, origin) } else { inbox.calibration(query, origin) }
+        };
+        queryables.push(answer_from(session, key, from, take).await?);
+    }
+    Ok(queryables)
+}
+
 async fn answer(
     session: &Session,
     key: &'static str,
     callback: impl Fn(Query) + Send + Sync + 'static,
 ) -> Result<Queryable<()>, ServiceError> {
-    let queryable = session.declare_queryable(key).callback(callback);
+    answer_from(session, key, Locality::Any, callback).await
+}
+
+async fn answer_from(
+    session: &Session,
+    key: &'static str,
+    from: Locality,
+    callback: impl Fn(Query) + Send + Sync + 'static,
+) -> Result<Queryable<()>, ServiceError> {
+    let queryable = session.declare_queryable(key).allowed_origin(from).callback(callback);
     queryable.await.map_err(|source| ServiceError::Declare { key, source })
 }

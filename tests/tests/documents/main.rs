@@ -6,6 +6,7 @@ mod fibre_optic;
 mod mems;
 mod real_logs;
 mod shipped;
+mod sigma;
 mod zeeman;
 
 use std::sync::Arc;

@@ -7,6 +7,7 @@
     reason = "what does not hold ends the test"
 )]
 
+mod access;
 mod broken_documents;
 mod documents;
 mod kill_9;

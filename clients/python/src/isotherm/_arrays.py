@@ -18,7 +18,8 @@ from ._wire import body_of, codec, read_count, read_varint, take
 
 Array = npt.NDArray[Any]
 
-#: One output. Flags of absent sensors are 0, absent parity residuals NaN; `mode` is +1, -1, or 0 if there is none.
+#: One output. Flags of absent sensors are 0, absent parity residuals NaN; `mode` is +1, -1, or 0 if there is none. Standard errors have a
+#: row per cause (noise, restoration, calibration, clamping) and a column per axis; NaN where unknown or not asked for.
 TICK = np.dtype(
     [
         ("sequence", "<u8"),
@@ -36,12 +37,15 @@ TICK = np.dtype(
         ("accel_flags", "u1", (layout.SENSORS,)),
         ("gyro_parity_rad_per_s", "<f8", (layout.PARITY,)),
         ("accel_parity_m_per_s2", "<f8", (layout.PARITY,)),
+        ("angle_sigma_rad", "<f8", (4, 3)),
+        ("velocity_sigma_m_per_s", "<f8", (4, 3)),
     ]
 )
 _COUNTS = {"gyro_flags": "gyros", "accel_flags": "accels"}
 _PARITY = ("gyro_parity_rad_per_s", "accel_parity_m_per_s2")
 _BLANK = np.zeros(1, TICK)
-for _name in _PARITY:
+SIGMAS = ("angle_sigma_rad", "velocity_sigma_m_per_s")
+for _name in _PARITY + SIGMAS:
     _BLANK[_name] = np.nan
 # Forms kept: a stream has a handful, of ticks with a mode and without, before and after a number gets a digit more.
 _MOST_FORMS = 16
@@ -187,7 +191,8 @@ class CorrectedDecoder:
 
     def decode(self, frame: bytes) -> CorrectedBatch:
         """The batch in a frame; raises `Refused`, whatever the bytes are."""
-        _, body = body_of(frame, layout.CORRECTED)
+        message, body = body_of(frame, layout.CORRECTED)
+        sigmas: list[dict[str, Any]] = []
         head: dict[str, Any] = {}
         at = 0
         *fields, (_, (_, _, least, most)) = layout.STRUCTS["corrected_batch"]
@@ -200,9 +205,15 @@ class CorrectedDecoder:
             parts.append(part)
             count -= len(part)
             at += len(part) * length
+        if message == "corrected_batch_2":
+            sigmas, at = codec(dict(layout.STRUCTS[message])["sigmas"])[0](body, at)
         if at != len(body):
             raise Refused(f"{len(body) - at} bytes are left over after the body")
         ticks = parts[0] if len(parts) == 1 else np.concatenate(parts)
+        for run in sigmas:
+            _, *numbers = run.values()
+            for name, causes in zip(SIGMAS, (numbers[:4], numbers[4:])):
+                ticks[name][run["from_tick"] :] = causes
         temperatures = {
             applied["channel"]: (applied["temperature_deg_c"], applied["rate_deg_c_per_s"])
             for applied in head["temperatures"]

@@ -35,13 +35,18 @@ class NotAccepted(BusError):
 
 
 def connect(
-    *endpoints: str, namespace: str | None = None, config: zenoh.Config | None = None, timeout_s: float = 10.0
+    *endpoints: str,
+    namespace: str | None = None,
+    config: zenoh.Config | None = None,
+    timeout_s: float = 10.0,
+    name: str | None = None,
 ) -> Bus:
     """Opens a session with the service or router at an endpoint (default: `ENDPOINT`), or with each of several; use it in a `with`
     statement.
 
-    Nothing is searched for on the network. `config` replaces the configuration altogether. Raises `BusError` if nobody is there
-    within `timeout_s`.
+    Nothing is searched for on the network. `config` replaces the configuration altogether. `name` is the common name of your
+    certificate, where access control asks for one: swaps and commands are given under it. Raises `BusError` if nobody is there within
+    `timeout_s`.
     """
     endpoints = endpoints or (ENDPOINT,)
     if config is None:
@@ -59,10 +64,10 @@ def connect(
         }
         if namespace is not None:
             options["namespace"] = namespace
-        for name, value in options.items():
-            config.insert_json5(name, json.dumps(value))
+        for key, value in options.items():
+            config.insert_json5(key, json.dumps(value))
     try:
-        return Bus(zenoh.open(config), timeout_s)
+        return Bus(zenoh.open(config), timeout_s, name)
     except zenoh.ZError as error:
         words = " or ".join(endpoints)
         raise BusError(f"{words}: no service or router answers within {timeout_s:g} s; is it running there? ({error})") from None
@@ -71,10 +76,11 @@ def connect(
 class Bus:
     """A session. Closing it ends its streams and producers."""
 
-    def __init__(self, session: zenoh.Session, timeout_s: float = 10.0) -> None:
+    def __init__(self, session: zenoh.Session, timeout_s: float = 10.0, name: str | None = None) -> None:
         #: The Zenoh session, for anything else.
         self.session = session
         self.timeout_s = timeout_s
+        self._named = "" if name is None else f"/{name}"
         self._streams: list[CorrectedStream | StatusStream] = []
         # A service that stops asks whether all has arrived; ending its query without a reply says so.
         self._receipt = session.declare_queryable(f"isotherm/{session.zid()}/receipt", lambda query: query.drop())
@@ -158,7 +164,7 @@ class Bus:
 
     def calibration(self, unit: str) -> str:
         """Text of the calibration document in force."""
-        return self._one(f"imu/{unit}/calibration", None).decode("utf-8")
+        return self._one(f"imu/{unit}/calibration{self._named}", None).decode("utf-8")
 
     def swap(
         self,
@@ -184,7 +190,8 @@ class Bus:
         options.update({name: "true" for name, on in switches.items() if on})
         escaped = {name: "".join(_ESCAPED.get(c, c) for c in value) for name, value in options.items()}
         parameters = ";".join(f"{name}={value}" for name, value in escaped.items())
-        reply = self._json(f"imu/{unit}/calibration?{parameters}" if parameters else f"imu/{unit}/calibration", text)
+        key = f"imu/{unit}/calibration{self._named}"
+        reply = self._json(f"{key}?{parameters}" if parameters else key, text)
         if reply["outcome"] == "refused":
             problems = [f"{problem.get('key') or 'document'}: {problem['message']}" for problem in reply["problems"]]
             raise NotAccepted(f"{unit}: the calibration is refused: {'; '.join(problems) or 'no reason given'}", reply)
@@ -196,7 +203,7 @@ class Bus:
         Raises `NotAccepted` if the service refuses it.
         """
         order = {"command": command, **({} if by is None else {"by": by}), **fields}
-        reply = self._json(f"imu/{unit}/command", json.dumps(order))
+        reply = self._json(f"imu/{unit}/command{self._named}", json.dumps(order))
         if not reply["accepted"]:
             raise NotAccepted(f"{unit}: {reply.get('reason') or reply}", reply)
         return reply

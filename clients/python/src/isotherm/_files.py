@@ -219,6 +219,14 @@ def _ticks(columns: dict[str, Array], count: int) -> Array:
         for index in range(layout.PARITY):
             if f"{kind}_parity_{index}_{unit}" in columns:
                 parity[:, index] = columns[f"{kind}_parity_{index}_{unit}"]
+    for increment, unit in (("angle", "rad"), ("velocity", "m_per_s")):
+        sigma = ticks[f"{increment}_sigma_{unit}"]
+        sigma[:] = np.nan
+        for row, cause in enumerate(("noise", "restoration", "calibration", "clamping")):
+            for index, axis in enumerate("xyz"):
+                column = f"{increment}_{cause}_sigma_{axis}_{unit}"
+                if column in columns:
+                    sigma[:, row, index] = columns[column]
     return ticks
 
 

@@ -328,9 +328,11 @@ def decode(frame: bytes, kind: int) -> Message:
 
 
 def encode(message: Message, kind: int, version: int | None = None) -> bytes:
-    """The frame of a message, in the last version where none is given. Raises `Refused`."""
+    """The frame of a message, in the last version whose fields it has where none is given. Raises `Refused`."""
     _, bodies, rules = layout.KINDS[kind]
-    version = version or len(bodies)
+    if version is None:
+        fits = (form for form in range(len(bodies), 0, -1) if all(name in message for name, _ in layout.STRUCTS[bodies[form - 1]]))
+        version = next(fits, len(bodies))
     frame = bytearray([kind, version])
     codec(("named", bodies[version - 1]))[1](frame, message)
     for rule in rules:

@@ -7,6 +7,7 @@ use crate::channel::ThermalFilter;
 use crate::curve::Curve;
 use crate::orientation::{Orientation, OrientationError, OrientationParts};
 use crate::sample::OutputKind;
+use crate::sigma::{MAX_BIAS_TERMS, SigmaParts};
 use crate::thermal::{
     ACCEL_TERMS, AccelModel, Feature, GYRO_TERMS, GyroModel, MAX_LAGS, MAX_PLAYS, MAX_REGRESSORS,
     PLAY_WIDTHS_DEG_C, Term, TermError,
@@ -38,6 +39,7 @@ pub(super) fn gyro_model(
     if gyro.servo.is_some() && parts.gyro_output != OutputKind::Counts {
         checker.push("servo", DefectKind::NeedsCounts);
     }
+    sigma(checker, gyro.sigma.as_ref());
     GyroModel::new(gyro, filter, &mut |field, error| match error {
         TermError::Curve(error) => checker.push(field, error),
         TermError::Servo(error) => checker.push(field, error),
@@ -61,11 +63,38 @@ pub(super) fn accel_model(
     }
     checker.positive("input_limit", accel.input_limit);
     terms(checker, (accel.channel, &accel.terms), &ACCEL_TERMS, parts);
+    sigma(checker, accel.sigma.as_ref());
     let model = AccelModel::new(accel, filter, &mut |field, error| checker.push(field, error))?;
     if let Some(at) = sign_change(&model.scale_factor) {
         checker.push("scale_factor", DefectKind::Zero { at });
     }
     Some(model)
+}
+
+/// Standard errors are numbers from 0 on, and correlations those of a covariance.
+fn sigma(checker: &mut Checker, parts: Option<&SigmaParts>) {
+    let Some(parts) = parts else { return };
+    let stated = [
+        ("sigma.random_walk", parts.random_walk),
+        ("sigma.quantisation", parts.quantisation),
+        ("sigma.instability", Some(parts.instability)),
+        ("sigma.rate_random_walk", Some(parts.rate_random_walk)),
+        ("sigma.scale", parts.scale),
+        ("sigma.misalignment", parts.misalignment),
+        ("sigma.clamping", parts.clamping_per_deg_c),
+    ];
+    for (field, value) in stated {
+        checker.within(field, value.unwrap_or(0.0), 0.0, HUGE);
+    }
+    let Some(bias) = &parts.bias else { return };
+    checker.count("sigma.bias.sigma", bias.sigma.len(), 1, MAX_BIAS_TERMS);
+    for sigma in &bias.sigma {
+        checker.within("sigma.bias.sigma", *sigma, 0.0, HUGE);
+    }
+    checker.within("sigma.bias.reference", bias.reference_deg_c, -HUGE, HUGE);
+    if !bias.is_covariance() {
+        checker.push("sigma.bias.correlation", DefectKind::NoCovariance);
+    }
 }
 
 /// Number of a sensor's terms of each feature, and what they need beside coefficients; `channel` is the sensor's own.

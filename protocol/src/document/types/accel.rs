@@ -7,7 +7,7 @@ use super::super::curve::{
     Curve, OutputBias, OutputHysteresisGain, OutputLagGain, OutputRegressorGain, Relative, ScaleFactor,
     SecondOrder,
 };
-use super::Orientation;
+use super::{AccelSigma, Orientation};
 
 /// The accelerometers of the unit: `f = (U − S(T) − lags)·r(T_board)/K(T)`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -95,6 +95,9 @@ pub struct AccelSensor {
     /// Source: models §3, 001 (y1…y3).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub board_ratio_error: Option<Curve<Relative>>,
+    /// As for gyros. Source: models §3, IEEE 952.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sigma: Option<AccelSigma>,
 }
 
 /// One thermal lag of an accelerometer's bias.

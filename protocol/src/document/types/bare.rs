@@ -29,6 +29,7 @@ impl GyroSensor {
             trend: None,
             servo: None,
             drift: None,
+            sigma: None,
         }
     }
 }
@@ -52,6 +53,7 @@ impl AccelSensor {
             second_order: None,
             position_m: None,
             board_ratio_error: None,
+            sigma: None,
         }
     }
 }

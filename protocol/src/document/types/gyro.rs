@@ -8,7 +8,7 @@ use super::super::curve::{
     Curve, DriftByForce, Frequency, HysteresisGain, LagGain, RateBias, RegressorGain, Relative,
     RelativeOverRate, ThermalAcceleration, ThermalRate,
 };
-use super::{Drift, Orientation};
+use super::{Drift, GyroSigma, Orientation};
 
 /// The gyros of the unit: `θ = K(T)·P − Ω·Δt`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -113,6 +113,9 @@ pub struct GyroSensor {
     /// run for this gyro. Source: models §7, 002.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub drift: Option<Drift>,
+    /// Standard errors, which have σ go out with every output. Source: models §2, IEEE 952.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sigma: Option<GyroSigma>,
 }
 
 /// One curve per thermal branch, both over the same argument.

@@ -113,6 +113,9 @@ fn parts_that_hold_another_entry_or_none_are_refused() {
         assert!(encode(&other).is_err());
         assert!(matches!(joiner.join(other), Err(JoinError::Part { .. })));
     }
+    let nameless = JournalPart { unit: "x\n".repeat(1000), parts: 0, ..good.clone() };
+    let words = joiner.join(nameless).expect_err("no parts").to_string();
+    assert!(words.len() < 200 && !words.contains('\n'), "{words}");
     assert!(joiner.join(good).is_ok_and(|joined| joined.is_some()));
 }
 
@@ -128,7 +131,12 @@ fn what_waits_for_its_other_parts_is_bounded() {
     };
     let mut joiner = Joiner::new();
     let taken = (0..2 * MAX_OPEN_ENTRIES).take_while(|unit| joiner.join(part(*unit)).is_ok()).count();
-    assert_eq!(taken, 128, "64 MiB");
+    assert_eq!(taken, 127, "64 MiB with the names");
+    let named =
+        |unit: usize| JournalPart { instance: "x".repeat(MAX_PART_BYTES), bytes: vec![0], ..part(unit) };
+    let mut joiner = Joiner::new();
+    let taken = (0..2 * MAX_OPEN_ENTRIES).take_while(|unit| joiner.join(named(*unit)).is_ok()).count();
+    assert_eq!(taken, 127, "names of any length");
     let small = |unit: usize| JournalPart { bytes: vec![0], ..part(unit) };
     let mut joiner = Joiner::new();
     let taken = (0..2 * MAX_OPEN_ENTRIES).take_while(|unit| joiner.join(small(*unit)).is_ok()).count();

@@ -3,10 +3,10 @@
 use std::fmt::Write;
 
 use comfy_table::{CellAlignment, Table, presets};
-use isotherm_correction::units::{Span, Timestamp};
+use isotherm_correction::units::{Angle, Span, Timestamp};
 use isotherm_log::date::date;
 use isotherm_log::info::{
-    FileInfo, JournalInfo, LogInfo, Spread, StateInfo, StatusInfo, TopicInfo, UnitInfo,
+    FileInfo, JournalInfo, LogInfo, SigmaInfo, Spread, StateInfo, StatusInfo, TopicInfo, UnitInfo,
 };
 use isotherm_log::source::LogReport;
 
@@ -234,6 +234,24 @@ fn unit_details(text: &mut String, unit: &UnitInfo, begin_ns: i64) {
             corrected.sensor_flags.iter().map(|(name, count)| format!("{name} {count}")).collect();
         if !flags.is_empty() || !sensors.is_empty() {
             line(text, format_args!("flags: {}", [flags, sensors].concat().join(", ")));
+        }
+        let angle = corrected.angle_sigma_rad.map(|sigma| {
+            let rms = sigma.rms.map(|rms| Angle::from_rad(rms).as_arcsec());
+            ("angle", SigmaInfo { rms, ..sigma }, "″")
+        });
+        let velocity = corrected.velocity_sigma_m_per_s.map(|sigma| ("velocity", sigma, "m/s"));
+        for (of, sigma, unit) in angle.into_iter().chain(velocity) {
+            let SigmaInfo { outputs, unknown, rms: [x, y, z] } = sigma;
+            if outputs == 0 {
+                line(text, format_args!("σ of {of} increments: unknown in {unknown} outputs"));
+            } else {
+                line(
+                    text,
+                    format_args!(
+                        "σ of {of} increments, rms: {x:.3e} {y:.3e} {z:.3e} {unit}, unknown in {unknown} outputs"
+                    ),
+                );
+            }
         }
         for (channel, range) in &corrected.temperatures {
             line(

@@ -2,6 +2,8 @@
 
 use std::time::SystemTime;
 
+use isotherm_protocol::history::chain::Chain;
+
 use super::blobs::BlobStore;
 use super::lock::Lock;
 use super::log::Log;
@@ -54,23 +56,28 @@ impl Store {
         overlays.into_iter().try_for_each(|bytes| of_overlays.put(bytes.as_ref()).map(drop))?;
         mark.write(&path).map_err(StoreError::write(&path))?;
         let mut log = Log::open(&path, &mut Opened::default(), &mut |_| {})?;
-        let (lines, next_number) = self.carried_lines(time)?;
-        log.begin_anew(self.next_number.saturating_sub(1), &lines)?;
+        let (lines, next_number, chain) = self.carried_lines(time)?;
+        log.begin_anew(self.next_number.saturating_sub(1), &lines, chain)?;
         self.next_number = next_number;
         [self.documents, self.overlays] = shelves;
         self.journal = Journal::Folder { path, log, lock, mark };
         Ok(true)
     }
 
-    /// What a new audit file begins with, and the number behind it.
-    fn carried_lines(&self, time: SystemTime) -> Result<(String, u64), StoreError> {
+    /// What a new audit file begins with, the number behind it, and the chain there.
+    fn carried_lines(&self, time: SystemTime) -> Result<(String, u64, Chain), StoreError> {
         let mut number = self.next_number;
         let mut lines = String::new();
+        let mut chain = match &self.journal {
+            Journal::Folder { log, .. } => log.chain,
+            Journal::Memory(_) => Chain::default(),
+        };
+        chain.begin_file();
         for (unit, event) in self.index.carried() {
-            lines.push_str(&entry(number, time, unit, "", event).to_line()?);
+            lines.push_str(&chain.line(&entry(number, time, unit, "", event))?);
             number = number.saturating_add(1);
         }
-        Ok((lines, number))
+        Ok((lines, number, chain))
     }
 
     /// Begins a new audit file where this one is full, empty behind a full one, or no longer ours.
@@ -85,9 +92,9 @@ impl Store {
         if !(taken_away || full || lacks_carried) {
             return Ok(());
         }
-        let (lines, number) = self.carried_lines(time)?;
+        let (lines, number, chain) = self.carried_lines(time)?;
         let Journal::Folder { log, .. } = &mut self.journal else { return Ok(()) };
-        match log.begin_anew(self.next_number.saturating_sub(1), &lines) {
+        match log.begin_anew(self.next_number.saturating_sub(1), &lines, chain) {
             Ok(()) => {
                 self.next_number = number;
                 (self.stuck, self.prune_due) = (false, true);

@@ -5,6 +5,7 @@ use std::fs::File;
 use std::io::{self, ErrorKind, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
+use isotherm_protocol::history::chain::Chain;
 use isotherm_protocol::history::{AuditEntry, LineError};
 use isotherm_protocol::key::UnitId;
 
@@ -13,7 +14,7 @@ use super::{StoreError, durable, scan};
 use crate::text::check_regular;
 
 /// Name of the file that is written to.
-const NAME: &str = "audit.jsonl";
+pub(super) const NAME: &str = "audit.jsonl";
 
 /// What was found on a line.
 #[derive(Debug)]
@@ -65,6 +66,8 @@ pub(super) struct Log {
     carried: u64,
     /// A failed write may have left something behind `length`.
     unclean: bool,
+    /// Where the next line carries on; to be taken further by whoever appends lines.
+    pub(super) chain: Chain,
 }
 
 impl Log {
@@ -78,12 +81,13 @@ impl Log {
         opened: &mut Opened,
         visit: &mut dyn FnMut(Found),
     ) -> Result<Self, StoreError> {
+        let mut chain = Chain::default();
         if let Some(before) = last_full_file(folder)? {
-            read(&before, false, opened, visit)?;
+            read(&before, false, opened, &mut chain, visit)?;
         }
         let path = folder.join(NAME);
         let mut file = append_to(&path)?;
-        let (extent, rest_is_whole) = read(&path, true, opened, visit)?;
+        let (extent, rest_is_whole) = read(&path, true, opened, &mut chain, visit)?;
         let mut length = extent.lines;
         if extent.rest > 0 {
             let torn = if rest_is_whole { complete(&mut file) } else { move_rest(folder, &mut file, extent) };
@@ -94,7 +98,11 @@ impl Log {
             opened.torn = Some(torn);
         }
         durable::sync_folder(folder).map_err(StoreError::write(folder))?;
-        Ok(Self { folder: folder.to_owned(), path, sink: Box::new(file), length, carried: 0, unclean: false })
+        if length == 0 {
+            chain.begin_file();
+        }
+        let (folder, sink) = (folder.to_owned(), Box::new(file));
+        Ok(Self { folder, path, sink, length, carried: 0, unclean: false, chain })
     }
 
     /// Whether a full file was put aside, and the present one has nothing.
@@ -156,12 +164,17 @@ impl Log {
         }
     }
 
-    /// Puts the file aside under the number of its last entry, and begins a new one with these lines. At every moment of
-    /// it the last full file and the new one hold everything between them.
+    /// Puts the file aside under the number of its last entry, and begins a new one with these lines, at whose end the chain
+    /// is here. At every moment of it the last full file and the new one hold everything between them.
     ///
     /// # Errors
     /// [`StoreError::Write`], or [`StoreError::Read`].
-    pub(super) fn begin_anew(&mut self, last_number: u64, lines: &str) -> Result<(), StoreError> {
+    pub(super) fn begin_anew(
+        &mut self,
+        last_number: u64,
+        lines: &str,
+        chain: Chain,
+    ) -> Result<(), StoreError> {
         let write = |source| StoreError::Write { path: self.path.clone(), source };
         let new = durable::prepare(&self.folder, NAME, lines.as_bytes()).map_err(write)?;
         if std::fs::metadata(&self.path).is_ok_and(|found| found.len() > 0) {
@@ -178,6 +191,7 @@ impl Log {
         self.length = lines.len() as u64;
         self.carried = self.length;
         self.unclean = false;
+        self.chain = chain;
         Ok(())
     }
 
@@ -227,6 +241,7 @@ fn read(
     path: &Path,
     may_be_torn: bool,
     opened: &mut Opened,
+    chain: &mut Chain,
     visit: &mut dyn FnMut(Found),
 ) -> Result<(scan::Extent, bool), StoreError> {
     let mut rest_is_whole = false;
@@ -234,6 +249,7 @@ fn read(
     let mut next = None;
     let extent = scan::lines(path, |scan::Line { number: line, bytes, ended }| {
         rest_is_whole = !ended && AuditEntry::is_whole(bytes);
+        chain.pass(bytes);
         match AuditEntry::from_line(bytes) {
             Ok(entry) => {
                 opened.entries += 1;

@@ -52,7 +52,7 @@ impl Worker {
         let candidate = match found {
             Ok(candidate) => candidate,
             Err(found) => {
-                problems.extend(other_serial(order, unit_of(text), text));
+                problems.extend(self.other_serial(order, unit_of(text), text));
                 problems.extend(found);
                 return Verdict { warnings, ..refused(named, problems) };
             }
@@ -66,7 +66,7 @@ impl Worker {
                 return Verdict { warnings, ..refused(None, problems) };
             }
         };
-        if candidate.unit != unit.as_str() && order.options.any_serial {
+        if candidate.unit != unit.as_str() && self.takes_any_serial(order) {
             let other = &candidate.unit;
             let message =
                 format!("is \"{other}\": taken for unit {unit} all the same, as asked (any_serial)");
@@ -75,7 +75,7 @@ impl Worker {
         // That of an overlay's text may be another than that of the document below it.
         let named =
             if candidate.overlay.is_some() { unit_of(text) } else { UnitId::new(&candidate.unit).ok() };
-        problems.extend(other_serial(order, named, text));
+        problems.extend(self.other_serial(order, named, text));
         let present = self.intake.present(&unit);
         warnings.extend(present.as_ref().and_then(|present| interrupts(order, present.state)));
         let waiting = self.intake.waiting(&unit).map(|(revision, _)| revision);
@@ -91,17 +91,25 @@ impl Worker {
         }
         Verdict { unit: Some(unit), candidate: Some(candidate), problems, warnings, difference }
     }
-}
 
-/// That a document names another unit than it is meant for, whatever else is wrong with it.
-fn other_serial(order: &Order<'_>, named: Option<UnitId>, text: &str) -> Option<Problem> {
-    let (unit, other) = (order.unit.as_ref()?, named?);
-    let message = format!(
-        "is \"{other}\", but the document was meant for unit {unit}: send it to {other}, correct the serial, or say so \
-         explicitly (any_serial)"
-    );
-    let wrong = other != *unit && !order.options.any_serial;
-    wrong.then(|| policy::at_key(text, order.name, "unit", message))
+    /// Whether a document for another unit is taken. What was signed was signed for one.
+    fn takes_any_serial(&self, order: &Order<'_>) -> bool {
+        order.options.any_serial && (order.is_own() || !self.swap.require_signature)
+    }
+
+    /// That a document names another unit than it is meant for, whatever else is wrong with it.
+    fn other_serial(&self, order: &Order<'_>, named: Option<UnitId>, text: &str) -> Option<Problem> {
+        let (unit, other) = (order.unit.as_ref()?, named?);
+        let next = if self.swap.require_signature {
+            format!("have one signed for {unit} (any_serial does not count where require_signature is set)")
+        } else {
+            "correct the serial, or say so explicitly (any_serial)".to_owned()
+        };
+        let message =
+            format!("is \"{other}\", but the document was meant for unit {unit}: send it to {other}, {next}");
+        let wrong = other != *unit && !self.takes_any_serial(order);
+        wrong.then(|| policy::at_key(text, order.name, "unit", message))
+    }
 }
 
 /// What a change of the calibration does to what the unit is at.

@@ -1,6 +1,6 @@
 //! Queries and puts from the bus, and their replies.
 
-use isotherm_protocol::control::{SwapOptions, SwapReply};
+use isotherm_protocol::control::{CommandOrder, SwapOptions, SwapReply};
 use isotherm_protocol::history::Source;
 use isotherm_protocol::key::{self, UnitId};
 use serde::Serialize;
@@ -10,29 +10,32 @@ use zenoh::key_expr::keyexpr;
 use zenoh::query::Query;
 use zenoh::sample::{Sample, SampleKind};
 
-use super::command::read_order;
+use super::inbox::Origin;
 use super::order::Order;
 use super::worker::Worker;
 
+/// What stands before the name of a certificate in the audit file.
+const CERTIFIED: &str = "CN=";
 /// Entries of a history where nothing else is asked for.
 const HISTORY_ENTRIES: usize = 20;
 
 impl Worker {
     /// A query on `imu/*/calibration`: with a document it is a swap, without one it asks for the active document.
-    pub(super) fn answer_calibration(&mut self, query: &Query) {
+    pub(super) fn answer_calibration(&mut self, query: &Query, origin: Origin) {
         let Some(payload) = query.payload() else {
             self.tell_documents(query);
             return;
         };
         let asked = one_unit(query, key::parse_calibration).and_then(|unit| {
-            Ok((unit, SwapOptions::parse(query.parameters().as_str()).map_err(|e| e.to_string())?))
+            let options = SwapOptions::parse(query.parameters().as_str()).map_err(|e| e.to_string())?;
+            Ok((unit, self.with_asker(query.key_expr().as_str(), origin, options)?))
         });
         match asked {
             // The instance that speaks answers.
             Ok((unit, _)) if !self.intake.answers_for(&unit) => {}
             Ok((unit, options)) => {
                 let reply = self.bus_swap(&unit, &payload.to_bytes(), options);
-                answer_json(query, &key::calibration(&unit), &reply);
+                answer_json(query, query.key_expr().as_str(), &reply);
             }
             Err(words) => refuse(query, &words),
         }
@@ -45,7 +48,8 @@ impl Worker {
             tracing::warn!("{key}: a deletion means nothing here");
             return;
         }
-        let Some(unit) = key::parse_calibration(key).and_then(|serial| UnitId::new(serial).ok()) else {
+        let serial = key::parse_calibration(key::asker(key).0);
+        let Some(unit) = serial.and_then(|serial| UnitId::new(serial).ok()) else {
             tracing::warn!("{key} names no unit: the document is passed over");
             return;
         };
@@ -55,9 +59,10 @@ impl Worker {
         let attachment = sample.attachment().map(|bytes| bytes.to_bytes().into_owned()).unwrap_or_default();
         let options = String::from_utf8(attachment).map_err(|error| error.to_string());
         let options = options.and_then(|text| SwapOptions::parse(&text).map_err(|error| error.to_string()));
-        match options {
+        let options = options.map_err(|words| format!("attachment: {words}"));
+        match options.and_then(|options| self.with_asker(key, Origin::Bus, options)) {
             Ok(options) => drop(self.bus_swap(&unit, &sample.payload().to_bytes(), options)),
-            Err(words) => tracing::warn!(%unit, "a document is passed over: attachment: {words}"),
+            Err(words) => tracing::warn!(%unit, "a document is passed over: {words}"),
         }
     }
 
@@ -77,13 +82,16 @@ impl Worker {
     /// Replies with the text of what was accepted last for every unit that the query takes in.
     fn tell_documents(&self, query: &Query) {
         let mut told = false;
+        let asked = query.key_expr().as_str();
         for (unit, record) in &self.records {
             let key = key::calibration(unit);
-            if !is_asked(query, &key) || !self.intake.speaks_for(unit) {
+            let is_named = key::asker(asked).0 == key;
+            if !(is_named || is_asked(query, &key)) || !self.intake.speaks_for(unit) {
                 continue;
             }
             if let Some(written) = record.written() {
-                answer(query, &key, written.text.read().into_bytes(), Encoding::TEXT_PLAIN);
+                let key = if is_named { asked } else { &*key };
+                answer(query, key, written.text.read().into_bytes(), Encoding::TEXT_PLAIN);
                 told = true;
             }
         }
@@ -95,14 +103,39 @@ impl Worker {
         }
     }
 
+    /// The options of a swap with the name that is written down.
+    fn with_asker(&self, key: &str, origin: Origin, options: SwapOptions) -> Result<SwapOptions, String> {
+        Ok(SwapOptions { by: self.by(key, origin, options.by)?, ..options })
+    }
+
+    /// Who asks, for the audit file: `CN=` and the common name of the certificate where access control gives each one keys of its own,
+    /// else as stated.
+    fn by(&self, key: &str, origin: Origin, stated: String) -> Result<String, String> {
+        match key::asker(key).1 {
+            Some(name) if self.certified_names => Ok(format!("{CERTIFIED}{name}")),
+            _ if stated.starts_with(CERTIFIED) => {
+                Err(format!("by is {stated:?}: {CERTIFIED} stands before the name of a certificate alone"))
+            }
+            None if self.certified_names && origin == Origin::Bus => Err(format!(
+                "who asks must be the last part of the key, {key}/NAME, as the certificate says it (certified_names)"
+            )),
+            Some(name) => Ok(name.to_owned()),
+            None => Ok(stated),
+        }
+    }
+
     /// A query on `imu/*/command`.
-    pub(super) fn answer_command(&mut self, query: &Query) {
+    pub(super) fn answer_command(&mut self, query: &Query, origin: Origin) {
         let payload = query.payload().map(|bytes| bytes.to_bytes().into_owned()).unwrap_or_default();
-        let asked = one_unit(query, key::parse_command).and_then(|unit| Ok((unit, read_order(&payload)?)));
+        let asked = one_unit(query, key::parse_command).and_then(|unit| {
+            let order = CommandOrder::read(&payload)?;
+            let by = self.by(query.key_expr().as_str(), origin, order.by)?;
+            Ok((unit, CommandOrder { by, ..order }))
+        });
         match asked {
             Ok((unit, _)) if !self.intake.answers_for(&unit) => {}
             Ok((unit, order)) => match self.command(&unit, &order) {
-                Some(reply) => answer_json(query, &key::command(&unit), &reply),
+                Some(reply) => answer_json(query, query.key_expr().as_str(), &reply),
                 None => refuse(query, &format!("unit {unit} has not appeared: nothing was received of it")),
             },
             Err(words) => refuse(query, &words),
@@ -132,7 +165,7 @@ impl Worker {
 
 /// The unit that a query is for.
 fn one_unit(query: &Query, parse: fn(&str) -> Option<&str>) -> Result<UnitId, String> {
-    let key = query.key_expr().as_str();
+    let (key, _) = key::asker(query.key_expr().as_str());
     let serial = parse(key).ok_or_else(|| format!("{key} is not the key of a unit"))?;
     UnitId::new(serial).map_err(|error| format!("serial {serial:?} {error}: name one unit"))
 }

@@ -8,7 +8,7 @@ use isotherm_correction::operation::{Command, State};
 use isotherm_correction::prelaunch::PreLaunchSettings;
 use isotherm_correction::units::Span;
 use isotherm_protocol::control::{
-    CommandOrder, CommandReply, MAX_BY, Order, PlaceOrder, PreLaunchOrder, SwapOptions, SwapOutcome,
+    CommandOrder, CommandReply, Order, PlaceOrder, PreLaunchOrder, SwapOptions, SwapOutcome,
 };
 use isotherm_protocol::history::{AuditEvent, CommandRecord};
 use isotherm_protocol::key::UnitId;
@@ -221,19 +221,4 @@ fn words(order: &Order) -> String {
             optional("rollback", revision.as_ref().map(|revision| revision as &dyn Display))
         }
     }
-}
-
-/// An order from what a query carried.
-pub(super) fn read_order(bytes: &[u8]) -> Result<CommandOrder, String> {
-    let unreadable = |error: serde_json::Error| format!("the command cannot be read: {error}");
-    let value: serde_json::Value = serde_json::from_slice(bytes).map_err(unreadable)?;
-    // A number would be taken for the place of a command in the list of all.
-    if !value.get("command").is_some_and(serde_json::Value::is_string) {
-        return Err("the command cannot be read: \"command\" must be the name of a command".to_owned());
-    }
-    let order: CommandOrder = serde_json::from_value(value).map_err(unreadable)?;
-    if order.by.chars().count() > MAX_BY || order.by.chars().any(char::is_control) {
-        return Err(format!("by must have at most {MAX_BY} characters, none of them a control character"));
-    }
-    Ok(order)
 }

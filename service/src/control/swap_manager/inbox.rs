@@ -22,11 +22,11 @@ pub(super) enum Request {
     /// A file of the folder has changed.
     Folder(FolderEvent),
     /// A query on `imu/*/calibration`: a swap, or the active document.
-    Calibration(Query),
+    Calibration(Query, Origin),
     /// A put on `imu/*/calibration`: a swap.
     Put(Sample),
     /// A query on `imu/*/command`.
-    Command(Query),
+    Command(Query, Origin),
     /// A query on `imu/*/history`.
     History(Query),
     /// A unit has something to tell.
@@ -39,6 +39,15 @@ pub(super) enum Request {
     Lacks(Carried, oneshot::Sender<Vec<Digest>>),
     /// What another instance has written down.
     Carry(Carried),
+}
+
+/// Where an order comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Origin {
+    /// Another process.
+    Bus,
+    /// This one: the console in the browser, which asks for its token.
+    Console,
 }
 
 /// What a unit has to tell.
@@ -79,23 +88,23 @@ impl Inbox {
     }
 
     /// Hands a query on `imu/*/calibration` over.
-    pub(crate) fn calibration(&self, query: Query) {
+    pub(crate) fn calibration(&self, query: Query, origin: Origin) {
         let (unit, bytes) = (unit_of(&query, key::parse_calibration), length(&query));
-        self.ask(unit, Request::Calibration(query), bytes);
+        self.ask(unit, Request::Calibration(query, origin), bytes);
     }
 
     /// Hands a put on `imu/*/calibration` over.
     pub(crate) fn put(&self, sample: Sample) {
-        let serial = key::parse_calibration(sample.key_expr().as_str());
+        let serial = key::parse_calibration(key::asker(sample.key_expr().as_str()).0);
         let unit = serial.and_then(|serial| UnitId::new(serial).ok());
         let bytes = sample.payload().len();
         self.ask(unit, Request::Put(sample), bytes);
     }
 
     /// Hands a query on `imu/*/command` over.
-    pub(crate) fn command(&self, query: Query) {
+    pub(crate) fn command(&self, query: Query, origin: Origin) {
         let (unit, bytes) = (unit_of(&query, key::parse_command), length(&query));
-        self.ask(unit, Request::Command(query), bytes);
+        self.ask(unit, Request::Command(query, origin), bytes);
     }
 
     /// Hands a query on `imu/*/history` over.
@@ -151,8 +160,8 @@ impl Inbox {
             Refused::Ended => "the service is ending",
         };
         tracing::warn!(unit = shown, "a swap, command or question is refused: {why}");
-        if let Request::Calibration(query)
-        | Request::Command(query)
+        if let Request::Calibration(query, _)
+        | Request::Command(query, _)
         | Request::History(query)
         | Request::Kept(query) = request
         {
@@ -165,7 +174,7 @@ impl Inbox {
 
 /// The unit that a query names.
 fn unit_of(query: &Query, parse: fn(&str) -> Option<&str>) -> Option<UnitId> {
-    parse(query.key_expr().as_str()).and_then(|serial| UnitId::new(serial).ok())
+    parse(key::asker(query.key_expr().as_str()).0).and_then(|serial| UnitId::new(serial).ok())
 }
 
 fn length(query: &Query) -> usize {

@@ -4,6 +4,7 @@ use std::time::SystemTime;
 
 use isotherm_correction::units::{AngularRate, SpecificForce};
 use isotherm_protocol::document::{CURRENT_SCHEMA, Problem};
+use isotherm_protocol::history::WallTime;
 
 use super::reading::Reading;
 use super::record::Active;
@@ -69,6 +70,7 @@ pub(super) fn judge(
         doubts.push(Doubt::new("schema", settings.old_schema, "old_schema", words));
     }
     doubts.extend(active.and_then(|active| stream(candidate, active)));
+    doubts.extend(active.and_then(|active| downgrade(settings, candidate, active)));
     if let Some(present) = present {
         doubts.extend(range(settings, candidate, present));
         doubts.extend(active.into_iter().flat_map(|active| jump(settings, candidate, active, present)));
@@ -115,6 +117,22 @@ fn age(settings: &SwapSettings, candidate: &Reading, now: SystemTime) -> Option<
     }
     (age_s > limit_s).then_some(())?;
     doubt(format!("is {created}: {} days old, more than {limit_days}", age_s / DAY_S))
+}
+
+/// A document that was replaced, with a signature or not, must not come back unseen.
+fn downgrade(settings: &SwapSettings, candidate: &Reading, active: &Active) -> Option<Doubt> {
+    let in_force = active.created_unix_s?;
+    let shown = WallTime::from_unix_ms(in_force.saturating_mul(1000));
+    let words = match (&candidate.created, candidate.label.created_unix_s) {
+        (Some(created), Some(own)) if own < in_force => {
+            format!("is {created}: older than the document in force, which is of {shown}")
+        }
+        (Some(_), Some(_)) => return None,
+        _ => format!(
+            "is missing: whether the document is older than the one in force, of {shown}, cannot be said"
+        ),
+    };
+    Some(Doubt::new("created", settings.downgrade, "downgrade", words))
 }
 
 fn range<'a>(

@@ -39,6 +39,8 @@ pub(super) struct Record {
 pub(super) struct Active {
     /// Revision counter.
     pub(super) revision: u64,
+    /// When its document was made (s since 1970-01-01 UTC), where that says so.
+    pub(super) created_unix_s: Option<i64>,
     /// The compiled calibration.
     pub(super) calibration: Arc<Calibration>,
     /// Document and text; `None` for a calibration that never was a document.

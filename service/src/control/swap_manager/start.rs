@@ -37,6 +37,7 @@ impl Worker {
             let Some(current) = &plan.current else { continue };
             let active = Active {
                 revision: current.revision.counter,
+                created_unix_s: None,
                 calibration: Arc::clone(&current.calibration),
                 written: None,
             };
@@ -75,6 +76,7 @@ impl Worker {
                     continue;
                 }
             };
+            let created_unix_s = label.created_unix_s;
             let next = Installable::of_document(
                 set.revision,
                 Arc::clone(&calibration),
@@ -88,6 +90,7 @@ impl Worker {
             }
             record.active.get_or_insert(Active {
                 revision: set.revision,
+                created_unix_s,
                 calibration,
                 written: Some(written),
             });

@@ -245,7 +245,8 @@ impl Worker {
             source,
         );
         let written = Written { digest, text: reading.text.clone(), layers: layers.clone() };
-        let active = Active { revision: counter, calibration, written: Some(written) };
+        let created_unix_s = reading.label.created_unix_s;
+        let active = Active { revision: counter, created_unix_s, calibration, written: Some(written) };
         let before = self.in_force(unit).cloned();
         let record = self.records.entry(unit.clone()).or_default();
         // What a unit is given first, from its file, is no swap.

@@ -27,6 +27,8 @@ pub(crate) struct Worker {
     pub(super) swap: SwapSettings,
     pub(super) pre_launch: PreLaunchSettings,
     pub(super) in_standby: bool,
+    /// Whether who asks is who a certificate says.
+    pub(super) certified_names: bool,
     pub(super) intake: Arc<Intake>,
     pub(super) store: Store,
     /// Number of the last entry of the audit file.
@@ -63,6 +65,7 @@ impl Worker {
             swap: settings.swap.clone(),
             pre_launch: settings.pre_launch,
             in_standby: settings.unit.in_standby,
+            certified_names: settings.certified_names,
             intake,
             store,
             records: BTreeMap::new(),
@@ -156,9 +159,9 @@ impl Worker {
     fn take(&mut self, request: Request) {
         match request {
             Request::Folder(event) => self.folder_event(event),
-            Request::Calibration(query) => self.answer_calibration(&query),
+            Request::Calibration(query, origin) => self.answer_calibration(&query, origin),
             Request::Put(sample) => self.take_put(&sample),
-            Request::Command(query) => self.answer_command(&query),
+            Request::Command(query, origin) => self.answer_command(&query, origin),
             Request::History(query) => self.answer_history(&query),
             Request::Notice(unit, notice) => self.note(&unit, notice),
             Request::JudgeAgain => self.judge_bad_again(),

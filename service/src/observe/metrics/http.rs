@@ -3,9 +3,9 @@
 use std::collections::VecDeque;
 use std::convert::Infallible;
 use std::net::SocketAddr;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+use std::sync::{Arc, OnceLock};
+use std::time::{Duration, Instant};
 
 use http_body_util::Full;
 use hyper::body::{Bytes, Incoming};
@@ -24,8 +24,11 @@ use super::page::{pack, page};
 use super::source::{Look, Source, Verdict};
 use super::{Exporter, NoLook};
 
-/// Most connections at a time; a further one takes the place of the oldest that has not asked for anything yet.
+/// Most connections at a time; a further one takes the place of the oldest that has not asked for anything yet, else of the oldest that
+/// does not take its answer.
 pub(super) const MAX_CONNECTIONS: usize = 64;
+/// How long an answer may be on its way while others wait for a place.
+const TAKEN_WITHIN: Duration = Duration::from_secs(1);
 /// Longest head of a request: a scraper needs a few hundred bytes.
 pub(super) const MAX_HEAD_BYTES: usize = 8192;
 /// Most header fields of a request.
@@ -45,9 +48,17 @@ pub(crate) type Answer = Response<Full<Bytes>>;
 
 /// A connection that is being served.
 struct Open {
-    /// Whether the head of a request has come.
-    asked: Arc<AtomicBool>,
+    progress: Arc<Progress>,
     task: AbortHandle,
+}
+
+/// How far a connection is.
+#[derive(Default)]
+struct Progress {
+    /// The head of a request has come.
+    asked: AtomicBool,
+    /// The answer was made then.
+    answered: OnceLock<Instant>,
 }
 
 /// Takes connections until it is dropped, and with it every connection.
@@ -71,24 +82,37 @@ pub(super) async fn serve(listener: TcpListener, exporter: Arc<Exporter>) {
         while connections.try_join_next().is_some() {}
         open.retain(|connection| !connection.task.is_finished());
         while open.len() >= MAX_CONNECTIONS {
-            let silent = open.iter().position(|connection| !connection.asked.load(Ordering::Relaxed));
-            if let Some(silent) = silent.and_then(|silent| open.remove(silent)) {
-                silent.task.abort();
+            let idle = open.iter().position(Open::is_silent);
+            let idle = idle.or_else(|| open.iter().position(Open::is_stuck));
+            if let Some(idle) = idle.and_then(|idle| open.remove(idle)) {
+                idle.task.abort();
             } else {
-                // All of them wait for the same look.
-                connections.join_next().await;
+                // Most of them wait for the same look.
+                let _ = tokio::time::timeout(PAUSE, connections.join_next()).await;
                 open.retain(|connection| !connection.task.is_finished());
             }
         }
-        let asked = Arc::new(AtomicBool::new(false));
-        let (exporter, mark) = (Arc::clone(&exporter), Arc::clone(&asked));
+        let progress = Arc::<Progress>::default();
+        let (exporter, mark) = (Arc::clone(&exporter), Arc::clone(&progress));
         let task = connections.spawn(async move { connection(stream, &exporter, &mark).await });
-        open.push_back(Open { asked, task });
+        open.push_back(Open { progress, task });
+    }
+}
+
+impl Open {
+    /// Nothing was asked for.
+    fn is_silent(&self) -> bool {
+        !self.progress.asked.load(Ordering::Relaxed)
+    }
+
+    /// The answer is not taken.
+    fn is_stuck(&self) -> bool {
+        self.progress.answered.get().is_some_and(|answered| answered.elapsed() > TAKEN_WITHIN)
     }
 }
 
 /// Answers one request within its time.
-async fn connection(stream: TcpStream, exporter: &Arc<Exporter>, asked: &AtomicBool) {
+async fn connection(stream: TcpStream, exporter: &Arc<Exporter>, progress: &Progress) {
     // Whoever has gone already is not answered.
     let Ok(local) = stream.local_addr() else { return };
     let answering = http1::Builder::new()
@@ -101,9 +125,11 @@ async fn connection(stream: TcpStream, exporter: &Arc<Exporter>, asked: &AtomicB
         .half_close(true)
         .serve_connection(
             TokioIo::new(stream),
-            service_fn(|request| {
-                asked.store(true, Ordering::Relaxed);
-                answer(request, exporter, local)
+            service_fn(async |request| {
+                progress.asked.store(true, Ordering::Relaxed);
+                let answer = answer(request, exporter, local).await;
+                let _ = progress.answered.set(Instant::now());
+                answer
             }),
         );
     // Whoever went away or was too slow need not be told of.

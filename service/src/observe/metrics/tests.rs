@@ -259,6 +259,37 @@ async fn connections_that_say_nothing_keep_nobody_out() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn connections_that_do_not_take_their_answer_keep_nobody_out() {
+    let limits = Limits { head: LIMIT, connection: LIMIT, ..Limits::default() };
+    let endpoint = Endpoint::start_within(&on_loopback(), String::new(), Watch::default(), limits).await;
+    let endpoint = endpoint.unwrap().unwrap();
+    let settings = Settings::default();
+    // The system holds little of an answer that is not taken: a page of many units does not fit.
+    let socket = tokio::net::TcpSocket::new_v4().unwrap();
+    socket.set_send_buffer_size(1 << 14).unwrap();
+    socket.bind("127.0.0.1:0".parse().unwrap()).unwrap();
+    let listener = socket.listen(1024).unwrap();
+    let address = listener.local_addr().unwrap();
+    let serving = tokio::spawn(http::serve(listener, Arc::clone(&endpoint.exporter)));
+    let intake = fleet(include_str!("../../../../config/calibration/ZLG-0001.toml"), 200, 2);
+    endpoint.open(Source::new(&settings, (intake, pair(&settings)), Arc::<ControlStatus>::default()), None);
+    let stuck: Vec<_> = (0..http::MAX_CONNECTIONS + 8)
+        .map(|_| {
+            let mut stream = connect(address);
+            stream.write_all(b"GET /metrics HTTP/1.1\r\nHost: x\r\n\r\n").unwrap();
+            stream
+        })
+        .collect();
+    let start = Instant::now();
+    for _ in 0..10 {
+        assert_eq!(get(address, "/livez").status, 200);
+    }
+    assert!(start.elapsed() < LIMIT / 2, "{:?}", start.elapsed());
+    drop(stuck);
+    serving.abort();
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn a_connection_ends_at_its_limit_whatever_goes_on() {
     let limits = Limits { connection: Duration::from_millis(300), head: LIMIT, ..Limits::default() };
     let stand = Stand::new(good(), Watch::default(), limits).await;

@@ -237,8 +237,7 @@ impl Web {
                 (options.by, options.dry_run, question)
             }
             Route::Command(unit) => {
-                let order: CommandOrder = serde_json::from_slice(body)
-                    .map_err(|error| bad(format!("the command cannot be read: {error}")))?;
+                let order = CommandOrder::read(body).map_err(bad)?;
                 let dry_run = matches!(order.order, Order::Rollback { dry_run: true, .. });
                 (order.by, dry_run, (key::command(unit), String::new(), body.to_vec()))
             }

@@ -4,6 +4,7 @@
 //! published in its place from the last tick on that was heard of it.
 
 mod kept;
+mod output;
 
 use std::time::{Duration, Instant};
 
@@ -117,6 +118,7 @@ struct Following {
     isolated: bool,
     /// Since when it has listened for others.
     listens: Instant,
+    /// What is computed goes out all the same: the instance is active, and the stream has joined.
     also_out: bool,
     /// Calibrations that came with the journal, the newest last.
     changes: Vec<JournalEntry>,
@@ -136,7 +138,7 @@ impl Following {
 
 impl UnitActor {
     /// Another instance speaks for the unit, or may do so: nothing goes out from here on.
-    pub(crate) fn follow(&mut self, now: Instant, active: bool, footing: Footing) {
+    pub(crate) fn follow(&mut self, now: Instant, footing: Footing) {
         let doubt = footing == Footing::Doubt;
         if self.speech.following.is_some() {
             return;
@@ -153,7 +155,7 @@ impl UnitActor {
             intact: footing != Footing::Nothing,
             isolated: footing == Footing::Isolated,
             listens: now,
-            also_out: active && doubt,
+            also_out: false,
             changes: Vec::new(),
         }));
         self.status_due = true;
@@ -169,7 +171,7 @@ impl UnitActor {
         let same = first.series == self.stream.incoming_series();
         let lacks = same && last.is_some_and(|last| first.sequence > last.saturating_add(1));
         match &mut self.speech.following {
-            None if lacks => self.follow(now, false, Footing::Nothing),
+            None if lacks => self.follow(now, Footing::Nothing),
             Some(following) if following.isolated => {
                 (following.isolated, following.listens) = (false, now);
                 (following.doubt, following.intact) = (!lacks, !lacks);
@@ -209,14 +211,19 @@ impl UnitActor {
         // What an isolated unit gives out is the end of a stream that has stopped.
         let following = self.speech.following.as_mut().filter(|following| !following.isolated);
         let Some(following) = following else { return (self.outlet)(frame) };
-        let copy = following.also_out.then(|| frame.clone());
-        if following.kept.computed(frame, Instant::now()) && copy.is_some() {
+        let now = Instant::now();
+        let lacks = following.kept.computed(frame, now);
+        if !following.also_out {
+            return Ok(());
+        }
+        if lacks {
             // What is missing here the other may have: it says nothing until it has the other's memory.
             following.also_out = false;
             following.lose();
             return Ok(());
         }
-        copy.map_or(Ok(()), |frame| (self.outlet)(frame))
+        let due = following.kept.due(now, Duration::ZERO);
+        due.into_iter().map(|frame| (self.outlet)(frame)).fold(Ok(()), Result::and)
     }
 
     /// Another instance has published a frame of the unit.
@@ -235,7 +242,7 @@ impl UnitActor {
         let Some(own) = self.stream.unit().observation() else {
             // Without a calibration there is nothing to keep up with.
             if standing.yields && standing.alone_since.is_none() {
-                self.follow(now, false, Footing::Nothing);
+                self.follow(now, Footing::Nothing);
             }
             return;
         };
@@ -249,7 +256,7 @@ impl UnitActor {
         } else if standing.alone_since.is_none() && (ahead || (standing.yields && keeps_up)) {
             tracing::info!(unit = %self.stream.id(), sequence = tick.sequence, "another instance speaks: standby");
             let footing = if self.speech.uncertain { Footing::Nothing } else { Footing::All };
-            self.follow(now, false, footing);
+            self.follow(now, footing);
             if let Some(following) = &mut self.speech.following {
                 following.kept.heard(batch, now);
             }
@@ -265,7 +272,7 @@ impl UnitActor {
     pub(crate) fn hear_journal(&mut self, entry: JournalEntry, now: Instant, standing: &Standing) {
         // Another instance speaks too, and goes before this one.
         if matches!(entry.event, JournalEvent::Memory { .. }) && standing.yields && self.speaks() {
-            self.follow(now, standing.active, Footing::All);
+            self.follow(now, Footing::All);
         }
         let Some(following) = &mut self.speech.following else { return };
         let ns = following.ns(now);
@@ -311,7 +318,7 @@ impl UnitActor {
         if self.speech.following.is_none() {
             if standing.deserted && self.stream_timeout.is_over(now) {
                 tracing::info!(unit = %self.stream.id(), "neither the other instance nor the producer is heard: standby");
-                self.follow(now, standing.active, Footing::Isolated);
+                self.follow(now, Footing::Isolated);
                 self.speech.uncertain = true;
                 return wants;
             }
@@ -320,9 +327,9 @@ impl UnitActor {
             return wants;
         }
         self.catch_up(now);
+        self.publish_owed(now, standing.active);
         let Some(following) = &mut self.speech.following else { return wants };
         let joined = following.follower.has_joined();
-        following.also_out = standing.active && joined;
         let settled = following.kept.settle(now, joined && !following.follower.is_waiting());
         self.speech.compared += settled.compared;
         self.speech.differing += settled.differing;
@@ -363,16 +370,8 @@ impl UnitActor {
     /// last `overlap` is published again: of what it sent at its end, some may have come here and nowhere else.
     pub(crate) fn speak(&mut self, now: Instant, overlap: Duration) {
         let Some(following) = self.speech.following.take() else { return };
-        let Following { mut kept, doubt, changes, also_out, .. } = *following;
-        if !also_out {
-            for frame in kept.take_from(now, overlap) {
-                if let Err(error) = (self.outlet)(frame) {
-                    self.fault(crate::receive::fault::FaultKind::Unpublished, 1, || {
-                        format!("corrected: {}", isotherm_bus::words(&error))
-                    });
-                }
-            }
-        }
+        let Following { mut kept, doubt, changes, .. } = *following;
+        self.publish_kept(kept.due(now, overlap));
         if !doubt {
             self.speech.takeovers += 1;
             self.speech.memory_due = true;

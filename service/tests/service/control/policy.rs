@@ -61,6 +61,15 @@ async fn an_old_document_is_warned_about_or_refused() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn a_document_older_than_the_one_in_force_is_warned_about_or_refused() {
+    let set = |settings: &mut Settings, severity| settings.swap.downgrade = severity;
+    let older = ["created: is 2026-01-05: older than the document in force", "2999-01-01T00:00:00"];
+    policy(set, 25.0, &document(UNIT, 2.0), &older).await;
+    let undated = document(UNIT, 2.0).replace("created = 2026-01-05\n", "");
+    policy(set, 25.0, &undated, &["created: is missing: whether the document is older"]).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn a_document_that_was_fitted_elsewhere_is_warned_about_or_refused() {
     let set = |settings: &mut Settings, severity| settings.swap.outside_range = severity;
     policy(set, 55.0, &document(UNIT, 2.0), &["channel body is at 55.00 °C", "-10 to 40 °C"]).await;
@@ -86,6 +95,7 @@ async fn with_a_required_signature_an_unsigned_or_wrongly_signed_document_is_ref
     std::fs::write(keys.path().join("bench.pub"), pem).unwrap();
     let mut settings = folders.settings();
     settings.swap.require_signature = true;
+    settings.swap.downgrade = Severity::Refuse;
     settings.swap.trusted_keys = Some(keys.path().to_owned());
     let mut stand = Stand::start(settings).await;
     stand.revisions(UNIT, 10).await;
@@ -106,6 +116,22 @@ async fn with_a_required_signature_an_unsigned_or_wrongly_signed_document_is_ref
     assert_accepted(&stand.swap(UNIT, &second, &PLAIN).await, 2);
     let reply = stand.command(UNIT, r#"{"command":"rollback"}"#).await;
     assert_eq!(reply.swap.unwrap().outcome, SwapOutcome::Accepted, "it was verified when it was accepted");
+
+    // What was signed for one unit is not taken for another, and what was replaced does not come back but by a rollback.
+    let foreign = sign(&document("ZLG-9", 3.0), &trusted, Existing::Refuse).unwrap();
+    for options in [PLAIN, SwapOptions { force: true, any_serial: true, ..PLAIN }] {
+        let words = ["is \"ZLG-9\", but the document was meant for unit", "any_serial does not count"];
+        assert_refused(&stand.swap(UNIT, &foreign, &options).await, &words);
+    }
+    let newer =
+        sign(&document(UNIT, 4.0).replace("2026-01-05", "2026-03-05"), &trusted, Existing::Refuse).unwrap();
+    assert_accepted(&stand.swap(UNIT, &newer, &PLAIN).await, 4);
+    assert_refused(
+        &stand.swap(UNIT, &second, &PLAIN).await,
+        &["older than the document in force", "downgrade"],
+    );
+    let reply = stand.command(UNIT, r#"{"command":"rollback"}"#).await;
+    assert_eq!(reply.swap.unwrap().outcome, SwapOutcome::Accepted, "somebody asks for it by its revision");
 
     // A key that is taken away no longer counts, at once.
     std::fs::remove_file(keys.path().join("bench.pub")).unwrap();

@@ -13,7 +13,7 @@ use isotherm_service::{Settings, start};
 use serde_json::{Value, json};
 
 use crate::control::stand::{Folders, LIMIT, Stand, UNIT, assert_accepted, document};
-use crate::metrics::client::{Answer, connect, get, say};
+use crate::metrics::client::{Answer, connect, get, read as read_answer, say};
 
 const TOKEN: &str = "a-token-for-tests-0123456789abcdef";
 
@@ -205,7 +205,9 @@ async fn without_write_everything_can_be_seen_and_nothing_changed() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 4)]
 async fn a_swap_a_rollback_and_a_command_are_those_of_the_bus() {
     let folders = Folders::new();
-    let (mut stand, address) = stand(&folders, true).await;
+    // Whoever has the token is not asked for a certificate, and has no name of one.
+    let mut stand = Stand::start(Settings { certified_names: true, ..settings(&folders, true) }).await;
+    let address = stand.service.metrics().unwrap();
     stand.run_unit(UNIT, 20).await;
     let (swap, command) = (format!("/api/unit/{UNIT}/swap"), format!("/api/unit/{UNIT}/command"));
     let reply: isotherm_protocol::control::SwapReply =
@@ -240,6 +242,8 @@ async fn a_swap_a_rollback_and_a_command_are_those_of_the_bus() {
         assert!(answer.status == 400 && answer.body.contains(words), "{words}: {answer:?}");
     }
     assert_eq!(send(address, "POST", &command, &[], "standby").status, 400);
+    let forged = post(address, &command, &json!({ "command": "standby", "by": "CN=eve" }));
+    assert!(forged.status == 409 && forged.body.contains("the name of a certificate alone"), "{forged:?}");
     let entries = stand.history(UNIT).await;
     let by: Vec<_> = entries
         .iter()
@@ -277,6 +281,54 @@ async fn a_body_without_end_holds_nothing_up() {
     }
     assert_eq!(get(address, "/livez").status, 200);
     stand.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 4)]
+async fn malformed_requests_are_refused_and_change_nothing() {
+    let folders = Folders::new();
+    let (mut stand, address) = stand(&folders, true).await;
+    stand.run_unit(UNIT, 5).await;
+    let command = format!("/api/unit/{UNIT}/command");
+    let head = format!(
+        "POST {command} HTTP/1.1\r\nHost: {address}\r\nAuthorization: Bearer {TOKEN}\r\nOrigin: http://{address}\r\n\
+         Content-Type: application/json\r\n"
+    );
+    let order = r#"{"command":"standby","by":"eve"}"#;
+    let with = |more: &str, body: &[u8]| [head.as_bytes(), more.as_bytes(), b"\r\n", body].concat();
+    let of = |body: &[u8]| with(&format!("Content-Length: {}\r\n", body.len()), body);
+    let deep = format!("{{\"command\":{}", "[".repeat(100_000));
+    let tries: [(&str, Vec<u8>); 12] = [
+        ("TLS", b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03\r\n\r\n".to_vec()),
+        ("HTTP/2", b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n".to_vec()),
+        ("zeros", vec![0; 10_000]),
+        ("a header of zeros", with("X-Zero: \0\0\r\nContent-Length: 32\r\n", order.as_bytes())),
+        ("two lengths", with("Content-Length: 32\r\nContent-Length: 3\r\n", order.as_bytes())),
+        ("a length that is none", with("Content-Length: -1\r\n", order.as_bytes())),
+        ("a length beyond all", with("Content-Length: 99999999999999999999999\r\n", order.as_bytes())),
+        ("chunks of no size", with("Transfer-Encoding: chunked\r\n", b"zz\r\nxx\r\n0\r\n\r\n")),
+        ("an unknown coding", with("Transfer-Encoding: gzip\r\n", order.as_bytes())),
+        ("deep JSON", of(deep.as_bytes())),
+        ("no UTF-8", of(b"{\"command\":\"standby\",\"by\":\"\xff\xfe\"}")),
+        ("half of it", of(&order.as_bytes()[..20])),
+    ];
+    for (what, bytes) in tries {
+        let mut stream = connect(address);
+        // The end may come in the middle of it.
+        let _ = stream.write_all(&bytes);
+        let _ = stream.shutdown(std::net::Shutdown::Write);
+        let answer = read_answer(stream);
+        let refused = answer.as_ref().is_none_or(|answer| [400, 411, 413, 501, 505].contains(&answer.status));
+        assert!(refused, "{what}: {answer:?}");
+    }
+    // A body that comes byte by byte, and not to its end, holds up nobody.
+    let mut slow = connect(address);
+    slow.write_all(&with("Content-Length: 32\r\n", b"{")).unwrap();
+    assert_eq!(get(address, "/livez").status, 200);
+    assert_eq!(read(address, "/api/units").status, 200);
+    let history = stand.history(UNIT).await;
+    assert!(history.iter().all(|entry| !matches!(entry.event, AuditEvent::Command(_))), "{history:#?}");
+    stand.stop().await;
+    drop(slow);
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 4)]
@@ -422,8 +474,11 @@ async fn a_second_service_is_shown_and_says_nothing_of_the_unit_while_it_stands_
         let answer = read(address, "/api/units");
         let (status, units) = (answer.status, answer.json());
         let sheet = read(address, &format!("/api/unit/{UNIT}"));
-        let shown =
-            sheet.status == 200 && sheet.json()["instances"].as_array().is_some_and(|all| !all.is_empty());
+        // The list was read before the sheet.
+        let listed = units["units"].as_array().is_some_and(|rows| rows.iter().any(|row| row["unit"] == UNIT));
+        let shown = listed
+            && sheet.status == 200
+            && sheet.json()["instances"].as_array().is_some_and(|all| !all.is_empty());
         if status == 200 && shown && units["services"].as_array().unwrap().len() == 2 {
             break units;
         }

@@ -26,6 +26,8 @@ struct Frame {
     at: Instant,
     /// The other instance has published it, or a later one.
     heard: bool,
+    /// This one has published it.
+    out: bool,
 }
 
 /// A tick that was heard.
@@ -68,7 +70,7 @@ impl Kept {
         let ids: Vec<_> = ticks.iter().map(id).collect();
         let heard = ids.iter().any(|id| self.was_heard(id));
         self.heard_at.get_or_insert(now);
-        self.frames.push_back(Frame { bytes, ids, at: now, heard });
+        self.frames.push_back(Frame { bytes, ids, at: now, heard, out: false });
         if heard {
             self.frames.iter_mut().for_each(|frame| frame.heard = true);
         }
@@ -98,9 +100,9 @@ impl Kept {
     /// that was heard until now is compared.
     pub(super) fn replace(&mut self, frames: Vec<Vec<u8>>, had_joined: bool, now: Instant) {
         let before = std::mem::take(&mut self.frames);
-        let mut times: BTreeMap<Id, (Instant, bool)> = BTreeMap::new();
+        let mut marks: BTreeMap<Id, (Instant, bool, bool)> = BTreeMap::new();
         for frame in &before {
-            times.extend(frame.ids.iter().map(|id| (*id, (frame.at, frame.heard))));
+            marks.extend(frame.ids.iter().map(|id| (*id, (frame.at, frame.heard, frame.out))));
         }
         if !had_joined {
             self.since = Some(now);
@@ -108,14 +110,14 @@ impl Kept {
         for bytes in frames {
             let Ok(batch) = codec::decode::<CorrectedBatch>(&bytes) else { continue };
             let ids: Vec<_> = batch.ticks.iter().map(id).collect();
-            let known = ids.iter().rev().find_map(|id| times.get(id).copied());
+            let known = ids.iter().rev().find_map(|id| marks.get(id).copied());
             // What is older than all that was kept has been compared.
             if known.is_none() && self.frames.is_empty() && !before.is_empty() {
                 continue;
             }
-            let (at, was_heard) = known.unwrap_or((now, false));
+            let (at, was_heard, out) = known.unwrap_or((now, false, false));
             let heard = was_heard || ids.iter().any(|id| self.was_heard(id));
-            self.frames.push_back(Frame { bytes, ids, at, heard });
+            self.frames.push_back(Frame { bytes, ids, at, heard, out });
         }
         let last = self.frames.iter().rposition(|frame| frame.heard);
         for frame in self.frames.iter_mut().take(last.unwrap_or(0)) {
@@ -178,13 +180,18 @@ impl Kept {
         settled
     }
 
-    /// The frames that were not heard, and those that were heard within the last `overlap`, to be published. What the other published
-    /// otherwise is not said again.
-    pub(super) fn take_from(&mut self, now: Instant, overlap: Duration) -> Vec<Vec<u8>> {
-        let frames = std::mem::take(&mut self.frames).into_iter();
+    /// The frames that are to be published and were not yet: those that were not heard, and those that were heard within the last
+    /// `overlap`. What the other published otherwise is not said again.
+    pub(super) fn due(&mut self, now: Instant, overlap: Duration) -> Vec<Vec<u8>> {
         let recent = |frame: &Frame| now.saturating_duration_since(frame.at) <= overlap * 2;
-        let due = frames.filter(|frame| !frame.heard || (recent(frame) && self.agrees(frame)));
-        due.map(|frame| frame.bytes).collect()
+        let is_due = |frame: &Frame| !frame.out && (!frame.heard || (recent(frame) && self.agrees(frame)));
+        let due: Vec<_> = self.frames.iter().map(is_due).collect();
+        let frames = self.frames.iter_mut().zip(due).filter(|(_, due)| *due);
+        let published = frames.map(|(frame, _)| {
+            frame.out = true;
+            frame.bytes.clone()
+        });
+        published.collect()
     }
 
     /// Whether a frame is what was heard, as far as it was.
@@ -223,4 +230,67 @@ fn difference(own: &CorrectedTick, revision: Revision, heard: &Heard) -> String 
         there.flags.bits(),
         there.missed
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use isotherm_correction::units::{Span, Timestamp};
+
+    use super::*;
+
+    const TAKEOVER: Duration = Duration::from_millis(20);
+
+    fn batch(sequence: u64) -> CorrectedBatch {
+        let tick = CorrectedTick {
+            sequence,
+            end_time: Timestamp::from_ns(i64::try_from(sequence).unwrap() * 5_000_000),
+            duration: Span::from_ns(5_000_000),
+            ticks: 1,
+            ..CorrectedTick::default()
+        };
+        CorrectedBatch {
+            unit: "ZLG-0001".to_owned(),
+            revision: Revision { counter: 1, digest: [7; 8] },
+            temperatures: [].into_iter().collect(),
+            ticks: vec![tick],
+            sigmas: Vec::new(),
+        }
+    }
+
+    fn frame(sequence: u64) -> Vec<u8> {
+        codec::encode(&batch(sequence)).unwrap()
+    }
+
+    fn sequences(frames: &[Vec<u8>]) -> Vec<u64> {
+        frames.iter().map(|frame| codec::decode::<CorrectedBatch>(frame).unwrap().ticks[0].sequence).collect()
+    }
+
+    #[test]
+    fn what_a_stream_that_joined_has_made_and_nobody_was_heard_of_is_due_once() {
+        let (mut kept, start) = (Kept::default(), Instant::now());
+        for sequence in 0..4 {
+            assert!(!kept.computed(frame(sequence), start));
+        }
+        kept.heard(batch(1), start);
+        kept.replace((2..6).map(frame).collect(), false, start);
+        let late = start + TAKEOVER * 3;
+        assert_eq!(sequences(&kept.due(late, TAKEOVER)), [2, 3, 4, 5]);
+        // What the other says now it need not say again, nor does this one.
+        kept.heard(batch(5), late);
+        kept.replace((2..7).map(frame).collect(), true, late);
+        assert_eq!(sequences(&kept.due(late, TAKEOVER)), [6]);
+        assert!(kept.due(late, TAKEOVER).is_empty());
+    }
+
+    #[test]
+    fn what_was_heard_a_moment_ago_is_due_where_it_is_the_same() {
+        let (mut kept, now) = (Kept::default(), Instant::now());
+        let mut other = batch(1);
+        other.revision.counter = 2;
+        for (sequence, heard) in [(0, batch(0)), (1, other), (2, batch(2))] {
+            kept.computed(frame(sequence), now);
+            kept.heard(heard, now);
+        }
+        assert_eq!(sequences(&kept.due(now + TAKEOVER, TAKEOVER)), [0, 2]);
+    }
 }

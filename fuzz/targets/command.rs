@@ -1,0 +1,6 @@
+//! Commands in JSON.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|input: &[u8]| isotherm_fuzz::operators::command(input));

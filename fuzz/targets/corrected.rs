@@ -1,0 +1,8 @@
+//! Corrected frames.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|input: &[u8]| isotherm_fuzz::frames::frame::<isotherm_protocol::corrected::CorrectedBatch>(
+    input
+));

@@ -1,0 +1,6 @@
+//! Calibration documents.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|input: &[u8]| isotherm_fuzz::texts::document(input));

@@ -1,0 +1,6 @@
+//! Journal entries, carried out.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|input: &[u8]| isotherm_fuzz::journal::entry(input));

@@ -1,0 +1,6 @@
+//! Parts of journal entries, put together again.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|input: &[u8]| isotherm_fuzz::journal::joiner(input));

@@ -1,0 +1,6 @@
+//! Column mappings.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|input: &[u8]| isotherm_fuzz::logs::mapping(input));

@@ -1,0 +1,6 @@
+//! Raw gyro frames.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|input: &[u8]| isotherm_fuzz::frames::raw::<isotherm_correction::sample::GyroTick>(input));

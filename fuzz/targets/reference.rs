@@ -1,0 +1,6 @@
+//! Frames of rate references.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|input: &[u8]| isotherm_fuzz::frames::frame::<isotherm_protocol::reference::Reference>(input));

@@ -1,0 +1,6 @@
+//! Parameters of a swap.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|input: &[u8]| isotherm_fuzz::operators::selector(input));

@@ -1,0 +1,6 @@
+//! Status frames of units.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|input: &[u8]| isotherm_fuzz::frames::frame::<isotherm_protocol::status::Status>(input));

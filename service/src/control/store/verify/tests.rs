@@ -1,0 +1,246 @@
+//! Audit files as they are found: whole, of before, full, damaged by a crash, damaged on purpose.
+
+use std::fs;
+use std::time::{Duration, SystemTime};
+
+use isotherm_protocol::history::{AuditEvent, CommandRecord};
+use isotherm_protocol::key::UnitId;
+use tempfile::TempDir;
+
+use super::*;
+use crate::control::store::Store;
+
+fn run(store: &mut Store, count: usize) {
+    for _ in 0..count {
+        let record = CommandRecord {
+            command: "run".to_owned(),
+            accepted: true,
+            reason: None,
+            state_before: "standby".to_owned(),
+            state_after: "running".to_owned(),
+            last_sequence: None,
+            order: None,
+        };
+        let time = SystemTime::UNIX_EPOCH + Duration::from_secs(1_795_248_000);
+        let unit = UnitId::new("ZLG-1").unwrap();
+        store.append(time, Some(&unit), "ann", AuditEvent::Command(record)).unwrap();
+    }
+}
+
+/// A folder with this many entries, from a service that has stopped.
+fn written(count: usize) -> TempDir {
+    let folder = TempDir::new().unwrap();
+    run(&mut Store::open(folder.path()).unwrap().0, count);
+    folder
+}
+
+fn lines(folder: &TempDir) -> Vec<String> {
+    let text = fs::read_to_string(folder.path().join(NAME)).unwrap();
+    text.split_inclusive('\n').map(ToOwned::to_owned).collect()
+}
+
+fn write(folder: &TempDir, lines: &[String]) {
+    fs::write(folder.path().join(NAME), lines.concat()).unwrap();
+}
+
+fn found(folder: &TempDir) -> Verification {
+    verify(folder.path(), None).unwrap()
+}
+
+/// The line as a version wrote it that knew of no digests.
+fn bare(line: &str) -> String {
+    AuditEntry::from_line(line.as_bytes()).unwrap().to_line().unwrap()
+}
+
+#[test]
+fn what_a_service_has_written_holds_over_restarts_and_full_files() {
+    let folder = TempDir::new().unwrap();
+    let mut numbers = Vec::new();
+    for round in 0..4 {
+        let (mut store, _) = Store::open(folder.path()).unwrap();
+        store.full_bytes = 2_000;
+        run(&mut store, 20);
+        // While the service is there, too.
+        let found = verify(folder.path(), None).unwrap();
+        assert!(found.holds && found.files > 1, "round {round}: {:?}", found.breaks);
+        numbers.push(found.head.unwrap().number);
+        assert_eq!((found.entries, found.first, found.begins), (numbers[round], Some(1), Some(1)));
+    }
+    assert!(numbers.is_sorted() && numbers[3] > 80, "{numbers:?}");
+    // The oldest files are removed in time; what is there still holds, and says where it begins.
+    fs::remove_file(&full_files(folder.path()).unwrap()[0]).unwrap();
+    let found = verify(folder.path(), None).unwrap();
+    assert!(found.holds && found.first > Some(1), "{found:?}");
+    assert!(found.to_string().contains("older files are not there any more"), "{found}");
+    // One in the middle is missed.
+    let file = full_files(folder.path()).unwrap().remove(2);
+    fs::remove_file(file).unwrap();
+    let found = verify(folder.path(), None).unwrap();
+    let [gap] = &*found.breaks else { panic!("{found:?}") };
+    assert!(gap.words.contains("are missing before it") && gap.line == 1, "{gap}");
+}
+
+#[test]
+fn a_file_of_before_is_read_and_its_end_is_where_the_chain_begins() {
+    let folder = written(5);
+    let old: Vec<_> = lines(&folder).iter().map(|line| bare(line)).collect();
+    write(&folder, &old);
+    let found = verify(folder.path(), None).unwrap();
+    assert!(found.holds && found.begins.is_none() && found.head.is_none(), "{found:?}");
+    assert!(found.to_string().contains("no entry has a digest"), "{found}");
+    let (mut store, opened) = Store::open(folder.path()).unwrap();
+    assert_eq!((opened.entries, opened.warnings().count(), opened.losses().count()), (5, 0, 0));
+    run(&mut store, 3);
+    assert!(lines(&folder).concat().starts_with(&old.concat()), "what was there stays as it is");
+    let found = verify(folder.path(), None).unwrap();
+    assert!(found.holds, "{:?}", found.breaks);
+    assert_eq!((found.entries, found.first, found.begins), (8, Some(1), Some(6)));
+    assert!(found.to_string().contains("entries before 6 have no digest"), "{found}");
+    // It covers the last line of before.
+    let mut changed = lines(&folder);
+    let entry = AuditEntry { by: "eve".to_owned(), ..AuditEntry::from_line(old[4].as_bytes()).unwrap() };
+    changed[4] = entry.to_line().unwrap();
+    write(&folder, &changed);
+    assert_eq!(verify(folder.path(), None).unwrap().breaks[0].number, Some(6));
+}
+
+#[test]
+fn every_break_is_told_with_file_line_entry_unit_and_what_to_do() {
+    let whole = lines(&written(6));
+    let with = |change: &dyn Fn(&mut Vec<String>)| {
+        let folder = written(6);
+        let mut changed = whole.clone();
+        change(&mut changed);
+        write(&folder, &changed);
+        let found = verify(folder.path(), None).unwrap();
+        assert!(!found.holds);
+        let file = folder.path().join(NAME);
+        for broken in &found.breaks {
+            assert_eq!(broken.file, file);
+            assert!(
+                broken.to_string().starts_with(&format!("{}:{}: entry ", file.display(), broken.line)),
+                "{broken}"
+            );
+            assert!(
+                broken.to_string().contains(" of unit ZLG-1: ") && broken.words.contains("backup"),
+                "{broken}"
+            );
+        }
+        found
+            .breaks
+            .into_iter()
+            .map(|broken| (broken.line, broken.number.unwrap(), broken.words))
+            .collect::<Vec<_>>()
+    };
+    let places = |breaks: &[(u64, u64, String)]| {
+        breaks.iter().map(|(line, number, _)| (*line, *number)).collect::<Vec<_>>()
+    };
+    let changed = with(&|lines| lines[2] = lines[2].replace("\"ann\"", "\"eve\""));
+    assert!(places(&changed) == [(3, 3)] && changed[0].2.contains("checksum"), "{changed:?}");
+    let removed = with(&|lines| drop(lines.remove(2)));
+    assert!(
+        places(&removed) == [(3, 4)] && removed[0].2.contains("entry 3 is missing before it"),
+        "{removed:?}"
+    );
+    let exchanged = with(&|lines| lines.swap(2, 3));
+    assert!(
+        places(&exchanged) == [(3, 4), (4, 3)] && exchanged[1].2.contains("stands behind entry 4"),
+        "{exchanged:?}"
+    );
+    let inserted = with(&|lines| lines.insert(3, bare(&lines[3])));
+    assert!(places(&inserted) == [(4, 4)] && inserted[0].2.contains("has no digest"), "{inserted:?}");
+    let cut = with(&|lines| lines.truncate(4));
+    assert!(places(&cut) == [(4, 4)] && cut[0].2.contains("entries 5 to 6 are missing behind it"), "{cut:?}");
+}
+
+#[test]
+fn a_chain_made_anew_is_found_by_a_digest_that_was_noted() {
+    let folder = written(4);
+    let noted = found(&folder).head.unwrap();
+    assert_eq!(noted.number, 4);
+    let forged = written(6);
+    let (own, other) = (lines(&folder), lines(&forged));
+    assert_eq!(own[..4], other[..4], "the same entries have the same digests");
+    assert!(verify(forged.path(), Some(noted.digest)).unwrap().holds);
+    // Somebody who knows how it is made writes the third entry otherwise, and everything behind it.
+    let mut chain = isotherm_protocol::history::chain::Chain::default();
+    let anew: Vec<_> = own
+        .iter()
+        .map(|line| {
+            let mut entry = AuditEntry::from_line(line.as_bytes()).unwrap();
+            if entry.number == 3 {
+                entry.by = "eve".to_owned();
+            }
+            chain.line(&entry).unwrap()
+        })
+        .collect();
+    write(&folder, &anew);
+    assert!(found(&folder).holds, "the chain alone cannot tell");
+    let found = verify(folder.path(), Some(noted.digest)).unwrap();
+    let [Break { words, .. }] = &*found.breaks else { panic!("{found:?}") };
+    assert!(words.contains(&noted.digest.to_string()), "{words}");
+}
+
+#[test]
+fn what_a_crash_leaves_is_no_break() {
+    let folder = written(3);
+    let whole = lines(&folder).concat();
+    let mut torn = whole.clone();
+    torn.push_str(&lines(&folder)[2][..40]);
+    fs::write(folder.path().join(NAME), &torn).unwrap();
+    assert!(found(&folder).holds, "it is being written, or was");
+    let (mut store, opened) = Store::open(folder.path()).unwrap();
+    assert!(opened.torn.is_some());
+    run(&mut store, 1);
+    assert!(found(&folder).holds);
+    // The line feed alone is missing.
+    fs::write(folder.path().join(NAME), lines(&folder).concat().trim_end()).unwrap();
+    let found_before = found(&folder);
+    assert!(found_before.holds && found_before.entries == 4);
+    drop(store);
+    let (mut store, _) = Store::open(folder.path()).unwrap();
+    run(&mut store, 1);
+    assert!(found(&folder).holds && found(&folder).entries == 5);
+}
+
+#[test]
+fn a_damaged_line_stays_the_only_break_however_long_the_service_goes_on() {
+    for damaged in [1, 3] {
+        let folder = written(4);
+        let mut changed = lines(&folder);
+        changed[damaged] = changed[damaged].replace("running", "runs");
+        write(&folder, &changed);
+        let (mut store, opened) = Store::open(folder.path()).unwrap();
+        assert_eq!(opened.damaged, 1);
+        run(&mut store, 3);
+        let found = verify(folder.path(), None).unwrap();
+        let line = damaged as u64 + 1;
+        assert_eq!(found.breaks.iter().map(|broken| broken.line).collect::<Vec<_>>(), [line], "{found:?}");
+    }
+}
+
+#[test]
+fn files_that_others_take_away_are_missed() {
+    let folder = written(3);
+    let (mut store, _) = Store::open(folder.path()).unwrap();
+    fs::remove_file(folder.path().join(NAME)).unwrap();
+    run(&mut store, 1);
+    let found = verify(folder.path(), None).unwrap();
+    assert!(found.first > Some(1) && found.to_string().contains("older files are not there"), "{found}");
+    drop(store);
+    // While no service runs: the number tells.
+    fs::write(folder.path().join(NAME), "").unwrap();
+    run(&mut Store::open(folder.path()).unwrap().0, 1);
+    let found = verify(folder.path(), None).unwrap();
+    let [gap] = &*found.breaks else { panic!("{found:?}") };
+    assert!(gap.words.contains("are missing before it"), "{gap}");
+}
+
+#[test]
+fn a_folder_without_an_audit_file_is_an_error_that_names_it() {
+    let folder = TempDir::new().unwrap();
+    for path in [folder.path().to_owned(), folder.path().join("not/there")] {
+        let error = verify(&path, None).unwrap_err().to_string();
+        assert!(error.contains(&path.display().to_string()), "{error}");
+    }
+}
