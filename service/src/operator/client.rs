@@ -114,7 +114,10 @@ impl Client {
         payload: Option<&[u8]>,
     ) -> Result<String, ConsoleError> {
         let first = self.answers(key, parameters, payload).await?.into_iter().next();
-        let Some(bytes) = first else { return Err(self.no_answer(key).await) };
+        // Nobody who is there keeps silent: without an answer in time, this had been an error before.
+        let Some(bytes) = first else {
+            return Err(ConsoleError::Ended { key: key.to_owned(), tried: self.tried.clone() });
+        };
         String::from_utf8(bytes)
             .map_err(|error| ConsoleError::Answer { key: key.to_owned(), reason: error.to_string() })
     }

@@ -50,6 +50,17 @@ pub enum ConsoleError {
         /// Common name of the certificate.
         name: String,
     },
+    /// The connection broke between a question and its answer.
+    #[error(
+        "the connection to {tried} ended before an answer came (asked on {key}): an order may have been carried out; look with \
+         `isotherm history` and `isotherm status`, then ask again"
+    )]
+    Ended {
+        /// The key.
+        key: String,
+        /// Where the service is.
+        tried: String,
+    },
     /// The service is there, the unit is not.
     #[error("the service knows no unit {unit}; it has {}", known(units))]
     NoUnit {
