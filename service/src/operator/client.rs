@@ -114,7 +114,7 @@ impl Client {
         payload: Option<&[u8]>,
     ) -> Result<String, ConsoleError> {
         let first = self.answers(key, parameters, payload).await?.into_iter().next();
-        // Nobody who is there keeps silent: without an answer in time, this had been an error before.
+        // It ended before its time: the link broke on the way, or who heard it does not answer for the unit.
         let Some(bytes) = first else {
             return Err(ConsoleError::Ended { key: key.to_owned(), tried: self.tried.clone() });
         };

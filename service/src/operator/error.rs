@@ -50,10 +50,10 @@ pub enum ConsoleError {
         /// Common name of the certificate.
         name: String,
     },
-    /// The connection broke between a question and its answer.
+    /// A question ended before its time without an answer.
     #[error(
-        "the connection to {tried} ended before an answer came (asked on {key}): an order may have been carried out; look with \
-         `isotherm history` and `isotherm status`, then ask again"
+        "the question to {tried} ended without an answer (asked on {key}): the connection broke, or no service there speaks for the \
+         unit; an order may have been carried out: look with `isotherm status` and `isotherm history`, then ask again"
     )]
     Ended {
         /// The key.

@@ -1,4 +1,5 @@
 use std::io::Write;
+use std::net::TcpStream;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Mutex as StdMutex, PoisonError};
 use std::time::Instant;
@@ -235,23 +236,29 @@ async fn a_service_that_still_waits_is_alive_and_says_what_for() {
     assert_eq!(page.value("isotherm_healthy", &[]), Some(0.0));
 }
 
+/// Connections that have sent this and read nothing, beside which others are still answered soon.
+fn occupy(address: SocketAddr, count: usize, request: &[u8], path: &str) -> Vec<TcpStream> {
+    let send = |_| {
+        let mut stream = connect(address);
+        stream.write_all(request).unwrap();
+        stream
+    };
+    let streams = (0..count).map(send).collect();
+    let start = Instant::now();
+    for _ in 0..10 {
+        assert_eq!(get(address, path).status, 200);
+    }
+    assert!(start.elapsed() < LIMIT / 2, "{:?}", start.elapsed());
+    streams
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn connections_that_say_nothing_keep_nobody_out() {
     let limits = Limits { head: LIMIT, connection: LIMIT, ..Limits::default() };
     let stand = Stand::new(good(), Watch::default(), limits).await;
     let address = stand.endpoint.address();
-    let idle: Vec<_> = (0..http::MAX_CONNECTIONS * 3)
-        .map(|_| {
-            let mut stream = connect(address);
-            stream.write_all(b"GET /metrics HTTP/1.1\r\nHost: x\r\nX-Slow: ").unwrap();
-            stream
-        })
-        .collect();
-    let start = Instant::now();
-    for _ in 0..10 {
-        assert_eq!(get(address, "/healthz").status, 200);
-    }
-    assert!(start.elapsed() < LIMIT / 2, "{:?}", start.elapsed());
+    let request = b"GET /metrics HTTP/1.1\r\nHost: x\r\nX-Slow: ";
+    let idle = occupy(address, http::MAX_CONNECTIONS * 3, request, "/healthz");
     // The oldest have made room.
     for stream in idle.into_iter().take(http::MAX_CONNECTIONS * 2) {
         assert!(read(stream).is_none());
@@ -273,19 +280,8 @@ async fn connections_that_do_not_take_their_answer_keep_nobody_out() {
     let serving = tokio::spawn(http::serve(listener, Arc::clone(&endpoint.exporter)));
     let intake = fleet(include_str!("../../../../config/calibration/ZLG-0001.toml"), 200, 2);
     endpoint.open(Source::new(&settings, (intake, pair(&settings)), Arc::<ControlStatus>::default()), None);
-    let stuck: Vec<_> = (0..http::MAX_CONNECTIONS + 8)
-        .map(|_| {
-            let mut stream = connect(address);
-            stream.write_all(b"GET /metrics HTTP/1.1\r\nHost: x\r\n\r\n").unwrap();
-            stream
-        })
-        .collect();
-    let start = Instant::now();
-    for _ in 0..10 {
-        assert_eq!(get(address, "/livez").status, 200);
-    }
-    assert!(start.elapsed() < LIMIT / 2, "{:?}", start.elapsed());
-    drop(stuck);
+    let request = b"GET /metrics HTTP/1.1\r\nHost: x\r\n\r\n";
+    drop(occupy(address, http::MAX_CONNECTIONS + 8, request, "/livez"));
     serving.abort();
 }
 

@@ -43,7 +43,7 @@ fn write(folder: &TempDir, lines: &[String]) {
     fs::write(folder.path().join(NAME), lines.concat()).unwrap();
 }
 
-fn found(folder: &TempDir) -> Verification {
+fn verified(folder: &TempDir) -> Verification {
     verify(folder.path(), None).unwrap()
 }
 
@@ -61,7 +61,7 @@ fn what_a_service_has_written_holds_over_restarts_and_full_files() {
         store.full_bytes = 2_000;
         run(&mut store, 20);
         // While the service is there, too.
-        let found = verify(folder.path(), None).unwrap();
+        let found = verified(&folder);
         assert!(found.holds && found.files > 1, "round {round}: {:?}", found.breaks);
         numbers.push(found.head.unwrap().number);
         assert_eq!((found.entries, found.first, found.begins), (numbers[round], Some(1), Some(1)));
@@ -69,13 +69,13 @@ fn what_a_service_has_written_holds_over_restarts_and_full_files() {
     assert!(numbers.is_sorted() && numbers[3] > 80, "{numbers:?}");
     // The oldest files are removed in time; what is there still holds, and says where it begins.
     fs::remove_file(&full_files(folder.path()).unwrap()[0]).unwrap();
-    let found = verify(folder.path(), None).unwrap();
+    let found = verified(&folder);
     assert!(found.holds && found.first > Some(1), "{found:?}");
     assert!(found.to_string().contains("older files are not there any more"), "{found}");
     // One in the middle is missed.
     let file = full_files(folder.path()).unwrap().remove(2);
     fs::remove_file(file).unwrap();
-    let found = verify(folder.path(), None).unwrap();
+    let found = verified(&folder);
     let [gap] = &*found.breaks else { panic!("{found:?}") };
     assert!(gap.words.contains("are missing before it") && gap.line == 1, "{gap}");
 }
@@ -85,14 +85,14 @@ fn a_file_of_before_is_read_and_its_end_is_where_the_chain_begins() {
     let folder = written(5);
     let old: Vec<_> = lines(&folder).iter().map(|line| bare(line)).collect();
     write(&folder, &old);
-    let found = verify(folder.path(), None).unwrap();
+    let found = verified(&folder);
     assert!(found.holds && found.begins.is_none() && found.head.is_none(), "{found:?}");
     assert!(found.to_string().contains("no entry has a digest"), "{found}");
     let (mut store, opened) = Store::open(folder.path()).unwrap();
     assert_eq!((opened.entries, opened.warnings().count(), opened.losses().count()), (5, 0, 0));
     run(&mut store, 3);
     assert!(lines(&folder).concat().starts_with(&old.concat()), "what was there stays as it is");
-    let found = verify(folder.path(), None).unwrap();
+    let found = verified(&folder);
     assert!(found.holds, "{:?}", found.breaks);
     assert_eq!((found.entries, found.first, found.begins), (8, Some(1), Some(6)));
     assert!(found.to_string().contains("entries before 6 have no digest"), "{found}");
@@ -112,7 +112,7 @@ fn every_break_is_told_with_file_line_entry_unit_and_what_to_do() {
         let mut changed = whole.clone();
         change(&mut changed);
         write(&folder, &changed);
-        let found = verify(folder.path(), None).unwrap();
+        let found = verified(&folder);
         assert!(!found.holds);
         let file = folder.path().join(NAME);
         for broken in &found.breaks {
@@ -156,7 +156,7 @@ fn every_break_is_told_with_file_line_entry_unit_and_what_to_do() {
 #[test]
 fn a_chain_made_anew_is_found_by_a_digest_that_was_noted() {
     let folder = written(4);
-    let noted = found(&folder).head.unwrap();
+    let noted = verified(&folder).head.unwrap();
     assert_eq!(noted.number, 4);
     let forged = written(6);
     let (own, other) = (lines(&folder), lines(&forged));
@@ -175,7 +175,7 @@ fn a_chain_made_anew_is_found_by_a_digest_that_was_noted() {
         })
         .collect();
     write(&folder, &anew);
-    assert!(found(&folder).holds, "the chain alone cannot tell");
+    assert!(verified(&folder).holds, "the chain alone cannot tell");
     let found = verify(folder.path(), Some(noted.digest)).unwrap();
     let [Break { words, .. }] = &*found.breaks else { panic!("{found:?}") };
     assert!(words.contains(&noted.digest.to_string()), "{words}");
@@ -188,19 +188,19 @@ fn what_a_crash_leaves_is_no_break() {
     let mut torn = whole.clone();
     torn.push_str(&lines(&folder)[2][..40]);
     fs::write(folder.path().join(NAME), &torn).unwrap();
-    assert!(found(&folder).holds, "it is being written, or was");
+    assert!(verified(&folder).holds, "it is being written, or was");
     let (mut store, opened) = Store::open(folder.path()).unwrap();
     assert!(opened.torn.is_some());
     run(&mut store, 1);
-    assert!(found(&folder).holds);
+    assert!(verified(&folder).holds);
     // The line feed alone is missing.
     fs::write(folder.path().join(NAME), lines(&folder).concat().trim_end()).unwrap();
-    let found_before = found(&folder);
+    let found_before = verified(&folder);
     assert!(found_before.holds && found_before.entries == 4);
     drop(store);
     let (mut store, _) = Store::open(folder.path()).unwrap();
     run(&mut store, 1);
-    assert!(found(&folder).holds && found(&folder).entries == 5);
+    assert!(verified(&folder).holds && verified(&folder).entries == 5);
 }
 
 #[test]
@@ -213,7 +213,7 @@ fn a_damaged_line_stays_the_only_break_however_long_the_service_goes_on() {
         let (mut store, opened) = Store::open(folder.path()).unwrap();
         assert_eq!(opened.damaged, 1);
         run(&mut store, 3);
-        let found = verify(folder.path(), None).unwrap();
+        let found = verified(&folder);
         let line = damaged as u64 + 1;
         assert_eq!(found.breaks.iter().map(|broken| broken.line).collect::<Vec<_>>(), [line], "{found:?}");
     }
@@ -225,13 +225,13 @@ fn files_that_others_take_away_are_missed() {
     let (mut store, _) = Store::open(folder.path()).unwrap();
     fs::remove_file(folder.path().join(NAME)).unwrap();
     run(&mut store, 1);
-    let found = verify(folder.path(), None).unwrap();
+    let found = verified(&folder);
     assert!(found.first > Some(1) && found.to_string().contains("older files are not there"), "{found}");
     drop(store);
     // While no service runs: the number tells.
     fs::write(folder.path().join(NAME), "").unwrap();
     run(&mut Store::open(folder.path()).unwrap().0, 1);
-    let found = verify(folder.path(), None).unwrap();
+    let found = verified(&folder);
     let [gap] = &*found.breaks else { panic!("{found:?}") };
     assert!(gap.words.contains("are missing before it"), "{gap}");
 }

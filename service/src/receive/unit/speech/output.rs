@@ -11,8 +11,10 @@ impl UnitActor {
     pub(super) fn publish_owed(&mut self, now: Instant, active: bool) {
         let Some(following) = &mut self.speech.following else { return };
         following.also_out = active && following.follower.has_joined();
-        let owed = if following.also_out { following.kept.due(now, Duration::ZERO) } else { Vec::new() };
-        self.publish_kept(owed);
+        if following.also_out {
+            let owed = following.kept.due(now, Duration::ZERO);
+            self.publish_kept(owed);
+        }
     }
 
     /// Publishes frames that were kept.
