@@ -91,6 +91,11 @@ impl Client {
         }
     }
 
+    /// Where the service was looked for.
+    pub(super) fn tried(&self) -> &str {
+        &self.tried
+    }
+
     /// Every answer to a question, once somebody is there to answer it.
     pub(crate) async fn answers(
         &self,
@@ -114,10 +119,8 @@ impl Client {
         payload: Option<&[u8]>,
     ) -> Result<String, ConsoleError> {
         let first = self.answers(key, parameters, payload).await?.into_iter().next();
-        // It ended before its time: the link broke on the way, or who heard it does not answer for the unit.
-        let Some(bytes) = first else {
-            return Err(ConsoleError::Ended { key: key.to_owned(), tried: self.tried.clone() });
-        };
+        let ended = || ConsoleError::Ended { key: key.to_owned(), tried: self.tried.clone() };
+        let bytes = first.ok_or_else(ended)?;
         String::from_utf8(bytes)
             .map_err(|error| ConsoleError::Answer { key: key.to_owned(), reason: error.to_string() })
     }

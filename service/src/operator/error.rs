@@ -4,7 +4,9 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use isotherm_bus::BusError;
-use isotherm_protocol::key::UnitIdError;
+use isotherm_protocol::key::{self, UnitIdError};
+use isotherm_protocol::service_status::ServiceStatus;
+use isotherm_protocol::status::Status;
 use thiserror::Error;
 
 use crate::control::store::StoreError;
@@ -119,6 +121,16 @@ pub enum ConsoleError {
 }
 
 impl ConsoleError {
+    /// Of a unit whose status is not among those that came: nobody knows it, or its answer was lost on the way.
+    pub(super) fn unlisted(unit: &str, tried: &str, statuses: &[Status], services: &[ServiceStatus]) -> Self {
+        let is_known = |service: &ServiceStatus| service.units.iter().any(|summary| summary.unit == unit);
+        if services.is_empty() || services.iter().any(is_known) {
+            return Self::Ended { key: key::ALL_STATUS.to_owned(), tried: tried.to_owned() };
+        }
+        let units = statuses.iter().map(|status| status.unit.clone()).collect();
+        Self::NoUnit { unit: unit.to_owned(), units }
+    }
+
     /// The exit code that this error stands for.
     pub(crate) fn exit(&self) -> Exit {
         match self {

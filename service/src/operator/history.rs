@@ -9,6 +9,7 @@ use isotherm_protocol::history::{AuditEntry, AuditEvent, Source};
 use isotherm_protocol::key;
 
 use super::client::{self, Client, ClientArgs};
+use super::status::or_none;
 use super::{ConsoleError, show};
 use crate::control::store::verify;
 use crate::exit::Exit;
@@ -80,10 +81,9 @@ pub(super) async fn run(args: &HistoryArgs) -> Result<Exit, ConsoleError> {
     let parameters = format!("limit={}", if args.all { args.limit } else { MOST_ENTRIES });
     let mut entries: Vec<AuditEntry> = client.json(&key::history(&unit), &parameters, None).await?;
     if entries.is_empty() {
-        let statuses = client.statuses().await?;
+        let (statuses, services) = (client.statuses().await?, or_none(client.services().await)?);
         if !statuses.iter().any(|status| status.unit == unit.as_str()) {
-            let units = statuses.into_iter().map(|status| status.unit).collect();
-            return Err(ConsoleError::NoUnit { unit: unit.to_string(), units });
+            return Err(ConsoleError::unlisted(unit.as_str(), client.tried(), &statuses, &services));
         }
     }
     client.close().await;

@@ -79,9 +79,10 @@ pub(super) async fn run(args: &StatusArgs) -> Result<Exit, ConsoleError> {
     }
     let client = Client::open(&args.client).await?;
     let (units, services, instances) = tokio::join!(client.statuses(), client.services(), client.pairs());
+    let tried = client.tried().to_owned();
     client.close().await;
     let mut report = Report { units: units?, services: or_none(services)?, instances: or_none(instances)? };
-    select(&mut report, &args.units)?;
+    select(&mut report, &args.units, &tried)?;
     if args.json {
         return Ok(print(&report.to_json(), Exit::Ok));
     }
@@ -102,14 +103,13 @@ pub(super) fn or_none<T>(answers: Result<Vec<T>, ConsoleError>) -> Result<Vec<T>
 }
 
 /// Keeps the units that were asked for, and their services.
-fn select(report: &mut Report, serials: &[String]) -> Result<(), ConsoleError> {
+fn select(report: &mut Report, serials: &[String], tried: &str) -> Result<(), ConsoleError> {
     if serials.is_empty() {
         return Ok(());
     }
     let known = |serial: &&String| report.units.iter().any(|status| status.unit == **serial);
     if let Some(unknown) = serials.iter().find(|serial| !known(serial)) {
-        let units = report.units.iter().map(|status| status.unit.clone()).collect();
-        return Err(ConsoleError::NoUnit { unit: unknown.clone(), units });
+        return Err(ConsoleError::unlisted(unknown, tried, &report.units, &report.services));
     }
     report.units.retain(|status| serials.contains(&status.unit));
     report.services.retain(|service| report.units.iter().any(|status| status.instance == service.instance));
@@ -189,9 +189,16 @@ mod tests {
         let services = vec![samples::service(&units), other];
         let mut report = Report { services, units, instances: Vec::new() };
         let serial = |serial: &str| [serial.to_owned()];
-        let error = select(&mut report, &serial("ZLG-9999")).unwrap_err().to_string();
+        let refused = |report: &mut Report, unit| {
+            let error = select(report, &serial(unit), "here").unwrap_err().to_string();
+            report.units.retain(|status| status.unit != "ZLG-0002");
+            error
+        };
+        let error = refused(&mut report, "ZLG-9999");
         assert!(error.contains("no unit ZLG-9999; it has ZLG-0001, ZLG-0002"), "{error}");
-        select(&mut report, &serial("ZLG-0003")).unwrap();
+        let error = refused(&mut report, "ZLG-0002");
+        assert!(error.contains("ended without an answer"), "its service has it: {error}");
+        select(&mut report, &serial("ZLG-0003"), "here").unwrap();
         assert_eq!((report.units.len(), report.services.len()), (1, 1));
         let page = tone::text(&pages(&report, 80), false);
         assert!(page.starts_with("○ ZLG-0003  standby"), "{page}");
