@@ -92,6 +92,7 @@ fn effects(report: &mut Report, instrument: &Instrument) {
         report.numbers(key, &[gyro.gradient_rad_per_s_per_k, gyro.supply_rad_per_s_per_v], ANY);
         report.number(key, gyro.scale_asymmetry, (-0.1, 0.1));
         report.number(key, gyro.scale_curvature_s2_per_rad2, (-1.0, 1.0));
+        report.number(key, gyro.delay_ticks, (0.0, 1.0));
         play(report, key, gyro.play);
     }
     for (index, accel) in accelerometers.iter().enumerate() {
@@ -99,6 +100,7 @@ fn effects(report: &mut Report, instrument: &Instrument) {
         report.numbers(key, &accel.position_m, (-10.0, 10.0));
         report.numbers(key, &[accel.gradient_m_per_s2_per_k, accel.supply_m_per_s2_per_v], ANY);
         report.number(key, accel.second_order_s2_per_m, (-1.0, 1.0));
+        report.number(key, accel.delay_ticks, (0.0, 1.0));
         play(report, key, accel.play);
     }
 }

@@ -59,6 +59,8 @@ pub struct GyroEffects {
     pub scale_asymmetry: f64,
     /// Curvature c of the scale over the rate ((rad/s)⁻²): the gyro senses R·(1 + c·R²), R the mean rate of the tick.
     pub scale_curvature_s2_per_rad2: f64,
+    /// By how much of a tick its reading lags: a tick's is that of a span so much earlier.
+    pub delay_ticks: f64,
     /// Friction in what follows temperature.
     pub play: Option<Play>,
     /// Bias by the gradient across it, its own temperature less that of the housing (rad/s per K).
@@ -75,6 +77,8 @@ pub struct AccelerometerEffects {
     pub position_m: [f64; 3],
     /// Second-order term K2 (1/(m/s²)): it senses f + K2·f², f along its axis at every instant.
     pub second_order_s2_per_m: f64,
+    /// By how much of a tick its reading lags, as for gyros.
+    pub delay_ticks: f64,
     /// Friction in what follows temperature.
     pub play: Option<Play>,
     /// Error by the gradient across it, its own temperature less that of the housing (m/s² per K).
@@ -182,6 +186,8 @@ pub(crate) struct Sensed<'a> {
 struct Felt {
     /// Mean rate (rad/s) and its mean change (rad/s²).
     mean_change: Vector,
+    /// Integral of the specific force (m/s).
+    velocity: Vector,
     /// Rate and specific force at instants of the tick, each with its share of it.
     instants: Vec<(f64, Vector, Vector)>,
 }
@@ -220,6 +226,11 @@ impl EffectsState {
             (Some(_), state) => housing_deg_c + state.error.at(share),
             (None, _) => housing_deg_c,
         })
+    }
+
+    /// By how much of a tick a gyro's reading lags.
+    pub(crate) fn gyro_delay_ticks(&self, index: usize) -> f64 {
+        self.gyros.get(index).map_or(0.0, |(gyro, _)| gyro.delay_ticks)
     }
 
     /// Whether gyros have any.
@@ -281,13 +292,20 @@ impl EffectsState {
         if self.accelerometers.is_empty() {
             return Sensors::new();
         }
-        let felt = Felt::of(trajectory, middle_s, length_s);
+        let on_time = Felt::of(trajectory, middle_s, length_s);
         let beyond_v = self.beyond_v(middle_s);
         let sensors = self.accelerometers.iter().zip(axes()).zip(sensors_deg_c);
         sensors
             .map(|(((accel, play), axis), deg_c)| {
                 let arm = accel.position_m;
+                let late = (accel.delay_ticks != 0.0)
+                    .then(|| Felt::of(trajectory, middle_s - accel.delay_ticks * length_s, length_s));
+                let felt = late.as_ref().unwrap_or(&on_time);
                 let mut sum = dot(axis, cross(felt.mean_change, arm));
+                if let Some(late) = &late {
+                    sum +=
+                        dot(axis, scale(add(late.velocity, scale(on_time.velocity, -1.0)), 1.0 / length_s));
+                }
                 for (weight, rate, force) in &felt.instants {
                     let along = dot(axis, *force);
                     let centripetal = dot(axis, cross(*rate, cross(*rate, arm)));
@@ -325,6 +343,7 @@ impl Felt {
         });
         Self {
             mean_change: scale(add(ends[0], scale(ends[1], -1.0)), 1.0 / length_s),
+            velocity: trajectory.increments(middle_s, length_s).velocity,
             instants: instants.collect(),
         }
     }

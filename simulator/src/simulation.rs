@@ -124,15 +124,21 @@ impl Simulation {
         length_s: f64,
         axes: &Sensors<[f64; 3]>,
     ) -> (Sensors<[f64; 2]>, [Increments; 2]) {
-        let (first, second) = if self.gyros.is_dithered() {
-            let half_s = 0.5 * length_s;
-            let half = |sign: f64| self.trajectory.increments(middle_s + sign * 0.5 * half_s, half_s);
-            (half(-1.0), half(1.0))
-        } else {
-            (self.trajectory.increments(middle_s, length_s), Increments::default())
+        let parts = |middle_s: f64| {
+            if self.gyros.is_dithered() {
+                let half_s = 0.5 * length_s;
+                [-1.0, 1.0].map(|sign| self.trajectory.increments(middle_s + sign * 0.5 * half_s, half_s))
+            } else {
+                [self.trajectory.increments(middle_s, length_s), Increments::default()]
+            }
         };
-        let halves = axes.iter().map(|&axis| [dot(axis, first.angle), dot(axis, second.angle)]);
-        (halves.collect(), [first, second])
+        let on_time = parts(middle_s);
+        let halves = axes.iter().enumerate().map(|(index, &axis)| {
+            let delay_ticks = self.effects.gyro_delay_ticks(index);
+            let sensed = if delay_ticks == 0.0 { on_time } else { parts(middle_s - delay_ticks * length_s) };
+            sensed.map(|part| dot(axis, part.angle))
+        });
+        (halves.collect(), on_time)
     }
 
     fn fail_gyros(&mut self, output: &mut GyroOutput, time_s: f64) {

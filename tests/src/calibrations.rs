@@ -66,6 +66,7 @@ pub fn plain_gyro() -> GyroParts {
         trend: None,
         servo: None,
         drift: None,
+        delay_ticks: 0.0,
         sigma: None,
     }
 }
@@ -81,6 +82,7 @@ pub fn plain_accel() -> AccelParts {
         board_ratio: None,
         position_m: [0.0; 3],
         input_limit: 1e6,
+        delay_ticks: 0.0,
         sigma: None,
     }
 }

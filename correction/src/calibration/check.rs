@@ -94,6 +94,10 @@ pub(super) fn compile(parts: &CalibrationParts) -> Result<Calibration, Vec<Defec
                 gyros_in_motion,
                 accels_in_motion,
                 parts.accels.iter().map(|accel| accel.position_m),
+                [
+                    parts.gyros.iter().map(|gyro| gyro.delay_ticks).collect(),
+                    parts.accels.iter().map(|accel| accel.delay_ticks).collect(),
+                ],
             ),
             sigma: sigma_model(parts, &models, &accels).map(Box::new),
             trends: Trends::of(&models).map(Box::new),

@@ -66,6 +66,8 @@ pub struct GyroParts {
     pub servo: Option<ServoParts>,
     /// What the drift estimator is to expect; `None`: it is not run for this gyro.
     pub drift: Option<DriftParts>,
+    /// By how much of a tick its reading lags behind the tick's time, 0…1.
+    pub delay_ticks: f64,
     /// Its standard errors; where a sensor states any, σ goes out with every output.
     pub sigma: Option<SigmaParts>,
 }
@@ -214,6 +216,8 @@ pub struct AccelParts {
     pub board_ratio: Option<CurveParts>,
     /// Where it sits, from the point whose specific force is published, in case axes (m).
     pub position_m: [f64; 3],
+    /// By how much of a tick its reading lags behind the tick's time, 0…1.
+    pub delay_ticks: f64,
     /// Outputs of this magnitude and above are flagged overrange (counts per tick, or output units).
     pub input_limit: f64,
     /// Its standard errors.

@@ -77,6 +77,7 @@ fn parts() -> CalibrationParts {
         trend: Some(TrendParts { coefficients: vec![deg_per_h(0.5), 1e-10], interval_s: [0.0, 10.0] }),
         servo: None,
         drift: None,
+        delay_ticks: 0.0,
         sigma: None,
     };
     let accel = |bias: f64| AccelParts {
@@ -87,6 +88,7 @@ fn parts() -> CalibrationParts {
         board_ratio: Some(polynomial(&[1.0, 2e-5], [-30.0, 85.0])),
         position_m: [0.0; 3],
         input_limit: 1e3,
+        delay_ticks: 0.0,
         sigma: None,
     };
     CalibrationParts {

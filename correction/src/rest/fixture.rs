@@ -37,6 +37,7 @@ pub(crate) fn calibration(output: OutputKind, count: f64, accels: bool) -> Calib
         trend: None,
         servo: None,
         drift: None,
+        delay_ticks: 0.0,
         sigma: None,
     };
     let accel = AccelParts {
@@ -51,6 +52,7 @@ pub(crate) fn calibration(output: OutputKind, count: f64, accels: bool) -> Calib
         board_ratio: None,
         position_m: [0.0; 3],
         input_limit: 1e9,
+        delay_ticks: 0.0,
         sigma: None,
     };
     let parts = CalibrationParts {

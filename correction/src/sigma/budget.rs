@@ -203,7 +203,7 @@ impl Watched<'_> {
 
     /// What the gyros' noise does through α × r along the input axis of an accelerometer away from the reference point.
     fn size_effect(&self, accels: &Resolved<'_>, lane: usize, angle: &Causes) -> f64 {
-        let Some(motion) = self.calibration.motion.as_deref().filter(|motion| motion.has_positions()) else {
+        let Some(motion) = self.calibration.motion.as_deref().filter(|motion| motion.has_positions) else {
             return 0.0;
         };
         let position = array::from_fn(|axis| motion.positions_m[axis][lane]);

@@ -1,4 +1,4 @@
-//! What few units have: terms whose features follow the unit's motion (models §2, §3; IEEE 528).
+//! What few units have: terms whose features follow the unit's motion (models §2, §3; IEEE 528), and sensors that lag behind others.
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;
@@ -12,7 +12,7 @@ use crate::calibration::{AccelParts, GyroParts, RegressorParts};
 use crate::channel::{ThermalFilter, ThermalState};
 use crate::curve::{Curve, CurveError};
 use crate::lanes::Lanes;
-use crate::sample::MAX_SENSORS;
+use crate::sample::{MAX_SENSORS, Sensors};
 
 /// A sensor's terms that follow motion, compiled.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -90,6 +90,12 @@ pub(crate) struct Motion {
     pub(crate) feels_force: bool,
     /// Where the accelerometers sit, axis by axis (m).
     pub(crate) positions_m: [Lanes; 3],
+    /// By how much of a tick gyros and accelerometers are held back, to go with the sensor that lags most.
+    pub(crate) held_back_ticks: [Lanes; 2],
+    /// Whether an accelerometer sits elsewhere than at the reference point.
+    pub(crate) has_positions: bool,
+    /// Whether a sensor lags less than another.
+    pub(crate) holds_back: bool,
 }
 
 impl Motion {
@@ -98,18 +104,35 @@ impl Motion {
         gyros: Vec<MotionTerms>,
         accels: Vec<MotionTerms>,
         positions_m: impl Iterator<Item = [f64; 3]>,
+        delays_ticks: [Sensors<f64>; 2],
     ) -> Option<Box<Self>> {
         let mut lanes = [[0.0; MAX_SENSORS]; 3];
         for (lane, position) in positions_m.take(MAX_SENSORS).enumerate() {
             lanes.iter_mut().zip(position).for_each(|(axis, metres)| axis[lane] = metres);
         }
+        let longest = delays_ticks.iter().flatten().copied().fold(0.0, f64::max);
+        let held_back_ticks = delays_ticks.map(|delays| {
+            let mut lanes = [0.0; MAX_SENSORS];
+            lanes.iter_mut().zip(delays).for_each(|(lane, delay)| *lane = longest - delay);
+            lanes
+        });
         let feels_force = gyros.iter().any(|gyro| gyro.terms.feel_force());
-        let motion = Self { gyros, accels, feels_force, positions_m: lanes };
+        let differs = |lane: &f64| *lane != 0.0;
+        let motion = Self {
+            gyros,
+            accels,
+            feels_force,
+            has_positions: lanes.iter().flatten().any(differs),
+            positions_m: lanes,
+            holds_back: held_back_ticks.iter().flatten().any(differs),
+            held_back_ticks,
+        };
         (!motion.is_empty()).then(|| Box::new(motion))
     }
 
     fn is_empty(&self) -> bool {
-        self.gyros.iter().chain(&self.accels).all(MotionTerms::is_empty) && !self.has_positions()
+        let has_terms = self.gyros.iter().chain(&self.accels).any(|terms| !terms.is_empty());
+        !(has_terms || self.has_positions || self.holds_back)
     }
 
     /// Whether a gyro's weight follows its rate.
@@ -120,10 +143,5 @@ impl Motion {
     /// Whether an accelerometer has a second-order term.
     pub(crate) fn has_squares(&self) -> bool {
         self.accels.iter().any(|accel| !accel.terms.is_empty())
-    }
-
-    /// Whether an accelerometer sits elsewhere than at the reference point.
-    pub(crate) fn has_positions(&self) -> bool {
-        self.positions_m.iter().flatten().any(|metres| *metres != 0.0)
     }
 }

@@ -1,12 +1,13 @@
 //! One tick through every model, sensor beside sensor, in the order of the signal path.
 //!
-//! scale and bias per gyro (with the mode's sign) → perimeter-servo transient → four-step substitution → case axes;
-//! accelerometers: bias, scale and board ratio → case axes.
+//! scale and bias per gyro (with the mode's sign) → perimeter-servo transient → four-step substitution → delays → case axes;
+//! accelerometers: bias, scale and board ratio → delays → case axes.
 //!
 //! Every tick goes this way. A sensor that cannot be taken as it stands is put right [on its lane](patch).
 
 mod accels;
 mod gyros;
+mod held;
 mod motion;
 mod patch;
 mod sigma;
@@ -178,7 +179,7 @@ impl Corrector {
         if restart {
             self.thermal.restart(calibration);
             self.servo.reset();
-            self.motion.interrupt();
+            self.motion.restart();
             self.slew = None;
         }
         if waiting.is_due(time, delay) {
@@ -192,7 +193,7 @@ impl Corrector {
             self.slew = None;
         }
         let slewing = self.slew.as_ref().is_some_and(|slew| slew.motion.is_some());
-        self.moves = calibration.motion.is_some() | slewing;
+        self.moves = calibration.motion.is_some() | slewing | self.motion.held.is_some();
         // Four lanes fill two registers of every x86-64, and suffice for most units.
         if calibration.gyros.len().max(calibration.accels.len()) <= 4 {
             self.correct_lanes::<4>(calibration, tick, counters, out);

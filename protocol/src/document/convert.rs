@@ -123,6 +123,7 @@ impl Document {
             trend: sensor.trend.as_ref().map(trend),
             servo: sensor.servo.as_ref().map(servo),
             drift: sensor.drift.as_ref().map(drift),
+            delay_ticks: sensor.delay_ticks.unwrap_or_default(),
             sigma: sigma::of_gyro(sensor),
         }
     }
@@ -139,6 +140,7 @@ impl Document {
             scale_factor: sensor.scale_factor.to_parts(0.0),
             terms: self.term_parts(&sensor.terms()),
             position_m: sensor.position_m.unwrap_or_default(),
+            delay_ticks: sensor.delay_ticks.unwrap_or_default(),
             board_ratio: sensor.board_ratio_error.as_ref().map(|curve| curve.to_parts(1.0)),
             input_limit: input_limit.unwrap_or(NO_LIMIT),
             sigma: sigma::of_accel(sensor),

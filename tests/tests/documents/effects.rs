@@ -348,3 +348,55 @@ fn what_goes_with_a_gradient_and_with_the_supply_is_removed() {
     let [floor, with, left] = judged(&scenario, state, |document, scenario| errors(document, scenario).1);
     assert!(with > 0.5 && left < floor + 0.03 * with, "mg: {with} {left} {floor}");
 }
+
+/// Angle and velocity of a tick.
+type Increments = [[f64; 3]; 2];
+
+/// Every tick's increments of a simulated unit, after the filters have settled.
+fn increments(document: &Document, scenario: &Scenario) -> Vec<Increments> {
+    let mut ticks = Vec::new();
+    run(&compile(document), scenario, |_, tick| ticks.push([tick.delta_angle, tick.delta_velocity])).unwrap();
+    ticks.split_off(2000)
+}
+
+#[test]
+fn delays_of_sensors_against_one_another_are_removed() {
+    let delays_ticks = ([0.2, 0.55, 0.0], [0.7, 0.1, 0.35]);
+    let late = |gyros: [f64; 3], accels: [f64; 3]| {
+        let gyro = |delay_ticks| GyroEffects { delay_ticks, ..GyroEffects::default() };
+        let accel = |delay_ticks| AccelerometerEffects { delay_ticks, ..AccelerometerEffects::default() };
+        let (gyros, accelerometers) = (gyros.map(gyro).to_vec(), accels.map(accel).to_vec());
+        Effects { gyros, accelerometers, ..Effects::default() }
+    };
+    let shaken = Path::Sculling {
+        axis: [1.0, -0.8, 0.6],
+        amplitude_deg: 10.0,
+        frequency_hz: 1.0,
+        vibration_axis: [1.0, -1.0, 1.0],
+        vibration_m_per_s2: 5.0,
+        vibration_phase_deg: 20.0,
+    };
+    let apart = scenario(shaken, late(delays_ticks.0, delays_ticks.1));
+    let mut together = apart.clone();
+    together.instrument.effects = late([0.7; 3], [0.7; 3]);
+
+    let mut stated = document();
+    let accels = &mut stated.accel.as_mut().unwrap().sensor;
+    accels.iter_mut().zip(delays_ticks.1).for_each(|(sensor, ticks)| sensor.delay_ticks = Some(ticks));
+    let gyros = stated.gyro.sensor.iter_mut().zip(delays_ticks.0);
+    gyros.for_each(|(sensor, ticks)| sensor.delay_ticks = Some(ticks));
+    let [right, raw, held] =
+        [(&document(), &together), (&document(), &apart), (&stated, &apart)].map(|(d, s)| increments(d, s));
+    for (part, what) in ["angle (µrad)", "velocity (µm/s)"].into_iter().enumerate() {
+        let off = |ticks: &[Increments]| {
+            let pairs = ticks.iter().zip(&right);
+            let errors = |axis: usize| {
+                pairs.clone().map(move |(tick, right)| (tick[part][axis] - right[part][axis]) * 1e6)
+            };
+            (0..3).map(|axis| Size::of(errors(axis)).rms).fold(0.0, f64::max)
+        };
+        let (with, left) = (off(&raw), off(&held));
+        println!("{what}: as it stands {with:.3}, held back {left:.3}");
+        assert!(with > 100.0 && left < 0.01 * with, "{what}: {with} {left}");
+    }
+}

@@ -171,3 +171,31 @@ fn i5_the_mode_dependent_bias_leaves_no_trace() {
         assert!(tick.delta_angle.iter().all(|angle| angle.abs() < 1e-17), "{tick:?}");
     }
 }
+
+#[test]
+fn i5_a_gyro_that_is_held_back_loses_nothing_and_the_next_tick_is_flagged_too() {
+    let parts = ReversalParts::default();
+    let calibration = |delay_ticks| {
+        let mut stated = mode_reversed(parts);
+        stated.gyros[1].delay_ticks = delay_ticks;
+        compile(&stated)
+    };
+    let n = u64::from(Reversal::new(&parts).unwrap().transition_ticks(Span::from_s(TICK_S)));
+    let ticks: Vec<_> = (0..TICKS).map(|k| raw(k, 1.0, 0.3, &[LAST_GOOD + 1], n)).collect();
+    let [plain, held] = [0.0, 0.6]
+        .map(|delay| drive::run(&mut drive::unit(&calibration(delay)), &[Owned::Gyro(ticks.clone())]));
+    let angle = |out: &[CorrectedTick]| out.iter().map(|tick| tick.delta_angle[0]).sum::<f64>();
+    // The first tick is taken to go on what was before it; the last one holds part of itself back.
+    let (first, before, last) = (&plain[0], &plain[plain.len() - 2], &plain[plain.len() - 1]);
+    let step = last.delta_angle[0] - before.delta_angle[0];
+    let ends = 0.6 * (first.delta_angle[0] - last.delta_angle[0]) - 0.5 * 0.6 * 0.4 * step;
+    assert!((angle(&held) - angle(&plain) - ends).abs() < 1e-15, "{} {}", angle(&held), angle(&plain));
+    let marked = |out: &[CorrectedTick]| {
+        let marks = TickFlags::INTERPOLATED | TickFlags::ANGLE_RESTORED;
+        let marked = out.iter().filter(|tick| tick.flags.intersects(marks));
+        marked.map(|tick| tick.sequence).collect::<Vec<_>>()
+    };
+    let (plain, held) = (marked(&plain), marked(&held));
+    assert!(plain.iter().all(|k| held.contains(k)), "{plain:?} {held:?}");
+    assert_eq!(held.last().copied(), plain.last().map(|k| k + 1), "{plain:?} {held:?}");
+}

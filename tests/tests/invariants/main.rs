@@ -7,6 +7,7 @@
     reason = "what does not hold ends the test"
 )]
 
+mod delays;
 mod i1_each_tick_once;
 mod i2_memory;
 mod i2_timing_does_not_matter;

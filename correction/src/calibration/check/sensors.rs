@@ -26,6 +26,7 @@ pub(super) fn gyro_model(
     checker.at(Section::Gyro(index)).channel("channel", gyro.channel);
     checker.positive("increment_weight", gyro.increment_weight.abs());
     checker.positive("input_limit", gyro.input_limit);
+    checker.within("delay_ticks", gyro.delay_ticks, 0.0, 1.0);
     terms(checker, (gyro.channel, &gyro.terms), &GYRO_TERMS, parts);
     if let Some(TrendParts { coefficients, interval_s }) = &gyro.trend {
         checker.coefficients("trend.coefficients", coefficients, 3);
@@ -62,6 +63,7 @@ pub(super) fn accel_model(
         checker.within("position_m", metres, -MOST_POSITION_M, MOST_POSITION_M);
     }
     checker.positive("input_limit", accel.input_limit);
+    checker.within("delay_ticks", accel.delay_ticks, 0.0, 1.0);
     terms(checker, (accel.channel, &accel.terms), &ACCEL_TERMS, parts);
     sigma(checker, accel.sigma.as_ref());
     let model = AccelModel::new(accel, filter, &mut |field, error| checker.push(field, error))?;

@@ -76,6 +76,7 @@ impl Corrector {
             out.accel_flags = of_sensors([SensorFlags::empty(); MAX_SENSORS], count);
             out.flags |= TickFlags::ACCELEROMETER_MISSING | TickFlags::VELOCITY_INVALID;
             counters.accel_missing += 1;
+            self.miss_accels();
             return None;
         };
         // The corrected tick has the gyro tick's time.
@@ -114,6 +115,10 @@ impl Corrector {
         out.accel_flags = of_sensors(flags, count);
         if self.moves {
             self.remove_squares(calibration, shares, &mut forces);
+            if self.holds_back(calibration) {
+                let held = (&mut forces, &mut usable);
+                self.hold_accels_back(calibration, tick.released, duration_s, held);
+            }
         }
         Some(Felt { forces, usable, within, duration_s })
     }

@@ -119,7 +119,7 @@ impl Corrector {
             mark_clamped(&mut flags, clamped);
         }
         // Before the substitution: the angle that it restores is a lump, not a rate.
-        let rates: [f64; N] = increments.map(|increment| increment / duration_s);
+        let mut rates: [f64; N] = increments.map(|increment| increment / duration_s);
         if sound {
             put(&mut self.last_rates, rates);
             self.gyro_health.note_sound();
@@ -143,6 +143,11 @@ impl Corrector {
         out.flags |= self.substitute(calibration, input, &mut increments[..count]);
         if out.flags.intersects(SWITCHING) {
             count_switch_flags(out.flags, counters);
+        }
+        if self.moves && self.holds_back(calibration) {
+            let held = (&mut increments, &mut usable);
+            let held = self.hold_gyros_back(calibration, tick.released, &mut out.flags, held);
+            rates = held.unwrap_or(rates);
         }
         self.seen.settled = !lost && self.slew.is_none() && !out.flags.intersects(UNSETTLED);
         self.resolve_angle(calibration, usable, (&increments, &rates), counters, out);

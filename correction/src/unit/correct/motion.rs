@@ -1,11 +1,13 @@
 //! What follows the unit's motion: drift with acceleration, weights that depend on the rate, squares of forces, and accelerometers
 //! away from the reference point (models §2, §3).
 
+use alloc::boxed::Box;
 use core::array;
 
 use serde::{Deserialize, Serialize};
 
 use super::Corrector;
+use super::held::HeldBack;
 use crate::calibration::Calibration;
 use crate::lanes::{Lanes, narrow};
 use crate::orientation::SensorMask;
@@ -24,12 +26,14 @@ pub(in crate::unit) struct MotionInUse {
 }
 
 /// Motion of the last ticks, in case axes.
-#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(super) struct MotionMemory {
     /// Last specific force to be trusted (m/s²).
     force: [f64; 3],
     /// Angular rates of the last two ticks without a gap (rad/s), the latest first, with the middles of the ticks.
     rates: [Option<([f64; 3], Timestamp)>; 2],
+    /// What is held back; `None` where nothing is.
+    pub(super) held: Option<Box<HeldBack>>,
 }
 
 impl MotionMemory {
@@ -55,8 +59,14 @@ impl MotionMemory {
     }
 
     /// Forgets rates: what comes next does not follow them without a gap.
-    pub(super) fn interrupt(&mut self) {
+    fn interrupt(&mut self) {
         self.rates = [None; 2];
+    }
+
+    /// Forgets what came before: another series begins.
+    pub(super) fn restart(&mut self) {
+        self.interrupt();
+        self.held = None;
     }
 }
 
@@ -99,9 +109,23 @@ impl Corrector {
     }
 
     /// What follows motion, and what did before a swap that is on its way.
-    fn motions<'a>(&'a self, calibration: &'a Calibration) -> impl Iterator<Item = &'a Motion> {
+    pub(super) fn motions<'a>(&'a self, calibration: &'a Calibration) -> impl Iterator<Item = &'a Motion> {
         let old = self.slew_from_motion().map(|old| &old.motion);
         calibration.motion.as_deref().into_iter().chain(old)
+    }
+
+    /// A number of each sensor, on its way from the old one.
+    pub(super) fn on_its_way<const N: usize>(
+        &self,
+        calibration: &Calibration,
+        of: impl Fn(&Motion) -> &Lanes,
+    ) -> [f64; N] {
+        let lanes = |motion: Option<&Motion>| motion.map_or([0.0; N], |motion| *narrow(of(motion)));
+        let new = lanes(calibration.motion.as_deref());
+        self.slewing().map_or(new, |slewing| {
+            let old = lanes(slewing.from.motion.as_ref().map(|old| &old.motion));
+            array::from_fn(|lane| between(new[lane], old[lane], slewing.share))
+        })
     }
 
     /// Adds to the gyros' biases (rad/s) what follows motion; `rates` are those that the gyros read (rad/s), before any bias is
@@ -200,27 +224,16 @@ impl Corrector {
         out: &CorrectedTick,
         forces: &mut [f64; N],
     ) {
-        if !self.motions(calibration).any(Motion::has_positions) {
+        if !self.motions(calibration).any(|motion| motion.has_positions) {
             return;
         }
-        let new = calibration.motion.as_deref().map(|motion| &motion.positions_m);
-        let old = self.slewing().and_then(|slewing| {
-            let old = slewing.from.motion.as_ref()?;
-            Some((old.motion.positions_m, slewing.share))
-        });
+        let positions: [[f64; N]; 3] =
+            array::from_fn(|axis| self.on_its_way(calibration, |motion| &motion.positions_m[axis]));
         let (rate, acceleration) = self.turning(missed, out);
         let (Some(orientation), Some(axes)) = (&calibration.accel_orientation, &self.thermal.accel_axes)
         else {
             return;
         };
-        let positions: [[f64; N]; 3] = array::from_fn(|axis| {
-            let mut here = new.map_or([0.0; N], |positions| *narrow(&positions[axis]));
-            if let Some((old, share)) = &old {
-                let old = narrow::<N>(&old[axis]);
-                here = array::from_fn(|lane| between(here[lane], old[lane], *share));
-            }
-            here
-        });
         let turned = cross_lanes(rate, &cross_lanes(rate, &positions));
         let hastened = cross_lanes(acceleration, &positions);
         let felt: [[f64; N]; 3] =

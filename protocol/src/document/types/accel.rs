@@ -91,6 +91,10 @@ pub struct AccelSensor {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(inner(range(min = -100.0, max = 100.0)))]
     pub position_m: Option<[f64; 3]>,
+    /// As for gyros. Source: models §3.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub delay_ticks: Option<f64>,
     /// `r(T_board) − 1`, r the board's scale factor at the calibration temperature over that at `T_board`.
     /// Source: models §3, 001 (y1…y3).
     #[serde(skip_serializing_if = "Option::is_none")]

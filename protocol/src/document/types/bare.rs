@@ -27,6 +27,7 @@ impl GyroSensor {
             increment_weight_asymmetry: None,
             increment_weight_over_rate: None,
             trend: None,
+            delay_ticks: None,
             servo: None,
             drift: None,
             sigma: None,
@@ -52,6 +53,7 @@ impl AccelSensor {
             regressor: Vec::new(),
             second_order: None,
             position_m: None,
+            delay_ticks: None,
             board_ratio_error: None,
             sigma: None,
         }

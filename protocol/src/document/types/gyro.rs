@@ -106,6 +106,11 @@ pub struct GyroSensor {
     /// Polynomial of the time since turn-on. Source: 002.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub trend: Option<Trend>,
+    /// By how much of a tick its reading lags behind the tick's time; all sensors are held back to the one that lags most. Source:
+    /// models §3.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub delay_ticks: Option<f64>,
     /// Transient of the path-length servo after a mode switch; needs `[mode_reversal]`. Source: models §6, 003.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub servo: Option<Servo>,

@@ -1,0 +1,152 @@
+//! Sensors held back by part of a tick, so that all of them tell of the same time as the one that lags most (models §3).
+//!
+//! The integral of what a sensor reads is interpolated by the parabola through its last three ends of ticks: what a tick holds back, the
+//! next one gives, so that nothing is lost and nothing counted twice.
+
+use alloc::boxed::Box;
+use core::array;
+
+use serde::{Deserialize, Serialize};
+
+use super::Corrector;
+use crate::calibration::Calibration;
+use crate::lanes::{Lanes, narrow, put};
+use crate::orientation::SensorMask;
+use crate::sample::{MAX_SENSORS, TickFlags};
+use crate::unit::pipeline::Released;
+use crate::units::Span;
+
+/// What holds for a tick that has part of such a tick in it, too.
+const CARRIED: TickFlags =
+    TickFlags::INTERPOLATED.union(TickFlags::ANGLE_RESTORED).union(TickFlags::SWITCH_UNRESOLVED);
+
+/// What was held back of the last ticks of a unit.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub(super) struct HeldBack {
+    gyros: Held,
+    accels: Held,
+    /// Of the last tick.
+    flags: TickFlags,
+}
+
+/// Likewise of one kind of sensor (rad, or m/s).
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+struct Held {
+    /// No tick of the series has come yet.
+    fresh: bool,
+    /// Increments of the last tick; `None` before the first and after a gap.
+    before: Option<Lanes>,
+    /// What the next tick is to give.
+    owed: Lanes,
+    /// Sensors whose last reading does not count.
+    unusable: SensorMask,
+}
+
+impl Held {
+    /// Holds part of a tick's increments back, and gives what was held back of the last one. A sensor whose last reading did not count
+    /// leaves `usable`.
+    fn pass<const N: usize>(
+        &mut self,
+        ticks: &[f64; N],
+        (increments, usable): (&mut [f64; N], &mut SensorMask),
+    ) {
+        let before = self.before.as_ref().map_or(*increments, |before| *narrow(before));
+        let back: [f64; N] = array::from_fn(|lane| {
+            let (held, increment) = (ticks[lane], increments[lane]);
+            held * increment + 0.5 * held * (1.0 - held) * (increment - before[lane])
+        });
+        // The first tick is taken to go on as what was before it.
+        let given = if self.fresh { back } else { *narrow(&self.owed) };
+        self.fresh = false;
+        let mut now = [0.0; MAX_SENSORS];
+        put(&mut now, *increments);
+        self.before = Some(now);
+        put(&mut self.owed, back);
+        *increments = array::from_fn(|lane| increments[lane] - back[lane] + given[lane]);
+        for (lane, given) in given.into_iter().enumerate() {
+            let (counts, counted) = (usable.contains(lane), !self.unusable.contains(lane));
+            *usable = usable.set(lane, counts && (counted || given == 0.0));
+            self.unusable = self.unusable.set(lane, !counts);
+        }
+    }
+
+    /// Whether the next tick is to give nothing.
+    fn owes_nothing(&self) -> bool {
+        self.owed.iter().all(|owed| *owed == 0.0)
+    }
+}
+
+impl HeldBack {
+    /// Before the first tick of a series, or in the middle of one.
+    fn new(fresh: bool) -> Self {
+        let held = || Held { fresh, ..Held::default() };
+        Self { gyros: held(), accels: held(), flags: TickFlags::empty() }
+    }
+}
+
+impl Corrector {
+    /// Whether sensors are held back, or something of them still is.
+    #[inline]
+    pub(super) fn holds_back(&self, calibration: &Calibration) -> bool {
+        self.motion.held.is_some() || self.motions(calibration).any(|motion| motion.holds_back)
+    }
+
+    /// What is held back; before a tick that is the first of its series, nothing.
+    fn held(&mut self, released: &Released<'_>) -> &mut HeldBack {
+        let is_first = released.restart || self.seen.duration == Span::ZERO;
+        self.motion.held.get_or_insert_with(|| Box::new(HeldBack::new(is_first)))
+    }
+
+    /// Holds the gyros' increments (rad) back; what the substitution made of the last tick holds for this one too. Gives their mean rates
+    /// (rad/s), where they are rates.
+    #[cold]
+    pub(super) fn hold_gyros_back<const N: usize>(
+        &mut self,
+        calibration: &Calibration,
+        released: &Released<'_>,
+        flags: &mut TickFlags,
+        (increments, usable): (&mut [f64; N], &mut SensorMask),
+    ) -> Option<[f64; N]> {
+        let [gyros, accels] = [0, 1]
+            .map(|kind: usize| self.on_its_way::<N>(calibration, |motion| &motion.held_back_ticks[kind]));
+        let held = self.held(released);
+        if released.missed > 0 {
+            held.gyros.before = None;
+        }
+        held.gyros.pass(&gyros, (increments, usable));
+        let before = core::mem::replace(&mut held.flags, *flags & CARRIED);
+        *flags |= before;
+        let none = gyros.iter().chain(&accels).all(|ticks| *ticks == 0.0);
+        if none && held.gyros.owes_nothing() && held.accels.owes_nothing() {
+            self.motion.held = None;
+        }
+        let per_second = 1.0 / released.tick.duration.as_s();
+        (!flags.intersects(CARRIED)).then(|| increments.map(|increment| increment * per_second))
+    }
+
+    /// Holds back what the accelerometers feel (m/s²) over a tick of `duration_s`.
+    #[cold]
+    pub(super) fn hold_accels_back<const N: usize>(
+        &mut self,
+        calibration: &Calibration,
+        released: &Released<'_>,
+        duration_s: f64,
+        (forces, usable): (&mut [f64; N], &mut SensorMask),
+    ) {
+        let ticks = self.on_its_way::<N>(calibration, |motion| &motion.held_back_ticks[1]);
+        let held = self.held(released);
+        if released.missed > 0 {
+            held.accels.before = None;
+        }
+        let mut increments = forces.map(|force| force * duration_s);
+        held.accels.pass(&ticks, (&mut increments, usable));
+        *forces = increments.map(|increment| increment / duration_s);
+    }
+
+    /// Notes that a tick of the accelerometers is missing.
+    pub(super) fn miss_accels(&mut self) {
+        if let Some(held) = &mut self.motion.held {
+            held.accels.before = None;
+        }
+    }
+}
