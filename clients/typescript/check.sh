@@ -9,5 +9,5 @@ fi
 tools=${CARGO_TARGET_DIR:-target}/typescript
 mkdir -p "$tools"
 [ -x "$tools/node_modules/.bin/tsc" ] || npm install --silent --no-audit --no-fund --prefix "$tools" typescript@5.9.3
-"$tools/node_modules/.bin/tsc" --strict --noEmit --target es2023 --types "" clients/typescript/isotherm.ts
+"$tools/node_modules/.bin/tsc" --strict --noEmit --target es2023 clients/typescript/isotherm.ts
 "$tools/node_modules/.bin/tsc" --project clients/typescript
