@@ -3,7 +3,10 @@ import type * as wire from "../../../../../clients/typescript/isotherm";
 
 declare global {
   /** Of `pages`. */
-  const Chart: any;
+  class Chart {
+    constructor(...parts: Array<any>);
+    [name: string]: any;
+  }
 
   type Status = wire.Status;
   type Verdict = wire.Verdict;
