@@ -35,6 +35,10 @@ purity:
 python:
     .ci/run python
 
+# Check the generated TypeScript types, and the console's scripts against them (needs npm)
+typescript:
+    .ci/run typescript
+
 # Kill the speaking service of a pair 100 times, stop it 50 times, cut the links of one 50 times, with 20 units at 200 Hz; print the
 # pauses (a quarter of an hour; ISOTHERM_PAIR=UNITS,KILLS,STOPS,CUTS)
 pair:
@@ -44,7 +48,7 @@ pair:
 fuzz: fuzz-c
     fuzz/run
 
-# Decode 10⁸ changed frames with the C header under the sanitizers of cc (some minutes)
+# Decode 10⁸ changed frames with the C header under the sanitizers of gcc and clang, those that are there (some minutes each)
 fuzz-c:
     ISOTHERM_FUZZ=100000000 cargo test --release --locked -p isotherm-protocol --test versions no_frame_leads -- --nocapture
 

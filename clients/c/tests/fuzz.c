@@ -1,7 +1,7 @@
 /*
  * fuzz COUNT SEED < lines "KIND HEX": frames made of these by a few changes, with a checksum that mostly fits, decoded as every
  * kind and walked to the end; what decodes as a raw batch is written again. Built with sanitizers, each frame ends where its memory
- * ends. Prints how many were read and refused.
+ * ends. Prints how many were read and refused, and how many sets of standard errors were walked.
  */
 #include "../isotherm.h"
 
@@ -27,6 +27,7 @@ static size_t lengths[SEEDS], seed_count = 0;
 static isotherm_account account;
 static isotherm_arbiter arbiter;
 static volatile uint64_t sink = 0;
+static uint64_t sigmas = 0;
 static uint8_t *space, out[2 * LONGEST];
 
 /* Takes every byte of a view. */
@@ -93,6 +94,11 @@ static bool decode(unsigned kind, const uint8_t *frame, size_t length) {
         take(batch.unit);
         while (isotherm_next_corrected_tick(&batch.ticks, &tick)) {
             if (isotherm_wins(&arbiter, &tick)) isotherm_enter(&account, &tick);
+        }
+        isotherm_sigma sigma;
+        while (isotherm_next_sigma(&batch.sigmas, &sigma)) {
+            sink += sigma.from_tick;
+            ++sigmas;
         }
         return true;
     }
@@ -195,7 +201,7 @@ int main(int argc, char **argv) {
         if (decode(kind, last, length)) ++read;
         else ++refused;
     }
-    printf("%" PRIu64 " read, %" PRIu64 " refused\n", read, refused);
+    printf("%" PRIu64 " read, %" PRIu64 " refused, %" PRIu64 " standard errors walked\n", read, refused, sigmas);
     free(space);
     return 0;
 }

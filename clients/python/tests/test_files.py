@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import tempfile
 import unittest
+import zlib
 
 import isotherm
 import numpy as np
@@ -179,6 +180,49 @@ class Files(unittest.TestCase):
                 numbers = [*tick["delta_angle_rad"], *tick["delta_velocity_m_per_s"]]
                 self.assertEqual([float(word) for word in words[10:]], [float(value) for value in numbers])
         self.assertRegex(done.stderr, "broken.wire: 3 of .* frames cannot be read")
+
+    @unittest.skipUnless(shutil.which("octave-cli"), "octave-cli not found (Debian: apt install octave)")
+    def test_octave_says_what_is_wrong_with_a_frame_and_a_file(self) -> None:
+        frame = next(vector.frame for vector in vectors() if vector.name == "corrected")
+        covered = frame[:-4]
+        signed = lambda covered: covered + zlib.crc32(covered).to_bytes(4, "little")
+        cases = [
+            (signed(covered[:-5]), "the body ends too early"),
+            (signed(b"\1" + covered[1:]), "kind 1, not 4"),
+            (signed(b"\4\t" + covered[2:]), "version 9 is not known here"),
+            (frame[:-1] + bytes([frame[-1] ^ 1]), "the checksum does not fit"),
+            (signed(covered[:2] + b"\xff\xff\xff\x7f" + covered[3:]), "the body ends too early"),
+        ]
+        for number, (broken, _) in enumerate(cases):
+            entries = b"".join(len(entry).to_bytes(4, "little") + entry for entry in (frame, broken, frame))
+            (self.folder / f"one-{number}.wire").write_bytes(entries)
+        (self.folder / "absurd.wire").write_bytes(b"\xff" * 8)
+        (self.folder / "cut.wire").write_bytes(len(frame).to_bytes(4, "little") + frame[:-3])
+        (self.folder / "table.parquet").write_bytes(b"PAR1")
+        done = self.octave(
+            """
+            for k = 0:%d
+              lastwarn('');
+              u = isotherm(sprintf('one-%%d.wire', k));
+              printf('%%d %%s\\n', numel(u.sequence), lastwarn());
+            end
+            for name = {'absurd.wire', 'cut.wire', 'table.parquet'}
+              try
+                isotherm(name{1});
+              catch problem
+                printf('%%s\\n', problem.message);
+              end
+            end
+            """
+            % (len(cases) - 1)
+        )
+        lines = done.stdout.splitlines()
+        self.assertEqual(len(lines), len(cases) + 3, done.stderr)
+        ticks = 2 * len(isotherm.CorrectedDecoder().decode(frame).ticks)
+        for line, (_, words) in zip(lines, cases):
+            self.assertRegex(line, f"^{ticks} .*1 of 3 frames cannot be read; the last: {words}")
+        for line, words in zip(lines[len(cases) :], ["4294967295 bytes, at most 1048576", "cut short at byte 0", "reads no Parquet"]):
+            self.assertIn(words, line)
 
     @unittest.skipUnless(shutil.which("octave-cli"), "octave-cli not found (Debian: apt install octave)")
     def test_octave_takes_and_refuses_the_frozen_frames(self) -> None:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import threading
 import unittest
+import zlib
 from typing import Any
 
 import isotherm
 import numpy as np
 import zenoh
-from common import LIMIT_S, ROOT, Service
+from common import LIMIT_S, ROOT, Service, vectors
 
 UNIT = "PY-0001"
 PERIOD_NS = 5_000_000
@@ -18,6 +19,10 @@ PERIOD_NS = 5_000_000
 def reading(k: int) -> list[float]:
     """Means with all their digits in use."""
     return [np.sin(k / 7.0), np.cos(k / 11.0), np.sin(k / 13.0)]
+
+
+def with_checksum(covered: bytes) -> bytes:
+    return covered + zlib.crc32(covered).to_bytes(4, "little")
 
 
 def produce(bus: isotherm.Bus, count: int, *, first: int = 0, batch: int = 8, **options: Any) -> None:
@@ -76,9 +81,23 @@ class OneService(unittest.TestCase):
 
     def test_frames_that_cannot_be_read_are_counted_and_the_stream_goes_on(self) -> None:
         stream = self.bus.corrected(UNIT, timeout_s=LIMIT_S)
+        frame = next(vector.frame for vector in vectors() if vector.name == "corrected")
+        covered = frame[:-4]
+        broken = [
+            b"",
+            frame[: len(frame) // 2],
+            # The checksum does not fit.
+            frame[:20] + bytes([frame[20] ^ 1]) + frame[21:],
+            # A newer version.
+            with_checksum(b"\4\t" + covered[2:]),
+            # A unit's name of 2^28 - 1 bytes.
+            with_checksum(covered[:2] + b"\xff\xff\xff\x7f" + covered[3:]),
+            # Another kind.
+            with_checksum(b"\1" + covered[1:]),
+        ]
         # From another session: it takes the way of every frame.
         with isotherm.connect(self.service.endpoint, timeout_s=LIMIT_S) as other:
-            for frame in (b"", b"\4\1\0\0\0\0", b"\4\2" + bytes(40), b"\1" * 100):
+            for frame in broken:
                 other.session.put(
                     f"imu/{UNIT}/corrected",
                     frame,
@@ -89,7 +108,7 @@ class OneService(unittest.TestCase):
             other.wait_for_receipts()
         produce(self.bus, 50)
         self.assertEqual(len(receive(stream, 50)), 50)
-        self.assertEqual(stream.refused, 4)
+        self.assertEqual(stream.refused, len(broken))
         self.assertRegex(stream.last_refusal or "", f"imu/{UNIT}/corrected: the frame is of kind 1")
 
     def test_a_callback_has_its_own_thread_and_a_slow_one_drops_the_oldest(self) -> None:

@@ -65,4 +65,8 @@ fn the_modules_of_other_languages_are_those_of_the_layout() {
     let layout = Layout::load();
     compare("clients/python/src/isotherm/_layout.py", &python::module(&layout));
     compare("clients/typescript/isotherm.ts", &python::typescript(&layout));
+    let regions = [("flags".to_owned(), python::flags_of_the_console(&layout))];
+    compare_regions("service/src/observe/web/page/sheet.js", &regions, |region| {
+        format!("// generated from protocol/layout.toml: {region}\n")
+    });
 }

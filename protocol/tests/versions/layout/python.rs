@@ -1,4 +1,4 @@
-//! The layout as a module of the Python package, and as types for TypeScript.
+//! The layout as a module of the Python package, as types for TypeScript, and as constants for the console.
 
 use std::fmt::Write;
 
@@ -115,6 +115,18 @@ pub(super) fn typescript(layout: &Layout) -> String {
                     .expect("memory");
             }
         }
+    }
+    text
+}
+
+/// Bits by name, for the script of the console: lines of JavaScript.
+pub(super) fn flags_of_the_console(layout: &Layout) -> String {
+    let mut text = String::new();
+    for flags in layout.flags.iter().filter(|flags| flags.name == "sensor") {
+        let bits = flags.bits.iter().enumerate();
+        let bits = bits.map(|(bit, [name, _])| format!("{name}: {}", 1_u32 << bit)).collect::<Vec<_>>();
+        writeln!(text, "const {}_FLAGS = {{ {} }};", flags.name.to_uppercase(), bits.join(", "))
+            .expect("memory");
     }
     text
 }

@@ -8,7 +8,7 @@ function byField() {
     value: localStorage.getItem(BY) ?? "" });
   input.addEventListener("change", () => {
     localStorage.setItem(BY, input.value.trim());
-    for (const other of document.querySelectorAll("input.by")) {
+    for (const other of /** @type {NodeListOf<HTMLInputElement>} */ (document.querySelectorAll("input.by"))) {
       if (other === input) continue;
       other.value = input.value;
       other.dispatchEvent(new Event("input"));
@@ -46,7 +46,9 @@ class ChangePart {
 /** Shows what would change, and changes it when that was seen. `question` gives path and body, or throws what is missing. */
 class Proposal {
   constructor(page, by, question, line) {
-    Object.assign(this, { page, by, question });
+    this.page = page;
+    this.by = by;
+    this.question = question;
     this.answer = make("div", { className: "answer", role: "status", "aria-live": "polite" });
     this.look = make("button", { type: "button", onclick: () => this.ask(true) }, "Show the difference");
     this.act = make("button", { type: "button", className: "primary", disabled: true, onclick: () => this.ask(false) }, "Put in force");

@@ -136,6 +136,7 @@ class Temperatures {
     this.element = card("Temperatures", "temperatures", this.table, this.place);
   }
 
+  /** @param {Instance} instance */
   show(instance) {
     const { channels } = instance.status;
     this.table.show(channels.map(channel => {

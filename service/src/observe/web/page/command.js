@@ -42,6 +42,7 @@ class CommandPart {
     this.line.renew();
   }
 
+  /** @param {Instance} instance */
   show(instance) {
     const { allowed, status } = instance;
     const writes = this.page.writes();

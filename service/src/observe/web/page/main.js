@@ -20,7 +20,7 @@ class App {
     if (takeToken()) this.refused = null;
     this.stop?.abort();
     this.stop = new AbortController();
-    document.querySelectorAll("dialog[open]").forEach(open => open.close());
+    document.querySelectorAll("dialog").forEach(open => open.close());
     if (!sessionStorage.getItem(TOKEN)) return this.askToken("");
     const serial = location.hash.match(/^#\/unit\/(.+)$/)?.[1];
     this.page = serial ? new UnitPage(this, decodeURIComponent(serial)) : new UnitsPage(this);
@@ -74,6 +74,7 @@ class App {
     }
   }
 
+  /** @param {Overview} overview */
   showServices({ services, instance, write }) {
     const own = services.find(service => service.instance === instance);
     const others = services.length - 1;

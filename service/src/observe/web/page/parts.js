@@ -1,6 +1,7 @@
 // Pieces that pages are put together from. Text goes in as text: nothing that somebody wrote becomes part of the page's form.
 
-/** An element with properties and children; `null` children are left out. */
+// An element with properties and children; `null` children are left out.
+/** @type {(tag: string, properties?: object, ...children: any[]) => any} */
 function make(tag, properties, ...children) {
   const made = document.createElement(tag);
   for (const [name, value] of Object.entries(properties ?? {})) {

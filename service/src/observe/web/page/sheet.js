@@ -1,11 +1,17 @@
 // Everything of one unit.
 
-/** What is wrong with a sensor's last tick, by the bits of its flags. */
-const SENSOR_FLAGS = [[2, "overrange"], [4, "temperature outside range"], [8, "temperature stale"], [16, "not finite"], [32, "excluded"]];
+// generated from protocol/layout.toml: flags
+const SENSOR_FLAGS = { VALID: 1, OVERRANGE: 2, CLAMPED_TEMPERATURE: 4, STALE_TEMPERATURE: 8, NOT_FINITE: 16, EXCLUDED: 32, CLAMPED_RATE: 64 };
+// generated from protocol/layout.toml: end of flags
+
+/** What is wrong with a sensor's last tick; a flag without words of its own shows its name. */
+const WORDS_OF_FLAGS = { OVERRANGE: "overrange", CLAMPED_TEMPERATURE: "temperature outside range", STALE_TEMPERATURE: "temperature stale",
+  NOT_FINITE: "not finite", EXCLUDED: "excluded", CLAMPED_RATE: "rate outside range" };
 
 class UnitPage {
   constructor(app, serial) {
-    Object.assign(this, { app, serial, chosen: null });
+    this.app = app;
+    this.serial = serial;
     const line = () => "isotherm status " + quoted(serial) + this.options();
     this.mark = make("span");
     this.state = make("span", { className: "pill" });
@@ -70,6 +76,7 @@ class UnitPage {
     return Promise.all([looks, watch(5000, signal, () => this.app.look(signal)), this.live.start(signal)]);
   }
 
+  /** @param {Sheet} sheet */
   draw(sheet) {
     const instance = sheet.instances[0];
     const { status } = instance;
@@ -100,6 +107,7 @@ class UnitPage {
     this.done = done;
   }
 
+  /** @param {Instance["remarks"]} remarks */
   showRemarks(remarks) {
     const key = JSON.stringify(remarks);
     if (key === this.remarked) return;
@@ -111,6 +119,7 @@ class UnitPage {
     }));
   }
 
+  /** @param {Status} status */
   showCalibration(status) {
     const { calibration, pending, swaps } = status;
     const output = { calibrated: null, "pass-through": "none: raw readings pass through", held: "none: nothing goes out" }[status.output];
@@ -125,6 +134,7 @@ class UnitPage {
     ]);
   }
 
+  /** @param {Sheet} sheet */
   showInstances(sheet) {
     this.instancesCard.hidden = sheet.instances.length < 2;
     this.instances.show(sheet.instances.map(({ status, own, gone_s }) => [
@@ -135,6 +145,7 @@ class UnitPage {
     ]));
   }
 
+  /** @param {Status} status */
   showCounters(status) {
     const rates = status.input_rates;
     this.rates.show([["Raw gyro ticks", hertz(rates.gyro_ticks_per_s) + " Hz"], ["Accelerometer ticks", hertz(rates.accel_ticks_per_s) + " Hz"],
@@ -144,14 +155,17 @@ class UnitPage {
     say(this.zero, status.counters.filter(one => !one.value).map(one => name(one.name)).join(", "));
   }
 
+  /** @param {Status} status */
   showSensors(status) {
     this.sensors.show(status.sensors.map(sensor => {
-      const wrong = SENSOR_FLAGS.filter(([bit]) => sensor.flags & bit).map(([, words]) => words);
+      const wrong = Object.keys(SENSOR_FLAGS).filter(name => name !== "VALID" && sensor.flags & SENSOR_FLAGS[name])
+        .map(name => WORDS_OF_FLAGS[name] ?? name.toLowerCase().replaceAll("_", " "));
       const figures = ["ticks", "invalid", "overrange", "not_finite", "clamped", "stale", "excluded"].map(name => count(sensor[name]));
       return [(sensor.kind === "gyro" ? "gyro " : "accelerometer ") + sensor.name, wrong.join(", ") || "good", ...figures];
     }));
   }
 
+  /** @param {Status} status */
   showTests(status) {
     const { self_test: test, pre_launch: progress, pre_launch_outcome: outcome } = status;
     this.testsCard.hidden = !test && !progress && !outcome;
@@ -180,16 +194,19 @@ class UnitPage {
   }
 }
 
+/** @type {(status: Status, name: string) => number} */
 const valueOf = (status, name) => status.counters.find(one => one.name === name)?.value ?? 0;
 
+/** @param {Verdict} verdict */
 function verdict(verdict) {
   if (verdict === "aborted") return "aborted";
-  if (verdict.refused) return "refused: " + verdict.refused.join("; ");
+  if ("refused" in verdict) return "refused: " + verdict.refused.join("; ");
   const words = verdict.accepted.map(one => one.gyro + " C0 " + signed(degPerHour(one.static_bias_change_rad_per_s)) + " ± " +
     digits(degPerHour(one.static_bias_sigma_rad_per_s)) + " °/h");
   return "accepted: " + words.join(", ");
 }
 
+/** @param {TestItem} item */
 function limits({ at_least: low, at_most: high }) {
   const [l, h] = [low, high].map(value => isNumber(value) ? plain(value, 4) : null);
   return l !== null && h !== null ? l + " … " + h : l !== null ? "≥ " + l : h !== null ? "≤ " + h : NONE;
@@ -203,6 +220,7 @@ class LatencyPart {
     this.element = card("Added latency", "latency", this.facts, this.bars);
   }
 
+  /** @param {Latency} latencies */
   show(latencies) {
     const names = { p50_ns: "Median", p99_ns: "99 %", p999_ns: "99.9 %", max_ns: "Longest" };
     this.facts.show(Object.entries(names).map(([key, name]) => [name, latency(latencies[key])]));

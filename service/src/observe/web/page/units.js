@@ -42,7 +42,7 @@ class UnitsPage {
   start(signal) { return watch(1000, signal, () => this.app.look(signal)); }
 
   /** Shows the last look again, or a new one. */
-  draw(look = this.look) {
+  draw(/** @type {Overview | undefined} */ look = this.look) {
     this.look = look;
     if (!look) return;
     for (const chip of this.chips.children) chip.renew(look.units);
@@ -99,6 +99,7 @@ class UnitRow {
       cell("temperature", make("span", { className: "pair" }, this.bar, this.temperature)), ...this.numbers);
   }
 
+  /** @type {(unit: Row, instance: string | false) => void} */
   show(unit, instance) {
     setMark(this.mark, unit.level, unit.running);
     this.element.className = unit.level;

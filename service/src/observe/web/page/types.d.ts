@@ -1,0 +1,63 @@
+// Answers of the console's API, as `view.rs` makes them of the messages; `clients/typescript/check.sh` holds the scripts to them.
+import type * as wire from "../../../../../clients/typescript/isotherm";
+
+declare global {
+  /** Of `pages`. */
+  class Chart {
+    constructor(...parts: Array<any>);
+    [name: string]: any;
+  }
+
+  type Status = wire.Status;
+  type Verdict = wire.Verdict;
+  type TestItem = wire.SelfTestItem;
+  type Latency = wire.Latency;
+
+  interface Overview {
+    instance: string;
+    write: boolean;
+    options: string;
+    now_unix_ms: number;
+    services: Array<wire.ServiceStatus & { gone: boolean }>;
+    units: Array<Row>;
+  }
+
+  interface Row {
+    unit: string;
+    instance: string;
+    level: string;
+    reasons: Array<string>;
+    state: string;
+    running: boolean;
+    revision: number | null;
+    digest: string | null;
+    temperature_deg_c: number | null;
+    temperature_rate_deg_c_per_s: number | null;
+    calibrated_range_deg_c: Array<number> | null;
+    range: string;
+    correction_deg_per_h: number | null;
+    correction_mg: number | null;
+    raw_ticks_per_s: number | null;
+    p99_ns: number;
+    gaps: number;
+    duplicates: number;
+    late: number;
+    bad: number;
+  }
+
+  interface Sheet {
+    now_unix_ms: number;
+    instances: Array<Instance>;
+  }
+
+  interface Instance {
+    own: boolean;
+    level: string;
+    remarks: Array<{ level: string; words: string }>;
+    gone_s: number | null;
+    allowed: Array<string>;
+    status: Status;
+    /** Age (s), then the temperature of each channel (°C). */
+    past: Array<Array<number>>;
+  }
+}
