@@ -97,7 +97,7 @@ impl Stage {
         let web = format!("[metrics]\nlisten = \"{listen}\"\n[web]\nenabled = true\nwrite = true\n");
         let (child, told) = self.serve("service", "state", &locators(&self.session)[..1], &web);
         self.child = Some(child);
-        self.first = told["locators"][0].as_str().unwrap().to_owned();
+        told["locators"][0].as_str().unwrap().clone_into(&mut self.first);
         self.address =
             Some(told["metrics"].as_str().unwrap().strip_prefix("http://").unwrap().parse().unwrap());
     }
@@ -129,13 +129,14 @@ impl Stage {
             .spawn();
         let child = child.unwrap();
         let deadline = Instant::now() + LIMIT;
-        loop {
+        let told = loop {
             if let Ok(text) = std::fs::read_to_string(&ready) {
-                return (child, serde_json::from_str(&text).unwrap());
+                break serde_json::from_str(&text).unwrap();
             }
             assert!(Instant::now() < deadline, "it does not start");
             std::thread::sleep(Duration::from_millis(20));
-        }
+        };
+        (child, told)
     }
 
     /// Ends the program at once.
