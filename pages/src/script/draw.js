@@ -50,7 +50,7 @@ function clipped(g, view, draw) {
  * One curve. Where many samples fall into a column, its smallest to largest is filled here; what is returned draws the line of
  * means, once all curves are filled.
  */
-function drawSeries(g, view, y, s, form, { colour, paper, density }) {
+function drawSeries(g, view, y, s, form, { colour, paper, density, dashes }) {
   const bottom = view.top + view.height;
   const level = value => bottom - y.to(value);
   g.strokeStyle = g.fillStyle = colour;
@@ -69,7 +69,9 @@ function drawSeries(g, view, y, s, form, { colour, paper, density }) {
     g.strokeStyle = paper;
     if (rim) strokeRuns(g, count, point, 3.5);
     g.strokeStyle = g.fillStyle = colour;
+    g.setLineDash(dashes ?? []);
     strokeRuns(g, count, point, 1.3);
+    g.setLineDash([]);
   };
   const columns = Math.max(1, Math.round(view.width * density));
   if (end - from > 2 * columns) {
@@ -101,7 +103,7 @@ function drawSeries(g, view, y, s, form, { colour, paper, density }) {
   const line = lined(end - from, point, !s.single);
   return () => {
     line();
-    if (end - from >= view.width / 8) return;
+    if (dashes || end - from >= view.width / 8) return;
     for (let i = 0; i < end - from; i++) {
       const place = point(i);
       if (place) g.fillRect(place[0] - 1.5, place[1] - 1.5, 3, 3);

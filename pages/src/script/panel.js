@@ -91,7 +91,8 @@ class Panel {
     } else if (y) {
       clipped(g, view, () => {
         const { paper } = chart.colours;
-        const lines = shown.map(one => drawSeries(g, view, y, one.samples, one.form, { colour: chart.colours[one.ink], paper, density }));
+        const lines = shown.map(one => drawSeries(g, view, y, one.samples, one.form,
+          { colour: chart.colours[one.ink], paper, density, dashes: one.dashes }));
         for (const line of lines) line();
       });
     }

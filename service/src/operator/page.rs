@@ -27,7 +27,7 @@ use isotherm_correction::sample::ChannelName;
 use isotherm_protocol::status::Status;
 
 pub(crate) use figure::fit;
-pub(crate) use pairs::{of_unit, pairs};
+pub(crate) use pairs::{of_unit, pairs, said as said_of_pairs};
 pub(crate) use remark::{Level, is_running, knows_rates, state_word};
 pub(crate) use services::{services, tally};
 pub(crate) use sheet::sheet;

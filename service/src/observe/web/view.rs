@@ -5,13 +5,15 @@ use std::time::Instant;
 use isotherm_correction::operation;
 use isotherm_correction::units::{AngularRate, STANDARD_GRAVITY_M_PER_S2};
 use isotherm_protocol::key::UnitId;
+use isotherm_protocol::pair::{PairReport, UnitRole};
 use isotherm_protocol::service_status::ServiceStatus;
 use isotherm_protocol::status::Status;
 use serde::{Serialize, Serializer};
 
 use super::Web;
 use crate::operator::page::{
-    Level, Unit, channel_in_view, duplicates, is_running, knows_rates, late, length, range, state_word,
+    Level, Unit, channel_in_view, duplicates, is_running, knows_rates, late, length, range, said_of_pairs,
+    state_word,
 };
 use crate::operator::status::unix_ms;
 use crate::operator::{Fleet, worst_first};
@@ -27,6 +29,8 @@ struct Overview<'f> {
     options: &'f str,
     now_unix_ms: i64,
     services: Vec<Service>,
+    /// Who speaks for how many units, where there are two services, and what is wrong with that.
+    pair: Vec<Said>,
     units: Vec<Row>,
 }
 
@@ -105,6 +109,19 @@ impl Row {
 struct Sheet<'f> {
     now_unix_ms: i64,
     instances: Vec<Instance<'f>>,
+    /// What each service of a pair does for it; empty where there is one service.
+    pair: Vec<Half<'f>>,
+}
+
+/// What one service of a pair does for a unit.
+#[derive(Debug, Serialize)]
+struct Half<'f> {
+    /// Whether it is this service.
+    own: bool,
+    name: &'f str,
+    priority: u8,
+    #[serde(flatten)]
+    unit: &'f UnitRole,
 }
 
 /// One unit as one instance sees it.
@@ -127,6 +144,12 @@ struct Instance<'f> {
 struct Said {
     level: &'static str,
     words: String,
+}
+
+impl From<(Level, String)> for Said {
+    fn from((level, words): (Level, String)) -> Self {
+        Self { level: self::level(level), words }
+    }
 }
 
 /// Temperatures some time ago.
@@ -162,6 +185,7 @@ impl Web {
             options: &self.options,
             now_unix_ms,
             services: services.collect(),
+            pair: said_of_pairs(&fleet.pairs).into_iter().map(Said::from).collect(),
             units: worst_first(self.seen(&fleet, now, now_unix_ms)).iter().map(Row::of).collect(),
         })
     }
@@ -183,7 +207,21 @@ impl Web {
         let mut instances: Vec<_> = of_serial.map(|unit| self.instance(unit, now)).collect();
         // This service's first: its ticks can be watched.
         instances.sort_by_key(|instance| (!instance.own, instance.gone_s.is_some()));
-        (!instances.is_empty()).then(|| serde_json::to_string(&Sheet { now_unix_ms, instances }))
+        (!instances.is_empty()).then(|| {
+            serde_json::to_string(&Sheet { now_unix_ms, instances, pair: self.pair(&fleet.pairs, serial) })
+        })
+    }
+
+    fn pair<'f>(&self, reports: &'f [PairReport], serial: &str) -> Vec<Half<'f>> {
+        if reports.len() < 2 {
+            return Vec::new();
+        }
+        let half = |report: &'f PairReport| {
+            let (own, member) = (report.member.instance == self.instance, &report.member);
+            let unit = report.units.iter().find(|unit| unit.unit == serial)?;
+            Some(Half { own, name: &member.name, priority: member.priority, unit })
+        };
+        reports.iter().filter_map(half).collect()
     }
 
     fn instance<'f>(&self, unit: &Unit<'f>, now: Instant) -> Instance<'f> {
@@ -194,7 +232,7 @@ impl Web {
             let age_s = now.saturating_duration_since(of.at).as_secs_f64();
             Past { age_s, of }
         });
-        let said = unit.remarks().into_iter().map(|it| Said { level: level(it.level), words: it.words });
+        let said = unit.remarks().into_iter().map(|it| Said::from((it.level, it.words)));
         Instance {
             own: unit.status.instance == self.instance,
             level: level(unit.level()),

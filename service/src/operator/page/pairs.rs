@@ -1,34 +1,44 @@
 //! Instances of a pair: who speaks for how many units, what the others do, and units that nobody takes.
 
 use isotherm_protocol::pair::{PairReport, Role, UnitRole};
-use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 
 use super::figure::{fit, grouped, of};
-use super::tone;
+use super::{Level, tone};
 
 /// Units that are named; more of them are counted.
 const NAMED: usize = 8;
 
 /// The lines of all instances; none of one alone that takes every unit.
 pub(crate) fn pairs(reports: &[PairReport], columns: usize) -> Vec<Line<'static>> {
-    let mut lines = Vec::new();
-    let line = |words: &str, style: Style| Line::from(Span::styled(fit(words, columns), style));
+    let line = |(level, words): (Level, String)| {
+        let (mark, style) = match level {
+            Level::Fault => ("! ", tone::FAULT),
+            Level::Warning => ("▲ ", tone::WARNING),
+            _ => ("", tone::PLAIN),
+        };
+        Line::from(Span::styled(fit(&format!("{mark}{words}"), columns), style))
+    };
+    said(reports).into_iter().map(line).collect()
+}
+
+/// What there is to say of all instances, and how grave it is.
+pub(crate) fn said(reports: &[PairReport]) -> Vec<(Level, String)> {
+    let mut said = Vec::new();
     if reports.len() > 1 {
         for report in reports {
-            lines.push(line(&instance(report), tone::PLAIN));
-            for difference in
-                report.units.iter().filter_map(|unit| unit.last_difference.as_deref()).take(NAMED)
-            {
-                lines.push(line(&format!("! {}: other bits: {difference}", report.member.name), tone::FAULT));
-            }
+            said.push((Level::Fine, instance(report)));
+            let differences = report.units.iter().filter_map(|unit| unit.last_difference.as_deref());
+            said.extend(differences.take(NAMED).map(|difference| {
+                (Level::Fault, format!("{}: other bits: {difference}", report.member.name))
+            }));
         }
         let twice = named(reports, |report, unit| {
             let speaks = |other: &PairReport| role(other, unit) == Some(Role::Speaking);
             speaks(report) && reports.iter().filter(|other| speaks(other)).count() > 1
         });
         if !twice.is_empty() {
-            lines.push(line(&format!("! two instances speak for {}", listed(&twice)), tone::FAULT));
+            said.push((Level::Fault, format!("two instances speak for {}", listed(&twice))));
         }
     }
     let mut nobody: Vec<String> = reports.iter().flat_map(|report| report.passed_over.clone()).collect();
@@ -36,9 +46,9 @@ pub(crate) fn pairs(reports: &[PairReport], columns: usize) -> Vec<Line<'static>
     nobody.sort_unstable();
     nobody.dedup();
     if !nobody.is_empty() {
-        lines.push(line(&format!("▲ nobody takes {}", listed(&nobody)), tone::WARNING));
+        said.push((Level::Warning, format!("nobody takes {}", listed(&nobody))));
     }
-    lines
+    said
 }
 
 /// "north  speaks for 20 units, standby for 3, joining 1  priority 1  takeovers 2  40 000 ticks compared, 0 other".

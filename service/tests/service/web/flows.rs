@@ -122,6 +122,13 @@ async fn an_operator_opens_swaps_is_refused_rolls_back_commands_and_loses_the_co
 
     loses_the_connection(&mut stage, &mut page);
 
+    // A second service of the pair: which of them speaks is shown for the unit and in the list.
+    stage.start_second();
+    page.until(&has("#troubles", "south · speaks for 0 units"));
+    page.value(&format!("location.hash = '#/unit/{UNIT}'"));
+    page.until(&has(".pairs tbody", "speaking"));
+    page.until(&has(".pairs tbody", "standby"));
+
     // What the other side wrote is text, and no part of the page.
     page.value("location.hash = '#/unit/' + encodeURIComponent('<img src=x onerror=alert(1)>')");
     page.until(&has("h1", "<img src=x onerror=alert(1)>"));

@@ -30,7 +30,7 @@ async fn of_every_size_and_colour() {
     };
     std::fs::create_dir_all(&folder).unwrap();
     for number in [1, 8, 200] {
-        let stage = Stage::start(&units(number)).await;
+        let mut stage = Stage::start(&units(number)).await;
         let mut page = Browser::start(&program);
         page.open(&stage.address());
         page.until(&format!("document.querySelectorAll('table.units tbody tr').length === {number}"));
@@ -65,6 +65,10 @@ async fn of_every_size_and_colour() {
             page.until("document.querySelector('.difference')");
             every(&mut page, "swap", false);
             page.press("×");
+            stage.start_second();
+            page.value("location.hash = '#/unit/ZLG-0002'");
+            page.until("document.querySelectorAll('.pairs tbody tr').length === 2 && document.querySelector('.pairs').textContent.includes('standby')");
+            every(&mut page, "pair", false);
         }
         page.is_content(&stage.origin());
     }

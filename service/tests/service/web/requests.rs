@@ -490,6 +490,28 @@ async fn a_second_service_is_shown_and_says_nothing_of_the_unit_while_it_stands_
     let sheet = read(address, &format!("/api/unit/{UNIT}")).json();
     assert_eq!(sheet["instances"].as_array().unwrap().len(), 1);
     assert_eq!(sheet["instances"][0]["status"]["instance"], own);
+
+    // What each of them does for the unit, and for how many.
+    let deadline = Instant::now() + LIMIT;
+    loop {
+        stand.send(UNIT, 5).await;
+        let sheet = read(address, &format!("/api/unit/{UNIT}")).json();
+        let mut halves = sheet["pair"].as_array().unwrap().clone();
+        halves.sort_by_key(|half| half["own"] != true);
+        let roles: Vec<_> = halves.iter().filter_map(|half| half["role"].as_str()).collect();
+        let compares = halves.iter().any(|half| half["ticks_compared"].as_u64() > Some(0));
+        if roles == ["speaking", "standby"] && compares {
+            assert!(halves.iter().all(|half| half["ticks_differing"] == 0), "{sheet}");
+            break;
+        }
+        assert!(Instant::now() < deadline, "{sheet}");
+        tokio::time::sleep(Duration::from_millis(50)).await;
+    }
+    let told = read(address, "/api/units").json();
+    let lines: Vec<_> =
+        told["pair"].as_array().unwrap().iter().map(|line| line["words"].as_str().unwrap()).collect();
+    assert!(lines.iter().any(|line| line.contains("speaks for 1 unit")), "{lines:?}");
+    assert!(lines.iter().any(|line| line.contains("standby for 1")), "{lines:?}");
     second.stop().await;
     stand.service.stop().await;
 }

@@ -41,12 +41,16 @@ pub(crate) struct Stage {
     session: Session,
     producers: Vec<JoinHandle<()>>,
     child: Option<Child>,
+    second: Option<Child>,
+    /// Where the first service listens.
+    first: String,
     address: Option<SocketAddr>,
 }
 
 impl Drop for Stage {
     fn drop(&mut self) {
         self.stop_service();
+        end(self.second.take());
         self.producers.iter().for_each(JoinHandle::abort);
     }
 }
@@ -66,7 +70,15 @@ impl Stage {
             };
         }
         let session = open(&SessionOptions::default()).await.unwrap();
-        let mut stage = Self { folders, session, producers: Vec::new(), child: None, address: None };
+        let mut stage = Self {
+            folders,
+            session,
+            producers: Vec::new(),
+            child: None,
+            second: None,
+            first: String::new(),
+            address: None,
+        };
         stage.start_service();
         for (at, (unit, kind)) in units.iter().enumerate() {
             let (session, unit, kind) = (stage.session.clone(), unit.clone(), *kind);
@@ -81,12 +93,28 @@ impl Stage {
 
     /// Starts the program, at the same address as before, and waits until it is ready.
     pub(crate) fn start_service(&mut self) {
-        let [configuration, ready] = ["service.toml", "ready.json"].map(|name| self.file(name));
         let listen = self.address.map_or_else(|| "127.0.0.1:0".to_owned(), |address| address.to_string());
+        let web = format!("[metrics]\nlisten = \"{listen}\"\n[web]\nenabled = true\nwrite = true\n");
+        let (child, told) = self.serve("service", "state", &locators(&self.session)[..1], &web);
+        self.child = Some(child);
+        told["locators"][0].as_str().unwrap().clone_into(&mut self.first);
+        self.address =
+            Some(told["metrics"].as_str().unwrap().strip_prefix("http://").unwrap().parse().unwrap());
+    }
+
+    /// Starts the other service of a pair.
+    pub(crate) fn start_second(&mut self) {
+        let connect = [self.first.clone(), locators(&self.session)[0].clone()];
+        let (child, _) = self.serve("second", "state-of-second", &connect, "[pair]\nname = \"south\"\n");
+        self.second = Some(child);
+    }
+
+    /// A service with its configuration, and what it says when it is ready.
+    fn serve(&self, name: &str, state: &str, connect: &[String], rest: &str) -> (Child, Value) {
+        let [configuration, ready] = ["toml", "json"].map(|form| self.file(&format!("{name}.{form}")));
         let text = format!(
-            "calibrations = \"documents\"\nstate = \"state\"\nmax_units = 400\n[metrics]\nlisten = \"{listen}\"\n[web]\nenabled = true\n\
-             write = true\n[zenoh]\nconnect = [\"{}\"]\nlisten = [\"tcp/127.0.0.1:0\"]\n",
-            locators(&self.session)[0]
+            "calibrations = \"documents\"\nstate = \"{state}\"\nmax_units = 400\n{rest}[zenoh]\nconnect = {connect:?}\n\
+             listen = [\"tcp/127.0.0.1:0\"]\n",
         );
         std::fs::write(&configuration, text).unwrap();
         let _ = std::fs::remove_file(&ready);
@@ -99,25 +127,21 @@ impl Stage {
             .stdout(Stdio::null())
             .stderr(Stdio::null())
             .spawn();
-        self.child = Some(child.unwrap());
+        let child = child.unwrap();
         let deadline = Instant::now() + LIMIT;
         let told = loop {
             if let Ok(text) = std::fs::read_to_string(&ready) {
-                break serde_json::from_str::<Value>(&text).unwrap();
+                break serde_json::from_str(&text).unwrap();
             }
             assert!(Instant::now() < deadline, "it does not start");
             std::thread::sleep(Duration::from_millis(20));
         };
-        self.address =
-            Some(told["metrics"].as_str().unwrap().strip_prefix("http://").unwrap().parse().unwrap());
+        (child, told)
     }
 
     /// Ends the program at once.
     pub(crate) fn stop_service(&mut self) {
-        if let Some(mut child) = self.child.take() {
-            let _ = child.kill();
-            let _ = child.wait();
-        }
+        end(self.child.take());
     }
 
     /// Where the console is.
@@ -133,6 +157,13 @@ impl Stage {
         let printed = String::from_utf8(printed.stdout).unwrap();
         let token = printed.trim().split_once("#token=").unwrap().1;
         format!("{}#token={token}", self.origin())
+    }
+}
+
+fn end(child: Option<Child>) {
+    if let Some(mut child) = child {
+        let _ = child.kill();
+        let _ = child.wait();
     }
 }
 

@@ -75,7 +75,7 @@ class App {
   }
 
   /** @param {Overview} overview */
-  showServices({ services, instance, write }) {
+  showServices({ services, instance, write, pair }) {
     const own = services.find(service => service.instance === instance);
     const others = services.length - 1;
     say(this.service, own ? [own.instance.slice(0, 8), "version " + own.version, "up " + since(own.uptime_s), write ? "" : "read-only",
@@ -90,7 +90,7 @@ class App {
         ...service.bad_documents.map(bad => ["warning", (bad.problem.startsWith(bad.file) ? "" : bad.file + ": ") + bad.problem +
           (bad.problems > 1 ? " (and " + (bad.problems - 1) + " more)" : "")]),
       ].filter(Boolean).map(([level, words]) => [level, name + words]);
-    });
+    }).concat(pair.map(({ level, words }) => [level, words.replaceAll("  ", " · ")]));
     const key = JSON.stringify(troubles);
     if (key === this.troubled) return;
     this.troubled = key;

@@ -25,6 +25,8 @@ class UnitPage {
     this.instances = figureTable(["Instance", "State", "Rev.", "Document", "Last tick", "Published", "p99", ""]);
     this.instancesCard = card("Instances", "wide", make("p", { className: "hint" },
       "More than one service has this unit. Swaps and commands go to all of them."), this.instances);
+    this.pair = figureTable(["Service", "Does", "Priority", "Takeovers", "Ticks compared", "With other bits", ""]);
+    this.pairCard = card("Pair", "wide pairs", this.pair);
     this.drift = figureTable(["Gyro", "Drift, °/h", "σ, °/h", "Updates", "Refused", ""]);
     this.driftCard = card("Drift in addition to the calibrated bias", "drift", this.drift);
     this.sensors = figureTable(["Sensor", "Now", "Ticks", "Invalid", "Overrange", "Not finite", "Clamped", "Stale", "Excluded"]);
@@ -38,7 +40,7 @@ class UnitPage {
     this.testsCard = card("Self-test and pre-launch calibration", "wide", this.tests);
     this.problem = make("p", { className: "empty" }, "Waiting for the unit…");
     this.body = make("div", { className: "grid", hidden: true },
-      this.instancesCard, this.live.element,
+      this.instancesCard, this.pairCard, this.live.element,
       make("div", { className: "column" }, this.temperatures.element, this.driftCard, this.latency.element),
       make("div", { className: "column" }, card("Calibration", "calibration", this.calibration, this.change.element), this.commands.element,
         card("Input and counters", "counters", this.rates, this.counters, this.idle)),
@@ -143,6 +145,9 @@ class UnitPage {
       status.last_tick ? count(status.last_tick.sequence) : NONE, count(valueOf(status, "ticks_out")), latency(status.latency.p99_ns),
       own ? "this service" : "",
     ]));
+    this.pairCard.hidden = sheet.pair.length < 2;
+    this.pair.show(sheet.pair.map(one => [one.name, one.role, String(one.priority), count(one.takeovers), count(one.ticks_compared),
+      count(one.ticks_differing), [one.own ? "this service" : "", one.last_difference].filter(Boolean).join("; ")]));
   }
 
   /** @param {Status} status */
