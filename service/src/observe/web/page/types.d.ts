@@ -20,6 +20,12 @@ declare global {
     now_unix_ms: number;
     services: Array<wire.ServiceStatus & { gone: boolean }>;
     units: Array<Row>;
+    pair: Array<Said>;
+  }
+
+  interface Said {
+    level: string;
+    words: string;
   }
 
   interface Row {
@@ -48,12 +54,25 @@ declare global {
   interface Sheet {
     now_unix_ms: number;
     instances: Array<Instance>;
+    pair: Array<Half>;
+  }
+
+  interface Half {
+    own: boolean;
+    name: string;
+    priority: number;
+    unit: string;
+    role: string;
+    ticks_compared: number;
+    ticks_differing: number;
+    takeovers: number;
+    last_difference?: string;
   }
 
   interface Instance {
     own: boolean;
     level: string;
-    remarks: Array<{ level: string; words: string }>;
+    remarks: Array<Said>;
     gone_s: number | null;
     allowed: Array<string>;
     status: Status;
