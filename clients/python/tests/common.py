@@ -7,6 +7,7 @@ import os
 import pathlib
 import subprocess
 import tempfile
+import zlib
 from dataclasses import dataclass
 from typing import Any
 
@@ -45,6 +46,11 @@ def vectors() -> list[Vector]:
     return [
         Vector(v["name"], v["kind"] or v["frame"][0], v["frame"], json.loads(v["json"]) if v["json"] else None) for v in found
     ]
+
+
+def with_checksum(covered: bytes) -> bytes:
+    """A frame of these bytes."""
+    return covered + zlib.crc32(covered).to_bytes(4, "little")
 
 
 class Service:

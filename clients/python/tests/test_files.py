@@ -8,11 +8,10 @@ import shutil
 import subprocess
 import tempfile
 import unittest
-import zlib
 
 import isotherm
 import numpy as np
-from common import LIMIT_S, REPLAY, ROOT, vectors
+from common import LIMIT_S, REPLAY, ROOT, vectors, with_checksum
 
 UNIT = "MEMS-0001"
 DOCUMENT = ROOT / f"config/calibration/{UNIT}.toml"
@@ -185,13 +184,12 @@ class Files(unittest.TestCase):
     def test_octave_says_what_is_wrong_with_a_frame_and_a_file(self) -> None:
         frame = next(vector.frame for vector in vectors() if vector.name == "corrected")
         covered = frame[:-4]
-        signed = lambda covered: covered + zlib.crc32(covered).to_bytes(4, "little")
         cases = [
-            (signed(covered[:-5]), "the body ends too early"),
-            (signed(b"\1" + covered[1:]), "kind 1, not 4"),
-            (signed(b"\4\t" + covered[2:]), "version 9 is not known here"),
+            (with_checksum(covered[:-5]), "the body ends too early"),
+            (with_checksum(b"\1" + covered[1:]), "kind 1, not 4"),
+            (with_checksum(b"\4\t" + covered[2:]), "version 9 is not known here"),
             (frame[:-1] + bytes([frame[-1] ^ 1]), "the checksum does not fit"),
-            (signed(covered[:2] + b"\xff\xff\xff\x7f" + covered[3:]), "the body ends too early"),
+            (with_checksum(covered[:2] + b"\xff\xff\xff\x7f" + covered[3:]), "the body ends too early"),
         ]
         for number, (broken, _) in enumerate(cases):
             entries = b"".join(len(entry).to_bytes(4, "little") + entry for entry in (frame, broken, frame))

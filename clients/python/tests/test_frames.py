@@ -6,12 +6,11 @@ import importlib.resources
 import math
 import random
 import unittest
-import zlib
 from typing import Any
 
 import isotherm
 import numpy as np
-from common import vectors
+from common import vectors, with_checksum
 
 
 def without_nan(value: Any) -> Any:
@@ -21,10 +20,6 @@ def without_nan(value: Any) -> Any:
     if isinstance(value, list):
         return [without_nan(item) for item in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def with_checksum(covered: bytes) -> bytes:
-    return covered + zlib.crc32(covered).to_bytes(4, "little")
 
 
 def bits(values: Any) -> list[str]:

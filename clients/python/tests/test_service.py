@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import threading
 import unittest
-import zlib
 from typing import Any
 
 import isotherm
 import numpy as np
 import zenoh
-from common import LIMIT_S, ROOT, Service, vectors
+from common import LIMIT_S, ROOT, Service, vectors, with_checksum
 
 UNIT = "PY-0001"
 PERIOD_NS = 5_000_000
@@ -19,10 +18,6 @@ PERIOD_NS = 5_000_000
 def reading(k: int) -> list[float]:
     """Means with all their digits in use."""
     return [np.sin(k / 7.0), np.cos(k / 11.0), np.sin(k / 13.0)]
-
-
-def with_checksum(covered: bytes) -> bytes:
-    return covered + zlib.crc32(covered).to_bytes(4, "little")
 
 
 def produce(bus: isotherm.Bus, count: int, *, first: int = 0, batch: int = 8, **options: Any) -> None:

@@ -182,6 +182,9 @@ impl Corrector {
             self.motion.restart();
             self.slew = None;
         }
+        if let Some(held) = self.motion.held.as_mut().filter(|_| tick.released.missed > 0) {
+            held.interrupt();
+        }
         if waiting.is_due(time, delay) {
             self.thermal.advance(calibration, waiting, delay, time, counters);
         }

@@ -76,7 +76,9 @@ impl Corrector {
             out.accel_flags = of_sensors([SensorFlags::empty(); MAX_SENSORS], count);
             out.flags |= TickFlags::ACCELEROMETER_MISSING | TickFlags::VELOCITY_INVALID;
             counters.accel_missing += 1;
-            self.miss_accels();
+            if let Some(held) = &mut self.motion.held {
+                held.miss_accels();
+            }
             return None;
         };
         // The corrected tick has the gyro tick's time.

@@ -21,7 +21,7 @@ const CARRIED: TickFlags =
     TickFlags::INTERPOLATED.union(TickFlags::ANGLE_RESTORED).union(TickFlags::SWITCH_UNRESOLVED);
 
 /// What was held back of the last ticks of a unit.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct HeldBack {
     gyros: Held,
     accels: Held,
@@ -82,6 +82,17 @@ impl HeldBack {
         let held = || Held { fresh, ..Held::default() };
         Self { gyros: held(), accels: held(), flags: TickFlags::empty() }
     }
+
+    /// Forgets the increments of the last tick: ticks are missing behind it.
+    pub(super) fn interrupt(&mut self) {
+        self.gyros.before = None;
+        self.miss_accels();
+    }
+
+    /// Forgets those of the accelerometers: their tick is missing.
+    pub(super) fn miss_accels(&mut self) {
+        self.accels.before = None;
+    }
 }
 
 impl Corrector {
@@ -110,9 +121,6 @@ impl Corrector {
         let [gyros, accels] = [0, 1]
             .map(|kind: usize| self.on_its_way::<N>(calibration, |motion| &motion.held_back_ticks[kind]));
         let held = self.held(released);
-        if released.missed > 0 {
-            held.gyros.before = None;
-        }
         held.gyros.pass(&gyros, (increments, usable));
         let before = core::mem::replace(&mut held.flags, *flags & CARRIED);
         *flags |= before;
@@ -134,19 +142,8 @@ impl Corrector {
         (forces, usable): (&mut [f64; N], &mut SensorMask),
     ) {
         let ticks = self.on_its_way::<N>(calibration, |motion| &motion.held_back_ticks[1]);
-        let held = self.held(released);
-        if released.missed > 0 {
-            held.accels.before = None;
-        }
         let mut increments = forces.map(|force| force * duration_s);
-        held.accels.pass(&ticks, (&mut increments, usable));
+        self.held(released).accels.pass(&ticks, (&mut increments, usable));
         *forces = increments.map(|increment| increment / duration_s);
-    }
-
-    /// Notes that a tick of the accelerometers is missing.
-    pub(super) fn miss_accels(&mut self) {
-        if let Some(held) = &mut self.motion.held {
-            held.accels.before = None;
-        }
     }
 }
