@@ -357,7 +357,7 @@ async fn imu_messages_come_back_corrected_to_the_bit_and_none_is_lost() {
     let uncertainty =
         array.status[0].values.iter().find(|value| value.key == "stamp uncertainty, stated (us)");
     assert_eq!(uncertainty.map(|value| value.value.as_str()), Some("200.0"), "{array:?}");
-    driver_and_services(&driver, &mut diagnostics).await;
+    driver_and_services(&driver, &mut diagnostics, folder.path()).await;
 
     let (code, totals) = bridge.stop();
     let kinds = totals["refused"].as_object().unwrap();
@@ -371,16 +371,31 @@ async fn imu_messages_come_back_corrected_to_the_bit_and_none_is_lost() {
     assert_eq!(code, Some(0));
 }
 
-/// Standby and run by their services; a unit that hears nothing is stale.
-async fn driver_and_services(driver: &Driver, diagnostics: &mut Heard) {
+/// Standby, run and rollback by their services; a unit that hears nothing is stale.
+async fn driver_and_services(driver: &Driver, diagnostics: &mut Heard, folder: &Path) {
     let empty = to_cdr(&TriggerRequest::default()).unwrap();
     let standby = driver.call("/isotherm/MEMS_0001/standby", empty.clone()).await;
     assert_eq!(standby, TriggerResponse { success: true, message: "MEMS-0001: standby".to_owned() });
     // Without the byte that ROS gives a message without fields.
     let run = driver.call("/isotherm/MEMS_0001/run", empty[..4].to_vec()).await;
     assert!(run.success && run.message.contains("running"), "{run:?}");
-    let rollback = driver.call("/isotherm/MEMS_0001/rollback", empty).await;
-    assert!(!rollback.success && rollback.message.contains(UNIT), "{rollback:?}");
+    let rollback = async || driver.call("/isotherm/MEMS_0001/rollback", empty.clone()).await;
+    let refused = rollback().await;
+    assert!(!refused.success && refused.message.contains(UNIT), "{refused:?}");
+    // Another calibration by its folder; until it is there, there is nothing to go back to.
+    let document = folder.join(format!("units/{UNIT}.toml"));
+    let text = std::fs::read_to_string(&document).unwrap();
+    let other = text.replacen(SIGMA, &SIGMA.replacen("0.3", "0.4", 1), 1);
+    assert_ne!(other, text);
+    std::fs::write(folder.join("other"), other).unwrap();
+    std::fs::rename(folder.join("other"), document).unwrap();
+    let deadline = Instant::now() + LIMIT;
+    let mut went_back = refused;
+    while !went_back.success {
+        assert!(Instant::now() < deadline, "{went_back:?}");
+        went_back = rollback().await;
+    }
+    assert!(went_back.message.contains(UNIT), "{went_back:?}");
     loop {
         let array: DiagnosticArray = from_cdr(&diagnostics.next().await.0).expect("diagnostics");
         if array.status[0].level == Level::Stale {
@@ -400,7 +415,7 @@ async fn a_router_of_theirs_and_a_driver_that_leaves_out_ticks() {
     let locator = isotherm_bus::locators(&router).remove(0);
     let bridge = Bridge::start(folder.path(), &["--connect", &locator]);
     let mut driver = Driver::join(&locator).await;
-    let (mut corrected, _diagnostics) = driver.hear().await;
+    let (mut corrected, mut diagnostics) = driver.hear().await;
     let tokens = driver.session.liveliness().get("@ros2_lv/7/**").timeout(LIMIT).await.unwrap();
     let mut graph = Vec::new();
     while let Ok(reply) = tokens.recv_async().await {
@@ -425,6 +440,17 @@ async fn a_router_of_theirs_and_a_driver_that_leaves_out_ticks() {
     }
     for _ in 0..sent {
         corrected.imu().await;
+    }
+    let mut told = [0, 0];
+    while told != [2, 8] {
+        let array: DiagnosticArray = from_cdr(&diagnostics.next().await.0).expect("diagnostics");
+        let status = &array.status[0];
+        let said = status.message.split("; ").find(|said| said.ends_with(" ticks missing"));
+        let Some(said) = said else { continue };
+        assert!(status.level >= Level::Warn, "{status:?}");
+        let numbers: Vec<u64> = said.split(' ').filter_map(|word| word.parse().ok()).collect();
+        assert_eq!(said, format!("{} gaps, {} ticks missing", numbers[0], numbers[1]));
+        told = [told[0] + numbers[0], told[1] + numbers[1]];
     }
     let (code, totals) = bridge.stop();
     for (key, value) in [("gaps", 2), ("missing", 8), ("announced_missing", 8)] {
