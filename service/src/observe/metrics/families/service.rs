@@ -13,7 +13,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "",
         kind: Type::Gauge,
         labels: &["version", "instance_id"],
-        help: "Always 1; version of the service, and its Zenoh id",
+        help: "Always 1; version and Zenoh id of the service",
         samples: |look, out| out.whole(&[env!("CARGO_PKG_VERSION"), &look.instance], 1),
     },
     Family {
@@ -29,7 +29,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "",
         kind: Type::Gauge,
         labels: &[],
-        help: "1 if /healthz says ok, otherwise 0",
+        help: "1 if /healthz answers 200, otherwise 0",
         samples: |look, out| out.flag(&[], look.healthy),
     },
     Family {
@@ -45,7 +45,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "",
         kind: Type::Gauge,
         labels: &[],
-        help: "Service instances for the same units that this one sees, itself included",
+        help: "Service instances for the same units, this one included",
         samples: |look, out| out.whole(&[], look.instances),
     },
     Family {
@@ -53,7 +53,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "",
         kind: Type::Counter,
         labels: &["kind"],
-        help: "Ticks of which another instance computed other bits, units that two services publish: alarm on any",
+        help: "Ticks whose bits differ between instances, units published by two services: alarm on any",
         samples: |look, out| {
             [FaultKind::OtherBits, FaultKind::TwoSpeak].into_iter().try_for_each(|kind| {
                 let fault = look.faults.iter().find(|fault| fault.kind == kind.name());
@@ -66,7 +66,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "",
         kind: Type::Counter,
         labels: &["kind"],
-        help: "Messages refused that belong to no known unit, by kind",
+        help: "Messages refused that belong to no known unit",
         samples: |look, out| {
             let mut kinds = FaultKind::ALL.iter().filter(|kind| is_refusal(**kind)).map(|kind| kind.name());
             kinds.try_for_each(|kind| {
@@ -80,7 +80,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "",
         kind: Type::Counter,
         labels: &["outcome"],
-        help: "Swaps accepted and refused, of all units, unknown ones included; first documents from files are no swaps",
+        help: "Swaps accepted and refused, of all units, unknown ones included; a first document from a file is not counted",
         samples: |look, out| {
             out.counter(&["accepted"], look.posted.accepted)?;
             out.counter(&["refused"], look.posted.refused)
@@ -91,7 +91,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "",
         kind: Type::Counter,
         labels: &[],
-        help: "Log lines dropped because standard error took none: a stopped terminal, a full pipe",
+        help: "Log lines dropped because stderr was blocked: a stopped terminal, a full pipe",
         samples: |look, out| out.counter(&[], look.log_lines_dropped),
     },
     Family {
@@ -99,7 +99,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "",
         kind: Type::Gauge,
         labels: &[],
-        help: "1 if the folder of calibration documents can be read; absent if none is configured",
+        help: "1 if the folder of calibration documents can be read; absent without one",
         samples: |look, out| match &look.posted.folder {
             Some(folder) => out.flag(&[], folder.state != FolderState::Gone),
             None => Ok(()),
@@ -110,7 +110,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "",
         kind: Type::Gauge,
         labels: &[],
-        help: "Documents of that folder that are refused, 64 at most",
+        help: "Refused documents of that folder, at most 64",
         samples: |look, out| out.whole(&[], look.posted.bad_documents.len() as u64),
     },
     Family {
@@ -118,7 +118,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "",
         kind: Type::Gauge,
         labels: &[],
-        help: "1 if the state folder can be written, 0 if every swap is refused; absent if none is configured",
+        help: "1 if the state folder can be written, 0 if every swap is refused; absent without one",
         samples: |look, out| look.state_folder_writable.map_or(Ok(()), |writable| out.flag(&[], writable)),
     },
     Family {
@@ -126,7 +126,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "",
         kind: Type::Gauge,
         labels: &[],
-        help: "Number of the last entry of the audit file; absent if no state folder is configured",
+        help: "Number of the last entry of the audit file; absent without a state folder",
         samples: |look, out| {
             look.posted.store.as_ref().map_or(Ok(()), |store| out.whole(&[], store.audit_entries))
         },

@@ -18,7 +18,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "",
         kind: Type::Gauge,
         labels: &["unit", "state"],
-        help: "1 for the present state, 0 for the others",
+        help: "1 for the present state",
         samples: |look, out| {
             each(look, |unit, look| {
                 let present = State::from(look.status.state);
@@ -31,7 +31,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "",
         kind: Type::Gauge,
         labels: &["unit", "output"],
-        help: "1 for what happens to ticks in a running state, 0 for the others",
+        help: "1 for what happens to ticks in a running state",
         samples: |look, out| {
             each(look, |unit, look| {
                 let outputs = [
@@ -57,7 +57,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "",
         kind: Type::Counter,
         labels: &["unit"],
-        help: "Times that this instance began to speak in another's place",
+        help: "Takeovers by this instance from another",
         samples: |look, out| each(look, |unit, look| out.counter(&[unit], look.role.takeovers)),
     },
     Family {
@@ -65,7 +65,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "",
         kind: Type::Counter,
         labels: &["unit"],
-        help: "Corrected ticks of another instance whose bits were compared with this one's",
+        help: "Corrected ticks compared with another instance's, bit by bit",
         samples: |look, out| each(look, |unit, look| out.counter(&[unit], look.role.ticks_compared)),
     },
     Family {
@@ -73,7 +73,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "",
         kind: Type::Counter,
         labels: &["unit"],
-        help: "Those that were others: alarm on any",
+        help: "Ticks that differed: alarm on any",
         samples: |look, out| each(look, |unit, look| out.counter(&[unit], look.role.ticks_differing)),
     },
     Family {
@@ -81,7 +81,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "",
         kind: Type::Gauge,
         labels: &["unit"],
-        help: "1 if raw ticks arrive and no corrected ones are published although they should be",
+        help: "1 if raw ticks arrive but corrected ones, though due, are not published",
         samples: |look, out| each(look, |unit, look| out.flag(&[unit], look.stalled)),
     },
     Family {
@@ -97,7 +97,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "seconds",
         kind: Type::Gauge,
         labels: &["unit"],
-        help: "Time since the document in force was made; absent if it does not say when",
+        help: "Age of the document in force; absent if it states no date",
         samples: |look, out| {
             each(look, |unit, look| {
                 let calibration = look.status.calibration.as_ref();
@@ -133,7 +133,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "",
         kind: Type::Gauge,
         labels: &["unit"],
-        help: "1 if the last self-test was passed; absent before the first",
+        help: "1 if the last self-test passed; absent before the first",
         samples: |look, out| {
             each(look, |unit, look| {
                 look.status.self_test.as_ref().map_or(Ok(()), |report| out.flag(&[unit], report.passed))
@@ -145,7 +145,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "per_second",
         kind: Type::Gauge,
         labels: &["unit", "input"],
-        help: "Input over the last status interval: gyro ticks, accelerometer ticks, temperature readings, messages",
+        help: "Gyro ticks, accelerometer ticks, temperature readings, messages, over the last status interval",
         samples: |look, out| {
             each(look, |unit, look| {
                 let rates = &look.status.input_rates;
@@ -161,7 +161,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "celsius",
         kind: Type::Gauge,
         labels: &["unit", "channel"],
-        help: "Smoothed temperature of a channel of the calibration in force; absent before the first reading",
+        help: "Smoothed temperature of a channel; absent before the first reading",
         samples: |look, out| {
             each_channel(look, |labels, channel| {
                 channel.temperature_deg_c.map_or(Ok(()), |value| out.gauge(labels, value))
@@ -173,7 +173,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "celsius_per_second",
         kind: Type::Gauge,
         labels: &["unit", "channel"],
-        help: "Its rate",
+        help: "Rate of the smoothed temperature",
         samples: |look, out| {
             each_channel(look, |labels, channel| {
                 channel.rate_deg_c_per_s.map_or(Ok(()), |value| out.gauge(labels, value))
@@ -185,7 +185,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "",
         kind: Type::Gauge,
         labels: &["unit", "channel"],
-        help: "1 if it is outside the range that the calibration was fitted over; absent if either is unknown",
+        help: "1 if it is outside the range of the fit; absent if either is unknown",
         samples: |look, out| {
             each_channel(look, |labels, channel| {
                 channel.place.map_or(Ok(()), |place| out.flag(labels, place != Place::Inside))
@@ -205,7 +205,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "radians_per_second",
         kind: Type::Gauge,
         labels: &["unit", "axis"],
-        help: "Correction now subtracted from the angular rate about a case axis",
+        help: "Correction subtracted from the angular rate about a case axis",
         samples: |look, out| {
             each(look, |unit, look| {
                 let applied = look.status.applied.map(|applied| applied.angular_rate_rad_per_s);
@@ -218,7 +218,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "meters_per_second_squared",
         kind: Type::Gauge,
         labels: &["unit", "axis"],
-        help: "Correction now subtracted from the specific force along a case axis",
+        help: "Correction subtracted from the specific force along a case axis",
         samples: |look, out| {
             each(look, |unit, look| {
                 let applied = look.status.applied.map(|applied| applied.specific_force_m_per_s2);
@@ -231,7 +231,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "radians_per_second",
         kind: Type::Gauge,
         labels: &["unit", "gyro"],
-        help: "Estimated drift of a gyro in addition to its calibrated bias",
+        help: "Estimated drift of a gyro, in addition to its calibrated bias",
         samples: |look, out| {
             each(look, |unit, look| {
                 let mut drift = look.status.drift.iter();
@@ -244,7 +244,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "radians_per_second",
         kind: Type::Gauge,
         labels: &["unit", "gyro"],
-        help: "Standard deviation of that estimate",
+        help: "Standard error of the estimated drift",
         samples: |look, out| {
             each(look, |unit, look| {
                 let mut drift = look.status.drift.iter();
@@ -257,7 +257,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "",
         kind: Type::Counter,
         labels: &["unit", "kind", "sensor"],
-        help: "Corrected ticks that did not use a sensor's reading as it was",
+        help: "Corrected ticks that did not use a sensor's reading as read",
         samples: |look, out| {
             each(look, |unit, look| {
                 look.status.sensors.iter().try_for_each(|sensor| {
@@ -275,7 +275,7 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "",
         kind: Type::Counter,
         labels: &["unit", "kind"],
-        help: "Faults by kind: messages refused, corrected ticks that could not be published, alarms",
+        help: "Messages refused, corrected ticks not published, alarms",
         samples: |look, out| {
             each(look, |unit, look| {
                 let mut kinds = FaultKind::ALL.iter().filter(|kind| concerns_units(**kind));
