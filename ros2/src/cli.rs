@@ -128,7 +128,7 @@ async fn bridge(args: BridgeArgs) -> Exit {
             print_within(PRINT_LIMIT, text + "\n", totals.exit())
         }
         Ok(None) => {
-            tracing::error!("stopped at once by a second signal");
+            tracing::error!("stopped immediately by a second signal");
             Exit::DataLoss
         }
         Err(error) => {

@@ -28,8 +28,8 @@ Examples:
   isotherm check state/overlays/*.toml
 
 Every problem goes to stderr as file:line:column: key: message, one line per good file to stdout.
-A calibration document need not be signed, but a signature that does not hold makes it bad.
-An overlay is checked by itself; whether it fits the document that it is for, a swap says.
+A calibration document need not be signed, but a wrong signature makes it bad.
+An overlay is checked by itself; a swap checks whether it fits its document.
 Exit codes: 0 all good, 78 a file is bad, 1 a file cannot be read (and none is bad).")]
 pub struct CheckArgs {
     /// Files to validate

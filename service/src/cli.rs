@@ -29,7 +29,7 @@ const EXIT_CODES: &str = "\
 Exit codes:
   0   done
   1   failed
-  2   called wrongly
+  2   usage
   3   finished, but data was lost
   78  a configuration or calibration document is bad or refused";
 

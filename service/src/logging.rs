@@ -60,7 +60,7 @@ pub(crate) fn start_writer() -> io::Result<()> {
         queue.write_to(io::stderr(), |count| {
             tracing::warn!(
                 count,
-                "log lines were dropped: stderr took none (a stopped terminal, a full pipe)"
+                "log lines were dropped: stderr was blocked (a stopped terminal, a full pipe)"
             );
         });
     };

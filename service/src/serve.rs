@@ -35,7 +35,7 @@ pub(crate) async fn run(args: ServeArgs) -> Exit {
     match serve(args).await {
         Ok(Some(totals)) => report(&totals, json),
         Ok(None) => {
-            tracing::error!("stopped at once by a second signal");
+            tracing::error!("stopped immediately by a second signal");
             Exit::DataLoss
         }
         Err(error) => failed(&error),

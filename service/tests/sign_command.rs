@@ -123,7 +123,10 @@ fn check_tells_unsigned_unverified_and_wrong_apart() {
     place.run(&["sign", "unit.toml", "--key", "anna.key"]);
     let (code, out, _) = check(&[]);
     assert_eq!(code, Some(0));
-    assert!(out.contains(", signed by key ") && out.contains(", not verified (--trusted-keys"), "{out}");
+    assert!(
+        out.contains(", signed by key ") && out.contains(", not verified (needs --trusted-keys"),
+        "{out}"
+    );
     let (_, out, _) = check(&["--json", "--trusted-keys", "trusted"]);
     let found: Value = serde_json::from_str(&out).unwrap();
     assert_eq!(found["files"][0]["signature"]["state"], "signed");
@@ -311,7 +314,7 @@ fn a_key_that_others_can_read_is_warned_about() {
     assert_eq!(code, Some(0));
     assert_eq!(
         err,
-        "anna.key:1:1: is a private key that others can get at (mode 644): `chmod 600 anna.key` (warning)\n"
+        "anna.key:1:1: is a private key that others can read (mode 644): `chmod 600 anna.key` (warning)\n"
     );
 
     std::fs::set_permissions(place.path("trusted/anna.pub"), Permissions::from_mode(0o666)).unwrap();

@@ -24,7 +24,7 @@ Examples:
   isotherm command ZLG-0001 pre-launch --latitude 55.75 --heading 30
   isotherm command ZLG-0001 run --reversal
 
-A command that the unit's state does not take is refused with what it would take now, exit code 1.")]
+A command that the unit's state does not allow is refused with a list of those allowed, exit code 1.")]
 pub struct CommandArgs {
     /// Serial of the unit
     pub unit: String,

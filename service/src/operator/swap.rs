@@ -24,8 +24,8 @@ Examples:
   isotherm swap ZLG-0001 new.toml --yes --slew 2 --by ann
   isotherm swap ZLG-0001 new.toml --dry-run --json
 
-The difference to the document in force is printed first: every entry that changes, and what that does to the correction
-at the unit's present temperatures. Exit codes: 0 in force or scheduled, 78 refused, 1 not answered or not confirmed.")]
+First prints the difference from the document in force: every entry that changes, and the effect on the correction at the
+unit's present temperatures. Exit codes: 0 in force or scheduled, 78 refused, 1 not answered or not confirmed.")]
 pub struct SwapArgs {
     /// Serial of the unit
     pub unit: String,
@@ -214,10 +214,7 @@ fn result(reply: &SwapReply, json: bool) -> Exit {
             format!("{}: unchanged: revision {} ({digest}) is this document\n", reply.unit, reply.revision)
         }
         SwapOutcome::WouldBeAccepted => {
-            format!(
-                "{}: would be accepted ({digest}) in the place of revision {}\n",
-                reply.unit, reply.revision
-            )
+            format!("{}: would be accepted ({digest}) and replace revision {}\n", reply.unit, reply.revision)
         }
         SwapOutcome::Accepted => format!(
             "{}: accepted as revision {} ({digest}), {}\n",

@@ -22,8 +22,8 @@ Examples:
   isotherm sign ZLG-0001.toml --key bench-2.key --out signed/ZLG-0001.toml
   isotherm sign --overwrite units/*.toml --key bench-2.key
 
-A document is validated first. If one of several is bad, none is signed. The signature is one more line of the file, so
-the document's digest, and with it the revision that outputs name, is another one than before.
+Documents are validated first; if one is bad, none is signed. The signature is one more line of the file, so the
+document's digest, which outputs name, changes.
 Exit codes: 0 all signed, 78 a document or the key is bad, 1 a file is signed already, or cannot be read or written.")]
 pub struct SignArgs {
     /// Calibration documents and overlays to sign

@@ -59,7 +59,7 @@ pub(super) fn badly_signed() -> Vec<Case> {
     let line = signed.lines().last().unwrap().to_owned();
     let at_last = |name, text: String, says| Case::new(name, text, last, "", says);
     vec![
-        Case::new("unsigned", BASE, 1, "", "is not signed, and require_signature is set"),
+        Case::new("unsigned", BASE, 1, "", "is not signed, but require_signature is set"),
         at_last("signed by a stranger", by_a_stranger, "which is not trusted here; ann ("),
         at_last(
             "changed after signing",

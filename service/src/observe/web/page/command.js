@@ -28,7 +28,7 @@ class CommandPart {
     });
     this.by.addEventListener("input", () => this.line.renew());
     this.element = card("Commands", "commands", make("div", { className: "controls" }, ...this.buttons), this.note,
-      field("Who asks", this.by), this.answer, this.line);
+      field("Your name", this.by), this.answer, this.line);
   }
 
   words(name, more = "") {
@@ -72,7 +72,7 @@ class CommandPart {
     const by = this.by.value.trim();
     if (!by) {
       this.by.focus();
-      return this.tell("bad", "Say who asks: it goes into the audit file.");
+      return this.tell("bad", "Give your name: it goes into the audit file.");
     }
     this.tell("", "Asking…");
     try {
