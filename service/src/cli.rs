@@ -41,24 +41,24 @@ enum Command {
     Status(StatusArgs),
     /// Show what units are doing, live
     Top(TopArgs),
-    /// Give a running unit another calibration, after a look at the difference
+    /// Swap a unit's calibration: show the difference, ask, swap
     Swap(SwapArgs),
     /// Go back to an earlier calibration
     Rollback(RollbackArgs),
-    /// Show what was done to a unit, by whom and when
+    /// Show a unit's calibrations and commands: what, when, by whom
     History(HistoryArgs),
-    /// Move a unit from state to state: standby, run, self-test, pre-launch calibration
+    /// Command a unit: standby, run, self-test, pre-launch calibration, rest
     #[command(name = "command")]
     Give(CommandArgs),
-    /// Print the address of the console in the browser, with its token
+    /// Print the address and token of the console in the browser
     Web(WebArgs),
     /// Validate calibration documents, service configurations and Zenoh configurations
     Check(CheckArgs),
     /// Sign calibration documents
     Sign(SignArgs),
-    /// Make a pair of keys to sign calibration documents with
+    /// Make a key pair for signing calibration documents
     Keygen(KeygenArgs),
-    /// Show simulated units being corrected, with a table and a report
+    /// Correct three simulated units: a live table and a report
     Demo(DemoArgs),
     /// Record, replay, correct, plot, convert logs: isotherm-replay
     #[command(disable_help_flag = true)]
@@ -102,19 +102,19 @@ pub struct ServeArgs {
     /// Service configuration (TOML)
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
-    /// Folder of calibration documents; replaces the configured one
+    /// Folder of calibration documents (default: as configured)
     #[arg(long = "calibration", alias = "calibrations", value_name = "FOLDER")]
     pub calibrations: Option<PathBuf>,
-    /// Folder for the audit file and every accepted document; replaces the configured one
+    /// Folder for the audit file and every accepted document (default: as configured)
     #[arg(long, value_name = "FOLDER")]
     pub state: Option<PathBuf>,
-    /// Serve metrics and health over HTTP on this address; replaces the configured one
+    /// Address for metrics and health over HTTP (default: as configured)
     #[arg(long, value_name = "ADDRESS:PORT")]
     pub metrics: Option<std::net::SocketAddr>,
     /// Serve the console in the browser too, read-only unless configured otherwise; `isotherm web` prints its address
     #[arg(long)]
     pub web: bool,
-    /// How to reach others; each option given replaces the configured one
+    /// How to reach others; each option replaces the configured one
     #[command(flatten)]
     pub session: isotherm_bus::SessionOptions,
     /// When ready, print one line of JSON on stdout: {"ready":true,"locators":[…],"metrics":"http://…"}
@@ -126,7 +126,7 @@ pub struct ServeArgs {
     /// Print the totals at the end as JSON on stdout instead of a table
     #[arg(long)]
     pub json: bool,
-    /// What is logged, and how
+    /// Logging
     #[command(flatten)]
     pub log: LogArgs,
 }

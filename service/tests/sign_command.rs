@@ -197,7 +197,7 @@ fn a_signature_is_replaced_only_when_told() {
     let once = place.text("unit.toml");
     let (code, _, err) = said(&place.run(&["sign", "unit.toml", "--key", "bert.key"]));
     assert_eq!(code, Some(1));
-    assert!(err.starts_with("unit.toml: is signed already, by key ") && err.contains("--overwrite"), "{err}");
+    assert!(err.starts_with("unit.toml: is already signed, by key ") && err.contains("--overwrite"), "{err}");
     assert_eq!(place.text("unit.toml"), once);
 
     assert_eq!(place.run(&["sign", "--overwrite", "unit.toml", "--key", "bert.key"]).status.code(), Some(0));
@@ -331,7 +331,7 @@ fn what_is_no_private_key_is_refused_by_name() {
     let place = Place::with_signer("anna");
     place.write("garbage.key", "-----BEGIN PRIVATE KEY-----\nAAAA\n-----END PRIVATE KEY-----\n");
     for (key, code, part) in [
-        ("anna.pub", 78, "anna.pub:1:1: holds a block \"PUBLIC KEY\", must be \"PRIVATE KEY\""),
+        ("anna.pub", 78, "anna.pub:1:1: has a block \"PUBLIC KEY\", must be \"PRIVATE KEY\""),
         ("garbage.key", 78, "garbage.key:1:1: is damaged: "),
         ("unit.toml", 78, "unit.toml:1:1: is no PEM text"),
         ("missing.key", 1, "missing.key:1:1: cannot be read: "),
@@ -359,7 +359,7 @@ fn every_bad_file_among_the_trusted_keys_is_named() {
     for (problem, start) in problems.iter().zip([
         "trusted/anna.pub:1:1: is the same key as anna-again (",
         "trusted/gone.pub:1:1: cannot be read: ",
-        "trusted/secret.pub:1:1: holds a block \"PRIVATE KEY\", must be \"PUBLIC KEY\": this is the secret half",
+        "trusted/secret.pub:1:1: has a block \"PRIVATE KEY\", must be \"PUBLIC KEY\": this is the secret half",
         "trusted/text.pub:1:1: is no PEM text",
     ]) {
         assert!(problem.starts_with(start), "{problem}\nnot {start}");

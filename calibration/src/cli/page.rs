@@ -17,7 +17,7 @@ pub(super) struct PageArgs {
     /// Write everything with its diagrams as one HTML file; of several units each to FILE-UNIT.html, and the table to FILE
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
-    /// Replace a page that is there already
+    /// Replace an existing page
     #[arg(long, requires = "html")]
     overwrite: bool,
 }
@@ -86,10 +86,7 @@ pub(super) fn writable(out: &Path, inputs: &[&Path], overwrite: bool) -> Result<
 /// Leaves a file alone that is there, unless it may be written over.
 pub(super) fn keep(out: &Path, overwrite: bool) -> Result<(), Error> {
     if out.exists() && !overwrite {
-        return Err(Error::Usage(format!(
-            "{} is there already: give another name, or --overwrite",
-            out.display()
-        )));
+        return Err(Error::Usage(format!("{} exists: give another name, or --overwrite", out.display())));
     }
     Ok(())
 }
@@ -119,7 +116,7 @@ mod tests {
             tried.err().map(|error| (error.exit_code(), error.to_string()))
         };
         for (name, overwrite, wanted) in [
-            ("notes.txt", false, "is there already"),
+            ("notes.txt", false, "exists"),
             ("no/such/x.toml", false, "make the folder first: mkdir -p "),
             ("notes.txt/x.toml", false, "is no folder"),
             (".", true, "is a folder: give the name of a file in it"),

@@ -180,9 +180,9 @@ fn several_modes(folder: &Path, run: &Path, alone: &Path) {
     let page = std::fs::read_to_string(&html).unwrap();
     assert!(page.contains("3 units: 6 of 6") && place("batch-ZLG-0002.html").exists());
     // Nothing that is there is written over, and nothing is fitted before that is said.
-    assert!(fails(&arguments, 2).contains("batch.html is there already"));
+    assert!(fails(&arguments, 2).contains("batch.html exists"));
     std::fs::remove_file(&html).unwrap();
-    assert!(fails(&arguments, 2).contains("batch-ZLG-0001.toml is there already"));
+    assert!(fails(&arguments, 2).contains("batch-ZLG-0001.toml exists"));
 }
 
 /// A run on the table: a rest before every step of whole turns.

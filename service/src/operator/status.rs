@@ -42,13 +42,13 @@ Columns:
            gaps announced, duplicates, late ticks and readings, frames refused, since the service started
   p99      latency added by the service, 99th percentile")]
 pub struct StatusArgs {
-    /// Serials; one: everything of it, none: all units
+    /// Serials: one shows everything about it (default: all units)
     #[arg(value_name = "UNIT")]
     pub units: Vec<String>,
     /// Print services and units as JSON on stdout
     #[arg(long)]
     pub json: bool,
-    /// Fit into so many columns (default: those of the terminal)
+    /// Width in columns (default: that of the terminal)
     #[arg(long, value_name = "COLUMNS", value_parser = clap::value_parser!(u16).range(20..))]
     pub width: Option<u16>,
     /// How to reach the service

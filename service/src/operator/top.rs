@@ -37,7 +37,7 @@ Examples:
 One line per unit, as in `isotherm status`; `isotherm status --help` explains the columns. Keys: arrows select, Enter
 shows everything about a unit, s sorts, / filters, ? helps, q quits.")]
 pub struct TopArgs {
-    /// Time between two looks at the screen (s)
+    /// Time between two updates (s)
     #[arg(long, value_name = "SECONDS", default_value = "1", value_parser = seconds)]
     pub interval: Duration,
     /// How to reach the service

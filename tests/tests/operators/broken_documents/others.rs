@@ -79,11 +79,11 @@ pub(super) fn badly_signed() -> Vec<Case> {
         at_last("signature of another kind", signed.replace("ed25519", "rsa"), "is of kind"),
         Case::new("signed twice", format!("{signed}{line}\n"), last + 1, "", "is a second signature line"),
         Case::new(
-            "more behind the signature",
+            "more after the signature",
             format!("{signed}note = 1\n"),
             last + 1,
             "",
-            "behind the signature",
+            "after the signature",
         ),
     ]
 }

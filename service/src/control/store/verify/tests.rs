@@ -144,7 +144,7 @@ fn every_break_is_told_with_file_line_entry_unit_and_what_to_do() {
     );
     let exchanged = with(&|lines| lines.swap(2, 3));
     assert!(
-        places(&exchanged) == [(3, 4), (4, 3)] && exchanged[1].2.contains("stands behind entry 4"),
+        places(&exchanged) == [(3, 4), (4, 3)] && exchanged[1].2.contains("comes after entry 4"),
         "{exchanged:?}"
     );
     let inserted = with(&|lines| lines.insert(3, bare(&lines[3])));
