@@ -20,18 +20,8 @@ impl Family {
     /// A line of the table.
     fn row(&self) -> String {
         let kind = format!("{:?}", self.kind).to_lowercase();
-        let unit = match self.unit {
-            "" => "—",
-            "seconds" => "s",
-            "celsius" => "°C",
-            "celsius_per_second" => "°C/s",
-            "radians_per_second" => "rad/s",
-            "meters_per_second_squared" => "m/s²",
-            "per_second" => "1/s",
-            unit => panic!("{unit} is a new unit of measure"),
-        };
         let labels: Vec<_> = self.labels.iter().map(|label| format!("`{label}`")).collect();
-        format!("| `{}` | {kind} | {unit} | {} | {} |\n", self.whole_name(), labels.join(", "), self.help)
+        format!("| `{}` | {kind} | {} | {} |\n", self.whole_name(), labels.join(", "), self.help)
     }
 }
 
@@ -41,7 +31,7 @@ fn docs(name: &str) -> PathBuf {
 
 #[test]
 fn the_page_of_the_metrics_has_every_one_and_no_other() {
-    let mut table = "| name | type | unit of measure | labels | says |\n|---|---|---|---|---|\n".to_owned();
+    let mut table = "| name | type | labels | meaning |\n|---|---|---|---|\n".to_owned();
     // Counters stand in `docs/wire.md`, in the same words.
     table.extend(service::FAMILIES.iter().chain(unit::FAMILIES).map(Family::row));
     let file = docs("metrics.md");
