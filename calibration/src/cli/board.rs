@@ -18,7 +18,7 @@ use crate::thermal::Site;
 #[command(after_help = "Examples:\n  \
     isotherm-calibrate board up.mcap down.mcap --calibration unit.toml --latitude 55.75 --heading 30 --pitch 35.264 --roll -135 \\\n      \
     --pitch -35.264 --roll 45 --out unit-board.toml --html board.html\n\n\
-    The accelerometers stay on their thermostat, or their temperature moves by itself. The case diagonal up and down serves all axes.")]
+    Keep the accelerometers on their thermostat, or vary their temperature independently. The case diagonal up and down serves all axes.")]
 pub(super) struct BoardArgs {
     #[command(flatten)]
     log: LogArgs,

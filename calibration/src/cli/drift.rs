@@ -29,7 +29,7 @@ use crate::written::Written;
     isotherm-calibrate drift static.mcap --html drift.html\n  \
     isotherm-calibrate drift rlg-static.imu.gz --mapping config/mappings/rlg-static.toml --increment-weight 0.1\n  \
     isotherm-calibrate drift static.mcap --calibration unit.toml --out unit-drift.toml\n\n\
-    With --calibration the log is corrected first, by the service's own code, and what is analysed is what the calibration leaves. \
+    With --calibration the log is first corrected by the service's own code, and the remainder is analysed. \
     Rates are in °/h, N in °/√h, K in °/h/√h, R in °/h², Q in ″.")]
 pub(super) struct DriftArgs {
     #[command(flatten)]
@@ -141,8 +141,8 @@ impl DriftArgs {
             .try_for_each(|(name, value)| value.map_or(Ok(()), |value| above_0(name, value)))?;
         if self.output.writes() && (self.document.is_none() || self.accelerometers) {
             return Err(Error::Usage(
-                "--out is the document with what the estimator is to expect of its gyros: give it with --calibration, and leave \
-                 --accelerometers out"
+                "--out writes drift parameters of gyros into a document: add --calibration, and remove \
+                 --accelerometers"
                     .to_owned(),
             ));
         }

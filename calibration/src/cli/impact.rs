@@ -39,9 +39,7 @@ const SIZES_DEG_H: [f64; 6] = [0.0034, 9.5, 0.000_08, 140.0, 0.05, 0.0002];
     isotherm-calibrate impact --calibration unit-drift.toml --seeds 100\n  \
     isotherm-calibrate impact corrected.mcap --calibration-hours 21\n  \
     isotherm-calibrate impact --calibration unit-drift.toml --start-log monday.mcap --start-log tuesday.mcap --start-log friday.mcap\n\n\
-    The system is calibrated, then goes on alone; its level platform turns about the vertical at four times the Earth's rate. \
-    Each drift is sailed four times: held at its last value, and with the service's own drift estimator with a Markov part (002's \
-    model 1), with Markov part and trend, with the trend alone (002's new model).")]
+    The system is calibrated, then navigates alone; its level platform turns about the vertical at four times the Earth's rate. Each drift is run four times: held at its last value, and with the service's own drift estimator with a Markov part (002's model 1), with Markov part and trend, with the trend alone (002's new model).")]
 pub(super) struct ImpactArgs {
     /// A log at rest: corrected ticks (CSV, .mcap), or raw ones with --calibration
     #[arg(value_name = "LOG")]
@@ -133,8 +131,7 @@ impl ImpactArgs {
         } else if self.trend.is_some() || self.constant.is_some() {
             self.sail_stated(&voyage, &parts)?
         } else {
-            let words =
-                "say which drift: a LOG, --calibration DOC, --trend DEG_PER_H2 or --constant DEG_PER_H";
+            let words = "give a drift: a LOG, --calibration DOC, --trend DEG_PER_H2 or --constant DEG_PER_H";
             return Err(Error::Usage(words.to_owned()));
         };
         report.notes.extend(starts);
@@ -165,11 +162,12 @@ impl ImpactArgs {
             }
         }
         if self.gyro.is_some() && self.trend.is_none() && self.constant.is_none() {
-            let words = "--gyro says which gyro has the trend or the constant: give --trend or --constant, or leave it out";
+            let words = "--gyro needs --trend or --constant: it names the gyro that has them";
             return Err(Error::Usage(words.to_owned()));
         }
         if self.gyro == Some(Gyro::Each) && self.seeds.is_some() {
-            let words = "--gyro each sails each gyro by itself, the drifts of --seeds are of all: give x, y, z or all";
+            let words =
+                "--gyro each runs each gyro alone, but --seeds makes drifts of all: give x, y, z or all";
             return Err(Error::Usage(words.to_owned()));
         }
         let inputs: Vec<&Path> =
@@ -232,7 +230,8 @@ impl ImpactArgs {
             format!("{} ({}…{})", short(found.sigma), short(low), short(high))
         };
         Ok(Some(format!(
-            "Sigma of the constant over {} starts, with its 95 % interval, gyros x, y, z: {} °/h. It stands in place of initial_sigma.",
+            "Sigma of the constant over {} starts, with its 95 % interval, gyros x, y, z: {} °/h. It replaces \
+             initial_sigma.",
             means.len(),
             found.iter().map(of).collect::<Vec<_>>().join(", ")
         )))
@@ -249,7 +248,7 @@ impl ImpactArgs {
             return columns;
         }
         let Some(document) = &self.document else {
-            return Err(Error::Usage("a raw log needs --calibration, to be corrected with".to_owned()));
+            return Err(Error::Usage("a raw log needs --calibration, to correct it".to_owned()));
         };
         let loaded = load_calibration(document)?;
         let run = args.run(Some(&loaded.unit))?;

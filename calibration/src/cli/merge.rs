@@ -16,8 +16,7 @@ use crate::written::Written;
 #[command(after_help = "Examples:\n  \
     isotherm-calibrate merge nominal.toml thermal.toml positions.toml --out unit.toml\n  \
     isotherm-calibrate merge nominal.toml a.toml b.toml --take gyro.sensor.x=b.toml --out unit.toml\n\n\
-    Each part is compared with BASE, the document that the fits started from: what it states otherwise, it has made. What two \
-    parts have made differently is told by key, and nothing is written before --take decides.")]
+    Each part is compared with BASE, the document that the fits started from; its differences are taken. If two parts state a key differently, the key is reported, and nothing is written until --take decides.")]
 pub(super) struct MergeArgs {
     /// The document that the parts were made from
     #[arg(value_name = "BASE")]

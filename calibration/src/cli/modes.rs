@@ -22,9 +22,7 @@ use crate::modes::make::{Wanted, make};
     isotherm-calibrate modes chamber.mcap --calibration unit.toml --latitude 55.75 --heading 30 --out unit-modes.toml\n  \
     isotherm-calibrate modes up.mcap down.mcap --judge other.mcap --calibration unit.toml --latitude 55.75 --heading 30 \
     --html modes.html\n\n\
-    The runs are of units at rest, with mode reversal on, over the temperatures it is to work at. The document gives scale, axes, \
-    temperature channels and filter; its static, magnetic and slow-meander terms are replaced, with the transition ticks and the \
-    servo where the runs show them.")]
+    The runs are at rest, with mode reversal, over the temperatures of use. The document gives scale, axes, temperature channels and filter; its static, magnetic and slow-meander terms are replaced, and transition ticks and servo if the runs show them.")]
 pub(super) struct ModesArgs {
     #[command(flatten)]
     log: LogArgs,
@@ -58,8 +56,8 @@ pub(super) struct ModesArgs {
     output: OutputArgs,
 }
 
-const NO_DOCUMENT: &str = "a mode-reversed gyro counts, and a log does not say what a count is worth: give --calibration with increment \
-    weights, input axes, temperature channels and filter";
+const NO_DOCUMENT: &str = "a mode-reversed gyro counts, and a log does not state its increment weight: give \
+                           --calibration with increment weights, input axes, temperature channels and filter";
 
 impl ModesArgs {
     /// Does what the command says.

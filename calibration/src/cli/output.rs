@@ -120,7 +120,7 @@ impl OutputArgs {
         report.warnings.extend(work.told());
         if let Some(out) = self.out.as_ref().filter(|_| !any_accepted) {
             let out = names.of(out);
-            report.warnings.push(format!("every sensor is refused: nothing is written to {}", out.display()));
+            report.warnings.push(format!("every sensor is refused: {} is not written", out.display()));
         }
         self.write(|| any_accepted.then(|| document(&report)).transpose(), || report.to_html(), names)?;
         Ok(report)

@@ -68,14 +68,14 @@ pub(super) fn writable(out: &Path, inputs: &[&Path], overwrite: bool) -> Result<
     };
     if !folder.exists() {
         return Err(Error::Usage(format!(
-            "{} cannot be written: make the folder first: mkdir -p {}",
+            "{} cannot be written: first create the folder with mkdir -p {}",
             out.display(),
             folder.display()
         )));
     }
     if !folder.is_dir() {
         return Err(Error::Usage(format!(
-            "{} cannot be written: {} is no folder",
+            "{} cannot be written: {} is not a folder",
             out.display(),
             folder.display()
         )));
@@ -117,7 +117,7 @@ mod tests {
         };
         for (name, overwrite, wanted) in [
             ("notes.txt", false, "exists"),
-            ("no/such/x.toml", false, "make the folder first: mkdir -p "),
+            ("no/such/x.toml", false, "first create the folder with mkdir -p "),
             ("notes.txt/x.toml", false, "is no folder"),
             (".", true, "is a folder: give the name of a file in it"),
             ("log.mcap", true, "would be written over"),

@@ -56,8 +56,8 @@ impl PlaceArgs {
             }
             let missing = if self.latitude.is_none() { "--latitude and --heading" } else { "--heading" };
             return Err(Error::Usage(format!(
-                "the Earth rate is to be removed: give {missing} (and --pitch and --roll where there are no accelerometers to level \
-                 with), or --remove-mean where the attitude is not known"
+                "to remove the Earth's rate, give {missing} (and --pitch and --roll without accelerometers); if the \
+                 attitude is unknown, --remove-mean"
             )));
         }
         self.known()

@@ -37,8 +37,7 @@ use steps::{first_document, judged, tracks};
     isotherm-calibrate positions --budget --positioning 5 --run-out 2\n  \
     isotherm-calibrate positions cold.mcap room.mcap hot.mcap --calibration unit.toml --latitude 55.75 --out unit-positions.toml --html positions.html\n  \
     isotherm-calibrate positions stand.mcap --plan my-plan.toml --gravity 9.8154 --times held.csv\n\n\
-    Still poses are found in the logs and known by the gyros' turns between them. Every set of positions works that shows each axis up \
-    and down; nine or more tell the stand's errors from the axes.")]
+    Still poses are found in the logs and identified by the gyros' turns between them. Any set of positions works that shows each axis up and down; nine or more separate the stand's errors from the axes.")]
 pub(super) struct PositionsArgs {
     /// Recordings (.mcap), or the files of a text log in the order of its mapping: each temperature may be a log of its own
     #[arg(value_name = "LOG", required_unless_present = "budget")]

@@ -110,7 +110,7 @@ impl Reading {
         if !are_recordings(files)? {
             let unit = given.as_ref().or(fallback).cloned().ok_or_else(|| {
                 Error::Usage(format!(
-                    "{name} is a text log, which does not say of which unit it is: give --unit SERIAL, or --calibration, which has it"
+                    "{name} is a text log, which does not state its unit: give --unit SERIAL, or --calibration"
                 ))
             })?;
             let mapping = Box::new(self.text_mapping(files)?);
@@ -165,7 +165,7 @@ impl Reading {
                 std::fs::metadata(path).map_err(|source| Error::file(path, "open the log", source))?;
             if about.is_file() && about.len() == 0 {
                 return Err(Error::Refused(vec![format!(
-                    "{} is empty, it has 0 bytes: was it recorded, and copied to its end?",
+                    "{} is empty: was it recorded and copied completely?",
                     path.display()
                 )]));
             }
@@ -173,12 +173,12 @@ impl Reading {
         let folder = logs.iter().find(|path| path.is_dir());
         Err(Error::Usage(match folder {
             Some(folder) => format!(
-                "the folder {} has no recording (.mcap) in it; a folder with the files of a text log needs --mapping FILE that names \
-                 them: ready ones are in config/mappings",
+                "the folder {} has no recording (.mcap) in it; a folder with the files of a text log needs --mapping \
+                 FILE that names them: examples are in config/mappings",
                 folder.display()
             ),
             None => format!(
-                "{} is no recording, and a text log needs --mapping FILE: ready ones are in config/mappings",
+                "{} is not a recording, and a text log needs --mapping FILE: examples are in config/mappings",
                 names(logs)
             ),
         }))

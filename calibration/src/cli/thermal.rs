@@ -137,7 +137,7 @@ impl ThermalArgs {
             logs.iter().enumerate().find(|(at, log)| logs.iter().take(*at).any(|other| same(log, other)));
         if let Some((_, log)) = again {
             return Err(Error::Usage(format!(
-                "{} is given twice: a log counts once, and cross-validation would find it again",
+                "{} is given twice: cross-validation needs each log once",
                 log.display()
             )));
         }
@@ -150,8 +150,8 @@ impl ThermalArgs {
         match self.judge.iter().find(|judge| logs.iter().any(|log| same(log, judge))) {
             None => Ok(()),
             Some(judge) => Err(Error::Usage(format!(
-                "--judge {}: the document is fitted to the same part of it, which cannot judge it: give another log, or other parts of this \
-                 one (--duration here, --judge-start there)",
+                "--judge {}: the document is fitted to the same part of it: give another log, or another part \
+                 (--duration, --judge-start)",
                 judge.display()
             ))),
         }

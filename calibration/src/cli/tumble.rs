@@ -27,8 +27,7 @@ use crate::written::Written;
 #[command(after_help = "Examples:\n  \
     isotherm-calibrate tumble gyro.txt.gz acc.txt.gz --mapping config/mappings/tumble-mems.toml --unit TUMBLE-0001 --gravity 9.81744 --out tumble.toml --html tumble.html\n  \
     isotherm-calibrate tumble tumbled.mcap --calibration unit.toml --latitude 55.75 --out unit-tumbled.toml\n\n\
-    Leave the unit alone for half a minute, then put it down in thirty or more different ways for two seconds each. The case axes \
-    are defined by the accelerometers: z is that of the third, y lies in the plane of the second and third.")]
+    Leave the unit alone for half a minute, then put it down in thirty or more different ways for two seconds each. The accelerometers define the case axes: z is the third's, y lies in the plane of the second and third.")]
 pub(super) struct TumbleArgs {
     #[command(flatten)]
     log: LogArgs,
@@ -163,8 +162,8 @@ impl TumbleArgs {
         let mut document = bare(&series, output)?;
         if output == AccelOutput::Volts {
             document.note = Some(
-                "What this document calls V is the accelerometers' reading as the log has it: volts, or counts of a converter with \
-                 its zero at mid-scale, which the bias then holds."
+                "V in this document is the accelerometers' reading in the log: volts, or counts of a converter with \
+                 its zero at mid-scale, which is then part of the bias."
                     .to_owned(),
             );
         }

@@ -67,7 +67,10 @@ fn outputs_are_checked_before_anything_is_read() {
     ];
     for command in commands {
         let refused = fails(command, 2);
-        assert!(refused.contains(&format!("make the folder first: mkdir -p {}", path("made"))), "{refused}");
+        assert!(
+            refused.contains(&format!("first create the folder with mkdir -p {}", path("made"))),
+            "{refused}"
+        );
     }
     let both = path("both");
     let refused = fails(&["thermal", &log, "--out", &both, "--html", &both], 2);

@@ -54,8 +54,8 @@ impl StandArgs {
             let judging = if judges > 0 { format!(" and {judges} of --judge") } else { String::new() };
             let logs = if runs == 1 { "log" } else { "logs" };
             return Err(Error::Usage(format!(
-                "{count} times {name} for {runs} {logs}{judging}: state it once for all, or once for each, in the order of the logs, those of \
-                 --judge behind"
+                "{count} times {name} for {runs} {logs}{judging}: state it once for all, or once for each log in \
+                 their order, then for those of --judge"
             )));
         }
         if self.latitude.is_none() && self.rate.is_empty() {
@@ -89,8 +89,8 @@ impl StandArgs {
         }
         if !(low..=high).contains(&rate_deg_per_s.abs()) {
             return Err(Error::Usage(format!(
-                "--rate is {rate_deg_per_s} °/s, must be 0 for a log at rest, or from {low} to {high} °/s in size: slower turns tell nothing \
-                 of a scale factor"
+                "--rate is {rate_deg_per_s} °/s, must be 0 for a log at rest, or from {low} to {high} °/s in size: \
+                 slower turns do not determine a scale factor"
             )));
         }
         Ok(Some(Turning { axis, rate_deg_per_s }))
