@@ -27,7 +27,7 @@ use isotherm_document::program::Common;
 
 use crate::error::Error;
 
-/// Makes calibration documents from logs, and judges them.
+/// Makes calibration documents from logs, judges and compares them.
 #[derive(Debug, Parser)]
 #[command(
     name = "isotherm-calibrate",

@@ -41,12 +41,12 @@ const SIZES_DEG_H: [f64; 6] = [0.0034, 9.5, 0.000_08, 140.0, 0.05, 0.0002];
     isotherm-calibrate impact --calibration unit-drift.toml --start-log monday.mcap --start-log tuesday.mcap --start-log friday.mcap\n\n\
     The system is calibrated, then navigates alone; its level platform turns about the vertical at four times the Earth's rate. Each drift is run four times: held at its last value, and with the service's own drift estimator with a Markov part (002's model 1), with Markov part and trend, with the trend alone (002's new model).")]
 pub(super) struct ImpactArgs {
-    /// A log at rest: corrected ticks (CSV, .mcap), or raw ones with --calibration
+    /// Log at rest: corrected ticks (CSV, .mcap), or raw ones with --calibration
     #[arg(value_name = "LOG")]
     log: Vec<PathBuf>,
     #[command(flatten)]
     reading: Reading,
-    /// Calibration document (TOML) that says what the estimator is to expect; a raw log is corrected with it
+    /// Calibration document (TOML) with the drift; corrects a raw log
     #[arg(long = "calibration", short = 'c', alias = "document", short_alias = 'd', value_name = "FILE")]
     document: Option<PathBuf>,
     /// Straight trend from the calibration's beginning (°/h²)
@@ -61,13 +61,13 @@ pub(super) struct ImpactArgs {
     /// Constant that appears at departure, as after a shock (°/h)
     #[arg(long, value_name = "DEG_PER_H", alias = "constant-deg-per-h", allow_hyphen_values = true, conflicts_with_all = ["log", "seeds"])]
     constant: Option<f64>,
-    /// Gyro that has the trend or the constant; without it each by itself, with --seeds all at once
+    /// Gyro with the trend or the constant (default: each alone, with --seeds all at once)
     #[arg(long, value_enum)]
     gyro: Option<Gyro>,
-    /// Sail many times with drifts from as many seeds, of the size that the document states; --trend comes on top
+    /// Number of random drifts of the size in the document; --trend is added
     #[arg(long, value_name = "NUMBER", conflicts_with = "log", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     seeds: Option<u32>,
-    /// Log at rest of one start, read as LOG is; with two or more, their means give the sigma of the constant over starts; repeatable
+    /// Log at rest of one start; the means of two or more give the sigma of the constant; repeatable
     #[arg(long, value_name = "LOG")]
     start_log: Vec<PathBuf>,
     /// The first seed
@@ -76,19 +76,19 @@ pub(super) struct ImpactArgs {
     /// Latitude (°)
     #[arg(long, value_name = "DEG", default_value_t = 60.0, allow_hyphen_values = true)]
     latitude: f64,
-    /// Hours on its own
+    /// Length of the voyage without position (h)
     #[arg(long, value_name = "HOURS", default_value_t = 48.0)]
     hours: f64,
-    /// Hours of calibration before
+    /// Length of the calibration before it (h)
     #[arg(long, value_name = "HOURS", default_value_t = 21.0)]
     calibration_hours: f64,
-    /// Rate of the platform about the vertical, over the Earth's
+    /// Rate of the platform about the vertical (multiples of the Earth's)
     #[arg(long, value_name = "RATIO", default_value_t = TURN_RATIO, allow_hyphen_values = true)]
     turn_ratio: f64,
-    /// Standard error of the rate that the calibration knows, per minute (°/h)
+    /// Standard error of the reference rate per minute (°/h)
     #[arg(long, value_name = "DEG_PER_H", default_value_t = 0.001)]
     reference_sigma: f64,
-    /// The velocity log does not keep the level gyros observable
+    /// No velocity log: level gyros are not observed during the voyage
     #[arg(long)]
     no_log_aid: bool,
     #[command(flatten)]

@@ -14,7 +14,7 @@ use crate::written::write_file;
 /// The page of a command that writes nothing else.
 #[derive(Debug, Clone, Args)]
 pub(super) struct PageArgs {
-    /// Write everything with its diagrams as one HTML file; of several units each to FILE-UNIT.html, and the table to FILE
+    /// HTML report to write, one file; several units: FILE-UNIT.html each, and a table in FILE
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
     /// Replace an existing page

@@ -15,13 +15,13 @@ pub(crate) struct PlaceArgs {
     /// Heading of the case's x axis from north (°)
     #[arg(long, value_name = "DEG", allow_negative_numbers = true, requires = "latitude")]
     heading: Option<f64>,
-    /// Pitch of the case's x axis above the horizon (°); without it the unit is levelled by its accelerometers
+    /// Pitch of the case's x axis above the horizon (°) (default: levelled by the accelerometers)
     #[arg(long, value_name = "DEG", allow_negative_numbers = true, requires_all = ["latitude", "roll"])]
     pitch: Option<f64>,
-    /// Roll about the case's x axis (°)
+    /// Roll about the case's x axis (°) (default: levelled by the accelerometers)
     #[arg(long, value_name = "DEG", allow_negative_numbers = true, requires_all = ["latitude", "pitch"])]
     roll: Option<f64>,
-    /// Do not remove the Earth rate: the attitude is not known
+    /// Remove the mean instead of the Earth's rate: the attitude is unknown
     #[arg(long, conflicts_with = "latitude")]
     remove_mean: bool,
 }

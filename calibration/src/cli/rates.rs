@@ -28,7 +28,7 @@ use crate::runs::Run;
 pub(super) struct RatesArgs {
     #[command(flatten)]
     log: LogArgs,
-    /// Judge what was found on this log too, which the fit does not see; may be repeated
+    /// Log to judge by, out of sample; repeatable
     #[arg(long, value_name = "LOG")]
     judge: Vec<PathBuf>,
     /// Axis of the table in case axes (x, -y, … or 0,0.6,0.8); once for each log, then for each judging log
@@ -37,7 +37,7 @@ pub(super) struct RatesArgs {
     /// Rates of the table in their order (°/s), with commas
     #[arg(long, value_name = "RATES", value_delimiter = ',', allow_hyphen_values = true, requires = "axis")]
     rates: Vec<f64>,
-    /// Rates of the table in the judging logs (°/s), with commas; those of --rates without it
+    /// Rates of the table in the judging logs (°/s), with commas (default: --rates)
     #[arg(
         long,
         value_name = "RATES",
@@ -49,8 +49,7 @@ pub(super) struct RatesArgs {
     /// Table of the steps (CSV or TOML)
     #[arg(long, value_name = "FILE", conflicts_with_all = ["axis", "rates", "judge_rates"])]
     steps: Option<PathBuf>,
-    /// Calibration document (TOML) that the fit starts from, nominal scale and axes without it; for several units the folder that
-    /// has UNIT.toml of each
+    /// Calibration document (TOML) to start from (default: nominal scale and axes); several units: a folder with UNIT.toml of each
     #[arg(long = "calibration", short = 'c', alias = "document", short_alias = 'd', value_name = "FILE")]
     document: Option<PathBuf>,
     #[command(flatten)]
@@ -58,7 +57,7 @@ pub(super) struct RatesArgs {
     /// Standard deviation of the table's rates (ppm)
     #[arg(long, value_name = "PPM", default_value_t = 0.0)]
     table_ppm: f64,
-    /// Add what is left of the bias to the document's static bias
+    /// Add the remaining bias to the document's static bias
     #[arg(long)]
     with_bias: bool,
     #[command(flatten)]

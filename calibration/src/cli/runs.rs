@@ -22,7 +22,7 @@ const BATCH_TICKS: usize = 512;
 /// Logs, of one unit or of several.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct LogArgs {
-    /// Recordings (.mcap), the files of a text log in the order of its mapping, or a folder that has them
+    /// Recordings (.mcap), the files of a text log in the mapping's order, or their folder
     #[arg(required = true, value_name = "LOG")]
     pub(crate) log: Vec<PathBuf>,
     #[command(flatten)]
@@ -32,16 +32,16 @@ pub(crate) struct LogArgs {
 /// How logs are read.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct Reading {
-    /// Column mapping of a text log (TOML) (default: LOG with .mapping.toml); ready ones are in config/mappings
+    /// Column mapping of a text log (TOML) (default: LOG with .mapping.toml); examples: config/mappings
     #[arg(long, short, value_name = "FILE")]
     pub(crate) mapping: Option<PathBuf>,
-    /// The unit, where a recording has several; of a text log its serial (default: that of the document)
+    /// Unit serial, if a recording has several; text log: the serial to assign (default: the document's)
     #[arg(long, short, value_name = "SERIAL")]
     pub(crate) unit: Option<String>,
-    /// Leave out this much of each log's beginning (s); recordings are cut between messages
+    /// Start this long after each log's beginning (s); recordings are cut between messages
     #[arg(long, value_name = "SECONDS", default_value = "0", value_parser = seconds)]
     pub(crate) start: Span,
-    /// Take this much of each log (s) (default: all)
+    /// Length to take of each log (s) (default: all)
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub(crate) duration: Option<Span>,
     /// Stop this long after each log's beginning (s)

@@ -29,12 +29,12 @@ pub(super) struct ValidateArgs {
     /// The document, or a folder with the documents of several units
     #[arg(value_name = "DOC")]
     document: PathBuf,
-    /// Recordings (.mcap), or text logs with --mapping; every one is a run for itself
+    /// Recordings (.mcap), or text logs with --mapping; each is a run
     #[arg(required = true, value_name = "LOG")]
     log: Vec<PathBuf>,
     #[command(flatten)]
     reading: Reading,
-    /// Length of the windows that are averaged over; without it 10 s, in logs of an hour and more up to 100 s, as thermal has them
+    /// Averaging windows (s) (default: 10, up to 100 in logs of an hour and more)
     #[arg(long, value_name = "SECONDS")]
     window: Option<f64>,
     #[command(flatten)]

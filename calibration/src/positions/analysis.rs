@@ -37,7 +37,7 @@ pub struct Settings {
     pub levelling_rad: f64,
     /// Channels that the orientation follows; those of the accelerometers where empty.
     pub channels: Vec<String>,
-    /// Temperature that all polynomials are about (°C); chosen where absent.
+    /// Reference temperature of the polynomials (°C); chosen where absent.
     pub reference_deg_c: Option<f64>,
 }
 
