@@ -35,10 +35,10 @@ pub struct CheckArgs {
     /// Files to validate
     #[arg(required = true, value_name = "FILE")]
     pub files: Vec<PathBuf>,
-    /// What the files are; without it told by extension and content
+    /// Kind of the files (default: by extension and content)
     #[arg(long, value_enum)]
     pub kind: Option<FileKind>,
-    /// Folder of public keys (*.pub): say which of them signed each calibration document
+    /// Folder of public keys (*.pub) that signatures are verified with
     #[arg(long, value_name = "FOLDER")]
     pub trusted_keys: Option<PathBuf>,
     /// Print one JSON object on stdout instead

@@ -111,7 +111,7 @@ pub struct ServeArgs {
     /// Address for metrics and health over HTTP (default: as configured)
     #[arg(long, value_name = "ADDRESS:PORT")]
     pub metrics: Option<std::net::SocketAddr>,
-    /// Serve the console in the browser too, read-only unless configured otherwise; `isotherm web` prints its address
+    /// Serve the console in the browser too (default: as configured); `isotherm web` prints its address
     #[arg(long)]
     pub web: bool,
     /// How to reach others; each option replaces the configured one

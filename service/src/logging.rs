@@ -118,7 +118,7 @@ pub struct LogArgs {
     /// Form of the log on stderr
     #[arg(long, value_enum, default_value = "human", value_name = "FORM")]
     pub log_format: LogFormat,
-    /// What is logged: a level (error, warn, info, debug, trace), or filters such as info,zenoh=debug
+    /// Log level (error, warn, info, debug, trace), or filters such as info,zenoh=debug
     #[arg(long, env = "ISOTHERM_LOG", default_value = "info", value_name = "FILTER")]
     pub log_level: String,
 }

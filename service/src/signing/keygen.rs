@@ -23,10 +23,10 @@ that accepts documents signed with NAME.key; the signer is shown there as NAME. 
 `openssl genpkey -algorithm ed25519` works too.
 Exit codes: 0 done, 1 a file exists or cannot be written.")]
 pub struct KeygenArgs {
-    /// What the signer is called: 1 to 64 letters, digits, `-`, `_` and `.`
+    /// Name of the signer: 1 to 64 letters, digits, `-`, `_` and `.`
     #[arg(value_parser = name)]
     pub name: String,
-    /// Where the two files are written
+    /// Folder for the two files
     #[arg(long, value_name = "FOLDER", default_value = ".")]
     pub folder: PathBuf,
     /// Print one JSON object on stdout instead

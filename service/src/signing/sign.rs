@@ -29,13 +29,13 @@ pub struct SignArgs {
     /// Calibration documents and overlays to sign
     #[arg(required = true, value_name = "FILE")]
     pub files: Vec<PathBuf>,
-    /// The private key, as `isotherm keygen` or `openssl genpkey -algorithm ed25519` writes it
+    /// Private key, of `isotherm keygen` or `openssl genpkey -algorithm ed25519`
     #[arg(long, value_name = "FILE")]
     pub key: PathBuf,
-    /// Write the signed document here and leave the original as it is; for a single document
+    /// Signed document to write, instead of changing the original; for a single document
     #[arg(long = "out", alias = "output", value_name = "FILE")]
     pub output: Option<PathBuf>,
-    /// Replace a signature that is there already, whether it holds or not
+    /// Replace an existing signature, valid or not
     #[arg(long = "overwrite", alias = "replace")]
     pub replace: bool,
     /// Print one JSON object on stdout instead

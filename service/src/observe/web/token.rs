@@ -35,7 +35,7 @@ pub struct WebArgs {
     /// Service configuration (TOML)
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
-    /// State folder of the service; replaces the configured one
+    /// State folder of the service (default: as configured)
     #[arg(long, value_name = "FOLDER")]
     pub state: Option<PathBuf>,
     /// Print JSON on stdout
