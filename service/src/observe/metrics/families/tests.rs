@@ -47,6 +47,22 @@ fn the_page_of_the_metrics_has_every_one_and_no_other() {
 }
 
 #[test]
+fn the_alert_rules_name_metrics_that_exist() {
+    let file = docs("../config/prometheus-rules.yml");
+    let rules = std::fs::read_to_string(&file).unwrap();
+    let names: Vec<_> = all().map(Family::whole_name).collect();
+    let told: BTreeSet<_> = rules
+        .split(|c: char| !c.is_ascii_lowercase() && c != '_')
+        .filter(|word| word.starts_with("isotherm_"))
+        .map(|word| word.strip_suffix("_bucket").unwrap_or(word))
+        .collect();
+    assert!(told.len() > 5, "{told:?}");
+    for name in told {
+        assert!(names.iter().any(|known| known == name), "{name} is no metric");
+    }
+}
+
+#[test]
 fn every_name_is_there_once_and_well_formed() {
     let names: Vec<_> = all().map(Family::whole_name).collect();
     assert_eq!(names.iter().collect::<BTreeSet<_>>().len(), names.len());
