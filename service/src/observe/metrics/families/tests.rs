@@ -19,9 +19,8 @@ impl Family {
 
     /// A line of the table.
     fn row(&self) -> String {
-        let kind = format!("{:?}", self.kind).to_lowercase();
         let labels: Vec<_> = self.labels.iter().map(|label| format!("`{label}`")).collect();
-        format!("| `{}` | {kind} | {} | {} |\n", self.whole_name(), labels.join(", "), self.help)
+        format!("| `{}` | {} | {} |\n", self.whole_name(), labels.join(", "), self.help)
     }
 }
 
@@ -31,7 +30,7 @@ fn docs(name: &str) -> PathBuf {
 
 #[test]
 fn the_page_of_the_metrics_has_every_one_and_no_other() {
-    let mut table = "| name | type | labels | meaning |\n|---|---|---|---|\n".to_owned();
+    let mut table = "| name | labels | meaning |\n|---|---|---|\n".to_owned();
     // Counters stand in `docs/wire.md`, in the same words.
     table.extend(service::FAMILIES.iter().chain(unit::FAMILIES).map(Family::row));
     let file = docs("metrics.md");
