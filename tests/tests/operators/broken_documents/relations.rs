@@ -44,7 +44,7 @@ pub(super) const EDITS: [Edit; 28] = [
         "channels = [\"house\"]",
         "\"house\"",
         "gyro.orientation.thermal.channels[0]",
-        "is \"house\", which is no temperature channel",
+        "is \"house\", not a temperature channel",
     ),
     (
         "two gyros of one name",

@@ -33,7 +33,7 @@ pub(super) const CASES: [Case; 32] = [
         "channels = [\"rock\"]",
         "rock",
         "gyro.orientation.thermal.channels[0]",
-        "is \"rock\", which is no temperature channel",
+        "is \"rock\", not a temperature channel",
     ),
     (
         "two sensors of one name",
