@@ -225,7 +225,7 @@ const BROKEN: [Case; 19] = [
         "name = \"x\"",
         "name = \"x\"\nstatic_bias_change_deg_per_h = -0.02",
         "gyro[1].name",
-        "the name of gyro[0] too",
+        "also the name of gyro[0]",
     ),
     (
         "= 0.031",
