@@ -11,7 +11,7 @@ import unittest
 
 import isotherm
 import numpy as np
-from common import LIMIT_S, REPLAY, ROOT, vectors, with_checksum
+from common import BROKEN, LIMIT_S, REPLAY, ROOT, frozen, vectors
 
 UNIT = "MEMS-0001"
 DOCUMENT = ROOT / f"config/calibration/{UNIT}.toml"
@@ -182,15 +182,16 @@ class Files(unittest.TestCase):
 
     @unittest.skipUnless(shutil.which("octave-cli"), "octave-cli not found (Debian: apt install octave)")
     def test_octave_says_what_is_wrong_with_a_frame_and_a_file(self) -> None:
-        frame = next(vector.frame for vector in vectors() if vector.name == "corrected")
-        covered = frame[:-4]
-        cases = [
-            (with_checksum(covered[:-5]), "the body ends too early"),
-            (with_checksum(b"\1" + covered[1:]), "kind 1, not 4"),
-            (with_checksum(b"\4\t" + covered[2:]), "version 9 is not known here"),
-            (frame[:-1] + bytes([frame[-1] ^ 1]), "the checksum does not fit"),
-            (with_checksum(covered[:2] + b"\xff\xff\xff\x7f" + covered[3:]), "the body ends too early"),
-        ]
+        frame = frozen("corrected")
+        reasons = {
+            "corrected-half": "the checksum does not fit",
+            "corrected-bit": "the checksum does not fit",
+            "corrected-truncated": "the body ends too early",
+            "corrected-kind": "kind 1, not 4",
+            "corrected-version-9": "version 9 is not known here",
+            "corrected-claim": "the body ends too early",
+        }
+        cases = [(frozen(name), reasons[name]) for name in BROKEN]
         for number, (broken, _) in enumerate(cases):
             entries = b"".join(len(entry).to_bytes(4, "little") + entry for entry in (frame, broken, frame))
             (self.folder / f"one-{number}.wire").write_bytes(entries)
@@ -224,8 +225,8 @@ class Files(unittest.TestCase):
 
     @unittest.skipUnless(shutil.which("octave-cli"), "octave-cli not found (Debian: apt install octave)")
     def test_octave_takes_and_refuses_the_frozen_frames(self) -> None:
-        frozen = vectors()
-        for number, vector in enumerate(frozen):
+        published = vectors()
+        for number, vector in enumerate(published):
             frame = vector.frame
             (self.folder / f"frozen-{number}.wire").write_bytes(len(frame).to_bytes(4, "little") + frame)
         script = """
@@ -240,12 +241,12 @@ class Files(unittest.TestCase):
                 printf('\\n');
               end
             end
-        """ % (len(frozen) - 1)
+        """ % (len(published) - 1)
         done = self.octave(script)
         lines = done.stdout.splitlines()
-        self.assertEqual(len(lines), len(frozen), done.stderr)
+        self.assertEqual(len(lines), len(published), done.stderr)
         decoder = isotherm.CorrectedDecoder()
-        for vector, line in zip(frozen, lines):
+        for vector, line in zip(published, lines):
             with self.subTest(vector.name):
                 if vector.kind != isotherm.CORRECTED or vector.message is None:
                     self.assertRegex(line, "^refused: .* 1 of 1 frames cannot be read")
