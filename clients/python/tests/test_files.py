@@ -181,6 +181,36 @@ class Files(unittest.TestCase):
         self.assertRegex(done.stderr, "broken.wire: 3 of .* frames cannot be read")
 
     @unittest.skipUnless(shutil.which("octave-cli"), "octave-cli not found (Debian: apt install octave)")
+    def test_octave_reads_every_column_of_parquet_to_the_bit(self) -> None:
+        import pyarrow.parquet
+
+        path = self.folder / f"tables/{UNIT}/corrected.parquet"
+        done = self.octave(
+            f"""
+            u = isotherm('{path}');
+            for name = fieldnames(u)'
+              v = u.(name{{1}});
+              file = fopen(['column-' name{{1}}], 'w');
+              if iscell(v), fprintf(file, '%s\\n', v{{:}}); else, fwrite(file, v, class(v)); end
+              fclose(file);
+              printf('%s %s\\n', name{{1}}, class(v));
+            end
+            """
+        )
+        table = pyarrow.parquet.read_table(path)
+        classes = dict(line.split() for line in done.stdout.splitlines())
+        self.assertEqual(list(classes), table.column_names, done.stderr)
+        for name, of in classes.items():
+            expected, found = table[name], self.folder / f"column-{name}"
+            if of == "cell":
+                self.assertEqual(found.read_text(encoding="utf-8").splitlines(), [text or "" for text in expected.to_pylist()], name)
+                continue
+            numbers = np.fromfile(found, dtype={"logical": "uint8", "double": "float64"}.get(of, of))
+            self.assertEqual(len(numbers), len(table), name)
+            whole = expected.null_count == 0
+            np.testing.assert_array_equal(numbers, expected.to_numpy() if whole else expected.cast("float64").to_numpy(), name)
+
+    @unittest.skipUnless(shutil.which("octave-cli"), "octave-cli not found (Debian: apt install octave)")
     def test_octave_says_what_is_wrong_with_a_frame_and_a_file(self) -> None:
         frame = frozen("corrected")
         reasons = {
@@ -197,7 +227,10 @@ class Files(unittest.TestCase):
             (self.folder / f"one-{number}.wire").write_bytes(entries)
         (self.folder / "absurd.wire").write_bytes(b"\xff" * 8)
         (self.folder / "cut.wire").write_bytes(len(frame).to_bytes(4, "little") + frame[:-3])
+        whole = (self.folder / f"tables/{UNIT}/corrected.parquet").read_bytes()
         (self.folder / "table.parquet").write_bytes(b"PAR1")
+        (self.folder / "cut.parquet").write_bytes(whole[: len(whole) // 2])
+        (self.folder / "lacking.parquet").write_bytes(whole[:4] + whole[104:])
         done = self.octave(
             """
             for k = 0:%d
@@ -205,7 +238,7 @@ class Files(unittest.TestCase):
               u = isotherm(sprintf('one-%%d.wire', k));
               printf('%%d %%s\\n', numel(u.sequence), lastwarn());
             end
-            for name = {'absurd.wire', 'cut.wire', 'table.parquet'}
+            for name = {'absurd.wire', 'cut.wire', 'table.parquet', 'cut.parquet', 'lacking.parquet'}
               try
                 isotherm(name{1});
               catch problem
@@ -216,11 +249,11 @@ class Files(unittest.TestCase):
             % (len(cases) - 1)
         )
         lines = done.stdout.splitlines()
-        self.assertEqual(len(lines), len(cases) + 3, done.stderr)
+        self.assertEqual(len(lines), len(cases) + 5, done.stderr)
         ticks = 2 * len(isotherm.CorrectedDecoder().decode(frame).ticks)
         for line, (_, words) in zip(lines, cases):
             self.assertRegex(line, f"^{ticks} .*1 of 3 frames cannot be read; the last: {words}")
-        for line, words in zip(lines[len(cases) :], ["4294967295 bytes, at most 1048576", "cut short at byte 0", "reads no Parquet"]):
+        for line, words in zip(lines[len(cases) :], ["4294967295 bytes, at most 1048576", "cut short at byte 0", *["no whole Parquet file"] * 3]):
             self.assertIn(words, line)
 
     @unittest.skipUnless(shutil.which("octave-cli"), "octave-cli not found (Debian: apt install octave)")
