@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
+use isotherm_cli::Bar;
 use isotherm_log::diff::is_csv;
 use serde_json::json;
 
 use super::above_0;
-use super::bar::Bar;
 use super::batch::{Batch, Named, Names, Unit, Work};
 use super::output::OutputArgs;
 use super::runs::LogArgs;

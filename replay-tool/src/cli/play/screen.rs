@@ -5,11 +5,11 @@ use std::io::{Write, stderr};
 use std::time::Duration;
 
 use indicatif::HumanDuration;
+use isotherm_cli::Bar;
 
 use super::show;
 use crate::keyboard::KEYS;
 use crate::play::{Position, Watch};
-use crate::progress::Bar;
 
 /// The progress bar, and what is said beside it.
 pub(super) struct Screen {

@@ -7,7 +7,7 @@ use isotherm_protocol::key::UnitId;
 
 use super::order::Order;
 use super::worker::Worker;
-use crate::text;
+use isotherm_document::{file, unplaced};
 
 impl Worker {
     /// Goes back to the calibration before the present one, or to a stated revision.
@@ -80,7 +80,7 @@ impl Worker {
             schedule: Schedule::NextTick,
             slew_s: 0.0,
             // No matter of a file.
-            problems: vec![Problem { file: None, ..text::whole("", message) }],
+            problems: vec![Problem { file: None, ..unplaced(Some(""), message) }],
             warnings: Vec::new(),
             difference: None,
         }

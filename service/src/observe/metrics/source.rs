@@ -13,11 +13,11 @@ use serde::Serialize;
 use super::health::{HeldBack, Kind, Reason, STOPPING, Seen, Watch};
 use crate::config::Settings;
 use crate::control::swap_manager::{ControlStatus, Posted, UNWRITTEN};
-use crate::logging::dropped_lines;
 use crate::pair::Pair;
 use crate::receive::intake::Intake;
 use crate::receive::pulse::{Pulse, Stuck};
 use crate::receive::unit::UnitActor;
+use isotherm_cli::stderr::dropped_lines;
 
 /// Where a look is taken from.
 #[derive(Debug)]

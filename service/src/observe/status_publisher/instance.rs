@@ -9,9 +9,9 @@ use isotherm_protocol::status::MAX_FAULTS;
 use zenoh::Session;
 
 use crate::control::swap_manager::{ControlStatus, Posted};
-use crate::logging::dropped_lines;
 use crate::receive::fault::standing;
 use crate::receive::intake::Intake;
+use isotherm_cli::stderr::dropped_lines;
 
 /// When the service's status is asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
