@@ -22,6 +22,6 @@ pub mod stderr;
 pub use advanced::parse;
 pub use bar::Bar;
 pub use exit::Exit;
-pub use print::{coloured, print, print_within, to_stdout};
+pub use print::{coloured, grouped, print, print_within, to_stdout};
 pub use program::Common;
 pub use stderr::{failed, failed_lines, say, say_lines};

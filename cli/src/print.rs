@@ -33,6 +33,20 @@ pub fn coloured(text: &str) -> String {
     shown
 }
 
+/// A number of things in full, thousands set apart.
+#[must_use]
+pub fn grouped(number: u64) -> String {
+    let digits = number.to_string();
+    let mut text = String::new();
+    for (index, digit) in digits.chars().enumerate() {
+        if index > 0 && (digits.len() - index).is_multiple_of(3) {
+            text.push(' ');
+        }
+        text.push(digit);
+    }
+    text
+}
+
 /// Writes to stdout. A reader that has closed its end of the pipe, as `head` does, has what it wanted.
 ///
 /// # Errors
@@ -74,5 +88,10 @@ mod tests {
     fn colours_stay_and_other_control_characters_are_shown() {
         let text = "\u{1b}[1;31mred\u{1b}[0m\n\u{1b}[2Jgone\u{7}\u{202e}\u{1b}[";
         assert_eq!(coloured(text), "\u{1b}[1;31mred\u{1b}[0m\n\\u001b[2Jgone\\u0007\\u202e\\u001b[");
+    }
+
+    #[test]
+    fn thousands_stand_apart() {
+        assert_eq!([0, 999, 1000, 1_234_567].map(grouped), ["0", "999", "1 000", "1 234 567"]);
     }
 }

@@ -46,7 +46,7 @@ pub struct BagTopic {
 
 /// What a bag holds.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct BagSummary {
+pub(crate) struct BagSummary {
     /// Time of the earliest message (ns); `None` without one.
     pub first_ns: Option<u64>,
     /// Time of the latest message (ns).
@@ -58,19 +58,19 @@ pub struct BagSummary {
 impl BagSummary {
     /// From the earliest to the latest message (ns).
     #[must_use]
-    pub fn duration_ns(&self) -> u64 {
+    pub(crate) fn duration_ns(&self) -> u64 {
         self.last_ns.saturating_sub(self.first_ns.unwrap_or(self.last_ns))
     }
 
     /// All messages.
     #[must_use]
-    pub fn messages(&self) -> u64 {
+    pub(crate) fn messages(&self) -> u64 {
         self.topics.iter().map(|topic| topic.messages).sum()
     }
 }
 
 /// Writes the MCAP file of a bag.
-pub struct BagWriter {
+pub(crate) struct BagWriter {
     writer: Writer<BufWriter<File>>,
     path: PathBuf,
     /// Channel and place in the summary by name; looked up, never gone through.
@@ -89,7 +89,7 @@ impl BagWriter {
     ///
     /// # Errors
     /// [`Error::File`].
-    pub fn create(path: &Path) -> Result<Self, Error> {
+    pub(crate) fn create(path: &Path) -> Result<Self, Error> {
         let file = File::create(path).map_err(|source| Error::file(path, "create the bag", source))?;
         let writer = WriteOptions::new()
             .profile("ros2")
@@ -107,7 +107,7 @@ impl BagWriter {
     ///
     /// # Errors
     /// [`Error::File`]; nothing can be written behind it.
-    pub fn write<M: RosMessage>(
+    pub(crate) fn write<M: RosMessage>(
         &mut self,
         topic: &str,
         time_ns: u64,
@@ -136,22 +136,16 @@ impl BagWriter {
     ///
     /// # Errors
     /// [`Error::File`].
-    pub fn metadata(&mut self, name: &str, values: BTreeMap<String, String>) -> Result<(), Error> {
+    pub(crate) fn metadata(&mut self, name: &str, values: BTreeMap<String, String>) -> Result<(), Error> {
         let metadata = mcap::records::Metadata { name: name.to_owned(), metadata: values };
         self.writer.write_metadata(&metadata).map_err(|source| failed(&self.path, source))
-    }
-
-    /// What was written so far.
-    #[must_use]
-    pub fn summary(&self) -> &BagSummary {
-        &self.summary
     }
 
     /// Ends the file; gives what it holds, and the text of `metadata.yaml` for the file under the name that it will have.
     ///
     /// # Errors
     /// [`Error::File`].
-    pub fn finish(mut self, name: &str) -> Result<(BagSummary, String), Error> {
+    pub(crate) fn finish(mut self, name: &str) -> Result<(BagSummary, String), Error> {
         self.writer.finish().map_err(|source| failed(&self.path, source))?;
         let path = self.path;
         let failed = |source| Error::file(&path, "write the bag", source);

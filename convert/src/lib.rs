@@ -27,6 +27,7 @@ use isotherm_log::streams::contents::Contents;
 use isotherm_protocol::document::Document;
 use serde::Serialize;
 
+pub use bag::BagTopic;
 pub use outcome::{Converted, Outcome, Written};
 pub use output::Place;
 pub use ros2::Ros2Options;

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use comfy_table::{CellAlignment, Table, TableComponent, presets};
+use isotherm_cli::grouped;
 use serde::Serialize;
 
 use super::fleet::Member;
@@ -179,19 +180,6 @@ fn event_time(seconds: f64) -> String {
     if seconds < 3600.0 { format!("{:.0} min", seconds / 60.0) } else { format!("{:.1} h", seconds / 3600.0) }
 }
 
-/// With thousands set apart.
-fn grouped(number: u64) -> String {
-    let digits = number.to_string();
-    let mut text = String::new();
-    for (index, digit) in digits.chars().enumerate() {
-        if index > 0 && (digits.len() - index).is_multiple_of(3) {
-            text.push(' ');
-        }
-        text.push(digit);
-    }
-    text
-}
-
 #[expect(clippy::cast_precision_loss, reason = "latencies are far below 2⁵³ ns (104 days)")]
 fn microseconds(ns: u64) -> f64 {
     ns as f64 / 1000.0
@@ -203,7 +191,6 @@ mod tests {
 
     #[test]
     fn numbers_read_well() {
-        assert_eq!([7, 999, 1000, 1_234_567].map(grouped), ["7", "999", "1 000", "1 234 567"]);
         assert_eq!(
             [1234.5, 12.34, 1.684, 0.1904, 0.0].map(figure),
             ["1234", "12.3", "1.68", "0.190", "0.000"]

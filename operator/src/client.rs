@@ -25,17 +25,16 @@ pub struct ClientArgs {
     #[command(flatten)]
     pub session: ClientOptions,
     /// How long to wait for an answer (s)
-    #[arg(long, value_name = "SECONDS", default_value = "5", value_parser = seconds, hide_short_help = true)]
+    #[arg(long, value_name = "SECONDS", default_value = "5", value_parser = seconds(3600.0), hide_short_help = true)]
     pub timeout: Duration,
 }
 
-/// Reads a time to wait: 0.1 to 3600 s.
-fn seconds(text: &str) -> Result<Duration, String> {
-    let seconds: f64 = text.parse().map_err(|_| "must be a number of seconds".to_owned())?;
-    if (0.1..=3600.0).contains(&seconds) {
-        Ok(Duration::from_secs_f64(seconds))
-    } else {
-        Err("must be from 0.1 to 3600".to_owned())
+/// Reads a time: 0.1 s to so many.
+pub(super) fn seconds(most: f64) -> impl Fn(&str) -> Result<Duration, String> + Clone {
+    move |text| {
+        let seconds: f64 = text.parse().map_err(|_| "must be a number of seconds".to_owned())?;
+        let is_sane = (0.1..=most).contains(&seconds);
+        is_sane.then(|| Duration::from_secs_f64(seconds)).ok_or_else(|| format!("must be from 0.1 to {most}"))
     }
 }
 

@@ -12,12 +12,10 @@ mod figure;
 mod grid;
 mod pairs;
 mod remark;
-#[cfg(test)]
-pub(crate) mod samples;
 mod services;
 mod sheet;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 pub mod tone;
 mod units;
 

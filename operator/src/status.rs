@@ -144,9 +144,8 @@ fn table(report: &Report, columns: usize) -> Vec<Line<'static>> {
     lines.extend(page::pairs(&report.instances, columns));
     lines.push(page::tally(&units, columns));
     if !units.is_empty() {
-        let grid = page::units(&units, columns);
-        lines.extend([Line::default(), grid.head]);
-        lines.extend(grid.lines);
+        lines.push(Line::default());
+        lines.extend(page::units(&units, columns).lines());
     }
     lines
 }
@@ -180,7 +179,7 @@ fn has_colours() -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::page::samples;
+    use super::page::tests::samples;
     use super::*;
 
     #[test]

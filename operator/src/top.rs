@@ -20,7 +20,7 @@ use tokio::time::{MissedTickBehavior, interval};
 use isotherm_cli::Exit;
 
 use super::ConsoleError;
-use super::client::{Client, ClientArgs};
+use super::client::{Client, ClientArgs, seconds};
 use super::status::unix_ms;
 pub use feed::Feed;
 pub use fleet::Fleet;
@@ -39,21 +39,11 @@ One line a unit, as in `isotherm status`; `isotherm status --help` explains the 
 shows everything of a unit, s sorts, / filters, ? helps, q quits.")]
 pub struct TopArgs {
     /// Time between two looks at the screen (s)
-    #[arg(long, value_name = "SECONDS", default_value = "1", value_parser = seconds)]
+    #[arg(long, value_name = "SECONDS", default_value = "1", value_parser = seconds(60.0))]
     pub interval: Duration,
     /// How to reach the service
     #[command(flatten)]
     pub client: ClientArgs,
-}
-
-/// Reads an interval: 0.1 to 60 s.
-fn seconds(text: &str) -> Result<Duration, String> {
-    let seconds: f64 = text.parse().map_err(|_| "must be a number of seconds".to_owned())?;
-    if (0.1..=60.0).contains(&seconds) {
-        Ok(Duration::from_secs_f64(seconds))
-    } else {
-        Err("must be from 0.1 to 60".to_owned())
-    }
 }
 
 /// Shows units and services until the operator has seen enough.

@@ -265,7 +265,7 @@ impl Batch<'_> {
         let bar = Bar::counting("units done", units.len());
         let came = in_parallel(
             &units,
-            |ready| bar.at(ready),
+            |ready| bar.at(ready as u64),
             |(unit, work)| {
                 let work = work.as_ref().map_err(|error| Error::Refused(vec![error.to_string()]))?;
                 one(work, &Names(Some(unit.as_str())), Bar::hidden)

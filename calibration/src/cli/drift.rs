@@ -20,7 +20,6 @@ use crate::drift::report::Report;
 use crate::drift::trend::FIT_H;
 use crate::error::Error;
 use crate::provenance::{TOOL, command_line, origin};
-use crate::runs::Watch;
 use crate::written::Written;
 
 /// Noise and drift of a log at rest: Allan deviation, Markov drift, trend, spectrum, estimator parameters

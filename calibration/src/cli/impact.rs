@@ -25,7 +25,6 @@ use crate::error::Error;
 use crate::impact::ins::{GREATEST_LATITUDE_DEG, TURN_RATIO};
 use crate::impact::over_starts;
 use crate::impact::scenario::Voyage;
-use crate::runs::Watch;
 use crate::runs::cut::Cut;
 
 /// Most hours of either part.

@@ -76,7 +76,7 @@ impl ValidateArgs {
         } else {
             work.iter().try_for_each(|work| self.page.check_unit(work.unit.as_str()))?;
             let bar = Bar::counting("units judged", work.len());
-            let reports = in_parallel(&work, |ready| bar.at(ready), |work| work.judged(wanted, ()));
+            let reports = in_parallel(&work, |ready| bar.at(ready as u64), |work| work.judged(wanted, ()));
             bar.finish();
             reports
         };

@@ -17,7 +17,7 @@ use isotherm_log::streams::decoded::Decoded;
 
 /// The files of a unit: one for each stream that the log has.
 #[derive(Debug)]
-pub struct UnitTables {
+pub(crate) struct UnitTables {
     unit: UnitId,
     gyro: Option<Table>,
     gyros: Sensors,
@@ -39,7 +39,7 @@ impl UnitTables {
     ///
     /// # Errors
     /// [`Error::File`], and those of `path`.
-    pub fn create<E: From<Error>>(
+    pub(crate) fn create<E: From<Error>>(
         unit: &UnitId,
         contents: &UnitContents,
         provenance: &[(String, String)],
@@ -83,7 +83,7 @@ impl UnitTables {
     ///
     /// # Errors
     /// [`Error::File`].
-    pub fn take(&mut self, received_ns: u64, decoded: &Decoded) -> Result<bool, Error> {
+    pub(crate) fn take(&mut self, received_ns: u64, decoded: &Decoded) -> Result<bool, Error> {
         match decoded {
             Decoded::Gyro(batch) => rows::write_gyro(self.gyro.as_mut(), self.gyros, received_ns, batch)?,
             Decoded::Accel(batch) => rows::write_accel(self.accel.as_mut(), self.accels, received_ns, batch)?,
@@ -108,7 +108,7 @@ impl UnitTables {
     ///
     /// # Errors
     /// [`Error::File`].
-    pub fn finish(self) -> Result<Vec<Written>, Error> {
+    pub(crate) fn finish(self) -> Result<Vec<Written>, Error> {
         let tables = [
             ("raw_gyro", self.gyro),
             ("raw_accel", self.accel),

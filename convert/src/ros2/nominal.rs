@@ -9,7 +9,7 @@ use isotherm_protocol::document::{AccelOutput, Document};
 
 /// Nominal scale of a unit's raw readings.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Nominal {
+pub(crate) struct Nominal {
     /// Angle per count (rad) of three gyros; `None` without a document that says it.
     per_count: Option<[f64; 3]>,
     /// The accelerometers' means are m/s².
@@ -21,7 +21,7 @@ pub struct Nominal {
 impl Nominal {
     /// As a calibration document has it.
     #[must_use]
-    pub fn of(document: &Document) -> Self {
+    pub(crate) fn of(document: &Document) -> Self {
         let weight = |sensor: usize| {
             let weight = document.gyro.sensor.get(sensor)?.increment_weight_arcsec_per_count?;
             Some(Angle::from_arcsec(weight).as_rad())
@@ -46,13 +46,13 @@ impl Nominal {
 
     /// Whether the readings of three gyros can be stated in rad/s: means as they stand, counts by a document.
     #[must_use]
-    pub fn states(&self, output: OutputKind, sensors: usize) -> bool {
+    pub(crate) fn states(&self, output: OutputKind, sensors: usize) -> bool {
         sensors == 3 && (output == OutputKind::Mean || self.per_count.is_some())
     }
 
     /// Rates about the three input axes (rad/s).
     #[must_use]
-    pub fn rate(&self, output: OutputKind, tick: &GyroTick) -> Option<[f64; 3]> {
+    pub(crate) fn rate(&self, output: OutputKind, tick: &GyroTick) -> Option<[f64; 3]> {
         let readings = three(&tick.readings)?;
         match output {
             OutputKind::Mean => Some(readings),
@@ -67,13 +67,13 @@ impl Nominal {
 
     /// Specific forces along the three input axes (m/s²), where the document says that the readings are such.
     #[must_use]
-    pub fn force(&self, output: OutputKind, tick: &AccelTick) -> Option<[f64; 3]> {
+    pub(crate) fn force(&self, output: OutputKind, tick: &AccelTick) -> Option<[f64; 3]> {
         (self.means_are_forces && output == OutputKind::Mean).then(|| three(&tick.readings)).flatten()
     }
 
     /// A raw reading of a channel as °C, where the document has the channel.
     #[must_use]
-    pub fn temperature(&self, channel: &str, raw: f64) -> Option<f64> {
+    pub(crate) fn temperature(&self, channel: &str, raw: f64) -> Option<f64> {
         let (_, coefficients) = self.channels.iter().find(|(name, _)| name == channel)?;
         Some(coefficients.iter().rev().fold(0.0, |sum, coefficient| sum * raw + coefficient))
     }

@@ -28,19 +28,6 @@ pub(super) fn count(number: u64) -> String {
     format!("{value:.0}P")
 }
 
-/// A number of things in full, thousands set apart.
-pub(super) fn grouped(number: u64) -> String {
-    let digits = number.to_string();
-    let mut text = String::new();
-    for (index, digit) in digits.chars().enumerate() {
-        if index > 0 && (digits.len() - index).is_multiple_of(3) {
-            text.push(' ');
-        }
-        text.push(digit);
-    }
-    text
-}
-
 /// "1 unit", "3 units".
 pub(super) fn of(number: usize, what: &str) -> String {
     format!("{number} {what}{}", if number == 1 { "" } else { "s" })
@@ -197,7 +184,6 @@ mod tests {
         let counts = [0, 99_999, 100_000, 999_499, 1_234_567, 12_345_678_901];
         assert_eq!(counts.map(count), ["0", "99999", "100k", "999k", "1.23M", "12.3G"]);
         assert_eq!(count(u64::MAX), "18447P");
-        assert_eq!([0, 1000, 1_234_567].map(grouped), ["0", "1 000", "1 234 567"]);
         assert_eq!([1234.5, 123.45, 12.345, 0.01234].map(digits), ["1234", "123.5", "12.35", "0.012"]);
         assert_eq!([1.0, -1.0, f64::NAN].map(signed), ["+1.000", "-1.000", NONE]);
         assert_eq!([0.0, 0.4, 9.96, 2000.2].map(frequency), ["0", "0.4", "10", "2000"]);

@@ -1,9 +1,10 @@
 //! Instances of a pair: who speaks for how many units, what the others do, and units that nobody takes.
 
+use isotherm_cli::grouped;
 use isotherm_protocol::pair::{PairReport, Role, UnitRole};
 use ratatui::text::{Line, Span};
 
-use super::figure::{fit, grouped, of};
+use super::figure::{fit, of};
 use super::{Level, tone};
 
 /// Units that are named; more of them are counted.

@@ -231,7 +231,7 @@ pub(super) fn schedule(schedule: Schedule) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::samples;
+    use super::super::tests::samples;
     use super::*;
 
     fn seen(status: &Status) -> (Level, String) {

@@ -1,11 +1,12 @@
 //! One line a service instance, and how many units are in which state.
 
+use isotherm_cli::grouped;
 use isotherm_protocol::service_status::{FolderState, ServiceStatus};
 use isotherm_protocol::status::State;
 use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 
-use super::figure::{fit, grouped, of, since, width};
+use super::figure::{fit, of, since, width};
 use super::remark::Level;
 use super::{Unit, state_word, tone};
 

@@ -9,10 +9,13 @@ mod work;
 
 use isotherm_protocol::service_status::ServiceStatus;
 use isotherm_protocol::status::{SensorKind, SensorStatus, Status};
+use ratatui::layout::{Constraint, Layout};
 use ratatui::style::Style;
 use ratatui::text::{Line, Span};
+use ratatui::widgets::{Paragraph, Widget};
 
 use super::figure::{fit, frequency, width, wrap};
+use super::grid::drawn;
 use super::remark::{Level, knows_rates};
 use super::{Unit, tone};
 
@@ -191,18 +194,12 @@ fn side_by_side(sections: Vec<Vec<Line<'static>>>, of_one: usize) -> Vec<Line<'s
     let split = (0..=sections.len()).min_by_key(|split| height(*split)).unwrap_or(0);
     let mut right = sections;
     let left: Vec<_> = right.drain(..split).flatten().collect();
-    let mut right = right.into_iter().flatten();
-    let mut lines = Vec::new();
-    let mut left = left.into_iter();
-    loop {
-        let (mut line, beside) = match (left.next(), right.next()) {
-            (None, None) => return lines,
-            (line, beside) => (line.unwrap_or_default(), beside.unwrap_or_default()),
-        };
-        if beside.width() > 0 {
-            line.push_span(" ".repeat((of_one + GUTTER).saturating_sub(line.width())));
-            line.spans.extend(beside.spans);
-        }
-        lines.push(line);
-    }
+    let right: Vec<_> = right.into_iter().flatten().collect();
+    let size = |length: usize| u16::try_from(length).unwrap_or(u16::MAX);
+    drawn(size(2 * of_one + GUTTER), size(height(split)), |area, buffer| {
+        let columns = [Constraint::Length(size(of_one)); 2];
+        let [on_the_left, on_the_right] = Layout::horizontal(columns).spacing(size(GUTTER)).areas(area);
+        Paragraph::new(left).render(on_the_left, buffer);
+        Paragraph::new(right).render(on_the_right, buffer);
+    })
 }

@@ -1,3 +1,5 @@
+pub(crate) mod samples;
+
 use ratatui::text::Line;
 
 use super::*;
@@ -19,8 +21,9 @@ fn a_table_has_a_line_for_each_unit_and_fits_at_any_width() {
         let statuses = samples::fleet(count);
         for columns in (1..300).step_by(if count == 200 { 40 } else { 7 }).chain(WIDTHS) {
             let grid = units(&now(&statuses), columns);
-            assert_eq!(grid.lines.len(), count);
-            let widest = grid.lines.iter().chain([&grid.head]).map(Line::width).max().unwrap();
+            let lines = grid.lines();
+            assert_eq!(lines.len(), count + 1);
+            let widest = lines.iter().map(Line::width).max().unwrap();
             assert!(widest <= columns, "{count} units: {widest} > {columns}");
         }
     }
@@ -29,7 +32,7 @@ fn a_table_has_a_line_for_each_unit_and_fits_at_any_width() {
 #[test]
 fn the_narrow_table_keeps_what_matters_and_the_wide_one_has_all() {
     let statuses = samples::fleet(8);
-    let head = |columns| words(&[units(&now(&statuses), columns).head]);
+    let head = |columns| words(&units(&now(&statuses), columns).lines()[..1]);
     for column in ["unit", "state", "rev", "°C", "range", "°/h", "Hz", "note"] {
         assert!(head(80).contains(column), "{column} in {}", head(80));
     }
@@ -41,7 +44,7 @@ fn the_narrow_table_keeps_what_matters_and_the_wide_one_has_all() {
 #[test]
 fn a_line_says_how_its_unit_is_without_any_colour() {
     let statuses = samples::fleet(8);
-    let text = words(&units(&now(&statuses), 160).lines);
+    let text = words(&units(&now(&statuses), 160).lines()[1..]);
     let lines: Vec<&str> = text.lines().collect();
     for (line, parts) in [
         (0, ["●", "ZLG-0001", "running ±", "23.4", "inside", "12.76", "200", "52 d"].as_slice()),
@@ -63,10 +66,14 @@ fn a_unit_that_is_gone_is_dim_and_says_for_how_long() {
     let mut seen = now(&statuses);
     seen[0].gone = Some(Duration::from_secs(200));
     let grid = units(&seen, 120);
-    let text = words(&grid.lines);
+    let lines = grid.lines();
+    let text = words(&lines[1..]);
     assert!(text.starts_with('×') && text.contains("gone for 3 min"), "{text}");
-    let words = grid.lines[0].spans.iter().filter(|span| !span.content.trim().is_empty());
-    assert!(words.clone().count() > 5 && words.clone().all(|span| span.style == tone::DIM));
+    let words = lines[1].spans.iter().filter(|span| !span.content.trim().is_empty());
+    assert!(
+        words.clone().count() > 5
+            && words.clone().all(|span| span.style.add_modifier == tone::DIM.add_modifier)
+    );
 }
 
 #[test]
@@ -183,8 +190,8 @@ fn screens_of_status() {
             let seen = now(&statuses);
             let mut lines = services(&[samples::service(&statuses)], &[], columns);
             let grid = units(&seen, columns);
-            lines.extend([tally(&seen, columns), Line::default(), grid.head]);
-            lines.extend(grid.lines);
+            lines.extend([tally(&seen, columns), Line::default()]);
+            lines.extend(grid.lines());
             write(format!("status-{count}-units-{columns}"), &lines);
         }
         for (name, status) in [

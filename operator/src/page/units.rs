@@ -3,8 +3,9 @@
 use isotherm_correction::units::{AngularRate, STANDARD_GRAVITY_M_PER_S2};
 use isotherm_protocol::status::{ChannelStatus, Place, Status};
 use ratatui::style::Style;
+use ratatui::text::Span;
 
-use super::grid::{Cell, Column, Grid};
+use super::grid::{Column, Grid};
 use super::remark::{Level, is_running, knows_rates};
 use super::{Unit, duplicates, figure, late, state_word, tone};
 
@@ -38,11 +39,11 @@ const NOTE_SHARE: usize = 6;
 pub fn units(units: &[Unit<'_>], columns: usize) -> Grid {
     let note = Column::filling("note", 4, columns / NOTE_SHARE);
     let layout: Vec<Column> = COLUMNS.into_iter().chain([note]).collect();
-    let rows: Vec<Vec<Cell>> = units.iter().map(row).collect();
-    Grid::set(&layout, &rows, columns)
+    let rows: Vec<Vec<Span<'static>>> = units.iter().map(row).collect();
+    Grid::set(&layout, rows, columns)
 }
 
-fn row(unit: &Unit<'_>) -> Vec<Cell> {
+fn row(unit: &Unit<'_>) -> Vec<Span<'static>> {
     let (status, lately) = (unit.status, unit.lately);
     let remarks = unit.remarks();
     let level = unit.level();
@@ -58,17 +59,17 @@ fn row(unit: &Unit<'_>) -> Vec<Cell> {
             (_, 0) => tone::PLAIN,
             _ => tone::WARNING,
         };
-        Cell::new(figure::count(count), or_base(style))
+        Span::styled(figure::count(count), or_base(style))
     };
     let rate = status.input_rates.gyro_ticks_per_s;
     let rate = if knows_rates(status) { figure::frequency(rate) } else { figure::NONE.to_owned() };
     let in_view = channel_in_view(status);
     let age_s = status.calibration.as_ref().and_then(|calibration| calibration.age_s);
     let note = remarks.first();
-    let cell = |text: String| Cell::new(text, base);
+    let cell = |text: String| Span::styled(text, base);
     vec![
-        Cell::new(mark, mark_style),
-        Cell::new(serial, if level > Level::Warning { level.style() } else { base }),
+        Span::styled(mark, mark_style),
+        Span::styled(serial, if level > Level::Warning { level.style() } else { base }),
         cell(state_word(status.state).to_owned()),
         cell(
             status
@@ -76,9 +77,9 @@ fn row(unit: &Unit<'_>) -> Vec<Cell> {
                 .as_ref()
                 .map_or_else(|| figure::NONE.to_owned(), |c| c.revision.counter.to_string()),
         ),
-        Cell::new(figure::temperature(in_view.and_then(|c| c.temperature_deg_c)), or_base(range_style)),
+        Span::styled(figure::temperature(in_view.and_then(|c| c.temperature_deg_c)), or_base(range_style)),
         cell(figure::temperature_rate(in_view.and_then(|c| c.rate_deg_c_per_s))),
-        Cell::new(range, or_base(range_style)),
+        Span::styled(range, or_base(range_style)),
         cell(applied_deg_per_h(status)),
         cell(applied_mg(status)),
         cell(rate),
@@ -92,7 +93,7 @@ fn row(unit: &Unit<'_>) -> Vec<Cell> {
             figure::latency(status.latency.p99_ns)
         }),
         cell(age_s.map_or_else(|| figure::NONE.to_owned(), figure::since_s)),
-        Cell::new(
+        Span::styled(
             note.map_or_else(String::new, |remark| remark.words.clone()),
             note.map_or(
                 base,

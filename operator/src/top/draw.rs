@@ -6,6 +6,7 @@ use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Position, Rect};
 use ratatui::style::{Modifier, Style};
 use ratatui::text::{Line, Span};
+use ratatui::widgets::Paragraph;
 
 use super::fleet::{Fleet, Key};
 use super::help;
@@ -38,21 +39,21 @@ pub(super) fn draw(frame: &mut Frame<'_>, fleet: &Fleet, view: &mut View, now: I
     let order: Vec<Key> =
         units.iter().map(|unit| (unit.status.unit.clone(), unit.status.instance.clone())).collect();
     view.arrange(order, rows);
-    put(frame, top, &head);
+    frame.render_widget(Paragraph::new(head), top);
     let at = view.selected_at();
     let selected = at.and_then(|at| units.get(at));
     let place = match (view.shown, selected) {
-        (Shown::Help, _) => scrolled(frame, middle, view, &help::lines()),
+        (Shown::Help, _) => scrolled(frame, middle, view, help::lines()),
         (Shown::Page, Some(unit)) => {
             let mut lines = page::sheet(unit, fleet.service_of(unit.status), columns);
             lines.extend(page::of_unit(&fleet.pairs, &unit.status.unit));
-            scrolled(frame, middle, view, &lines)
+            scrolled(frame, middle, view, lines)
         }
         // Nothing to show a page of: the filter, or the last unit's end, has left none.
         (Shown::Page | Shown::Table, _) => {
             table(frame, middle, view, &units, known);
-            let shown = rows.min(units.len().saturating_sub(view.first));
-            places(view.first, shown, units.len())
+            let first = view.table.offset();
+            places(first, rows.min(units.len().saturating_sub(first)), units.len())
         }
     };
     foot(frame, bottom, view, &place);
@@ -78,39 +79,31 @@ fn head(fleet: &Fleet, units: &[Unit<'_>], columns: usize, height: usize) -> Vec
     lines
 }
 
-/// The table, from the first line that is shown on.
-fn table(frame: &mut Frame<'_>, area: Rect, view: &View, units: &[Unit<'_>], known: usize) {
+/// The table, as far as the selected line asks for.
+fn table(frame: &mut Frame<'_>, area: Rect, view: &mut View, units: &[Unit<'_>], known: usize) {
     // Set from all units, so that columns stay where they are while one scrolls.
-    let grid = page::units(units, usize::from(area.width));
-    let mut lines = vec![grid.head];
+    let table = page::units(units, usize::from(area.width)).table.row_highlight_style(SELECTED);
+    frame.render_stateful_widget(table, area, &mut view.table);
     if units.is_empty() {
         let words = if known == 0 {
             "no unit has appeared yet: units appear with their first raw message"
         } else {
             "no unit matches the filter: Esc ends it"
         };
-        lines.push(Line::from(Span::styled(words, tone::DIM)));
+        let below = area.rows().nth(1).unwrap_or_default();
+        frame.render_widget(Line::styled(words, tone::DIM), below);
     }
-    let at = view.selected_at();
-    for (index, mut line) in grid.lines.into_iter().enumerate().skip(view.first) {
-        if at == Some(index) {
-            line = line.patch_style(SELECTED);
-            let blanks = usize::from(area.width).saturating_sub(line.width());
-            line.push_span(Span::styled(" ".repeat(blanks), SELECTED));
-        }
-        lines.push(line);
-    }
-    put(frame, area, &lines);
 }
 
 /// Lines from the one that was scrolled to on; which these are.
-fn scrolled(frame: &mut Frame<'_>, area: Rect, view: &mut View, lines: &[Line<'static>]) -> String {
+fn scrolled(frame: &mut Frame<'_>, area: Rect, view: &mut View, lines: Vec<Line<'static>>) -> String {
     let height = usize::from(area.height);
     view.height = height;
     view.page_first = view.page_first.min(lines.len().saturating_sub(height));
-    let shown = lines.get(view.page_first..).unwrap_or_default();
-    put(frame, area, shown);
-    places(view.page_first, shown.len().min(height), lines.len())
+    let scroll = u16::try_from(view.page_first).unwrap_or(u16::MAX);
+    let of = lines.len();
+    frame.render_widget(Paragraph::new(lines).scroll((scroll, 0)), area);
+    places(view.page_first, height.min(of), of)
 }
 
 /// "4–20 of 200", or nothing where all is to be seen.
@@ -132,21 +125,15 @@ fn foot(frame: &mut Frame<'_>, area: Rect, view: &View, place: &str) {
         Shown::Page => "q quit  Esc back  ↑↓ scroll  ←→ other units  ? help".to_owned(),
         Shown::Help => "q quit  Esc back  ↑↓ scroll".to_owned(),
     };
-    let columns = usize::from(area.width);
-    let room = columns.saturating_sub(Line::from(place).width() + 2);
-    let words = page::fit(&words, room);
+    let place = Line::styled(place.to_owned(), tone::DIM);
+    let width = u16::try_from(place.width()).unwrap_or(u16::MAX);
+    let [left, right] =
+        Layout::horizontal([Constraint::Fill(1), Constraint::Length(width)]).spacing(2).areas(area);
+    let words = Line::styled(page::fit(&words, usize::from(left.width)), tone::DIM);
     if view.typing && view.shown == Shown::Table {
-        let x = u16::try_from(Line::from(words.as_str()).width()).unwrap_or(u16::MAX);
+        let x = u16::try_from(words.width()).unwrap_or(u16::MAX);
         frame.set_cursor_position(Position::new(area.x.saturating_add(x), area.y));
     }
-    let blanks = columns.saturating_sub(Line::from(words.as_str()).width() + Line::from(place).width());
-    let line = Line::from(Span::styled(format!("{words}{}{place}", " ".repeat(blanks)), tone::DIM));
-    put(frame, area, &[line]);
-}
-
-/// Puts lines into an area; what is too much is cut off.
-fn put(frame: &mut Frame<'_>, area: Rect, lines: &[Line<'_>]) {
-    for (line, row) in lines.iter().zip(area.rows()) {
-        frame.render_widget(line, row);
-    }
+    frame.render_widget(words, left);
+    frame.render_widget(place, right);
 }

@@ -11,7 +11,7 @@ use super::feed::News;
 use super::fleet::Fleet;
 use super::order::Sort;
 use super::view::{Act, Shown, View};
-use crate::page::samples::{self, NOW_UNIX_MS};
+use crate::page::tests::samples::{self, NOW_UNIX_MS};
 
 /// A fleet, a view and a terminal of a size, with a clock that is set by hand.
 struct Bench {

@@ -1,6 +1,7 @@
 //! What the operator looks at: changed by keys, and nothing else.
 
 use ratatui::crossterm::event::{Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
+use ratatui::widgets::TableState;
 
 use super::fleet::Key;
 use super::order::Sort;
@@ -44,8 +45,8 @@ pub(super) struct View {
     pub(super) typing: bool,
     /// The selected unit: it stays selected wherever its numbers move it to.
     pub(super) selected: Option<Key>,
-    /// First line of the table that is shown.
-    pub(super) first: usize,
+    /// Which line of the table is selected, and which is the first to be seen.
+    pub(super) table: TableState,
     /// First line of the page, or of the help, that is shown.
     pub(super) page_first: usize,
     /// What the help was called from.
@@ -184,8 +185,8 @@ impl View {
             // The one that stands there now: the selected one is filtered out, or was forgotten.
             self.selected = self.order.get(before).or_else(|| self.order.last()).cloned();
         }
-        let at = self.selected_at().unwrap_or(0);
+        self.table.select(self.selected_at());
         let lowest = self.order.len().saturating_sub(height);
-        self.first = self.first.min(at).max((at + 1).saturating_sub(height)).min(lowest);
+        *self.table.offset_mut() = self.table.offset().min(lowest);
     }
 }

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use isotherm_cli::{Exit, failed, print, say};
+use isotherm_cli::{Exit, failed, print};
 use isotherm_protocol::signature::{KeyError, PrivateKey};
 use serde::Serialize;
 use thiserror::Error;

@@ -1,9 +1,10 @@
 //! Faults, and counters that have counted something.
 
+use isotherm_cli::grouped;
 use isotherm_protocol::status::{Fault, Status};
 use ratatui::text::{Line, Span};
 
-use super::super::figure::{ago, grouped, since, width, wrap};
+use super::super::figure::{ago, since, width, wrap};
 use super::super::{Unit, tone};
 use super::Section;
 

@@ -1,10 +1,11 @@
 //! The latency that the service adds, as figures and bars.
 
+use isotherm_cli::grouped;
 use isotherm_protocol::status::{Latency, LatencyBucket};
 use ratatui::text::{Line, Span};
 
 use super::super::chart::bar;
-use super::super::figure::{grouped, latency, width};
+use super::super::figure::{latency, width};
 use super::super::tone;
 use super::Section;
 

@@ -4,9 +4,10 @@ use isotherm_correction::sample::SensorFlags;
 use isotherm_correction::units::AngularRate;
 use isotherm_protocol::status::{DriftStatus, Rest, SensorStatus, Status};
 use ratatui::style::Style;
+use ratatui::text::Span;
 
 use super::super::figure::{NONE, count, digits, signed};
-use super::super::grid::{Cell, Column, Grid};
+use super::super::grid::{Column, Grid};
 use super::super::remark::sensor_words;
 use super::super::tone;
 use super::{Section, sensor_name};
@@ -29,16 +30,16 @@ pub(super) fn sensors(status: &Status, columns: usize) -> Option<Section> {
         number("stale", 6),
     ];
     let rows: Vec<_> = status.sensors.iter().map(row).collect();
-    let grid = Grid::set(&layout, &rows, columns.saturating_sub(2));
+    let grid = Grid::set(&layout, rows, columns.saturating_sub(2));
     Some(Section { title: "Sensors, in ticks since the start", lines: grid.indented() })
 }
 
-fn row(sensor: &SensorStatus) -> Vec<Cell> {
+fn row(sensor: &SensorStatus) -> Vec<Span<'static>> {
     let (now, style) = now(sensor);
-    let number = |number: u64| Cell::new(count(number), if number == 0 { tone::DIM } else { tone::PLAIN });
+    let number = |number: u64| Span::styled(count(number), if number == 0 { tone::DIM } else { tone::PLAIN });
     let SensorStatus { ticks, invalid, overrange, not_finite, clamped, stale, excluded, .. } = *sensor;
     let counts = [ticks, invalid, excluded, overrange, not_finite, clamped, stale].map(number);
-    [Cell::plain(sensor_name(sensor)), Cell::new(now, style)].into_iter().chain(counts).collect()
+    [Span::raw(sensor_name(sensor)), Span::styled(now, style)].into_iter().chain(counts).collect()
 }
 
 /// The last tick's flags in words.
@@ -80,7 +81,7 @@ pub(super) fn drift(status: &Status, columns: usize) -> Option<Section> {
             Column::words("", 1, 10),
         ];
         let rows: Vec<_> = status.drift.iter().map(estimate).collect();
-        section.lines = Grid::set(&layout, &rows, columns.saturating_sub(2)).indented();
+        section.lines = Grid::set(&layout, rows, columns.saturating_sub(2)).indented();
     }
     let rest = match &status.rest {
         None => return Some(section),
@@ -93,20 +94,20 @@ pub(super) fn drift(status: &Status, columns: usize) -> Option<Section> {
     Some(section)
 }
 
-fn estimate(drift: &DriftStatus) -> Vec<Cell> {
+fn estimate(drift: &DriftStatus) -> Vec<Span<'static>> {
     let deg_per_h = |rate_rad_per_s: f64| AngularRate::from_rad_per_s(rate_rad_per_s).as_deg_per_h();
     vec![
-        Cell::plain(format!(
+        Span::raw(format!(
             "gyro {}",
             drift.gyro.trim_start_matches("gyro").trim_start_matches([' ', '-', '_'])
         )),
-        Cell::plain(signed(deg_per_h(drift.rate_rad_per_s))),
-        Cell::plain(digits(deg_per_h(drift.sigma_rad_per_s))),
-        Cell::plain(signed(deg_per_h(drift.trend_rad_per_s2) * 3600.0)),
-        Cell::plain(count(drift.updates)),
-        Cell::plain(count(drift.refused)),
-        Cell::plain(drift.mean_nis.map_or_else(|| NONE.to_owned(), digits)),
-        Cell::new(
+        Span::raw(signed(deg_per_h(drift.rate_rad_per_s))),
+        Span::raw(digits(deg_per_h(drift.sigma_rad_per_s))),
+        Span::raw(signed(deg_per_h(drift.trend_rad_per_s2) * 3600.0)),
+        Span::raw(count(drift.updates)),
+        Span::raw(count(drift.refused)),
+        Span::raw(drift.mean_nis.map_or_else(|| NONE.to_owned(), digits)),
+        Span::styled(
             if drift.subtracted { "subtracted" } else { "only told" },
             if drift.subtracted { tone::PLAIN } else { tone::DIM },
         ),

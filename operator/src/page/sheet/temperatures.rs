@@ -8,7 +8,7 @@ use ratatui::text::{Line, Span};
 
 use super::super::chart::spark;
 use super::super::figure::{self, NONE};
-use super::super::grid::{Cell, Column, Grid};
+use super::super::grid::{Column, Grid};
 use super::super::{Past, Unit, tone};
 use super::Section;
 
@@ -35,24 +35,24 @@ pub(super) fn section(unit: &Unit<'_>, columns: usize) -> Option<Section> {
         Column::words("", 1, 6),
     ];
     let rows: Vec<_> = channels.iter().map(row).collect();
-    let grid = Grid::set(&layout, &rows, columns.saturating_sub(2));
-    let used = grid.lines.first().map_or(0, Line::width);
+    let grid = Grid::set(&layout, rows, columns.saturating_sub(2));
+    let used = usize::from(grid.width);
     let mut lines = grid.indented();
     courses(&mut lines, unit, columns.saturating_sub(used + 2));
     Some(Section { title: "Temperatures", lines })
 }
 
-fn row(channel: &ChannelStatus) -> Vec<Cell> {
+fn row(channel: &ChannelStatus) -> Vec<Span<'static>> {
     let (place, style) = place(channel);
     let range = channel
         .calibrated_range_deg_c
         .map_or_else(|| NONE.to_owned(), |[low, high]| format!("{low} … {high}"));
     vec![
-        Cell::plain(channel.name.as_str()),
-        Cell::new(figure::temperature(channel.temperature_deg_c), style),
-        Cell::plain(figure::temperature_rate(channel.rate_deg_c_per_s)),
-        Cell::plain(range),
-        Cell::new(place, style),
+        Span::raw(channel.name.as_str().to_owned()),
+        Span::styled(figure::temperature(channel.temperature_deg_c), style),
+        Span::raw(figure::temperature_rate(channel.rate_deg_c_per_s)),
+        Span::raw(range),
+        Span::styled(place, style),
     ]
 }
 

@@ -11,7 +11,7 @@ use ratatui::text::{Line, Span};
 
 use super::super::chart::bar;
 use super::super::figure::{self, NONE, digits, of, signed, since};
-use super::super::grid::{Cell, Column, Grid};
+use super::super::grid::{Column, Grid};
 use super::super::tone;
 use super::Section;
 
@@ -34,7 +34,7 @@ pub(super) fn pre_launch(status: &Status, columns: usize) -> Option<Section> {
             Column::words("ticks of each mode", 1, 10),
         ];
         let rows: Vec<_> = progress.gyros.iter().map(gyro).collect();
-        section.lines.extend(Grid::set(&layout, &rows, columns.saturating_sub(2)).indented());
+        section.lines.extend(Grid::set(&layout, rows, columns.saturating_sub(2)).indented());
         return Some(section);
     }
     let outcome = status.pre_launch_outcome.as_ref()?;
@@ -53,7 +53,7 @@ pub(super) fn pre_launch(status: &Status, columns: usize) -> Option<Section> {
                 Column::number("σ", 0, 6),
             ];
             let rows: Vec<_> = changes.iter().map(change).collect();
-            section.lines.extend(Grid::set(&layout, &rows, columns.saturating_sub(2)).indented());
+            section.lines.extend(Grid::set(&layout, rows, columns.saturating_sub(2)).indented());
         }
         PreLaunchVerdict::Refused(reasons) => {
             section.field("last one", "refused; the constants stay", tone::WARNING, columns);
@@ -72,10 +72,10 @@ fn deg_per_h(rate_rad_per_s: f64) -> f64 {
     AngularRate::from_rad_per_s(rate_rad_per_s).as_deg_per_h()
 }
 
-fn gyro(gyro: &PreLaunchGyro) -> Vec<Cell> {
+fn gyro(gyro: &PreLaunchGyro) -> Vec<Span<'static>> {
     let sigma = gyro.sigma_rad_per_s.map_or_else(|| NONE.to_owned(), |sigma| digits(deg_per_h(sigma)));
     let modes: Vec<_> = gyro.modes.iter().map(mode).collect();
-    vec![Cell::plain(gyro.name.as_str()), Cell::plain(sigma), Cell::plain(modes.join(", "))]
+    vec![Span::raw(gyro.name.clone()), Span::raw(sigma), Span::raw(modes.join(", "))]
 }
 
 fn mode(mode: &PreLaunchMode) -> String {
@@ -87,12 +87,12 @@ fn mode(mode: &PreLaunchMode) -> String {
     format!("{name}{} in {:.0} s", mode.ticks, mode.time_s)
 }
 
-fn change(change: &ConstantsChange) -> Vec<Cell> {
+fn change(change: &ConstantsChange) -> Vec<Span<'static>> {
     let maybe = |value: Option<f64>, words: fn(f64) -> String| {
-        Cell::plain(value.map_or_else(|| NONE.to_owned(), |value| words(deg_per_h(value))))
+        Span::raw(value.map_or_else(|| NONE.to_owned(), |value| words(deg_per_h(value))))
     };
     vec![
-        Cell::plain(change.gyro.as_str()),
+        Span::raw(change.gyro.clone()),
         maybe(Some(change.static_bias_change_rad_per_s), signed),
         maybe(Some(change.static_bias_sigma_rad_per_s), digits),
         maybe(change.magnetic_bias_change_rad_per_s, signed),

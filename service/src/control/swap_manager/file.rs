@@ -14,7 +14,7 @@ use super::admit::unit_of;
 use super::reading::Reading;
 use crate::control::compressed::CompressedBytes;
 use crate::control::watch::read_document;
-use isotherm_document::{file, unplaced};
+use isotherm_document::file;
 
 /// Files from which on it is worth while to read several at the same time.
 const FEW: usize = 8;

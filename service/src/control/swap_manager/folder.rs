@@ -26,7 +26,7 @@ use super::file::Read;
 use super::order::Order;
 use super::worker::Worker;
 use crate::control::watch::{FolderEvent, read_document};
-use isotherm_document::{file, unplaced};
+use isotherm_document::unplaced;
 
 /// Distance of the attempts to write down what could not be.
 const RETRY_INTERVAL: Duration = Duration::from_secs(2);

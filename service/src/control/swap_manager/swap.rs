@@ -19,7 +19,7 @@ use super::worker::Worker;
 use crate::control::calibrations::{Change, Installable};
 use crate::control::compressed::CompressedText;
 use crate::control::store::StoreError;
-use isotherm_document::{file, unplaced};
+use isotherm_document::unplaced;
 
 /// A document that was found good, before it is written down.
 #[derive(Debug)]
