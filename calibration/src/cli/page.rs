@@ -116,7 +116,7 @@ mod tests {
         std::fs::write(path("notes.txt"), "mine").unwrap();
         let refused = |name: &str, overwrite| {
             let tried = writable(&path(name), &[&path("log.mcap")], overwrite);
-            tried.err().map(|error| (error.exit_code(), error.to_string()))
+            tried.err().map(|error| (error.exit(), error.to_string()))
         };
         for (name, overwrite, wanted) in [
             ("notes.txt", false, "is there already"),
@@ -138,6 +138,6 @@ mod tests {
     #[test]
     fn a_place_that_takes_no_file_is_told_before_anything_is_read() {
         let error = writable(Path::new("/proc/unit.toml"), &[], false).unwrap_err();
-        assert!(error.exit_code() == 1 && error.to_string().contains("/proc/unit.toml"), "{error}");
+        assert!(error.exit() == Exit::Failed && error.to_string().contains("/proc/unit.toml"), "{error}");
     }
 }

@@ -39,7 +39,7 @@ fn made(run: Run, base: &Document) -> Result<Made, Error> {
 #[track_caller]
 fn refused(run: Run, base: &Document, words: &[&str]) {
     let error = made(run, base).map(|made| made.report().to_text()).unwrap_err();
-    assert_eq!(error.exit_code(), 1);
+    assert_eq!(error.exit(), Exit::Failed);
     let text = error.to_string();
     for word in words {
         assert!(text.contains(word), "{word:?} is not in: {text}");

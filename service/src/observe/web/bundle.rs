@@ -8,9 +8,9 @@ use flate2::write::GzEncoder;
 use isotherm_protocol::key::{self, UnitId};
 
 use super::Web;
-use crate::operator::page::{self, tone};
-use crate::operator::status::{Report, unix_ms};
-use crate::operator::worst_first;
+use isotherm_operator::page::{self, tone};
+use isotherm_operator::status::{Report, unix_ms};
+use isotherm_operator::worst_first;
 
 /// Latest entries of a unit's history that go in.
 const ENTRIES: usize = 1000;
