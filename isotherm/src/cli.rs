@@ -77,7 +77,7 @@ impl Sibling {
 
 /// Runs the command line and says how it ended.
 #[must_use]
-pub fn run() -> Exit {
+pub(crate) fn run() -> Exit {
     match parse::<Cli>().command {
         Command::Log(sibling) => sibling.exec("isotherm-replay"),
         Command::Calibrate(sibling) => sibling.exec("isotherm-calibrate"),
