@@ -48,7 +48,7 @@ pub fn utf8<'b>(bytes: &'b [u8], file: Option<&str>) -> Result<&'b str, Vec<Prob
         let before =
             bytes.get(..valid).and_then(|before| std::str::from_utf8(before).ok()).unwrap_or_default();
         let (line, column) = Lines::new(before).position(valid);
-        let message = format!("is not UTF-8 at byte {valid}: save the document as UTF-8");
+        let message = format!("is not UTF-8 at byte {valid}: is it the right file, saved as UTF-8?");
         vec![Problem { line, column, ..unplaced(file, message) }]
     })
 }

@@ -5,6 +5,7 @@ use std::io::{self, Read, Write};
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, absolute};
 
+use isotherm_document::file::read_bounded;
 use isotherm_protocol::document::MAX_DOCUMENT_BYTES;
 
 use crate::error::Error;
@@ -15,9 +16,7 @@ use crate::error::Error;
 /// [`Error::File`].
 pub fn read_small(path: &Path, action: &'static str) -> Result<Vec<u8>, Error> {
     let failed = |source| Error::file(path, action, source);
-    let mut bytes = Vec::new();
-    let file = File::open(path).map_err(failed)?;
-    file.take(MAX_DOCUMENT_BYTES as u64 + 1).read_to_end(&mut bytes).map_err(failed)?;
+    let bytes = read_bounded(path).map_err(failed)?;
     if bytes.len() > MAX_DOCUMENT_BYTES {
         let words = format!("longer than {MAX_DOCUMENT_BYTES} bytes: is it the right file?");
         return Err(failed(io::Error::other(words)));

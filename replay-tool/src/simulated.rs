@@ -4,9 +4,9 @@ use std::io::{self, Write};
 
 use isotherm_correction::sample::{ChannelName, OutputKind, TemperatureReading};
 use isotherm_correction::units::Timestamp;
-use isotherm_log::convert::contents::{Shape, UnitContents};
-use isotherm_log::convert::raw_text::RawColumns;
-use isotherm_log::convert::rows::Row;
+use isotherm_log::streams::contents::{Shape, UnitContents};
+use isotherm_log::streams::raw_text::RawColumns;
+use isotherm_log::streams::rows::Row;
 use isotherm_simulator::{Scenario, Simulation, Step};
 
 use crate::error::Error;

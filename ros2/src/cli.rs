@@ -5,12 +5,8 @@ use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand};
 use isotherm_bus::{ClientOptions, Role, SessionOptions, close, endpoint, locators, open, open_config};
-use isotherm_document::advanced;
-use isotherm_document::program::Common;
-use isotherm_service::cli::unheld;
-use isotherm_service::exit::Exit;
-use isotherm_service::logging::LogArgs;
-use isotherm_service::words::{print, print_within, say};
+use isotherm_cli::{Common, Exit, failed, parse, print, print_within, say};
+use isotherm_service::logging::{LogArgs, unheld};
 use isotherm_service::{RunningService, Settings};
 use tokio::signal::unix::{SignalKind, signal};
 use zenoh::Session;
@@ -104,19 +100,10 @@ pub struct BridgeArgs {
 /// Runs the command line and says how it ended.
 #[must_use]
 pub fn run() -> Exit {
-    match advanced::parse::<Cli>().command {
+    match parse::<Cli>().command {
         Command::Bridge(args) => unheld(&args.log.clone(), bridge(args)),
         Command::Check(args) => check::run(&args),
-        Command::Common(common) => match common.run::<Cli>() {
-            Ok(printed) => print(&String::from_utf8_lossy(&printed), Exit::Ok),
-            Err((folder, error)) => {
-                say(format_args!(
-                    "isotherm-ros: cannot write manual pages into {}: {error}",
-                    folder.display()
-                ));
-                Exit::Failed
-            }
-        },
+        Command::Common(common) => common.run::<Cli>(),
     }
 }
 
@@ -133,8 +120,7 @@ async fn bridge(args: BridgeArgs) -> Exit {
         }
         Err(error) => {
             error.problems().iter().for_each(say);
-            say(format_args!("isotherm-ros: {error}"));
-            error.exit()
+            failed(&error, error.exit())
         }
     }
 }

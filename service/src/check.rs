@@ -7,15 +7,14 @@ mod signer;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use isotherm_cli::{Exit, print, say};
 use isotherm_protocol::document::Problem;
 use isotherm_protocol::escape::escaped;
 use serde::Serialize;
 
 pub use signer::Signer;
 
-use crate::exit::Exit;
 use crate::signing::read_trusted_keys;
-use crate::words::{print, say};
 
 /// Arguments of `check`.
 #[derive(Debug, Clone, Args)]
@@ -98,7 +97,8 @@ pub struct Summary {
 }
 
 /// Validates the files and says what was found.
-pub(crate) fn run(args: &CheckArgs) -> Exit {
+#[must_use]
+pub fn run(args: &CheckArgs) -> Exit {
     let trusted = match args.trusted_keys.as_deref().map(read_trusted_keys).transpose() {
         Ok(trusted) => trusted,
         Err(problems) => {

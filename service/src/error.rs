@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 
 use isotherm_bus::BusError;
+use isotherm_cli::Exit;
 use isotherm_protocol::document::Problem;
 use thiserror::Error;
 
 use crate::control::store::StoreError;
-use crate::exit::Exit;
 
 /// Why the service did not start, or a command failed.
 #[derive(Debug, Error)]
@@ -100,7 +100,7 @@ impl ServiceError {
             Self::Token { source, .. } if source.kind() == std::io::ErrorKind::InvalidData => {
                 Exit::BadConfiguration
             }
-            Self::Bus(error) => Exit::of_bus(error),
+            Self::Bus(error) => Exit::blaming(error.is_usage(), error.is_configuration()),
             _ => Exit::Failed,
         }
     }

@@ -11,6 +11,7 @@ use isotherm_bus::receipt;
 use isotherm_protocol::key::{self, UnitId};
 use isotherm_protocol::pair::Member;
 use isotherm_protocol::status::Status;
+use tokio::task::JoinHandle;
 use tokio::time::Instant;
 use zenoh::Session;
 
@@ -22,6 +23,7 @@ use crate::control::swap_manager::{Found, Inbox, Opening, SwapManager, Worker};
 use crate::control::watch::{WatchSettings, Watcher};
 use crate::observe::metrics::{Endpoint, Source};
 use crate::observe::status_publisher::StatusPublisher;
+use crate::observe::subscribers::Subscribers;
 use crate::observe::totals::Totals;
 use crate::observe::web::Web;
 use crate::pair::{Asker, Pair, Watch};
@@ -51,6 +53,7 @@ pub struct RunningService {
     inbox: Inbox,
     pair: Watch,
     metrics: Option<Endpoint>,
+    asking: JoinHandle<()>,
 }
 
 /// Starts the service on a session, with the last good sets of the state folder and the documents of the configured one.
@@ -115,11 +118,12 @@ pub(crate) async fn start_on(
     let control_status = work.control_status();
     let source =
         Source::new(&settings, (Arc::clone(&intake), Arc::clone(&pair)), Arc::clone(&control_status));
-    let source = source.feeling(Arc::clone(&pulse));
+    let subscribers = Arc::<Subscribers>::default();
+    let source = source.feeling(Arc::clone(&pulse)).asking(Arc::clone(&subscribers));
     let swap_manager = SwapManager::start(opening, work).map_err(ServiceError::Thread)?;
-    let status_publisher =
-        StatusPublisher::start(&session, Arc::clone(&intake), control_status, &pair, &settings)
-            .map_err(ServiceError::Thread)?;
+    let said = (control_status, Arc::clone(&subscribers));
+    let status_publisher = StatusPublisher::start(&session, Arc::clone(&intake), said, &pair, &settings)
+        .map_err(ServiceError::Thread)?;
     let watcher = match &settings.calibrations {
         Some(folder) => {
             let (watch, inbox) = (watch_settings(&settings), inbox.clone());
@@ -137,6 +141,7 @@ pub(crate) async fn start_on(
     if let Some(metrics) = &metrics {
         metrics.open(source, web);
     }
+    let asking = subscribers.watch(&session);
     Ok(RunningService {
         session,
         settings,
@@ -149,6 +154,7 @@ pub(crate) async fn start_on(
         inbox,
         pair: watch,
         metrics,
+        asking,
     })
 }
 
@@ -245,8 +251,11 @@ impl RunningService {
             swap_manager,
             pair,
             metrics,
+            asking,
             ..
         } = self;
+        // From here on the stop itself asks.
+        asking.abort();
         metrics.iter().for_each(Endpoint::stopping);
         let deadline = Instant::now() + settings.stop_timeout;
         let left = |deadline: Instant| deadline.saturating_duration_since(Instant::now());

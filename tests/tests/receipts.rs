@@ -13,6 +13,7 @@ use isotherm_bus::{SessionOptions, close, locators, open, presence};
 use isotherm_protocol::codec;
 use isotherm_protocol::corrected::CorrectedBatch;
 use isotherm_protocol::key::{self, UnitId};
+use isotherm_protocol::service_status::ServiceStatus;
 use isotherm_service::Settings;
 use isotherm_tests::bench::{Bench, LIMIT};
 use isotherm_tests::calibrations::{compile, identity};
@@ -97,6 +98,32 @@ async fn a_subscriber_that_hangs_is_told_and_does_not_hold_the_stop_up() {
     let (totals, _) = bench.stop().await;
     assert!(!totals.stopped_in_time && totals.lost(), "a loss is told: {totals:?}");
     drop(let_go);
+    hanging.end().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_subscriber_that_is_behind_is_named_in_the_status_of_the_service() {
+    let (let_go, held) = std::sync::mpsc::channel::<()>();
+    let held = Mutex::new(held);
+    let (mut bench, hanging) = service(LIMIT, move || held.lock().unwrap().recv().unwrap_or(())).await;
+    // The bench's own consumer takes all of it at once, and is never named.
+    corrected(&mut bench, 10).await;
+    let session = open(&bench.options).await.unwrap();
+    let fault = loop {
+        let replies = session.get(key::ALL_SERVICE_STATUS).timeout(LIMIT).await.unwrap();
+        let sample = replies.recv_async().await.unwrap().into_result().unwrap();
+        let status: ServiceStatus = codec::decode(&sample.payload().to_bytes()).unwrap();
+        if let Some(fault) = status.faults.into_iter().find(|fault| fault.kind == "subscriber_behind") {
+            break fault;
+        }
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    };
+    let name = hanging.session.zid().to_string();
+    assert!(fault.first.contains(&name) && fault.first.contains("tcp/127.0.0.1:"), "{fault:?}");
+    drop(let_go);
+    close(session, LIMIT).await.unwrap();
+    let (totals, _) = bench.stop().await;
+    assert!(totals.stopped_in_time, "{totals:?}");
     hanging.end().await;
 }
 

@@ -3,10 +3,11 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use isotherm_cli::Bar;
 use isotherm_protocol::key::UnitId;
 use serde_json::json;
 
-use super::bar::Bar;
+use super::bar;
 use super::output::OutputArgs;
 use super::print;
 use super::runs::Reading;
@@ -256,7 +257,7 @@ impl Batch<'_> {
         {
             let work = work?;
             let report =
-                one(&work, &Names(None), Bar::reading).map_err(|error| error.beside(&work.cuts()))?;
+                one(&work, &Names(None), bar::reading).map_err(|error| error.beside(&work.cuts()))?;
             let json = self.output.json;
             print(if json { format!("{}\n", report.to_json()) } else { report.to_text() }.as_bytes())?;
             return Error::end(refusals(&report, self.accept_partial), work.cuts());
@@ -265,7 +266,7 @@ impl Batch<'_> {
         let bar = Bar::counting("units done", units.len());
         let came = in_parallel(
             &units,
-            |ready| bar.at(ready),
+            |ready| bar.at(ready as u64),
             |(unit, work)| {
                 let work = work.as_ref().map_err(|error| Error::Refused(vec![error.to_string()]))?;
                 one(work, &Names(Some(unit.as_str())), Bar::hidden)

@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
+use isotherm_cli::Bar;
 use isotherm_log::diff::is_csv;
 use serde_json::json;
 
 use super::above_0;
-use super::bar::Bar;
 use super::batch::{Batch, Named, Names, Unit, Work};
 use super::output::OutputArgs;
 use super::runs::LogArgs;
@@ -20,7 +20,6 @@ use crate::drift::report::Report;
 use crate::drift::trend::FIT_H;
 use crate::error::Error;
 use crate::provenance::{TOOL, command_line, origin};
-use crate::runs::Watch;
 use crate::written::Written;
 
 /// Noise and drift of a log at rest: Allan deviation, Markov drift, trend, spectrum, estimator parameters

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::slice;
 
 use clap::{Args, ValueEnum};
+use isotherm_cli::Bar;
 use isotherm_correction::drift::DriftParts;
 use isotherm_correction::units::AngularRate;
 use isotherm_log::diff::is_csv;
@@ -13,7 +14,7 @@ use isotherm_log::file::read_small_text;
 use isotherm_log::offline::load_calibration;
 use isotherm_protocol::document::Document;
 
-use super::bar::Bar;
+use super::bar;
 use super::page::PageArgs;
 use super::print;
 use super::runs::{LogArgs, Reading};
@@ -24,7 +25,6 @@ use crate::error::Error;
 use crate::impact::ins::{GREATEST_LATITUDE_DEG, TURN_RATIO};
 use crate::impact::over_starts;
 use crate::impact::scenario::Voyage;
-use crate::runs::Watch;
 use crate::runs::cut::Cut;
 
 /// Most hours of either part.
@@ -252,7 +252,7 @@ impl ImpactArgs {
         };
         let loaded = load_calibration(document)?;
         let run = args.run(Some(&loaded.unit))?;
-        let columns = Columns::corrected_by(&run, &loaded, Kind::Rate, [Bar::reading(), Bar::reading()]);
+        let columns = Columns::corrected_by(&run, &loaded, Kind::Rate, [bar::reading(), bar::reading()]);
         run.hand_on(cut);
         columns
     }

@@ -104,6 +104,8 @@ fn probe(out: &Path, folder: &Path) -> io::Result<()> {
 
 #[cfg(test)]
 mod tests {
+    use isotherm_cli::Exit;
+
     use super::*;
 
     #[test]
@@ -113,7 +115,7 @@ mod tests {
         std::fs::write(path("notes.txt"), "mine").unwrap();
         let refused = |name: &str, overwrite| {
             let tried = writable(&path(name), &[&path("log.mcap")], overwrite);
-            tried.err().map(|error| (error.exit_code(), error.to_string()))
+            tried.err().map(|error| (error.exit(), error.to_string()))
         };
         for (name, overwrite, wanted) in [
             ("notes.txt", false, "exists"),
@@ -123,7 +125,7 @@ mod tests {
             ("log.mcap", true, "would be overwritten"),
         ] {
             let (code, words) = refused(name, overwrite).unwrap();
-            assert!(code == 2 && words.contains(wanted), "{name}: {words}");
+            assert!(code == Exit::Usage && words.contains(wanted), "{name}: {words}");
         }
         assert_eq!((refused("notes.txt", true), refused("new.toml", false)), (None, None));
         // Nothing has been touched.
@@ -135,6 +137,6 @@ mod tests {
     #[test]
     fn a_place_that_takes_no_file_is_told_before_anything_is_read() {
         let error = writable(Path::new("/proc/unit.toml"), &[], false).unwrap_err();
-        assert!(error.exit_code() == 1 && error.to_string().contains("/proc/unit.toml"), "{error}");
+        assert!(error.exit() == Exit::Failed && error.to_string().contains("/proc/unit.toml"), "{error}");
     }
 }

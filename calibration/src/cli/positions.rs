@@ -6,10 +6,10 @@ mod steps;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use isotherm_cli::Bar;
 use isotherm_protocol::document::AccelOutput;
 
 use super::above_0;
-use super::bar::Bar;
 use super::batch::{Batch, Named, Work};
 use super::output::{About, Fitted, OutputArgs};
 use super::place::GravityArgs;

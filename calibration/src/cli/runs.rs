@@ -11,7 +11,7 @@ use isotherm_log::part::{LogFiles, Part, are_recordings};
 use isotherm_log::source::Log;
 use isotherm_protocol::key::UnitId;
 
-use super::bar::Bar;
+use super::bar;
 use crate::error::Error;
 use crate::provenance::recordings_in;
 use crate::runs::{Run, units_of};
@@ -136,7 +136,7 @@ impl Reading {
             None => {
                 for file in files {
                     let mut log = Log::recordings(std::slice::from_ref(file))?;
-                    let (units, cut) = units_of(&mut log, Bar::reading())?;
+                    let (units, cut) = units_of(&mut log, bar::reading())?;
                     if let (true, Some(cut)) = (units.is_empty(), cut.words()) {
                         return Err(Error::Refused(vec![format!("no raw readings can be read: {cut}")]));
                     }

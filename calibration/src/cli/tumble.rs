@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use isotherm_cli::Bar;
 use isotherm_correction::sample::OutputKind;
 use isotherm_protocol::document::AccelOutput;
 
 use super::above_0;
-use super::bar::Bar;
 use super::batch::{Batch, Named, Names, Work};
 use super::output::{About, Fitted, OutputArgs};
 use super::place::GravityArgs;

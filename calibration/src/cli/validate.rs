@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use isotherm_cli::Bar;
 use isotherm_protocol::key::UnitId;
 
-use super::bar::Bar;
+use super::bar;
 use super::batch::{Outcome, close};
 use super::page::PageArgs;
 use super::place::PlaceArgs;
@@ -69,11 +70,11 @@ impl ValidateArgs {
             if folder { None } else { documents.values().next().map(|(_, d)| d.loaded.unit.clone()) };
         let work = self.work(documents, folder, fallback.as_ref())?;
         let reports = if let [only] = work.as_slice() {
-            vec![only.judged(wanted, Bar::reading())]
+            vec![only.judged(wanted, bar::reading())]
         } else {
             work.iter().try_for_each(|work| self.page.check_unit(work.unit.as_str()))?;
             let bar = Bar::counting("units judged", work.len());
-            let reports = in_parallel(&work, |ready| bar.at(ready), |work| work.judged(wanted, ()));
+            let reports = in_parallel(&work, |ready| bar.at(ready as u64), |work| work.judged(wanted, ()));
             bar.finish();
             reports
         };

@@ -9,8 +9,8 @@ use super::layout::{self, Found};
 use super::names::{Kind, Meaning, meaning};
 use super::written::{FileText, Sensors, Temperature, Time, name_line};
 use super::{Hints, Proposal, Question, refuse};
-use crate::convert::raw_text::RawColumns;
 use crate::error::Error;
+use crate::streams::raw_text::RawColumns;
 
 /// Standard gravity in the units that an accelerometer may have.
 const GRAVITY: [(&str, f64); 3] = [("m_per_s2", 9.80665), ("g", 1.0), ("mg", 1000.0)];

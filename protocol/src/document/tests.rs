@@ -157,7 +157,7 @@ fn bytes_that_are_no_text_are_placed() {
     let line = FULL[..at].matches('\n').count() + 1;
     assert_eq!(
         listed(&problems),
-        format!("{line}:9: is not UTF-8 at byte {}: save the document as UTF-8", at + 8)
+        format!("{line}:9: is not UTF-8 at byte {}: is it the right file, saved as UTF-8?", at + 8)
     );
 }
 

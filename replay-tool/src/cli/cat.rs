@@ -3,6 +3,7 @@
 use std::io::{self, BufWriter, ErrorKind, Write};
 
 use clap::Args;
+use isotherm_cli::Exit;
 use isotherm_log::message::{Message, Topic};
 use isotherm_protocol::codec::{self, CodecError};
 use isotherm_protocol::corrected::CorrectedBatch;
@@ -16,7 +17,7 @@ use serde_json::{Value, json};
 use zenoh::key_expr::OwnedKeyExpr;
 
 use super::play::key_expression;
-use super::{LogArgs, Outcome, show};
+use super::{LogArgs, show};
 use crate::error::Error;
 use crate::play::wanted;
 
@@ -39,7 +40,7 @@ pub(super) struct CatArgs {
 }
 
 /// Runs the command.
-pub(super) fn run(args: &CatArgs) -> Result<Outcome, Error> {
+pub(super) fn run(args: &CatArgs) -> Result<Exit, Error> {
     let mut messages = args.log.messages(1, None)?;
     let mut out = BufWriter::new(io::stdout().lock());
     let (mut printed, mut unread) = (0, false);
@@ -65,12 +66,12 @@ pub(super) fn run(args: &CatArgs) -> Result<Outcome, Error> {
     if let Err(source) = out.flush() {
         return ended(source);
     }
-    Ok(if unread || messages.report().lost_data() { Outcome::DataLoss } else { Outcome::Complete })
+    Ok(Exit::of_loss(unread || messages.report().lost_data()))
 }
 
 /// A reader that has gone away, as `head` does, has what it wanted.
-fn ended(source: io::Error) -> Result<Outcome, Error> {
-    if source.kind() == ErrorKind::BrokenPipe { Ok(Outcome::Complete) } else { Err(Error::Stdout { source }) }
+fn ended(source: io::Error) -> Result<Exit, Error> {
+    if source.kind() == ErrorKind::BrokenPipe { Ok(Exit::Ok) } else { Err(Error::Stdout { source }) }
 }
 
 /// What a message says; of a key that is none of the protocol's, its length.

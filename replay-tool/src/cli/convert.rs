@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use isotherm_cli::Exit;
 use isotherm_log::file::read_small;
 use isotherm_log::source::LogReport;
 use isotherm_protocol::document::Document;
@@ -10,9 +11,9 @@ use serde::Serialize;
 
 use super::log_args::LogArgs;
 use super::record::Compression;
-use super::{Outcome, print, show};
-use crate::convert::{self, Conversion, Place, Ros2Options, Target};
+use super::{print, show};
 use crate::error::Error;
+use isotherm_convert::{self as convert, Conversion, Place, Ros2Options, Target};
 
 /// Convert recordings to text, ROS 2 bags or Parquet, and text logs to recordings
 #[derive(Debug, Args)]
@@ -175,7 +176,7 @@ fn document(path: &Path) -> Result<Document, Error> {
 }
 
 /// Runs the command.
-pub(super) fn run(args: &ConvertArgs) -> Result<Outcome, Error> {
+pub(super) fn run(args: &ConvertArgs) -> Result<Exit, Error> {
     let conversion = args.conversion()?;
     let outcome = conversion.run()?;
     for note in &outcome.notes {
@@ -183,7 +184,7 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Outcome, Error> {
     }
     let report = Report { target: conversion.target, outcome: &outcome };
     print(if args.json { show::json(&report) } else { human(&outcome) }.as_bytes())?;
-    Ok(if outcome.lost_data() { Outcome::DataLoss } else { Outcome::Complete })
+    Ok(Exit::of_loss(outcome.lost_data()))
 }
 
 /// The summary as tables.

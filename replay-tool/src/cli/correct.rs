@@ -8,11 +8,12 @@ mod text;
 use std::path::PathBuf;
 
 use clap::Args;
+use isotherm_cli::Exit;
 use isotherm_correction::navigation::NavigationStep;
 use isotherm_correction::unit::UnitSettings;
 use isotherm_correction::units::Span;
 
-use super::{LogArgs, Outcome};
+use super::LogArgs;
 use crate::error::Error;
 use crate::output::Format;
 
@@ -97,6 +98,6 @@ impl CorrectArgs {
 }
 
 /// Runs the command.
-pub(super) fn run(args: &CorrectArgs) -> Result<Outcome, Error> {
+pub(super) fn run(args: &CorrectArgs) -> Result<Exit, Error> {
     if args.log.is_recording()? { recording::run(args) } else { text::run(args) }
 }

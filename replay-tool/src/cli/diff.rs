@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use comfy_table::{CellAlignment, Table, presets};
+use isotherm_cli::{Bar, Exit};
 use isotherm_log::diff::{AXES, Account, CorrectedLog, DiffOptions, Largest, Tolerance, compare, is_csv};
 use isotherm_log::offline::unit_id;
 use isotherm_log::replica::scan;
@@ -18,9 +19,8 @@ use serde::Serialize;
 
 pub(super) use show_difference::first_difference;
 
-use super::{Outcome, print, show};
+use super::{print, show};
 use crate::error::Error;
-use crate::progress::Bar;
 
 /// Compare two corrected logs tick by tick, and show the first difference
 #[derive(Debug, Args)]
@@ -77,7 +77,7 @@ struct Report<'r> {
 }
 
 /// Runs the command.
-pub(super) fn run(args: &DiffArgs) -> Result<Outcome, Error> {
+pub(super) fn run(args: &DiffArgs) -> Result<Exit, Error> {
     let units = args.unit.iter().map(|serial| unit_id(serial)).collect::<Result<BTreeSet<_>, _>>()?;
     let unnamed = unnamed(args, &units)?;
     let mut a = CorrectedLog::open(&args.a, &units, &unnamed)?;
@@ -88,8 +88,9 @@ pub(super) fn run(args: &DiffArgs) -> Result<Outcome, Error> {
         relative: args.tolerance_relative,
     };
     let options = DiffOptions { tolerance, around: usize::from(args.around) };
-    let mut bar = Bar::over_log(a.progress());
-    let accounts = compare(&mut a, &mut b, options, |ticks| bar.step(|| format!("{ticks} ticks")))?;
+    let mut bar = Bar::over_log(a.progress().watch());
+    let accounts =
+        compare(&mut a, &mut b, options, |ticks| bar.step_saying(|| Some(format!("{ticks} ticks"))))?;
     bar.finish();
     if accounts.is_empty() {
         return Err(Error::Usage("neither log has corrected ticks".to_owned()));
@@ -101,7 +102,7 @@ pub(super) fn run(args: &DiffArgs) -> Result<Outcome, Error> {
     let name = |path: &Path| path.display().to_string();
     let report = Report { a: name(&args.a), b: name(&args.b), identical, tolerance, units: &accounts };
     print(if args.json { show::json(&report) } else { human(&report) }.as_bytes())?;
-    Ok(if identical { Outcome::Complete } else { Outcome::Different })
+    Ok(if identical { Exit::Ok } else { Exit::Failed })
 }
 
 /// The unit that a CSV is of, where it is not said: the only one of the other log.

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use clap::builder::PossibleValuesParser;
+use isotherm_cli::Exit;
 use isotherm_correction::units::Span;
 use isotherm_log::file::{refuse_overwriting, write_whole};
 use isotherm_log::import::{ACCEL_UNITS, GYRO_UNITS, Hints, Proposal, TIME_UNITS, propose};
@@ -13,7 +14,7 @@ use isotherm_log::mapping::{Encoding, Mapping};
 use serde::Serialize;
 
 use super::log_args::LogArgs;
-use super::{Outcome, info, plot, print, show};
+use super::{info, plot, print, show};
 use crate::error::Error;
 
 /// Propose a column mapping for a text log of any maker, then show what the log contains
@@ -122,7 +123,7 @@ impl ImportArgs {
 }
 
 /// Runs the command.
-pub(super) fn run(args: &ImportArgs) -> Result<Outcome, Error> {
+pub(super) fn run(args: &ImportArgs) -> Result<Exit, Error> {
     let out = args.out.clone().unwrap_or_else(|| Mapping::path_beside(args.first()));
     let page = (!args.no_plot).then(|| args.plot.clone().unwrap_or_else(|| args.page()));
     let inputs: Vec<_> = args.log.iter().map(PathBuf::as_path).collect();

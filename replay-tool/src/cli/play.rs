@@ -9,6 +9,7 @@ use std::time::Duration;
 use clap::Args;
 use isotherm_bus::ClientOptions;
 use isotherm_bus::outlet::least_in_flight;
+use isotherm_cli::Exit;
 use isotherm_correction::sample::ChannelName;
 use isotherm_correction::units::Span;
 use isotherm_log::faults::FaultOptions;
@@ -20,7 +21,7 @@ use isotherm_protocol::raw::{HealthReading, MAX_HEALTH};
 use serde::Serialize;
 use zenoh::key_expr::OwnedKeyExpr;
 
-use super::{LogArgs, Outcome, print, seconds, show};
+use super::{LogArgs, print, seconds, show};
 use crate::error::Error;
 use crate::keyboard::Keyboard;
 use crate::pace::Speed;
@@ -241,7 +242,7 @@ fn check_names(options: &PlayOptions) -> Result<(), Error> {
 }
 
 /// Runs the command.
-pub(super) fn run(args: &PlayArgs) -> Result<Outcome, Error> {
+pub(super) fn run(args: &PlayArgs) -> Result<Exit, Error> {
     let options = args.options()?;
     // A log that cannot be read is said before a session is opened.
     check_names(&options)?;
@@ -263,5 +264,5 @@ pub(super) fn run(args: &PlayArgs) -> Result<Outcome, Error> {
     if play.stopped {
         return Err(Error::Stopped);
     }
-    Ok(if play.lost_data() || log.lost_data() { Outcome::DataLoss } else { Outcome::Complete })
+    Ok(Exit::of_loss(play.lost_data() || log.lost_data()))
 }

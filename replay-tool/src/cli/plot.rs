@@ -4,6 +4,7 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use isotherm_cli::{Bar, Exit};
 use isotherm_log::diff::is_csv;
 use isotherm_log::file::{read_small_text, refuse_overwriting, write_whole};
 use isotherm_log::part::Messages;
@@ -13,9 +14,8 @@ use isotherm_protocol::key::UnitId;
 use serde::Serialize;
 
 use super::log_args::LogArgs;
-use super::{Outcome, print, show};
+use super::{print, show};
 use crate::error::Error;
-use crate::progress::Bar;
 
 /// Ticks in one batch of a text log.
 const BATCH: usize = 256;
@@ -84,12 +84,12 @@ impl PlotArgs {
 }
 
 /// Runs the command.
-pub(super) fn run(args: &PlotArgs) -> Result<Outcome, Error> {
+pub(super) fn run(args: &PlotArgs) -> Result<Exit, Error> {
     let (bytes, summary) = draw(args)?;
     let report = Report { page: args.out.display().to_string(), bytes, summary: &summary };
     print(if args.json { show::json(&report) } else { human(&report) }.as_bytes())?;
     let lost = summary.reading.iter().any(LogReport::lost_data);
-    Ok(if lost { Outcome::DataLoss } else { Outcome::Complete })
+    Ok(Exit::of_loss(lost))
 }
 
 /// Draws a text log that a mapping reads.
@@ -137,7 +137,7 @@ fn draw(args: &PlotArgs) -> Result<(usize, PlotSummary), Error> {
             Some(messages) => messages,
             None => log.messages(BATCH, unnamed.as_ref())?,
         };
-        bar.get_or_insert_with(|| Bar::over_log(messages.progress()));
+        bar.get_or_insert_with(|| Bar::over_log(messages.progress().watch()));
         let names: Vec<_> = log.log.iter().filter_map(|path| path.file_name()).collect();
         let name = names.iter().map(|name| name.to_string_lossy()).collect::<Vec<_>>().join(", ");
         // Units of different serials are compared where each log has one that was asked for.

@@ -5,10 +5,11 @@ use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use isotherm_bus::ClientOptions;
+use isotherm_cli::Exit;
 use isotherm_correction::units::Span;
 use isotherm_log::offline::unit_id;
 
-use super::{Outcome, print, seconds, show};
+use super::{print, seconds, show};
 use crate::error::Error;
 use crate::record::{Bounds, RecordOptions, ServiceWait, TopicFilter, record};
 
@@ -177,7 +178,7 @@ fn time(span: Span) -> Duration {
 }
 
 /// Runs the command.
-pub(super) fn run(args: &RecordArgs) -> Result<Outcome, Error> {
+pub(super) fn run(args: &RecordArgs) -> Result<Exit, Error> {
     let options = args.options()?;
     let runtime = tokio::runtime::Runtime::new().map_err(|source| Error::Runtime { source })?;
     let mut live = Live::new();
@@ -207,5 +208,5 @@ pub(super) fn run(args: &RecordArgs) -> Result<Outcome, Error> {
         ));
     }
     print(if args.json { show::json(&report) } else { human(&report) }.as_bytes())?;
-    Ok(if report.lost_data() { Outcome::DataLoss } else { Outcome::Complete })
+    Ok(Exit::of_loss(report.lost_data()))
 }

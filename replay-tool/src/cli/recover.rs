@@ -3,12 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use isotherm_cli::{Bar, Exit};
 use isotherm_log::recording::recover::{Recovery, RecoveryReport};
 use isotherm_log::recording::{RecordingOptions, is_being_written};
 
-use super::{Outcome, print, show};
+use super::{print, show};
 use crate::error::Error;
-use crate::progress::Bar;
 
 /// Damaged places that the table names.
 const SHOWN: usize = 5;
@@ -41,7 +41,7 @@ pub(super) struct RecoverArgs {
 }
 
 /// Runs the command.
-pub(super) fn run(args: &RecoverArgs) -> Result<Outcome, Error> {
+pub(super) fn run(args: &RecoverArgs) -> Result<Exit, Error> {
     let recovery = Recovery::open(&args.input)?;
     if is_being_written(&args.input) {
         show::warn(&format!(
@@ -54,14 +54,14 @@ pub(super) fn run(args: &RecoverArgs) -> Result<Outcome, Error> {
         overwrite: args.overwrite,
         ..RecordingOptions::default()
     };
-    let mut bar = Bar::over_log(recovery.progress());
+    let mut bar = Bar::over_log(recovery.progress().watch());
     let recovered = recovery.run(&args.out, options, |report| {
-        bar.step(|| format!("{} messages", report.messages));
+        bar.step_saying(|| Some(format!("{} messages", report.messages)));
     });
     bar.finish();
     let report = recovered?;
     print(if args.json { show::json(&report) } else { human(&report, &args.out) }.as_bytes())?;
-    Ok(if report.lost_data() { Outcome::DataLoss } else { Outcome::Complete })
+    Ok(Exit::of_loss(report.lost_data()))
 }
 
 /// The summary as a table.

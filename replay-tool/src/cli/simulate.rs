@@ -6,13 +6,13 @@ use std::path::{Path, PathBuf};
 
 use clap::{ArgGroup, Args};
 use flate2::{Compression, write::GzEncoder};
+use isotherm_cli::{Bar, Exit};
 use isotherm_correction::units::Span;
 use isotherm_simulator::{Scenario, Simulation, presets};
 use serde::Serialize;
 
-use super::{Outcome, print, seconds, show};
+use super::{print, seconds, show};
 use crate::error::Error;
-use crate::progress::Bar;
 use crate::simulated::{Columns, LogWriter, write_truth, write_truth_header};
 use isotherm_log::file::{read_small_text, refuse_overwriting};
 use isotherm_log::mapping::Mapping;
@@ -147,18 +147,18 @@ fn load(path: &Path) -> Result<Scenario, Error> {
 }
 
 /// Runs the command.
-pub(super) fn run(args: &SimulateArgs) -> Result<Outcome, Error> {
+pub(super) fn run(args: &SimulateArgs) -> Result<Exit, Error> {
     if args.list_presets {
         let rows: Vec<_> =
             PRESETS.iter().map(|preset| format!("{:21} {}\n", preset.name, preset.about)).collect();
         print(rows.concat().as_bytes())?;
-        return Ok(Outcome::Complete);
+        return Ok(Exit::Ok);
     }
     if args.print_preset.is_some() {
         let text =
             toml::to_string(&args.scenario()?).map_err(|error| Error::Scenario(vec![error.to_string()]))?;
         print(text.as_bytes())?;
-        return Ok(Outcome::Complete);
+        return Ok(Exit::Ok);
     }
     let Some(out) = &args.out else { return Err(Error::Usage("give --out".into())) };
     let scenario = args.scenario()?;
@@ -198,7 +198,7 @@ pub(super) fn run(args: &SimulateArgs) -> Result<Outcome, Error> {
         }
         report.ticks += 1;
         report.temperature_readings += step.temperatures.len() as u64;
-        bar.step(String::new);
+        bar.step();
     }
     bar.finish();
     log.finish().map_err(failed)?;
@@ -206,7 +206,7 @@ pub(super) fn run(args: &SimulateArgs) -> Result<Outcome, Error> {
         writer.finish().map_err(|source| Error::file(path, "write", source))?;
     }
     print(if args.json { show::json(&report) } else { human(&report) }.as_bytes())?;
-    Ok(Outcome::Complete)
+    Ok(Exit::Ok)
 }
 
 /// The summary as a table.

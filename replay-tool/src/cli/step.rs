@@ -6,6 +6,7 @@ use std::io::{self, BufRead, IsTerminal, Write};
 use std::path::PathBuf;
 
 use clap::Args;
+use isotherm_cli::Exit;
 use isotherm_correction::unit::UnitSettings;
 use isotherm_log::offline::{Loaded, load_calibration};
 use isotherm_log::part::Part;
@@ -13,7 +14,7 @@ use isotherm_log::replica::stepper::{Step, Stepper};
 use isotherm_log::replica::{Changes, Replica, scan};
 use isotherm_protocol::key::UnitId;
 
-use super::{LogArgs, Outcome, print, show};
+use super::{LogArgs, print, show};
 use crate::error::Error;
 
 /// What can be typed between two events.
@@ -44,7 +45,7 @@ pub(super) struct StepArgs {
 }
 
 /// Runs the command.
-pub(super) fn run(args: &StepArgs) -> Result<Outcome, Error> {
+pub(super) fn run(args: &StepArgs) -> Result<Exit, Error> {
     let loaded = args.calibration.as_deref().map(load_calibration).transpose()?;
     let mut stepper = open(args, loaded.as_ref())?;
     let terminal = io::stdin().is_terminal() && io::stdout().is_terminal();
@@ -54,7 +55,7 @@ pub(super) fn run(args: &StepArgs) -> Result<Outcome, Error> {
     } else {
         list(&mut stepper, args)?;
     }
-    Ok(if stepper.replica().report().is_exact() { Outcome::Complete } else { Outcome::DataLoss })
+    Ok(Exit::of_loss(!stepper.replica().report().is_exact()))
 }
 
 /// Opens the log of one unit.

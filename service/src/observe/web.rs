@@ -32,14 +32,14 @@ use zenoh::Session;
 
 use crate::ServiceError;
 use crate::config::Settings;
-use crate::operator::client::Client;
-use crate::operator::status::unix_ms;
-use crate::operator::{Feed, Fleet};
 use crate::receive::intake::Intake;
 use guard::Guard;
+use isotherm_operator::client::Client;
+use isotherm_operator::status::unix_ms;
+use isotherm_operator::{Feed, Fleet};
 
 pub use token::WebArgs;
-pub(crate) use token::show;
+pub use token::show;
 
 /// How long an answer on the bus is waited for: shorter than a connection may last.
 const ANSWER_LIMIT: Duration = Duration::from_secs(10);

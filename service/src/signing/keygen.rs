@@ -3,13 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use isotherm_cli::{Exit, failed, print};
 use isotherm_protocol::signature::{KeyError, PrivateKey};
 use serde::Serialize;
 use thiserror::Error;
 
 use super::files;
-use crate::exit::Exit;
-use crate::words::{print, say};
 
 /// Arguments of `keygen`.
 #[derive(Debug, Clone, Args)]
@@ -58,16 +57,14 @@ enum KeygenError {
 }
 
 /// Makes a pair of keys and says what they are called.
-pub(crate) fn run(args: &KeygenArgs) -> Exit {
+#[must_use]
+pub fn run(args: &KeygenArgs) -> Exit {
     match make(&args.name, &args.folder) {
         Ok(made) if args.json => {
             print(&(serde_json::to_string_pretty(&made).unwrap_or_default() + "\n"), Exit::Ok)
         }
         Ok(made) => print(&in_words(&made), Exit::Ok),
-        Err(error) => {
-            say(format_args!("isotherm: {error}"));
-            Exit::Failed
-        }
+        Err(error) => failed(error, Exit::Failed),
     }
 }
 

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use isotherm_cli::{Exit, print, say};
 use isotherm_protocol::digest::Digest;
 use isotherm_protocol::document::{Document, Problem};
 use isotherm_protocol::overlay::{Overlay, is_overlay};
@@ -10,9 +11,7 @@ use isotherm_protocol::signature::{self, Existing, KeyId, PrivateKey, Wrong};
 use serde::Serialize;
 
 use super::{files, private_key};
-use crate::exit::Exit;
-use crate::text::{read_bounded, text};
-use crate::words::{print, say};
+use isotherm_document::file::{read_bounded, text};
 
 /// Arguments of `sign`.
 #[derive(Debug, Clone, Args)]
@@ -63,7 +62,8 @@ struct Outcome {
 }
 
 /// Signs the files and says what became of each.
-pub(crate) fn run(args: &SignArgs) -> Exit {
+#[must_use]
+pub fn run(args: &SignArgs) -> Exit {
     if args.output.is_some() && args.files.len() > 1 {
         say("isotherm: --out names one file, so one document can be given with it");
         return Exit::Usage;

@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 use isotherm_protocol::document::Problem;
 use isotherm_protocol::signature::{PublicKey, TrustedKeys};
 
-use crate::text::{read_bounded, text, whole};
+use isotherm_document::file::{read_bounded, text};
+use isotherm_document::unplaced;
 
 /// Longest name of a signer, in characters.
 const LONGEST_NAME: usize = 64;
@@ -24,7 +25,8 @@ const WORLD_WRITABLE: u32 = 0o002;
 /// bad file among them no key is taken: a key that silently did not count would have its signer's documents refused.
 pub fn read_trusted_keys(folder: &Path) -> Result<(TrustedKeys, Vec<Problem>), Vec<Problem>> {
     let name = folder.display().to_string();
-    let files = key_files(folder).map_err(|error| vec![whole(&name, format!("cannot be read: {error}"))])?;
+    let files =
+        key_files(folder).map_err(|error| vec![unplaced(Some(&name), format!("cannot be read: {error}"))])?;
     let mut trusted = TrustedKeys::default();
     let (mut problems, mut warnings) = (Vec::new(), Vec::new());
     warnings.extend(open_to_all(folder));
@@ -34,12 +36,13 @@ pub fn read_trusted_keys(folder: &Path) -> Result<(TrustedKeys, Vec<Problem>), V
             trusted.insert(&name, key).map_err(|rival| format!("{rival}, in {}", folder.display()))
         });
         if let Err(message) = added {
-            problems.push(whole(&file, message));
+            problems.push(unplaced(Some(&file), message));
         }
         warnings.extend(open_to_all(&path));
     }
     warnings.extend(
-        private_keys(folder).map_err(|error| vec![whole(&name, format!("cannot be read: {error}"))])?,
+        private_keys(folder)
+            .map_err(|error| vec![unplaced(Some(&name), format!("cannot be read: {error}"))])?,
     );
     if problems.is_empty() { Ok((trusted, warnings)) } else { Err(problems) }
 }
@@ -59,7 +62,7 @@ fn private_keys(folder: &Path) -> std::io::Result<Vec<Problem>> {
         if bytes.windows(PRIVATE.len()).any(|window| window == PRIVATE) {
             let message = "is a private key in the folder of trusted keys: anyone who can read it can sign in its \
                            owner's name. Move it to another machine, and make a new key if others could read it";
-            found.push(whole(&path.display().to_string(), message.to_owned()));
+            found.push(unplaced(Some(&path.display().to_string()), message.to_owned()));
         }
     }
     found.sort_by(|a, b| a.file.cmp(&b.file));
@@ -108,6 +111,6 @@ fn open_to_all(path: &Path) -> Option<Problem> {
         let message = format!(
             "decides who is trusted, but everybody may write to it (mode {mode:o}): `chmod o-w {file}`"
         );
-        whole(&file, message)
+        unplaced(Some(&file), message)
     })
 }

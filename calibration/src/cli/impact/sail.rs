@@ -1,10 +1,10 @@
 //! How the drifts are sailed: stated ones, seeded ones, that of a log.
 
+use isotherm_cli::Bar;
 use isotherm_correction::drift::DriftParts;
 use isotherm_correction::units::AngularRate;
 
 use super::{Gyro, ImpactArgs, sizes};
-use crate::cli::bar::Bar;
 use crate::drift::HOUR_S;
 use crate::error::Error;
 use crate::impact::estimate::TICK_S;

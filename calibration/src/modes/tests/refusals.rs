@@ -1,5 +1,6 @@
 //! Logs that cannot be used are refused, with every reason and what to do.
 
+use isotherm_cli::Exit;
 use isotherm_correction::sample::{GyroTick, LasingMode};
 use isotherm_log::offline::unit_id;
 use isotherm_log::text::LogEvent;
@@ -39,7 +40,7 @@ fn made(run: Run, base: &Document) -> Result<Made, Error> {
 #[track_caller]
 fn refused(run: Run, base: &Document, words: &[&str]) {
     let error = made(run, base).map(|made| made.report().to_text()).unwrap_err();
-    assert_eq!(error.exit_code(), 1);
+    assert_eq!(error.exit(), Exit::Failed);
     let text = error.to_string();
     for word in words {
         assert!(text.contains(word), "{word:?} is not in: {text}");

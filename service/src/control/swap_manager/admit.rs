@@ -16,7 +16,7 @@ use super::record::Record;
 use super::worker::Worker;
 use crate::config::SwapSettings;
 use crate::signing::read_trusted_keys;
-use crate::text;
+use isotherm_document::{file, unplaced};
 
 /// What was found out about an order. Nothing has changed yet.
 #[derive(Debug)]
@@ -36,7 +36,7 @@ pub(super) struct Verdict {
 impl Worker {
     /// Judges an order.
     pub(super) fn admit(&self, order: &Order<'_>) -> Verdict {
-        let text = match text::text(order.bytes, order.name) {
+        let text = match file::text(order.bytes, order.name) {
             Ok(text) => text,
             Err(problems) => return refused(order.unit.clone(), problems),
         };
@@ -62,7 +62,7 @@ impl Worker {
             (Some(unit), _) | (None, Ok(unit)) => unit,
             // Not to be reached: a document's unit has been checked.
             (None, Err(error)) => {
-                problems.push(text::whole(order.name, format!("unit: {error}")));
+                problems.push(unplaced(Some(order.name), format!("unit: {error}")));
                 return Verdict { warnings, ..refused(None, problems) };
             }
         };
@@ -118,7 +118,7 @@ fn interrupts(order: &Order<'_>, state: State) -> Option<Problem> {
         State::SelfTest => "the unit is in self-test, which starts again",
         State::Standby | State::RunningWithReversal | State::RunningWithoutReversal => return None,
     };
-    Some(text::whole(order.name, words.to_owned()))
+    Some(unplaced(Some(order.name), words.to_owned()))
 }
 
 /// A verdict on what could not be read.
@@ -163,8 +163,8 @@ pub(super) fn check_signature(
     match signature::verify(text, &keys) {
         Ok(signature::Verdict::Signed { .. }) => {}
         Ok(signature::Verdict::Unsigned) if !settings.require_signature => {}
-        Ok(signature::Verdict::Unsigned) => verdict.push(text::whole(
-            name,
+        Ok(signature::Verdict::Unsigned) => verdict.push(unplaced(Some(
+            name),
             "is not signed, but require_signature is set: sign it (`isotherm sign`) with a key that has its .pub \
              file in the folder of trusted keys"
                 .to_owned(),

@@ -26,7 +26,7 @@ use super::file::Read;
 use super::order::Order;
 use super::worker::Worker;
 use crate::control::watch::{FolderEvent, read_document};
-use crate::text;
+use isotherm_document::unplaced;
 
 /// Distance of the attempts to write down what could not be.
 const RETRY_INTERVAL: Duration = Duration::from_secs(2);
@@ -172,7 +172,8 @@ impl Worker {
                 self.look_for_survivor(before.as_ref());
             }
             FolderEvent::Unreadable { file, reason } => {
-                let problem = text::whole(&file.display().to_string(), format!("cannot be read: {reason}"));
+                let problem =
+                    unplaced(Some(&file.display().to_string()), format!("cannot be read: {reason}"));
                 tracing::error!("{problem}; the calibration in force stays");
                 self.folder.unreadable(&file, problem);
             }
@@ -231,7 +232,7 @@ impl Worker {
         if may_be_overlay && std::str::from_utf8(bytes).is_ok_and(overlay::is_overlay) {
             let message =
                 "is an overlay, but this folder is for documents: put it in force with `isotherm swap`";
-            let problem = text::whole(&name, message.to_owned());
+            let problem = unplaced(Some(&name), message.to_owned());
             tracing::error!("{problem}");
             return vec![problem];
         }
@@ -278,7 +279,7 @@ impl Worker {
         if problems.is_empty() {
             let message = "was refused when it was put there, and a restart does not change that: put it in force \
                            with `isotherm swap`, or replace the file";
-            problems.push(text::whole(order.name, message.to_owned()));
+            problems.push(unplaced(Some(order.name), message.to_owned()));
         }
         let unit = order.unit.as_ref().map(ToString::to_string).unwrap_or_default();
         for problem in &problems {

@@ -1,13 +1,12 @@
 //! Back to an earlier revision: a swap like any other, with a document that was accepted before.
 
 use isotherm_protocol::control::{Schedule, SwapOptions, SwapOutcome, SwapReply};
-use isotherm_protocol::document::Problem;
 use isotherm_protocol::history::Source;
 use isotherm_protocol::key::UnitId;
 
 use super::order::Order;
 use super::worker::Worker;
-use crate::text;
+use isotherm_document::unplaced;
 
 impl Worker {
     /// Goes back to the calibration before the present one, or to a stated revision.
@@ -79,7 +78,7 @@ impl Worker {
             schedule: Schedule::NextTick,
             slew_s: 0.0,
             // No matter of a file.
-            problems: vec![Problem { file: None, ..text::whole("", message) }],
+            problems: vec![unplaced(None, message)],
             warnings: Vec::new(),
             difference: None,
         }

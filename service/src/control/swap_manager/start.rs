@@ -22,7 +22,7 @@ use crate::control::calibrations::{Calibrations, Change, Installable, Plan};
 use crate::control::compressed::CompressedText;
 use crate::control::store::Store;
 use crate::control::watch::{Known, documents_in};
-use crate::text;
+use isotherm_document::{file, unplaced};
 
 /// How many units a line of the log names.
 const NAMED: usize = 8;
@@ -125,7 +125,7 @@ impl Worker {
                 }
                 Err(error) => {
                     let problem =
-                        text::whole(&file.display().to_string(), format!("cannot be read: {error}"));
+                        unplaced(Some(&file.display().to_string()), format!("cannot be read: {error}"));
                     tracing::error!("{problem}");
                     self.folder.unreadable(&file, problem);
                     found.insert(file, Known::Unreadable);
@@ -212,10 +212,10 @@ pub(super) fn written(
 ) -> Result<(Written, Label, Arc<Calibration>), Vec<Problem>> {
     let file = store.document_file(&set.digest);
     let name = file.map_or_else(|| format!("document {}", set.digest), |file| file.display().to_string());
-    let problem = |message: String| vec![text::whole(&name, message)];
+    let problem = |message: String| vec![unplaced(Some(&name), message)];
     let bytes = store.document(&set.digest).map_err(|error| problem(error.to_string()))?;
     let bytes = bytes.ok_or_else(|| problem("is no longer in the state folder".to_owned()))?;
-    let document_text = text::text(&bytes, &name)?;
+    let document_text = file::text(&bytes, &name)?;
     let parsed = Document::parse(document_text, Some(&name))?;
     let written = Written {
         digest: set.digest,

@@ -19,7 +19,7 @@ use super::worker::Worker;
 use crate::control::calibrations::{Change, Installable};
 use crate::control::compressed::CompressedText;
 use crate::control::store::StoreError;
-use crate::text;
+use isotherm_document::unplaced;
 
 /// A document that was found good, before it is written down.
 #[derive(Debug)]
@@ -97,7 +97,7 @@ impl Worker {
     /// Tells and counts that a document is refused because it cannot be written down.
     fn refuse_unwritten(&mut self, unit: &UnitId, name: &str, error: &StoreError) -> Problem {
         let message = format!("the swap cannot be written to the state folder, nothing has changed: {error}");
-        let problem = text::whole(name, message);
+        let problem = unplaced(Some(name), message);
         self.folder.note_unwritten(Path::new(name));
         if !self.retrying {
             tracing::error!(%unit, "a swap is refused, it cannot be written to the state folder: {error}");

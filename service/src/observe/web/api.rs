@@ -16,7 +16,7 @@ use serde_json::json;
 use super::guard::{Guard, Refusal};
 use super::{Web, assets, live};
 use crate::observe::metrics::http::{Answer, JSON, packed, text};
-use crate::operator::ConsoleError;
+use isotherm_operator::ConsoleError;
 
 /// Longest body of a request: a document, each of its characters written in JSON.
 const MAX_BODY: usize = 6 * MAX_DOCUMENT_BYTES + 4096;

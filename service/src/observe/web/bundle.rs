@@ -8,9 +8,9 @@ use flate2::write::GzEncoder;
 use isotherm_protocol::key::{self, UnitId};
 
 use super::Web;
-use crate::operator::page::{self, tone};
-use crate::operator::status::{Report, unix_ms};
-use crate::operator::worst_first;
+use isotherm_operator::page::{self, tone};
+use isotherm_operator::status::{Report, unix_ms};
+use isotherm_operator::worst_first;
 
 /// Latest entries of a unit's history that go in.
 const ENTRIES: usize = 1000;
@@ -75,9 +75,7 @@ impl Web {
         let mut lines = page::services(&services, &gone, COLUMNS);
         lines.extend(page::pairs(&fleet.pairs, COLUMNS));
         lines.push(page::tally(&units, COLUMNS));
-        let grid = page::units(&units, COLUMNS);
-        lines.push(grid.head);
-        lines.extend(grid.lines);
+        lines.extend(page::units(&units, COLUMNS).lines());
         let units = units.iter().map(|it| it.status.clone()).collect();
         (tone::text(&lines, false), Report { services, units, instances: fleet.pairs.clone() })
     }

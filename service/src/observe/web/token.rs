@@ -7,14 +7,13 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use isotherm_cli::{Exit, failed, print, say};
 use isotherm_protocol::digest::Digest;
 
 use crate::ServiceError;
 use crate::config::Settings;
-use crate::exit::Exit;
 use crate::signing::create;
-use crate::text::{check_regular, read_bounded};
-use crate::words::{print, say};
+use isotherm_document::file::{check_regular, read_bounded};
 
 /// Its name in the state folder.
 const FILE: &str = "web-token";
@@ -44,7 +43,8 @@ pub struct WebArgs {
 }
 
 /// Prints where the console is.
-pub(crate) fn show(args: &WebArgs) -> Exit {
+#[must_use]
+pub fn show(args: &WebArgs) -> Exit {
     match address(args) {
         Ok((url, token)) => {
             let text = if args.json {
@@ -58,8 +58,7 @@ pub(crate) fn show(args: &WebArgs) -> Exit {
             if let ServiceError::Configuration(problems) = &error {
                 problems.iter().for_each(say);
             }
-            say(format_args!("isotherm: {error}"));
-            error.exit()
+            failed(&error, error.exit())
         }
     }
 }

@@ -58,7 +58,7 @@ class Proposal {
 
   note() {
     return this.page.writes() ? null
-      : make("p", { className: "hint" }, "This console changes nothing: the service has no write = true in [web]. The difference can be seen.");
+      : make("p", { className: "hint" }, READ_ONLY + " The difference can be seen.");
   }
 
   /** What was asked for is another thing now: it has to be looked at first. */
@@ -74,7 +74,7 @@ class Proposal {
     const by = this.by.value.trim();
     if (!dryRun && !by) {
       this.by.focus();
-      return this.say("bad", "Give your name: it goes into the audit file.");
+      return this.say("bad", "Enter your name: it goes into the audit file.");
     }
     this.look.disabled = this.act.disabled = true;
     this.say("", "Asking…");
@@ -118,7 +118,7 @@ function difference({ document: entries, correction, temperatures }) {
     const table = figureTable(["Entry", "Before", "After"]);
     table.classList.add("words");
     table.show(entries.map(({ key, before, after }) => [key, before ?? NONE, after ?? NONE]));
-    parts.push(make("h3", {}, "What changes in the document"), table);
+    parts.push(make("h3", {}, "Changes in the document"), table);
   } else {
     parts.push(make("p", {}, "No entry of the document differs."));
   }
@@ -129,7 +129,7 @@ function difference({ document: entries, correction, temperatures }) {
     const six = value => fixed(value, 6);
     table.show(correction.map(({ quantity, unit, before, after }) =>
       [quantity, six(before), six(after), (after > before ? "+" : "") + six(after - before), unit]));
-    parts.push(make("h3", {}, "What that does now, at " + temperatures.join(", ")), table);
+    parts.push(make("h3", {}, "Effect on the correction now, at " + temperatures.join(", ")), table);
   } else {
     parts.push(make("p", {}, "The correction stays as it is at " + temperatures.join(", ") + "."));
   }
@@ -165,8 +165,8 @@ function swap(page) {
     field("Calibration document or overlay", file), field("Text", text),
     make("details", {}, make("summary", {}, "Options"), make("div", { className: "fields" },
       field("Over, s", slew, "0 is at once"), field("From tick", at, "sequence number"),
-      make("label", { className: "check" }, force, "Accept it despite age, range, version or jump"),
-      make("label", { className: "check" }, any, "Take a document of another serial"))),
+      make("label", { className: "check" }, force, "Force: accept it despite age, range, version or jump"),
+      make("label", { className: "check" }, any, "Accept a document of another serial"))),
     field("Your name", by), proposal.element).classList.add("large");
 }
 

@@ -90,7 +90,7 @@ class App {
         ...service.bad_documents.map(bad => ["warning", (bad.problem.startsWith(bad.file) ? "" : bad.file + ": ") + bad.problem +
           (bad.problems > 1 ? " (and " + (bad.problems - 1) + " more)" : "")]),
       ].filter(Boolean).map(([level, words]) => [level, name + words]);
-    }).concat(pair.map(({ level, words }) => [level, words.replaceAll("  ", " · ")]));
+    }).concat(pair.map(({ level, columns }) => [level, columns.join(" · ")]));
     const key = JSON.stringify(troubles);
     if (key === this.troubled) return;
     this.troubled = key;
