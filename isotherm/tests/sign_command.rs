@@ -145,7 +145,7 @@ fn check_tells_unsigned_unverified_and_wrong_apart() {
             format!("unit.toml:{line}:136: the signature line ends with CRLF"),
             "changed",
         ),
-        (format!("{signed}# ok\n"), format!("unit.toml:{}:1: something was put behind", line + 1), "changed"),
+        (format!("{signed}# ok\n"), format!("unit.toml:{}:1: something was put after", line + 1), "changed"),
         (
             format!("{signed}{signed}"),
             format!("unit.toml:{}:1: is a second signature line", 2 * line),
