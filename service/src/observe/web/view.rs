@@ -11,12 +11,12 @@ use isotherm_protocol::status::Status;
 use serde::{Serialize, Serializer};
 
 use super::Web;
-use crate::operator::page::{
+use isotherm_operator::page::{
     Level, Unit, channel_in_view, duplicates, is_running, knows_rates, late, length, range, said_of_pairs,
     state_word,
 };
-use crate::operator::status::unix_ms;
-use crate::operator::{Fleet, worst_first};
+use isotherm_operator::status::unix_ms;
+use isotherm_operator::{Fleet, worst_first};
 
 /// All units, those that need somebody first.
 #[derive(Debug, Serialize)]
@@ -169,7 +169,7 @@ impl From<(Level, Vec<String>)> for Columns {
 #[derive(Debug)]
 struct Past<'f> {
     age_s: f64,
-    of: &'f crate::operator::page::Past,
+    of: &'f isotherm_operator::page::Past,
 }
 
 impl Serialize for Past<'_> {

@@ -97,7 +97,7 @@ class Proposal {
     const words = {
       "refused": "Refused. Revision " + reply.revision + " stays in force.",
       "unchanged": "Unchanged: revision " + reply.revision + " is this document.",
-      "would-be-accepted": "Would be accepted (" + id + ") in the place of revision " + reply.revision + ".",
+      "would-be-accepted": "Would be accepted (" + id + ") and replace revision " + reply.revision + ".",
       "accepted": "Accepted as revision " + reply.revision + " (" + id + ").",
     }[reply.outcome];
     const className = { "refused": "bad", "accepted": "good" }[reply.outcome] ?? "";
@@ -123,7 +123,7 @@ function difference({ document: entries, correction, temperatures }) {
     parts.push(make("p", {}, "No entry of the document differs."));
   }
   if (!temperatures.length) {
-    parts.push(make("p", {}, "The unit's temperatures are not known yet, so neither is the effect on its correction."));
+    parts.push(make("p", {}, "The unit's temperatures are not known yet, so the effect is unknown."));
   } else if (correction.length) {
     const table = figureTable(["Correction", "Before", "After", "Change", "Unit"]);
     const six = value => fixed(value, 6);
@@ -165,7 +165,7 @@ function swap(page) {
     field("Calibration document or overlay", file), field("Text", text),
     make("details", {}, make("summary", {}, "Options"), make("div", { className: "fields" },
       field("Over, s", slew, "0 is at once"), field("From tick", at, "sequence number"),
-      make("label", { className: "check" }, force, "Force: accept it although age, range, version or jump speak against it"),
+      make("label", { className: "check" }, force, "Force: accept it despite age, range, version or jump"),
       make("label", { className: "check" }, any, "Accept a document of another serial"))),
     field("Your name", by), proposal.element).classList.add("large");
 }

@@ -124,7 +124,7 @@ class UnitPage {
   /** @param {Status} status */
   showCalibration(status) {
     const { calibration, pending, swaps } = status;
-    const output = { calibrated: null, "pass-through": "none: raw readings pass through", held: "none: nothing goes out" }[status.output];
+    const output = { calibrated: null, "pass-through": "none: raw readings pass through", held: "none: nothing is published" }[status.output];
     this.calibration.show([
       ["In force", calibration ? "revision " + calibration.revision.counter : output ?? NONE],
       ["Document", calibration ? head(calibration.digest ?? calibration.revision.digest) : null],
