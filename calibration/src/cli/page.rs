@@ -107,6 +107,8 @@ fn probe(out: &Path, folder: &Path) -> io::Result<()> {
 
 #[cfg(test)]
 mod tests {
+    use isotherm_cli::Exit;
+
     use super::*;
 
     #[test]
@@ -126,7 +128,7 @@ mod tests {
             ("log.mcap", true, "would be written over"),
         ] {
             let (code, words) = refused(name, overwrite).unwrap();
-            assert!(code == 2 && words.contains(wanted), "{name}: {words}");
+            assert!(code == Exit::Usage && words.contains(wanted), "{name}: {words}");
         }
         assert_eq!((refused("notes.txt", true), refused("new.toml", false)), (None, None));
         // Nothing has been touched.

@@ -2,6 +2,7 @@
 
 mod over_temperature;
 
+use isotherm_cli::Exit;
 use isotherm_correction::earth::Place;
 use isotherm_log::offline::unit_id;
 use isotherm_log::text::LogEvent;

@@ -1,5 +1,6 @@
 //! Logs that cannot be used are refused, with every reason and what to do.
 
+use isotherm_cli::Exit;
 use isotherm_correction::sample::{GyroTick, LasingMode};
 use isotherm_log::offline::unit_id;
 use isotherm_log::text::LogEvent;

@@ -75,9 +75,7 @@ impl Web {
         let mut lines = page::services(&services, &gone, COLUMNS);
         lines.extend(page::pairs(&fleet.pairs, COLUMNS));
         lines.push(page::tally(&units, COLUMNS));
-        let grid = page::units(&units, COLUMNS);
-        lines.push(grid.head);
-        lines.extend(grid.lines);
+        lines.extend(page::units(&units, COLUMNS).lines());
         let units = units.iter().map(|it| it.status.clone()).collect();
         (tone::text(&lines, false), Report { services, units, instances: fleet.pairs.clone() })
     }
