@@ -24,13 +24,13 @@ use isotherm_cli::{Common, Exit, failed_lines, parse, to_stdout};
 
 use crate::error::Error;
 
-/// Makes calibration documents from logs, and judges them.
+/// Makes calibration documents from logs, judges and compares them.
 #[derive(Debug, Parser)]
 #[command(
     name = "isotherm-calibrate",
     version,
-    after_help = "Exit codes: 0 ok, 1 failed, or the data do not allow what was asked for, 2 usage, 3 finished with data loss, \
-        78 bad mapping or calibration document."
+    after_help = "Exit codes: 0 ok, 1 failed, or the data do not allow the fit, 2 usage, 3 finished with data loss, \
+                  78 bad mapping or calibration document."
 )]
 struct Cli {
     #[command(subcommand)]

@@ -22,7 +22,7 @@ pub enum Error {
     #[error("{}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))]
     Found(Vec<Finding>),
     /// A document that was made is refused by its own reader; every problem, one per line.
-    #[error("the document that was made does not hold:\n{}", .0.join("\n"))]
+    #[error("the new document is invalid:\n{}", .0.join("\n"))]
     Document(Vec<String>),
     /// Arguments that do not go together.
     #[error("{0}")]

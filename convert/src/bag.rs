@@ -222,7 +222,7 @@ mod tests {
         let schema = imu.channel.schema.as_ref().unwrap();
         assert_eq!((schema.name.as_str(), schema.encoding.as_str()), ("sensor_msgs/msg/Imu", "ros2msg"));
         assert_eq!((imu.channel.message_encoding.as_str(), imu.log_time), ("cdr", 7));
-        assert_eq!(imu.channel.metadata["offered_qos_profiles"], metadata::QUALITY_OF_SERVICE);
+        assert_eq!(imu.channel.metadata["offered_qos_profiles"], QUALITY_OF_SERVICE);
         assert_eq!(imu.channel.metadata["unit"], "A-1");
     }
 }

@@ -48,8 +48,8 @@ impl Converted {
     /// Adds what became of a unit's rows.
     pub fn add(&mut self, tally: &Tally) {
         self.duplicates += tally.duplicates;
-        self.lose("too late to be put in order", tally.late);
-        self.lose("two different ticks or readings of one time", tally.conflicts);
+        self.lose("too late to be sorted", tally.late);
+        self.lose("two different ticks or readings at one time", tally.conflicts);
     }
 
     /// Whether anything was lost.

@@ -37,7 +37,7 @@ impl Place {
         refuse_overwriting(path, &inputs)?;
         if !self.overwrite && path.symlink_metadata().is_ok() {
             let path = path.display();
-            return Err(Error::Usage(format!("{path} is there already: take another name, or --overwrite")));
+            return Err(Error::Usage(format!("{path} exists: give another name, or --overwrite")));
         }
         Ok(())
     }
@@ -54,11 +54,13 @@ impl Place {
                 return Ok(());
             }
             return Err(Error::Usage(format!(
-                "the folder {name} has something in it: take another name, or --overwrite (other files in it stay)"
+                "the folder {name} is not empty: give another name, or --overwrite (other files in it stay)"
             )));
         }
         if path.symlink_metadata().is_ok() {
-            return Err(Error::Usage(format!("{name} is a file, the output is a folder: take another name")));
+            return Err(Error::Usage(format!(
+                "{name} is a file, but the output is a folder: give another name"
+            )));
         }
         Ok(())
     }

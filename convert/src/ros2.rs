@@ -20,7 +20,7 @@ use super::{Conversion, Converted, Found, Outcome, Written};
 use isotherm_log::error::Error;
 
 /// What stands in for the reason where a time is beyond what a bag holds.
-const NO_TIME: &str = "times before 1970 or after 2038, which ROS does not have";
+const NO_TIME: &str = "times before 1970 or after 2038, outside the range of ROS";
 
 /// How a ROS 2 bag is made.
 #[derive(Debug, Clone, Default)]
@@ -46,7 +46,7 @@ pub(super) fn convert(conversion: &Conversion, found: &Found) -> Result<Outcome,
         units.insert(unit.clone(), units_own);
     }
     if !units.values().any(|unit| unit.corrected || unit.raw.is_some()) {
-        let words = "nothing in the log can go into a ROS 2 bag";
+        let words = "the log has nothing for a ROS 2 bag";
         return Err(Error::Usage(if notes.is_empty() {
             format!("{words}: it has no units")
         } else {
@@ -127,7 +127,8 @@ impl UnitBag {
                 shape.sensors
             )),
             Some((false, _)) => Some(format!(
-                "{unit}: its raw readings are counts: correct the log first, or give the document that says what a count is with --calibration"
+                "{unit}: its raw readings are counts: correct the log first, or give the calibration document with \
+                 --calibration"
             )),
             None => Some(format!("{unit}: it has neither corrected ticks nor raw gyro ticks")),
         };

@@ -24,7 +24,7 @@ pub(super) fn convert(conversion: &Conversion, found: &Found) -> Result<Outcome,
     if single && units.len() > 1 {
         let names: Vec<_> = units.keys().map(UnitId::as_str).collect();
         return Err(Error::Usage(format!(
-            "{} holds one unit, the log has {} ({}): give --unit, or a folder with --to text",
+            "{} is for one unit, the log has {} ({}): give --unit, or a folder with --to text",
             conversion.out.display(),
             units.len(),
             names.join(", ")
@@ -206,7 +206,7 @@ impl UnitText {
         let columns = &self.columns;
         let (not_held, written) = sink.write(|writer| columns.write_row(row, writer))?;
         *rows += u64::from(written);
-        converted.lose("ticks with other sensors than most have", not_held.other_shape);
+        converted.lose("ticks with other sensors than most", not_held.other_shape);
         converted.lose("readings of channels without a name", not_held.no_column);
         Ok(())
     }

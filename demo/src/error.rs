@@ -32,7 +32,7 @@ pub enum DemoError {
     #[error(transparent)]
     Bus(#[from] BusError),
     /// The status of a unit did not come.
-    #[error("no status of unit {unit} came: {reason}")]
+    #[error("no status of unit {unit} was received: {reason}")]
     Status {
         /// Serial of the unit.
         unit: String,
@@ -40,7 +40,7 @@ pub enum DemoError {
         reason: String,
     },
     /// The service did not stop in its time.
-    #[error("the service did not stop in order: see its log")]
+    #[error("the service did not stop cleanly: see its log")]
     Stop,
     /// A producer's task ended unexpectedly.
     #[error("a producer ended unexpectedly: {0}")]

@@ -96,13 +96,13 @@ impl Member {
     pub(crate) fn story(&self) -> String {
         match (&self.scenario.instrument.gyros, &self.scenario.motion.path) {
             (Gyros::Zeeman(zeeman), Path::Sine { amplitude_deg, frequency_hz, .. }) => format!(
-                "On a stand that swings by {amplitude_deg}° at {frequency_hz}\u{a0}Hz, in a chamber that warms, \
-                 with mode reversal every {}\u{a0}s. At each switch the counts of some ticks carry nothing.",
+                "On a stand that swings by {amplitude_deg}° at {frequency_hz}\u{a0}Hz, in a chamber that warms, with \
+                 mode reversal every {}\u{a0}s. At each switch the counts of some ticks are meaningless.",
                 zeeman.reversal.period_s
             ),
             (Gyros::FibreOptic(_), _) => {
-                "At rest through a chamber cycle. The drift follows the heat that flows through \
-                 the coil, so it depends on how the temperature changes and not only on what it is."
+                "At rest through a chamber cycle. The drift follows the heat flow through the coil, so it depends on \
+                 the rate of temperature, not only on temperature."
                     .to_owned()
             }
             _ => "At rest through a chamber cycle. Bias and scale factor follow the temperature.".to_owned(),

@@ -43,7 +43,7 @@ Examples:
 
 Exit codes: 0 every tick came back once, 3 a tick was lost, 1 the demo failed.")]
 pub struct DemoArgs {
-    /// How long the units run (s); their own time is compressed to fit
+    /// Duration (s); the units' event time is compressed to fit
     #[arg(long, value_name = "N", default_value_t = 30, value_parser = clap::value_parser!(u32).range(1..=3600))]
     pub seconds: u32,
     /// Seed of all noise: the same seed gives the same ticks
@@ -52,7 +52,7 @@ pub struct DemoArgs {
     /// Print one JSON object instead of the table
     #[arg(long)]
     pub json: bool,
-    /// Where to write the report
+    /// Report to write
     #[arg(long, value_name = "FILE", default_value = "isotherm-demo.html")]
     pub report: PathBuf,
     /// Write no report

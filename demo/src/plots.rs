@@ -20,10 +20,10 @@ pub(crate) fn page(summary: &Summary, fleet: &[Member], watched: &[Watched]) -> 
         page.headline(&headline(unit));
     }
     page.paragraph(
-        "Three simulated units sent gyro, accelerometer and temperature ticks over Zenoh; the service corrected \
-         each with its own calibration; a subscriber received the result. Raw is what the readings give with \
-         nominal scale factor and input axes alone. The errors are differences from the simulation's exact rate, \
-         averaged as the table says; rms is over all three axes, peak to peak that of the worst axis.",
+        "Three simulated units sent gyro, accelerometer and temperature ticks over Zenoh; the service corrected each \
+         with its own calibration; a subscriber received the result. Raw: readings with nominal scale factor and \
+         input axes only. Errors are differences from the simulated rate, averaged as in the table; rms is over all \
+         three axes, peak to peak of the worst axis.",
     );
     let (head, rows) = summary.rows();
     page.table(&Table { head, rows });
@@ -114,9 +114,9 @@ fn mode_switch(switch: &Switch) -> Chart {
     };
     Chart {
         caption: format!(
-            "One mode switch, {} axis. The counts of the ticks in the bar carry nothing and are predicted; the \
-             two-sided fit then restores their angle. Angle error at the right edge: raw {}″, corrected {}″ (the \
-             quantisation of the counts, about 2″ each, is what remains).",
+            "One mode switch, {} axis. The counts of the ticks in the bar are meaningless and are predicted; the \
+             two-sided fit then restores their angle. Angle error at the right edge: raw {}″, corrected {}″ (what \
+             remains is quantisation, about 2″ per count).",
             AXES[axis],
             signed(total(|tick| tick.raw)),
             signed(total(|tick| tick.corrected)),
@@ -141,7 +141,7 @@ fn mode_switch(switch: &Switch) -> Chart {
                 content: Content::Lanes(lanes),
             },
             panel(
-                "angle error added up",
+                "accumulated angle error",
                 "″",
                 130,
                 vec![

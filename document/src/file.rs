@@ -23,7 +23,7 @@ pub fn read_bounded(file: &Path) -> std::io::Result<Vec<u8>> {
 pub fn check_regular(file: &Path) -> std::io::Result<()> {
     match std::fs::metadata(file) {
         Ok(found) if !found.is_file() => {
-            Err(std::io::Error::other("it is not a file, but a folder, pipe or device"))
+            Err(std::io::Error::other("it is a folder, pipe or device, not a file"))
         }
         _ => Ok(()),
     }

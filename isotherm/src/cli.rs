@@ -26,7 +26,7 @@ const EXIT_CODES: &str = "\
 Exit codes:
   0   done
   1   failed
-  2   called wrongly
+  2   usage
   3   finished, but data was lost
   78  a configuration or calibration document is bad or refused";
 
@@ -36,15 +36,15 @@ enum Command {
     Serve(ServeArgs),
     #[command(flatten)]
     Operate(Operation),
-    /// Print the address of the console in the browser, with its token
+    /// Print the address and token of the console in the browser
     Web(WebArgs),
     /// Validate calibration documents, service configurations and Zenoh configurations
     Check(CheckArgs),
     /// Sign calibration documents
     Sign(SignArgs),
-    /// Make a pair of keys to sign calibration documents with
+    /// Make a key pair for signing calibration documents
     Keygen(KeygenArgs),
-    /// Show simulated units being corrected, with a table and a report
+    /// Correct three simulated units: a live table and a report
     Demo(DemoArgs),
     /// Record, replay, correct, plot, convert logs: isotherm-replay
     #[command(disable_help_flag = true)]

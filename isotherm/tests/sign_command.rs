@@ -123,7 +123,10 @@ fn check_tells_unsigned_unverified_and_wrong_apart() {
     place.run(&["sign", "unit.toml", "--key", "anna.key"]);
     let (code, out, _) = check(&[]);
     assert_eq!(code, Some(0));
-    assert!(out.contains(", signed by key ") && out.contains(", not verified (--trusted-keys"), "{out}");
+    assert!(
+        out.contains(", signed by key ") && out.contains(", not verified (needs --trusted-keys"),
+        "{out}"
+    );
     let (_, out, _) = check(&["--json", "--trusted-keys", "trusted"]);
     let found: Value = serde_json::from_str(&out).unwrap();
     assert_eq!(found["files"][0]["signature"]["state"], "signed");
@@ -194,7 +197,7 @@ fn a_signature_is_replaced_only_when_told() {
     let once = place.text("unit.toml");
     let (code, _, err) = said(&place.run(&["sign", "unit.toml", "--key", "bert.key"]));
     assert_eq!(code, Some(1));
-    assert!(err.starts_with("unit.toml: is signed already, by key ") && err.contains("--overwrite"), "{err}");
+    assert!(err.starts_with("unit.toml: is already signed, by key ") && err.contains("--overwrite"), "{err}");
     assert_eq!(place.text("unit.toml"), once);
 
     assert_eq!(place.run(&["sign", "--overwrite", "unit.toml", "--key", "bert.key"]).status.code(), Some(0));
@@ -311,7 +314,7 @@ fn a_key_that_others_can_read_is_warned_about() {
     assert_eq!(code, Some(0));
     assert_eq!(
         err,
-        "anna.key:1:1: is a private key that others can get at (mode 644): `chmod 600 anna.key` (warning)\n"
+        "anna.key:1:1: is a private key that others can read (mode 644): `chmod 600 anna.key` (warning)\n"
     );
 
     std::fs::set_permissions(place.path("trusted/anna.pub"), Permissions::from_mode(0o666)).unwrap();
@@ -328,7 +331,7 @@ fn what_is_no_private_key_is_refused_by_name() {
     let place = Place::with_signer("anna");
     place.write("garbage.key", "-----BEGIN PRIVATE KEY-----\nAAAA\n-----END PRIVATE KEY-----\n");
     for (key, code, part) in [
-        ("anna.pub", 78, "anna.pub:1:1: holds a block \"PUBLIC KEY\", must be \"PRIVATE KEY\""),
+        ("anna.pub", 78, "anna.pub:1:1: has a block \"PUBLIC KEY\", must be \"PRIVATE KEY\""),
         ("garbage.key", 78, "garbage.key:1:1: is damaged: "),
         ("unit.toml", 78, "unit.toml:1:1: is no PEM text"),
         ("missing.key", 1, "missing.key:1:1: cannot be read: "),
@@ -356,7 +359,7 @@ fn every_bad_file_among_the_trusted_keys_is_named() {
     for (problem, start) in problems.iter().zip([
         "trusted/anna.pub:1:1: is the same key as anna-again (",
         "trusted/gone.pub:1:1: cannot be read: ",
-        "trusted/secret.pub:1:1: holds a block \"PRIVATE KEY\", must be \"PUBLIC KEY\": this is the secret half",
+        "trusted/secret.pub:1:1: has a block \"PRIVATE KEY\", must be \"PUBLIC KEY\": this is the secret half",
         "trusted/text.pub:1:1: is no PEM text",
     ]) {
         assert!(problem.starts_with(start), "{problem}\nnot {start}");

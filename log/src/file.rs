@@ -45,7 +45,7 @@ pub fn refuse_overwriting(out: &Path, others: &[&Path]) -> Result<(), Error> {
     let same = |other: &&&Path| resolved(out).is_some_and(|out| resolved(other) == Some(out));
     match others.iter().find(same) {
         Some(other) if out.is_file() || !out.exists() => Err(Error::Usage(format!(
-            "{} would be written over: this command has it as {} too",
+            "{} would be overwritten: it is also the {} of this command",
             out.display(),
             other.display()
         ))),

@@ -24,7 +24,7 @@ pub struct ClientArgs {
     /// How to reach the service
     #[command(flatten)]
     pub session: ClientOptions,
-    /// How long to wait for an answer (s)
+    /// Longest wait for an answer (s)
     #[arg(long, value_name = "SECONDS", default_value = "5", value_parser = seconds(3600.0), hide_short_help = true)]
     pub timeout: Duration,
 }

@@ -23,20 +23,20 @@ Examples:
   isotherm command ZLG-0001 pre-launch --latitude 55.75 --heading 30
   isotherm command ZLG-0001 run --reversal
 
-A command that the unit's state does not take is refused with what it would take now, exit code 1.")]
+A command that the unit's state does not allow is refused with a list of those allowed, exit code 1.")]
 pub struct CommandArgs {
     /// Serial of the unit
     pub unit: String,
-    /// What it is to do
+    /// Command
     #[command(subcommand)]
     pub action: Action,
-    /// Who asks, for the audit file (default: the name of the user)
+    /// Your name for the audit file (default: user name)
     #[arg(long, value_name = "NAME")]
     pub by: Option<String>,
     /// Print the answer as JSON on stdout
     #[arg(long)]
     pub json: bool,
-    /// Return as soon as the unit has begun, without following it
+    /// Return as soon as the unit has begun
     #[arg(long)]
     pub detach: bool,
     /// How to reach the service
@@ -49,23 +49,23 @@ pub struct CommandArgs {
 pub enum Action {
     /// Publish nothing until further notice
     Standby,
-    /// Publish corrected increments; with mode reversal where the calibration has it
+    /// Publish corrected increments, by default with mode reversal if the calibration has it
     Run {
         /// The producer reverses the lasing mode
         #[arg(long, conflicts_with = "no_reversal")]
         reversal: bool,
-        /// The lasing mode is to stay as it is
+        /// The producer keeps the lasing mode
         #[arg(long)]
         no_reversal: bool,
     },
-    /// Look the instrument over (10 s, from standby) and print the report
+    /// Test the instrument (10 s, from standby) and print the report
     SelfTest,
     /// Determine C0 and B0 of each gyro at rest (10 min, from standby)
     PreLaunch {
-        /// Where the unit stands and how
+        /// Place and attitude of the unit
         #[command(flatten)]
         place: PlaceArgs,
-        /// How long to accumulate (s, 60…7200)
+        /// Time to accumulate (s, 60…7200; default: 600)
         #[arg(long, value_name = "SECONDS")]
         duration: Option<f64>,
         /// Store and print the result, but do not put it in force
@@ -82,7 +82,7 @@ pub enum Action {
     },
     /// The unit is no longer at rest
     EndRest,
-    /// Forget a unit that sends no more: calibration, status and place; its revision numbers are not given again
+    /// Forget a silent unit: calibration, status and place; its revision numbers are not reused
     Forget,
 }
 
@@ -95,10 +95,10 @@ pub struct PlaceArgs {
     /// Heading of the case's x axis from north (°)
     #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = degrees)]
     pub heading: f64,
-    /// Pitch of the case (°) (default: pitch and roll from the accelerometers)
+    /// Pitch of the case (°) (default: levelled by the accelerometers)
     #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = degrees, requires = "roll")]
     pub pitch: Option<f64>,
-    /// Roll of the case (°)
+    /// Roll of the case (°) (default: levelled by the accelerometers)
     #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = degrees, requires = "pitch")]
     pub roll: Option<f64>,
 }

@@ -19,8 +19,8 @@ pub enum ConsoleError {
     Bus(#[from] BusError),
     /// Nobody answers on a key.
     #[error(
-        "no service answers at {tried} within {}.{} s: is one running there, and under the same --namespace? Else say where it is: \
-         --connect HOST:PORT or ISOTHERM_CONNECT (asked on {key})",
+        "no service at {tried} answers on {key} within {}.{} s: start one there, check --namespace, or give its \
+         address with --connect HOST:PORT or ISOTHERM_CONNECT",
         waited.as_secs(), waited.subsec_millis() / 100
     )]
     NoAnswer {
@@ -33,8 +33,8 @@ pub enum ConsoleError {
     },
     /// Nobody answers on a key, though the connection stands.
     #[error(
-        "nobody at {tried} answers {name} on {key} within {}.{} s, though the connection stands: does the service's access control let \
-         the certificate of {name} ask there? Else no service runs there, or under another --namespace",
+        "nobody at {tried} answers {name} on {key} within {}.{} s, though connected: check that the service's access \
+         control allows the certificate of {name}, that a service runs there, and --namespace",
         waited.as_secs(), waited.subsec_millis() / 100
     )]
     NotAllowed {
@@ -49,8 +49,8 @@ pub enum ConsoleError {
     },
     /// A question ended before its time without an answer.
     #[error(
-        "the question to {tried} ended without an answer (asked on {key}): the connection broke, or no service there speaks for the \
-         unit; an order may have been carried out: look with `isotherm status` and `isotherm history`, then ask again"
+        "{tried} did not answer on {key}: the connection broke, or no service there publishes the unit. An order may \
+         have been carried out: check `isotherm status` and `isotherm history`, then try again"
     )]
     Ended {
         /// The key.
@@ -67,10 +67,10 @@ pub enum ConsoleError {
         units: Vec<String>,
     },
     /// The service answers with an error.
-    #[error("the service says: {0}")]
+    #[error("the service answers: {0}")]
     Refused(String),
     /// An answer is not understood.
-    #[error("the answer on {key} is not understood: {reason}; is the service of another version?")]
+    #[error("the answer on {key} cannot be read: {reason}; has the service another version?")]
     Answer {
         /// The key.
         key: String,
@@ -94,15 +94,13 @@ pub enum ConsoleError {
         source: UnitIdError,
     },
     /// There is nobody to ask, and `--yes` was not given.
-    #[error(
-        "standard input is no terminal: give --yes to go on without a question, or --dry-run to look only"
-    )]
+    #[error("standard input is not a terminal: give --yes to proceed without confirmation, or --dry-run")]
     Unasked,
     /// Asked, and answered with no.
     #[error("nothing was changed")]
     Declined,
     /// A terminal is needed.
-    #[error("standard output is no terminal: `isotherm status` prints the same once, `--json` for programs")]
+    #[error("standard output is not a terminal: use `isotherm status`, for programs with --json")]
     NoTerminal,
     /// The terminal does not do what it is told.
     #[error("the terminal cannot be used: {0}")]

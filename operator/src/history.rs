@@ -35,13 +35,13 @@ pub struct HistoryArgs {
     /// Serial of the unit
     #[arg(required_unless_present = "verify")]
     pub unit: Option<String>,
-    /// Verify the chain of the audit files in this state folder instead; no service is asked
+    /// Verify the chain of the audit files in this state folder, without a service
     #[arg(long, value_name = "FOLDER", conflicts_with_all = ["unit", "limit", "all"])]
     pub verify: Option<PathBuf>,
-    /// Digest of an entry that an earlier `--verify` has printed: the entry must still be there
+    /// Digest printed by an earlier `--verify`: its entry must still exist
     #[arg(long, value_name = "DIGEST", requires = "verify")]
     pub noted: Option<Digest>,
-    /// Most entries, the newest first
+    /// Number of entries, newest first
     #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_ENTRIES)))]
     pub limit: u32,
     /// Show refusals, commands and first ticks too, not only calibrations

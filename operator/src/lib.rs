@@ -43,13 +43,13 @@ pub enum Operation {
     Status(StatusArgs),
     /// Show what units are doing, live
     Top(TopArgs),
-    /// Give a running unit another calibration, after a look at the difference
+    /// Swap a unit's calibration: show the difference, ask, swap
     Swap(SwapArgs),
     /// Go back to an earlier calibration
     Rollback(RollbackArgs),
-    /// Show what was done to a unit, by whom and when
+    /// Show a unit's calibrations and commands: what, when, by whom
     History(HistoryArgs),
-    /// Move a unit from state to state: standby, run, self-test, pre-launch calibration
+    /// Command a unit: standby, run, self-test, pre-launch calibration, rest
     Command(CommandArgs),
 }
 

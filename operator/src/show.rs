@@ -74,9 +74,9 @@ pub(super) fn difference(difference: &Difference) -> String {
         let _ = writeln!(text, "  {}", change.words());
     }
     if difference.temperatures.is_empty() {
-        text.push_str("The unit's temperatures are not known yet: what comes of it cannot be said.");
+        text.push_str("The unit's temperatures are not known yet, so the effect is unknown.");
     } else if difference.correction.is_empty() {
-        text.push_str("The correction at the present temperatures stays as it is.");
+        text.push_str("The correction at the present temperatures does not change.");
     } else {
         let rows = difference.correction.iter().map(correction_row);
         let header = ["correction", "before", "after", "change", "unit"];

@@ -28,26 +28,26 @@ Examples:
   isotherm status ZLG-0001
   isotherm status ZLG-0001 ZLG-0002 --json
 
-One line a unit, or everything of one unit. What does not fit the terminal is left out, the least important columns
-first; into a pipe goes all of it. The columns:
+One line per unit, or everything about one unit. On a narrow terminal the least important columns are left out.
+Columns:
   ●  running    ○  not running    ▲  warning    !  fault in the last minute
   state    \"running ±\" with, \"running\" without reversal of the lasing mode
   rev      revision of the calibration in force; cal. age: time since its document was made
   °C       temperature and its rate, of the first channel that is stale or outside its range, else of the first
-  range    where all temperatures lie against the range that the calibration was fitted over
-  °/h, mg  length of the correction that is subtracted at present
-  Hz       raw gyro ticks that come in
+  range    all temperatures against the calibrated range
+  °/h, mg  size of the correction subtracted at present
+  Hz       raw gyro ticks received per second
   gaps, dup, late, bad
            gaps announced, duplicates, late ticks and readings, frames refused, since the service started
-  p99      time that the service adds, 99th percentile")]
+  p99      latency added by the service, 99th percentile")]
 pub struct StatusArgs {
-    /// Serials; one: everything of it, none: all units
+    /// Serials: one shows everything about it (default: all units)
     #[arg(value_name = "UNIT")]
     pub units: Vec<String>,
     /// Print services and units as JSON on stdout
     #[arg(long)]
     pub json: bool,
-    /// Fit into so many columns (default: those of the terminal)
+    /// Width in columns (default: that of the terminal)
     #[arg(long, value_name = "COLUMNS", value_parser = clap::value_parser!(u16).range(20..))]
     pub width: Option<u16>,
     /// How to reach the service
@@ -197,7 +197,7 @@ mod tests {
         let error = refused(&mut report, "ZLG-9999");
         assert!(error.contains("no unit ZLG-9999; it has ZLG-0001, ZLG-0002"), "{error}");
         let error = refused(&mut report, "ZLG-0002");
-        assert!(error.contains("ended without an answer"), "its service has it: {error}");
+        assert!(error.contains("did not answer"), "its service has it: {error}");
         select(&mut report, &serial("ZLG-0003"), "here").unwrap();
         assert_eq!((report.units.len(), report.services.len()), (1, 1));
         let page = tone::text(&pages(&report, 80), false);

@@ -23,26 +23,26 @@ Examples:
   isotherm swap ZLG-0001 new.toml --yes --slew 2 --by ann
   isotherm swap ZLG-0001 new.toml --dry-run --json
 
-The difference to the document in force is printed first: every entry that changes, and what that does to the correction
-at the unit's present temperatures. Exit codes: 0 in force or scheduled, 78 refused, 1 not answered or not confirmed.")]
+First prints the difference from the document in force: every entry that changes, and the effect on the correction at the
+unit's present temperatures. Exit codes: 0 in force or scheduled, 78 refused, 1 not answered or not confirmed.")]
 pub struct SwapArgs {
     /// Serial of the unit
     pub unit: String,
     /// Calibration document or overlay (TOML); - for standard input
     pub file: PathBuf,
-    /// Take effect at the tick with this sequence number instead of the next one
+    /// First tick, by sequence number (default: the next tick)
     #[arg(long, value_name = "SEQUENCE", conflicts_with = "at_time_ns")]
     pub at_sequence: Option<u64>,
-    /// Take effect at the first tick that ends at this time or later (ns on the producer's clock)
+    /// First tick, by its end time (ns on the producer's clock) (default: the next tick)
     #[arg(long, value_name = "NS", allow_negative_numbers = true)]
     pub at_time_ns: Option<i64>,
-    /// Make the change over this time (s, 0…3600) instead of at once
+    /// Duration of the change (s, 0…3600) (default: as configured)
     #[arg(long, value_name = "SECONDS")]
     pub slew: Option<f64>,
-    /// Take a document that names another serial
+    /// Accept a document for another serial
     #[arg(long)]
     pub any_serial: bool,
-    /// Take it although age, temperature range, schema version or size of the jump speak against it
+    /// Accept it despite age, temperature range, schema version or size of the jump
     #[arg(long)]
     pub force: bool,
     /// What is asked before, and how it is said
@@ -62,7 +62,7 @@ Examples:
 pub struct RollbackArgs {
     /// Serial of the unit
     pub unit: String,
-    /// Revision to go back to; without it the one before the present one (`isotherm history` lists them)
+    /// Revision to go back to (default: the previous one; `isotherm history` lists them)
     #[arg(long, value_name = "REVISION")]
     pub to: Option<u64>,
     /// What is asked before, and how it is said
@@ -76,13 +76,13 @@ pub struct RollbackArgs {
 /// What is asked before a change, and how it is said.
 #[derive(Debug, Clone, Args)]
 pub struct Consent {
-    /// Go on without a question
+    /// Do not ask for confirmation
     #[arg(long, conflicts_with = "dry_run")]
     pub yes: bool,
-    /// Only say what would happen
+    /// Show only what would happen
     #[arg(long)]
     pub dry_run: bool,
-    /// Who asks, for the audit file; without it the name of the user
+    /// Your name for the audit file (default: user name)
     #[arg(long, value_name = "NAME")]
     pub by: Option<String>,
     /// Print the service's answer as JSON on stdout; the difference goes to stderr
@@ -212,10 +212,7 @@ fn result(reply: &SwapReply, json: bool) -> Exit {
             format!("{}: unchanged: revision {} ({digest}) is this document\n", reply.unit, reply.revision)
         }
         SwapOutcome::WouldBeAccepted => {
-            format!(
-                "{}: would be accepted ({digest}) in the place of revision {}\n",
-                reply.unit, reply.revision
-            )
+            format!("{}: would be accepted ({digest}) and replace revision {}\n", reply.unit, reply.revision)
         }
         SwapOutcome::Accepted => format!(
             "{}: accepted as revision {} ({digest}), {}\n",

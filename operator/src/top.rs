@@ -35,10 +35,10 @@ Examples:
   isotherm top
   isotherm top --connect tcp/10.0.0.7:7447 --interval 0.5
 
-One line a unit, as in `isotherm status`; `isotherm status --help` explains the columns. Keys: arrows select, Enter
-shows everything of a unit, s sorts, / filters, ? helps, q quits.")]
+One line per unit, as in `isotherm status`; `isotherm status --help` explains the columns. Keys: arrows select, Enter
+shows everything about a unit, s sorts, / filters, ? helps, q quits.")]
 pub struct TopArgs {
-    /// Time between two looks at the screen (s)
+    /// Time between two updates (s)
     #[arg(long, value_name = "SECONDS", default_value = "1", value_parser = seconds(60.0))]
     pub interval: Duration,
     /// How to reach the service

@@ -23,7 +23,7 @@ use isotherm_correction::units::Span;
 use crate::error::Error;
 use log_args::LogArgs;
 
-/// Plays recorded logs into the service, corrects them offline, simulates new ones.
+/// Records, plays, corrects, compares, plots, converts and simulates logs.
 #[derive(Debug, Parser)]
 #[command(
     name = "isotherm-replay",

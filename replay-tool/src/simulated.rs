@@ -115,7 +115,7 @@ fn take(readings: &mut Vec<TemperatureReading>, time: Timestamp) -> Vec<Temperat
 fn are_whole(output: OutputKind, values: &[f64]) -> io::Result<()> {
     let broken = values.iter().find(|value| output == OutputKind::Counts && value.fract() != 0.0);
     broken.map_or(Ok(()), |value| {
-        let words = format!("count {value} is not whole: switch the scenario's quantisation on");
+        let words = format!("count {value} is not whole: enable quantisation in the scenario");
         Err(io::Error::new(io::ErrorKind::InvalidData, words))
     })
 }

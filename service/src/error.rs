@@ -40,8 +40,8 @@ pub enum ServiceError {
     },
     /// The folder of calibration documents cannot be read, and there is nothing to go on with.
     #[error(
-        "the folder of calibrations {path} cannot be read: {source}; make it, or correct `calibrations` (no last good set is in `state` \
-         to go on with, or strict_start is set)",
+        "the folder of calibrations {path} cannot be read: {source}; create it, or correct `calibrations` (`state` \
+         has no last good set, or strict_start is set)",
         path = path.display()
     )]
     NoCalibrations {
@@ -109,7 +109,7 @@ impl ServiceError {
 /// What to do about a port that somebody else has.
 fn in_use(error: &std::io::Error) -> &'static str {
     match error.kind() {
-        std::io::ErrorKind::AddrInUse => "; take another port, or 0 for one of the system's choice",
+        std::io::ErrorKind::AddrInUse => "; choose another port, or 0 to let the system choose",
         _ => "",
     }
 }

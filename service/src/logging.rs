@@ -57,7 +57,7 @@ pub struct LogArgs {
     /// Form of the log on stderr
     #[arg(long, value_enum, default_value = "human", value_name = "FORM")]
     pub log_format: LogFormat,
-    /// What is logged: a level (error, warn, info, debug, trace), or filters such as info,zenoh=debug
+    /// Log level (error, warn, info, debug, trace), or filters such as info,zenoh=debug
     #[arg(long, env = "ISOTHERM_LOG", default_value = "info", value_name = "FILTER")]
     pub log_level: String,
 }
@@ -109,7 +109,7 @@ impl LogArgs {
 /// Runs a command that a blocked stderr must not hold up: what it says there goes through a queue.
 pub fn unheld(log: &LogArgs, command: impl Future<Output = Exit>) -> Exit {
     let report = |count| {
-        tracing::warn!(count, "log lines were dropped: stderr took none (a stopped terminal, a full pipe)");
+        tracing::warn!(count, "log lines were dropped: stderr was blocked (a stopped terminal, a full pipe)");
     };
     // Drained however this ends, by a panic too.
     match queue_lines(report) {

@@ -42,19 +42,19 @@ pub struct ServeArgs {
     /// Service configuration (TOML)
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
-    /// Folder of calibration documents; replaces the configured one
+    /// Folder of calibration documents (default: as configured)
     #[arg(long = "calibration", alias = "calibrations", value_name = "FOLDER")]
     pub calibrations: Option<PathBuf>,
-    /// Folder for the audit file and every accepted document; replaces the configured one
+    /// Folder for the audit file and every accepted document (default: as configured)
     #[arg(long, value_name = "FOLDER")]
     pub state: Option<PathBuf>,
-    /// Serve metrics and health over HTTP on this address; replaces the configured one
+    /// Address for metrics and health over HTTP (default: as configured)
     #[arg(long, value_name = "ADDRESS:PORT")]
     pub metrics: Option<SocketAddr>,
-    /// Serve the console in the browser too, read-only unless configured otherwise; `isotherm web` prints its address
+    /// Serve the console in the browser too (default: as configured); `isotherm web` prints its address
     #[arg(long)]
     pub web: bool,
-    /// How to reach others; each option given replaces the configured one
+    /// How to reach others; each option replaces the configured one
     #[command(flatten)]
     pub session: SessionOptions,
     /// When ready, print one line of JSON on stdout: {"ready":true,"locators":[…],"metrics":"http://…"}
@@ -66,7 +66,7 @@ pub struct ServeArgs {
     /// Print the totals at the end as JSON on stdout instead of a table
     #[arg(long)]
     pub json: bool,
-    /// What is logged, and how
+    /// Logging
     #[command(flatten)]
     pub log: LogArgs,
 }
@@ -77,7 +77,7 @@ pub async fn run(args: ServeArgs) -> Exit {
     match serve(args).await {
         Ok(Some(totals)) => report(&totals, json),
         Ok(None) => {
-            tracing::error!("stopped at once by a second signal");
+            tracing::error!("stopped immediately by a second signal");
             Exit::DataLoss
         }
         Err(error) => refused(&error),

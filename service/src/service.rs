@@ -94,7 +94,8 @@ pub(crate) async fn start_on(
     tell_keys(&settings);
     if settings.certified_names && !settings.session.has_access_control()? {
         tracing::warn!(
-            "certified_names is set, but the Zenoh configuration has no access control: whoever connects may use any name"
+            "certified_names is set, but the Zenoh configuration has no access control: anyone who connects may use \
+             any name"
         );
     }
     let opening = Opening::new();
@@ -180,7 +181,7 @@ fn now_unix_ms() -> i64 {
 pub(crate) fn open_store(folder: Option<&Path>) -> Result<(Store, Opened), ServiceError> {
     let Some(folder) = folder else {
         tracing::warn!(
-            "no state folder is configured (`state`): swaps, and what was done to a unit, are forgotten at the end"
+            "no state folder is configured (`state`): swaps and history are lost when the service ends"
         );
         return Ok((Store::in_memory(), Opened::default()));
     };
@@ -208,7 +209,7 @@ fn tell_keys(settings: &Settings) {
             for problem in &problems {
                 tracing::error!("{problem}");
             }
-            tracing::error!(folder = %folder.display(), "no key is trusted until every *.pub file is one");
+            tracing::error!(folder = %folder.display(), "no key is trusted until every *.pub file is valid");
         }
     }
 }
@@ -279,7 +280,7 @@ impl RunningService {
             receipt::all_taken(&session, left(deadline).saturating_sub(settings.stop_timeout / CLOSE_SHARE))
                 .await;
         if !flushed {
-            tracing::error!("not everything could be flushed within {:?}", settings.stop_timeout);
+            tracing::error!("not everything was published within {:?}", settings.stop_timeout);
         }
         let closed = isotherm_bus::close(session, left(deadline)).await;
         for error in [&taken, &closed].into_iter().filter_map(|done| done.as_ref().err()) {

@@ -145,7 +145,7 @@ async fn a_session_that_is_closed_behind_the_receipts_loses_nothing() {
         publisher.put(vec![0; 20_000]).await.unwrap();
     }
     let error = all_taken(&source, Duration::from_millis(1)).await.unwrap_err();
-    assert!(error.to_string().starts_with("a subscriber has not taken within 1ms"), "{error}");
+    assert!(error.to_string().starts_with("a subscriber has not read everything within 1ms"), "{error}");
     all_taken(&source, LIMIT).await.unwrap();
     assert_eq!(slow.taken(), COUNT);
     slow.end().await;

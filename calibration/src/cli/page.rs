@@ -14,10 +14,10 @@ use crate::written::write_file;
 /// The page of a command that writes nothing else.
 #[derive(Debug, Clone, Args)]
 pub(super) struct PageArgs {
-    /// Write everything with its diagrams as one HTML file; of several units each to FILE-UNIT.html, and the table to FILE
+    /// HTML report to write, one file; several units: FILE-UNIT.html each, and a table in FILE
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
-    /// Replace a page that is there already
+    /// Replace an existing page
     #[arg(long, requires = "html")]
     overwrite: bool,
 }
@@ -68,14 +68,14 @@ pub(super) fn writable(out: &Path, inputs: &[&Path], overwrite: bool) -> Result<
     };
     if !folder.exists() {
         return Err(Error::Usage(format!(
-            "{} cannot be written: make the folder first: mkdir -p {}",
+            "{} cannot be written: first create the folder with mkdir -p {}",
             out.display(),
             folder.display()
         )));
     }
     if !folder.is_dir() {
         return Err(Error::Usage(format!(
-            "{} cannot be written: {} is no folder",
+            "{} cannot be written: {} is not a folder",
             out.display(),
             folder.display()
         )));
@@ -86,10 +86,7 @@ pub(super) fn writable(out: &Path, inputs: &[&Path], overwrite: bool) -> Result<
 /// Leaves a file alone that is there, unless it may be written over.
 pub(super) fn keep(out: &Path, overwrite: bool) -> Result<(), Error> {
     if out.exists() && !overwrite {
-        return Err(Error::Usage(format!(
-            "{} is there already: give another name, or --overwrite",
-            out.display()
-        )));
+        return Err(Error::Usage(format!("{} exists: give another name, or --overwrite", out.display())));
     }
     Ok(())
 }
@@ -121,8 +118,8 @@ mod tests {
             tried.err().map(|error| (error.exit(), error.to_string()))
         };
         for (name, overwrite, wanted) in [
-            ("notes.txt", false, "is there already"),
-            ("no/such/x.toml", false, "make the folder first: mkdir -p "),
+            ("notes.txt", false, "exists"),
+            ("no/such/x.toml", false, "first create the folder with mkdir -p "),
             ("notes.txt/x.toml", false, "is no folder"),
             (".", true, "is a folder: give the name of a file in it"),
             ("log.mcap", true, "would be written over"),

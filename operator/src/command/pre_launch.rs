@@ -39,7 +39,7 @@ pub(super) async fn follow(
             status = timeout_at(deadline, follow.next()) => {
                 let Ok(Some(status)) = status else {
                     bar.finish();
-                    let words = format!("{unit} has been silent for {} s; the calibration may be going on", SILENCE.as_secs());
+                    let words = format!("{unit} has been silent for {} s; the calibration may still be running", SILENCE.as_secs());
                     return Err(ConsoleError::TimedOut(words));
                 };
                 if let Some(progress) = &status.pre_launch {
@@ -57,7 +57,7 @@ pub(super) async fn follow(
                     return Err(ConsoleError::Interrupted);
                 }
                 interrupted = true;
-                bar.beside(|| say("Aborting; interrupt again to leave it to itself."));
+                bar.beside(|| say("Aborting; interrupt again to stop waiting."));
                 super::give(client, unit, abort).await?;
             }
         }
@@ -107,7 +107,7 @@ fn words(unit: &UnitId, outcome: &PreLaunchOutcome) -> String {
             for reason in reasons {
                 say(format_args!("isotherm: {reason}"));
             }
-            format!("{unit}: pre-launch calibration refused; it has changed nothing\n{next}")
+            format!("{unit}: pre-launch calibration refused; nothing has changed\n{next}")
         }
         PreLaunchVerdict::Aborted => {
             format!("{unit}: pre-launch calibration aborted; the constants are as before\n{next}")

@@ -11,27 +11,27 @@ use super::{Level, tone};
 const NAMED: usize = 8;
 
 /// The lines of all instances; none of one alone that takes every unit.
-pub fn pairs(reports: &[PairReport], columns: usize) -> Vec<Line<'static>> {
-    let line = |(level, words): (Level, String)| {
+pub fn pairs(reports: &[PairReport], width: usize) -> Vec<Line<'static>> {
+    let line = |(level, columns): (Level, Vec<String>)| {
         let (mark, style) = match level {
             Level::Fault => ("! ", tone::FAULT),
             Level::Warning => ("▲ ", tone::WARNING),
             _ => ("", tone::PLAIN),
         };
-        Line::from(Span::styled(fit(&format!("{mark}{words}"), columns), style))
+        Line::from(Span::styled(fit(&format!("{mark}{}", columns.join("  ")), width), style))
     };
     said(reports).into_iter().map(line).collect()
 }
 
-/// What there is to say of all instances, and how grave it is.
-pub fn said(reports: &[PairReport]) -> Vec<(Level, String)> {
+/// What there is to say of all instances, in columns, and how grave it is.
+pub fn said(reports: &[PairReport]) -> Vec<(Level, Vec<String>)> {
     let mut said = Vec::new();
     if reports.len() > 1 {
         for report in reports {
             said.push((Level::Fine, instance(report)));
             let differences = report.units.iter().filter_map(|unit| unit.last_difference.as_deref());
             said.extend(differences.take(NAMED).map(|difference| {
-                (Level::Fault, format!("{}: other bits: {difference}", report.member.name))
+                (Level::Fault, vec![format!("{}: other bits: {difference}", report.member.name)])
             }));
         }
         let twice = named(reports, |report, unit| {
@@ -39,7 +39,7 @@ pub fn said(reports: &[PairReport]) -> Vec<(Level, String)> {
             speaks(report) && reports.iter().filter(|other| speaks(other)).count() > 1
         });
         if !twice.is_empty() {
-            said.push((Level::Fault, format!("two instances speak for {}", listed(&twice))));
+            said.push((Level::Fault, vec![format!("two instances speak for {}", listed(&twice))]));
         }
     }
     let mut nobody: Vec<String> = reports.iter().flat_map(|report| report.passed_over.clone()).collect();
@@ -47,29 +47,30 @@ pub fn said(reports: &[PairReport]) -> Vec<(Level, String)> {
     nobody.sort_unstable();
     nobody.dedup();
     if !nobody.is_empty() {
-        said.push((Level::Warning, format!("nobody takes {}", listed(&nobody))));
+        said.push((Level::Warning, vec![format!("nobody takes {}", listed(&nobody))]));
     }
     said
 }
 
-/// "north  speaks for 20 units, standby for 3, joining 1  priority 1  takeovers 2  40 000 ticks compared, 0 other".
-fn instance(report: &PairReport) -> String {
+/// "north", "speaks for 20 units, standby for 3, joining 1", "standby", "priority 1", "takeovers 2", "40 000 ticks compared, 0 other".
+fn instance(report: &PairReport) -> Vec<String> {
     let count = |role| report.units.iter().filter(|unit| unit.role == role).count();
     let sum = |number: fn(&UnitRole) -> u64| grouped(report.units.iter().map(number).sum());
     let member = &report.member;
     let silent = [Role::Standby, Role::Joining].into_iter().filter(|role| count(*role) > 0);
     let silent: Vec<_> = silent.map(|role| format!(", {} for {}", role.name(), count(role))).collect();
-    format!(
-        "{}  speaks for {}{}  {}  priority {}  takeovers {}  {} ticks compared, {} other",
-        member.name,
-        of(count(Role::Speaking), "unit"),
-        silent.concat(),
-        member.mode.name(),
-        member.priority,
-        sum(|unit| unit.takeovers),
-        sum(|unit| unit.ticks_compared),
-        sum(|unit| unit.ticks_differing),
-    )
+    vec![
+        member.name.clone(),
+        format!("speaks for {}{}", of(count(Role::Speaking), "unit"), silent.concat()),
+        member.mode.name().to_owned(),
+        format!("priority {}", member.priority),
+        format!("takeovers {}", sum(|unit| unit.takeovers)),
+        format!(
+            "{} ticks compared, {} other",
+            sum(|unit| unit.ticks_compared),
+            sum(|unit| unit.ticks_differing)
+        ),
+    ]
 }
 
 /// Who does what for one unit: "north speaks, south standby"; nothing where there is one instance.

@@ -134,16 +134,16 @@ fn faults(unit: &Unit<'_>, add: &mut impl FnMut(Level, String)) {
 fn flow(unit: &Unit<'_>, add: &mut impl FnMut(Level, String)) {
     let Unit { status, lately, .. } = unit;
     if lately.stuck {
-        add(Level::Fault, "nothing goes out though raw ticks come in".to_owned());
+        add(Level::Fault, "nothing is published although raw ticks arrive".to_owned());
     }
     match status.output {
         Output::Calibrated => {}
         Output::PassThrough => add(Level::Warning, "no calibration: raw readings pass through".to_owned()),
-        Output::Held => add(Level::Warning, "no calibration: nothing goes out".to_owned()),
+        Output::Held => add(Level::Warning, "no calibration: nothing is published".to_owned()),
     }
     if knows_rates(status) && status.input_rates.gyro_ticks_per_s == 0.0 && unit.gone.is_none() {
         let level = if is_running(status.state) { Level::Warning } else { Level::Note };
-        add(level, "no raw ticks come in".to_owned());
+        add(level, "no raw ticks arrive".to_owned());
     }
     let grown = [
         (lately.bad, "bad frame"),

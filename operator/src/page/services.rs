@@ -77,7 +77,7 @@ fn troubles(service: &ServiceStatus, columns: usize) -> Vec<Line<'static>> {
         let reason = folder.reason.as_deref().unwrap_or("it cannot be read");
         match folder.state {
             FolderState::Gone => troubles.push((
-                format!("! calibrations {}: {reason}; what is in force stays in force", folder.path),
+                format!("! calibrations {}: {reason}; calibrations in force stay", folder.path),
                 tone::FAULT,
             )),
             FolderState::Polling => {

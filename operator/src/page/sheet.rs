@@ -178,7 +178,7 @@ fn stream(status: &Status, service: Option<&ServiceStatus>, columns: usize) -> S
             field("last tick", &format!("sequence {}, series {}", tick.sequence, tick.series));
             field("", &format!("ended at {} ns on the producer's clock", tick.end_time_ns));
         }
-        None => field("last tick", "none was published yet"),
+        None => field("last tick", "none published yet"),
     }
     section
 }

@@ -316,7 +316,7 @@ fn a_unit_that_takes_ticks_and_gives_none_is_a_fault() {
         status.counters.iter_mut().filter(|c| c.name == "gyro_ticks_in").for_each(|c| c.value += 200);
         bench.take(News::Unit(Box::new(status.clone())));
     }
-    assert!(bench.line_of("ZLG-0001").contains("nothing goes out though"));
+    assert!(bench.line_of("ZLG-0001").contains("nothing is published although"));
     // The first tick that goes out ends it.
     bench.pass(1);
     status.counters.iter_mut().filter(|c| c.name == "ticks_out").for_each(|c| c.value += 200);

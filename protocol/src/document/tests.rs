@@ -165,7 +165,7 @@ fn bytes_that_are_no_text_are_placed() {
 fn problems_are_serialised_field_by_field() {
     let problem = &refuse("schema = 2")[0];
     let json = serde_json::to_value(problem).unwrap();
-    let message = "is version 2; this release reads 1: nothing else was read";
+    let message = "is version 2; this release reads 1: the rest was not read";
     let expected = serde_json::json!({"file": "test.toml", "line": 1, "column": 10, "key": "schema", "message": message});
     assert_eq!(json, expected);
 }

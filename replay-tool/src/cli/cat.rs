@@ -21,20 +21,20 @@ use super::{LogArgs, show};
 use crate::error::Error;
 use crate::play::wanted;
 
-/// Print the messages of a log as JSON, one a line
+/// Print the messages of a log as JSON, one per line
 #[derive(Debug, Args)]
 #[command(after_help = "Example, in two steps:\n  \
     isotherm-replay simulate --preset mems-chamber --duration 60 --out mems.csv\n  \
     isotherm-replay cat mems.csv --unit MEMS-0001 --topic 'imu/*/raw/temp' --limit 2\n\n\
-    Each line has `topic`, `received_ns` and `message`, whose fields are those of docs/wire.md; or `error`, where a frame cannot\n\
+    Each line has `topic`, `received_ns` and `message`, with the fields of docs/wire.md; or `error`, if a frame cannot\n\
     be read (exit code 3).")]
 pub(super) struct CatArgs {
     #[command(flatten)]
     log: LogArgs,
-    /// Take only topics of these keys, e.g. 'imu/*/raw/gyro'; repeatable
+    /// Only these keys, e.g. 'imu/*/raw/gyro'; repeatable
     #[arg(long, value_name = "KEY", value_parser = key_expression)]
     topic: Vec<OwnedKeyExpr>,
-    /// Stop after so many messages
+    /// Stop after N messages
     #[arg(long, value_name = "N")]
     limit: Option<u64>,
 }

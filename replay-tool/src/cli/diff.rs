@@ -29,8 +29,7 @@ use crate::error::Error;
     isotherm-replay correct mems.csv --calibration config/calibration/MEMS-0001.toml --out a.csv\n  \
     isotherm-replay correct mems.csv --calibration config/calibration/MEMS-0001.toml --out b.csv\n  \
     isotherm-replay diff a.csv b.csv\n\n\
-    A log is a recording (MCAP) with corrected ticks, or a CSV or wire file of `isotherm-replay correct`. Ticks are known by \
-    their sequence number and end, and compared to the bit unless a tolerance is given.\n\n\
+    A log is a recording (MCAP) with corrected ticks, or a CSV or wire file of `isotherm-replay correct`. Ticks are matched by sequence number and end, and compared to the bit unless a tolerance is given.\n\n\
     Exit codes: 0 identical, or within the tolerance; 1 different, or one cannot be read; 2 usage.")]
 pub(super) struct DiffArgs {
     /// The first log
@@ -42,13 +41,13 @@ pub(super) struct DiffArgs {
     /// Unit serial, repeatable (default: all). CSV: the serial to assign
     #[arg(long, short, value_name = "SERIAL")]
     unit: Vec<String>,
-    /// How much an angle increment may differ (rad)
+    /// Tolerance of angle increments (rad)
     #[arg(long, value_name = "RAD", default_value_t = 0.0, value_parser = not_negative)]
     tolerance_angle: f64,
-    /// How much a velocity increment may differ (m/s)
+    /// Tolerance of velocity increments (m/s)
     #[arg(long, value_name = "M/S", default_value_t = 0.0, value_parser = not_negative)]
     tolerance_velocity: f64,
-    /// How much any number that is not whole may differ, as a share of the larger of the two
+    /// Tolerance of any number that is not an integer, as a share of the larger of the two
     #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = not_negative)]
     tolerance_relative: f64,
     /// Ticks to show before and after the first difference
@@ -94,7 +93,7 @@ pub(super) fn run(args: &DiffArgs) -> Result<Exit, Error> {
         compare(&mut a, &mut b, options, |ticks| bar.step_saying(|| Some(format!("{ticks} ticks"))))?;
     bar.finish();
     if accounts.is_empty() {
-        return Err(Error::Usage("there are no corrected ticks in either log".to_owned()));
+        return Err(Error::Usage("neither log has corrected ticks".to_owned()));
     }
     for words in [a.cut_short(), b.cut_short()].into_iter().flatten() {
         show::warn(&words);
@@ -130,7 +129,7 @@ fn unnamed(args: &DiffArgs, units: &BTreeSet<UnitId>) -> Result<UnitId, Error> {
     match of_other.as_slice() {
         [unit] => Ok(unit.clone()),
         _ => Err(Error::Usage(format!(
-            "{} is of {} units, and a CSV does not say which it is of: give --unit SERIAL",
+            "{} has {} units, and a CSV does not say which is its own: give --unit SERIAL",
             other.display(),
             of_other.len()
         ))),

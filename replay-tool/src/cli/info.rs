@@ -18,7 +18,7 @@ const BATCH: usize = 256;
 /// What a text log's unit is called where nobody says.
 const UNNAMED: &str = "log";
 
-/// Say what a log holds: topics, rates, gaps, jitter, temperatures, mode switches, calibrations, commands
+/// Summarise a log: topics, rates, gaps, jitter, temperatures, mode switches, calibrations, commands
 #[derive(Debug, Args)]
 #[command(after_help = "Example, in two steps:\n  \
     isotherm-replay simulate --preset mems-chamber --duration 60 --out mems.csv\n  \

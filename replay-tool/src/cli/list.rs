@@ -18,11 +18,11 @@ use crate::play::wanted;
 #[command(after_help = "Example, in two steps:\n  \
     isotherm-replay simulate --preset mems-chamber --duration 60 --out mems.csv\n  \
     isotherm-replay list mems.csv --unit MEMS-0001\n\n\
-    Times are seconds from the log's first message. What they hold: `isotherm-replay info` and `isotherm-replay cat`.")]
+    Times are seconds from the log's first message. For contents use `isotherm-replay info` and `isotherm-replay cat`.")]
 pub(super) struct ListArgs {
     #[command(flatten)]
     log: LogArgs,
-    /// Take only topics of these keys, e.g. 'imu/*/raw/gyro'; repeatable
+    /// Only these keys, e.g. 'imu/*/raw/gyro'; repeatable
     #[arg(long, value_name = "KEY", value_parser = key_expression)]
     topic: Vec<OwnedKeyExpr>,
     /// Print one JSON object

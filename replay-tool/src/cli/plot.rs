@@ -24,32 +24,31 @@ const DETAIL: u32 = 32_768;
 /// What a text log's unit is called where nobody says.
 const UNNAMED: &str = "log";
 
-/// Draw a log, or two over one time axis, as one HTML file that one can zoom into
+/// Plot a log, or two over one time axis, as one HTML file with zoom
 #[derive(Debug, Args)]
 #[command(after_help = "Example, in two steps:\n  \
     isotherm-replay simulate --preset mems-chamber --duration 60 --out mems.csv\n  \
     isotherm-replay plot mems.csv --calibration config/calibration/MEMS-0001.toml --out mems.html\n\n\
-    The file needs no network and nothing beside it. Two logs: isotherm-replay plot a.mcap --beside b.mcap --out both.html")]
+    The file needs no network and no other file. Two logs: isotherm-replay plot a.mcap --beside b.mcap --out both.html")]
 pub(super) struct PlotArgs {
     #[command(flatten)]
     log: LogArgs,
-    /// Another log, drawn over the same time axis with its difference; repeatable for the files of one log. Also a CSV of
-    /// `isotherm-replay correct`
+    /// Second log, or a CSV of `isotherm-replay correct`, plotted with the difference; repeatable for files of one log
     #[arg(long, value_name = "LOG")]
     beside: Vec<PathBuf>,
-    /// Column mapping of the other log (default: that of the first)
+    /// Column mapping of the second log (default: that of the first)
     #[arg(long, value_name = "FILE", requires = "beside")]
     beside_mapping: Option<PathBuf>,
-    /// Unit of the other log (default: as for the first)
+    /// Unit of the second log (default: that of the first)
     #[arg(long, value_name = "SERIAL", requires = "beside")]
     beside_unit: Vec<String>,
-    /// Calibration document (TOML): text logs are corrected with it and raw counts scaled; recordings know their own
+    /// Calibration document (TOML) that corrects a text log and scales counts (recordings: as recorded)
     #[arg(long, short, value_name = "FILE")]
     calibration: Option<PathBuf>,
-    /// The page
+    /// HTML file to write
     #[arg(long, short, value_name = "FILE")]
     out: PathBuf,
-    /// Most bins of each quantity; logs of up to three times as many ticks are drawn tick by tick
+    /// Most bins per curve; up to three times as many ticks are drawn one by one
     #[arg(long, value_name = "BINS", default_value_t = DETAIL, value_parser = clap::value_parser!(u32).range(64..=1_048_576))]
     detail: u32,
     /// Print the summary as one JSON object

@@ -17,38 +17,38 @@ use crate::simulated::{Columns, LogWriter, write_truth, write_truth_header};
 use isotherm_log::file::{read_small_text, refuse_overwriting};
 use isotherm_log::mapping::Mapping;
 
-/// Simulate a log, with the mapping that reads it back beside it
+/// Simulate a log, with the mapping that reads it back
 #[derive(Debug, Args)]
 #[command(
     group = ArgGroup::new("what").required(true).args(["scenario", "preset", "list_presets", "print_preset"]),
     after_help = "Example:\n  isotherm-replay simulate --preset zeeman-sine --duration 60 --out zeeman.csv --truth truth.csv\n\n\
         Writes zeeman.csv and zeeman.mapping.toml; a name that ends in .gz is compressed.\n\n\
-        A scenario of one's own begins with a ready-made one:\n  \
+        To write your own scenario, start from a preset:\n  \
         isotherm-replay simulate --print-preset mems-chamber > mine.toml"
 )]
 pub(super) struct SimulateArgs {
     /// Scenario (TOML)
     #[arg(value_name = "SCENARIO")]
     scenario: Option<PathBuf>,
-    /// A ready-made scenario
+    /// Preset scenario
     #[arg(long, value_name = "NAME")]
     preset: Option<String>,
-    /// List the ready-made scenarios
+    /// List the presets
     #[arg(long)]
     list_presets: bool,
-    /// Print a ready-made scenario as TOML, with --seed and --duration in it
+    /// Print a preset as TOML, with --seed and --duration applied
     #[arg(long, value_name = "NAME", conflicts_with_all = ["out", "truth", "json"])]
     print_preset: Option<String>,
-    /// Where the log goes
+    /// Log to write
     #[arg(long, short, value_name = "FILE", required_unless_present_any = ["list_presets", "print_preset"])]
     out: Option<PathBuf>,
-    /// Where the truth goes: true increments, temperatures and drifts
+    /// Truth to write: increments, temperatures and drifts
     #[arg(long, value_name = "FILE")]
     truth: Option<PathBuf>,
-    /// Seed of all noise, in place of the scenario's
+    /// Seed of all noise (default: the scenario's)
     #[arg(long)]
     seed: Option<u64>,
-    /// Duration (s), in place of the scenario's
+    /// Duration (s) (default: the scenario's)
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     duration: Option<Span>,
     /// Print the summary as one JSON object
@@ -117,7 +117,7 @@ impl SimulateArgs {
             (None, Some(name)) => {
                 let preset = PRESETS.iter().find(|preset| preset.name == name).ok_or_else(|| {
                     let names: Vec<_> = PRESETS.iter().map(|preset| preset.name).collect();
-                    Error::Usage(format!("there is no preset {name:?}, there are {}", names.join(", ")))
+                    Error::Usage(format!("there is no preset {name:?}; presets are {}", names.join(", ")))
                 })?;
                 (preset.make)(1)
             }

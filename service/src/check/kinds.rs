@@ -20,7 +20,7 @@ use isotherm_document::unplaced;
 const CALIBRATION_KEYS: [&str; 6] = ["schema", "unit", "gyro", "accel", "temperature", "mode_reversal"];
 
 /// What is said of a file that may be anything.
-const NO_KEYS: &str = "holds no keys: say with --kind what it is meant to be";
+const NO_KEYS: &str = "has no keys: state its kind with --kind";
 
 /// Longest message of the JSON5 parser that is passed on; long enough for Zenoh's lists of known keys.
 const MAX_MESSAGE_CHARS: usize = 1000;

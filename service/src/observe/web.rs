@@ -79,8 +79,8 @@ impl Web {
         }
         if settings.metrics.listen.is_some_and(|address| !address.ip().to_canonical().is_loopback()) {
             tracing::warn!(
-                "the console in the browser can be reached from other machines, and its token is not encrypted on the way: let it \
-                 listen on 127.0.0.1 behind a proxy with TLS"
+                "other machines can reach the console in the browser, and its token is sent unencrypted: listen on \
+                 127.0.0.1 behind a proxy with TLS"
             );
         }
         let token = token::of_service(settings)?;
@@ -123,7 +123,7 @@ async fn feed(client: Arc<Client>, fleet: Arc<Mutex<Fleet>>) {
                     fleet.forget(now);
                 }
             }
-            Err(error) => tracing::debug!("console in the browser: {error}; tried again"),
+            Err(error) => tracing::debug!("console in the browser: {error}; will retry"),
         }
         tokio::time::sleep(PAUSE).await;
     }

@@ -61,7 +61,7 @@ async fn of_two_files_that_name_one_unit_none_is_taken_until_one_is_gone() {
     let mut stand = Stand::start(folders.settings()).await;
     let rival = folders.put("b.toml", &document(UNIT, 2.0));
     let status = until_service(&stand, |status| status.bad_documents.len() == 2).await;
-    assert!(status.bad_documents.iter().all(|bad| bad.problem.contains("is named by")), "{status:#?}");
+    assert!(status.bad_documents.iter().all(|bad| bad.problem.contains("is also named by")), "{status:#?}");
     assert_eq!(stand.revisions(UNIT, 20).await, [1], "what is in force stays in force");
 
     std::fs::remove_file(rival).unwrap();
@@ -118,9 +118,9 @@ async fn the_beginning_of_a_document_is_refused_though_it_is_one_by_itself() {
 
     folders.put("a.toml", torn);
     let status = until_service(&stand, |status| !status.bad_documents.is_empty()).await;
-    assert!(status.bad_documents[0].problem.contains("does not have [accel]"), "{status:#?}");
+    assert!(status.bad_documents[0].problem.contains("lacks [accel]"), "{status:#?}");
     let options = SwapOptions::default();
-    assert_refused(&stand.swap(UNIT, torn, &options).await, &["does not have [accel]", "by force"]);
+    assert_refused(&stand.swap(UNIT, torn, &options).await, &["lacks [accel]", "--force"]);
     // The rest is written.
     folders.put("a.toml", &(whole.clone() + "# The rest.\n"));
     stand.until_accepted(UNIT, 2).await;

@@ -36,9 +36,9 @@ async fn a_state_folder_that_is_removed_is_told_refuses_swaps_and_a_new_one_gets
     remove(&folders.state);
     let status = until_service(&stand, |status| told(status, "state_folder").is_some()).await;
     let words = told(&status, "state_folder").unwrap();
-    assert!(words.contains("was removed") && words.contains("make an empty folder"), "{words}");
+    assert!(words.contains("was removed") && words.contains("make an empty writable folder"), "{words}");
     let reply = stand.swap(UNIT, &document(UNIT, 3.0), &plain()).await;
-    assert_refused(&reply, &["cannot be written down", "nothing has changed", "was removed"]);
+    assert_refused(&reply, &["cannot be written to the state folder", "nothing has changed", "was removed"]);
     assert_eq!(stand.revisions(UNIT, 20).await, [2], "the stream does not notice");
     assert!(!folders.state.exists(), "a folder is not made where a disk may have been");
 
@@ -95,7 +95,7 @@ async fn an_emptied_audit_file_is_told_and_no_revision_is_given_twice() {
     assert!(words.contains("the history is lost") && words.contains("3 documents are kept"), "{words}");
     let revisions = stand.revisions(UNIT, 20).await;
     assert!(revisions.len() == 1 && revisions[0] > 3, "{revisions:?}");
-    assert!(words.contains(&format!("go on from {}", revisions[0])), "{words}");
+    assert!(words.contains(&format!("continue from {}", revisions[0])), "{words}");
     stand.stop().await;
 
     // It holds for units that come later, and over another restart.

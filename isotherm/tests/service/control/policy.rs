@@ -34,7 +34,7 @@ async fn policy(set: impl Fn(&mut Settings, Severity), temperature_deg_c: f64, t
         let reply = stand.swap(UNIT, text, &PLAIN).await;
         let reply = if severity == Severity::Refuse {
             assert_refused(&reply, words);
-            assert_refused(&reply, &["by force"]);
+            assert_refused(&reply, &["--force"]);
             stand.swap(UNIT, text, &forced).await
         } else {
             reply
@@ -120,7 +120,7 @@ async fn with_a_required_signature_an_unsigned_or_wrongly_signed_document_is_ref
     // What was signed for one unit is not taken for another, and what was replaced does not come back but by a rollback.
     let foreign = sign(&document("ZLG-9", 3.0), &trusted, Existing::Refuse).unwrap();
     for options in [PLAIN, SwapOptions { force: true, any_serial: true, ..PLAIN }] {
-        let words = ["is \"ZLG-9\", but the document was meant for unit", "any_serial does not count"];
+        let words = ["is \"ZLG-9\", but the document was sent to unit", "so any_serial does not count"];
         assert_refused(&stand.swap(UNIT, &foreign, &options).await, &words);
     }
     let newer =

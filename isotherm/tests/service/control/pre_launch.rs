@@ -111,7 +111,7 @@ async fn a_result_that_is_only_kept_can_be_put_in_force_later_and_the_next_one_l
     let mut stand = stand(&folders).await;
     stand.command(UNIT, &order(false)).await;
     send(&mut stand, 12_500).await;
-    assert!(ended(&stand, 0).await.reason.unwrap().contains("not put in force, as asked"));
+    assert!(ended(&stand, 0).await.reason.unwrap().contains("not put in force, as requested"));
     let kept = stand.status(UNIT).pre_launch_outcome.unwrap().overlay.unwrap();
     assert_eq!(stand.active(UNIT).await.unwrap(), document(UNIT, 1.0));
 
@@ -174,7 +174,7 @@ async fn a_swap_gives_it_up_and_status_log_and_audit_file_say_so() {
         };
         assert_accepted(&reply, revision);
         assert!(
-            reply.warnings.iter().any(|warning| warning.message.contains("is given up with this")),
+            reply.warnings.iter().any(|warning| warning.message.contains("which this ends")),
             "{reply:#?}"
         );
         let reason = format!("given up: a swap of the calibration (revision {revision})");

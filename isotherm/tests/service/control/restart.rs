@@ -126,7 +126,7 @@ async fn rollback_goes_back_and_is_a_revision_of_its_own() {
     assert_accepted(&reply.swap.unwrap(), 5);
     assert_eq!(stand.active(UNIT).await.unwrap(), document(UNIT, 1.0));
     let reply = stand.command(UNIT, r#"{"command":"rollback","revision":77}"#).await;
-    assert!(!reply.accepted && reply.reason.unwrap().contains("revision 77 is not one of unit ZLG-7"));
+    assert!(!reply.accepted && reply.reason.unwrap().contains("unit ZLG-7 has no revision 77"));
     let source = stand
         .until(UNIT, |event| match event {
             AuditEvent::Accepted(accepted) if accepted.revision == 4 => Some(accepted.source.clone()),

@@ -68,8 +68,8 @@ async fn an_operator_opens_swaps_is_refused_rolls_back_commands_and_loses_the_co
     page.until(&has(".outcome", "Would be accepted"));
     page.until(&has(".difference", "4.25"));
     page.press("Put in force");
-    page.until(&has("dialog .answer", "Say who asks"));
-    page.write("Who asks", "ann");
+    page.until(&has("dialog .answer", "Enter your name"));
+    page.write("Your name", "ann");
     assert!(
         page.value(&text_of("dialog .line code"))
             .as_str()

@@ -60,7 +60,7 @@ async fn of_every_size_and_colour() {
             page.until("document.querySelector('.remarks li.warning')");
             page.press("Swap…");
             page.write("Text", &document("ZLG-0004", 4.25));
-            page.write("Who asks", "ann");
+            page.write("Your name", "ann");
             page.press("Show the difference");
             page.until("document.querySelector('.difference')");
             every(&mut page, "swap", false);

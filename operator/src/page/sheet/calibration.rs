@@ -39,7 +39,7 @@ pub(super) fn section(status: &Status, columns: usize) -> Section {
 
 fn none(output: Output) -> &'static str {
     match output {
-        Output::Held => "none: nothing goes out, as configured",
+        Output::Held => "none: nothing is published, as configured",
         Output::PassThrough | Output::Calibrated => "none: raw readings pass through, flagged",
     }
 }
@@ -55,7 +55,7 @@ fn in_force(section: &mut Section, calibration: &ActiveCalibration, columns: usi
         (Some(day), Some(age_s)) => field("made", &format!("{day}, {}", age(age_s))),
         (Some(day), None) => field("made", &day),
         (None, Some(age_s)) => field("made", &age(age_s)),
-        (None, None) => field("made", "the document does not say"),
+        (None, None) => field("made", "not stated in the document"),
     }
     if let Some(overlay) = calibration.overlay {
         field("overlay", &figure::digest(Some(overlay), [0; 8]));

@@ -85,8 +85,8 @@ pub(super) fn drift(status: &Status, columns: usize) -> Option<Section> {
     }
     let rest = match &status.rest {
         None => return Some(section),
-        Some(Rest::Learning) => "declared; too little has been seen yet".to_owned(),
-        Some(Rest::Still) => "declared; the unit stands still".to_owned(),
+        Some(Rest::Learning) => "declared; too few ticks yet".to_owned(),
+        Some(Rest::Still) => "declared; the unit is still".to_owned(),
         Some(Rest::Moved(words)) => format!("declared, but it moved: {words}"),
     };
     let style = if matches!(status.rest, Some(Rest::Moved(_))) { tone::WARNING } else { tone::PLAIN };

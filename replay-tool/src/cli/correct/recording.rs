@@ -126,7 +126,7 @@ fn plans(
 ) -> Result<(Vec<UnitPlan>, Option<String>), Error> {
     let wanted = args.log.units()?;
     if let Some(unit) = wanted.iter().find(|unit: &&UnitId| !outlines.units.contains_key(*unit)) {
-        return Err(Error::Usage(format!("--unit {unit}: there is nothing of this unit in the log")));
+        return Err(Error::Usage(format!("--unit {unit}: the log has nothing of this unit")));
     }
     let (mut plans, mut without) = (Vec::new(), Vec::new());
     for (id, outline) in outlines.units {
@@ -144,7 +144,8 @@ fn plans(
         let basis = if by_journal {
             if let Some(setting) = args.given_setting() {
                 return Err(Error::Usage(format!(
-                    "{setting}: the journal of unit {id} has the settings that it had; leave it out, or --ignore-journal"
+                    "{setting}: the journal of unit {id} has its settings: leave the option out, or add \
+                     --ignore-journal"
                 )));
             }
             Basis::Journal {
@@ -163,7 +164,8 @@ fn plans(
             more => format!(" and {more} more"),
         };
         format!(
-            "there is no journal to correct {named}{more} by: give --calibration FILE for each, or name the other units with --unit"
+            "there is no journal to correct {named}{more} by: give --calibration FILE for each, or choose the other \
+             units with --unit"
         )
     });
     // What was asked for by name must be there.
@@ -171,12 +173,10 @@ fn plans(
         return Err(Error::Usage(words));
     }
     if let Some(unit) = calibrations.keys().next() {
-        return Err(Error::Usage(format!(
-            "--calibration: there are no raw messages of unit {unit} in the log"
-        )));
+        return Err(Error::Usage(format!("--calibration: the log has no raw messages of unit {unit}")));
     }
     if plans.is_empty() {
-        return Err(Error::Usage("there are no raw messages in the log to correct".to_owned()));
+        return Err(Error::Usage("the log has no raw messages to correct".to_owned()));
     }
     Ok((plans, without))
 }

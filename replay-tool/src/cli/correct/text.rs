@@ -39,7 +39,7 @@ fn calibration(args: &CorrectArgs) -> Result<&Path, Error> {
     ];
     if let Some((name, _)) = only.into_iter().find(|(_, given)| *given) {
         return Err(Error::Usage(format!(
-            "{name} is for recordings: a text log has no journal and nothing corrected"
+            "{name} is for recordings: a text log has no journal and no corrected ticks"
         )));
     }
     match args.calibration.as_slice() {

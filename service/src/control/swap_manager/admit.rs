@@ -68,8 +68,7 @@ impl Worker {
         };
         if candidate.unit != unit.as_str() && self.takes_any_serial(order) {
             let other = &candidate.unit;
-            let message =
-                format!("is \"{other}\": taken for unit {unit} all the same, as asked (any_serial)");
+            let message = format!("is \"{other}\": accepted for unit {unit}, as requested (any_serial)");
             warnings.push(policy::at_key(text, order.name, "unit", message));
         }
         // That of an overlay's text may be another than that of the document below it.
@@ -101,12 +100,12 @@ impl Worker {
     fn other_serial(&self, order: &Order<'_>, named: Option<UnitId>, text: &str) -> Option<Problem> {
         let (unit, other) = (order.unit.as_ref()?, named?);
         let next = if self.swap.require_signature {
-            format!("have one signed for {unit} (any_serial does not count where require_signature is set)")
+            format!("or sign one for {unit} (require_signature is set, so any_serial does not count)")
         } else {
-            "correct the serial, or say so explicitly (any_serial)".to_owned()
+            "correct the serial, or add any_serial".to_owned()
         };
         let message =
-            format!("is \"{other}\", but the document was meant for unit {unit}: send it to {other}, {next}");
+            format!("is \"{other}\", but the document was sent to unit {unit}: send it to {other}, {next}");
         let wrong = other != *unit && !self.takes_any_serial(order);
         wrong.then(|| policy::at_key(text, order.name, "unit", message))
     }
@@ -115,8 +114,8 @@ impl Worker {
 /// What a change of the calibration does to what the unit is at.
 fn interrupts(order: &Order<'_>, state: State) -> Option<Problem> {
     let words = match state {
-        State::PreLaunchCalibration => "the unit is in pre-launch calibration, which is given up with this",
-        State::SelfTest => "the unit is in self-test, which begins anew with this",
+        State::PreLaunchCalibration => "the unit is in pre-launch calibration, which this ends",
+        State::SelfTest => "the unit is in self-test, which starts again",
         State::Standby | State::RunningWithReversal | State::RunningWithoutReversal => return None,
     };
     Some(unplaced(Some(order.name), words.to_owned()))
@@ -166,8 +165,8 @@ pub(super) fn check_signature(
         Ok(signature::Verdict::Unsigned) if !settings.require_signature => {}
         Ok(signature::Verdict::Unsigned) => verdict.push(unplaced(Some(
             name),
-            "is not signed, and require_signature is set: sign it (`isotherm sign`) with a key whose .pub file is in the \
-             folder of trusted keys"
+            "is not signed, but require_signature is set: sign it (`isotherm sign`) with a key that has its .pub \
+             file in the folder of trusted keys"
                 .to_owned(),
         )),
         Err(error) => verdict.push(error.problem(Some(name))),

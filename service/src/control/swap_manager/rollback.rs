@@ -21,7 +21,7 @@ impl Worker {
         let bytes = match self.store.document(&set.digest) {
             Ok(Some(bytes)) => bytes,
             Ok(None) => {
-                let message = format!("the document of revision {} is not kept any more", set.revision);
+                let message = format!("the document of revision {} is no longer kept", set.revision);
                 return self.no_rollback(unit, message);
             }
             Err(error) => return self.no_rollback(unit, error.to_string()),
@@ -49,7 +49,7 @@ impl Worker {
         match to {
             _ if revisions.is_empty() => format!("no document was ever accepted for unit {unit}"),
             Some(to) => {
-                format!("revision {to} is not one of unit {unit}; its latest are {}", revisions.join(", "))
+                format!("unit {unit} has no revision {to}; its latest are {}", revisions.join(", "))
             }
             None if self
                 .store
@@ -57,11 +57,10 @@ impl Worker {
                 .zip(self.store.good_sets(unit).skip(1))
                 .all(|(a, b)| a.corrects_as(b)) =>
             {
-                format!("unit {unit} was never given another document than the present one")
+                format!("unit {unit} has had no other document than the present one")
             }
             None => format!(
-                "nothing is kept of unit {unit} before what was gone back to: to go forth again, name a revision; its \
-                 latest are {}",
+                "unit {unit} has no older revision to roll back to: to go forward, give a revision; its latest are {}",
                 revisions.join(", ")
             ),
         }

@@ -128,7 +128,7 @@ impl Verdict {
     pub(super) fn too_busy(uptime: Duration, limit: Duration) -> Self {
         let limit_s = limit.as_secs_f64();
         let words = format!(
-            "units or state folder could not be looked at within {limit_s} s: something holds them up"
+            "units or state folder could not be read within {limit_s} s: a slow subscriber or disk blocks them"
         );
         Self::new(uptime, vec![Reason { kind: Kind::Busy, unit: None, words }])
     }
@@ -246,7 +246,7 @@ impl Source {
         let folder = self.state_folder.as_deref()?;
         let reason = |error| {
             let words = format!(
-                "the state folder {} cannot be written: {error}; until it can, every swap is refused",
+                "the state folder {} cannot be written: {error}; until then every swap is refused",
                 folder.display()
             );
             Reason { kind: Kind::StateFolder, unit: None, words }

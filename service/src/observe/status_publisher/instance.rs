@@ -100,7 +100,7 @@ impl Instance {
         faults.extend(intake.faults());
         let dropped = dropped_lines();
         if dropped > 0 {
-            let words = "log lines were dropped: stderr took none (a stopped terminal, a full pipe)";
+            let words = "log lines were dropped: stderr was blocked (a stopped terminal, a full pipe)";
             faults.push(standing("log_lines_dropped", dropped, words.to_owned()));
         }
         faults.extend(self.subscribers.fault());

@@ -23,13 +23,13 @@ Fault report of isotherm, made by its console in the browser.
 
 summary.txt            the lines of `isotherm status`, worst first
 status.json            all of it: services and units, as `isotherm status --json`
-service/ID.toml        configuration that holds, defaults included; secrets of the Zenoh configuration left out
+service/ID.toml        effective configuration, defaults included; secrets of the Zenoh configuration left out
 unit/SERIAL/calibration.toml   document in force
 unit/SERIAL/history.json       what was done to the unit, as `isotherm history --all --json`
-missing.txt            what could not be had, if there is any
+missing.txt            what could not be read, if anything
 
 Not in it: the service's log (for example: journalctl -u isotherm), and recordings (isotherm-replay record).
-Names of operators and paths of files stand in it as they are.
+Names of operators and paths of files are in it unchanged.
 ";
 
 impl Web {

@@ -30,7 +30,7 @@ struct Overview<'f> {
     now_unix_ms: i64,
     services: Vec<Service>,
     /// Who speaks for how many units, where there are two services, and what is wrong with that.
-    pair: Vec<Said>,
+    pair: Vec<Columns>,
     units: Vec<Row>,
 }
 
@@ -152,6 +152,19 @@ impl From<(Level, String)> for Said {
     }
 }
 
+/// A line in columns.
+#[derive(Debug, Serialize)]
+struct Columns {
+    level: &'static str,
+    columns: Vec<String>,
+}
+
+impl From<(Level, Vec<String>)> for Columns {
+    fn from((level, columns): (Level, Vec<String>)) -> Self {
+        Self { level: self::level(level), columns }
+    }
+}
+
 /// Temperatures some time ago.
 #[derive(Debug)]
 struct Past<'f> {
@@ -185,7 +198,7 @@ impl Web {
             options: &self.options,
             now_unix_ms,
             services: services.collect(),
-            pair: said_of_pairs(&fleet.pairs).into_iter().map(Said::from).collect(),
+            pair: said_of_pairs(&fleet.pairs).into_iter().map(Columns::from).collect(),
             units: worst_first(self.seen(&fleet, now, now_unix_ms)).iter().map(Row::of).collect(),
         })
     }

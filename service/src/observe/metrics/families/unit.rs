@@ -16,7 +16,7 @@ pub(super) const FAMILIES: &[Family] = &[
     Family::unit_gauge(
         ("isotherm_unit_state", ""),
         &["unit", "state"],
-        "1 for the present state, 0 for the others",
+        "1 for the present state",
         |unit, look, out| {
             let present = State::from(look.status.state);
             State::ALL.iter().try_for_each(|state| out.flag(&[unit, state.name()], *state == present))
@@ -25,7 +25,7 @@ pub(super) const FAMILIES: &[Family] = &[
     Family::unit_gauge(
         ("isotherm_unit_output", ""),
         &["unit", "output"],
-        "1 for what happens to ticks in a running state, 0 for the others",
+        "1 for what happens to ticks in a running state",
         |unit, look, out| {
             let outputs = [
                 ("calibrated", Output::Calibrated),
@@ -45,25 +45,25 @@ pub(super) const FAMILIES: &[Family] = &[
     Family::unit_counter(
         ("isotherm_unit_takeovers", ""),
         &["unit"],
-        "Times that this instance began to speak in another's place",
+        "Takeovers by this instance from another",
         |unit, look, out| out.counter(&[unit], look.role.takeovers),
     ),
     Family::unit_counter(
         ("isotherm_unit_ticks_compared", ""),
         &["unit"],
-        "Corrected ticks of another instance whose bits were compared with this one's",
+        "Corrected ticks compared with another instance's, bit by bit",
         |unit, look, out| out.counter(&[unit], look.role.ticks_compared),
     ),
     Family::unit_counter(
         ("isotherm_unit_ticks_differing", ""),
         &["unit"],
-        "Those that were others: alarm on any",
+        "Ticks that differed: alarm on any",
         |unit, look, out| out.counter(&[unit], look.role.ticks_differing),
     ),
     Family::unit_gauge(
         ("isotherm_unit_stalled", ""),
         &["unit"],
-        "1 if raw ticks arrive and no corrected ones are published although they should be",
+        "1 if raw ticks arrive but corrected ones, though due, are not published",
         |unit, look, out| out.flag(&[unit], look.stalled),
     ),
     Family::unit_gauge(
@@ -75,7 +75,7 @@ pub(super) const FAMILIES: &[Family] = &[
     Family::unit_gauge(
         ("isotherm_unit_calibration_age", "seconds"),
         &["unit"],
-        "Time since the document in force was made; absent if it does not say when",
+        "Age of the document in force; absent if it states no date",
         |unit, look, out| {
             let calibration = look.status.calibration.as_ref();
             #[expect(clippy::cast_precision_loss, reason = "whole seconds, of fewer than 2⁵³")]
@@ -101,7 +101,7 @@ pub(super) const FAMILIES: &[Family] = &[
     Family::unit_gauge(
         ("isotherm_unit_self_test_passed", ""),
         &["unit"],
-        "1 if the last self-test was passed; absent before the first",
+        "1 if the last self-test passed; absent before the first",
         |unit, look, out| {
             look.status.self_test.as_ref().map_or(Ok(()), |report| out.flag(&[unit], report.passed))
         },
@@ -109,7 +109,7 @@ pub(super) const FAMILIES: &[Family] = &[
     Family::unit_gauge(
         ("isotherm_unit_input_rate", "per_second"),
         &["unit", "input"],
-        "Input over the last status interval: gyro ticks, accelerometer ticks, temperature readings, messages",
+        "Gyro ticks, accelerometer ticks, temperature readings, messages, over the last status interval",
         |unit, look, out| {
             let rates = &look.status.input_rates;
             out.gauge(&[unit, "gyro_ticks"], rates.gyro_ticks_per_s)?;
@@ -121,7 +121,7 @@ pub(super) const FAMILIES: &[Family] = &[
     Family::unit_gauge(
         ("isotherm_unit_temperature", "celsius"),
         &["unit", "channel"],
-        "Smoothed temperature of a channel of the calibration in force; absent before the first reading",
+        "Smoothed temperature of a channel; absent before the first reading",
         |unit, look, out| {
             each_channel(unit, look, |labels, channel| {
                 channel.temperature_deg_c.map_or(Ok(()), |value| out.gauge(labels, value))
@@ -131,7 +131,7 @@ pub(super) const FAMILIES: &[Family] = &[
     Family::unit_gauge(
         ("isotherm_unit_temperature_rate", "celsius_per_second"),
         &["unit", "channel"],
-        "Its rate",
+        "Rate of the smoothed temperature",
         |unit, look, out| {
             each_channel(unit, look, |labels, channel| {
                 channel.rate_deg_c_per_s.map_or(Ok(()), |value| out.gauge(labels, value))
@@ -141,7 +141,7 @@ pub(super) const FAMILIES: &[Family] = &[
     Family::unit_gauge(
         ("isotherm_unit_temperature_outside_range", ""),
         &["unit", "channel"],
-        "1 if it is outside the range that the calibration was fitted over; absent if either is unknown",
+        "1 if it is outside the range of the fit; absent if either is unknown",
         |unit, look, out| {
             each_channel(unit, look, |labels, channel| {
                 channel.place.map_or(Ok(()), |place| out.flag(labels, place != Place::Inside))
@@ -157,7 +157,7 @@ pub(super) const FAMILIES: &[Family] = &[
     Family::unit_gauge(
         ("isotherm_unit_applied_rate", "radians_per_second"),
         &["unit", "axis"],
-        "Correction now subtracted from the angular rate about a case axis",
+        "Correction subtracted from the angular rate about a case axis",
         |unit, look, out| {
             let applied = look.status.applied.map(|applied| applied.angular_rate_rad_per_s);
             each_axis(applied, |axis, value| out.gauge(&[unit, axis], value))
@@ -166,7 +166,7 @@ pub(super) const FAMILIES: &[Family] = &[
     Family::unit_gauge(
         ("isotherm_unit_applied_force", "meters_per_second_squared"),
         &["unit", "axis"],
-        "Correction now subtracted from the specific force along a case axis",
+        "Correction subtracted from the specific force along a case axis",
         |unit, look, out| {
             let applied = look.status.applied.map(|applied| applied.specific_force_m_per_s2);
             each_axis(applied, |axis, value| out.gauge(&[unit, axis], value))
@@ -175,7 +175,7 @@ pub(super) const FAMILIES: &[Family] = &[
     Family::unit_gauge(
         ("isotherm_unit_drift", "radians_per_second"),
         &["unit", "gyro"],
-        "Estimated drift of a gyro in addition to its calibrated bias",
+        "Estimated drift of a gyro, in addition to its calibrated bias",
         |unit, look, out| {
             let mut drift = look.status.drift.iter();
             drift.try_for_each(|drift| out.gauge(&[unit, &drift.gyro], drift.rate_rad_per_s))
@@ -184,7 +184,7 @@ pub(super) const FAMILIES: &[Family] = &[
     Family::unit_gauge(
         ("isotherm_unit_drift_sigma", "radians_per_second"),
         &["unit", "gyro"],
-        "Standard deviation of that estimate",
+        "Standard error of the estimated drift",
         |unit, look, out| {
             let mut drift = look.status.drift.iter();
             drift.try_for_each(|drift| out.gauge(&[unit, &drift.gyro], drift.sigma_rad_per_s))
@@ -193,7 +193,7 @@ pub(super) const FAMILIES: &[Family] = &[
     Family::unit_counter(
         ("isotherm_unit_sensor_invalid_ticks", ""),
         &["unit", "kind", "sensor"],
-        "Corrected ticks that did not use a sensor's reading as it was",
+        "Corrected ticks that did not use a sensor's reading as read",
         |unit, look, out| {
             look.status.sensors.iter().try_for_each(|sensor| {
                 let kind = match sensor.kind {
@@ -207,7 +207,7 @@ pub(super) const FAMILIES: &[Family] = &[
     Family::unit_counter(
         ("isotherm_unit_faults", ""),
         &["unit", "kind"],
-        "Faults by kind: messages refused, corrected ticks that could not be published, alarms",
+        "Messages refused, corrected ticks not published, alarms",
         |unit, look, out| {
             let mut kinds = FaultKind::ALL.iter().filter(|kind| concerns_units(**kind));
             kinds.try_for_each(|kind| out.counter(&[unit, kind.name()], look.status.counter(kind.name())))
