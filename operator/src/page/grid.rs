@@ -60,40 +60,39 @@ impl Grid {
     /// Sets the table in at most `columns` columns of the terminal.
     pub(super) fn set(layout: &[Column], rows: Vec<Vec<Span<'static>>>, columns: usize) -> Self {
         let columns = u16::try_from(columns).unwrap_or(u16::MAX);
-        let wanted = |(index, column): (usize, &Column)| {
+        // Of each column what it asks for, and what it could do with.
+        let widths = layout.iter().enumerate().map(|(index, column)| {
             let least = column.least.max(width(column.head));
             let cells = rows.iter().filter_map(|row| row.get(index)).map(Span::width);
             let widest = cells.max().unwrap_or(0).max(least);
-            u16::try_from(if column.fills { least } else { widest }).unwrap_or(u16::MAX)
-        };
-        let mut shown: Vec<(usize, &Column, u16)> = layout
-            .iter()
-            .enumerate()
-            .map(|(index, column)| (index, column, wanted((index, column))))
-            .collect();
-        let taken = |shown: &[(usize, &Column, u16)]| {
-            let widths = shown.iter().map(|(.., wanted)| wanted.saturating_add(BETWEEN));
+            let [wanted, widest] = [if column.fills { least } else { widest }, widest]
+                .map(|width| u16::try_from(width).unwrap_or(u16::MAX));
+            (index, column, wanted, widest)
+        });
+        let mut shown: Vec<_> = widths.collect();
+        let taken = |shown: &[(usize, &Column, u16, u16)]| {
+            let widths = shown.iter().map(|(_, _, wanted, _)| wanted.saturating_add(BETWEEN));
             widths.fold(0, u16::saturating_add).saturating_sub(BETWEEN)
         };
         while taken(&shown) > columns {
-            let candidates = shown.iter().enumerate().filter(|(_, (_, column, _))| column.rank > 0);
-            let Some((least, _)) = candidates.max_by_key(|(_, (_, column, _))| column.rank) else { break };
+            let candidates = shown.iter().enumerate().filter(|(_, (_, column, ..))| column.rank > 0);
+            let Some((least, _)) = candidates.max_by_key(|(_, (_, column, ..))| column.rank) else { break };
             shown.remove(least);
         }
         let left = columns.saturating_sub(taken(&shown));
-        for (.., wanted) in shown.iter_mut().filter(|(_, column, _)| column.fills) {
-            *wanted = wanted.saturating_add(left);
+        for (_, _, wanted, widest) in shown.iter_mut().filter(|(_, column, ..)| column.fills) {
+            *wanted = wanted.saturating_add(left).min(*widest);
         }
-        let head = shown.iter().map(|(_, column, _)| column.set(Span::styled(column.head, tone::HEAD)));
+        let head = shown.iter().map(|(_, column, ..)| column.set(Span::styled(column.head, tone::HEAD)));
         let head = Row::new(head.collect::<Vec<_>>());
         let row = |cells: &Vec<Span<'static>>| {
-            let cells = shown.iter().filter_map(|(index, column, width)| {
+            let cells = shown.iter().filter_map(|(index, column, width, _)| {
                 let cell = cells.get(*index)?;
                 Some(column.set(Span::styled(fit(&cell.content, usize::from(*width)), cell.style)))
             });
             Row::new(cells.collect::<Vec<_>>())
         };
-        let widths = shown.iter().map(|(.., wanted)| Constraint::Length(*wanted));
+        let widths = shown.iter().map(|(_, _, wanted, _)| Constraint::Length(*wanted));
         let table = Table::new(rows.iter().map(row), widths).header(head).column_spacing(BETWEEN);
         let width = taken(&shown).min(columns);
         Self { table, width, rows: u16::try_from(rows.len()).unwrap_or(u16::MAX) }
