@@ -42,7 +42,23 @@ typescript:
 # Kill the speaking service of a pair 100 times, stop it 50 times, cut the links of one 50 times, with 20 units at 200 Hz; print the
 # pauses (a quarter of an hour; ISOTHERM_PAIR=UNITS,KILLS,STOPS,CUTS)
 pair:
-    cargo test --release --workspace --locked --test operators pair:: -- --include-ignored --nocapture --test-threads=1
+    cargo test --release --workspace --locked --test operators pair:: -- --include-ignored --skip soak --nocapture --test-threads=1
+
+# Half an hour with 20 units at 200 Hz, swaps, commands, failovers and watchers, and a day of ticks at full speed; prints what grows
+# (ISOTHERM_SOAK=MINUTES)
+soak:
+    cargo test --release --workspace --locked --test operators pair::soak:: -- --ignored --nocapture --test-threads=1
+
+# Show the account of every fault of links, peers and machine, then of links in network namespaces (the latter need root)
+faults:
+    cargo test --release --workspace --locked --test faults -- --nocapture --test-threads=1
+    cargo build --release --workspace --locked --bins
+    tests/namespaces.sh
+
+# Change the corrector's and the protocol's code, one place at a time, and see whether a test notices (needs cargo-mutants; SHARD=7/100:
+# a hundredth; minutes to days)
+mutants shard="7/100":
+    cargo mutants -p isotherm-correction -p isotherm-protocol --shard {{shard}} --output target/mutants --minimum-test-timeout 120 -- --lib --tests
 
 # Fuzz every reader, 10⁸ executions each (hours; ISOTHERM_FUZZ_SECONDS=N: seconds each; fuzz/run TARGET: one)
 fuzz: fuzz-c

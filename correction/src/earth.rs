@@ -190,6 +190,26 @@ mod tests {
     }
 
     #[test]
+    fn the_case_axes_are_those_of_a_body_in_every_attitude() {
+        for (heading, pitch, roll) in [(0.0, 0.0, 0.0), (0.5, 0.2, -0.1), (-3.0, -1.0, 2.9), (0.2, 1.4, 1.7)]
+        {
+            let [x, y, z] = level_to_case(heading, pitch, roll);
+            let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+            let cross = [x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]];
+            // Of length one, perpendicular, right-handed.
+            for (got, expected) in
+                [(dot(x, x), 1.0), (dot(y, y), 1.0), (dot(x, y), 0.0), (dot(cross, z), 1.0)]
+            {
+                assert!(
+                    (got - expected).abs() < 1e-15 * 4.0,
+                    "{heading} {pitch} {roll}: {got} is not {expected}"
+                );
+            }
+            close(z, cross);
+        }
+    }
+
+    #[test]
     fn levelling_wants_about_one_g_and_an_x_axis_that_has_a_heading() {
         let place = Place::new(55.0, 0.0, None).unwrap();
         let without = [

@@ -1,10 +1,11 @@
-//! A TCP proxy whose connections a test can cut, stall, open by half or slow down.
+//! A TCP proxy whose connections a test can cut, stall, open by half, delay or slow down.
 
+use std::collections::VecDeque;
 use std::io::{Read, Write};
 use std::net::{Shutdown, TcpListener, TcpStream};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// What is done to every connection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -18,6 +19,10 @@ pub enum Fault {
     Stall,
     /// They stay open, and nothing passes to the side that is connected to.
     HalfOpen,
+    /// They stay open, and nothing passes from the side that is connected to.
+    Deaf,
+    /// Everything passes 100 ms later, as much as before.
+    Delay,
     /// 16 kB/s pass in each direction.
     Throttle,
 }
@@ -27,6 +32,8 @@ const LOOK: Duration = Duration::from_millis(1);
 /// Bytes that pass at once, and the pause behind them where they are slowed down.
 const PART: usize = 256;
 const PAUSE: Duration = Duration::from_millis(16);
+/// How much later everything passes where it is delayed.
+const DELAY: Duration = Duration::from_millis(100);
 
 /// What several proxies have in common.
 #[derive(Debug, Clone, Default)]
@@ -93,32 +100,47 @@ impl Drop for Proxy {
 
 /// Passes bytes on in one direction, until either side or the test ends it.
 fn pass(mut from: &TcpStream, mut to: &TcpStream, inward: bool, switch: &Switch, over: &AtomicBool) {
-    let prepared = from.set_nonblocking(false).is_ok()
-        && from.set_read_timeout(Some(LOOK * 5)).is_ok()
-        && to.set_nodelay(true).is_ok();
+    let prepared = from.set_nonblocking(false).is_ok() && to.set_nodelay(true).is_ok();
     let mut bytes = vec![0; 1 << 16];
+    // Read and not written yet, with the time of reading.
+    let mut held: VecDeque<(Instant, Vec<u8>)> = VecDeque::new();
+    let mut wait = Duration::ZERO;
     let ends = || switch.is(Fault::Cut) || over.load(Ordering::SeqCst);
+    let one_way = if inward { Fault::HalfOpen } else { Fault::Deaf };
     while prepared && !ends() {
+        let wanted = if held.is_empty() { LOOK * 5 } else { LOOK };
+        if wait != wanted && from.set_read_timeout(Some(wanted)).is_err() {
+            break;
+        }
+        wait = wanted;
         let most = if switch.is(Fault::Throttle) { PART } else { bytes.len() };
-        let read = match from.read(&mut bytes[..most]) {
+        match from.read(&mut bytes[..most]) {
             Ok(0) => break,
-            Ok(read) => read,
+            Ok(read) => held.push_back((Instant::now(), bytes[..read].to_vec())),
             Err(error)
-                if matches!(error.kind(), std::io::ErrorKind::WouldBlock | std::io::ErrorKind::TimedOut) =>
-            {
-                continue;
-            }
+                if matches!(error.kind(), std::io::ErrorKind::WouldBlock | std::io::ErrorKind::TimedOut) => {}
             Err(_) => break,
-        };
-        while !ends() && (switch.is(Fault::Stall) || inward && switch.is(Fault::HalfOpen)) {
+        }
+        while !ends() && (switch.is(Fault::Stall) || switch.is(one_way)) {
             std::thread::sleep(LOOK);
         }
-        if ends() || to.write_all(&bytes[..read]).is_err() {
+        if !write_due(&mut held, &mut to, switch) {
             break;
+        }
+    }
+    let _ = (from.shutdown(Shutdown::Both), to.shutdown(Shutdown::Both));
+}
+
+/// Writes what has been held for long enough; whether that was possible.
+fn write_due(held: &mut VecDeque<(Instant, Vec<u8>)>, to: &mut &TcpStream, switch: &Switch) -> bool {
+    while held.front().is_some_and(|(at, _)| !switch.is(Fault::Delay) || at.elapsed() >= DELAY) {
+        let Some((_, bytes)) = held.pop_front() else { break };
+        if switch.is(Fault::Cut) || to.write_all(&bytes).is_err() {
+            return false;
         }
         if switch.is(Fault::Throttle) {
             std::thread::sleep(PAUSE);
         }
     }
-    let _ = (from.shutdown(Shutdown::Both), to.shutdown(Shutdown::Both));
+    true
 }

@@ -122,9 +122,9 @@ impl GyroIntake {
             && self.pending.is_empty()
     }
 
-    /// Sequence number of the newest tick that was admitted.
-    pub(super) fn newest_sequence(&self) -> Option<u64> {
-        self.newest.map(|newest| newest.sequence)
+    /// Sequence number and end of the newest tick that was admitted.
+    pub(super) fn newest(&self) -> Option<(u64, Timestamp)> {
+        self.newest.map(|newest| (newest.sequence, newest.end_time))
     }
 
     /// Remembers a tick that [is the next](Self::is_next) and did not wait.

@@ -9,6 +9,7 @@ use crate::drift::{DriftEstimate, ReferenceCounters};
 use crate::observation::Observation;
 use crate::operation::{SelfTestReport, State};
 use crate::sample::{ChannelName, Sensors};
+use crate::units::Timestamp;
 
 impl Unit {
     /// What has been counted.
@@ -73,10 +74,10 @@ impl Unit {
         self.gyros.len()
     }
 
-    /// Sequence number of the newest gyro tick that was taken, corrected or waiting; `None` before the first.
+    /// Sequence number and end of the newest gyro tick that was taken, corrected or waiting; `None` before the first.
     #[must_use]
-    pub fn newest_sequence(&self) -> Option<u64> {
-        self.gyros.newest_sequence()
+    pub fn newest_tick(&self) -> Option<(u64, Timestamp)> {
+        self.gyros.newest()
     }
 
     /// The settings it was made with.

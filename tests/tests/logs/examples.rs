@@ -5,7 +5,7 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use isotherm_tests::bench::LIMIT;
-use isotherm_tests::process::{Service, program, run_well};
+use isotherm_tests::process::{Service, program, run_well, send_signal};
 
 /// Whether a line needs a service.
 fn needs_service(line: &str) -> bool {
@@ -42,8 +42,7 @@ fn interrupt(recorder: &Child, file: &Path) {
         assert!(began.elapsed() < LIMIT, "{} does not appear", file.display());
         std::thread::sleep(Duration::from_millis(20));
     }
-    let asked = Command::new("kill").args(["-INT", &recorder.id().to_string()]).status();
-    assert!(asked.is_ok_and(|status| status.success()), "SIGINT is sent");
+    send_signal(recorder, "INT");
 }
 
 #[test]

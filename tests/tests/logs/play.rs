@@ -41,12 +41,6 @@ fn begin(arguments: &[&str]) -> Child {
         .expect("the player starts")
 }
 
-/// Sends a signal to a player.
-fn signal(player: &Child, name: &str) {
-    let sent = Command::new("kill").args([&format!("-{name}"), &player.id().to_string()]).status();
-    assert!(sent.is_ok_and(|status| status.success()), "SIG{name} is sent");
-}
-
 /// The summary of a player that ended with this exit code.
 fn summary(output: &Output, code: i32) -> Value {
     let errors = String::from_utf8_lossy(&output.stderr);

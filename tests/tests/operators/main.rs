@@ -13,6 +13,7 @@ mod documents;
 mod kill_9;
 mod pair;
 mod recipes;
+mod shares;
 mod stand;
 mod states;
 mod swaps_1000;

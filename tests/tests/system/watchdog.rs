@@ -11,7 +11,7 @@ use isotherm_bus::{close, open};
 use isotherm_protocol::key::UnitId;
 use isotherm_service::Stuck;
 use isotherm_tests::bench::{Bench, LIMIT};
-use isotherm_tests::process::program;
+use isotherm_tests::process::{program, send_signal};
 use isotherm_tests::streams::send_waiting_ticks;
 
 /// A service whose manager the test is.
@@ -77,8 +77,7 @@ fn a_manager_is_told_of_start_and_end_and_an_idle_service_is_fed() {
     }
     // Thirty on a quiet machine.
     assert!(fed > 3, "{fed}");
-    let asked = Command::new("kill").args(["-TERM", &service.child.id().to_string()]).status();
-    assert!(asked.unwrap().success());
+    send_signal(&service.child, "TERM");
     service.until("STOPPING=1");
     assert_eq!(service.child.wait().unwrap().code(), Some(0));
 }

@@ -3,18 +3,15 @@
 //! While another instance speaks, what is computed here is kept for a while: to be compared with what that one publishes, and to be
 //! published in its place from the last tick on that was heard of it.
 
+mod heard;
 mod kept;
 mod output;
 
 use std::time::{Duration, Instant};
 
-use isotherm_correction::operation::State;
-use isotherm_protocol::codec;
-use isotherm_protocol::corrected::CorrectedBatch;
-use isotherm_protocol::journal::{JournalEntry, JournalEvent};
+use isotherm_protocol::journal::JournalEntry;
 use isotherm_protocol::key::Input;
 use isotherm_protocol::pair::{Role, UnitRole};
-use isotherm_protocol::raw::GyroBatch;
 use isotherm_protocol::replay::Follower;
 
 use super::{Plan, UnitActor};
@@ -23,17 +20,14 @@ use kept::Kept;
 
 /// How often the memory is asked for while none comes.
 const ASK_INTERVAL: Duration = Duration::from_millis(250);
+/// For how long an active instance publishes what it has heard of the other, too: that may have reached nobody else, and what is behind it
+/// is published before the other is missed.
+const REPEATED: Duration = Duration::from_millis(20);
 /// How long nothing of any other instance must be seen before one that lacks something speaks: both may have lost the network, and
 /// the other may be the one that went on. Longer than it takes to connect again once the network is back.
 const LONELY: Duration = Duration::from_millis(1500);
 /// The same for one that lacks nothing and goes before all others: two that have yielded to each other.
 const MUTUAL: Duration = Duration::from_millis(100);
-/// How long after the other instance is lost what the producer sent before may still come.
-const LATE: Duration = Duration::from_millis(50);
-/// How long two speak at once before that is an alarm.
-const DOUBLED: Duration = Duration::from_secs(1);
-/// Entries of the journal that are remembered until they are in the audit file.
-const MOST_CHANGES: usize = 8;
 
 /// How the instance stands to the others, as a unit needs to know it.
 #[derive(Debug, Clone, Copy)]
@@ -161,25 +155,6 @@ impl UnitActor {
         self.status_due = true;
     }
 
-    /// The producer is heard after the other instance was lost. Where no tick is missing an isolated unit speaks on, as soon as nobody
-    /// else is heard; what is missing here another instance may have published.
-    pub(super) fn hear_again(&mut self, frame: &[u8], now: Instant) {
-        self.speech.uncertain = self.speech.lost_at.is_some_and(|since| now < since + LATE);
-        let first = codec::decode::<GyroBatch>(frame).ok().and_then(|batch| batch.ticks.into_iter().next());
-        let Some(first) = first else { return };
-        let last = self.stream.unit().newest_sequence();
-        let same = first.series == self.stream.incoming_series();
-        let lacks = same && last.is_some_and(|last| first.sequence > last.saturating_add(1));
-        match &mut self.speech.following {
-            None if lacks => self.follow(now, Footing::Nothing),
-            Some(following) if following.isolated => {
-                (following.isolated, following.listens) = (false, now);
-                (following.doubt, following.intact) = (!lacks, !lacks);
-            }
-            _ => {}
-        }
-    }
-
     /// Highest revision counter that the unit was given.
     #[must_use]
     pub(crate) fn highest_revision(&self) -> u64 {
@@ -222,67 +197,8 @@ impl UnitActor {
             following.lose();
             return Ok(());
         }
-        let due = following.kept.due(now, Duration::ZERO);
+        let due = following.kept.due(now, REPEATED);
         due.into_iter().map(|frame| (self.outlet)(frame)).fold(Ok(()), Result::and)
-    }
-
-    /// Another instance has published a frame of the unit.
-    pub(crate) fn hear(&mut self, frame: &[u8], now: Instant, standing: &Standing) {
-        let Ok(batch) = codec::decode::<CorrectedBatch>(frame) else { return };
-        if let Some(following) = &mut self.speech.following {
-            following.kept.heard(batch, now);
-            // It speaks, and what it knows is what counts.
-            (following.doubt, following.isolated) = (false, false);
-            return;
-        }
-        if standing.active {
-            return;
-        }
-        let Some(tick) = batch.ticks.last() else { return };
-        let Some(own) = self.stream.unit().observation() else {
-            // Without a calibration there is nothing to keep up with.
-            if standing.yields && standing.alone_since.is_none() {
-                self.follow(now, Footing::Nothing);
-            }
-            return;
-        };
-        let behind_ns = tick.end_time.as_ns().saturating_sub(own.end_time.as_ns());
-        let limit_ns = i64::try_from(standing.takeover.as_nanos()).unwrap_or(i64::MAX);
-        let (ahead, keeps_up) = (behind_ns > limit_ns, behind_ns >= -limit_ns);
-        let state = self.stream.unit().state();
-        if !matches!(state, State::RunningWithReversal | State::RunningWithoutReversal) {
-            // Silent on purpose: the other is told.
-            self.speech.memory_due |= standing.alone_since.is_none();
-        } else if standing.alone_since.is_none() && (ahead || (standing.yields && keeps_up)) {
-            tracing::info!(unit = %self.stream.id(), sequence = tick.sequence, "another instance publishes: standby");
-            let footing = if self.speech.uncertain { Footing::Nothing } else { Footing::All };
-            self.follow(now, footing);
-            if let Some(following) = &mut self.speech.following {
-                following.kept.heard(batch, now);
-            }
-        } else if keeps_up {
-            // Until one of the two has yielded.
-            let first =
-                self.speech.doubled.filter(|(_, last)| now.saturating_duration_since(*last) < DOUBLED);
-            self.speech.doubled = Some((first.map_or(now, |(first, _)| first), now));
-        }
-    }
-
-    /// Takes an entry of another instance's journal, or its memory.
-    pub(crate) fn hear_journal(&mut self, entry: JournalEntry, now: Instant, standing: &Standing) {
-        // Another instance speaks too, and goes before this one.
-        if matches!(entry.event, JournalEvent::Memory { .. }) && standing.yields && self.speaks() {
-            self.follow(now, Footing::All);
-        }
-        let Some(following) = &mut self.speech.following else { return };
-        let ns = following.ns(now);
-        let change = matches!(entry.event, JournalEvent::Changed { .. }).then(|| entry.clone());
-        if following.follower.entry(entry, ns) {
-            following.changes.extend(change);
-            let beyond = following.changes.len().saturating_sub(MOST_CHANGES);
-            following.changes.drain(..beyond);
-        }
-        self.catch_up(now);
     }
 
     /// Goes on as the journal says, as far as frames and entries have come.
@@ -401,22 +317,6 @@ impl UnitActor {
         if std::mem::take(&mut self.speech.memory_due) {
             self.journal_memory();
         }
-    }
-
-    fn two_speak(&mut self, now: Instant) -> Option<Alarm> {
-        let (first, last) = self.speech.doubled?;
-        let lasts = now.saturating_duration_since(last) < DOUBLED;
-        if !lasts {
-            (self.speech.doubled, self.speech.two_told) = (None, false);
-            return None;
-        }
-        let long = last.saturating_duration_since(first) >= DOUBLED;
-        (long && !std::mem::replace(&mut self.speech.two_told, true)).then(|| {
-            Alarm::TwoSpeak(format!(
-                "unit {}: another service publishes its corrected ticks too",
-                self.stream.id()
-            ))
-        })
     }
 
     /// What the instance does for the unit.

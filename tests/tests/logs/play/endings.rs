@@ -9,9 +9,10 @@ use isotherm_protocol::service_status::ServiceStatus;
 use isotherm_protocol::status::Status;
 use isotherm_tests::bench::LIMIT;
 use isotherm_tests::operator::Operator;
+use isotherm_tests::process::send_signal;
 use serde_json::json;
 
-use super::{begin, in_time, service, signal, simulated, summary};
+use super::{begin, in_time, service, simulated, summary};
 
 const UNIT: &str = "MEMS-0001";
 
@@ -59,7 +60,7 @@ async fn a_signal_always_ends_it_with_its_summary() {
         let player = begin(&["-m", &mapping, &log, "-u", UNIT, "--connect", &service.locator, "--json"]);
         series = Some(played(&operator, series).await);
         let begun = Instant::now();
-        signal(&player, name);
+        send_signal(&player, name);
         let output = in_time(LIMIT, move || player.wait_with_output().unwrap()).await;
         assert!(begun.elapsed() < AT_ONCE, "{:?}", begun.elapsed());
         let said = summary(&output, 1);
@@ -90,7 +91,7 @@ async fn a_unit_in_standby_is_said_and_a_signal_ends_the_wait() {
     let said = in_time(LIMIT, move || BufReader::new(stderr).lines().next().unwrap().unwrap()).await;
     assert!(said.contains("MEMS-0001: nothing has come back for 3 s"), "{said}");
     assert!(said.contains("is in standby") && said.contains("--no-acknowledge"), "{said}");
-    signal(&player, "INT");
+    send_signal(&player, "INT");
     let status = in_time(LIMIT, move || player.wait().unwrap()).await;
     assert_eq!(status.code(), Some(1));
 

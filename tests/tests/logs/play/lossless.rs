@@ -6,10 +6,10 @@ use std::time::Duration;
 use isotherm_bus::{Consumer, SessionOptions, close, open, presence};
 use isotherm_protocol::key::{self, UnitId};
 use isotherm_tests::bench::LIMIT;
-use isotherm_tests::process::Service;
+use isotherm_tests::process::{Service, send_signal};
 use tokio::time::timeout;
 
-use super::{begin, in_time, service, signal, simulated, summary};
+use super::{begin, in_time, service, simulated, summary};
 
 const UNIT: &str = "ZLG-0001";
 /// Ticks in a second of the log.
@@ -80,9 +80,9 @@ async fn nothing_is_lost_while_somebody_stalls(seconds: u32, batch: &str) {
     while consumer.continuity(&unit).ticks < ticks / 10 {
         timeout(LIMIT, consumer.next()).await.expect("in time").expect("the session is open");
     }
-    signal(&player, "STOP");
+    send_signal(&player, "STOP");
     tokio::time::sleep(STALL).await;
-    signal(&player, "CONT");
+    send_signal(&player, "CONT");
     // The consumer takes nothing any more until all has been played.
     let took = whole(player, ticks).await;
     while consumer.continuity(&unit).ticks < ticks {

@@ -293,4 +293,16 @@ mod tests {
         }
         assert_eq!(sequences(&kept.due(now + TAKEOVER, TAKEOVER)), [0, 2]);
     }
+
+    /// It may have reached nobody else, and what is behind it is published before the other is missed.
+    #[test]
+    fn what_was_heard_before_it_was_computed_is_due_to_an_active_instance() {
+        let (mut kept, now) = (Kept::default(), Instant::now());
+        for sequence in 0..3 {
+            kept.heard(batch(sequence), now);
+            kept.computed(frame(sequence), now);
+            assert_eq!(sequences(&kept.due(now, TAKEOVER)), [sequence]);
+            assert!(kept.due(now, TAKEOVER).is_empty());
+        }
+    }
 }

@@ -1,7 +1,8 @@
 //! Frames that were kept go out.
 
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
+use super::REPEATED;
 use crate::receive::fault::FaultKind;
 use crate::receive::unit::UnitActor;
 
@@ -12,7 +13,7 @@ impl UnitActor {
         let Some(following) = &mut self.speech.following else { return };
         following.also_out = active && following.follower.has_joined();
         if following.also_out {
-            let owed = following.kept.due(now, Duration::ZERO);
+            let owed = following.kept.due(now, REPEATED);
             self.publish_kept(owed);
         }
     }

@@ -1,0 +1,177 @@
+//! What must not be is told: other bits, two services that are no pair, two producers. And what an operator ordered holds, whoever
+//! took the order.
+
+use std::time::Duration;
+
+use isotherm_bus::{SessionOptions, close, open};
+use isotherm_protocol::codec;
+use isotherm_protocol::control::{SwapOptions, SwapOutcome};
+use isotherm_protocol::corrected::CorrectedBatch;
+use isotherm_protocol::history::AuditEvent;
+use isotherm_protocol::key;
+use isotherm_protocol::service_status::ServiceStatus;
+use isotherm_protocol::status::{Fault, State, Status};
+use isotherm_tests::bench::LIMIT;
+use isotherm_tests::judged::{Sink, Source};
+use isotherm_tests::operator::audit;
+use isotherm_tests::pair::{reports, until, until_compared, until_paired, until_speaks};
+use isotherm_tests::process::Service;
+use serde_json::json;
+
+use super::stand::{Stand, configuration, scenario};
+use crate::documents::base;
+
+const UNIT: &str = "PAIR-00";
+
+/// The faults of a kind that the services have.
+async fn faults(stand: &Stand, kind: &str) -> Vec<Fault> {
+    let replies = stand.session.get(key::ALL_SERVICE_STATUS).await.unwrap();
+    let mut faults = Vec::new();
+    while let Ok(reply) = replies.recv_async().await {
+        let frame = reply.into_result().unwrap();
+        let status: ServiceStatus = codec::decode(&frame.payload().to_bytes()).unwrap();
+        faults.extend(status.faults.into_iter().filter(|fault| fault.kind == kind));
+    }
+    faults
+}
+
+async fn times_told(stand: &Stand, kind: &str) -> u64 {
+    faults(stand, kind).await.iter().map(|fault| fault.count).sum()
+}
+
+/// What the services say under a kind of fault, waited for.
+async fn told(stand: &Stand, kind: &str) -> String {
+    let deadline = tokio::time::Instant::now() + LIMIT;
+    loop {
+        if let Some(fault) = faults(stand, kind).await.first() {
+            return fault.first.clone();
+        }
+        assert!(tokio::time::Instant::now() < deadline, "{kind}");
+        tokio::time::sleep(Duration::from_millis(50)).await;
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_tick_with_other_bits_is_an_alarm_that_names_it() {
+    let stand = Stand::start(1, &configuration("")).await;
+    until_compared(&stand.session, 1, 50).await;
+    // As another instance with broken memory would publish it: one bit of one tick.
+    let (sender, mut heard) = tokio::sync::mpsc::unbounded_channel();
+    let listening = stand.session.declare_subscriber(key::ALL_CORRECTED).callback(move |sample| {
+        let _ = sender.send((sample.key_expr().clone(), sample.payload().to_bytes().into_owned()));
+    });
+    let listening = listening.await.unwrap();
+    let (topic, frame) = tokio::time::timeout(LIMIT, heard.recv()).await.unwrap().unwrap();
+    drop(listening);
+    let mut batch: CorrectedBatch = codec::decode(&frame).unwrap();
+    let tick = &mut batch.ticks[0];
+    let (sequence, right) = (tick.sequence, tick.delta_angle[1]);
+    tick.delta_angle[1] = f64::from_bits(right.to_bits() ^ 1);
+    stand.session.put(topic, codec::encode(&batch).unwrap()).await.unwrap();
+    let words = told(&stand, "instances_disagree").await;
+    for part in [format!("unit {UNIT}"), format!("sequence {sequence}:"), "delta_angle_rad".to_owned()] {
+        assert!(words.contains(&part), "{part}: {words}");
+    }
+    let standby = reports(&stand.session).await.into_iter().flat_map(|report| report.units);
+    assert!(standby.map(|unit| unit.ticks_differing).sum::<u64>() > 0);
+    // It takes the other's memory anew, and stands by again.
+    until_paired(&stand.session, 1).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_service_that_is_none_of_the_pair_and_publishes_its_unit_is_an_alarm() {
+    let stand = Stand::start(1, &configuration("")).await;
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir(folder.path().join("documents")).unwrap();
+    std::fs::write(folder.path().join("documents/unit.toml"), base(UNIT)).unwrap();
+    let connect = stand.pair.endpoints().map(|endpoint| format!("{endpoint:?}")).join(", ");
+    let text = format!(
+        "calibrations = \"documents\"\nunits = [\"PAIR-*\"]\n[zenoh]\nlisten = [\"tcp/127.0.0.1:0\"]\nconnect = [{connect}]\n"
+    );
+    std::fs::write(folder.path().join("service.toml"), text).unwrap();
+    let stranger = tokio::task::block_in_place(|| {
+        Service::start_in(folder.path(), &["--config", "service.toml", "--log-level", "error"])
+    });
+    // A unit without a calibration, and one that has been given one since.
+    for calibrated in [false, true] {
+        if calibrated {
+            let reply =
+                stand.operator.swap("PAIR-01", base("PAIR-01").as_bytes(), &SwapOptions::default()).await;
+            assert_eq!(reply.unwrap().outcome, SwapOutcome::Accepted);
+        }
+        let connect = vec![stranger.locator.clone()].into_iter().chain(stand.pair.endpoints()).collect();
+        let session = open(&SessionOptions { connect, ..SessionOptions::default() }).await.unwrap();
+        let sink = Sink::declare(&session).await;
+        let mut source = Source::declare(&session, scenario("PAIR-01", 9), &base("PAIR-01"), &sink).await;
+        let before = times_told(&stand, "two_services").await;
+        let deadline = tokio::time::Instant::now() + LIMIT;
+        while times_told(&stand, "two_services").await == before {
+            assert!(tokio::time::Instant::now() < deadline, "calibrated: {calibrated}");
+            for _ in 0..100 {
+                source.tick().await;
+                tokio::time::sleep(Duration::from_millis(5)).await;
+            }
+        }
+        close(session, LIMIT).await.unwrap();
+        // Until nobody doubles any more: the next time is another alarm.
+        tokio::time::sleep(Duration::from_millis(1500)).await;
+    }
+    let words = told(&stand, "two_services").await;
+    assert!(words.contains("unit PAIR-01: another service publishes its corrected ticks too"), "{words}");
+    drop(stranger);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_second_producer_of_a_unit_is_an_alarm() {
+    let stand = Stand::start(1, &configuration("")).await;
+    let session = stand.pair.session().await;
+    let sink = Sink::declare(&session).await;
+    let mut second = Source::declare(&session, scenario(UNIT, 99), &base(UNIT), &sink).await;
+    for _ in 0..400 {
+        second.tick().await;
+        tokio::time::sleep(Duration::from_millis(5)).await;
+    }
+    let words = stand
+        .operator
+        .until(UNIT, |status| {
+            let fault = status.faults.iter().find(|fault| fault.kind == "two_producers");
+            fault.map(|fault| fault.first.clone())
+        })
+        .await;
+    assert!(words.contains("two producers") && words.contains("stop one of them"), "{words}");
+    close(session, LIMIT).await.unwrap();
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_command_holds_when_the_instance_that_took_it_is_gone() {
+    let mut stand = Stand::start(2, &configuration("")).await;
+    until_compared(&stand.session, 2, 50).await;
+    let (speaking, commanded) = (stand.speaker().await, "PAIR-01");
+    let reply = stand.operator.command(commanded, json!({"command": "standby", "by": "ann"})).await.unwrap();
+    assert!(reply.accepted, "{reply:?}");
+    // The other has heard of it.
+    until_paired(&stand.session, 2).await;
+    let ordered = |index: usize| {
+        let entries = audit(&stand.pair.state(index)).into_iter();
+        let of_ann =
+            entries.filter(|entry| entry.by == "ann" && matches!(entry.event, AuditEvent::Command(_)));
+        of_ann.map(|entry| entry.unit).collect::<Vec<_>>()
+    };
+    let deadline = tokio::time::Instant::now() + LIMIT;
+    while ordered(1 - speaking) != [Some(commanded.to_owned())] {
+        assert!(tokio::time::Instant::now() < deadline, "{:?}", ordered(1 - speaking));
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
+    stand.pair.kill(speaking);
+    until_speaks(&stand.session, 1 - speaking, 2).await;
+    let held = |status: &Status| (status.state == State::Standby).then_some(());
+    stand.operator.until(commanded, held).await;
+    assert!(stand.operator.command(commanded, json!({"command": "run"})).await.unwrap().accepted);
+    stand.operator.until(commanded, |status| (status.state != State::Standby).then_some(())).await;
+    // The one that comes back learns it too.
+    stand.restart(speaking);
+    until(&stand.session, |reports| reports.len() == 2).await;
+    until_paired(&stand.session, 2).await;
+    stand.judged = 1;
+    stand.end().await;
+}
