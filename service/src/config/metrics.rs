@@ -9,7 +9,7 @@ use super::units::{AddressText, As};
 
 /// What the address must be.
 pub(super) const LOOPBACK: &str =
-    "a loopback address and a port, such as \"127.0.0.1:9464\"; any other needs allow_remote = true";
+    "an address and a port, such as \"127.0.0.1:9464\"; any but loopback needs allow_remote = true";
 
 /// Where metrics and health are served over HTTP.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
