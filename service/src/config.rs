@@ -25,7 +25,7 @@ use serde::{Deserialize, Serialize};
 use zenoh::qos::CongestionControl;
 
 use crate::ServiceError;
-use crate::text::{self, read_bounded};
+use isotherm_document::file::{self, read_bounded};
 use keys::{PreLaunchKeys, SessionKeys, UnitKeys};
 pub use metrics::MetricsSettings;
 pub use pair::{PairSettings, chunk};
@@ -145,7 +145,7 @@ impl Settings {
     pub fn load(path: &Path) -> Result<Self, ServiceError> {
         let read = |source| ServiceError::Read { path: path.to_owned(), source };
         let bytes = read_bounded(path).map_err(read)?;
-        text::text(&bytes, &path.display().to_string())
+        file::text(&bytes, &path.display().to_string())
             .and_then(|text| Self::parse(text, path))
             .map(|settings| Self { digest: Some(Digest::of(&bytes)), ..settings })
             .map_err(ServiceError::Configuration)

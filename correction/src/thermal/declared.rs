@@ -246,7 +246,7 @@ pub const ACCEL_TERMS: [Term; 5] = [
         Feature::ForceSquared,
         ("second_order", TermForm::Curve),
         (Makes::Force, Per::G2),
-        "K2: what it feels beyond f per f², f along its input axis. Source: models §3, IEEE 528.",
+        "K2: error per f², f along its input axis. Source: models §3, IEEE 528.",
     ),
 ];
 

@@ -40,7 +40,7 @@ pub(super) fn check(r: &mut Reader<'_>, document: &Document) {
     if document.mode_reversal.as_ref().is_some_and(|reversal| reversal.transition_s.is_some()) {
         let key = "mode_reversal.transition_ticks";
         if r.has(key) {
-            r.refuse(key, "says the same as `transition_s`: give one of the two");
+            r.refuse(key, "duplicates `transition_s`: give one of the two");
         }
     }
     if let Some(section) = &document.self_test {
@@ -54,7 +54,7 @@ fn names<'n>(r: &mut Reader<'_>, sensors: &str, names: impl Iterator<Item = &'n 
     for (i, name) in names.enumerate() {
         if let Some(earlier) = seen.insert(name, i) {
             let path = join(&element(sensors, i), "name");
-            r.refuse(&path, format!("is {name:?}, the name of {sensors}[{earlier}] too: names must differ"));
+            r.refuse(&path, format!("is {name:?}, also the name of {sensors}[{earlier}]: names must differ"));
         }
     }
 }
@@ -69,7 +69,7 @@ fn self_test_names(r: &mut Reader<'_>, self_test: &SelfTest) {
         if let Some(earlier) = voltages.clone().position(|voltage| voltage == name) {
             let path = join(&element("self_test.counter", i), "name");
             let voltage = element("self_test.voltage", earlier);
-            r.refuse(&path, format!("is {name:?}, the name of {voltage} too: names must differ"));
+            r.refuse(&path, format!("is {name:?}, also the name of {voltage}: names must differ"));
         }
     }
 }
@@ -90,7 +90,7 @@ fn channel(r: &mut Reader<'_>, path: &str, name: Option<&str>, channels: Option<
         && !channels.contains(&name)
     {
         let known = if channels.is_empty() { "none".into() } else { channels.join(", ") };
-        r.refuse(path, format!("is {name:?}, which is no temperature channel; the channels are: {known}"));
+        r.refuse(path, format!("is {name:?}, not a temperature channel; the channels are: {known}"));
     }
 }
 
@@ -120,7 +120,7 @@ fn terms(
         }
         if term.feature.is_force() && document.accel.is_none() {
             let table = key.split('.').next().unwrap_or_default();
-            let message = "needs the specific force, but there is no [accel]: add it, or leave this out";
+            let message = "needs the specific force, but there is no [accel]: add it, or remove this";
             r.refuse(&join(path, table), message);
         }
         if let Some(regressor) = &stated.regressor {
@@ -161,7 +161,7 @@ fn check_regressor(
             let all = temperatures.iter().copied().chain(document.auxiliary.iter().map(|c| c.name.as_str()));
             let known = all.collect::<Vec<_>>().join(", ");
             let known = if known.is_empty() { "none" } else { &known };
-            let message = format!("is {name:?}, which is no channel; the channels are: {known}");
+            let message = format!("is {name:?}, not a channel; the channels are: {known}");
             r.refuse(&join(path, part), message);
         }
     }
@@ -209,7 +209,7 @@ fn one_argument(
         let (first, second) = (first.symbol(), second.symbol());
         r.refuse(
             braking_path,
-            format!("is over {second}, but run_up is over {first}: both must have one argument"),
+            format!("is over {second}, but run_up is over {first}: both must have the same argument"),
         );
     }
 }

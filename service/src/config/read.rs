@@ -72,7 +72,7 @@ fn existing(
 fn names(r: &mut Reader<'_>, settings: &mut Settings) {
     for (index, pattern) in settings.units.iter().enumerate() {
         if chunk(pattern).is_none() {
-            let must_be = "a serial, such as \"ZLG-0042\", in which * stands for any characters: \"ZLG-*\"";
+            let must_be = "a serial, such as \"ZLG-0042\"; * matches any characters: \"ZLG-*\"";
             r.report(&element("units", index), format!("is {pattern:?}, must be {must_be}"));
         }
     }

@@ -93,7 +93,7 @@ async fn withhold(session: &Session) -> (Queryable<()>, Arc<Mutex<Vec<Query>>>) 
 fn isotherm(config: &Path, arguments: &[&str]) -> Output {
     let arguments = [arguments, &["--zenoh-config", config.to_str().unwrap(), "--timeout", "2"]].concat();
     // Zenoh's TLS links break where both ends speak at once (zenoh#2557): asked again, as the program says.
-    let broke = |output: &Output| String::from_utf8_lossy(&output.stderr).contains("ended without an answer");
+    let broke = |output: &Output| String::from_utf8_lossy(&output.stderr).contains("did not answer");
     let mut outputs = std::iter::repeat_with(|| run("isotherm", &arguments)).take(TRIES);
     outputs.find(|output| !broke(output)).expect("an answer that no broken link took")
 }
@@ -266,7 +266,7 @@ async fn names_are_those_of_certificates_only_where_the_service_is_told_so() {
         let folders = Folders::new();
         folders.put("unit.toml", base("ZLG-7").as_bytes());
         let mut settings = folders.settings();
-        settings.certified_names = certified;
+        settings.zenoh.certified_names = certified;
         let stand = Stand::start(settings).await;
         let (session, unit) = (stand.operator.session(), id("ZLG-7"));
         let text = base("ZLG-7").replacen("0.41", "0.44", 1);

@@ -91,7 +91,7 @@ pub struct AccelSensor {
     /// Terms of its bias S and of what it feels.
     #[serde(flatten)]
     pub terms: Terms<Accels>,
-    /// Where it sits in case axes, from the point whose specific force is published; default: there. Source: models §3.
+    /// Position in case axes, from the point of the published specific force (default). Source: models §3.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(inner(range(min = -100.0, max = 100.0)))]
     pub position_m: Option<[f64; 3]>,
