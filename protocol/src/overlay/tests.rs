@@ -1,5 +1,7 @@
 //! Overlays by themselves, on their base, and as candidates.
 
+use isotherm_correction::thermal::Feature;
+
 use super::*;
 use crate::digest::Digest;
 use crate::document::{Document, Parsed, difference};
