@@ -5,6 +5,7 @@
 
 mod accel;
 mod bank;
+mod declared;
 mod gyro;
 mod motion;
 mod ramp;
@@ -13,11 +14,12 @@ mod trail;
 
 pub use accel::AccelModel;
 pub(crate) use bank::{Bank, MotionBanks, Paces, Shares};
+pub use declared::{ACCEL_TERMS, Feature, GYRO_TERMS, Makes, Parameter, Per, Term, TermForm};
 pub use gyro::{GyroModel, GyroTerms, TrendModel};
 pub(crate) use gyro::{TermError, Trends};
 pub(crate) use motion::{Motion, MotionTerms};
 pub(crate) use ramp::{Pace, Ramp};
+pub use terms::MAX_REGRESSORS;
 pub(crate) use terms::Others;
-pub use terms::{ACCEL_TERMS, Feature, GYRO_TERMS, MAX_REGRESSORS, Term};
 pub use trail::{MAX_LAGS, MAX_PLAYS};
 pub(crate) use trail::{PLAY_WIDTHS_DEG_C, drag};

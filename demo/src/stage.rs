@@ -37,7 +37,7 @@ impl Stage {
             calibrations.insert(member.id.clone(), Arc::new(parsed.calibration), digest);
         }
         let settings = Settings::default();
-        let session = isotherm_bus::open(&settings.session).await?;
+        let session = isotherm_bus::open(&settings.zenoh.session).await?;
         let service = start_with(settings, calibrations, session).await?;
         let session = isotherm_bus::open(&connect(&service)).await?;
         let consumer = Consumer::declare(&session, None).await?;

@@ -35,7 +35,7 @@
 //! | `x-must-be` | the words behind "must be" |
 //! | `x-rising` | of two numbers, the first must be below the second |
 //!
-//! Lengths of texts count bytes.
+//! Lengths of texts count bytes; a text of the format `socket-address` is an address and a port.
 
 pub mod escape;
 pub mod file;

@@ -2,6 +2,7 @@
 
 use std::cmp::Reverse;
 use std::collections::BTreeSet;
+use std::net::SocketAddr;
 
 use isotherm_correction::stated::Shown;
 use regex_lite::Regex;
@@ -341,9 +342,11 @@ fn length(node: &Json) -> Option<(u64, u64)> {
 }
 
 fn is_fit(node: &Json, text: &str) -> bool {
+    let is_address = node.get("format").is_some_and(|format| format == "socket-address");
     let pattern = node.get("pattern").and_then(Json::as_str).and_then(|pattern| Regex::new(pattern).ok());
     length(node).is_none_or(|(low, high)| (low..=high).contains(&(text.len() as u64)))
         && pattern.is_none_or(|pattern| pattern.is_match(text))
+        && (!is_address || text.parse::<SocketAddr>().is_ok())
 }
 
 fn text_must_be(node: &Json) -> String {

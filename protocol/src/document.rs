@@ -43,20 +43,16 @@ use serde_json::Value as Json;
 use sha2::{Digest, Sha256};
 
 pub use correction_change::{Side, correction_change};
-pub use curve::{
-    Curve, CurveForm, DriftByForce, Frequency, HysteresisGain, LagGain, OutputBias, OutputHysteresisGain,
-    OutputRegressorGain, Quantity, RateBias, RegressorGain, Relative, RelativeOverRate, ScaleFactor,
-    SecondOrder, Shape, ThermalAcceleration, ThermalRate,
-};
+pub use curve::{Curve, Shape};
 pub use difference::{difference, lost_sections};
-pub use measure::{Argument, Unit};
+pub use measure::{Argument, BaseUnit, Unit};
+pub use terms::{Accels, Coefficient, Gyros, Regressor, SensorKind, StatedTerm, Terms};
 pub use types::{
-    Accel, AccelBiasSigma, AccelHysteresis, AccelLag, AccelOrientation, AccelOutput, AccelParity,
-    AccelRegressor, AccelSensor, AccelSigma, AlongAxes, Auxiliary, AxesHysteresis, Branches, Channel,
-    Created, Document, Drift, Filter, FitWindow, Gyro, GyroBiasSigma, GyroOrientation, GyroOutput,
-    GyroParity, GyroSensor, GyroSigma, Hysteresis, Lag, Log, Measure, ModeReversal, Orientation,
-    OrientationThermal, Origin, Regressor, Residual, Sample, SelfTest, SelfTestCounter, SelfTestVoltage,
-    Servo, ServoKind, Temperature, Trend,
+    Accel, AccelBiasSigma, AccelOrientation, AccelOutput, AccelParity, AccelSensor, AccelSigma, Auxiliary,
+    AxesHysteresis, Channel, Created, Document, Drift, Filter, FitWindow, Gyro, GyroBiasSigma,
+    GyroOrientation, GyroOutput, GyroParity, GyroSensor, GyroSigma, Log, Measure, ModeReversal, Orientation,
+    OrientationThermal, Origin, Residual, Sample, SelfTest, SelfTestCounter, SelfTestVoltage, Servo,
+    ServoKind, Temperature, Trend,
 };
 
 /// Oldest version of the document's form that is still read.

@@ -187,13 +187,13 @@ async fn correct(args: &BridgeArgs) -> Result<(Option<RunningService>, Session),
     let mut settings = args.config.as_deref().map_or_else(|| Ok(Settings::default()), Settings::load)?;
     settings.calibrations = args.calibration.clone().or(settings.calibrations);
     settings.state = args.state.clone().or(settings.state);
-    let session = &mut settings.session;
+    let session = &mut settings.zenoh.session;
     if session.config.is_none() && session.connect.is_empty() && session.listen.is_empty() {
         // The default port is that of the router of ROS 2.
         session.listen = vec![ANY_PORT.to_owned()];
     }
     let namespace = session.namespace.clone();
-    let session = open(&settings.session).await?;
+    let session = open(&settings.zenoh.session).await?;
     let connect = locators(&session);
     let service = match isotherm_service::start(settings, session.clone()).await {
         Ok(service) => service,

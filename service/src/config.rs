@@ -8,6 +8,7 @@ mod metrics;
 mod pair;
 mod read;
 mod swap;
+mod units;
 mod web;
 
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
@@ -19,60 +20,96 @@ use isotherm_correction::prelaunch::PreLaunchSettings;
 use isotherm_correction::unit::UnitSettings;
 use isotherm_document::{Problem, Reader};
 use isotherm_protocol::digest::Digest;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use zenoh::qos::CongestionControl;
 
 use crate::ServiceError;
 use isotherm_document::file::{self, read_bounded};
+use keys::{PreLaunchKeys, SessionKeys, UnitKeys};
 pub use metrics::MetricsSettings;
 pub use pair::{PairSettings, chunk};
 pub use swap::{FolderSettings, Severity, SwapSettings};
+use units::{As, Congestion, Ms, PathText};
 pub use web::WebSettings;
 
 /// Where the console in the browser is, unless `[metrics]` says otherwise.
 const USUAL_LISTENER: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), 9464);
 
-/// Everything that an operator can set, checked.
-#[derive(Debug, Clone, PartialEq)]
+/// Everything that an operator can set, checked: key for key what stands in `config/service.toml`, in its order. A key that is left out
+/// has its default.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+#[schemars(deny_unknown_fields, title = "Isotherm service configuration")]
 pub struct Settings {
     /// Folder of the calibration documents; without one every unit is uncalibrated.
+    #[serde(with = "As::<PathText>")]
+    #[schemars(with = "Option<String>", length(min = 1))]
     pub calibrations: Option<PathBuf>,
     /// Whether a bad calibration document keeps the service from starting.
     pub strict_start: bool,
-    /// How that folder is watched.
-    pub folder: FolderSettings,
     /// Folder in which the audit file and every accepted document are kept; without one they go with the process.
+    #[serde(with = "As::<PathText>")]
+    #[schemars(with = "Option<String>", length(min = 1))]
     pub state: Option<PathBuf>,
-    /// What speaks against a swap.
-    pub swap: SwapSettings,
-    /// Most units at a time (1…16384); further ones are refused.
-    pub max_units: usize,
     /// Settings of every unit's state machine.
+    #[serde(flatten, with = "UnitKeys")]
+    #[schemars(with = "UnitKeys")]
     pub unit: UnitSettings,
-    /// What a pre-launch calibration is asked to do where the command does not say otherwise.
-    pub pre_launch: PreLaunchSettings,
-    /// How long (10 ms…60 s) a unit's gyro topic must be silent before what it holds back is flushed; at least twice
-    /// the pairing window and four times the usual distance of its messages.
+    /// Most units at a time; further ones are refused.
+    #[schemars(with = "u32", range(min = 1, max = 16_384))]
+    pub max_units: usize,
+    /// How long a unit's gyro topic must be silent before what it holds back is flushed; at least twice the pairing window and four
+    /// times the usual distance of its messages.
+    #[serde(rename = "tail_flush_ms", with = "As::<Ms>")]
+    #[schemars(with = "u32", range(min = 10, max = 60_000))]
     pub tail_flush: Duration,
-    /// Interval of the status messages (100 ms…60 s).
+    /// Interval of the status messages.
+    #[serde(rename = "status_interval_ms", with = "As::<Ms>")]
+    #[schemars(with = "u32", range(min = 100, max = 60_000))]
     pub status_interval: Duration,
-    /// How long a stop may take (100 ms…60 s).
+    /// How long a stop may take.
+    #[serde(rename = "stop_timeout_ms", with = "As::<Ms>")]
+    #[schemars(with = "u32", range(min = 100, max = 60_000))]
     pub stop_timeout: Duration,
     /// What happens to corrected batches where a subscriber does not keep up.
+    #[serde(with = "As::<Congestion>")]
+    #[schemars(with = "Congestion")]
     pub congestion: CongestionControl,
     /// Serials of the units that are taken, with `*` for any characters; not empty.
     pub units: Vec<String>,
     /// Other instances for the same units.
     pub pair: PairSettings,
+    /// How the folder of the documents is watched.
+    pub folder: FolderSettings,
+    /// What speaks against a swap.
+    pub swap: SwapSettings,
+    /// What a pre-launch calibration is asked to do where the command does not say otherwise.
+    #[serde(with = "PreLaunchKeys")]
+    #[schemars(with = "PreLaunchKeys")]
+    pub pre_launch: PreLaunchSettings,
     /// Where metrics and health are served.
     pub metrics: MetricsSettings,
     /// The console in the browser, beside the metrics.
     pub web: WebSettings,
-    /// How to open the Zenoh session.
+    /// The Zenoh session.
+    pub zenoh: ZenohSettings,
+    /// SHA-256 of the configuration's text; `None` without one.
+    #[serde(skip)]
+    pub digest: Option<Digest>,
+}
+
+/// The Zenoh session.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+#[schemars(deny_unknown_fields)]
+pub struct ZenohSettings {
+    /// How to open it.
+    #[serde(flatten, with = "SessionKeys")]
+    #[schemars(with = "SessionKeys")]
     pub session: SessionOptions,
     /// Whether swaps and commands are taken only on keys that end in the name of who asks, which access control vouches for.
     pub certified_names: bool,
-    /// SHA-256 of the configuration's text; `None` without one.
-    pub digest: Option<Digest>,
 }
 
 impl Default for Settings {
@@ -80,22 +117,21 @@ impl Default for Settings {
         Self {
             calibrations: None,
             strict_start: false,
-            folder: FolderSettings::default(),
             state: None,
-            swap: SwapSettings::default(),
-            max_units: 64,
             unit: UnitSettings::default(),
-            pre_launch: PreLaunchSettings::default(),
+            max_units: 64,
             tail_flush: Duration::from_millis(500),
             status_interval: Duration::from_secs(1),
             stop_timeout: Duration::from_secs(3),
             congestion: CongestionControl::Drop,
             units: vec![pair::ALL_UNITS.to_owned()],
             pair: PairSettings::default(),
+            folder: FolderSettings::default(),
+            swap: SwapSettings::default(),
+            pre_launch: PreLaunchSettings::default(),
             metrics: MetricsSettings::default(),
             web: WebSettings::default(),
-            session: SessionOptions::default(),
-            certified_names: false,
+            zenoh: ZenohSettings::default(),
             digest: None,
         }
     }

@@ -62,7 +62,7 @@ impl Pair {
         started_unix_ms: i64,
         others: Vec<Member>,
     ) -> Self {
-        let PairSettings { name, mode, priority, takeover } = settings.pair.clone();
+        let PairSettings { name, mode, priority, takeover, .. } = settings.pair.clone();
         let name = name.unwrap_or_else(|| instance.chars().take(8).collect());
         let group = Digest::of(settings.units.join("\n").as_bytes()).to_string().chars().take(8).collect();
         let me = Member { instance, name, mode, priority, started_unix_ms, group };

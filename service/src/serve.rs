@@ -117,7 +117,7 @@ fn settings(args: &ServeArgs) -> Result<Settings, ServiceError> {
     }
     settings.web.enabled |= args.web;
     settings.listen_for_web();
-    let (configured, given) = (&mut settings.session, &args.session);
+    let (configured, given) = (&mut settings.zenoh.session, &args.session);
     if given.config.is_some() {
         configured.config.clone_from(&given.config);
     }
@@ -154,10 +154,10 @@ async fn serve(args: ServeArgs) -> Result<Option<Totals>, ServiceError> {
     };
 
     let state = open_store(settings.state.as_deref())?;
-    let awaited = settings.session.awaited()?;
+    let awaited = settings.zenoh.session.awaited()?;
     let metrics = Endpoint::start(&settings.metrics, awaited.clone()).await?;
     let session = tokio::select! {
-        session = open_session(settings.session.clone(), &awaited) => session?,
+        session = open_session(settings.zenoh.session.clone(), &awaited) => session?,
         // There is nothing to flush.
         _ = stop_asked() => return Ok(Some(Totals { stopped_in_time: true, ..Totals::default() })),
     };

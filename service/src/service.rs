@@ -92,7 +92,7 @@ pub(crate) async fn start_on(
     session: Session,
 ) -> Result<RunningService, ServiceError> {
     tell_keys(&settings);
-    if settings.certified_names && !settings.session.has_access_control()? {
+    if settings.zenoh.certified_names && !settings.zenoh.session.has_access_control()? {
         tracing::warn!(
             "certified_names is set, but the Zenoh configuration has no access control: anyone who connects may use \
              any name"
@@ -103,7 +103,7 @@ pub(crate) async fn start_on(
     let outlets = declare::outlets(session.clone(), settings.congestion);
     let intake = Intake::new(settings.clone(), calibrations.clone(), outlets).reporting_to(inbox.clone());
     let intake = intake.journaling_to(declare::journal(session.clone(), settings.congestion));
-    isotherm_bus::connected(&session, &settings.session, MEMBERS_LIMIT).await?;
+    isotherm_bus::connected(&session, &settings.zenoh.session, MEMBERS_LIMIT).await?;
     let pair = Pair::new(&settings, session.zid().to_string(), now_unix_ms(), members(&session).await?);
     let pair = Arc::new(pair);
     let intake = Arc::new(intake.paired_with(Arc::clone(&pair)));

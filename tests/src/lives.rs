@@ -26,7 +26,7 @@ use crate::script::{Meets, Scenario, Script};
 /// Never: the document is sound.
 #[must_use]
 pub fn full() -> Arc<Calibration> {
-    let text = include_str!("../../config/calibration/example-full.toml");
+    let text = include_str!("inputs/example-0001.toml");
     Arc::new(Document::parse(text, None).expect("the fixture is sound").calibration)
 }
 

@@ -8,9 +8,10 @@ use isotherm_correction::navigation::NavigationStep;
 use isotherm_correction::sample::{
     AccelTick, CorrectedTick, GyroTick, OutputKind, SensorFlags, TemperatureReading, TickFlags,
 };
+use isotherm_correction::thermal::Feature;
 use isotherm_correction::unit::{Event, Unit, UnitSettings};
 use isotherm_correction::units::{AngularRate, STANDARD_GRAVITY_M_PER_S2};
-use isotherm_protocol::document::{AlongAxes, Curve, Document, Shape};
+use isotherm_protocol::document::{Curve, Document, Shape};
 use isotherm_simulator::effects::{AccelerometerEffects, Effects, GyroEffects};
 use isotherm_simulator::{Scenario, Simulation, presets};
 
@@ -76,8 +77,10 @@ pub(crate) fn in_motion() -> Result<UnitCase, Error> {
     let name = "the same, drift with acceleration, size effect";
     let state = |document: &mut Document| {
         for sensor in &mut document.gyro.sensor {
-            let [x, y, z] = DEG_PER_H_PER_G.map(|value| Some(Curve::new(Shape::Constant { value })));
-            sensor.acceleration_sensitive_drift = Some(AlongAxes { x, y, z });
+            let axes = [Feature::ForceX, Feature::ForceY, Feature::ForceZ];
+            for (axis, value) in axes.into_iter().zip(DEG_PER_H_PER_G) {
+                sensor.set(axis, Curve::new(Shape::Constant { value }));
+            }
         }
         let sensors = document.accel.iter_mut().flat_map(|accel| &mut accel.sensor);
         sensors.zip(positions_m).for_each(|(sensor, position_m)| sensor.position_m = Some(position_m));
@@ -114,14 +117,13 @@ pub(crate) fn coning_sculling() -> Result<UnitCase, Error> {
 /// Nothing but unit scale along the case axes.
 fn strip_all(document: &mut Document) {
     for sensor in &mut document.gyro.sensor {
-        sensor.increment_weight_error = None;
-        sensor.static_bias = None;
+        sensor.terms.retain(|feature| !matches!(feature, Feature::Reading | Feature::One));
     }
     document.gyro.orientation.thermal = None;
     if let Some(accel) = &mut document.accel {
         accel.orientation.thermal = None;
         for sensor in &mut accel.sensor {
-            sensor.bias = None;
+            sensor.set(Feature::One, None);
             sensor.board_ratio_error = None;
         }
     }

@@ -1,7 +1,7 @@
 //! One accelerometer: the windows of its runs, what they must hold, and what they say of the board.
 
 use isotherm_correction::units::STANDARD_GRAVITY_M_PER_S2;
-use isotherm_protocol::document::{Argument, Curve, Relative, Shape, Unit};
+use isotherm_protocol::document::{Curve, Shape};
 
 use crate::finding::AccelKind;
 use crate::lsq::weighted::{once, solve};
@@ -195,7 +195,7 @@ impl Ratio {
 
     /// As the document has it: 1/(1 + x) − 1 = −x + x² − …, whose next term is some 1e-9.
     #[must_use]
-    pub fn curve(&self) -> Curve<Relative> {
+    pub fn curve(&self) -> Curve {
         let mut coefficients = vec![0.0; 2 * self.x.len() + 1];
         for (i, a) in self.x.iter().enumerate() {
             coefficients[i + 1] -= 1e6 * a;
@@ -209,7 +209,7 @@ impl Ratio {
             coefficients: coefficients.into_iter().map(tidy).collect(),
             range: [libm::floor(2.0 * (low - ROOM_DEG_C)) / 2.0, libm::ceil(2.0 * (high + ROOM_DEG_C)) / 2.0],
         };
-        Curve::new(shape).in_unit(Unit::Ppm).over(Argument::DegC)
+        Curve::new(shape)
     }
 }
 

@@ -1,3 +1,4 @@
+use isotherm_correction::thermal::Feature;
 use isotherm_protocol::document::{Curve, Document, Shape};
 
 use super::*;
@@ -69,12 +70,12 @@ fn without_stated_errors_those_of_the_stand_hold() {
 #[test]
 fn biases_and_scale_factors_change_over_temperature() {
     let before = written(|document| {
-        document.gyro.sensor[1].static_bias = Some(Curve::new(Shape::Constant { value: 1.0 }));
+        document.gyro.sensor[1].set(Feature::One, Curve::new(Shape::Constant { value: 1.0 }));
     });
     let after = written(|document| {
         let (reference, range) = (document.temperature.assumed_deg_c, [-20.0, 60.0]);
         let shape = Shape::Polynomial { reference, coefficients: vec![3.0, 0.1], range };
-        document.gyro.sensor[1].static_bias = Some(Curve::new(shape));
+        document.gyro.sensor[1].set(Feature::One, Curve::new(shape));
         let scale = &mut document.accel.as_mut().unwrap().sensor[2].scale_factor;
         let per_million = match scale.shape() {
             Shape::Constant { value } => value * 1e-4,

@@ -1,4 +1,5 @@
-use isotherm_protocol::document::{Branches, Curve, GyroOutput, Lag, Shape};
+use isotherm_correction::thermal::Feature;
+use isotherm_protocol::document::{Curve, GyroOutput, Shape, StatedTerm};
 
 use super::*;
 use crate::report::Sigmas;
@@ -7,20 +8,19 @@ fn named(name: &str, change: impl FnOnce(&mut Document)) -> Named {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/calibration/MEMS-0001.toml");
     let mut document = Written::read(path.as_ref()).unwrap().document;
     for gyro in &mut document.gyro.sensor {
-        gyro.thermal_rate = None;
-        gyro.thermal_acceleration = None;
-        gyro.lag.clear();
+        let thermal = [Feature::ThermalRate, Feature::ThermalAcceleration, Feature::Lag];
+        gyro.terms.retain(|feature| !thermal.contains(&feature));
     }
     change(&mut document);
     Named { name: name.into(), written: Written::of(&document).unwrap() }
 }
 
-fn constant<Q: isotherm_protocol::document::Quantity>(value: f64) -> Curve<Q> {
+fn constant(value: f64) -> Curve {
     Curve::new(Shape::Constant { value })
 }
 
 fn bias(value: f64) -> impl FnOnce(&mut Document) {
-    move |document| document.gyro.sensor[0].static_bias = Some(constant(value))
+    move |document| document.gyro.sensor[0].set(Feature::One, constant(value))
 }
 
 fn from<'a>(merged: &'a Merged, key: &str) -> &'a str {
@@ -53,7 +53,10 @@ fn parts_made_from_one_base_go_together() {
     });
     let merged = merge(&base, &[thermal.clone(), positions.clone()], &[]).unwrap();
     let document = &merged.written.document;
-    assert_eq!(document.gyro.sensor[0].static_bias, thermal.written.document.gyro.sensor[0].static_bias);
+    assert_eq!(
+        document.gyro.sensor[0].terms.curve(Feature::One),
+        thermal.written.document.gyro.sensor[0].terms.curve(Feature::One)
+    );
     assert_eq!(
         document.accel.as_ref().unwrap().orientation,
         positions.written.document.accel.as_ref().unwrap().orientation
@@ -100,8 +103,8 @@ fn the_same_key_made_twice_is_a_conflict_until_someone_decides() {
 #[test]
 fn a_term_that_takes_the_place_of_another_takes_it_away_and_a_missing_one_is_kept() {
     let rate = |document: &mut Document| {
-        let branches = Branches { run_up: constant(3.0), braking: constant(2.0) };
-        document.gyro.sensor[0].thermal_rate = Some(branches);
+        let branches = [constant(3.0), constant(2.0)];
+        document.gyro.sensor[0].put(StatedTerm::branched(Feature::ThermalRate, branches));
         if let Some(filter) = &mut document.temperature.filter {
             filter.branch_dead_band_deg_c2_per_s3 = Some(1e-8);
         }
@@ -111,17 +114,17 @@ fn a_term_that_takes_the_place_of_another_takes_it_away_and_a_missing_one_is_kep
         if let Some(filter) = &mut document.temperature.filter {
             filter.branch_dead_band_deg_c2_per_s3 = Some(1e-8);
         }
-        document.gyro.sensor[0].lag = vec![Lag { time_constant_s: 300.0, gain: constant(5.0) }];
+        document.gyro.sensor[0].put(StatedTerm::with_parameter(Feature::Lag, 300.0, constant(5.0)));
     });
     let merged = merge(&base, std::slice::from_ref(&lags), &[]).unwrap();
     assert_eq!(merged.gone, [("gyro.sensor.x.thermal_rate".to_owned(), "lag.toml".to_owned())]);
-    assert_eq!(merged.written.document.gyro.sensor[0].thermal_rate, None);
+    assert!(!merged.written.document.gyro.sensor[0].terms.has(Feature::ThermalRate));
     let without = named("positions.toml", |document| {
         rate(document);
-        document.gyro.sensor[0].thermal_rate = None;
+        document.gyro.sensor[0].terms.remove(Feature::ThermalRate);
     });
     let merged = merge(&base, &[without], &[]).unwrap();
-    assert!(merged.written.document.gyro.sensor[0].thermal_rate.is_some());
+    assert!(merged.written.document.gyro.sensor[0].terms.has(Feature::ThermalRate));
     assert!(merged.warnings[0].contains("lacks gyro.sensor.x.thermal_rate"), "{:?}", merged.warnings);
     let text = merged.sheet("new.toml").to_text();
     assert!(text.contains("warning: positions.toml lacks"), "{text}");
@@ -130,7 +133,7 @@ fn a_term_that_takes_the_place_of_another_takes_it_away_and_a_missing_one_is_kep
 #[test]
 fn what_does_not_go_together_is_refused_by_key() {
     let base = named("base.toml", |document| {
-        document.gyro.sensor[1].lag = vec![Lag { time_constant_s: 300.0, gain: constant(5.0) }];
+        document.gyro.sensor[1].put(StatedTerm::with_parameter(Feature::Lag, 300.0, constant(5.0)));
     });
     let other = named("other.toml", |document| {
         document.unit = "MEMS-0002".into();
@@ -139,7 +142,7 @@ fn what_does_not_go_together_is_refused_by_key() {
     let Err(Error::Refused(reasons)) = merge(&base, &[other], &[]) else { panic!("refused") };
     assert!(reasons[0].starts_with("unit is MEMS-0001 in base.toml") && reasons.len() == 2, "{reasons:?}");
     let filter = named("filter.toml", |document| {
-        document.gyro.sensor[1].lag = vec![Lag { time_constant_s: 300.0, gain: constant(5.0) }];
+        document.gyro.sensor[1].put(StatedTerm::with_parameter(Feature::Lag, 300.0, constant(5.0)));
         document.temperature.filter.as_mut().unwrap().smoothing_s += 1.0;
         bias(7.0)(document);
     });

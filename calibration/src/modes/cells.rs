@@ -6,6 +6,7 @@
 mod jackknife;
 
 use isotherm_correction::sample::TickFlags;
+use isotherm_correction::thermal::Feature;
 use isotherm_log::offline::Loaded;
 use isotherm_protocol::document::{Curve, Document, Orientation, OrientationThermal, Shape};
 
@@ -111,8 +112,8 @@ fn documents(bare: &Document, group: [usize; 3], reference: f64) -> Result<Vec<L
         for sensor in &mut document.gyro.sensor {
             let mut coefficients = vec![0.0; power];
             coefficients.push(1.0);
-            sensor.static_bias =
-                Some(Curve::new(Shape::Polynomial { reference, coefficients, range: ANY_DEG_C }));
+            let shape = Shape::Polynomial { reference, coefficients, range: ANY_DEG_C };
+            sensor.set(Feature::One, Curve::new(shape));
         }
         loaded.push(Written::compiled(&document)?);
     }

@@ -1,9 +1,8 @@
 //! The constants on their way into a document.
 
+use isotherm_correction::thermal::Feature;
 use isotherm_correction::units::Angle;
-use isotherm_protocol::document::{
-    Curve, Document, GyroSensor, ModeReversal, Quantity, Servo, ServoKind, Shape,
-};
+use isotherm_protocol::document::{Curve, Document, GyroSensor, ModeReversal, Servo, ServoKind, Shape, Unit};
 use toml::{Table, Value};
 
 use super::fit::{GyroFit, MEANDER_REFERENCE_DEG_C, Term};
@@ -16,6 +15,8 @@ use crate::written::tidy;
 pub const SETTLED: f64 = 8.0;
 /// `T_ref` where the document states none (°C).
 const REFERENCE_DEG_C: f64 = 20.0;
+/// Terms that are fitted.
+const FITTED: [Feature; 3] = [Feature::One, Feature::LasingMode, Feature::Meander];
 /// Ranges are widened to the next tenth of a degree.
 const PER_DEG_C: f64 = 10.0;
 
@@ -27,9 +28,7 @@ pub fn bare(base: &Document, transition_ticks: u8, servos: &[Option<Servo>]) -> 
     let (transition_ticks, transition_s) = (Some(transition_ticks), None);
     document.mode_reversal = Some(ModeReversal { transition_ticks, transition_s, ..reversal });
     for (sensor, servo) in document.gyro.sensor.iter_mut().zip(servos) {
-        sensor.static_bias = None;
-        sensor.magnetic_bias = None;
-        sensor.slow_meander = None;
+        sensor.terms.retain(|feature| !FITTED.contains(&feature));
         if servo.is_some() {
             sensor.servo.clone_from(servo);
         }
@@ -62,7 +61,7 @@ fn servo(found: &ServoFit, old: &GyroSensor, reference: f64) -> Servo {
     Servo {
         form: old.servo.as_ref().map_or(ServoKind::Modelled, |servo| servo.form),
         time_constant_s: tidy(found.transient.time_constant_s),
-        rest_frequency: Curve::new(Shape::Polynomial { reference, coefficients, range }),
+        rest_frequency: Curve::new(Shape::Polynomial { reference, coefficients, range }).in_unit(Unit::HZ),
         settle_time_constants: old.servo.as_ref().map_or(SETTLED, |servo| servo.settle_time_constants),
     }
 }
@@ -74,9 +73,9 @@ pub fn fitted(stripped: &Document, made: &Made, constants: &[Option<f64>]) -> Do
     for ((sensor, found), constant) in document.gyro.sensor.iter_mut().zip(&made.gyros).zip(constants) {
         let Ok(found) = found else { continue };
         let reference = made.reference_deg_c;
-        sensor.static_bias = curve(found, Term::Static, reference, *constant);
-        sensor.magnetic_bias = curve(found, Term::Magnetic, reference, None);
-        sensor.slow_meander = curve(found, Term::Meander, MEANDER_REFERENCE_DEG_C, None);
+        sensor.set(Feature::One, curve(found, Term::Static, reference, *constant));
+        sensor.set(Feature::LasingMode, curve(found, Term::Magnetic, reference, None));
+        sensor.set(Feature::Meander, curve(found, Term::Meander, MEANDER_REFERENCE_DEG_C, None));
     }
     document
 }
@@ -85,20 +84,15 @@ pub fn fitted(stripped: &Document, made: &Made, constants: &[Option<f64>]) -> Do
 pub fn keep_old(document: &mut Document, base: &Document, gyros: &[Result<GyroFit, String>]) {
     for ((sensor, old), found) in document.gyro.sensor.iter_mut().zip(&base.gyro.sensor).zip(gyros) {
         if found.is_err() {
-            sensor.static_bias.clone_from(&old.static_bias);
-            sensor.magnetic_bias.clone_from(&old.magnetic_bias);
-            sensor.slow_meander.clone_from(&old.slow_meander);
+            for feature in FITTED {
+                sensor.set(feature, old.terms.curve(feature).cloned());
+            }
         }
     }
 }
 
 /// A term as a curve, its constant as it was found or as it is given.
-fn curve<Q: Quantity>(
-    found: &GyroFit,
-    term: Term,
-    reference: f64,
-    constant: Option<f64>,
-) -> Option<Curve<Q>> {
+fn curve(found: &GyroFit, term: Term, reference: f64, constant: Option<f64>) -> Option<Curve> {
     let mut coefficients: Vec<f64> = found.of(term).into_iter().map(tidy).collect();
     let range = widened(found.range_deg_c);
     if let (Some(first), Some(constant)) = (coefficients.first_mut(), constant) {
@@ -118,7 +112,7 @@ pub(crate) fn widened([low, high]: [f64; 2]) -> [f64; 2] {
 #[must_use]
 pub fn reference_of(base: &Document) -> f64 {
     let of = |sensor: &GyroSensor| {
-        let curves = [&sensor.static_bias, &sensor.magnetic_bias];
+        let curves = [Feature::One, Feature::LasingMode].map(|feature| sensor.terms.curve(feature));
         curves.into_iter().flatten().find_map(|curve| match curve.shape() {
             Shape::Polynomial { reference, .. } => Some(*reference),
             _ => None,
@@ -130,7 +124,7 @@ pub fn reference_of(base: &Document) -> f64 {
 /// The base's static bias of a gyro at `T_ref` (°/h); zero where it has none.
 #[must_use]
 pub fn base_constant(base: &Document, sensor: usize, reference_deg_c: f64) -> f64 {
-    let curve = base.gyro.sensor.get(sensor).and_then(|sensor| sensor.static_bias.as_ref());
+    let curve = base.gyro.sensor.get(sensor).and_then(|sensor| sensor.terms.curve(Feature::One));
     curve.and_then(|curve| curve.shape().at(reference_deg_c)).unwrap_or(0.0)
 }
 
@@ -144,7 +138,7 @@ pub(super) fn inverted(
     const ALIKE: f64 = 0.2;
     const SEEN: f64 = 10.0;
     let is_inverted = |(old, found): &(&GyroSensor, &Result<GyroFit, String>)| {
-        let old = old.magnetic_bias.as_ref().and_then(|curve| curve.shape().at(reference_deg_c));
+        let old = old.terms.curve(Feature::LasingMode).and_then(|curve| curve.shape().at(reference_deg_c));
         let now = found.as_ref().ok().and_then(|fit| fit.coefficient(Term::Magnetic, 0));
         old.zip(now).is_some_and(|(old, [now, sigma])| {
             (now + old).abs() < ALIKE * old.abs() && old.abs() > SEEN * sigma

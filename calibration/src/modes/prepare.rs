@@ -1,7 +1,7 @@
 //! What the procedure needs before it fits: windows, lost ticks, the Earth, a look at what was gathered.
 
 use isotherm_correction::units::Span;
-use isotherm_protocol::document::{Curve, Document, Servo, ServoKind, Shape};
+use isotherm_protocol::document::{Curve, Document, Servo, ServoKind, Shape, Unit};
 
 use super::cells::{Cell, Gathered};
 use super::make::Wanted;
@@ -51,7 +51,7 @@ pub(super) fn provisional(transient: &Transient) -> Servo {
     Servo {
         form: ServoKind::Modelled,
         time_constant_s: transient.time_constant_s,
-        rest_frequency: Curve::new(Shape::Constant { value: transient.rest_hz }),
+        rest_frequency: Curve::new(Shape::Constant { value: transient.rest_hz }).in_unit(Unit::HZ),
         settle_time_constants: document::SETTLED,
     }
 }

@@ -2,7 +2,7 @@
 
 use isotherm_protocol::document::{
     Accel, AccelOutput, AccelSensor, CURRENT_SCHEMA, Channel, Curve, Document, Filter, Gyro, GyroOutput,
-    GyroSensor, Orientation, Shape, Temperature, Unit,
+    GyroSensor, Orientation, Shape, Temperature,
 };
 
 use isotherm_correction::sample::{MAX_SENSORS, MIN_SENSORS, OutputKind};
@@ -67,11 +67,7 @@ pub fn bare(series: &Series, accel_output: AccelOutput) -> Result<Document, Erro
     }
     let follows = |kind: &str, index: usize| follows(&channels, kind, index);
     let names = || ["x", "y", "z"].into_iter().enumerate();
-    let scale_unit = match accel_output {
-        AccelOutput::Counts => Unit::CountsPerSPerMPerS2,
-        AccelOutput::Volts => Unit::VPerMPerS2,
-        AccelOutput::MetresPerSecondSquared => Unit::MPerS2PerMPerS2,
-    };
+    let scale_unit = accel_output.scale_unit();
     let gyro = names().map(|(index, name)| GyroSensor {
         channel: follows("gyro", index),
         increment_weight_rad_per_rad: Some(1.0),

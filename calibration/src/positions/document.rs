@@ -1,9 +1,8 @@
 //! What was found, as a document.
 
+use isotherm_correction::thermal::Feature;
 use isotherm_correction::units::Angle;
-use isotherm_protocol::document::{
-    AccelOutput, AccelSensor, Curve, Document, OrientationThermal, Quantity, Shape, Unit,
-};
+use isotherm_protocol::document::{AccelSensor, Curve, Document, OrientationThermal, Shape, Unit};
 
 use super::analysis::Analysis;
 use super::model::Sensor;
@@ -12,30 +11,21 @@ use crate::written::tidy;
 /// Room around the temperatures that were taken (°C), for the stand's chamber does not meet them to the degree.
 const ROOM_DEG_C: f64 = 1.0;
 
-/// Units of scale factor and bias for an output.
-pub(crate) const fn units(output: AccelOutput) -> (Unit, Unit) {
-    match output {
-        AccelOutput::Counts => (Unit::CountsPerSPerMPerS2, Unit::CountsPerS),
-        AccelOutput::Volts => (Unit::VPerMPerS2, Unit::V),
-        AccelOutput::MetresPerSecondSquared => (Unit::MPerS2PerMPerS2, Unit::MPerS2),
-    }
-}
-
 /// Puts what was found into a document.
 #[must_use]
 pub fn complete(document: &Document, analysis: &Analysis, gravity: f64) -> Document {
     let mut document = document.clone();
     let Some(accel) = &mut document.accel else { return document };
-    let (scale_unit, bias_unit) = units(accel.output);
+    let scale_unit = accel.output.scale_unit();
     let found = analysis.fit.sensors.iter().zip(&analysis.sensors_deg_c);
     for (sensor, (found, deg_c)) in accel.sensor.iter_mut().zip(found) {
         let range = with_room(deg_c.range);
         let scale: Vec<f64> = found.scale.iter().map(|k| k / gravity).collect();
         if analysis.levels_deg_c.len() > 1 {
             sensor.scale_factor = curve(analysis, &scale, range).in_unit(scale_unit);
-            sensor.bias = Some(curve(analysis, &found.bias, range).in_unit(bias_unit));
+            sensor.set(Feature::One, curve(analysis, &found.bias, range));
         } else {
-            level(sensor, scale[0], found.bias[0], deg_c.mean, (scale_unit, bias_unit));
+            level(sensor, scale[0], found.bias[0], deg_c.mean, scale_unit);
         }
     }
     orient(accel, analysis, with_room(analysis.range_deg_c));
@@ -55,7 +45,7 @@ fn with_room([low, high]: [f64; 2]) -> [f64; 2] {
 }
 
 /// A polynomial over temperature from coefficients over scaled temperature.
-fn curve<Q: Quantity>(analysis: &Analysis, scaled: &[f64], range: [f64; 2]) -> Curve<Q> {
+fn curve(analysis: &Analysis, scaled: &[f64], range: [f64; 2]) -> Curve {
     let mut factor = 1.0;
     let coefficients = scaled.iter().map(|c| {
         let coefficient = tidy(c * factor);
@@ -70,13 +60,7 @@ fn curve<Q: Quantity>(analysis: &Analysis, scaled: &[f64], range: [f64; 2]) -> C
 }
 
 /// Moves an accelerometer's curves to what one temperature says, keeping their shape.
-pub(crate) fn level(
-    sensor: &mut AccelSensor,
-    scale: f64,
-    bias: f64,
-    deg_c: f64,
-    (scale_unit, bias_unit): (Unit, Unit),
-) {
+pub(crate) fn level(sensor: &mut AccelSensor, scale: f64, bias: f64, deg_c: f64, scale_unit: Unit) {
     let constant = |value: f64| Shape::Constant { value: tidy(value) };
     let shape = sensor.scale_factor.shape();
     let shape = match shape.at(deg_c) {
@@ -84,9 +68,10 @@ pub(crate) fn level(
         _ => constant(scale),
     };
     sensor.scale_factor = Curve::new(shape).in_unit(scale_unit);
-    let moved = sensor.bias.as_ref().and_then(|curve| Some(curve.plus(bias - curve.shape().at(deg_c)?)));
+    let old = sensor.terms.curve(Feature::One);
+    let moved = old.and_then(|curve| Some(curve.plus(bias - curve.shape().at(deg_c)?)));
     let shape = moved.map_or_else(|| constant(bias), |curve| times(curve.shape(), 1.0));
-    sensor.bias = Some(Curve::new(shape).in_unit(bias_unit));
+    sensor.set(Feature::One, Curve::new(shape));
 }
 
 /// A shape with all values multiplied.

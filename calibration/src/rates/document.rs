@@ -1,5 +1,6 @@
 //! Scale and axes on their way into a document.
 
+use isotherm_correction::thermal::Feature;
 use isotherm_correction::units::Angle;
 use isotherm_protocol::document::{
     Curve, Document, Gyro, GyroOutput, GyroSensor, Orientation, Shape, Temperature,
@@ -35,10 +36,9 @@ pub fn fitted(
             weights.into_iter().flatten().for_each(|weight| *weight = tidy(*weight / gain));
             if with_bias {
                 let change = found.bias[0];
-                own.static_bias = Some(match &own.static_bias {
-                    Some(bias) => bias.plus(change),
-                    None => Curve::new(Shape::Constant { value: tidy(change) }),
-                });
+                let bias = own.terms.curve(Feature::One).map(|bias| bias.plus(change));
+                let new = || Curve::new(Shape::Constant { value: tidy(change) });
+                own.set(Feature::One, bias.unwrap_or_else(new));
             }
         }
         if let (Some(axis), Some(row)) = (found.axis, document.gyro.orientation.rows.get_mut(sensor)) {

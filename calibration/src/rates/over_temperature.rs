@@ -2,7 +2,8 @@
 //!
 //! Each temperature by itself gives every gyro's weight and axis with their errors; lines and a parabola are laid through them.
 
-use isotherm_protocol::document::{Document, OrientationThermal, Shape};
+use isotherm_correction::thermal::Feature;
+use isotherm_protocol::document::{Curve, Document, OrientationThermal, Shape};
 use nalgebra::{DMatrix, DVector};
 
 use super::make::Wanted;
@@ -197,10 +198,9 @@ impl OverTemperature {
             }
             let s: Vec<f64> = std::iter::once(0.0).chain(line.scale_ppm.iter().copied()).collect();
             let range = room(ends(&|level| level.own_deg_c[index]));
-            let old = sensor.increment_weight_error.take();
-            let old = old
-                .unwrap_or_else(|| isotherm_protocol::document::Curve::new(Shape::Constant { value: 0.0 }));
-            sensor.increment_weight_error = Some(put(&old, (self.reference_deg_c, range), &s, Holds::Error));
+            let none = Curve::new(Shape::Constant { value: 0.0 });
+            let old = sensor.terms.curve(Feature::Reading).unwrap_or(&none);
+            sensor.set(Feature::Reading, put(old, (self.reference_deg_c, range), &s, Holds::Error));
         }
     }
 }

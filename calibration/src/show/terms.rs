@@ -108,8 +108,8 @@ fn term((kind, sensor): (&'static str, &str), name: &str, table: &Table) -> Opti
         _ => Argument::DegC,
     };
     let symbol = |suffix: &str| {
-        let known = Unit::ALL.into_iter().find(|unit| unit.suffix() == suffix);
-        known.map_or_else(|| suffix.replace("_per_", "/").replace('_', " "), |unit| unit.symbol().to_owned())
+        let known = Unit::of_suffix(suffix);
+        known.map_or_else(|| suffix.replace("_per_", "/").replace('_', " "), Unit::symbol)
     };
     let (unit, argument, range, words, parts);
     match form {

@@ -1,9 +1,10 @@
 //! A unit without the terms that a thermal fit gives it, and a nominal document for a log that comes without one.
 
 use isotherm_correction::sample::OutputKind;
+use isotherm_correction::thermal::Feature;
 use isotherm_protocol::document::{
     Accel, AccelOutput, AccelSensor, Channel, Curve, Document, Filter, Gyro, GyroOutput, GyroSensor,
-    Orientation, Shape, Temperature, Unit,
+    Orientation, Shape, Temperature,
 };
 
 use super::checks::median_step_s;
@@ -27,15 +28,12 @@ const DEG_C: [f64; 2] = [-100.0, 200.0];
 pub fn bare(document: &Document) -> Document {
     let mut document = document.clone();
     for sensor in &mut document.gyro.sensor {
-        sensor.static_bias = None;
-        sensor.thermal_rate = None;
-        sensor.thermal_acceleration = None;
-        sensor.lag.clear();
+        let fitted = [Feature::One, Feature::ThermalRate, Feature::ThermalAcceleration, Feature::Lag];
+        sensor.terms.retain(|feature| !fitted.contains(&feature));
         sensor.trend = None;
     }
     for sensor in document.accel.iter_mut().flat_map(|accel| &mut accel.sensor) {
-        sensor.bias = None;
-        sensor.lag.clear();
+        sensor.terms.retain(|feature| !matches!(feature, Feature::One | Feature::Lag));
     }
     document
 }
@@ -135,7 +133,11 @@ fn document(
     };
     let accel = |(index, name): (usize, &&str)| AccelSensor {
         channel: channel_of("accel", index),
-        ..AccelSensor::bare(name, Curve::new(Shape::Constant { value: 1.0 }).in_unit(Unit::MPerS2PerMPerS2))
+        ..AccelSensor::bare(
+            name,
+            Curve::new(Shape::Constant { value: 1.0 })
+                .in_unit(AccelOutput::MetresPerSecondSquared.scale_unit()),
+        )
     };
     let mut used: Vec<String> = (0..3).filter_map(|index| channel_of("gyro", index)).collect();
     if has_accel {

@@ -11,13 +11,14 @@ use isotherm_correction::observation::Observation;
 use isotherm_correction::sample::{
     GyroTick, MAX_SENSORS, MIN_SENSORS, OutputKind, SensorFlags, Sensors, TemperatureReading,
 };
+use isotherm_correction::thermal::Feature;
 use isotherm_correction::unit::{MAX_TICK_DURATION, UnitSettings};
 use isotherm_correction::units::{AngularRate, Span, Timestamp};
 use isotherm_log::offline::Offline;
 use isotherm_log::text::LogEvent;
 use isotherm_protocol::document::{
-    Argument, Branches, Channel, Curve, Document, Filter, Gyro, GyroOutput, GyroSensor, Lag, Orientation,
-    Quantity, Shape, Temperature,
+    Channel, Curve, Document, Filter, Gyro, GyroOutput, GyroSensor, Orientation, Shape, StatedTerm,
+    Temperature,
 };
 
 use super::samples::Samples;
@@ -87,15 +88,11 @@ pub struct Columns<'a> {
 
 impl Basis {
     /// A polynomial with one coefficient of one.
-    pub(super) fn power<Q: Quantity>(&self, power: usize, value: f64) -> Curve<Q> {
+    pub(super) fn power(&self, power: usize, value: f64) -> Curve {
         let mut coefficients = vec![0.0; power + 1];
         coefficients[power] = value;
-        Curve::new(Shape::Polynomial {
-            reference: self.reference_deg_c,
-            coefficients,
-            range: self.range_deg_c,
-        })
-        .over(Argument::DegC)
+        let (reference, range) = (self.reference_deg_c, self.range_deg_c);
+        Curve::new(Shape::Polynomial { reference, coefficients, range })
     }
 
     /// A document of gyros on this channel, each with the term that it is given and nothing else.
@@ -108,13 +105,19 @@ impl Basis {
             };
             match *term {
                 Term::Scale(_) => {}
-                Term::Static(power) => gyro.static_bias = Some(self.power(power, 1.0)),
-                Term::Rate(branch, power) => gyro.thermal_rate = Some(self.branches(branch, power)),
+                Term::Static(power) => gyro.set(Feature::One, self.power(power, 1.0)),
+                Term::Rate(branch, power) => {
+                    gyro.put(StatedTerm::branched(Feature::ThermalRate, self.branches(branch, power)));
+                }
                 Term::Acceleration(branch, power) => {
-                    gyro.thermal_acceleration = Some(self.branches(branch, power));
+                    gyro.put(StatedTerm::branched(
+                        Feature::ThermalAcceleration,
+                        self.branches(branch, power),
+                    ));
                 }
                 Term::Lag(tau, power) => {
-                    gyro.lag.push(Lag { time_constant_s: seconds(tau), gain: self.power(power, 1.0) });
+                    let gain = self.power(power, 1.0);
+                    gyro.put(StatedTerm::with_parameter(Feature::Lag, seconds(tau), gain));
                 }
             }
             gyro
@@ -151,9 +154,8 @@ impl Basis {
         }
     }
 
-    fn branches<Q: Quantity>(&self, branch: Branch, power: usize) -> Branches<Curve<Q>> {
-        let on = |on: bool| self.power(power, f64::from(u8::from(on)));
-        Branches { run_up: on(branch != Branch::Braking), braking: on(branch != Branch::RunUp) }
+    fn branches(&self, branch: Branch, power: usize) -> [Curve; 2] {
+        [Branch::Braking, Branch::RunUp].map(|other| self.power(power, f64::from(u8::from(branch != other))))
     }
 
     /// What up to eight terms subtract over the windows of a run (°/h).

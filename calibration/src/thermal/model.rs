@@ -1,8 +1,7 @@
 //! Which terms a sensor has, and their place in the document.
 
-use isotherm_protocol::document::{
-    AccelLag, AccelSensor, Argument, Branches, Curve, GyroSensor, Lag, Quantity, Shape, Unit,
-};
+use isotherm_correction::thermal::Feature;
+use isotherm_protocol::document::{AccelSensor, Curve, GyroSensor, Shape, StatedTerm};
 
 use super::columns::{Basis, Branch, Term, seconds};
 use super::scale::{Holds, put};
@@ -88,18 +87,14 @@ pub fn described(term: Term, output: &str) -> (String, String) {
 }
 
 /// A curve from the coefficients of its powers; `None` without any.
-fn curve<Q: Quantity>(basis: &Basis, found: &[(usize, f64)]) -> Option<Curve<Q>> {
+fn curve(basis: &Basis, found: &[(usize, f64)]) -> Option<Curve> {
     let highest = found.iter().map(|(power, _)| *power).max()?;
     let mut coefficients = vec![0.0; highest + 1];
     for (power, value) in found {
         coefficients[*power] = tidy(*value);
     }
-    let curve = Curve::new(Shape::Polynomial {
-        reference: basis.reference_deg_c,
-        coefficients,
-        range: basis.range_deg_c,
-    });
-    Some(curve.over(Argument::DegC))
+    let (reference, range) = (basis.reference_deg_c, basis.range_deg_c);
+    Some(Curve::new(Shape::Polynomial { reference, coefficients, range }))
 }
 
 /// Coefficients of one kind of term, by power.
@@ -126,6 +121,20 @@ fn of_lag(found: &[(Term, f64)], tau: u64) -> Vec<(usize, f64)> {
     })
 }
 
+fn lags(basis: &Basis, found: &[(Term, f64)]) -> impl Iterator<Item = StatedTerm> {
+    taus(found).into_iter().filter_map(|tau| {
+        let gain = curve(basis, &of_lag(found, tau))?;
+        Some(StatedTerm::with_parameter(Feature::Lag, seconds(tau), gain))
+    })
+}
+
+fn of_static(found: &[(Term, f64)]) -> Vec<(usize, f64)> {
+    powers(found, |term| match term {
+        Term::Static(power) => Some(power),
+        _ => None,
+    })
+}
+
 /// Coefficients of the scale factor error (ppm), by power from 0; `None` where the scale factor stays.
 fn scale_error(found: &[(Term, f64)]) -> Option<Vec<f64>> {
     let powers = powers(found, |term| match term {
@@ -143,37 +152,33 @@ fn scale_error(found: &[(Term, f64)]) -> Option<Vec<f64>> {
 /// Puts found coefficients (°/h and so on) into a gyro that has none of these terms; its scale factor keeps what it has, times the
 /// error that was found.
 pub fn put_gyro(sensor: &mut GyroSensor, basis: &Basis, found: &[(Term, f64)]) {
-    sensor.static_bias = curve(
-        basis,
-        &powers(found, |term| match term {
-            Term::Static(power) => Some(power),
-            _ => None,
-        }),
-    );
-    sensor.thermal_rate = branches(basis, found, |term| match term {
+    sensor.set(Feature::One, curve(basis, &of_static(found)));
+    let rate = branches(basis, found, |term| match term {
         Term::Rate(branch, power) => Some((branch, power)),
         _ => None,
     });
-    sensor.thermal_acceleration = branches(basis, found, |term| match term {
+    let acceleration = branches(basis, found, |term| match term {
         Term::Acceleration(branch, power) => Some((branch, power)),
         _ => None,
     });
-    let lag =
-        |tau: u64| Some(Lag { time_constant_s: seconds(tau), gain: curve(basis, &of_lag(found, tau))? });
-    sensor.lag = taus(found).into_iter().filter_map(lag).collect();
+    for (feature, branches) in [(Feature::ThermalRate, rate), (Feature::ThermalAcceleration, acceleration)] {
+        branches.into_iter().for_each(|curves| sensor.put(StatedTerm::branched(feature, curves)));
+    }
+    lags(basis, found).for_each(|lag| sensor.put(lag));
     if let Some(error) = scale_error(found) {
-        let old = sensor.increment_weight_error.take();
-        let old = old.unwrap_or_else(|| Curve::new(Shape::Constant { value: 0.0 }));
-        sensor.increment_weight_error =
-            Some(put(&old, (basis.reference_deg_c, basis.range_deg_c), &error, Holds::Error));
+        let none = Curve::new(Shape::Constant { value: 0.0 });
+        let old = sensor.terms.curve(Feature::Reading).unwrap_or(&none);
+        let new = put(old, (basis.reference_deg_c, basis.range_deg_c), &error, Holds::Error);
+        sensor.set(Feature::Reading, new);
     }
 }
 
-fn branches<Q: Quantity>(
+/// Run-up and braking.
+fn branches(
     basis: &Basis,
     found: &[(Term, f64)],
     of: impl Fn(Term) -> Option<(Branch, usize)>,
-) -> Option<Branches<Curve<Q>>> {
+) -> Option<[Curve; 2]> {
     let side = |side: Branch| {
         let found =
             powers(found, |term| of(term).filter(|(on, _)| *on == Branch::Both || *on == side).map(|x| x.1));
@@ -183,7 +188,7 @@ fn branches<Q: Quantity>(
         (None, None) => None,
         (up, down) => {
             let zero = || curve(basis, &[(0, 0.0)]);
-            Some(Branches { run_up: up.or_else(zero)?, braking: down.or_else(zero)? })
+            Some([up.or_else(zero)?, down.or_else(zero)?])
         }
     }
 }
@@ -191,37 +196,10 @@ fn branches<Q: Quantity>(
 /// Puts found coefficients (output units and so on) into an accelerometer, which has a static bias and lags only; its scale factor
 /// keeps what it has, times the error that was found.
 pub fn put_accel(sensor: &mut AccelSensor, basis: &Basis, found: &[(Term, f64)]) {
-    let unit = output_unit(sensor.scale_factor.unit());
-    let of_static = powers(found, |term| match term {
-        Term::Static(power) => Some(power),
-        _ => None,
-    });
-    sensor.bias = curve(basis, &of_static).map(|curve| curve.in_unit(unit));
-    let lag = |tau: u64| {
-        let gain = curve(basis, &of_lag(found, tau))?.in_unit(lag_unit(unit));
-        Some(AccelLag { time_constant_s: seconds(tau), gain })
-    };
-    sensor.lag = taus(found).into_iter().filter_map(lag).collect();
+    sensor.set(Feature::One, curve(basis, &of_static(found)));
+    lags(basis, found).for_each(|lag| sensor.put(lag));
     if let Some(error) = scale_error(found) {
         sensor.scale_factor =
             put(&sensor.scale_factor, (basis.reference_deg_c, basis.range_deg_c), &error, Holds::Factor);
-    }
-}
-
-/// The output that a scale factor leads to.
-#[must_use]
-pub fn output_unit(scale_factor: Unit) -> Unit {
-    match scale_factor {
-        Unit::VPerMPerS2 => Unit::V,
-        Unit::MPerS2PerMPerS2 => Unit::MPerS2,
-        _ => Unit::CountsPerS,
-    }
-}
-
-fn lag_unit(output: Unit) -> Unit {
-    match output {
-        Unit::V => Unit::VPerDegCPerS,
-        Unit::MPerS2 => Unit::MPerS2PerDegCPerS,
-        _ => Unit::CountsPerSPerDegCPerS,
     }
 }

@@ -1,5 +1,6 @@
 //! What a thermal fit came to: the document, its verdicts, its report.
 
+use isotherm_correction::thermal::Feature;
 use isotherm_protocol::document::{Document, Filter, Origin, Sample};
 
 use super::branches::History;
@@ -216,11 +217,12 @@ impl Outcome {
             if sensor.gyro {
                 let gyro = self.base.gyro.sensor.get(sensor.index);
                 gyro.is_some_and(|gyro| {
-                    gyro.thermal_rate.is_some() || gyro.thermal_acceleration.is_some() || !gyro.lag.is_empty()
+                    let following = [Feature::ThermalRate, Feature::ThermalAcceleration, Feature::Lag];
+                    following.into_iter().any(|feature| gyro.terms.has(feature))
                 })
             } else {
                 let accel = self.base.accel.as_ref().and_then(|accel| accel.sensor.get(sensor.index));
-                accel.is_some_and(|accel| !accel.lag.is_empty())
+                accel.is_some_and(|accel| accel.terms.has(Feature::Lag))
             }
         };
         let refused = self.found.iter().filter(|(.., found)| found.refused.is_some());

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use isotherm_correction::sample::{ChannelName, TemperatureReading};
+use isotherm_correction::thermal::Feature;
 use isotherm_correction::units::Timestamp;
 use isotherm_log::offline::Loaded;
 use isotherm_protocol::document::{Curve, Document, Shape};
@@ -139,8 +140,7 @@ fn thermometers(series: &Series) -> BTreeMap<String, Thermometer> {
 fn with_unit_bias(bare: &Document) -> Document {
     let mut document = bare.clone();
     for sensor in document.accel.iter_mut().flat_map(|accel| &mut accel.sensor) {
-        let unit = super::model::output_unit(sensor.scale_factor.unit());
-        sensor.bias = Some(Curve::new(Shape::Constant { value: 1.0 }).in_unit(unit));
+        sensor.set(Feature::One, Curve::new(Shape::Constant { value: 1.0 }));
     }
     document
 }

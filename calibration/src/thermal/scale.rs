@@ -10,7 +10,7 @@
 //! The y beside s is taken from a cubic over temperature for each run: its noise would otherwise pull s towards that of nothing.
 
 use isotherm_correction::units::STANDARD_GRAVITY_M_PER_S2;
-use isotherm_protocol::document::{Argument, Curve, Quantity, Shape};
+use isotherm_protocol::document::{Curve, Shape};
 
 use crate::drift::figures::short;
 use crate::lsq::weighted::once;
@@ -152,12 +152,7 @@ impl Holds {
 /// Polynomials stay polynomials and splines keep their knots; what has no such form over the fitted range becomes straight lines
 /// between knots near enough.
 #[must_use]
-pub fn put<Q: Quantity>(
-    old: &Curve<Q>,
-    (reference_deg_c, range): (f64, [f64; 2]),
-    s: &[f64],
-    how: Holds,
-) -> Curve<Q> {
+pub fn put(old: &Curve, (reference_deg_c, range): (f64, [f64; 2]), s: &[f64], how: Holds) -> Curve {
     let at = |t: f64| {
         let away = t.clamp(range[0], range[1]) - reference_deg_c;
         s.iter().rev().fold(0.0, |sum, c| sum * away + c)
@@ -191,7 +186,7 @@ pub fn put<Q: Quantity>(
             Shape::PiecewiseLinear { knots: (0..KNOTS).map(knot).collect() }
         }
     });
-    Curve::new(shape).in_unit(old.unit()).over(Argument::DegC)
+    Curve::new(shape).in_unit(old.unit())
 }
 
 /// Coefficients of the same polynomial about a point that lies `by` further.
@@ -207,7 +202,7 @@ fn moved(coefficients: &[f64], by: f64) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
-    use isotherm_protocol::document::{Relative, ScaleFactor, Unit};
+    use isotherm_protocol::document::AccelOutput;
 
     use super::*;
 
@@ -227,9 +222,9 @@ mod tests {
         for (shape, limit) in
             [(wide, 1e-12), (narrow, 1e-6), (lines, 1e-6), (Shape::Constant { value: 0.1 }, 1e-12)]
         {
-            let old: Curve<ScaleFactor> = Curve::new(shape).in_unit(Unit::VPerMPerS2);
+            let old = Curve::new(shape).in_unit(AccelOutput::Volts.scale_unit());
             let new = put(&old, OVER, &s, Holds::Factor);
-            assert_eq!(new.unit(), Unit::VPerMPerS2);
+            assert_eq!(new.unit(), old.unit());
             for t in [-40.0, -31.0, -7.3, 0.0, 10.0, 44.4, 60.0] {
                 let away = t - 10.0;
                 let factor = 1.0 + 1e-6 * (s[0] + s[1] * away + s[2] * away * away);
@@ -238,7 +233,7 @@ mod tests {
                 assert!((got / wanted - 1.0).abs() < limit, "{t}: {got} {wanted}");
             }
         }
-        let old: Curve<Relative> = Curve::new(Shape::Constant { value: 500.0 });
+        let old = Curve::new(Shape::Constant { value: 500.0 });
         let new = put(&old, OVER, &s, Holds::Error);
         let got = 1.0 + 1e-6 * new.shape().at(30.0).unwrap();
         let wanted = (1.0 + 500e-6) * (1.0 + 1e-6 * (300.0 + 400.0 - 40.0));

@@ -1,14 +1,15 @@
 //! What was found of a tumbled unit, as a document.
 
+use isotherm_correction::thermal::Feature;
 use isotherm_correction::units::{AngularRate, STANDARD_GRAVITY_M_PER_S2};
-use isotherm_protocol::document::{Accel, AccelOutput, AlongAxes, Curve, Document, Shape};
+use isotherm_protocol::document::{Accel, AccelOutput, Curve, Document, Shape};
 
 use super::accel::AccelFit;
 use super::acceleration::GyroDrift;
 use super::analysis::Tumble;
 use super::analysis::odd::odd;
 use super::gyro::GyroFit;
-use crate::positions::document::{level, units};
+use crate::positions::document::level;
 use crate::written::tidy;
 
 /// Puts what was found into a document; gives what is to be said of it.
@@ -26,11 +27,11 @@ pub fn complete(document: &Document, tumble: &Tumble) -> Result<(Document, Vec<S
     };
     let mut warnings = odd(base, tumble, &temperature)?;
     if let Some(accel) = &mut document.accel {
-        let units = units(accel.output);
+        let scale_unit = accel.output.scale_unit();
         for (index, sensor) in accel.sensor.iter_mut().enumerate() {
             let deg_c = temperature(sensor.channel.as_ref());
             let AccelFit { scale, bias, .. } = &tumble.accel;
-            level(sensor, scale[index], bias[index], deg_c, units);
+            level(sensor, scale[index], bias[index], deg_c, scale_unit);
         }
         accel.orientation.rows = tumble.accel.rows.iter().map(|row| row.map(tidy)).collect();
         if accel.orientation.thermal.take().is_some() {
@@ -55,26 +56,23 @@ fn gyros(
 ) {
     for (index, sensor) in document.gyro.sensor.iter_mut().enumerate() {
         let deg_c = temperature(sensor.channel.as_ref());
-        let error = sensor.increment_weight_error.as_ref().and_then(|curve| curve.shape().at(deg_c));
+        let error = sensor.terms.curve(Feature::Reading).and_then(|curve| curve.shape().at(deg_c));
         let weight = found.weight[index];
         sensor.increment_weight_rad_per_rad = Some(tidy(weight / (1.0 + error.unwrap_or(0.0) * 1e-6)));
         let deg_per_h = |of_log: f64| AngularRate::from_rad_per_s(weight * of_log).as_deg_per_h();
         let drift = acceleration[index].as_ref().ok();
         let rest = deg_per_h(drift.map_or(found.rest[index], |drift| drift.response.bias));
         if let Some(drift) = drift {
-            let along = |per_force: f64| {
+            let axes = [Feature::ForceX, Feature::ForceY, Feature::ForceZ];
+            for (feature, per_force) in axes.into_iter().zip(drift.response.by_force) {
                 let value = tidy(deg_per_h(per_force * STANDARD_GRAVITY_M_PER_S2));
-                Some(Curve::new(Shape::Constant { value }))
-            };
-            let [x, y, z] = drift.response.by_force.map(along);
-            sensor.acceleration_sensitive_drift = Some(AlongAxes { x, y, z });
+                sensor.set(feature, Curve::new(Shape::Constant { value }));
+            }
         }
-        let there = sensor.static_bias.take();
-        let old = there.as_ref().and_then(|curve| curve.shape().at(deg_c));
-        sensor.static_bias = Some(match (there, old) {
-            (Some(curve), Some(old)) => curve.plus(tidy(rest - old)),
-            _ => Curve::new(Shape::Constant { value: tidy(rest) }),
-        });
+        let there = sensor.terms.curve(Feature::One);
+        let moved = there.and_then(|curve| Some(curve.plus(tidy(rest - curve.shape().at(deg_c)?))));
+        let new = || Curve::new(Shape::Constant { value: tidy(rest) });
+        sensor.set(Feature::One, moved.unwrap_or_else(new));
     }
     document.gyro.orientation.rows = found.rows.iter().map(|row| row.map(tidy)).collect();
     document.gyro.orientation.thermal = None;
@@ -96,11 +94,11 @@ pub fn before(base: &Document, tumble: &Tumble, given: bool) -> (Document, &'sta
          gyros' readings less their mean over all poses."
     };
     if let Some(accel) = document.accel.as_mut().filter(|accel| !given && !raw(accel)) {
-        let (scale_unit, bias_unit) = units(accel.output);
+        let scale_unit = accel.output.scale_unit();
         for sensor in &mut accel.sensor {
             let constant = |value| Shape::Constant { value };
             sensor.scale_factor = Curve::new(constant(mean(tumble.accel.scale))).in_unit(scale_unit);
-            sensor.bias = Some(Curve::new(constant(mean(tumble.accel.bias))).in_unit(bias_unit));
+            sensor.set(Feature::One, Curve::new(constant(mean(tumble.accel.bias))));
         }
     }
     if let Ok(gyro) =
@@ -109,7 +107,7 @@ pub fn before(base: &Document, tumble: &Tumble, given: bool) -> (Document, &'sta
         // Without the mean at rest the gyros would be judged by their bias, which nobody leaves in.
         for (sensor, rest) in document.gyro.sensor.iter_mut().zip(gyro.rest) {
             let rest = AngularRate::from_rad_per_s(rest).as_deg_per_h();
-            sensor.static_bias = Some(Curve::new(Shape::Constant { value: tidy(rest) }));
+            sensor.set(Feature::One, Curve::new(Shape::Constant { value: tidy(rest) }));
         }
     }
     (document, words)

@@ -6,6 +6,7 @@ use isotherm_calibration::finding::{AccelKind, Kind};
 use isotherm_calibration::runs::Run;
 use isotherm_calibration::thermal::{Site, Stand};
 use isotherm_calibration::written::Written;
+use isotherm_correction::thermal::Feature;
 use isotherm_log::offline::unit_id;
 use isotherm_log::text::LogEvent;
 use isotherm_protocol::document::{Curve, Document, Shape};
@@ -68,7 +69,7 @@ fn base(thermostat: bool) -> Document {
         sensor.board_channel = Some("board".to_owned());
         if thermostat {
             sensor.channel = None;
-            sensor.bias = None;
+            sensor.set(Feature::One, None);
         }
     }
     document.origin = None;

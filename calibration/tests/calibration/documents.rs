@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use isotherm_calibration::written::Written;
+use isotherm_correction::thermal::Feature;
 use isotherm_protocol::document::{Curve, Document, Measure, Origin, Residual, Sample, Shape};
 use serde_json::Value;
 
@@ -69,7 +70,7 @@ fn diff_tells_what_has_changed() {
     save(&path("before.toml"), |_| ());
     save(&path("after.toml"), |document| {
         document.accel.as_mut().unwrap().orientation.rows[2][0] += 50.0 / 206_265.0;
-        document.gyro.sensor[0].static_bias = Some(Curve::new(Shape::Constant { value: 9.0 }));
+        document.gyro.sensor[0].set(Feature::One, Curve::new(Shape::Constant { value: 9.0 }));
     });
     let (before, after, html) = (path("before.toml"), path("after.toml"), path("diff.html"));
     let changes = json(&["diff", &before, &after, "--axis-sigma", "5", "--json", "--html", &html]);
@@ -91,7 +92,7 @@ fn merge_puts_parts_together_or_says_what_is_in_the_way() {
     let path = |name: &str| files.path().join(name).display().to_string();
     let bias = |value: f64| {
         move |document: &mut Document| {
-            document.gyro.sensor[0].static_bias = Some(Curve::new(Shape::Constant { value }));
+            document.gyro.sensor[0].set(Feature::One, Curve::new(Shape::Constant { value }));
         }
     };
     let axes =

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use isotherm_correction::thermal::Feature;
 use isotherm_log::text::LogEvent;
 use isotherm_protocol::document::{Document, Sample};
 use isotherm_simulator::chamber::Profile;
@@ -58,9 +59,9 @@ pub(crate) fn base(folder: &Path) -> PathBuf {
     let path = shipped("ZLG-0001.toml");
     let mut document = Document::parse(&std::fs::read_to_string(path).unwrap(), None).unwrap().document;
     for sensor in &mut document.gyro.sensor {
-        sensor.static_bias = None;
-        sensor.magnetic_bias = None;
-        sensor.slow_meander = None;
+        sensor
+            .terms
+            .retain(|feature| !matches!(feature, Feature::One | Feature::LasingMode | Feature::Meander));
         sensor.servo = None;
     }
     document.mode_reversal = None;

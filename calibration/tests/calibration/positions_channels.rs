@@ -4,6 +4,7 @@ use std::path::Path;
 
 use isotherm_calibration::positions::plan::Plan;
 use isotherm_calibration::written::Written;
+use isotherm_correction::thermal::Feature;
 use isotherm_log::text::LogEvent;
 use isotherm_protocol::document::{Document, Shape};
 use isotherm_simulator::instrument::Instrument;
@@ -35,7 +36,8 @@ fn record(path: &str, instrument: &Instrument, chamber_deg_c: f64) -> f64 {
 fn wrong(path: &str) -> Document {
     let mut document = Written::read(&shipped("MEMS-0001.toml")).unwrap().document;
     for sensor in &mut document.accel.as_mut().unwrap().sensor {
-        sensor.bias = sensor.bias.as_ref().map(|bias| bias.plus(0.02));
+        let bias = sensor.terms.curve(Feature::One).map(|bias| bias.plus(0.02));
+        sensor.set(Feature::One, bias);
     }
     std::fs::write(path, Written::of(&document).unwrap().text).unwrap();
     document
@@ -67,7 +69,7 @@ fn scale_and_bias_stand_at_the_temperature_of_their_own_channel() {
     assert_eq!(old.orientation.thermal, new.orientation.thermal);
     for (old, new) in old.sensor.iter().zip(&new.sensor) {
         let at = |sensor: &isotherm_protocol::document::AccelSensor| {
-            sensor.bias.as_ref().unwrap().shape().at(24.0).unwrap()
+            sensor.terms.curve(Feature::One).unwrap().shape().at(24.0).unwrap()
         };
         assert!((at(new) - at(old) + 0.02).abs() < 3e-4, "{} {}", at(old), at(new));
     }
@@ -93,7 +95,7 @@ fn curves_reach_as_far_as_their_own_channel_went() {
     // The housing itself is 2 °C above the chamber.
     let hottest = 55.0 + 2.0 + logs[2].2;
     for sensor in &accel.sensor {
-        for shape in [sensor.scale_factor.shape(), sensor.bias.as_ref().unwrap().shape()] {
+        for shape in [sensor.scale_factor.shape(), sensor.terms.curve(Feature::One).unwrap().shape()] {
             let Shape::Polynomial { range: [low, high], .. } = shape else { panic!("{shape:?}") };
             assert!(*high >= hottest && *low <= -18.0 + logs[0].2, "{low}…{high}, went to {hottest}");
         }

@@ -5,7 +5,8 @@ use std::path::Path;
 use isotherm_calibration::positions::document::complete;
 use isotherm_calibration::positions::plan::Plan;
 use isotherm_calibration::written::Written;
-use isotherm_protocol::document::{AccelSensor, Curve, Document, GyroSensor, Shape, Unit};
+use isotherm_correction::thermal::Feature;
+use isotherm_protocol::document::{AccelOutput, AccelSensor, Curve, Document, GyroSensor, Shape};
 use isotherm_simulator::Scenario;
 use isotherm_simulator::chamber::Profile;
 use isotherm_simulator::instrument::{Gyros, Instrument};
@@ -49,7 +50,9 @@ fn document() -> Document {
     let accel = document.accel.as_mut().unwrap();
     accel.output = isotherm_protocol::document::AccelOutput::MetresPerSecondSquared;
     accel.orientation.rows = rows;
-    let one = || Curve::new(Shape::Constant { value: 1.0 }).in_unit(Unit::MPerS2PerMPerS2);
+    let one = || {
+        Curve::new(Shape::Constant { value: 1.0 }).in_unit(AccelOutput::MetresPerSecondSquared.scale_unit())
+    };
     let sensor = |(index, name): (usize, &&str)| AccelSensor {
         channel: Some(format!("accel{index}")),
         ..AccelSensor::bare(name, one())
@@ -215,8 +218,9 @@ fn modes_find_a_fourth_gyro_that_stands_askew() {
     let made = Written::read(Path::new(&out)).unwrap().document;
     let value = |gyro: usize, deg_c: f64| {
         let sensor = &made.gyro.sensor[gyro];
-        [&sensor.static_bias, &sensor.magnetic_bias]
-            .map(|curve| curve.as_ref().unwrap().shape().at(deg_c).unwrap())
+        [Feature::One, Feature::LasingMode]
+            .map(|feature| sensor.terms.curve(feature))
+            .map(|curve| curve.unwrap().shape().at(deg_c).unwrap())
     };
     for deg_c in [-25.0, 10.0, 45.0] {
         let (second, fourth) = (value(1, deg_c), value(3, deg_c));

@@ -10,9 +10,10 @@ use std::collections::BTreeMap;
 use isotherm_calibration::positions::plan::{Attitude, Plan};
 use isotherm_calibration::runs::Run;
 use isotherm_calibration::written::Written;
+use isotherm_correction::thermal::Feature;
 use isotherm_log::offline::unit_id;
 use isotherm_log::text::LogEvent;
-use isotherm_protocol::document::{AccelOutput, Curve, Document, Shape, Unit};
+use isotherm_protocol::document::{AccelOutput, Curve, Document, Shape};
 use isotherm_simulator::chamber::Profile;
 use isotherm_simulator::instrument::Instrument;
 use isotherm_simulator::motion::{Motion, Path};
@@ -101,10 +102,11 @@ pub(crate) fn document() -> Document {
     accel.output = AccelOutput::Counts;
     for (index, sensor) in accel.sensor.iter_mut().enumerate() {
         let nominal = Shape::Constant { value: 0.102 * HZ_PER_V };
-        sensor.scale_factor = Curve::new(nominal).in_unit(Unit::CountsPerSPerMPerS2);
-        sensor.bias = None;
+        sensor.scale_factor = Curve::new(nominal).in_unit(AccelOutput::Counts.scale_unit());
+        sensor.set(Feature::One, None);
         sensor.channel = Some(format!("accel{index}"));
-        let Shape::Polynomial { range, .. } = document.gyro.sensor[0].static_bias.as_ref().unwrap().shape()
+        let Shape::Polynomial { range, .. } =
+            document.gyro.sensor[0].terms.curve(Feature::One).unwrap().shape()
         else {
             unreachable!()
         };
@@ -112,7 +114,7 @@ pub(crate) fn document() -> Document {
         let truth = instrument().accelerometers.unwrap().sensors[index];
         let coefficients = vec![0.0, truth.board_ratio[1] * 1e6, truth.board_ratio[2] * 1e6];
         let ratio = Shape::Polynomial { reference: truth.reference_deg_c, coefficients, range: *range };
-        sensor.board_ratio_error = Some(Curve::new(ratio).in_unit(Unit::Ppm));
+        sensor.board_ratio_error = Some(Curve::new(ratio));
     }
     accel.orientation.rows = vec![[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     accel.orientation.thermal = None;

@@ -22,6 +22,7 @@ use isotherm_calibration::report::FitReport;
 use isotherm_calibration::runs::Run;
 use isotherm_calibration::thermal::{Fitted, Method, Settings, Site, fit};
 use isotherm_correction::earth::Place;
+use isotherm_correction::thermal::Feature;
 use isotherm_log::offline::unit_id;
 use isotherm_log::text::LogEvent;
 use isotherm_protocol::document::{Document, Origin};
@@ -100,8 +101,10 @@ fn methods_reach_what_they_must_on_a_simulated_coil() {
     for (method, rms, peak_to_peak) in wanted {
         let Fitted { report, written, .. } = fitted(method, &runs);
         let gyros = &written.document.gyro.sensor;
-        assert_eq!(gyros.iter().all(|gyro| gyro.thermal_rate.is_some()), method != Method::Joint);
-        assert!(method != Method::Rate || gyros.iter().all(|gyro| gyro.thermal_acceleration.is_none()));
+        assert_eq!(gyros.iter().all(|gyro| gyro.terms.has(Feature::ThermalRate)), method != Method::Joint);
+        assert!(
+            method != Method::Rate || gyros.iter().all(|gyro| !gyro.terms.has(Feature::ThermalAcceleration))
+        );
         println!("{method:?}: {:.1?} times smaller, together {:.1?}", factors(&report), together(&report));
         println!("{}", report.headline());
         let reached = together(&report);

@@ -11,6 +11,7 @@ use isotherm_calibration::tumble::acceleration;
 use isotherm_calibration::tumble::analysis::{Settings, Tumble, analyse};
 use isotherm_calibration::tumble::document::complete;
 use isotherm_calibration::written::Written;
+use isotherm_correction::thermal::Feature;
 use isotherm_correction::unit::UnitSettings;
 use isotherm_log::mapping::Mapping;
 use isotherm_log::message::Topic;
@@ -53,7 +54,7 @@ fn the_real_tumble_log_gives_the_known_answers() {
     for (sensor, (scale, bias)) in accel.sensor.iter().zip(known) {
         let per_count = 1.0 / constant(sensor.scale_factor.shape());
         assert!((per_count / scale - 1.0).abs() < 0.01, "{}: {per_count}", sensor.name);
-        let found = constant(sensor.bias.as_ref().unwrap().shape());
+        let found = constant(sensor.terms.curve(Feature::One).unwrap().shape());
         assert!((found - bias).abs() < 1.0, "{}: {found}", sensor.name);
     }
     let residual = written.document.origin.as_ref().unwrap().residual.clone();
@@ -71,8 +72,8 @@ fn the_real_tumble_log_gives_the_known_answers() {
         assert!((per_count * 4775.0 - 1.0).abs() < 0.01, "{}: 1/{}", sensor.name, 1.0 / per_count);
     }
     for sensor in &written.document.gyro.sensor {
-        let along = sensor.acceleration_sensitive_drift.as_ref().unwrap();
-        let [x, y, z] = [&along.x, &along.y, &along.z].map(|curve| constant(curve.as_ref().unwrap().shape()));
+        let axes = [Feature::ForceX, Feature::ForceY, Feature::ForceZ];
+        let [x, y, z] = axes.map(|axis| constant(sensor.terms.curve(axis).unwrap().shape()));
         let size = libm::sqrt(x * x + y * y + z * z);
         assert!((50.0..1000.0).contains(&size), "{}: {size} (°/h)/g", sensor.name);
     }

@@ -7,10 +7,11 @@ use isotherm_calibration::runs::Run;
 use isotherm_calibration::runs::table::Table;
 use isotherm_calibration::written::Written;
 use isotherm_correction::sample::OutputKind;
+use isotherm_correction::thermal::Feature;
 use isotherm_log::offline::unit_id;
 use isotherm_log::part::{LogFiles, Part};
 use isotherm_log::text::LogEvent;
-use isotherm_protocol::document::{Document, Shape};
+use isotherm_protocol::document::{Curve, Document, Shape, StatedTerm};
 use isotherm_simulator::Simulation;
 use isotherm_simulator::failure::{FailingSensor, Failure, Fault};
 use serde_json::Value;
@@ -55,13 +56,17 @@ fn a_good_document_is_accepted_and_a_bad_one_is_not() {
     }
     // The sign of a bias the wrong way round.
     save(Path::new(&path("bad.toml")), |document| {
-        for lag in &mut document.gyro.sensor[0].lag {
-            let Shape::Polynomial { reference, coefficients, range } = lag.gain.shape().clone() else {
+        let sensor = &mut document.gyro.sensor[0];
+        let lags: Vec<StatedTerm> = sensor.terms.of(Feature::Lag).cloned().collect();
+        sensor.terms.remove(Feature::Lag);
+        for lag in lags {
+            let Shape::Polynomial { reference, coefficients, range } = lag.curve().unwrap().shape().clone()
+            else {
                 continue;
             };
             let coefficients = coefficients.iter().map(|c| -c).collect();
-            lag.gain =
-                isotherm_protocol::document::Curve::new(Shape::Polynomial { reference, coefficients, range });
+            let gain = Curve::new(Shape::Polynomial { reference, coefficients, range });
+            sensor.put(StatedTerm::with_parameter(Feature::Lag, lag.parameter, gain));
         }
     });
     let (code, stdout, stderr) = words(&calibrate(&["validate", &path("bad.toml"), &path("judge.mcap")]));

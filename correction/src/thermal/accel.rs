@@ -3,7 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::bank::Follows;
-use super::terms::{ACCEL_TERMS, Others, SensorState, Terms};
+use super::declared::ACCEL_TERMS;
+use super::terms::{Others, SensorState, Terms};
 use super::trail::{Trail, settled};
 use crate::calibration::{AccelParts, RegressorParts};
 use crate::channel::{ThermalFilter, ThermalState};

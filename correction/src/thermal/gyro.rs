@@ -6,7 +6,8 @@ use arrayvec::ArrayVec;
 use serde::{Deserialize, Serialize};
 
 use super::bank::Follows;
-use super::terms::{GYRO_TERMS, Others, SensorState, Terms};
+use super::declared::GYRO_TERMS;
+use super::terms::{Others, SensorState, Terms};
 use super::trail::{Trail, settled};
 use crate::calibration::{GyroParts, RegressorParts};
 use crate::channel::{ThermalFilter, ThermalState};

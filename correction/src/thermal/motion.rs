@@ -6,7 +6,8 @@ use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 
 use super::bank::Follows;
-use super::terms::{ACCEL_TERMS, GYRO_TERMS, SensorState, Terms};
+use super::declared::{ACCEL_TERMS, GYRO_TERMS};
+use super::terms::{SensorState, Terms};
 use super::trail::{MAX_TRAILS, Trail};
 use crate::calibration::{AccelParts, GyroParts, RegressorParts};
 use crate::channel::{ThermalFilter, ThermalState};

@@ -1,4 +1,4 @@
-//! The terms of the sensors' models: each is a coefficient times a feature. Which there are is said here and nowhere else.
+//! The terms of the sensors' models, evaluated.
 //!
 //! A coefficient is a curve over the sensor's temperature, or one for either thermal branch over temperature or the feature
 //! itself. Terms of one line are added up at each thermal evaluation; a tick multiplies the lines, not the terms.
@@ -7,102 +7,11 @@ use alloc::vec::Vec;
 
 use serde::{Deserialize, Serialize};
 
+use super::declared::{Feature, Term};
 use super::trail::{Trail, Trailed};
 use crate::calibration::{BranchArgument, CoefficientParts, RegressorParts, Source, TermParts};
 use crate::channel::{ThermalFilter, ThermalState};
 use crate::curve::{Curve, CurveError, CurveParts};
-
-/// What a coefficient is multiplied by. Terms are added up in this order.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-pub enum Feature {
-    /// What the sensor reads: the coefficient is a relative error of its scale.
-    Reading,
-    /// 1.
-    One,
-    /// Sign of the lasing mode.
-    LasingMode,
-    /// Sign of the slow meander's phase.
-    Meander,
-    /// `(T − L_τ[T])/τ`, `L_τ` a first-order low-pass (°C/s).
-    Lag,
-    /// `p_w[T] − T`, `p_w` a play of half width w: what sticks, and is dragged along by temperature (°C).
-    Play,
-    /// `x − x₀`: what another channel says, less what a third one does and a constant (the channel's unit).
-    Regressor,
-    /// Ṫ (°C/s).
-    ThermalRate,
-    /// T̈ (°C/s²).
-    ThermalAcceleration,
-    /// Specific force along case axis x (m/s²).
-    ForceX,
-    /// Along y.
-    ForceY,
-    /// Along z.
-    ForceZ,
-    /// Magnitude of the rate that the gyro reads (rad/s): the coefficient is an asymmetry of its scale.
-    RateMagnitude,
-    /// Square of the specific force along the input axis (m²/s⁴).
-    ForceSquared,
-}
-
-/// A term as it is declared.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Term {
-    /// What its coefficient is multiplied by; no two terms of a kind of sensor have the same.
-    pub feature: Feature,
-    /// Its key in a document; a part of a table after a full stop.
-    pub key: &'static str,
-}
-
-/// Terms of a gyro (models §2): all but the first add to its bias Ω (rad/s).
-pub const GYRO_TERMS: [Term; 13] = [
-    Term { feature: Feature::Reading, key: "increment_weight_error" },
-    Term { feature: Feature::One, key: "static_bias" },
-    Term { feature: Feature::LasingMode, key: "magnetic_bias" },
-    Term { feature: Feature::Meander, key: "slow_meander" },
-    Term { feature: Feature::Lag, key: "lag" },
-    Term { feature: Feature::Play, key: "hysteresis" },
-    Term { feature: Feature::Regressor, key: "regressor" },
-    Term { feature: Feature::ThermalRate, key: "thermal_rate" },
-    Term { feature: Feature::ThermalAcceleration, key: "thermal_acceleration" },
-    Term { feature: Feature::ForceX, key: "acceleration_sensitive_drift.x" },
-    Term { feature: Feature::ForceY, key: "acceleration_sensitive_drift.y" },
-    Term { feature: Feature::ForceZ, key: "acceleration_sensitive_drift.z" },
-    Term { feature: Feature::RateMagnitude, key: "increment_weight_asymmetry" },
-];
-
-/// Terms of an accelerometer (models §3): they add to its bias S (output units), the last one to what remains of it as a force.
-pub const ACCEL_TERMS: [Term; 5] = [
-    Term { feature: Feature::One, key: "bias" },
-    Term { feature: Feature::Lag, key: "lag" },
-    Term { feature: Feature::Play, key: "hysteresis" },
-    Term { feature: Feature::Regressor, key: "regressor" },
-    Term { feature: Feature::ForceSquared, key: "second_order" },
-];
-
-impl Feature {
-    /// Whether it changes from tick to tick with the unit's motion: its line is kept apart, where only units with such terms have it.
-    #[must_use]
-    pub const fn follows_motion(self) -> bool {
-        matches!(self, Self::ForceX | Self::ForceY | Self::ForceZ | Self::RateMagnitude | Self::ForceSquared)
-    }
-
-    /// Line that its term is added to, among those of the features that follow motion or among the others.
-    const fn line(self) -> usize {
-        match self {
-            Self::Reading | Self::ForceX | Self::ForceSquared => 0,
-            Self::One
-            | Self::Lag
-            | Self::Play
-            | Self::Regressor
-            | Self::ThermalRate
-            | Self::ThermalAcceleration
-            | Self::ForceY => 1,
-            Self::LasingMode | Self::ForceZ => 2,
-            Self::Meander | Self::RateMagnitude => 3,
-        }
-    }
-}
 
 /// A coefficient, compiled.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -176,7 +85,8 @@ pub(crate) struct SensorState<'a> {
 }
 
 impl Terms {
-    /// Compiles the terms whose features follow motion, or the others; `report` hears of every one that is wrong, by its key.
+    /// Compiles the terms whose features follow motion, or the others, in the order of the features; `report` hears of every one that
+    /// is wrong, by its key.
     pub(crate) fn new(
         declared: &[Term],
         parts: &[TermParts],
@@ -186,31 +96,32 @@ impl Terms {
     ) -> Option<Self> {
         let mut compiled = Self::default();
         let mut sound = true;
+        let key = |feature| declared.iter().find(|term| term.feature == feature).map(|term| term.key);
         let among = parts.iter().filter(|part| part.feature.follows_motion() == follow_motion);
-        for term in declared {
-            for part in among.clone().filter(|part| part.feature == term.feature) {
-                let mut curve = |parts: &CurveParts| {
-                    let made = Curve::new(parts).map_err(|error| report(term.key, error));
-                    sound &= made.is_ok();
-                    made.ok()
-                };
-                let coefficient = match &part.coefficient {
-                    CoefficientParts::Curve(parts) => curve(parts).map(Coefficient::Curve),
-                    CoefficientParts::Branched(parts) => {
-                        let curves = (curve(&parts.run_up), curve(&parts.braking));
-                        let argument = parts.argument;
-                        let (Some(run_up), Some(braking)) = curves else { continue };
-                        Some(Coefficient::Branched { argument, run_up, braking })
-                    }
-                };
-                compiled.coefficients.extend(coefficient.map(|coefficient| (term.feature, coefficient)));
-                compiled.regressors.extend(part.regressor.filter(|_| term.feature == Feature::Regressor));
-                compiled.trails.extend(match term.feature {
-                    Feature::Lag => Some(Trail::lag(part.parameter, filter)),
-                    Feature::Play => Some(Trail::Play { half_width_deg_c: part.parameter }),
-                    _ => None,
-                });
-            }
+        let mut among: Vec<_> = among.filter_map(|part| Some((key(part.feature)?, part))).collect();
+        among.sort_by_key(|(_, part)| part.feature);
+        for (key, part) in among {
+            let mut curve = |parts: &CurveParts| {
+                let made = Curve::new(parts).map_err(|error| report(key, error));
+                sound &= made.is_ok();
+                made.ok()
+            };
+            let coefficient = match &part.coefficient {
+                CoefficientParts::Curve(parts) => curve(parts).map(Coefficient::Curve),
+                CoefficientParts::Branched(parts) => {
+                    let curves = (curve(&parts.run_up), curve(&parts.braking));
+                    let argument = parts.argument;
+                    let (Some(run_up), Some(braking)) = curves else { continue };
+                    Some(Coefficient::Branched { argument, run_up, braking })
+                }
+            };
+            compiled.coefficients.extend(coefficient.map(|coefficient| (part.feature, coefficient)));
+            compiled.regressors.extend(part.regressor.filter(|_| part.feature == Feature::Regressor));
+            compiled.trails.extend(match part.feature {
+                Feature::Lag => Some(Trail::lag(part.parameter, filter)),
+                Feature::Play => Some(Trail::Play { half_width_deg_c: part.parameter }),
+                _ => None,
+            });
         }
         sound.then_some(compiled)
     }
@@ -222,9 +133,7 @@ impl Terms {
 
     /// Whether one is multiplied by the specific force along a case axis.
     pub(crate) fn feel_force(&self) -> bool {
-        self.coefficients
-            .iter()
-            .any(|(feature, _)| matches!(feature, Feature::ForceX | Feature::ForceY | Feature::ForceZ))
+        self.coefficients.iter().any(|(feature, _)| feature.is_force())
     }
 
     /// What trails behind the temperature.

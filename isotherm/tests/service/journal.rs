@@ -264,7 +264,7 @@ async fn a_log_alone_gives_the_corrected_output_again() {
     settings.congestion = CongestionControl::Block;
     settings.unit.subtract_drift = true;
     settings.unit.pairing_window = Span::from_ms(20);
-    let session = open(&settings.session).await.unwrap();
+    let session = open(&settings.zenoh.session).await.unwrap();
     let locators = locators(&session);
     let service = start(settings.clone(), session).await.unwrap();
     let options = SessionOptions { connect: locators, ..SessionOptions::default() };

@@ -21,7 +21,7 @@ fn unit(serial: &str) -> UnitId {
 }
 
 async fn service(settings: Settings) -> (RunningService, Vec<String>) {
-    let session = open(&settings.session).await.unwrap();
+    let session = open(&settings.zenoh.session).await.unwrap();
     let locators = locators(&session);
     (start(settings, session).await.unwrap(), locators)
 }

@@ -27,7 +27,7 @@ const LIMIT: Duration = Duration::from_secs(30);
 async fn service(settings: Settings) -> (RunningService, Session, SocketAddr) {
     let listen = Some("127.0.0.1:0".parse().unwrap());
     let settings = Settings { metrics: MetricsSettings { listen, allow_remote: false }, ..settings };
-    let session = open(&settings.session).await.unwrap();
+    let session = open(&settings.zenoh.session).await.unwrap();
     let connect = locators(&session);
     let service = start(settings, session).await.unwrap();
     let address = service.metrics().unwrap();

@@ -24,10 +24,10 @@ fn assert_values(name: &str, values: &[(&str, Value)]) {
 fn the_service_configuration_shows_the_defaults() {
     let settings = Settings::load(&shipped("service.toml")).unwrap();
     assert_eq!(settings.calibrations, Some(shipped("calibration")));
-    assert_eq!(settings.session.config, Some(shipped("zenoh/peer.json5")));
+    assert_eq!(settings.zenoh.session.config, Some(shipped("zenoh/peer.json5")));
     let defaults = Settings {
         calibrations: settings.calibrations.clone(),
-        session: settings.session.clone(),
+        zenoh: settings.zenoh.clone(),
         digest: settings.digest,
         ..Settings::default()
     };

@@ -11,8 +11,8 @@ use isotherm_correction::curve::{Curve as CoreCurve, CurveError};
 use isotherm_correction::orientation::ROW_NORM_TOLERANCE;
 use isotherm_correction::thermal::Feature;
 
-use super::curve::CurveForm;
-use super::terms::StatedTerm;
+use super::curve::Curve;
+use super::terms::{Coefficient, KeyedTerm, Regressor, StatedTerm};
 use super::types::{AccelSensor, Document, Filter, GyroSensor, Orientation, SelfTest};
 use isotherm_document::{Reader, element, join};
 
@@ -24,12 +24,7 @@ pub(super) fn check(r: &mut Reader<'_>, document: &Document) {
     for (i, sensor) in document.gyro.sensor.iter().enumerate() {
         output::gyro(r, &element("gyro.sensor", i), document.gyro.output, sensor);
         gyro(r, &element("gyro.sensor", i), sensor, channels);
-        if sensor.acceleration_sensitive_drift.is_some() && document.accel.is_none() {
-            let path = join(&element("gyro.sensor", i), "acceleration_sensitive_drift");
-            r.refuse(&path, "needs the specific force, but there is no [accel]: add it, or remove this");
-        }
-        terms(r, &element("gyro.sensor", i), &sensor.terms(), document.temperature.filter.as_ref());
-        regressors(r, &element("gyro.sensor", i), &sensor.terms(), document, channels);
+        terms(r, &element("gyro.sensor", i), &sensor.terms.keyed(), document, channels);
     }
     orientation(r, "gyro", &document.gyro.orientation, document.gyro.sensor.len(), channels);
     filter(r, document);
@@ -38,8 +33,7 @@ pub(super) fn check(r: &mut Reader<'_>, document: &Document) {
         for (i, sensor) in section.sensor.iter().enumerate() {
             output::accel(r, &element("accel.sensor", i), section.output, sensor);
             accel(r, &element("accel.sensor", i), sensor, channels);
-            terms(r, &element("accel.sensor", i), &sensor.terms(), document.temperature.filter.as_ref());
-            regressors(r, &element("accel.sensor", i), &sensor.terms(), document, channels);
+            terms(r, &element("accel.sensor", i), &sensor.terms.keyed(), document, channels);
         }
         orientation(r, "accel", &section.orientation, section.sensor.len(), channels);
     }
@@ -102,43 +96,55 @@ fn channel(r: &mut Reader<'_>, path: &str, name: Option<&str>, channels: Option<
 
 fn gyro(r: &mut Reader<'_>, path: &str, sensor: &GyroSensor, channels: Option<&[&str]>) {
     channel(r, &join(path, "channel"), sensor.channel.as_deref(), channels);
-    let over_rate = sensor.increment_weight_over_rate.as_deref();
-    curve(r, &join(path, "increment_weight_over_rate"), over_rate);
-    curve(
-        r,
-        &join_dotted(path, "servo.rest_frequency"),
-        sensor.servo.as_ref().map(|servo| &*servo.rest_frequency),
-    );
+    curve(r, &join(path, "increment_weight_over_rate"), sensor.increment_weight_over_rate.as_ref());
+    let rest_frequency = sensor.servo.as_ref().map(|servo| &servo.rest_frequency);
+    curve(r, &join_dotted(path, "servo.rest_frequency"), rest_frequency);
 }
 
-/// Curves of every term; both curves of a branched coefficient over one argument; lags no shorter than the grid's step.
-fn terms(r: &mut Reader<'_>, path: &str, terms: &[StatedTerm<'_>], filter: Option<&Filter>) {
-    for term in terms {
-        let curves = term.curves();
-        for (key, form) in &curves {
-            curve(r, &format!("{path}.{key}"), Some(form));
+/// Curves of every term; both curves of a branched coefficient over one argument; lags no shorter than the grid's step; forces that
+/// there are.
+fn terms(
+    r: &mut Reader<'_>,
+    path: &str,
+    terms: &[KeyedTerm<'_>],
+    document: &Document,
+    temperatures: Option<&[&str]>,
+) {
+    for KeyedTerm { term, key, stated } in terms {
+        let curves = KeyedTerm { term, key: format!("{path}.{key}"), stated }.curves();
+        for (path, form) in &curves {
+            curve(r, path, Some(form));
         }
-        if let [(run_up, first), (braking, second)] = &curves[..] {
-            let path = |key: &str| format!("{path}.{key}");
-            one_argument(r, (&path(run_up), first), (&path(braking), second));
+        if let [run_up, braking] = &curves[..] {
+            one_argument(r, run_up, braking);
         }
-        let (Feature::Lag, Some(tau)) = (term.feature, term.parameter) else { continue };
-        let Some(Filter { grid_step_s, .. }) = filter else { continue };
+        if term.feature.is_force() && document.accel.is_none() {
+            let table = key.split('.').next().unwrap_or_default();
+            let message = "needs the specific force, but there is no [accel]: add it, or remove this";
+            r.refuse(&join(path, table), message);
+        }
+        if let Some(regressor) = &stated.regressor {
+            check_regressor(r, &format!("{path}.{key}"), regressor, document, temperatures);
+        }
+        let (Feature::Lag, tau, Some(filter)) =
+            (term.feature, stated.parameter, &document.temperature.filter)
+        else {
+            continue;
+        };
+        let Filter { grid_step_s, .. } = filter;
         if tau < *grid_step_s && !r.is_damaged("temperature.filter.grid_step_s") {
-            let path = format!("{path}.{}.time_constant_s", term.key);
-            r.refuse(
-                &path,
-                format!("is {tau} s, must be at least temperature.filter.grid_step_s, {grid_step_s} s"),
-            );
+            let message =
+                format!("is {tau} s, must be at least temperature.filter.grid_step_s, {grid_step_s} s");
+            r.refuse(&format!("{path}.{key}.time_constant_s"), message);
         }
     }
 }
 
-/// Regressors of channels that there are; both of a difference in one unit.
-fn regressors(
+/// A regressor of channels that there are; both of a difference in one unit.
+fn check_regressor(
     r: &mut Reader<'_>,
     path: &str,
-    terms: &[StatedTerm<'_>],
+    Regressor { channel, minus, .. }: &Regressor,
     document: &Document,
     temperatures: Option<&[&str]>,
 ) {
@@ -148,39 +154,34 @@ fn regressors(
         let temperature = temperatures.contains(&name).then_some("°C");
         auxiliary.map(|channel| channel.unit.as_str()).or(temperature)
     };
-    for (key, stated) in terms.iter().filter_map(|term| Some((&term.key, term.regressor?))) {
-        let names = [("channel", Some(stated.channel)), ("minus", stated.minus)];
-        for (part, name) in names.into_iter().filter_map(|(part, name)| Some((part, name?))) {
-            if unit(name).is_none() {
-                let all =
-                    temperatures.iter().copied().chain(document.auxiliary.iter().map(|c| c.name.as_str()));
-                let known = all.collect::<Vec<_>>().join(", ");
-                let known = if known.is_empty() { "none" } else { &known };
-                let path = format!("{path}.{key}.{part}");
-                r.refuse(&path, format!("is {name:?}, not a channel; the channels are: {known}"));
-            }
+    for (part, name) in
+        std::iter::once(("channel", channel)).chain(minus.iter().map(|minus| ("minus", minus)))
+    {
+        if unit(name).is_none() {
+            let all = temperatures.iter().copied().chain(document.auxiliary.iter().map(|c| c.name.as_str()));
+            let known = all.collect::<Vec<_>>().join(", ");
+            let known = if known.is_empty() { "none" } else { &known };
+            let message = format!("is {name:?}, not a channel; the channels are: {known}");
+            r.refuse(&join(path, part), message);
         }
-        if let (Some(of), Some(other)) = (unit(stated.channel), stated.minus.and_then(unit))
-            && of != other
-        {
-            let path = format!("{path}.{key}.minus");
-            r.refuse(
-                &path,
-                format!("is in {other}, but the channel is in {of}: a difference needs one unit"),
-            );
-        }
+    }
+    if let (Some(of), Some(other)) = (unit(channel), minus.as_deref().and_then(unit))
+        && of != other
+    {
+        let message = format!("is in {other}, but the channel is in {of}: a difference needs one unit");
+        r.refuse(&join(path, "minus"), message);
     }
 }
 
 fn accel(r: &mut Reader<'_>, path: &str, sensor: &AccelSensor, channels: Option<&[&str]>) {
     channel(r, &join(path, "channel"), sensor.channel.as_deref(), channels);
     channel(r, &join(path, "board_channel"), sensor.board_channel.as_deref(), channels);
-    curve(r, &join(path, "scale_factor"), Some(&*sensor.scale_factor));
-    curve(r, &join(path, "board_ratio_error"), sensor.board_ratio_error.as_deref());
+    curve(r, &join(path, "scale_factor"), Some(&sensor.scale_factor));
+    curve(r, &join(path, "board_ratio_error"), sensor.board_ratio_error.as_ref());
 }
 
 /// A curve that the core must be able to compile.
-fn curve(r: &mut Reader<'_>, path: &str, curve: Option<&CurveForm>) {
+fn curve(r: &mut Reader<'_>, path: &str, curve: Option<&Curve>) {
     let Some(curve) = curve else { return };
     if r.is_damaged(path) {
         return;
@@ -198,8 +199,8 @@ fn curve(r: &mut Reader<'_>, path: &str, curve: Option<&CurveForm>) {
 /// Both curves of a branched coefficient have one argument.
 fn one_argument(
     r: &mut Reader<'_>,
-    (run_up_path, run_up): (&str, &CurveForm),
-    (braking_path, braking): (&str, &CurveForm),
+    (run_up_path, run_up): &(String, &Curve),
+    (braking_path, braking): &(String, &Curve),
 ) {
     if let (Some(first), Some(second)) = (run_up.argument(), braking.argument())
         && first != second
@@ -227,7 +228,10 @@ fn filter(r: &mut Reader<'_>, document: &Document) {
         return;
     };
     let mut sensors = document.gyro.sensor.iter();
-    let branched = |sensor: &GyroSensor| sensor.terms().iter().any(|term| term.curves().len() > 1);
+    let branched = |sensor: &GyroSensor| {
+        let branched = |stated: &StatedTerm| matches!(stated.coefficient, Coefficient::Branched { .. });
+        sensor.terms.iter().any(branched)
+    };
     let Some(i) = sensors.position(branched) else { return };
     if filter.branch_dead_band_deg_c2_per_s3.is_none() {
         let why = "run-up and braking curves of";

@@ -14,7 +14,7 @@ use isotherm_correction::sample::{ChannelName, MAX_CHANNEL_NAME, OutputKind};
 use isotherm_correction::servo::{ServoForm, ServoParts};
 
 use super::measure::{ARCSEC, DEG_PER_H, DEG_PER_S, DEG_PER_SQRT_H, HOUR};
-use super::terms::StatedTerm;
+use super::terms::{SensorKind, Terms};
 use super::types::{
     AccelOutput, AccelSensor, Auxiliary, AxesHysteresis, Channel, Document, Drift, FitWindow, GyroOutput,
     GyroSensor, ModeReversal, Orientation, SelfTest, Servo, ServoKind, Temperature, Trend,
@@ -92,7 +92,7 @@ impl Document {
         self.temperature.channel.iter().position(|channel| channel.name == name).unwrap_or(usize::MAX)
     }
 
-    fn term_parts(&self, terms: &[StatedTerm<'_>]) -> Vec<TermParts> {
+    fn term_parts<K: SensorKind>(&self, terms: &Terms<K>) -> Vec<TermParts> {
         let auxiliary = |name: &str| self.auxiliary.iter().position(|channel| channel.name == name);
         let source = |name: &str| {
             auxiliary(name).map_or_else(|| Source::Temperature(self.channel_index(name)), Source::Auxiliary)
@@ -115,7 +115,7 @@ impl Document {
             channel: sensor.channel.as_ref().map(|name| self.channel_index(name)),
             increment_weight: increment_weight.unwrap_or(f64::NAN),
             input_limit: input_limit.unwrap_or(NO_LIMIT),
-            terms: self.term_parts(&sensor.terms()),
+            terms: self.term_parts(&sensor.terms),
             increment_weight_over_rate: sensor
                 .increment_weight_over_rate
                 .as_ref()
@@ -138,7 +138,7 @@ impl Document {
             channel: sensor.channel.as_ref().map(|name| self.channel_index(name)),
             board_channel: sensor.board_channel.as_ref().map(|name| self.channel_index(name)),
             scale_factor: sensor.scale_factor.to_parts(0.0),
-            terms: self.term_parts(&sensor.terms()),
+            terms: self.term_parts(&sensor.terms),
             position_m: sensor.position_m.unwrap_or_default(),
             delay_ticks: sensor.delay_ticks.unwrap_or_default(),
             board_ratio: sensor.board_ratio_error.as_ref().map(|curve| curve.to_parts(1.0)),

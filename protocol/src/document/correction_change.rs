@@ -5,8 +5,8 @@ use isotherm_correction::channel::ThermalState;
 use isotherm_correction::sample::{ChannelName, LasingMode};
 use isotherm_correction::units::{Angle, AngularRate, SpecificForce};
 
-use super::measure::{ARCSEC, Unit};
-use super::types::{AccelOutput, Document, GyroOutput};
+use super::measure::ARCSEC;
+use super::types::{Document, GyroOutput};
 use crate::control::CorrectionChange;
 
 /// Names of the case axes.
@@ -88,18 +88,14 @@ impl Changes {
         let names = |sensors: &[super::AccelSensor]| -> Vec<String> {
             sensors.iter().map(|sensor| sensor.name.clone()).collect()
         };
-        let unit = match second.output {
-            AccelOutput::Counts => Unit::CountsPerSPerMPerS2,
-            AccelOutput::Volts => Unit::VPerMPerS2,
-            AccelOutput::MetresPerSecondSquared => Unit::MPerS2PerMPerS2,
-        };
+        let unit = second.output.scale_unit().symbol();
         for (name, i, j) in matched(&names(&first.sensor), &names(&second.sensor)) {
             if let Some((old, new)) = pair(&old.accel_bias, &new.accel_bias, i, j) {
                 self.add(format!("accelerometer {name} bias"), "mg", milli_g(old), milli_g(new));
             }
             let same_output = first.output == second.output;
             if let Some((old, new)) = pair(&old.accel_scale, &new.accel_scale, i, j).filter(|_| same_output) {
-                self.add(format!("accelerometer {name} scale factor"), unit.symbol(), old, new);
+                self.add(format!("accelerometer {name} scale factor"), &unit, old, new);
             }
             if let Some((old, new)) = pair(&old.accel_axes, &new.accel_axes, i, j) {
                 self.add(format!("accelerometer {name} input axis turns"), "″", 0.0, turned_arcsec(old, new));

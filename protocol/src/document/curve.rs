@@ -2,8 +2,7 @@
 
 mod schema;
 
-use std::marker::PhantomData;
-use std::ops::Deref;
+pub(super) use schema::{definition, frequency, relative, relative_over_rate, scale_factor};
 
 use isotherm_correction::curve::{Curve as CoreCurve, CurveParts};
 use serde::de::{Deserialize, Deserializer, Error as _};
@@ -11,86 +10,12 @@ use serde::ser::{Serialize, SerializeMap, Serializer};
 
 use super::measure::{Argument, Unit};
 
-/// What a curve's values stand for: which units and arguments its keys may name.
-pub trait Quantity: std::fmt::Debug + Clone + PartialEq + 'static {
-    /// Name of the definition in the schema.
-    const NAME: &'static str;
-    /// Units of the values, the usual one first.
-    const UNITS: &'static [Unit];
-    /// Units of the argument, the usual one first.
-    const ARGUMENTS: &'static [Argument];
-}
-
-/// Defines the quantities.
-macro_rules! quantities {
-    ($($(#[$doc:meta])* $name:ident: [$($unit:ident),+] over [$($argument:ident),+];)+) => {$(
-        $(#[$doc])*
-        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-        pub enum $name {}
-        impl Quantity for $name {
-            const NAME: &'static str = concat!("CurveOf", stringify!($name));
-            const UNITS: &'static [Unit] = &[$(Unit::$unit),+];
-            const ARGUMENTS: &'static [Argument] = &[$(Argument::$argument),+];
-        }
-    )+};
-}
-
-quantities! {
-    /// Relative deviation from one.
-    Relative: [Ppm] over [DegC];
-    /// Bias of a gyro.
-    RateBias: [DegPerH] over [DegC];
-    /// K1 of models §2.
-    ThermalRate: [DegPerHPerDegCPerS] over [DegC, DegCPerS];
-    /// K2 of models §2.
-    ThermalAcceleration: [DegPerHPerDegCPerS2] over [DegC, DegCPerS2];
-    /// Gain of a thermal lag.
-    LagGain: [DegPerHPerDegCPerS] over [DegC];
-    /// Gain of a hysteresis.
-    HysteresisGain: [DegPerHPerDegC] over [DegC];
-    /// Gain of a regressor, per unit of its channel.
-    RegressorGain: [DegPerHPerUnit] over [DegC];
-    /// Drift of a gyro by specific force.
-    DriftByForce: [DegPerHPerG] over [DegC];
-    /// Relative deviation from one over the rate of a gyro.
-    RelativeOverRate: [Ppm] over [DegPerS];
-    /// Second-order term of an accelerometer.
-    SecondOrder: [MicroGPerG2] over [DegC];
-    /// Rest frequency of the dither.
-    Frequency: [Hz] over [DegC];
-    /// Scale factor of an accelerometer.
-    ScaleFactor: [CountsPerSPerMPerS2, VPerMPerS2, MPerS2PerMPerS2] over [DegC];
-    /// Bias of an accelerometer, in units of its output.
-    OutputBias: [CountsPerS, V, MPerS2] over [DegC];
-    /// Gain of a thermal lag of an accelerometer, in units of its output per °C/s.
-    OutputLagGain: [CountsPerSPerDegCPerS, VPerDegCPerS, MPerS2PerDegCPerS] over [DegC];
-    /// Gain of a hysteresis of an accelerometer, in units of its output per °C.
-    OutputHysteresisGain: [CountsPerSPerDegC, VPerDegC, MPerS2PerDegC] over [DegC];
-    /// Gain of a regressor of an accelerometer, in units of its output per unit of the channel.
-    OutputRegressorGain: [CountsPerSPerUnit, VPerUnit, MPerS2PerUnit] over [DegC];
-}
-
-/// A curve of one quantity, in the units of its keys.
+/// A curve over temperature, one of its derivatives or the rate, in the units of its keys.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Curve<Q> {
-    form: CurveForm,
-    quantity: PhantomData<Q>,
-}
-
-/// A curve of any quantity over temperature, one of its derivatives or the rate, in the units of its keys.
-#[derive(Debug, Clone, PartialEq)]
-pub struct CurveForm {
+pub struct Curve {
     unit: Unit,
     argument: Argument,
     shape: Shape,
-}
-
-impl<Q> Deref for Curve<Q> {
-    type Target = CurveForm;
-
-    fn deref(&self) -> &CurveForm {
-        &self.form
-    }
 }
 
 /// Form of a curve.
@@ -175,41 +100,38 @@ impl Shape {
 /// Argument range of a constant in the core, which has no form for it: wider than any temperature or rate.
 const EVERYWHERE: [f64; 2] = [-1e9, 1e9];
 
-impl<Q: Quantity> Curve<Q> {
-    /// A curve over temperature in the quantity's usual unit.
+impl Curve {
+    /// A curve over temperature in ppm, or in the unit of the term that it is put into.
     #[must_use]
     pub fn new(shape: Shape) -> Self {
-        let (unit, argument) = match (Q::UNITS, Q::ARGUMENTS) {
-            ([unit, ..], [argument, ..]) => (*unit, *argument),
-            _ => (Unit::Ppm, Argument::DegC),
-        };
-        Self { form: CurveForm { unit, argument, shape }, quantity: PhantomData }
+        Self { unit: Unit::PPM, argument: Argument::DegC, shape }
     }
 
-    /// The same curve with its values in another unit; one that the quantity does not allow changes nothing.
+    /// The same curve with its values in another unit.
     #[must_use]
-    pub fn in_unit(mut self, unit: Unit) -> Self {
-        if Q::UNITS.contains(&unit) {
-            self.form.unit = unit;
-        }
-        self
+    pub fn in_unit(self, unit: Unit) -> Self {
+        Self { unit, ..self }
     }
 
-    /// The same curve over another argument; one that the quantity does not allow changes nothing, and so does
-    /// any for a constant.
+    /// The same curve over another argument.
     #[must_use]
-    pub fn over(mut self, argument: Argument) -> Self {
-        if Q::ARGUMENTS.contains(&argument) && !matches!(self.shape, Shape::Constant { .. }) {
-            self.form.argument = argument;
+    pub fn over(self, argument: Argument) -> Self {
+        Self { argument, ..self }
+    }
+
+    /// Takes the unit of a term, and an argument that it may have.
+    pub(super) fn fit(&mut self, unit: Unit, arguments: &[Argument]) {
+        self.unit = unit;
+        if !arguments.contains(&self.argument) {
+            self.argument = Argument::DegC;
         }
-        self
     }
 
     /// The same curve with a constant (in the unit of its values) added to all of it.
     #[must_use]
     pub fn plus(&self, change: f64) -> Self {
         let mut curve = self.clone();
-        match &mut curve.form.shape {
+        match &mut curve.shape {
             Shape::Constant { value } => *value += change,
             Shape::Polynomial { coefficients, .. } => match coefficients.first_mut() {
                 Some(first) => *first += change,
@@ -232,9 +154,7 @@ impl<Q: Quantity> Curve<Q> {
             None => self.clone(),
         }
     }
-}
 
-impl CurveForm {
     /// Unit of the values.
     #[must_use]
     pub fn unit(&self) -> Unit {
@@ -307,7 +227,7 @@ impl Keys {
     }
 }
 
-impl<Q: Quantity> Serialize for Curve<Q> {
+impl Serialize for Curve {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let keys = self.keys();
         let mut map = serializer.serialize_map(None)?;
@@ -327,33 +247,33 @@ impl<Q: Quantity> Serialize for Curve<Q> {
     }
 }
 
-impl<'de, Q: Quantity> Deserialize<'de> for Curve<Q> {
+impl<'de> Deserialize<'de> for Curve {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let table = toml::Table::deserialize(deserializer)?;
-        let form =
-            |unit: &Unit| Q::ARGUMENTS.iter().find_map(|argument| Self::stated(&table, *unit, *argument));
-        Q::UNITS.iter().find_map(form).ok_or_else(|| D::Error::custom("a curve must have one of its forms"))
+        Self::stated(&table).ok_or_else(|| D::Error::custom("a curve must have one of its forms"))
     }
 }
 
-impl<Q: Quantity> Curve<Q> {
-    /// The curve that a table states in one unit over one argument.
-    fn stated(table: &toml::Table, unit: Unit, argument: Argument) -> Option<Self> {
-        fn get<'de, T: Deserialize<'de>>(table: &toml::Table, key: &str) -> Option<T> {
-            table.get(key)?.clone().try_into().ok()
-        }
-        let Keys { value, reference, coefficients, range, knots } = Keys::new(unit, argument);
+impl Curve {
+    /// The curve that a table states, whatever its unit and argument.
+    fn stated(table: &toml::Table) -> Option<Self> {
+        let find = |stem: &str| table.iter().find_map(|(key, value)| Some((key.strip_prefix(stem)?, value)));
+        let number = |stem| find(stem)?.1.as_float();
+        let knots = || -> Option<Vec<[f64; 2]>> { find("knots_")?.1.clone().try_into().ok() };
         let shape = match table.get("kind")?.as_str()? {
-            "constant" => Shape::Constant { value: get(table, &value)? },
+            "constant" => Shape::Constant { value: number("value_")? },
             "polynomial" => Shape::Polynomial {
-                reference: get(table, &reference)?,
-                coefficients: get(table, &coefficients)?,
-                range: get(table, &range)?,
+                reference: number("reference_")?,
+                coefficients: find("coefficients_")?.1.clone().try_into().ok()?,
+                range: find("range_")?.1.clone().try_into().ok()?,
             },
-            "piecewise-linear" => Shape::PiecewiseLinear { knots: get(table, &knots)? },
-            "spline" => Shape::Spline { knots: get(table, &knots)? },
+            "piecewise-linear" => Shape::PiecewiseLinear { knots: knots()? },
+            "spline" => Shape::Spline { knots: knots()? },
             _ => return None,
         };
-        Some(Self::new(shape).in_unit(unit).over(argument))
+        let (values, _) = ["value_", "coefficients_", "knots_"].into_iter().find_map(find)?;
+        let (unit, over) = values.split_once("_over_").unwrap_or((values, "deg_c"));
+        let over = find("reference_").map_or(over, |(over, _)| over);
+        Some(Self::new(shape).in_unit(Unit::of_suffix(unit)?).over(Argument::of_suffix(over)?))
     }
 }

@@ -1,5 +1,6 @@
 //! Units of measure as the document's keys spell them, and their size in SI.
 
+use isotherm_correction::thermal::Per;
 use isotherm_correction::units::{Angle, AngularRate, STANDARD_GRAVITY_M_PER_S2};
 
 /// rad/s in one °/h.
@@ -15,164 +16,111 @@ pub(super) const PPM: f64 = 1e-6;
 /// Seconds in an hour.
 pub(super) const HOUR: f64 = 3600.0;
 
-/// Unit of a curve's values.
+/// Unit of a curve's values, but for what it is per.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Unit {
+pub enum BaseUnit {
     /// °/h.
     DegPerH,
-    /// (°/h)/(°C/s).
-    DegPerHPerDegCPerS,
-    /// (°/h)/(°C/s²).
-    DegPerHPerDegCPerS2,
     /// 10⁻⁶.
     Ppm,
+    /// 10⁻⁶ of standard gravity.
+    MicroG,
     /// Hz.
     Hz,
-    /// (counts/s)/(m/s²).
-    CountsPerSPerMPerS2,
-    /// V/(m/s²).
-    VPerMPerS2,
-    /// (m/s²)/(m/s²).
-    MPerS2PerMPerS2,
     /// counts/s.
     CountsPerS,
     /// V.
     V,
     /// m/s².
     MPerS2,
-    /// (counts/s)/(°C/s).
-    CountsPerSPerDegCPerS,
-    /// V/(°C/s).
-    VPerDegCPerS,
-    /// (m/s²)/(°C/s).
-    MPerS2PerDegCPerS,
-    /// (°/h)/g, g the standard gravity.
-    DegPerHPerG,
-    /// µg/g².
-    MicroGPerG2,
-    /// (°/h)/°C.
-    DegPerHPerDegC,
-    /// (counts/s)/°C.
-    CountsPerSPerDegC,
-    /// V/°C.
-    VPerDegC,
-    /// (m/s²)/°C.
-    MPerS2PerDegC,
-    /// °/h per unit of a channel.
-    DegPerHPerUnit,
-    /// counts/s per unit of a channel.
-    CountsPerSPerUnit,
-    /// V per unit of a channel.
-    VPerUnit,
-    /// m/s² per unit of a channel.
-    MPerS2PerUnit,
+}
+
+impl BaseUnit {
+    const ALL: [Self; 7] =
+        [Self::DegPerH, Self::Ppm, Self::MicroG, Self::Hz, Self::CountsPerS, Self::V, Self::MPerS2];
+
+    /// Spelling in keys and for readers, and how much of the core's unit it is (rad/s, 1, Hz, counts/s, V, m/s²; of a force per its
+    /// square, s²/m).
+    const fn spelled(self) -> (&'static str, &'static str, f64) {
+        match self {
+            Self::DegPerH => ("deg_per_h", "°/h", DEG_PER_H),
+            Self::Ppm => ("ppm", "ppm", PPM),
+            Self::MicroG => ("micro_g", "µg", 1e-6),
+            Self::Hz => ("hz", "Hz", 1.0),
+            Self::CountsPerS => ("counts_per_s", "counts/s", 1.0),
+            Self::V => ("v", "V", 1.0),
+            Self::MPerS2 => ("m_per_s2", "m/s²", 1.0),
+        }
+    }
+
+    /// It, per unit of a feature.
+    #[must_use]
+    pub const fn per(self, per: Per) -> Unit {
+        Unit { base: self, per }
+    }
+}
+
+/// What a unit is per: all of them.
+const PER: [Per; 8] =
+    [Per::One, Per::DegC, Per::DegCPerS, Per::DegCPerS2, Per::MPerS2, Per::G, Per::G2, Per::Unit];
+
+/// Spelling in keys and for readers, and how much of the core's unit it is (°C, °C/s, °C/s², m/s²); of the square of a force, whose
+/// coefficient is a force by itself, a standard gravity.
+const fn spelled(per: Per) -> (&'static str, &'static str, f64) {
+    match per {
+        Per::One => ("", "", 1.0),
+        Per::DegC => ("_per_deg_c", "°C", 1.0),
+        Per::DegCPerS => ("_per_deg_c_per_s", "°C/s", 1.0),
+        Per::DegCPerS2 => ("_per_deg_c_per_s2", "°C/s²", 1.0),
+        Per::MPerS2 => ("_per_m_per_s2", "m/s²", 1.0),
+        Per::G => ("_per_g", "g", STANDARD_GRAVITY_M_PER_S2),
+        Per::G2 => ("_per_g2", "g²", STANDARD_GRAVITY_M_PER_S2),
+        Per::Unit => ("_per_unit", "unit", 1.0),
+    }
+}
+
+/// Unit of a curve's values.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Unit {
+    /// The unit by itself.
+    pub base: BaseUnit,
+    /// Per unit of what.
+    pub per: Per,
 }
 
 impl Unit {
-    /// All of them.
-    pub const ALL: [Self; 24] = [
-        Self::DegPerH,
-        Self::DegPerHPerDegCPerS,
-        Self::DegPerHPerDegCPerS2,
-        Self::Ppm,
-        Self::Hz,
-        Self::CountsPerSPerMPerS2,
-        Self::VPerMPerS2,
-        Self::MPerS2PerMPerS2,
-        Self::CountsPerS,
-        Self::V,
-        Self::MPerS2,
-        Self::CountsPerSPerDegCPerS,
-        Self::VPerDegCPerS,
-        Self::MPerS2PerDegCPerS,
-        Self::DegPerHPerG,
-        Self::MicroGPerG2,
-        Self::DegPerHPerDegC,
-        Self::CountsPerSPerDegC,
-        Self::VPerDegC,
-        Self::MPerS2PerDegC,
-        Self::DegPerHPerUnit,
-        Self::CountsPerSPerUnit,
-        Self::VPerUnit,
-        Self::MPerS2PerUnit,
-    ];
+    /// ppm.
+    pub const PPM: Self = BaseUnit::Ppm.per(Per::One);
+    /// Hz.
+    pub const HZ: Self = BaseUnit::Hz.per(Per::One);
+
+    /// The unit of a spelling in keys.
+    #[must_use]
+    pub fn of_suffix(suffix: &str) -> Option<Self> {
+        let mut all =
+            BaseUnit::ALL.into_iter().flat_map(|base| PER.into_iter().map(move |per| base.per(per)));
+        all.find(|unit| unit.suffix() == suffix)
+    }
 
     /// Spelling in keys.
     #[must_use]
-    pub const fn suffix(self) -> &'static str {
-        match self {
-            Self::DegPerH => "deg_per_h",
-            Self::DegPerHPerDegCPerS => "deg_per_h_per_deg_c_per_s",
-            Self::DegPerHPerDegCPerS2 => "deg_per_h_per_deg_c_per_s2",
-            Self::Ppm => "ppm",
-            Self::Hz => "hz",
-            Self::CountsPerSPerMPerS2 => "counts_per_s_per_m_per_s2",
-            Self::VPerMPerS2 => "v_per_m_per_s2",
-            Self::MPerS2PerMPerS2 => "m_per_s2_per_m_per_s2",
-            Self::CountsPerS => "counts_per_s",
-            Self::V => "v",
-            Self::MPerS2 => "m_per_s2",
-            Self::CountsPerSPerDegCPerS => "counts_per_s_per_deg_c_per_s",
-            Self::VPerDegCPerS => "v_per_deg_c_per_s",
-            Self::MPerS2PerDegCPerS => "m_per_s2_per_deg_c_per_s",
-            Self::DegPerHPerG => "deg_per_h_per_g",
-            Self::MicroGPerG2 => "micro_g_per_g2",
-            Self::DegPerHPerDegC => "deg_per_h_per_deg_c",
-            Self::CountsPerSPerDegC => "counts_per_s_per_deg_c",
-            Self::VPerDegC => "v_per_deg_c",
-            Self::MPerS2PerDegC => "m_per_s2_per_deg_c",
-            Self::DegPerHPerUnit => "deg_per_h_per_unit",
-            Self::CountsPerSPerUnit => "counts_per_s_per_unit",
-            Self::VPerUnit => "v_per_unit",
-            Self::MPerS2PerUnit => "m_per_s2_per_unit",
-        }
+    pub fn suffix(self) -> String {
+        [self.base.spelled().0, spelled(self.per).0].concat()
     }
 
     /// Spelling for readers.
     #[must_use]
-    pub const fn symbol(self) -> &'static str {
-        match self {
-            Self::DegPerH => "°/h",
-            Self::DegPerHPerDegCPerS => "(°/h)/(°C/s)",
-            Self::DegPerHPerDegCPerS2 => "(°/h)/(°C/s²)",
-            Self::Ppm => "ppm",
-            Self::Hz => "Hz",
-            Self::CountsPerSPerMPerS2 => "(counts/s)/(m/s²)",
-            Self::VPerMPerS2 => "V/(m/s²)",
-            Self::MPerS2PerMPerS2 => "(m/s²)/(m/s²)",
-            Self::CountsPerS => "counts/s",
-            Self::V => "V",
-            Self::MPerS2 => "m/s²",
-            Self::CountsPerSPerDegCPerS => "(counts/s)/(°C/s)",
-            Self::VPerDegCPerS => "V/(°C/s)",
-            Self::MPerS2PerDegCPerS => "(m/s²)/(°C/s)",
-            Self::DegPerHPerG => "(°/h)/g",
-            Self::MicroGPerG2 => "µg/g²",
-            Self::DegPerHPerDegC => "(°/h)/°C",
-            Self::CountsPerSPerDegC => "(counts/s)/°C",
-            Self::VPerDegC => "V/°C",
-            Self::MPerS2PerDegC => "(m/s²)/°C",
-            Self::DegPerHPerUnit => "(°/h)/unit",
-            Self::CountsPerSPerUnit => "(counts/s)/unit",
-            Self::VPerUnit => "V/unit",
-            Self::MPerS2PerUnit => "(m/s²)/unit",
-        }
+    pub fn symbol(self) -> String {
+        let whole =
+            |symbol: &str| if symbol.contains('/') { format!("({symbol})") } else { symbol.to_owned() };
+        let (base, per) = (self.base.spelled().1, spelled(self.per).1);
+        if per.is_empty() { base.to_owned() } else { format!("{}/{}", whole(base), whole(per)) }
     }
 
-    /// How much of the core's unit it is (rad/s, 1, Hz, counts/s, V, m/s² or s²/m; per °C, °C/s, °C/s² or m/s² where it says so).
+    /// How much of the core's unit it is.
     #[must_use]
-    pub const fn in_core_units(self) -> f64 {
-        match self {
-            Self::DegPerH
-            | Self::DegPerHPerDegC
-            | Self::DegPerHPerUnit
-            | Self::DegPerHPerDegCPerS
-            | Self::DegPerHPerDegCPerS2 => DEG_PER_H,
-            Self::Ppm => PPM,
-            Self::DegPerHPerG => DEG_PER_H / STANDARD_GRAVITY_M_PER_S2,
-            Self::MicroGPerG2 => 1e-6 / STANDARD_GRAVITY_M_PER_S2,
-            _ => 1.0,
-        }
+    pub fn in_core_units(self) -> f64 {
+        self.base.spelled().2 / spelled(self.per).2
     }
 }
 
@@ -190,35 +138,40 @@ pub enum Argument {
 }
 
 impl Argument {
+    const ALL: [Self; 4] = [Self::DegC, Self::DegCPerS, Self::DegCPerS2, Self::DegPerS];
+
+    /// Spelling in keys and for readers, and how much of the core's unit it is (°C, °C/s, °C/s² or rad/s).
+    const fn spelled(self) -> (&'static str, &'static str, f64) {
+        match self {
+            Self::DegC => ("deg_c", "°C", 1.0),
+            Self::DegCPerS => ("deg_c_per_s", "°C/s", 1.0),
+            Self::DegCPerS2 => ("deg_c_per_s2", "°C/s²", 1.0),
+            Self::DegPerS => ("deg_per_s", "°/s", DEG_PER_S),
+        }
+    }
+
+    /// The argument of a spelling in keys.
+    #[must_use]
+    pub fn of_suffix(suffix: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|argument| argument.suffix() == suffix)
+    }
+
     /// Spelling in keys.
     #[must_use]
     pub const fn suffix(self) -> &'static str {
-        match self {
-            Self::DegC => "deg_c",
-            Self::DegCPerS => "deg_c_per_s",
-            Self::DegCPerS2 => "deg_c_per_s2",
-            Self::DegPerS => "deg_per_s",
-        }
+        self.spelled().0
     }
 
     /// How much of the core's unit it is (°C, °C/s, °C/s² or rad/s).
     #[must_use]
     pub const fn in_core_units(self) -> f64 {
-        match self {
-            Self::DegC | Self::DegCPerS | Self::DegCPerS2 => 1.0,
-            Self::DegPerS => DEG_PER_S,
-        }
+        self.spelled().2
     }
 
     /// Spelling for readers.
     #[must_use]
     pub const fn symbol(self) -> &'static str {
-        match self {
-            Self::DegC => "°C",
-            Self::DegCPerS => "°C/s",
-            Self::DegCPerS2 => "°C/s²",
-            Self::DegPerS => "°/s",
-        }
+        self.spelled().1
     }
 }
 

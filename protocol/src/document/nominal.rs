@@ -1,5 +1,7 @@
 //! What is left of a document without its errors.
 
+use isotherm_correction::thermal::Feature;
+
 use super::Document;
 
 impl Document {
@@ -11,15 +13,7 @@ impl Document {
         document.mode_reversal = None;
         document.gyro.orientation.thermal = None;
         for sensor in &mut document.gyro.sensor {
-            sensor.increment_weight_error = None;
-            sensor.static_bias = None;
-            sensor.magnetic_bias = None;
-            sensor.slow_meander = None;
-            sensor.thermal_rate = None;
-            sensor.thermal_acceleration = None;
-            sensor.lag.clear();
-            sensor.hysteresis.clear();
-            sensor.regressor.clear();
+            sensor.terms.retain(Feature::follows_motion);
             sensor.trend = None;
             sensor.servo = None;
         }
@@ -28,11 +22,10 @@ impl Document {
             accel.orientation.thermal = None;
             for sensor in &mut accel.sensor {
                 sensor.board_ratio_error = None;
-                sensor.lag.clear();
-                sensor.hysteresis.clear();
-                sensor.regressor.clear();
                 sensor.scale_factor = sensor.scale_factor.held_at(assumed);
-                sensor.bias = sensor.bias.as_ref().map(|bias| bias.held_at(assumed));
+                let bias = sensor.terms.curve(Feature::One).map(|bias| bias.held_at(assumed));
+                sensor.terms.retain(Feature::follows_motion);
+                sensor.set(Feature::One, bias);
             }
         }
         document
@@ -67,7 +60,7 @@ mod tests {
     #[test]
     fn a_held_curve_has_the_value_of_the_service() {
         let knots = vec![[-40.0, 1.0], [0.0, 3.0], [40.0, 2.0]];
-        let curve = Curve::<crate::document::RateBias>::new(Shape::PiecewiseLinear { knots: knots.clone() });
+        let curve = Curve::new(Shape::PiecewiseLinear { knots: knots.clone() });
         assert_eq!(curve.held_at(-20.0).shape(), &Shape::Constant { value: 2.0 });
         assert_eq!(curve.held_at(90.0).shape(), &Shape::Constant { value: 2.0 });
         let spline = Shape::Spline { knots };

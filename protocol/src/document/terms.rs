@@ -1,62 +1,158 @@
-//! The terms of a document's sensors, one list for all who go through them: checks, warnings, and what the core gets.
+//! The terms of a document's sensors: read, written and described by their declarations in the core.
+
+mod schema;
+mod written;
+
+use std::marker::PhantomData;
 
 use isotherm_correction::calibration::{
     BranchArgument, BranchedParts, CoefficientParts, RegressorParts, Source, TermParts,
 };
-use isotherm_correction::thermal::{ACCEL_TERMS, Feature, GYRO_TERMS, Term};
+use isotherm_correction::thermal::{ACCEL_TERMS, Feature, GYRO_TERMS, Makes, Per, Term, TermForm};
 use isotherm_document::{element, join};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
-use super::curve::{Curve, CurveForm, Quantity};
-use super::measure::Argument;
-use super::types::{AccelRegressor, AccelSensor, AlongAxes, Branches, GyroSensor, Regressor};
+use super::curve::Curve;
+use super::measure::{Argument, BaseUnit, Unit};
+
+/// A kind of sensor.
+pub trait SensorKind: std::fmt::Debug + Clone + PartialEq + Default + 'static {
+    /// Its terms, in the order of documents.
+    const TERMS: &'static [Term];
+    /// What its biases are in, the usual one first.
+    const BIAS: &'static [BaseUnit];
+}
+
+/// Gyros.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Gyros;
+
+/// Accelerometers, whose biases are in units of their output.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Accels;
+
+impl SensorKind for Gyros {
+    const TERMS: &'static [Term] = &GYRO_TERMS;
+    const BIAS: &'static [BaseUnit] = &[BaseUnit::DegPerH];
+}
+
+impl SensorKind for Accels {
+    const TERMS: &'static [Term] = &ACCEL_TERMS;
+    const BIAS: &'static [BaseUnit] = &[BaseUnit::CountsPerS, BaseUnit::V, BaseUnit::MPerS2];
+}
+
+/// The terms that a sensor states, in the order of documents.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Terms<K> {
+    stated: Vec<StatedTerm>,
+    kind: PhantomData<K>,
+}
 
 /// A term that a sensor states.
-#[derive(Debug)]
-pub(super) struct StatedTerm<'d> {
-    pub(super) feature: Feature,
-    /// Its key in the sensor's table.
-    pub(super) key: String,
-    /// τ of a lag (s), half width of a play (°C).
-    pub(super) parameter: Option<f64>,
+#[derive(Debug, Clone, PartialEq)]
+pub struct StatedTerm {
+    /// What its coefficient is multiplied by.
+    pub feature: Feature,
+    /// τ of a lag (s), half width of a play (°C); 0 for any other.
+    pub parameter: f64,
     /// What a regressor is.
-    pub(super) regressor: Option<StatedRegressor<'d>>,
-    pub(super) coefficient: StatedCoefficient<'d>,
+    pub regressor: Option<Regressor>,
+    /// Its coefficient.
+    pub coefficient: Coefficient,
 }
 
-/// Names of a regressor's channels, and its constant.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct StatedRegressor<'d> {
-    pub(super) channel: &'d str,
-    pub(super) minus: Option<&'d str>,
-    pub(super) reference: f64,
+/// The coefficient of a term.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Coefficient {
+    /// One curve.
+    Curve(Curve),
+    /// One curve per thermal branch, both over the same argument.
+    Branched {
+        /// "+" curve: Ṫ·T̈ > 0.
+        run_up: Curve,
+        /// "−" curve: Ṫ·T̈ < 0.
+        braking: Curve,
+    },
 }
 
-/// Its coefficient.
-#[derive(Debug, Clone, Copy)]
-pub(super) enum StatedCoefficient<'d> {
-    Curve(&'d CurveForm),
-    Branched { run_up: &'d CurveForm, braking: &'d CurveForm },
+/// What a regressor is but for its gain.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub struct Regressor {
+    /// x.
+    #[schemars(length(min = 1, max = 24), extend("x-must-be" = "a name of 1 to 24 bytes"))]
+    pub channel: String,
+    /// Subtracted channel.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(length(min = 1, max = 24), extend("x-must-be" = "a name of 1 to 24 bytes"))]
+    pub minus: Option<String>,
+    /// Subtracted constant.
+    #[serde(default)]
+    pub reference: f64,
 }
 
-impl<'d> StatedTerm<'d> {
-    /// Its curves, each with its path in the sensor's table.
-    pub(super) fn curves(&self) -> Vec<(String, &'d CurveForm)> {
-        match self.coefficient {
-            StatedCoefficient::Curve(curve) if self.parameter.is_some() || self.regressor.is_some() => {
-                vec![(join(&self.key, "gain"), curve)]
+impl StatedTerm {
+    /// A term with one curve.
+    #[must_use]
+    pub fn new(feature: Feature, curve: Curve) -> Self {
+        Self { feature, parameter: 0.0, regressor: None, coefficient: Coefficient::Curve(curve) }
+    }
+
+    /// A term with a curve for each thermal branch.
+    #[must_use]
+    pub fn branched(feature: Feature, [run_up, braking]: [Curve; 2]) -> Self {
+        let coefficient = Coefficient::Branched { run_up, braking };
+        Self { feature, parameter: 0.0, regressor: None, coefficient }
+    }
+
+    /// A lag of a time constant (s) or a play of a half width (°C).
+    #[must_use]
+    pub fn with_parameter(feature: Feature, parameter: f64, gain: Curve) -> Self {
+        Self { parameter, ..Self::new(feature, gain) }
+    }
+
+    /// A regressor.
+    #[must_use]
+    pub fn regressor(regressor: Regressor, gain: Curve) -> Self {
+        Self { regressor: Some(regressor), ..Self::new(Feature::Regressor, gain) }
+    }
+
+    /// Its one curve.
+    #[must_use]
+    pub fn curve(&self) -> Option<&Curve> {
+        match &self.coefficient {
+            Coefficient::Curve(curve) => Some(curve),
+            Coefficient::Branched { .. } => None,
+        }
+    }
+
+    /// Its curves, each with its key after that of the term, where it has one.
+    fn keyed(&self, form: TermForm) -> Vec<(Option<&'static str>, &Curve)> {
+        match &self.coefficient {
+            Coefficient::Branched { run_up, braking } => {
+                vec![(Some("run_up"), run_up), (Some("braking"), braking)]
             }
-            StatedCoefficient::Curve(curve) => vec![(self.key.clone(), curve)],
-            StatedCoefficient::Branched { run_up, braking } => {
-                vec![(join(&self.key, "run_up"), run_up), (join(&self.key, "braking"), braking)]
+            Coefficient::Curve(gain) => {
+                let is_gain = matches!(form, TermForm::Each(_) | TermForm::Regressors(_));
+                vec![(is_gain.then_some("gain"), gain)]
             }
         }
     }
 
+    fn curves_mut(&mut self) -> impl Iterator<Item = &mut Curve> {
+        let curves = match &mut self.coefficient {
+            Coefficient::Curve(curve) => [Some(curve), None],
+            Coefficient::Branched { run_up, braking } => [Some(run_up), Some(braking)],
+        };
+        curves.into_iter().flatten()
+    }
+
     /// What the core gets; `source` gives a channel by its name.
     pub(super) fn to_parts(&self, source: impl Fn(&str) -> Source) -> TermParts {
-        let coefficient = match self.coefficient {
-            StatedCoefficient::Curve(curve) => CoefficientParts::Curve(curve.to_parts(0.0)),
-            StatedCoefficient::Branched { run_up, braking } => CoefficientParts::Branched(BranchedParts {
+        let coefficient = match &self.coefficient {
+            Coefficient::Curve(curve) => CoefficientParts::Curve(curve.to_parts(0.0)),
+            Coefficient::Branched { run_up, braking } => CoefficientParts::Branched(BranchedParts {
                 argument: match run_up.argument().or(braking.argument()) {
                     None | Some(Argument::DegC) => BranchArgument::Temperature,
                     Some(_) => BranchArgument::Derivative,
@@ -65,119 +161,118 @@ impl<'d> StatedTerm<'d> {
                 braking: braking.to_parts(0.0),
             }),
         };
-        let parameter = self.parameter.unwrap_or_default();
-        let regressor = self.regressor.map(|StatedRegressor { channel, minus, reference }| RegressorParts {
-            channel: source(channel),
-            minus: minus.map(source),
-            reference,
+        let regressor = self.regressor.as_ref().map(|stated| RegressorParts {
+            channel: source(&stated.channel),
+            minus: stated.minus.as_deref().map(source),
+            reference: stated.reference,
         });
-        TermParts { feature: self.feature, parameter, regressor, coefficient }
+        TermParts { feature: self.feature, parameter: self.parameter, regressor, coefficient }
     }
 }
 
-impl<'d> From<&'d Regressor> for StatedRegressor<'d> {
-    fn from(Regressor { channel, minus, reference, .. }: &'d Regressor) -> Self {
-        Self { channel, minus: minus.as_deref(), reference: *reference }
-    }
-}
-
-impl<'d> From<&'d AccelRegressor> for StatedRegressor<'d> {
-    fn from(AccelRegressor { channel, minus, reference, .. }: &'d AccelRegressor) -> Self {
-        Self { channel, minus: minus.as_deref(), reference: *reference }
-    }
-}
-
-/// Terms found so far, of one kind of sensor.
-struct Terms<'d> {
-    declared: &'static [Term],
-    found: Vec<StatedTerm<'d>>,
-}
-
-impl<'d> Terms<'d> {
-    fn key(&self, feature: Feature) -> &'static str {
-        self.declared.iter().find(|term| term.feature == feature).map_or("", |term| term.key)
+impl<K: SensorKind> Terms<K> {
+    fn place(feature: Feature) -> Option<usize> {
+        K::TERMS.iter().position(|term| term.feature == feature)
     }
 
-    fn curve<Q: Quantity>(&mut self, feature: Feature, curve: Option<&'d Curve<Q>>) {
-        let key = self.key(feature).to_owned();
-        let coefficient = curve.map(|curve| StatedCoefficient::Curve(curve));
-        let term = |coefficient| StatedTerm { feature, key, parameter: None, regressor: None, coefficient };
-        self.found.extend(coefficient.map(term));
+    /// Adds a term in the unit of a sensor whose biases are in `bias`; it replaces one that may stand once only. A term that
+    /// the kind of sensor does not have changes nothing.
+    pub(super) fn put(&mut self, mut stated: StatedTerm, bias: BaseUnit) {
+        let Some(term) = Self::place(stated.feature).and_then(|place| K::TERMS.get(place)) else { return };
+        let (unit, arguments) = (unit(term, bias), arguments(term));
+        stated.curves_mut().for_each(|curve| curve.fit(unit, &arguments));
+        if term.form.most() == 1 {
+            self.remove(stated.feature);
+        }
+        self.stated.push(stated);
+        self.stated.sort_by_key(|stated| Self::place(stated.feature));
     }
 
-    fn branches<Q: Quantity>(&mut self, feature: Feature, branches: Option<&'d Branches<Curve<Q>>>) {
-        let Some(Branches { run_up, braking }) = branches else { return };
-        let coefficient = StatedCoefficient::Branched { run_up, braking };
-        let key = self.key(feature).to_owned();
-        self.found.push(StatedTerm { feature, key, parameter: None, regressor: None, coefficient });
-    }
-
-    /// Terms that may stand more than once, each with its parameter.
-    fn list<Q: Quantity>(&mut self, feature: Feature, stated: impl Iterator<Item = (f64, &'d Curve<Q>)>) {
-        let key = self.key(feature);
-        for (i, (parameter, gain)) in stated.enumerate() {
-            self.found.push(StatedTerm {
-                feature,
-                key: element(key, i),
-                parameter: Some(parameter),
-                regressor: None,
-                coefficient: StatedCoefficient::Curve(gain),
-            });
+    /// Sets the term of a feature to a curve, or takes it out.
+    pub(super) fn set(&mut self, feature: Feature, curve: Option<Curve>, bias: BaseUnit) {
+        self.remove(feature);
+        if let Some(curve) = curve {
+            self.put(StatedTerm::new(feature, curve), bias);
         }
     }
 
-    fn regressors<Q: Quantity>(&mut self, stated: impl Iterator<Item = (StatedRegressor<'d>, &'d Curve<Q>)>) {
-        let key = self.key(Feature::Regressor);
-        for (i, (regressor, gain)) in stated.enumerate() {
-            self.found.push(StatedTerm {
-                feature: Feature::Regressor,
-                key: element(key, i),
-                parameter: None,
-                regressor: Some(regressor),
-                coefficient: StatedCoefficient::Curve(gain),
-            });
-        }
+    /// Takes a term out, all of it where it stands more than once.
+    pub fn remove(&mut self, feature: Feature) {
+        self.retain(|stated| stated != feature);
     }
 
-    fn along_axes<Q: Quantity>(&mut self, features: [Feature; 3], curves: Option<&'d AlongAxes<Curve<Q>>>) {
-        let Some(AlongAxes { x, y, z }) = curves else { return };
-        for (feature, curve) in features.into_iter().zip([x, y, z]) {
-            self.curve(feature, curve.as_ref());
-        }
+    /// Keeps the terms of some features.
+    pub fn retain(&mut self, keep: impl Fn(Feature) -> bool) {
+        self.stated.retain(|stated| keep(stated.feature));
+    }
+
+    /// All of them.
+    pub fn iter(&self) -> impl Iterator<Item = &StatedTerm> {
+        self.stated.iter()
+    }
+
+    /// Those of a feature.
+    pub fn of(&self, feature: Feature) -> impl Iterator<Item = &StatedTerm> {
+        self.iter().filter(move |stated| stated.feature == feature)
+    }
+
+    /// Whether one of a feature is stated.
+    #[must_use]
+    pub fn has(&self, feature: Feature) -> bool {
+        self.of(feature).next().is_some()
+    }
+
+    /// The one curve of a feature's term.
+    #[must_use]
+    pub fn curve(&self, feature: Feature) -> Option<&Curve> {
+        self.of(feature).next()?.curve()
+    }
+
+    /// All of them, each with its key in the sensor's table.
+    pub(super) fn keyed(&self) -> Vec<KeyedTerm<'_>> {
+        let of_term = |term: &'static Term| {
+            let stated = self.of(term.feature).enumerate();
+            stated.map(move |(i, stated)| {
+                let key = if term.form.most() > 1 { element(term.key, i) } else { term.key.to_owned() };
+                KeyedTerm { term, key, stated }
+            })
+        };
+        K::TERMS.iter().flat_map(of_term).collect()
     }
 }
 
-impl GyroSensor {
-    /// Every term that it states.
-    pub(super) fn terms(&self) -> Vec<StatedTerm<'_>> {
-        let mut terms = Terms { declared: &GYRO_TERMS, found: Vec::new() };
-        terms.curve(Feature::Reading, self.increment_weight_error.as_ref());
-        terms.curve(Feature::One, self.static_bias.as_ref());
-        terms.curve(Feature::LasingMode, self.magnetic_bias.as_ref());
-        terms.curve(Feature::Meander, self.slow_meander.as_ref());
-        terms.branches(Feature::ThermalRate, self.thermal_rate.as_ref());
-        terms.branches(Feature::ThermalAcceleration, self.thermal_acceleration.as_ref());
-        terms.list(Feature::Lag, self.lag.iter().map(|lag| (lag.time_constant_s, &lag.gain)));
-        let plays = self.hysteresis.iter().map(|play| (play.half_width_deg_c, &play.gain));
-        terms.list(Feature::Play, plays);
-        terms.regressors(self.regressor.iter().map(|stated| (stated.into(), &stated.gain)));
-        terms.curve(Feature::RateMagnitude, self.increment_weight_asymmetry.as_ref());
-        let axes = [Feature::ForceX, Feature::ForceY, Feature::ForceZ];
-        terms.along_axes(axes, self.acceleration_sensitive_drift.as_ref());
-        terms.found
+/// A term with its declaration and its key in the sensor's table.
+#[derive(Debug)]
+pub(super) struct KeyedTerm<'d> {
+    pub(super) term: &'static Term,
+    pub(super) key: String,
+    pub(super) stated: &'d StatedTerm,
+}
+
+impl<'d> KeyedTerm<'d> {
+    /// Its curves, each with its path in the sensor's table.
+    pub(super) fn curves(&self) -> Vec<(String, &'d Curve)> {
+        let path = |key: Option<&str>| key.map_or_else(|| self.key.clone(), |key| join(&self.key, key));
+        self.stated.keyed(self.term.form).into_iter().map(|(key, curve)| (path(key), curve)).collect()
     }
 }
 
-impl AccelSensor {
-    /// Every term that it states.
-    pub(super) fn terms(&self) -> Vec<StatedTerm<'_>> {
-        let mut terms = Terms { declared: &ACCEL_TERMS, found: Vec::new() };
-        terms.curve(Feature::One, self.bias.as_ref());
-        terms.list(Feature::Lag, self.lag.iter().map(|lag| (lag.time_constant_s, &lag.gain)));
-        let plays = self.hysteresis.iter().map(|play| (play.half_width_deg_c, &play.gain));
-        terms.list(Feature::Play, plays);
-        terms.regressors(self.regressor.iter().map(|stated| (stated.into(), &stated.gain)));
-        terms.curve(Feature::ForceSquared, self.second_order.as_ref());
-        terms.found
-    }
+/// Unit of a term's coefficient, of a sensor whose biases are in `bias`.
+pub(super) fn unit(term: &Term, bias: BaseUnit) -> Unit {
+    let base = match term.makes {
+        Makes::Bias => bias,
+        Makes::ScaleError => BaseUnit::Ppm,
+        Makes::Force => BaseUnit::MicroG,
+    };
+    base.per(term.per)
+}
+
+/// Arguments of a term's curves: temperature, and the feature where the coefficient is branched.
+fn arguments(term: &Term) -> Vec<Argument> {
+    let feature = match (term.form, term.per) {
+        (TermForm::Branches, Per::DegCPerS) => Some(Argument::DegCPerS),
+        (TermForm::Branches, Per::DegCPerS2) => Some(Argument::DegCPerS2),
+        _ => None,
+    };
+    std::iter::once(Argument::DegC).chain(feature).collect()
 }

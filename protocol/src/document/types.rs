@@ -11,14 +11,9 @@ mod origin;
 mod self_test;
 mod sigma;
 
-pub use accel::{
-    Accel, AccelHysteresis, AccelLag, AccelOrientation, AccelOutput, AccelParity, AccelRegressor, AccelSensor,
-};
+pub use accel::{Accel, AccelOrientation, AccelOutput, AccelParity, AccelSensor};
 pub use drift::Drift;
-pub use gyro::{
-    AlongAxes, Branches, Gyro, GyroOrientation, GyroOutput, GyroParity, GyroSensor, Hysteresis, Lag,
-    Regressor, Servo, ServoKind, Trend,
-};
+pub use gyro::{Gyro, GyroOrientation, GyroOutput, GyroParity, GyroSensor, Servo, ServoKind, Trend};
 pub use origin::{Created, Log, Measure, Origin, Residual, Sample};
 pub use self_test::{SelfTest, SelfTestCounter, SelfTestVoltage};
 pub use sigma::{AccelBiasSigma, AccelSigma, GyroBiasSigma, GyroSigma};

@@ -1,8 +1,10 @@
 //! What is doubtful about a document that is valid.
 
-use super::curve::CurveForm;
+use isotherm_correction::thermal::{Feature, GYRO_TERMS, Term, TermForm};
+
+use super::curve::Curve;
 use super::measure::Argument;
-use super::terms::StatedTerm;
+use super::terms::KeyedTerm;
 use super::types::{Document, Filter, GyroSensor, Orientation, Temperature};
 use isotherm_document::Problem;
 use isotherm_document::{Reader, element, join};
@@ -18,9 +20,9 @@ pub(super) fn warnings(r: &Reader<'_>, document: &Document) -> Vec<Problem> {
     for (i, sensor) in document.gyro.sensor.iter().enumerate() {
         let path = element("gyro.sensor", i);
         let channel = sensor.channel.as_deref();
-        ranges.compare_terms(&path, channel, &sensor.terms(), &mut found);
+        ranges.compare_terms(&path, channel, &sensor.terms.keyed(), &mut found);
         without_channel(r, &path, sensor, &mut found);
-        if sensor.magnetic_bias.is_some() && document.mode_reversal.is_none() {
+        if sensor.terms.has(Feature::LasingMode) && document.mode_reversal.is_none() {
             let why = "changes its sign with the lasing mode, but there is no [mode_reversal]: switches are not bridged";
             found.push(r.warning(&join(&path, "magnetic_bias"), why));
         }
@@ -30,10 +32,10 @@ pub(super) fn warnings(r: &Reader<'_>, document: &Document) -> Vec<Problem> {
         for (i, sensor) in accel.sensor.iter().enumerate() {
             let path = element("accel.sensor", i);
             let channel = sensor.channel.as_deref();
-            ranges.compare(&path, "scale_factor", channel, Some(&*sensor.scale_factor), &mut found);
-            ranges.compare_terms(&path, channel, &sensor.terms(), &mut found);
+            ranges.compare(&path, "scale_factor", channel, Some(&sensor.scale_factor), &mut found);
+            ranges.compare_terms(&path, channel, &sensor.terms.keyed(), &mut found);
             let board = sensor.board_channel.as_deref();
-            let ratio = sensor.board_ratio_error.as_deref();
+            let ratio = sensor.board_ratio_error.as_ref();
             ranges.compare(&path, "board_ratio_error", board, ratio, &mut found);
         }
         parity(r, "accel", &accel.orientation, &mut found);
@@ -78,21 +80,17 @@ fn unused_channels(r: &Reader<'_>, document: &Document, found: &mut Vec<Problem>
 
 /// Channels of regressors.
 fn regressors(document: &Document) -> impl Iterator<Item = &String> {
-    let gyros = document.gyro.sensor.iter().flat_map(|sensor| &sensor.regressor);
-    let accels = document.accel.iter().flat_map(|accel| &accel.sensor).flat_map(|sensor| &sensor.regressor);
-    let gyros = gyros.flat_map(|stated| stated.minus.iter().chain([&stated.channel]));
-    gyros.chain(accels.flat_map(|stated| stated.minus.iter().chain([&stated.channel])))
+    let gyros = document.gyro.sensor.iter().flat_map(|sensor| sensor.terms.iter());
+    let accels = document.accel.iter().flat_map(|accel| &accel.sensor).flat_map(|sensor| sensor.terms.iter());
+    let stated = gyros.chain(accels).filter_map(|stated| stated.regressor.as_ref());
+    stated.flat_map(|regressor| regressor.minus.iter().chain([&regressor.channel]))
 }
 
 /// Terms that need a temperature that moves.
 fn without_channel(r: &Reader<'_>, path: &str, sensor: &GyroSensor, found: &mut Vec<Problem>) {
-    for (key, there) in [
-        ("thermal_rate", sensor.thermal_rate.is_some()),
-        ("thermal_acceleration", sensor.thermal_acceleration.is_some()),
-        ("lag", !sensor.lag.is_empty()),
-        ("hysteresis", !sensor.hysteresis.is_empty()),
-    ] {
-        if there && sensor.channel.is_none() {
+    for Term { feature, key, form, .. } in &GYRO_TERMS {
+        let moves = matches!(form, TermForm::Branches | TermForm::Each(_));
+        if moves && sensor.channel.is_none() && sensor.terms.has(*feature) {
             found.push(r.warning(&join(path, key), "has no effect: the gyro follows no temperature channel"));
         }
     }
@@ -117,10 +115,10 @@ impl Ranges<'_, '_> {
         &self,
         sensor: &str,
         channel: Option<&str>,
-        terms: &[StatedTerm<'_>],
+        terms: &[KeyedTerm<'_>],
         found: &mut Vec<Problem>,
     ) {
-        for (key, curve) in terms.iter().flat_map(StatedTerm::curves) {
+        for (key, curve) in terms.iter().flat_map(KeyedTerm::curves) {
             self.compare(sensor, &key, channel, Some(curve), found);
         }
     }
@@ -130,7 +128,7 @@ impl Ranges<'_, '_> {
         sensor: &str,
         key: &str,
         channel: Option<&str>,
-        curve: Option<&CurveForm>,
+        curve: Option<&Curve>,
         found: &mut Vec<Problem>,
     ) {
         let Some(curve) = curve.filter(|curve| curve.argument() == Some(Argument::DegC)) else { return };

@@ -2,7 +2,8 @@
 
 use super::{OVERLAY_OF, Overlay, ParsedOverlay};
 use crate::digest::Digest;
-use crate::document::{Curve, Document, Origin, Problem, Quantity, Shape};
+use crate::document::{Curve, Document, GyroSensor, Origin, Problem, Shape};
+use isotherm_correction::thermal::Feature;
 use isotherm_document::{element, join};
 
 /// Key of `origin.details` that lists the overlays a document was made with, the last one last.
@@ -26,8 +27,8 @@ impl ParsedOverlay {
         for change in &self.overlay.gyro {
             let named = document.gyro.sensor.iter_mut().find(|sensor| sensor.name == change.name);
             let Some(sensor) = named else { continue };
-            add(&mut sensor.static_bias, Some(change.static_bias_change_deg_per_h));
-            add(&mut sensor.magnetic_bias, change.magnetic_bias_change_deg_per_h);
+            add(sensor, Feature::One, Some(change.static_bias_change_deg_per_h));
+            add(sensor, Feature::LasingMode, change.magnetic_bias_change_deg_per_h);
         }
         document.created = self.overlay.created.or(document.created);
         record(document.origin.get_or_insert_default(), &self.overlay, &self.digest);
@@ -64,7 +65,8 @@ impl ParsedOverlay {
                 );
                 continue;
             };
-            let magnetic = base.gyro.sensor.get(at).is_some_and(|sensor| sensor.magnetic_bias.is_some());
+            let magnetic =
+                base.gyro.sensor.get(at).is_some_and(|sensor| sensor.terms.has(Feature::LasingMode));
             if change.magnetic_bias_change_deg_per_h.is_some() && !magnetic && base.mode_reversal.is_none() {
                 refuse(
                     &join(&path, "magnetic_bias_change_deg_per_h"),
@@ -120,12 +122,11 @@ impl Overlay {
 }
 
 /// Adds a change to a bias; without one the bias stays as it is, stated or not.
-fn add<Q: Quantity>(bias: &mut Option<Curve<Q>>, change: Option<f64>) {
+fn add(sensor: &mut GyroSensor, bias: Feature, change: Option<f64>) {
     let Some(change) = change else { return };
-    *bias = Some(match bias.take() {
-        Some(curve) => curve.plus(change),
-        None => Curve::new(Shape::Constant { value: change }),
-    });
+    let stated = sensor.terms.curve(bias).map(|curve| curve.plus(change));
+    let curve = stated.unwrap_or_else(|| Curve::new(Shape::Constant { value: change }));
+    sensor.set(bias, curve);
 }
 
 /// Enters the overlay in the origin's details.

@@ -1,5 +1,7 @@
 //! Overlays by themselves, on their base, and as candidates.
 
+use isotherm_correction::thermal::Feature;
+
 use super::*;
 use crate::digest::Digest;
 use crate::document::{Document, Parsed, difference};
@@ -90,8 +92,8 @@ fn the_changes_are_added_to_all_of_a_curve_and_nothing_else_changes() {
 #[test]
 fn a_bias_that_the_base_leaves_out_becomes_a_constant() {
     let mut document = base(FULL).document;
-    document.gyro.sensor[0].static_bias = None;
-    document.gyro.sensor[0].magnetic_bias = None;
+    document.gyro.sensor[0].set(Feature::One, None);
+    document.gyro.sensor[0].set(Feature::LasingMode, None);
     document.origin = None;
     let bare = document.to_toml().unwrap();
     let made = candidate(&overlay_of(&bare), Some(&bare)).document;
@@ -182,7 +184,7 @@ fn what_does_not_fit_the_base_is_told_at_once_with_its_place() {
         let mut document = base(FULL).document;
         document.mode_reversal = None;
         document.gyro.sensor.iter_mut().for_each(|sensor| {
-            sensor.magnetic_bias = None;
+            sensor.set(Feature::LasingMode, None);
             sensor.servo = None;
         });
         document.to_toml().unwrap()

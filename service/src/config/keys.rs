@@ -1,254 +1,162 @@
-//! The configuration as types: key for key what stands in the file. A key that is left out has its default.
+//! Settings of other crates, key for key.
 
+use std::path::PathBuf;
+use std::time::Duration;
+
+use isotherm_bus::SessionOptions;
+use isotherm_correction::earth::Place;
+use isotherm_correction::navigation::{MAX_STEP_TICKS, NavigationStep};
+use isotherm_correction::prelaunch::{PreLaunchLimits, PreLaunchSettings};
+use isotherm_correction::rest::RestLimits;
+use isotherm_correction::unit::{Uncalibrated, UnitSettings};
+use isotherm_correction::units::Span;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::swap::Severity;
+use super::units::{As, DegPerH, DriftEstimate, Endpoints, Form, InitialState, Ms, PathText, Seconds, form};
 
-/// The keys of `config/service.toml`, in its order.
-#[derive(Debug, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(default)]
-#[schemars(deny_unknown_fields, title = "Isotherm service configuration")]
-pub(super) struct Keys {
-    /// Folder of the calibration documents.
-    #[schemars(length(min = 1))]
-    pub(super) calibrations: Option<String>,
-    /// Whether a bad calibration document keeps the service from starting.
-    pub(super) strict_start: Option<bool>,
-    /// Folder of the audit file and of every accepted document.
-    #[schemars(length(min = 1))]
-    pub(super) state: Option<String>,
+/// A key that is left out means what it means in the other crate.
+macro_rules! defaults {
+    ($keys:ident of $settings:ident: $($field:ident),+) => {
+        impl Default for $keys {
+            fn default() -> Self {
+                let $settings { $($field,)+ .. } = $settings::default();
+                Self { $($field),+ }
+            }
+        }
+    };
+}
+
+defaults!(UnitKeys of UnitSettings: in_standby, subtract_drift, reference_delay, uncalibrated, pairing_window, temperature_delay, navigation);
+defaults!(PreLaunchKeys of PreLaunchSettings: duration, place, limits);
+defaults!(LimitsKeys of PreLaunchLimits: static_bias_change_rad_per_s, magnetic_bias_change_rad_per_s, mode_imbalance, time_per_mode, good_share, rest);
+defaults!(SessionKeys of SessionOptions: config, connect, listen, namespace, lease);
+
+/// Keys of every unit's state machine.
+#[derive(Serialize, Deserialize, JsonSchema)]
+#[serde(remote = "UnitSettings", default)]
+pub(super) struct UnitKeys {
     /// State that a unit starts in.
-    pub(super) initial_state: Option<InitialState>,
+    #[serde(rename = "initial_state", with = "As::<InitialState>")]
+    #[schemars(with = "InitialState")]
+    in_standby: bool,
     /// What is done with the drift estimate.
-    pub(super) drift_estimate: Option<DriftEstimate>,
+    #[serde(rename = "drift_estimate", with = "As::<DriftEstimate>")]
+    #[schemars(with = "DriftEstimate")]
+    subtract_drift: bool,
     /// How long a rate reference is waited for.
-    #[schemars(range(max = 60_000))]
-    pub(super) reference_delay_ms: Option<u32>,
+    #[serde(rename = "reference_delay_ms", with = "As::<Ms>")]
+    #[schemars(with = "u32", range(max = 60_000))]
+    reference_delay: Span,
     /// What happens to ticks of units without a calibration.
-    pub(super) uncalibrated: Option<UncalibratedKey>,
-    /// Most units at a time.
-    #[schemars(range(min = 1, max = 16_384))]
-    pub(super) max_units: Option<u32>,
+    #[serde(with = "UncalibratedKey")]
+    #[schemars(with = "UncalibratedKey")]
+    uncalibrated: Uncalibrated,
     /// How long a gyro tick waits for its accelerometer tick.
-    #[schemars(range(min = 1, max = 10_000))]
-    pub(super) pairing_window_ms: Option<u32>,
+    #[serde(rename = "pairing_window_ms", with = "As::<Ms>")]
+    #[schemars(with = "u32", range(min = 1, max = 10_000))]
+    pairing_window: Span,
     /// How much later than its time a temperature reading takes effect.
-    #[schemars(range(max = 10_000))]
-    pub(super) temperature_delay_ms: Option<u32>,
-    /// Silence after which what a unit holds back is flushed.
-    #[schemars(range(min = 10, max = 60_000))]
-    pub(super) tail_flush_ms: Option<u32>,
-    /// Interval of the status messages.
-    #[schemars(range(min = 100, max = 60_000))]
-    pub(super) status_interval_ms: Option<u32>,
-    /// How long a stop may take.
-    #[schemars(range(min = 100, max = 60_000))]
-    pub(super) stop_timeout_ms: Option<u32>,
-    /// What happens to corrected batches where a subscriber does not keep up.
-    pub(super) congestion: Option<Congestion>,
-    /// Units that are taken, by their serials.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub(super) units: Vec<String>,
-    /// Other instances for the same units.
-    pub(super) pair: PairKeys,
-    /// How the folder of the documents is watched.
-    pub(super) folder: FolderKeys,
-    /// What speaks against a swap.
-    pub(super) swap: SwapKeys,
-    /// Pre-launch calibration, where the command does not say otherwise.
-    pub(super) pre_launch: PreLaunchKeys,
+    #[serde(rename = "temperature_delay_ms", with = "As::<Ms>")]
+    #[schemars(with = "u32", range(max = 10_000))]
+    temperature_delay: Span,
     /// Navigation steps.
-    pub(super) navigation: NavigationKeys,
-    /// Metrics and health over HTTP.
-    pub(super) metrics: MetricsKeys,
-    /// The console in the browser.
-    pub(super) web: WebKeys,
-    /// How the Zenoh session is opened.
-    pub(super) zenoh: ZenohKeys,
+    #[serde(with = "As::<NavigationKeys>")]
+    #[schemars(with = "NavigationKeys")]
+    navigation: NavigationStep,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Serialize, Deserialize, JsonSchema)]
+#[serde(remote = "Uncalibrated", rename_all = "kebab-case")]
 #[schemars(inline)]
-pub(super) enum InitialState {
-    Running,
-    Standby,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-#[schemars(inline)]
-pub(super) enum DriftEstimate {
-    Publish,
-    Subtract,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-#[schemars(inline)]
-pub(super) enum UncalibratedKey {
+enum UncalibratedKey {
     PassThrough,
     Hold,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-#[schemars(inline)]
-pub(super) enum Congestion {
-    Drop,
-    Block,
-}
-
-#[derive(Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
 #[schemars(deny_unknown_fields)]
-pub(super) struct PairKeys {
-    /// Name of this instance, for people.
-    pub(super) name: Option<String>,
-    /// What it does while another one speaks.
-    pub(super) mode: Option<ModeKey>,
-    /// Of two that speak the one with the lower priority yields.
-    pub(super) priority: Option<u8>,
-    /// How late the other's output may be.
-    #[schemars(range(min = 5, max = 10_000))]
-    pub(super) takeover_ms: Option<u32>,
-    /// How long this process may stand still before others close their connections to it, and how long a put of its own may block;
-    /// left out: Zenoh's.
-    #[schemars(range(min = 100, max = 60_000))]
-    pub(super) lease_ms: Option<u32>,
+struct NavigationKeys {
+    /// Ticks in a navigation step.
+    #[schemars(range(min = 1, max = MAX_STEP_TICKS))]
+    ticks: u16,
+    /// Whether coning and sculling are compensated.
+    coning_sculling: bool,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-#[schemars(inline)]
-pub(super) enum ModeKey {
-    Standby,
-    Active,
+impl Default for NavigationKeys {
+    fn default() -> Self {
+        Self::write(&NavigationStep::default())
+    }
 }
 
-#[derive(Debug, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(default)]
-#[schemars(deny_unknown_fields)]
-pub(super) struct FolderKeys {
-    /// How long a file must be unchanged before it is read.
-    #[schemars(range(min = 10, max = 60_000))]
-    pub(super) settle_ms: Option<u32>,
-    /// Interval at which the files are looked at although nothing was heard of them.
-    #[schemars(range(min = 0.1, max = 600.0))]
-    pub(super) poll_s: Option<f64>,
-}
+form!(NavigationKeys, NavigationStep => Self,
+    |step| Self { ticks: step.ticks(), coning_sculling: step.coning_sculling() },
+    |keys| NavigationStep::new(keys.ticks, keys.coning_sculling).unwrap_or_default());
 
-#[derive(Debug, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(default)]
-#[schemars(deny_unknown_fields)]
-pub(super) struct SwapKeys {
-    /// Greatest age of a document by its `created`; 0 for no limit.
-    #[schemars(range(max = 36_500))]
-    pub(super) max_age_days: Option<u32>,
-    /// What follows where it is older.
-    pub(super) age: Option<Severity>,
-    /// What follows where a present temperature lies outside the document's fitted ranges.
-    pub(super) outside_range: Option<Severity>,
-    /// Greatest jump of the corrected angular rate about an axis of the case; 0 for no limit.
-    #[schemars(range(min = 0.0, max = 1e6))]
-    pub(super) max_jump_deg_per_h: Option<f64>,
-    /// Greatest jump of the corrected specific force along an axis of the case; 0 for no limit.
-    #[schemars(range(min = 0.0, max = 1e6))]
-    pub(super) max_jump_mg: Option<f64>,
-    /// What follows where the jump is greater.
-    pub(super) jump: Option<Severity>,
-    /// What follows where the document is of an older version.
-    pub(super) old_schema: Option<Severity>,
-    /// Time over which a swap is made where nothing else is asked for.
-    #[schemars(range(max = 3_600_000))]
-    pub(super) slew_ms: Option<u32>,
-    /// What follows where the document was created before the one in force.
-    pub(super) downgrade: Option<Severity>,
-    /// Whether a document without a signature of a trusted key is refused.
-    pub(super) require_signature: Option<bool>,
-    /// Folder of the trusted public keys.
-    #[schemars(length(min = 1))]
-    pub(super) trusted_keys: Option<String>,
-}
-
-#[derive(Debug, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(default)]
+/// Keys of pre-launch calibrations.
+#[derive(Serialize, Deserialize, JsonSchema)]
+#[serde(remote = "PreLaunchSettings", default)]
 #[schemars(deny_unknown_fields)]
 pub(super) struct PreLaunchKeys {
     /// How long it lasts.
-    #[schemars(range(min = 60.0, max = 7200.0))]
-    pub(super) duration_s: Option<f64>,
+    #[serde(rename = "duration_s", with = "As::<Seconds>")]
+    #[schemars(with = "f64", range(min = 60.0, max = 7200.0))]
+    duration: Span,
+    #[serde(skip)]
+    place: Option<Place>,
+    #[serde(flatten, with = "LimitsKeys")]
+    #[schemars(with = "LimitsKeys")]
+    limits: PreLaunchLimits,
+}
+
+#[derive(Serialize, Deserialize, JsonSchema)]
+#[serde(remote = "PreLaunchLimits", default)]
+struct LimitsKeys {
     /// Greatest change of the static bias that is accepted.
-    #[schemars(range(min = 1e-6, max = 1e6))]
-    pub(super) max_static_change_deg_per_h: Option<f64>,
+    #[serde(rename = "max_static_change_deg_per_h", with = "As::<DegPerH>")]
+    #[schemars(with = "f64", range(min = 1e-6, max = 1e6))]
+    static_bias_change_rad_per_s: f64,
     /// Greatest change of the magnetic bias that is accepted.
-    #[schemars(range(min = 1e-6, max = 1e6))]
-    pub(super) max_magnetic_change_deg_per_h: Option<f64>,
+    #[serde(rename = "max_magnetic_change_deg_per_h", with = "As::<DegPerH>")]
+    #[schemars(with = "f64", range(min = 1e-6, max = 1e6))]
+    magnetic_bias_change_rad_per_s: f64,
     /// Greatest difference of the times in the two modes, as a share of both.
+    #[serde(rename = "max_imbalance")]
     #[schemars(range(min = 0.0, max = 1.0))]
-    pub(super) max_imbalance: Option<f64>,
+    mode_imbalance: f64,
     /// Shortest time in each mode.
-    #[schemars(range(min = 30.0, max = 7200.0))]
-    pub(super) min_time_per_mode_s: Option<f64>,
+    #[serde(rename = "min_time_per_mode_s", with = "As::<Seconds>")]
+    #[schemars(with = "f64", range(min = 30.0, max = 7200.0))]
+    time_per_mode: Span,
     /// Smallest share of good ticks.
+    #[serde(rename = "min_good_share")]
     #[schemars(range(min = 0.0, max = 1.0))]
-    pub(super) min_good_share: Option<f64>,
+    good_share: f64,
+    #[serde(skip)]
+    rest: RestLimits,
 }
 
-#[derive(Debug, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(default)]
-#[schemars(deny_unknown_fields)]
-pub(super) struct NavigationKeys {
-    /// Ticks in a navigation step.
-    #[schemars(range(min = 1, max = isotherm_correction::navigation::MAX_STEP_TICKS))]
-    pub(super) ticks: Option<u16>,
-    /// Whether coning and sculling are compensated.
-    pub(super) coning_sculling: Option<bool>,
-}
-
-#[derive(Debug, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(default)]
-#[schemars(deny_unknown_fields)]
-pub(super) struct MetricsKeys {
-    /// Address and port.
-    pub(super) listen: Option<String>,
-    /// Whether other machines may reach it.
-    pub(super) allow_remote: Option<bool>,
-}
-
-#[derive(Debug, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(default)]
-#[schemars(deny_unknown_fields)]
-pub(super) struct WebKeys {
-    /// Whether the console is served.
-    pub(super) enabled: Option<bool>,
-    /// Whether it may change anything.
-    pub(super) write: Option<bool>,
-    /// Further names under which browsers may ask for it.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub(super) hosts: Vec<String>,
-    /// File of the token.
-    #[schemars(length(min = 1))]
-    pub(super) token_file: Option<String>,
-}
-
-#[derive(Debug, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(default)]
-#[schemars(deny_unknown_fields)]
-pub(super) struct ZenohKeys {
+/// Keys of the Zenoh session.
+#[derive(Serialize, Deserialize, JsonSchema)]
+#[serde(remote = "SessionOptions", default)]
+pub(super) struct SessionKeys {
     /// A Zenoh configuration file.
-    #[schemars(length(min = 1))]
-    pub(super) config: Option<String>,
+    #[serde(with = "As::<PathText>")]
+    #[schemars(with = "Option<String>", length(min = 1))]
+    config: Option<PathBuf>,
     /// Endpoints to connect to.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub(super) connect: Vec<String>,
+    #[serde(with = "As::<Endpoints>", skip_serializing_if = "Vec::is_empty")]
+    #[schemars(with = "Vec<String>")]
+    connect: Vec<String>,
     /// Endpoints to listen on.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub(super) listen: Vec<String>,
+    #[serde(with = "As::<Endpoints>", skip_serializing_if = "Vec::is_empty")]
+    #[schemars(with = "Vec<String>")]
+    listen: Vec<String>,
     /// Prefix of every key.
     #[schemars(length(min = 1))]
-    pub(super) namespace: Option<String>,
-    /// Whether swaps and commands are taken only on keys that end in the name of who asks.
-    pub(super) certified_names: Option<bool>,
+    namespace: Option<String>,
+    #[serde(skip)]
+    lease: Option<Duration>,
 }

@@ -2,10 +2,23 @@
 
 use std::net::SocketAddr;
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::units::{AddressText, As};
+
+/// What the address must be.
+pub(super) const LOOPBACK: &str =
+    "an address and a port, such as \"127.0.0.1:9464\"; any but loopback needs allow_remote = true";
+
 /// Where metrics and health are served over HTTP.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+#[schemars(deny_unknown_fields)]
 pub struct MetricsSettings {
     /// Address and port (0: one of the system's choice); `None` for no HTTP at all.
+    #[serde(with = "As::<AddressText>")]
+    #[schemars(with = "Option<String>", extend("format" = "socket-address", "x-must-be" = LOOPBACK))]
     pub listen: Option<SocketAddr>,
     /// Whether other machines may reach it. Nobody is asked for a name there, and nothing is encrypted.
     pub allow_remote: bool,

@@ -3,24 +3,53 @@
 use std::time::Duration;
 
 use isotherm_protocol::pair::Mode;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use zenoh::key_expr::OwnedKeyExpr;
 
+use super::units::{As, Ms};
+
 /// What an operator can set of a pair.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+#[schemars(deny_unknown_fields)]
 pub struct PairSettings {
     /// Name of this instance; `None`: the first characters of its Zenoh id.
     pub name: Option<String>,
     /// What it does while another one speaks.
+    #[schemars(with = "ModeKey")]
     pub mode: Mode,
     /// Of two that speak the one with the lower priority yields.
     pub priority: u8,
-    /// How late the other's output may be (5 ms…10 s).
+    /// How late the other's output may be.
+    #[serde(rename = "takeover_ms", with = "As::<Ms>")]
+    #[schemars(with = "u32", range(min = 5, max = 10_000))]
     pub takeover: Duration,
+    /// How long this process may stand still before others close their connections to it, and how long a put of its own may block;
+    /// `None`: Zenoh's.
+    #[serde(rename = "lease_ms", with = "As::<Ms>")]
+    #[schemars(with = "Option<u32>", range(min = 100, max = 60_000))]
+    pub lease: Option<Duration>,
+}
+
+/// The modes of [`Mode`], as they are spelled.
+#[derive(JsonSchema)]
+#[schemars(inline, rename_all = "kebab-case")]
+#[expect(dead_code, reason = "read by the derived schema alone")]
+enum ModeKey {
+    Standby,
+    Active,
 }
 
 impl Default for PairSettings {
     fn default() -> Self {
-        Self { name: None, mode: Mode::Standby, priority: 0, takeover: Duration::from_millis(20) }
+        Self {
+            name: None,
+            mode: Mode::Standby,
+            priority: 0,
+            takeover: Duration::from_millis(20),
+            lease: None,
+        }
     }
 }
 

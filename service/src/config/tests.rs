@@ -128,15 +128,18 @@ fn every_key_arrives_where_it_belongs() {
             mode: Mode::Active,
             priority: 7,
             takeover: Duration::from_millis(35),
+            lease: Some(Duration::from_millis(400)),
         },
         metrics: MetricsSettings { listen: Some("0.0.0.0:9464".parse().unwrap()), allow_remote: true },
-        certified_names: true,
-        session: SessionOptions {
-            config: Some(folder.path().join("z.json5")),
-            connect: vec!["tcp/127.0.0.1:1".to_owned()],
-            listen: vec!["tcp/127.0.0.1:0".to_owned()],
-            namespace: Some("site/a".to_owned()),
-            lease: Some(Duration::from_millis(400)),
+        zenoh: ZenohSettings {
+            certified_names: true,
+            session: SessionOptions {
+                config: Some(folder.path().join("z.json5")),
+                connect: vec!["tcp/127.0.0.1:1".to_owned()],
+                listen: vec!["tcp/127.0.0.1:0".to_owned()],
+                namespace: Some("site/a".to_owned()),
+                lease: Some(Duration::from_millis(400)),
+            },
         },
         ..Settings::default()
     };

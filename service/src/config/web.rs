@@ -2,16 +2,26 @@
 
 use std::path::PathBuf;
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::units::{As, PathText};
+
 /// The console in the browser, on the address of `[metrics]`.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+#[schemars(deny_unknown_fields)]
 pub struct WebSettings {
     /// Whether it is served.
     pub enabled: bool,
     /// Whether it may change anything: swaps, rollbacks, commands.
     pub write: bool,
     /// Names beside loopback under which browsers may ask for it, without a port.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub hosts: Vec<String>,
     /// File of the token; `None` for `web-token` in the state folder, and a new one at each start where there is none.
+    #[serde(with = "As::<PathText>")]
+    #[schemars(with = "Option<String>", length(min = 1))]
     pub token_file: Option<PathBuf>,
 }
 

@@ -92,7 +92,7 @@ impl Web {
             write: settings.web.write,
             intake: Arc::clone(intake),
             instance: session.zid().to_string(),
-            options: options(&isotherm_bus::locators(session), settings.session.namespace.as_deref()),
+            options: options(&isotherm_bus::locators(session), settings.zenoh.session.namespace.as_deref()),
             client,
             fleet,
             live: Arc::new(Semaphore::new(MAX_LIVE)),

@@ -4,9 +4,10 @@ use std::path::Path;
 use std::sync::Arc;
 
 use isotherm_correction::calibration::Calibration;
+use isotherm_correction::thermal::Feature;
 use isotherm_protocol::document::{
     Accel, AccelOutput, AccelSensor, Channel, Curve, Document, Filter, Gyro, GyroOutput, GyroSensor, Measure,
-    Orientation, Origin, Quantity, Residual, Sample, Shape, Temperature, Unit,
+    Orientation, Origin, Residual, Sample, Shape, Temperature,
 };
 use isotherm_tests::logs::{RealLog, correct};
 use isotherm_tests::simulated::Size;
@@ -86,7 +87,11 @@ fn bare() -> Document {
     };
     let accel = |name: &&str| AccelSensor {
         channel: Some(CHANNEL.into()),
-        ..AccelSensor::bare(name, Curve::new(Shape::Constant { value: 1.0 }).in_unit(Unit::MPerS2PerMPerS2))
+        ..AccelSensor::bare(
+            name,
+            Curve::new(Shape::Constant { value: 1.0 })
+                .in_unit(AccelOutput::MetresPerSecondSquared.scale_unit()),
+        )
     };
     Document {
         note: Some(NOTE.into()),
@@ -122,20 +127,17 @@ fn bare() -> Document {
 
 /// The document with one cubic per sensor, gyros first (°/h, m/s²).
 fn with_cubics(bare: &Document, cubics: &[[f64; DEGREE + 1]; 6]) -> Document {
-    fn curve<Q: Quantity>(cubic: &[f64]) -> Curve<Q> {
-        Curve::new(Shape::Polynomial {
-            reference: REFERENCE_DEG_C,
-            coefficients: cubic.to_vec(),
-            range: RANGE_DEG_C,
-        })
-    }
+    let curve = |cubic: &[f64]| {
+        let (reference, coefficients, range) = (REFERENCE_DEG_C, cubic.to_vec(), RANGE_DEG_C);
+        Curve::new(Shape::Polynomial { reference, coefficients, range })
+    };
     let mut document = bare.clone();
     let (gyros, accels) = cubics.split_at(AXES.len());
     for (sensor, cubic) in document.gyro.sensor.iter_mut().zip(gyros) {
-        sensor.static_bias = Some(curve(cubic));
+        sensor.set(Feature::One, curve(cubic));
     }
     for (sensor, cubic) in document.accel.iter_mut().flat_map(|accel| &mut accel.sensor).zip(accels) {
-        sensor.bias = Some(curve(cubic).in_unit(Unit::MPerS2));
+        sensor.set(Feature::One, curve(cubic));
     }
     document
 }

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use isotherm_correction::calibration::Calibration;
+use isotherm_correction::thermal::Feature;
 use isotherm_protocol::document::{
     Document, Filter, Gyro, GyroOutput, GyroSensor, Measure, Orientation, Origin, Residual, Sample,
 };
@@ -92,10 +93,9 @@ fn with_scale(scenario: &Scenario) -> Result<Document, Failure> {
     let (Gyros::FibreOptic(gyros), Some(block)) = (&instrument.gyros, &instrument.accelerometers) else {
         return Err(Failure::WrongUnit { unit: scenario.unit.clone() });
     };
-    let sensors = gyros.iter().zip(AXES).enumerate().map(|(index, (gyro, name))| GyroSensor {
-        increment_weight_rad_per_rad: Some(tidy(gyro.scale)),
-        increment_weight_error: Some(scale_error(gyro.reference_deg_c, gyro.scale_per_k)),
-        ..bare_gyro(index, name)
+    let sensors = gyros.iter().zip(AXES).enumerate().map(|(index, (gyro, name))| {
+        GyroSensor { increment_weight_rad_per_rad: Some(tidy(gyro.scale)), ..bare_gyro(index, name) }
+            .with(Feature::Reading, scale_error(gyro.reference_deg_c, gyro.scale_per_k))
     });
     Ok(Document {
         note: Some(format!(

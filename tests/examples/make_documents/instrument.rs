@@ -4,10 +4,11 @@
 //! has both. Its accelerometer scale leads from specific force to output, as the document's scale factor does. Its
 //! thermometers lead from °C to the reading; the document goes back.
 
+use isotherm_correction::thermal::Feature;
 use isotherm_correction::units::{Angle, AngularRate};
 use isotherm_protocol::document::{
     Accel, AccelOutput, AccelSensor, Channel, Curve, Filter, GyroSensor, Orientation, OrientationThermal,
-    Quantity, Shape, Temperature, Unit,
+    Shape, Temperature,
 };
 use isotherm_simulator::accelerometer::{AccelerometerOutput, Accelerometers};
 use isotherm_simulator::instrument::Instrument;
@@ -42,13 +43,13 @@ pub(crate) fn deg_per_h(rad_per_s: f64) -> f64 {
 }
 
 /// A polynomial, lowest power first.
-pub(crate) fn polynomial<Q: Quantity>(reference: f64, coefficients: &[f64]) -> Curve<Q> {
+pub(crate) fn polynomial(reference: f64, coefficients: &[f64]) -> Curve {
     let coefficients = coefficients.iter().copied().map(tidy).collect();
     Curve::new(Shape::Polynomial { reference, coefficients, range: RANGE_DEG_C })
 }
 
 /// The scale's thermal coefficients κ1 (1/K) and κ2 (1/K²).
-pub(crate) fn scale_error<Q: Quantity>(reference: f64, [first, second]: [f64; 2]) -> Curve<Q> {
+pub(crate) fn scale_error(reference: f64, [first, second]: [f64; 2]) -> Curve {
     polynomial(reference, &[0.0, first * 1e6, second * 1e6])
 }
 
@@ -90,13 +91,9 @@ pub(crate) fn orientation<P>(axes: &Axes) -> Orientation<P> {
 
 /// The accelerometers by their own constants.
 pub(crate) fn accelerometers(block: &Accelerometers) -> Accel {
-    let (output, scale_unit, bias_unit, per_output) = match block.output {
-        AccelerometerOutput::Counts { hz_per_v, .. } => {
-            (AccelOutput::Counts, Unit::CountsPerSPerMPerS2, Unit::CountsPerS, hz_per_v)
-        }
-        AccelerometerOutput::Mean => {
-            (AccelOutput::MetresPerSecondSquared, Unit::MPerS2PerMPerS2, Unit::MPerS2, 1.0)
-        }
+    let (output, per_output) = match block.output {
+        AccelerometerOutput::Counts { hz_per_v, .. } => (AccelOutput::Counts, hz_per_v),
+        AccelerometerOutput::Mean => (AccelOutput::MetresPerSecondSquared, 1.0),
     };
     let sensors = block.sensors.iter().zip(AXES).enumerate().map(|(index, (sensor, name))| {
         let reference = sensor.reference_deg_c;
@@ -104,14 +101,14 @@ pub(crate) fn accelerometers(block: &Accelerometers) -> Accel {
         AccelSensor {
             channel: Some(format!("accel{index}")),
             board_channel: Some(BOARD.into()),
-            bias: Some(polynomial(reference, &sensor.bias_v.map(|s| s * per_output)).in_unit(bias_unit)),
             board_ratio_error: Some(scale_error(reference, [first, second])),
             ..AccelSensor::bare(
                 name,
                 polynomial(reference, &sensor.scale_v_per_m_per_s2.map(|k| k * per_output))
-                    .in_unit(scale_unit),
+                    .in_unit(output.scale_unit()),
             )
         }
+        .with(Feature::One, polynomial(reference, &sensor.bias_v.map(|s| s * per_output)))
     });
     Accel { output, sensor: sensors.collect(), orientation: orientation(&block.orientation) }
 }

@@ -1,5 +1,6 @@
 //! MEMS-0001: the micromechanical unit, by the constants of the simulated instrument.
 
+use isotherm_correction::thermal::Feature;
 use isotherm_protocol::document::{Document, Filter, Gyro, GyroOutput, GyroSensor, Origin};
 use isotherm_simulator::Scenario;
 use isotherm_simulator::instrument::Gyros;
@@ -52,10 +53,7 @@ pub(crate) fn make(scenario: &Scenario) -> Result<Document, Failure> {
 
 fn sensor(gyro: &MemsGyro, index: usize, name: &str) -> GyroSensor {
     let reference = gyro.reference_deg_c;
-    GyroSensor {
-        increment_weight_rad_per_rad: Some(tidy(gyro.scale)),
-        increment_weight_error: Some(scale_error(reference, gyro.scale_per_k)),
-        static_bias: Some(polynomial(reference, &gyro.bias_rad_per_s.map(deg_per_h))),
-        ..bare_gyro(index, name)
-    }
+    GyroSensor { increment_weight_rad_per_rad: Some(tidy(gyro.scale)), ..bare_gyro(index, name) }
+        .with(Feature::Reading, scale_error(reference, gyro.scale_per_k))
+        .with(Feature::One, polynomial(reference, &gyro.bias_rad_per_s.map(deg_per_h)))
 }

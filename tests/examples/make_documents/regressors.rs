@@ -6,7 +6,8 @@
 
 use std::sync::Arc;
 
-use isotherm_protocol::document::{Curve, Document, GyroSensor, Lag, Quantity, Shape};
+use isotherm_correction::thermal::Feature;
+use isotherm_protocol::document::{Curve, Document, GyroSensor, Shape, StatedTerm};
 use isotherm_simulator::{Scenario, Step};
 use isotherm_tests::simulated::{Windows, run};
 
@@ -29,22 +30,25 @@ impl Term {
     pub(crate) fn add(self, sensor: &mut GyroSensor, coefficient: f64, range: [f64; 2]) {
         match self {
             Self::Static(power) => {
-                let before = sensor.static_bias.take();
-                sensor.static_bias = Some(with(before.as_ref(), power, coefficient, range));
+                let more = with(sensor.terms.curve(Feature::One), power, coefficient, range);
+                sensor.set(Feature::One, more);
             }
             Self::Lag(time_constant_s, power) => {
-                let lag =
-                    sensor.lag.iter().position(|lag| lag.time_constant_s.total_cmp(&time_constant_s).is_eq());
-                let before = lag.map(|index| sensor.lag.remove(index));
-                let gain = with(before.as_ref().map(|lag| &lag.gain), power, coefficient, range);
-                sensor.lag.insert(lag.unwrap_or(sensor.lag.len()), Lag { time_constant_s, gain });
+                let mut lags: Vec<StatedTerm> = sensor.terms.of(Feature::Lag).cloned().collect();
+                let is_this = |lag: &StatedTerm| lag.parameter.total_cmp(&time_constant_s).is_eq();
+                let place = lags.iter().position(is_this).unwrap_or(lags.len());
+                let gain = with(lags.get(place).and_then(StatedTerm::curve), power, coefficient, range);
+                let lag = StatedTerm::with_parameter(Feature::Lag, time_constant_s, gain);
+                lags.splice(place..(place + 1).min(lags.len()), [lag]);
+                sensor.terms.remove(Feature::Lag);
+                lags.into_iter().for_each(|lag| sensor.put(lag));
             }
         }
     }
 }
 
 /// A polynomial with one more coefficient.
-fn with<Q: Quantity>(before: Option<&Curve<Q>>, power: usize, coefficient: f64, range: [f64; 2]) -> Curve<Q> {
+fn with(before: Option<&Curve>, power: usize, coefficient: f64, range: [f64; 2]) -> Curve {
     let mut coefficients = match before.map(|curve| curve.shape()) {
         Some(Shape::Polynomial { coefficients, .. }) => coefficients.clone(),
         _ => Vec::new(),

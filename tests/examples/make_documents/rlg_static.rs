@@ -4,7 +4,7 @@ use std::path::Path;
 
 use isotherm_protocol::document::{
     Accel, AccelOutput, AccelSensor, Curve, Document, Gyro, GyroOutput, GyroSensor, Orientation, Origin,
-    Shape, Unit,
+    Shape,
 };
 use isotherm_tests::logs::RealLog;
 
@@ -38,7 +38,7 @@ pub(crate) fn make(data: &Path) -> Result<Document, Failure> {
     let accel = |name: &&str| {
         AccelSensor::bare(
             name,
-            Curve::new(Shape::Constant { value: counts_per_s }).in_unit(Unit::CountsPerSPerMPerS2),
+            Curve::new(Shape::Constant { value: counts_per_s }).in_unit(AccelOutput::Counts.scale_unit()),
         )
     };
     Ok(Document {

@@ -1,9 +1,10 @@
 //! ZLG-0001: the Zeeman laser unit, by the constants of the simulated instrument.
 
+use isotherm_correction::thermal::Feature;
 use isotherm_correction::units::Angle;
 use isotherm_protocol::document::{
     Document, Drift, Filter, Gyro, GyroOutput, GyroSensor, ModeReversal, Origin, SelfTest, SelfTestCounter,
-    SelfTestVoltage, Servo, ServoKind,
+    SelfTestVoltage, Servo, ServoKind, Unit,
 };
 use isotherm_simulator::Scenario;
 use isotherm_simulator::instrument::Gyros;
@@ -85,16 +86,12 @@ fn sensor(unit: &Zeeman, gyro: &ZeemanGyro, index: usize, name: &str) -> GyroSen
     let rates = |coefficients: &[f64]| coefficients.iter().copied().map(deg_per_h).collect::<Vec<_>>();
     GyroSensor {
         increment_weight_arcsec_per_count: Some(tidy(Angle::from_rad(gyro.scale_rad_per_count).as_arcsec())),
-        increment_weight_error: Some(scale_error(reference, gyro.scale_per_k)),
-        static_bias: Some(polynomial(reference, &rates(&gyro.bias_nonmagnetic_rad_per_s))),
-        magnetic_bias: Some(polynomial(reference, &rates(&gyro.bias_magnetic_rad_per_s))),
-        slow_meander: Some(polynomial(MEANDER_REFERENCE_DEG_C, &rates(&gyro.meander_rad_per_s))),
         servo: Some(Servo {
             // Whole half-period counts are a poor measure of a frequency: one of them is 200 Hz in a tick of 5 ms. The
             // exponential needs only the first, and its error decays with the transient.
             form: ServoKind::Modelled,
             time_constant_s: unit.reversal.servo_time_constant_s,
-            rest_frequency: polynomial(reference, &gyro.dither_hz),
+            rest_frequency: polynomial(reference, &gyro.dither_hz).in_unit(Unit::HZ),
             settle_time_constants: SETTLED,
         }),
         drift: Some(Drift {
@@ -107,6 +104,10 @@ fn sensor(unit: &Zeeman, gyro: &ZeemanGyro, index: usize, name: &str) -> GyroSen
         }),
         ..bare_gyro(index, name)
     }
+    .with(Feature::Reading, scale_error(reference, gyro.scale_per_k))
+    .with(Feature::One, polynomial(reference, &rates(&gyro.bias_nonmagnetic_rad_per_s)))
+    .with(Feature::LasingMode, polynomial(reference, &rates(&gyro.bias_magnetic_rad_per_s)))
+    .with(Feature::Meander, polynomial(MEANDER_REFERENCE_DEG_C, &rates(&gyro.meander_rad_per_s)))
 }
 
 /// White noise of the measured rate as the estimator meets it: that of the gyro, and that of counting (°/√h).

@@ -1,9 +1,9 @@
 //! What sensors do with the unit's motion: simulated as physics, taken out by the terms of a document.
 
 use isotherm_correction::sample::SensorFlags;
+use isotherm_correction::thermal::Feature;
 use isotherm_protocol::document::{
-    AccelHysteresis, AccelRegressor, AlongAxes, Auxiliary, AxesHysteresis, Curve, Document, Hysteresis,
-    Regressor, Shape, Unit,
+    Argument, Auxiliary, AxesHysteresis, Curve, Document, Regressor, Shape, StatedTerm,
 };
 use isotherm_simulator::Scenario;
 use isotherm_simulator::chamber::Profile;
@@ -17,6 +17,7 @@ use isotherm_tests::simulated::{Size, run};
 use crate::{compile, parsed};
 
 const G: f64 = 9.806_65;
+const FORCES: [Feature; 3] = [Feature::ForceX, Feature::ForceY, Feature::ForceZ];
 const DEG_PER_H: f64 = std::f64::consts::PI / 180.0 / 3600.0;
 /// Tumbling: every axis feels gravity from both sides.
 const TUMBLE: Path = Path::ConstantRate { axis: [1.0, 2.0, -0.5], rate_deg_per_s: 40.0 };
@@ -70,6 +71,10 @@ fn constant(value: f64) -> Shape {
     Shape::Constant { value }
 }
 
+fn over_rate(shape: Shape) -> Curve {
+    Curve::new(shape).over(Argument::DegPerS)
+}
+
 /// The error that an effect makes, and what is left of it with the terms that `state` puts into the document; both beside an instrument
 /// without the effect.
 fn judged(
@@ -103,15 +108,12 @@ fn drift_with_acceleration_is_removed_over_temperature() {
         &scenario,
         |document| {
             for (sensor, row) in document.gyro.sensor.iter_mut().zip(coefficients) {
-                let [x, y, z] = [0, 1, 2].map(|axis: usize| {
+                for (axis, feature) in FORCES.into_iter().enumerate() {
                     let coefficients = vec![row[axis], per_k[axis]];
-                    Some(Curve::new(Shape::Polynomial {
-                        reference: 25.0,
-                        coefficients,
-                        range: [-40.0, 80.0],
-                    }))
-                });
-                sensor.acceleration_sensitive_drift = Some(AlongAxes { x, y, z });
+                    let range = [-40.0, 80.0];
+                    sensor
+                        .set(feature, Curve::new(Shape::Polynomial { reference: 25.0, coefficients, range }));
+                }
             }
         },
         |document, scenario| errors(document, scenario).0,
@@ -135,14 +137,14 @@ fn a_scale_that_depends_on_the_rate_is_removed() {
         |document| {
             for (sensor, sense) in document.gyro.sensor.iter_mut().zip([1.0, -1.0, 0.5]) {
                 // The gyro senses 1 + a of a positive rate: its weight is less there.
-                sensor.increment_weight_asymmetry = Some(Curve::new(constant(-asymmetry * sense * 1e6)));
+                sensor.set(Feature::RateMagnitude, Curve::new(constant(-asymmetry * sense * 1e6)));
                 let knot = |step: i32| {
                     let deg_per_s = f64::from(step) * 10.0;
                     let rate = deg_per_s.to_radians();
                     [deg_per_s, (1.0 / (1.0 + curvature * sense * rate * rate) - 1.0) * 1e6]
                 };
                 let knots = (-12..=12).map(knot).collect();
-                sensor.increment_weight_over_rate = Some(Curve::new(Shape::Spline { knots }));
+                sensor.increment_weight_over_rate = Some(over_rate(Shape::Spline { knots }));
             }
         },
         |document, scenario| errors(document, scenario).0,
@@ -155,7 +157,7 @@ fn a_rate_outside_its_curve_is_flagged_as_such() {
     let mut document = document();
     for sensor in &mut document.gyro.sensor {
         let knots = vec![[-10.0, 5.0], [10.0, 5.0]];
-        sensor.increment_weight_over_rate = Some(Curve::new(Shape::PiecewiseLinear { knots }));
+        sensor.increment_weight_over_rate = Some(over_rate(Shape::PiecewiseLinear { knots }));
     }
     for (rate_deg_per_s, outside) in [(5.0, false), (40.0, true)] {
         let path = Path::ConstantRate { axis: [1.0, 1.0, -1.0], rate_deg_per_s };
@@ -220,7 +222,7 @@ fn a_square_in_the_force_is_removed() {
         |document| {
             let sensors = document.accel.as_mut().unwrap().sensor.iter_mut();
             for (sensor, value) in sensors.zip(second_order) {
-                sensor.second_order = Some(Curve::new(constant(value)));
+                sensor.set(Feature::ForceSquared, Curve::new(constant(value)));
             }
         },
         |document, scenario| errors(document, scenario).1,
@@ -248,14 +250,14 @@ fn hysteresis_of_biases_is_removed() {
     let scenario = thermal_loop(TUMBLE, effects);
     let state = |document: &mut Document| {
         for (sensor, g) in document.gyro.sensor.iter_mut().zip(gyro_per_k) {
-            let halved = Hysteresis { half_width_deg_c: 3.0, gain: Curve::new(constant(0.5 * g)) };
-            sensor.hysteresis = vec![halved.clone(), halved];
+            let halved = StatedTerm::with_parameter(Feature::Play, 3.0, Curve::new(constant(0.5 * g)));
+            [halved.clone(), halved].into_iter().for_each(|play| sensor.put(play));
         }
         for (sensor, g) in document.accel.as_mut().unwrap().sensor.iter_mut().zip(accel_per_k) {
             // The simulated error is a force, the document's an output.
             let scale = sensor.scale_factor.shape().at(25.0).unwrap();
-            let gain = Curve::new(constant(g * 1e-3 * G * scale)).in_unit(Unit::MPerS2PerDegC);
-            sensor.hysteresis = vec![AccelHysteresis { half_width_deg_c: 2.0, gain }];
+            let gain = Curve::new(constant(g * 1e-3 * G * scale));
+            sensor.put(StatedTerm::with_parameter(Feature::Play, 2.0, gain));
         }
     };
     let [floor, with, left] = judged(&scenario, state, |document, scenario| errors(document, scenario).0);
@@ -293,6 +295,14 @@ fn hysteresis_of_the_axes_is_removed() {
     assert!(with > 0.03 && left < floor + 0.03 * with, "mg: {with} {left} {floor}");
 }
 
+/// A gradient from the housing to a channel, and the supply about 5 V.
+fn regressors(channel: String) -> [Regressor; 2] {
+    [
+        Regressor { channel, minus: Some("housing".into()), reference: 0.0 },
+        Regressor { channel: "supply".into(), minus: None, reference: 5.0 },
+    ]
+}
+
 #[test]
 fn what_goes_with_a_gradient_and_with_the_supply_is_removed() {
     let (by_gradient, by_supply) = ([3.0, -2.0, 4.0], [25.0, -30.0, 18.0]);
@@ -319,28 +329,16 @@ fn what_goes_with_a_gradient_and_with_the_supply_is_removed() {
         let conversion = vec![0.0, 1.0];
         document.auxiliary = vec![Auxiliary { name, unit, conversion, range: [3.0, 7.0], spike_limit: 0.5 }];
         for (i, sensor) in document.gyro.sensor.iter_mut().enumerate() {
-            let regressor = |channel: String, minus, reference, gain| Regressor {
-                channel,
-                minus,
-                reference,
-                gain: Curve::new(constant(gain)),
-            };
-            sensor.regressor = vec![
-                regressor(format!("gyro{i}"), Some("housing".into()), 0.0, by_gradient[i]),
-                regressor("supply".into(), None, 5.0, by_supply[i]),
-            ];
+            let [gradient, supply] = regressors(format!("gyro{i}"));
+            sensor.put(StatedTerm::regressor(gradient, Curve::new(constant(by_gradient[i]))));
+            sensor.put(StatedTerm::regressor(supply, Curve::new(constant(by_supply[i]))));
         }
         for (i, sensor) in document.accel.as_mut().unwrap().sensor.iter_mut().enumerate() {
             let scale = sensor.scale_factor.shape().at(25.0).unwrap();
-            let regressor = |channel: String, minus, reference, milli_g: f64| {
-                let gain =
-                    Curve::new(constant(0.05 * milli_g * 1e-3 * G * scale)).in_unit(Unit::MPerS2PerUnit);
-                AccelRegressor { channel, minus, reference, gain }
-            };
-            sensor.regressor = vec![
-                regressor(format!("accel{i}"), Some("housing".into()), 0.0, by_gradient[i]),
-                regressor("supply".into(), None, 5.0, by_supply[i]),
-            ];
+            let gain = |milli_g: f64| Curve::new(constant(0.05 * milli_g * 1e-3 * G * scale));
+            let [gradient, supply] = regressors(format!("accel{i}"));
+            sensor.put(StatedTerm::regressor(gradient, gain(by_gradient[i])));
+            sensor.put(StatedTerm::regressor(supply, gain(by_supply[i])));
         }
     };
     let [floor, with, left] = judged(&scenario, state, |document, scenario| errors(document, scenario).0);

@@ -4,6 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use isotherm_correction::sample::CorrectedTick;
+use isotherm_correction::thermal::Feature;
 use isotherm_correction::units::AngularRate;
 use isotherm_tests::data;
 use isotherm_tests::logs::{RealLog, correct, events};
@@ -59,7 +60,7 @@ fn needs_data_the_cubic_of_the_chamber_log_reaches_the_known_residuals() {
     };
     let mut bare = document.nominal();
     for sensor in &mut bare.accel.as_mut().unwrap().sensor {
-        sensor.bias = None;
+        sensor.set(Feature::One, None);
     }
     let known =
         [("as logged", compile(&bare), [1.77e-2, 0.189]), ("cubic", compile(&document), [9.5e-4, 0.044])];

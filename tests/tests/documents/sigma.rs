@@ -2,6 +2,7 @@
 
 use isotherm_correction::sample::{CorrectedTick, SensorFlags, TickFlags};
 use isotherm_correction::sigma::Causes;
+use isotherm_correction::thermal::Feature;
 use isotherm_protocol::document::{
     AccelBiasSigma, AccelSigma, Curve, Document, GyroBiasSigma, GyroSensor, GyroSigma, Shape,
 };
@@ -269,11 +270,11 @@ fn errors_of_the_calibration_scatter_as_sigma_says() {
             });
             let (a, b) = (normal(&mut dice), normal(&mut dice));
             let errors = [8.0 * a, -0.6 * a + 0.8 * b];
-            let bias = gyro.static_bias.as_ref().unwrap().shape().clone();
+            let bias = gyro.terms.curve(Feature::One).unwrap().shape().clone();
             let Shape::Polynomial { reference, mut coefficients, range } = bias else { panic!("{bias:?}") };
             assert!((reference - 25.0).abs() < 1e-9);
             coefficients.iter_mut().zip(errors).for_each(|(c, error)| *c += error);
-            gyro.static_bias = Some(Curve::new(Shape::Polynomial { reference, coefficients, range }));
+            gyro.set(Feature::One, Curve::new(Shape::Polynomial { reference, coefficients, range }));
             let weight = gyro.increment_weight_rad_per_rad.as_mut().unwrap();
             *weight *= 1.0 + 200e-6 * normal(&mut dice);
         }
@@ -291,12 +292,10 @@ fn errors_of_the_calibration_scatter_as_sigma_says() {
                 misalignment_arcsec: Some(40.0),
                 ..accel_sigma(0.0)
             });
-            let bias = sensor.bias.as_ref().unwrap();
-            let (unit, shape) = (bias.unit(), bias.shape().clone());
+            let shape = sensor.terms.curve(Feature::One).unwrap().shape().clone();
             let Shape::Polynomial { reference, mut coefficients, range } = shape else { panic!("{shape:?}") };
             coefficients[0] += 3e-3 * scale * normal(&mut dice);
-            sensor.bias =
-                Some(Curve::new(Shape::Polynomial { reference, coefficients, range }).in_unit(unit));
+            sensor.set(Feature::One, Curve::new(Shape::Polynomial { reference, coefficients, range }));
         }
         turn(&mut accel.orientation.rows, 40.0 * ARCSEC, &mut dice);
         let mut last = None;
@@ -340,10 +339,11 @@ fn clamped_temperatures_scatter_as_sigma_says() {
             gyro.bias_rad_per_s[1] = slope * DEG_PER_H;
             gyro.reference_deg_c = 30.0;
             (gyro.scale, gyro.scale_per_k) = (1.0, [0.0; 2]);
-            (sensor.increment_weight_error, sensor.increment_weight_rad_per_rad) = (None, Some(1.0));
+            sensor.set(Feature::Reading, None);
+            sensor.increment_weight_rad_per_rad = Some(1.0);
             let range = [20.0, 30.0];
             let bias = Shape::Polynomial { reference: 30.0, coefficients: vec![0.0, slope], range };
-            sensor.static_bias = Some(Curve::new(bias));
+            sensor.set(Feature::One, Curve::new(bias));
             sensor.sigma = Some(GyroSigma {
                 angle_random_walk_deg_per_sqrt_h: Some(0.0),
                 clamping_deg_per_h_per_deg_c: Some(5.0),

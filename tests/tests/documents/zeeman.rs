@@ -2,7 +2,7 @@
 
 use isotherm_correction::sample::LasingMode;
 use isotherm_correction::units::{Angle, AngularRate};
-use isotherm_protocol::document::{Curve, Document, Shape};
+use isotherm_protocol::document::{Curve, Document, Shape, Unit};
 use isotherm_simulator::Scenario;
 use isotherm_simulator::instrument::Gyros;
 use isotherm_simulator::noise::GyroNoise;
@@ -122,7 +122,7 @@ fn finer(scenario: &mut Scenario, document: &mut Document) {
             panic!()
         };
         let coefficients = coefficients.iter().map(|hz| hz * FINER).collect();
-        *rest_frequency = Curve::new(Shape::Polynomial { reference, coefficients, range });
+        *rest_frequency = Curve::new(Shape::Polynomial { reference, coefficients, range }).in_unit(Unit::HZ);
     }
 }
 

@@ -25,7 +25,7 @@ use isotherm_tests::script::{Accels, Scenario, Script, Step, UNIT};
 use crate::plain::told;
 use crate::recording::{Recording, hex};
 
-const EXAMPLE: &str = include_str!("../../../config/calibration/example-full.toml");
+const EXAMPLE: &str = include_str!("../../src/inputs/example-0001.toml");
 
 /// What was published, in order.
 enum Published {

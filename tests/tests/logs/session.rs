@@ -210,7 +210,7 @@ async fn play(folder: &Path) -> [Vec<String>; 2] {
         congestion: CongestionControl::Block,
         ..Settings::default()
     };
-    let session = open(&settings.session).await.unwrap();
+    let session = open(&settings.zenoh.session).await.unwrap();
     let to_service = locators(&session);
     let service = start(settings, session).await.unwrap();
     let of_service = SessionOptions { connect: to_service.clone(), ..SessionOptions::default() };

@@ -266,7 +266,7 @@ async fn names_are_those_of_certificates_only_where_the_service_is_told_so() {
         let folders = Folders::new();
         folders.put("unit.toml", base("ZLG-7").as_bytes());
         let mut settings = folders.settings();
-        settings.certified_names = certified;
+        settings.zenoh.certified_names = certified;
         let stand = Stand::start(settings).await;
         let (session, unit) = (stand.operator.session(), id("ZLG-7"));
         let text = base("ZLG-7").replacen("0.41", "0.44", 1);

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use isotherm_correction::earth::Place;
+use isotherm_correction::thermal::Feature;
 use isotherm_log::text::LogEvent;
 use isotherm_protocol::document::Document;
 use isotherm_simulator::chamber::Profile;
@@ -50,9 +51,9 @@ pub(super) fn base() -> Document {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/calibration/ZLG-0001.toml");
     let mut document = Written::read(&path).unwrap().document;
     for sensor in &mut document.gyro.sensor {
-        sensor.static_bias = None;
-        sensor.magnetic_bias = None;
-        sensor.slow_meander = None;
+        sensor
+            .terms
+            .retain(|feature| !matches!(feature, Feature::One | Feature::LasingMode | Feature::Meander));
         sensor.servo = None;
     }
     document.mode_reversal = None;

@@ -2,6 +2,7 @@
 
 use isotherm_cli::Exit;
 use isotherm_correction::sample::{GyroTick, LasingMode};
+use isotherm_correction::thermal::Feature;
 use isotherm_log::offline::unit_id;
 use isotherm_log::text::LogEvent;
 use isotherm_protocol::document::{Document, GyroOutput};
@@ -230,7 +231,7 @@ fn without_an_attitude_the_constant_stays_and_the_rest_is_fitted() {
     assert!(made.warnings.iter().any(|words| words.contains("the phase of the slow meander")));
     for (sensor, fit) in made.written.document.gyro.sensor.iter().zip(&made.gyros) {
         let fit = fit.as_ref().unwrap();
-        assert!(sensor.slow_meander.is_none());
+        assert!(!sensor.terms.has(Feature::Meander));
         let bias = format!("{:?}", sensor.static_bias.as_ref().unwrap().shape());
         assert!(bias.contains("coefficients: [0.0, "), "{bias}");
         let [got, sigma] = fit.coefficient(Term::Magnetic, 0).unwrap();

@@ -1,5 +1,6 @@
 //! Runs at several temperatures.
 
+use isotherm_correction::thermal::Feature;
 use isotherm_protocol::document::Document;
 use isotherm_simulator::Scenario;
 use isotherm_simulator::instrument::Gyros;
@@ -32,7 +33,7 @@ fn warm_base() -> Document {
     let mut document = Document::parse(&std::fs::read_to_string(path).unwrap(), None).unwrap().document;
     document.accel = None;
     document.gyro.orientation.thermal = None;
-    document.gyro.sensor.iter_mut().for_each(|gyro| gyro.increment_weight_error = None);
+    document.gyro.sensor.iter_mut().for_each(|gyro| gyro.set(Feature::Reading, None));
     document
 }
 
@@ -68,7 +69,7 @@ fn several_temperatures_give_the_slopes_of_axes_and_weights() {
             let away = t - gyro.reference_deg_c;
             1.0 + gyro.scale_per_k[0] * away + gyro.scale_per_k[1] * away * away
         };
-        let curve = made.written.document.gyro.sensor[sensor].increment_weight_error.as_ref().unwrap();
+        let curve = made.written.document.gyro.sensor[sensor].terms.curve(Feature::Reading).unwrap();
         let at = |t: f64| 1.0 + 1e-6 * curve.shape().at(t).unwrap();
         let (found, wanted) = (at(own[2]) / at(own[0]), scale(own[2]) / scale(own[0]));
         assert!((found / wanted - 1.0).abs() < 2e-5, "gyro {sensor}: {found} {wanted}");

@@ -5,10 +5,11 @@ use isotherm_calibration::runs::Run;
 use isotherm_calibration::thermal::{Fitted, Method, Settings, Terms, fit};
 use isotherm_calibration::validate::{JudgedLog, Wanted, validate};
 use isotherm_correction::sample::{AccelTick, GyroTick, OutputKind, TemperatureReading};
+use isotherm_correction::thermal::Feature;
 use isotherm_correction::units::{Span, Timestamp};
 use isotherm_log::offline::unit_id;
 use isotherm_log::text::LogEvent;
-use isotherm_protocol::document::{Curve, Lag, Origin, Shape};
+use isotherm_protocol::document::{Curve, Origin, Shape, StatedTerm};
 
 use crate::drift_generator::Normal;
 
@@ -162,7 +163,7 @@ fn a_dead_sensor_is_refused_and_the_others_are_fitted() {
     // No figures of what comes through the other axes.
     assert!(of("gyro y").words().starts_with("gyro y: refused: it reads zero"), "{}", of("gyro y").words());
     assert!(of("gyro x").accepted && of("gyro z").accepted);
-    assert!(made.written.document.gyro.sensor[1].static_bias.is_none());
+    assert!(!made.written.document.gyro.sensor[1].terms.has(Feature::One));
 }
 
 #[test]
@@ -176,12 +177,13 @@ fn terms_that_are_kept_under_another_filter_are_told() {
     };
     let mut base = tried(run(0..5400, usual), Method::Joint).unwrap().written.document;
     let gain = Curve::new(Shape::Constant { value: 5.0 });
-    base.gyro.sensor[1].lag = vec![Lag { time_constant_s: 300.0, gain }];
+    base.gyro.sensor[1].put(StatedTerm::with_parameter(Feature::Lag, 300.0, gain));
     let old_s = base.temperature.filter.as_ref().unwrap().smoothing_s;
     let told = |smoothing_s: f64| {
         let settings = Settings { smoothing_s: Some(smoothing_s), ..Settings::default() };
         let made = fit(Some(&base), (&[zero()], &[]), &settings, Origin::default(), ()).unwrap();
-        assert!(made.any_accepted && made.written.document.gyro.sensor[1].lag == base.gyro.sensor[1].lag);
+        let [new, old] = [&made.written.document, &base].map(|document| &document.gyro.sensor[1].terms);
+        assert!(made.any_accepted && new.of(Feature::Lag).eq(old.of(Feature::Lag)));
         made.report.warnings.iter().any(|words| words.starts_with("gyro y: refused, and keeps rate terms"))
     };
     assert!(told(old_s + 30.0) && !told(old_s));
@@ -257,7 +259,7 @@ fn one_direction_and_too_few_plateaus_are_told() {
             .gyro
             .sensor
             .iter()
-            .all(|gyro| gyro.lag.is_empty() && gyro.thermal_rate.is_none())
+            .all(|gyro| !gyro.terms.has(Feature::Lag) && !gyro.terms.has(Feature::ThermalRate))
     );
     let made = tried(upwards(), Method::Sequential).unwrap();
     assert!(!made.any_accepted);
@@ -334,7 +336,8 @@ fn an_axis_that_temperature_does_nothing_to_is_a_good_one() {
             verdict.words()
         );
         assert!(
-            made.written.document.gyro.sensor[1].static_bias.is_none() && made.report.refusals().is_empty()
+            !made.written.document.gyro.sensor[1].terms.has(Feature::One)
+                && made.report.refusals().is_empty()
         );
     }
     // Whoever judges the document says the same.

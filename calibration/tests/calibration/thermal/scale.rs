@@ -4,10 +4,11 @@ use isotherm_calibration::report::FitReport;
 use isotherm_calibration::runs::Run;
 use isotherm_calibration::thermal::{Fitted, Method, Settings, Site, Stand, Turning, fit};
 use isotherm_correction::sample::OutputKind;
+use isotherm_correction::thermal::Feature;
 use isotherm_correction::unit::UnitSettings;
 use isotherm_log::offline::{Offline, load_calibration, unit_id};
 use isotherm_log::text::LogEvent;
-use isotherm_protocol::document::{Curve, Document, Origin, Sample, Shape, Unit};
+use isotherm_protocol::document::{AccelOutput, Curve, Document, Origin, Sample, Shape};
 use isotherm_simulator::chamber::Profile;
 use isotherm_simulator::instrument::Gyros;
 use isotherm_simulator::motion::Path;
@@ -63,11 +64,11 @@ fn stand([pitch, roll]: [f64; 2], rate_deg_per_s: f64) -> Stand {
 fn base() -> Document {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/calibration/MEMS-0001.toml");
     let mut document = Document::parse(&std::fs::read_to_string(path).unwrap(), None).unwrap().document;
-    document.gyro.sensor.iter_mut().for_each(|gyro| gyro.increment_weight_error = None);
+    document.gyro.sensor.iter_mut().for_each(|gyro| gyro.set(Feature::Reading, None));
     for accel in document.accel.iter_mut().flat_map(|accel| &mut accel.sensor) {
         let Shape::Polynomial { coefficients, .. } = accel.scale_factor.shape().clone() else { panic!() };
         let constant = Shape::Constant { value: coefficients[0] };
-        accel.scale_factor = Curve::new(constant).in_unit(Unit::MPerS2PerMPerS2);
+        accel.scale_factor = Curve::new(constant).in_unit(AccelOutput::MetresPerSecondSquared.scale_unit());
     }
     document.origin = None;
     document
@@ -97,7 +98,7 @@ fn truth(scenario: &Scenario, gyro: bool, index: usize, about_deg_c: f64) -> [f6
 /// Point about which the powers of a fitted sensor are taken (°C).
 fn reference(document: &Document, gyro: bool, index: usize) -> f64 {
     let shape = if gyro {
-        document.gyro.sensor[index].increment_weight_error.as_ref().unwrap().shape().clone()
+        document.gyro.sensor[index].terms.curve(Feature::Reading).unwrap().shape().clone()
     } else {
         document.accel.as_ref().unwrap().sensor[index].scale_factor.shape().clone()
     };
@@ -147,7 +148,7 @@ fn accelerometer_scale_comes_from_gravity_in_two_attitudes() {
         for index in 0..3 {
             all.extend(distances(&made, &scenarios[0], false, index));
             // The Earth's rate tells nothing of a gyro's scale factor, and nobody meant it to.
-            assert!(made.written.document.gyro.sensor[index].increment_weight_error.is_none());
+            assert!(!made.written.document.gyro.sensor[index].terms.has(Feature::Reading));
         }
         assert!(made.report.warnings.iter().all(|words| !words.contains("scale factor")));
         assert!(made.report.to_text().contains("gyros on a rate table (--axis, --rate)"));
@@ -293,7 +294,7 @@ fn a_known_scale_factor_does_not_get_into_the_bias_where_the_attitude_is_not_kno
     let made = fit(Some(&known), (&runs, &[]), &Settings::default(), Origin::default(), ()).unwrap();
     assert!(made.report.accepted(), "{}", made.report.to_text());
     let slope = |document: &Document| {
-        let bias = document.accel.as_ref().unwrap().sensor[2].bias.clone().unwrap();
+        let bias = document.accel.as_ref().unwrap().sensor[2].terms.curve(Feature::One).cloned().unwrap();
         let Shape::Polynomial { coefficients, .. } = bias.shape().clone() else { panic!() };
         coefficients[1]
     };

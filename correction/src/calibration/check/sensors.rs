@@ -9,8 +9,7 @@ use crate::orientation::{Orientation, OrientationError, OrientationParts};
 use crate::sample::OutputKind;
 use crate::sigma::{MAX_BIAS_TERMS, SigmaParts};
 use crate::thermal::{
-    ACCEL_TERMS, AccelModel, Feature, GYRO_TERMS, GyroModel, MAX_LAGS, MAX_PLAYS, MAX_REGRESSORS,
-    PLAY_WIDTHS_DEG_C, Term, TermError,
+    ACCEL_TERMS, AccelModel, Feature, GYRO_TERMS, GyroModel, MAX_PLAYS, Parameter, Term, TermError, TermForm,
 };
 
 /// Farthest that an accelerometer may sit from the reference point along an axis (m).
@@ -106,36 +105,27 @@ fn terms(
     declared: &[Term],
     parts: &CalibrationParts,
 ) {
-    for Term { feature, key } in declared {
+    for Term { feature, key, form, .. } in declared {
         let stated = terms.iter().filter(|term| term.feature == *feature);
-        let most = match feature {
-            Feature::Lag => MAX_LAGS,
-            Feature::Play => MAX_PLAYS,
-            Feature::Regressor => MAX_REGRESSORS,
-            _ => 1,
-        };
-        checker.count(key, stated.count(), 0, most);
-    }
-    for TermParts { feature, parameter, regressor, .. } in terms {
-        match feature {
-            Feature::Lag => {
-                checker.within("lag.time_constant_s", *parameter, parts.filter.grid_step_s, 1e7);
-            }
-            Feature::Play => {
-                let [least, most] = PLAY_WIDTHS_DEG_C;
-                checker.within("hysteresis.half_width_deg_c", *parameter, least, most);
-            }
-            Feature::Regressor => match regressor {
-                Some(regressor) => {
-                    regressor.channels().for_each(|source| checker.source("regressor.channel", source));
-                    checker.within("regressor.reference", regressor.reference, -HUGE, HUGE);
-                    if channel.is_none() {
-                        checker.push("channel", DefectKind::Missing { needed_by: "regressor" });
-                    }
+        checker.count(key, stated.clone().count(), 0, form.most());
+        for TermParts { parameter, regressor, .. } in stated {
+            match form {
+                TermForm::Each(Parameter { range: [least, most], .. }) => {
+                    let step_s = if *feature == Feature::Lag { parts.filter.grid_step_s } else { *least };
+                    checker.within(key, *parameter, step_s, *most);
                 }
-                None => checker.push("regressor", DefectKind::Missing { needed_by: "its coefficient" }),
-            },
-            _ => {}
+                TermForm::Regressors(_) => match regressor {
+                    Some(regressor) => {
+                        regressor.channels().for_each(|source| checker.source(key, source));
+                        checker.within(key, regressor.reference, -HUGE, HUGE);
+                        if channel.is_none() {
+                            checker.push("channel", DefectKind::Missing { needed_by: "regressor" });
+                        }
+                    }
+                    None => checker.push(key, DefectKind::Missing { needed_by: "its coefficient" }),
+                },
+                TermForm::Curve | TermForm::Branches | TermForm::PartOf(_) => {}
+            }
         }
     }
 }

@@ -142,7 +142,7 @@ async fn two_instances_cannot_share_a_state_folder() {
     let folders = Folders::new();
     let stand = Stand::start(folders.settings()).await;
     let settings = folders.settings();
-    let session = open(&settings.session).await.unwrap();
+    let session = open(&settings.zenoh.session).await.unwrap();
     let error = isotherm_service::start(settings, session).await.expect_err("refused");
     assert!(matches!(error, ServiceError::State(_)), "{error}");
     let words = error.to_string();

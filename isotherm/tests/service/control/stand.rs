@@ -98,7 +98,7 @@ pub(crate) struct Stand {
 
 impl Stand {
     pub(crate) async fn start(settings: Settings) -> Self {
-        let session = open(&settings.session).await.unwrap();
+        let session = open(&settings.zenoh.session).await.unwrap();
         let options = SessionOptions { connect: locators(&session), ..SessionOptions::default() };
         let service = start(settings, session).await.unwrap();
         let session = open(&options).await.unwrap();

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use flate2::read::GzDecoder;
 use isotherm_bus::{SessionOptions, locators, open};
 use isotherm_protocol::history::AuditEvent;
-use isotherm_service::config::{MetricsSettings, WebSettings};
+use isotherm_service::config::{MetricsSettings, WebSettings, ZenohSettings};
 use isotherm_service::{Settings, start};
 use serde_json::{Value, json};
 
@@ -206,7 +206,11 @@ async fn without_write_everything_can_be_seen_and_nothing_changed() {
 async fn a_swap_a_rollback_and_a_command_are_those_of_the_bus() {
     let folders = Folders::new();
     // Whoever has the token is not asked for a certificate, and has no name of one.
-    let mut stand = Stand::start(Settings { certified_names: true, ..settings(&folders, true) }).await;
+    let mut stand = Stand::start(Settings {
+        zenoh: ZenohSettings { certified_names: true, ..settings(&folders, true).zenoh },
+        ..settings(&folders, true)
+    })
+    .await;
     let address = stand.service.metrics().unwrap();
     stand.run_unit(UNIT, 20).await;
     let (swap, command) = (format!("/api/unit/{UNIT}/swap"), format!("/api/unit/{UNIT}/command"));

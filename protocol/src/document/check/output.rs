@@ -1,9 +1,11 @@
 //! Keys that go with one output only.
 
+use isotherm_correction::thermal::{ACCEL_TERMS, Makes};
 use isotherm_document::{Reader, join};
 
-use super::super::curve::{Curve, Keys, Quantity};
+use super::super::curve::{Curve, Keys};
 use super::super::measure::{Argument, Unit};
+use super::super::terms::unit;
 use super::super::types::{AccelOutput, AccelSensor, GyroOutput, GyroSensor};
 
 /// Increment weight and input limit of each output, with its name.
@@ -11,38 +13,11 @@ const GYRO_OUTPUTS: [(GyroOutput, &str, [&str; 2]); 2] = [
     (GyroOutput::Counts, "counts", ["increment_weight_arcsec_per_count", "input_limit_counts_per_tick"]),
     (GyroOutput::Mean, "mean", ["increment_weight_rad_per_rad", "input_limit_deg_per_s"]),
 ];
-/// Input limit of each output, with its name and the units of scale factor, bias, lags, hysteresis and regressors.
-const ACCEL_OUTPUTS: [(AccelOutput, &str, &str, [Unit; 5]); 3] = [
-    (
-        AccelOutput::Counts,
-        "counts",
-        "input_limit_counts_per_tick",
-        [
-            Unit::CountsPerSPerMPerS2,
-            Unit::CountsPerS,
-            Unit::CountsPerSPerDegCPerS,
-            Unit::CountsPerSPerDegC,
-            Unit::CountsPerSPerUnit,
-        ],
-    ),
-    (
-        AccelOutput::Volts,
-        "V",
-        "input_limit_v",
-        [Unit::VPerMPerS2, Unit::V, Unit::VPerDegCPerS, Unit::VPerDegC, Unit::VPerUnit],
-    ),
-    (
-        AccelOutput::MetresPerSecondSquared,
-        "m/s2",
-        "input_limit_m_per_s2",
-        [
-            Unit::MPerS2PerMPerS2,
-            Unit::MPerS2,
-            Unit::MPerS2PerDegCPerS,
-            Unit::MPerS2PerDegC,
-            Unit::MPerS2PerUnit,
-        ],
-    ),
+/// Input limit of each output, with its name.
+const ACCEL_OUTPUTS: [(AccelOutput, &str, &str); 3] = [
+    (AccelOutput::Counts, "counts", "input_limit_counts_per_tick"),
+    (AccelOutput::Volts, "V", "input_limit_v"),
+    (AccelOutput::MetresPerSecondSquared, "m/s2", "input_limit_m_per_s2"),
 ];
 
 /// A gyro has the keys of its output, and its increment weight.
@@ -76,38 +51,31 @@ pub(super) fn gyro(r: &mut Reader<'_>, path: &str, output: GyroOutput, sensor: &
 pub(super) fn accel(r: &mut Reader<'_>, path: &str, output: AccelOutput, sensor: &AccelSensor) {
     if r.is_damaged("accel.output") {
         // Nobody knows the units of these.
-        for key in ["scale_factor", "bias", "lag", "hysteresis", "regressor"] {
+        let biases = ACCEL_TERMS.into_iter().filter(|term| term.makes == Makes::Bias).map(|term| term.key);
+        for key in biases.chain(["scale_factor"]) {
             r.damage(&join(path, key));
         }
         return;
     }
-    for (other, name, key, _) in ACCEL_OUTPUTS {
+    for (other, name, key) in ACCEL_OUTPUTS {
         let path = join(path, key);
         if other != output && r.has(&path) {
             r.refuse(&path, format!("goes with output = {name:?} only"));
         }
     }
-    let Some((_, _, _, [scale_factor, bias, of_lag, of_play, of_regressor])) =
-        ACCEL_OUTPUTS.into_iter().find(|(this, ..)| *this == output)
-    else {
-        return;
-    };
-    in_unit(r, &join(path, "scale_factor"), Some(&sensor.scale_factor), scale_factor);
-    in_unit(r, &join(path, "bias"), sensor.bias.as_ref(), bias);
-    for (i, lag) in sensor.lag.iter().enumerate() {
-        in_unit(r, &format!("{path}.lag[{i}].gain"), Some(&lag.gain), of_lag);
-    }
-    for (i, play) in sensor.hysteresis.iter().enumerate() {
-        in_unit(r, &format!("{path}.hysteresis[{i}].gain"), Some(&play.gain), of_play);
-    }
-    for (i, regressor) in sensor.regressor.iter().enumerate() {
-        in_unit(r, &format!("{path}.regressor[{i}].gain"), Some(&regressor.gain), of_regressor);
+    in_unit(r, &join(path, "scale_factor"), &sensor.scale_factor, output.scale_unit());
+    for term in sensor.terms.keyed() {
+        for (key, curve) in term.curves() {
+            in_unit(r, &format!("{path}.{key}"), curve, unit(term.term, output.base_unit()));
+        }
     }
 }
 
 /// A curve in the unit that the output calls for.
-fn in_unit<Q: Quantity>(r: &mut Reader<'_>, path: &str, curve: Option<&Curve<Q>>, unit: Unit) {
-    let Some(curve) = curve.filter(|curve| curve.unit() != unit) else { return };
+fn in_unit(r: &mut Reader<'_>, path: &str, curve: &Curve, unit: Unit) {
+    if curve.unit() == unit {
+        return;
+    }
     let keys = Keys::new(curve.unit(), curve.argument().unwrap_or(Argument::DegC));
     let key = keys.of_values().map(|key| join(path, key)).into_iter().find(|key| r.has(key));
     let message = format!("is in {}, but the output needs {}", curve.unit().symbol(), unit.symbol());

@@ -2,6 +2,7 @@
 
 use isotherm_correction::channel::ThermalState;
 use isotherm_correction::sample::LasingMode;
+use isotherm_correction::thermal::Feature;
 
 use super::super::tests::{FULL, OTHER, accept};
 use super::super::{Parsed, Side, correction_change};
@@ -236,7 +237,7 @@ fn a_section_that_is_gone_is_named_and_a_term_is_none() {
     assert_eq!(gone, [format!("[[gyro.sensor]] \"{final_gyro}\"")]);
     assert_eq!(lost(&|it| it.gyro.sensor[0].name = "renamed".to_owned()), [""; 0]);
     assert_eq!(lost(&|it| it.gyro.sensor[0].drift = None), ["[gyro.sensor.drift]"]);
-    assert_eq!(lost(&|it| it.gyro.sensor[0].static_bias = None), [""; 0], "a curve");
+    assert_eq!(lost(&|it| it.gyro.sensor[0].set(Feature::One, None)), [""; 0], "a curve");
     assert_eq!(lost(&|it| (it.origin, it.created, it.note) = (None, None, None)), [""; 0]);
     assert_eq!(lost_sections(&Document { accel: None, ..full.clone() }, &full), [""; 0], "it gains one");
 }

@@ -1,12 +1,12 @@
 //! The accelerometers of a document.
 
+use isotherm_correction::thermal::Per;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::super::curve::{
-    Curve, OutputBias, OutputHysteresisGain, OutputLagGain, OutputRegressorGain, Relative, ScaleFactor,
-    SecondOrder,
-};
+use super::super::curve::{Curve, relative, scale_factor};
+use super::super::measure::{BaseUnit, Unit};
+use super::super::terms::{Accels, Terms};
 use super::{AccelSigma, Orientation};
 
 /// The accelerometers of the unit: `f = (U − S(T) − lags)·r(T_board)/K(T)`.
@@ -35,6 +35,24 @@ pub enum AccelOutput {
     /// Mean specific force (m/s²).
     #[serde(rename = "m/s2")]
     MetresPerSecondSquared,
+}
+
+impl AccelOutput {
+    /// What its biases are measured in.
+    #[must_use]
+    pub const fn base_unit(self) -> BaseUnit {
+        match self {
+            Self::Counts => BaseUnit::CountsPerS,
+            Self::Volts => BaseUnit::V,
+            Self::MetresPerSecondSquared => BaseUnit::MPerS2,
+        }
+    }
+
+    /// Unit of its scale factors.
+    #[must_use]
+    pub const fn scale_unit(self) -> Unit {
+        self.base_unit().per(Per::MPerS2)
+    }
 }
 
 /// Orientation of the accelerometers.
@@ -68,25 +86,11 @@ pub struct AccelSensor {
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub input_limit_m_per_s2: Option<f64>,
     /// K(T): output per specific force, never 0. Source: models §3, 001 (k1…k3).
-    pub scale_factor: Curve<ScaleFactor>,
-    /// S(T): output at zero specific force. Source: models §3, 001 (z1…z3).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub bias: Option<Curve<OutputBias>>,
-    /// Thermal lags of the bias, as for gyros. Source: models §2, §8.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    #[schemars(length(max = 8))]
-    pub lag: Vec<AccelLag>,
-    /// As for gyros. Source: models §2.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    #[schemars(length(max = 8))]
-    pub hysteresis: Vec<AccelHysteresis>,
-    /// As for gyros. Source: models §2.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    #[schemars(length(max = 8))]
-    pub regressor: Vec<AccelRegressor>,
-    /// K2: error per f², f along its input axis. Source: models §3, IEEE 528.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub second_order: Option<Curve<SecondOrder>>,
+    #[schemars(schema_with = "scale_factor")]
+    pub scale_factor: Curve,
+    /// Terms of its bias S and of what it feels.
+    #[serde(flatten)]
+    pub terms: Terms<Accels>,
     /// Position in case axes, from the point of the published specific force (default). Source: models §3.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(inner(range(min = -100.0, max = 100.0)))]
@@ -97,51 +101,12 @@ pub struct AccelSensor {
     pub delay_ticks: Option<f64>,
     /// `r(T_board) − 1`, r the board's scale factor at the calibration temperature over that at `T_board`.
     /// Source: models §3, 001 (y1…y3).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub board_ratio_error: Option<Curve<Relative>>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(schema_with = "relative")]
+    pub board_ratio_error: Option<Curve>,
     /// As for gyros. Source: models §3, IEEE 952.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sigma: Option<AccelSigma>,
-}
-
-/// One thermal lag of an accelerometer's bias.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[schemars(deny_unknown_fields, title = "Thermal lag of an accelerometer")]
-pub struct AccelLag {
-    /// τ, at least `grid_step_s`.
-    #[schemars(range(min = 0.001, max = 1e7))]
-    pub time_constant_s: f64,
-    /// g(T).
-    pub gain: Curve<OutputLagGain>,
-}
-
-/// One play of an accelerometer's bias.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[schemars(deny_unknown_fields, title = "Hysteresis of an accelerometer")]
-pub struct AccelHysteresis {
-    /// w.
-    #[schemars(range(min = 0.001, max = 1000.0))]
-    pub half_width_deg_c: f64,
-    /// g(T).
-    pub gain: Curve<OutputHysteresisGain>,
-}
-
-/// One regressor of an accelerometer's bias.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[schemars(deny_unknown_fields, title = "Regressor of an accelerometer")]
-pub struct AccelRegressor {
-    /// x.
-    #[schemars(length(min = 1, max = 24), extend("x-must-be" = "a name of 1 to 24 bytes"))]
-    pub channel: String,
-    /// Subtracted channel.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(length(min = 1, max = 24), extend("x-must-be" = "a name of 1 to 24 bytes"))]
-    pub minus: Option<String>,
-    /// Subtracted constant.
-    #[serde(default)]
-    pub reference: f64,
-    /// g(T).
-    pub gain: Curve<OutputRegressorGain>,
 }
 
 /// Detection and exclusion of a failed accelerometer.

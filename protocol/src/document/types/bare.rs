@@ -1,44 +1,40 @@
 //! Parts of a document with nothing in them: what documents that are made begin with.
 
+use isotherm_correction::thermal::Feature;
+
 use super::{AccelSensor, GyroSensor, Orientation};
-use crate::document::{Curve, ScaleFactor};
+use crate::document::measure::BaseUnit;
+use crate::document::{Curve, StatedTerm, Terms};
 
 impl GyroSensor {
     /// A gyro without any term, channel or increment weight.
     #[must_use]
     pub fn bare(name: &str) -> Self {
-        Self {
-            name: name.to_owned(),
-            channel: None,
-            increment_weight_arcsec_per_count: None,
-            increment_weight_rad_per_rad: None,
-            input_limit_counts_per_tick: None,
-            input_limit_deg_per_s: None,
-            increment_weight_error: None,
-            static_bias: None,
-            magnetic_bias: None,
-            slow_meander: None,
-            thermal_rate: None,
-            thermal_acceleration: None,
-            lag: Vec::new(),
-            hysteresis: Vec::new(),
-            regressor: Vec::new(),
-            acceleration_sensitive_drift: None,
-            increment_weight_asymmetry: None,
-            increment_weight_over_rate: None,
-            trend: None,
-            delay_ticks: None,
-            servo: None,
-            drift: None,
-            sigma: None,
-        }
+        Self { name: name.to_owned(), ..Self::default() }
+    }
+
+    /// Adds a term, in its unit; it replaces one that may stand once only.
+    pub fn put(&mut self, term: StatedTerm) {
+        self.terms.put(term, BaseUnit::DegPerH);
+    }
+
+    /// Sets the term of a feature to a curve, or takes it out.
+    pub fn set(&mut self, feature: Feature, curve: impl Into<Option<Curve>>) {
+        self.terms.set(feature, curve.into(), BaseUnit::DegPerH);
+    }
+
+    /// The same sensor with a term of one curve.
+    #[must_use]
+    pub fn with(mut self, feature: Feature, curve: Curve) -> Self {
+        self.set(feature, curve);
+        self
     }
 }
 
 impl AccelSensor {
     /// An accelerometer with a scale factor and nothing else.
     #[must_use]
-    pub fn bare(name: &str, scale_factor: Curve<ScaleFactor>) -> Self {
+    pub fn bare(name: &str, scale_factor: Curve) -> Self {
         Self {
             name: name.to_owned(),
             channel: None,
@@ -47,16 +43,29 @@ impl AccelSensor {
             input_limit_v: None,
             input_limit_m_per_s2: None,
             scale_factor,
-            bias: None,
-            lag: Vec::new(),
-            hysteresis: Vec::new(),
-            regressor: Vec::new(),
-            second_order: None,
+            terms: Terms::default(),
             position_m: None,
             delay_ticks: None,
             board_ratio_error: None,
             sigma: None,
         }
+    }
+
+    /// Adds a term, in its unit beside that of the scale factor; it replaces one that may stand once only.
+    pub fn put(&mut self, term: StatedTerm) {
+        self.terms.put(term, self.scale_factor.unit().base);
+    }
+
+    /// Sets the term of a feature to a curve, or takes it out.
+    pub fn set(&mut self, feature: Feature, curve: impl Into<Option<Curve>>) {
+        self.terms.set(feature, curve.into(), self.scale_factor.unit().base);
+    }
+
+    /// The same sensor with a term of one curve.
+    #[must_use]
+    pub fn with(mut self, feature: Feature, curve: Curve) -> Self {
+        self.set(feature, curve);
+        self
     }
 }
 

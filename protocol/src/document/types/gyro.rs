@@ -4,10 +4,8 @@ use isotherm_correction::servo::DEFAULT_SETTLE_TIME_CONSTANTS;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::super::curve::{
-    Curve, DriftByForce, Frequency, HysteresisGain, LagGain, RateBias, RegressorGain, Relative,
-    RelativeOverRate, ThermalAcceleration, ThermalRate,
-};
+use super::super::curve::{Curve, frequency, relative_over_rate};
+use super::super::terms::{Gyros, Terms};
 use super::{Drift, GyroSigma, Orientation};
 
 /// The gyros of the unit: `θ = K(T)·P − Ω·Δt`.
@@ -38,7 +36,7 @@ pub enum GyroOutput {
 pub type GyroOrientation = Orientation<GyroParity>;
 
 /// One gyro and the terms of its bias Ω; any of them may be left out.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Gyro")]
 pub struct GyroSensor {
     /// Unique name, 1 to 24 bytes.
@@ -64,45 +62,13 @@ pub struct GyroSensor {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub input_limit_deg_per_s: Option<f64>,
-    /// K(T)/K0 − 1. Source: models §2, 003.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub increment_weight_error: Option<Curve<Relative>>,
-    /// Static (non-magnetic) bias. Source: 003; K0(T) of 000; 001.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub static_bias: Option<Curve<RateBias>>,
-    /// Bias with the sign of the lasing mode. Source: 003.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub magnetic_bias: Option<Curve<RateBias>>,
-    /// Bias with the sign of the meander's phase, if reported, else +. Source: 003.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub slow_meander: Option<Curve<RateBias>>,
-    /// K1±, multiplies Ṫ; over T or Ṫ. Source: 000; 001 (x3).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub thermal_rate: Option<Branches<Curve<ThermalRate>>>,
-    /// K2±, multiplies T̈; over T or T̈. Source: 000.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub thermal_acceleration: Option<Branches<Curve<ThermalAcceleration>>>,
-    /// Thermal lags `Σ g(T)·(T − L_τ[T])/τ`, `L_τ` a first-order low-pass. Source: models §2, §8.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    #[schemars(length(max = 8))]
-    pub lag: Vec<Lag>,
-    /// Hysteresis `Σ g(T)·(p_w[T] − T)`, `p_w` a play. Source: models §2.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    #[schemars(length(max = 8))]
-    pub hysteresis: Vec<Hysteresis>,
-    /// Bias by other channels `Σ g(T)·(x − x₀)`; needs `channel`. Source: models §2.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    #[schemars(length(max = 8))]
-    pub regressor: Vec<Regressor>,
-    /// Drift by specific force along the case axes; needs `[accel]`. Source: models §2, IEEE 528.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub acceleration_sensitive_drift: Option<AlongAxes<Curve<DriftByForce>>>,
-    /// Half the difference of K between positive and negative rates, over their mean. Source: models §2, IEEE 528.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub increment_weight_asymmetry: Option<Curve<Relative>>,
+    /// Terms of its bias Ω and of its scale.
+    #[serde(flatten)]
+    pub terms: Terms<Gyros>,
     /// K(ω)/K(T) − 1, ω the rate that the gyro reads. Source: models §2, IEEE 528.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub increment_weight_over_rate: Option<Curve<RelativeOverRate>>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(schema_with = "relative_over_rate")]
+    pub increment_weight_over_rate: Option<Curve>,
     /// Polynomial of the time since turn-on. Source: 002.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub trend: Option<Trend>,
@@ -119,71 +85,6 @@ pub struct GyroSensor {
     /// Standard errors: σ is published with every output. Source: models §2, IEEE 952.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sigma: Option<GyroSigma>,
-}
-
-/// One curve per thermal branch, both over the same argument.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[schemars(deny_unknown_fields)]
-pub struct Branches<C> {
-    /// "+" curve: Ṫ·T̈ > 0. Source: 000.
-    pub run_up: C,
-    /// "−" curve, over the same argument: Ṫ·T̈ < 0. Source: 000.
-    pub braking: C,
-}
-
-/// One curve per case axis; default of each: 0.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[schemars(deny_unknown_fields)]
-pub struct AlongAxes<C> {
-    /// Along x.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub x: Option<C>,
-    /// Along y.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub y: Option<C>,
-    /// Along z.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub z: Option<C>,
-}
-
-/// One thermal lag.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[schemars(deny_unknown_fields, title = "Thermal lag")]
-pub struct Lag {
-    /// τ, at least `grid_step_s`.
-    #[schemars(range(min = 0.001, max = 1e7))]
-    pub time_constant_s: f64,
-    /// g(T).
-    pub gain: Curve<LagGain>,
-}
-
-/// One play.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[schemars(deny_unknown_fields, title = "Hysteresis")]
-pub struct Hysteresis {
-    /// w.
-    #[schemars(range(min = 0.001, max = 1000.0))]
-    pub half_width_deg_c: f64,
-    /// g(T).
-    pub gain: Curve<HysteresisGain>,
-}
-
-/// One regressor.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[schemars(deny_unknown_fields, title = "Regressor")]
-pub struct Regressor {
-    /// x.
-    #[schemars(length(min = 1, max = 24), extend("x-must-be" = "a name of 1 to 24 bytes"))]
-    pub channel: String,
-    /// Subtracted channel.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(length(min = 1, max = 24), extend("x-must-be" = "a name of 1 to 24 bytes"))]
-    pub minus: Option<String>,
-    /// Subtracted constant.
-    #[serde(default)]
-    pub reference: f64,
-    /// g(T).
-    pub gain: Curve<RegressorGain>,
 }
 
 /// Polynomial of the time since turn-on, held outside its interval.
@@ -208,7 +109,8 @@ pub struct Servo {
     #[schemars(range(min = 1e-4, max = 1e3))]
     pub time_constant_s: f64,
     /// f0: settled dither frequency.
-    pub rest_frequency: Curve<Frequency>,
+    #[schemars(schema_with = "frequency")]
+    pub rest_frequency: Curve,
     /// End of the transient after the switch, in τ.
     #[serde(default = "Servo::default_settling")]
     #[schemars(range(min = 1.0, max = 20.0))]

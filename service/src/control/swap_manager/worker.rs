@@ -65,7 +65,7 @@ impl Worker {
             swap: settings.swap.clone(),
             pre_launch: settings.pre_launch,
             in_standby: settings.unit.in_standby,
-            certified_names: settings.certified_names,
+            certified_names: settings.zenoh.certified_names,
             intake,
             store,
             records: BTreeMap::new(),
