@@ -100,7 +100,8 @@ impl AccelIntake {
     pub(super) fn partner(&mut self, gyro: &GyroTick, counters: &mut Counters) -> Option<&PendingAccel> {
         let late = gyro.end_time + Span::from_ns(gyro.duration.as_ns() / 2);
         // Mostly both end at once.
-        if self.pending.front().is_some_and(|front| front.end_time != gyro.end_time) {
+        if self.pending.front().is_some_and(|front| front.end_time != gyro.end_time || gyro.end_time == late)
+        {
             self.drop_unpaired(gyro, counters);
         }
         self.pending.front().filter(|front| front.end_time < late)
