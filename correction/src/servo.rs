@@ -194,10 +194,10 @@ impl ServoMemory {
             return false;
         }
         let duration_s = duration.as_s();
-        let mut means_hz = [f64::NAN; MAX_SENSORS];
-        let known = means_hz.iter_mut().zip(half_periods);
+        self.last = [middle; MAX_SENSORS];
+        self.last_mean_hz = [f64::NAN; MAX_SENSORS];
+        let known = self.last_mean_hz.iter_mut().zip(half_periods);
         known.for_each(|(mean, counts)| *mean = mean_hz(*counts, duration_s));
-        (self.last, self.last_mean_hz) = ([middle; MAX_SENSORS], means_hz);
         true
     }
 

@@ -186,12 +186,12 @@ impl Unit {
     /// Gives out a tick that is the next, where its accelerometers are at hand; whether they were.
     #[inline]
     fn pass_next<E: FnMut(&CorrectedTick) + ?Sized>(&mut self, tick: &GyroTick, emit: &mut E) -> bool {
-        let met = self.accels.meets(tick, &mut self.pipeline.counters);
+        let accel = self.accels.partner(tick, &mut self.pipeline.counters);
+        let met = accel.is_some();
         if !met && self.pipeline.expects_accels() {
             return false;
         }
         self.gyros.passed(tick);
-        let accel = self.accels.front().filter(|_| met);
         self.pipeline.begin(tick, false);
         self.pipeline.pass(Released { tick, missed: 0, restart: false }, true, accel, emit);
         self.accels.gyro_released(tick.end_time, met);
@@ -212,12 +212,12 @@ impl Unit {
             if front.restart {
                 self.accels.starts_anew(front.tick.end_time, &mut self.pipeline.counters);
             }
-            let met = self.accels.meets(front.tick, &mut self.pipeline.counters);
+            let accel = self.accels.partner(front.tick, &mut self.pipeline.counters);
+            let met = accel.is_some();
             if !met && self.pipeline.expects_accels() && !front.expired {
                 return;
             }
             let Some(Left { tick, output, missed, restart }) = self.gyros.release() else { return };
-            let accel = self.accels.front().filter(|_| met);
             self.pipeline.begin(&tick, restart);
             let fits = self.pipeline.takes_gyro(&tick, output);
             self.pipeline.pass(Released { tick: &tick, missed, restart }, fits, accel, emit);

@@ -14,6 +14,7 @@ mod writer;
 
 use std::fmt;
 use std::marker::PhantomData;
+use std::sync::LazyLock;
 
 use postcard::ser_flavors::Flavor;
 use serde::de::{DeserializeOwned, Error as _, SeqAccess, Visitor};
@@ -244,9 +245,18 @@ pub(crate) fn begin<M: Message>(frame: &mut Vec<u8>, version: u8) {
     frame.extend([M::KIND as u8, version]);
 }
 
+/// What every checksum begins with: making one anew would ask each time what the processor can do.
+static CHECKSUM_OF_NOTHING: LazyLock<crc32fast::Hasher> = LazyLock::new(crc32fast::Hasher::new);
+
+fn checksum(bytes: &[u8]) -> u32 {
+    let mut hasher = CHECKSUM_OF_NOTHING.clone();
+    hasher.update(bytes);
+    hasher.finalize()
+}
+
 /// Appends the checksum of everything before.
 pub(crate) fn seal(frame: &mut Vec<u8>) {
-    let checksum = crc32fast::hash(frame);
+    let checksum = checksum(frame);
     frame.extend(checksum.to_le_bytes());
 }
 
@@ -299,7 +309,7 @@ fn open<M: Message>(frame: &[u8]) -> Result<(u8, &[u8]), CodecError> {
     let Some((&[kind, version], _)) = frame.split_first_chunk() else {
         return Err(CodecError::Length { length });
     };
-    let Some((covered, checksum)) = frame.split_last_chunk::<CHECKSUM>() else {
+    let Some((covered, found)) = frame.split_last_chunk::<CHECKSUM>() else {
         return Err(CodecError::Length { length });
     };
     if kind != M::KIND as u8 {
@@ -308,7 +318,7 @@ fn open<M: Message>(frame: &[u8]) -> Result<(u8, &[u8]), CodecError> {
     if !M::VERSIONS.contains(version) {
         return Err(CodecError::Version { got: version, known: M::VERSIONS });
     }
-    let (got, need) = (u32::from_le_bytes(*checksum), crc32fast::hash(covered));
+    let (got, need) = (u32::from_le_bytes(*found), checksum(covered));
     if got != need {
         return Err(CodecError::Checksum { got, need });
     }

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::DriftModel;
 use super::gyro::{DriftEstimate, GRID, GyroDrift};
 use super::reference::{Reference, ReferenceCounters, ReferenceRefusal, Waiting};
-use super::ring::{Covered, cell_end};
+use super::ring::{Covered, OpenCell, cell_end};
 use crate::observation::{GyroLanes, Observation};
 use crate::sample::{MAX_SENSORS, SensorFlags, Sensors};
 use crate::units::{Span, Timestamp};
@@ -41,6 +41,8 @@ pub struct DriftEstimator {
     observed_until: Option<Timestamp>,
     /// End of the last reference that was measured against the readings.
     used_until: Option<Timestamp>,
+    /// The cell that the next tick most likely adds to.
+    open: Option<OpenCell>,
 }
 
 impl DriftEstimator {
@@ -59,6 +61,7 @@ impl DriftEstimator {
             grid: 0,
             observed_until: None,
             used_until: None,
+            open: None,
         }
     }
 
@@ -71,6 +74,7 @@ impl DriftEstimator {
     /// Goes on where `before` is, after a swap of the calibration, for each gyro whose drift parameters are the same and
     /// for which `same_bias` says that the other biases are too; what is left of a bias that changed is another drift.
     pub fn carry(&mut self, mut before: Self, same_bias: impl Fn(usize) -> bool) {
+        before.close_cell();
         let old = core::mem::take(&mut before.gyros);
         let mut gyros = core::mem::take(&mut self.gyros);
         for (index, (new, old)) in gyros.iter_mut().zip(old).enumerate() {
@@ -165,6 +169,7 @@ impl DriftEstimator {
         let delay = self.settings.delay;
         let due = |r: &Reference| r.end + delay < end_time && cell_end(r.end) <= observed_until;
         while let Some(reference) = self.waiting.pop_if(due) {
+            self.close_cell();
             match self.apply(&reference, end_time, project) {
                 Ok(()) => self.counters.used += 1,
                 Err(refusal) => self.counters.refuse(refusal),
@@ -200,6 +205,7 @@ impl DriftEstimator {
     /// nobody knows how long the producer was away, and the estimate starts anew about its constant part.
     #[cold]
     fn restart(&mut self, end_time: Timestamp, grid: i64) {
+        self.open = None;
         let last = self.now.replace(end_time);
         let goes_on = last.is_none_or(|last| last < end_time);
         for gyro in self.gyros.iter_mut().flatten() {
@@ -231,17 +237,55 @@ impl DriftEstimator {
     fn add(&mut self, observation: &Observation) {
         let end = observation.end_time;
         let start = end - observation.duration;
-        let covered = Covered::new(start, end);
         let GyroLanes { count, rate, bias, flags, .. } = &observation.gyros;
-        for (lane, gyro) in self.gyros.iter_mut().enumerate().take(MAX_SENSORS.min(*count)) {
-            let Some(gyro) = gyro else { continue };
-            gyro.filter.start(start);
+        let residual = |lane: usize| {
             let residual = rate[lane] - bias[lane];
             let counts =
                 observation.settled & flags[lane].contains(SensorFlags::VALID) & residual.is_finite();
-            gyro.ring.take(&covered, counts.then_some(residual));
+            counts.then_some(residual)
+        };
+        let count = MAX_SENSORS.min(*count);
+        match self.open.as_mut().and_then(|open| Some((open.within(start, end)?, open))) {
+            Some((covered_s, open)) => {
+                for lane in 0..count {
+                    if let Some(rate) = residual(lane) {
+                        open.gain(lane, covered_s, rate);
+                    }
+                }
+            }
+            None => self.go_on(Covered::new(start, end), start, count, residual),
         }
         self.observed_until = Some(end);
+    }
+
+    /// Likewise of a tick that does not lie in the open cell; the cell in which it ends is open then.
+    #[cold]
+    fn go_on(
+        &mut self,
+        covered: Covered,
+        start: Timestamp,
+        count: usize,
+        residual: impl Fn(usize) -> Option<f64>,
+    ) {
+        self.close_cell();
+        for (lane, gyro) in self.gyros.iter_mut().enumerate().take(count) {
+            let Some(gyro) = gyro else { continue };
+            gyro.filter.start(start);
+            gyro.ring.take(&covered, residual(lane));
+        }
+        let gyros = self.gyros.iter().enumerate();
+        let rings = gyros.filter_map(|(lane, gyro)| Some((lane, &gyro.as_ref()?.ring)));
+        self.open = OpenCell::new(&covered, rings);
+    }
+
+    /// Has the rings know what the open cell holds.
+    fn close_cell(&mut self) {
+        let Some(open) = self.open.take() else { return };
+        for (lane, gyro) in self.gyros.iter_mut().enumerate() {
+            if let Some(gyro) = gyro {
+                open.write(lane, &mut gyro.ring);
+            }
+        }
     }
 
     /// Whether [`subtrahend`](Self::subtrahend) may be anything but zero.

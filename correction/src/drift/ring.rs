@@ -15,6 +15,8 @@ use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 
 use super::{Reference, ReferenceRefusal};
+use crate::lanes::Lanes;
+use crate::sample::MAX_SENSORS;
 use crate::units::{Span, Timestamp};
 
 /// Length of a cell.
@@ -68,6 +70,56 @@ impl Covered {
     }
 }
 
+/// The cell in which the last tick ended, as the rings of a unit will hold it: a lane for each gyro. Ticks add to it what they would
+/// add to the rings.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct OpenCell {
+    from: Timestamp,
+    to: Timestamp,
+    slot: usize,
+    angle_rad: Lanes,
+    observed_s: Lanes,
+}
+
+impl OpenCell {
+    /// The last cell of a tick; `None` where it is not the newest of each ring.
+    pub(super) fn new<'a>(
+        tick: &Covered,
+        rings: impl Iterator<Item = (usize, &'a Ring)> + Clone,
+    ) -> Option<Self> {
+        let from = Timestamp::of_cell(tick.last, CELL);
+        if from + CELL == from || rings.clone().any(|(_, ring)| ring.newest != Some(tick.last)) {
+            return None;
+        }
+        let (mut angle_rad, mut observed_s) = ([0.0; MAX_SENSORS], [0.0; MAX_SENSORS]);
+        for (lane, ring) in rings {
+            let cell = ring.cell(tick.last);
+            (angle_rad[lane], observed_s[lane]) = (cell.angle_rad, cell.observed_s);
+        }
+        Some(Self { from, to: from + CELL, slot: tick.slot, angle_rad, observed_s })
+    }
+
+    /// Time of a tick that lies in it (s); `None` for another tick.
+    #[inline]
+    pub(super) fn within(&self, start: Timestamp, end: Timestamp) -> Option<f64> {
+        (self.from <= start && start < end && end <= self.to).then(|| end.since(start).as_s())
+    }
+
+    /// Adds the mean rate (rad/s) of one gyro over a time (s).
+    #[inline]
+    pub(super) fn gain(&mut self, lane: usize, covered_s: f64, rate: f64) {
+        self.angle_rad[lane] += rate * covered_s;
+        self.observed_s[lane] += covered_s;
+    }
+
+    /// Writes one gyro's part of it into its ring.
+    pub(super) fn write(&self, lane: usize, ring: &mut Ring) {
+        if let Some(cell) = ring.cells.get_mut(self.slot) {
+            *cell = Cell { angle_rad: self.angle_rad[lane], observed_s: self.observed_s[lane] };
+        }
+    }
+}
+
 /// The cells of one gyro.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Ring {
@@ -87,7 +139,6 @@ impl Ring {
     }
 
     /// Shares the mean rate (rad/s) of a tick out to the cells that it covers; `None` where nothing was observed.
-    #[inline]
     pub(super) fn take(&mut self, tick: &Covered, rate: Option<f64>) {
         if self.newest != Some(tick.last) {
             self.reach(tick.last);

@@ -94,30 +94,27 @@ impl AccelIntake {
         }
     }
 
-    /// Whether the tick that ends with `gyro`, nearer than half the gyro tick's duration, is [the oldest](Self::front); one that
-    /// is not there may still come.
+    /// The tick that ends with `gyro`, nearer than half the gyro tick's duration: the oldest that waits. One that is not there may
+    /// still come.
     #[inline]
-    pub(super) fn meets(&mut self, gyro: &GyroTick, counters: &mut Counters) -> bool {
-        let Some(front) = self.pending.front() else { return false };
+    pub(super) fn partner(&mut self, gyro: &GyroTick, counters: &mut Counters) -> Option<&PendingAccel> {
         let late = gyro.end_time + Span::from_ns(gyro.duration.as_ns() / 2);
         // Mostly both end at once.
-        (front.end_time == gyro.end_time && gyro.end_time < late) || self.looks_for(gyro, late, counters)
+        if self.pending.front().is_some_and(|front| front.end_time != gyro.end_time || gyro.end_time == late)
+        {
+            self.drop_unpaired(gyro, counters);
+        }
+        self.pending.front().filter(|front| front.end_time < late)
     }
 
-    /// Likewise, past ticks whose gyro tick never came.
+    /// Drops ticks whose gyro tick never came.
     #[cold]
-    fn looks_for(&mut self, gyro: &GyroTick, late: Timestamp, counters: &mut Counters) -> bool {
+    fn drop_unpaired(&mut self, gyro: &GyroTick, counters: &mut Counters) {
         let half = Span::from_ns(gyro.duration.as_ns() / 2);
         while self.pending.front().is_some_and(|front| front.end_time + half <= gyro.end_time) {
             self.pending.pop_front();
             counters.accel_unpaired += 1;
         }
-        self.pending.front().is_some_and(|front| front.end_time < late)
-    }
-
-    /// The oldest tick that waits: what [`meets`](Self::meets) has found, until its gyro tick has gone.
-    pub(super) fn front(&self) -> Option<&PendingAccel> {
-        self.pending.front()
     }
 
     /// Remembers that the gyro tick which ends at `end_time` has gone, with the tick here that it has `met`.

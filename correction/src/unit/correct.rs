@@ -34,7 +34,7 @@ use crate::servo::ServoMemory;
 use crate::units::{Span, Timestamp};
 
 pub(super) use motion::MotionInUse;
-use motion::MotionMemory;
+use motion::{Follows, MotionMemory};
 
 /// What is presently subtracted from a unit's readings, in case axes.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -65,6 +65,12 @@ pub(super) struct Corrector {
     slew_share: f64,
     /// Whether anything follows motion at the present tick.
     moves: bool,
+    /// Up to this time a tick finds everything as the last one did: no memory, only a shorter way.
+    #[serde(skip)]
+    calm_until: Option<Timestamp>,
+    /// What follows motion up to then.
+    #[serde(skip)]
+    follows: Follows,
 }
 
 /// When a corrector begins, as seen from the one before it.
@@ -114,6 +120,8 @@ impl Corrector {
             slew: None,
             slew_share: 0.0,
             moves: false,
+            calm_until: None,
+            follows: Follows::default(),
         };
         let Some((old_calibration, old)) =
             before.filter(|(old, _)| old.gyro_count() == gyros && old.accel_count() == accels)
@@ -128,7 +136,7 @@ impl Corrector {
         let same_bias = |i| same_basis && old_calibration.gyros.get(i) == calibration.gyros.get(i);
         let Self { mut drift, thermal, .. } = new;
         drift.carry(old.drift, same_bias);
-        Self { drift, thermal, slew, slew_share: 0.0, ..old }
+        Self { drift, thermal, slew, slew_share: 0.0, calm_until: None, ..old }
     }
 
     /// Everything as it is in use at the end of the last tick, for a slew away from it.
@@ -174,29 +182,13 @@ impl Corrector {
         counters: &mut Counters,
         out: &mut CorrectedTick,
     ) {
-        let time = tick.released.tick.end_time;
-        let restart = tick.released.restart;
-        if restart {
-            self.thermal.restart(calibration);
-            self.servo.reset();
-            self.motion.restart();
-            self.slew = None;
-        }
-        if let Some(held) = self.motion.held.as_mut().filter(|_| tick.released.missed > 0) {
-            held.interrupt();
-        }
-        if waiting.is_due(time, delay) {
-            self.thermal.advance(calibration, waiting, delay, time, counters);
+        let (time, restart) = (tick.released.tick.end_time, tick.released.restart);
+        if restart || self.calm_until.is_none_or(|until| time > until) {
+            self.renew(calibration, tick, (waiting, delay), counters);
         }
         self.drift.advance(time, restart, &|rate| {
             calibration.gyro_orientation.forward(self.thermal.gyro_axes.temperature_deg_c(time), rate)
         });
-        self.slew_share = self.slew.as_ref().map_or(0.0, |slew| slew.share(time));
-        if self.slew_share <= 0.0 {
-            self.slew = None;
-        }
-        let slewing = self.slew.as_ref().is_some_and(|slew| slew.motion.is_some());
-        self.moves = calibration.motion.is_some() | slewing | self.motion.held.is_some();
         // Four lanes fill two registers of every x86-64, and suffice for most units.
         if calibration.gyros.len().max(calibration.accels.len()) <= 4 {
             self.correct_lanes::<4>(calibration, tick, counters, out);
@@ -204,6 +196,39 @@ impl Corrector {
             self.correct_lanes::<MAX_SENSORS>(calibration, tick, counters, out);
         }
         self.drift.observe(&self.seen);
+    }
+
+    /// Does before a tick what few need: a new series begins, temperature readings take effect, a swap is on its way.
+    #[cold]
+    fn renew(
+        &mut self,
+        calibration: &Calibration,
+        tick: &OnItsWay<'_>,
+        (waiting, delay): (&mut Waiting, Span),
+        counters: &mut Counters,
+    ) {
+        let time = tick.released.tick.end_time;
+        if tick.released.restart {
+            self.thermal.restart(calibration);
+            self.servo.reset();
+            self.motion.restart();
+            self.slew = None;
+        }
+        if waiting.is_due(time, delay) {
+            self.thermal.advance(calibration, waiting, delay, time, counters);
+        }
+        self.seen.gyros.temperature_deg_c = self.thermal.gyro_footing.temperature_deg_c;
+        self.slew_share = self.slew.as_ref().map_or(0.0, |slew| slew.share(time));
+        if self.slew_share <= 0.0 {
+            self.slew = None;
+        }
+        self.follow_motion(calibration);
+        self.calm_until = Some(waiting.due_after(delay)).filter(|_| self.slew.is_none());
+    }
+
+    /// Has the next tick look for what has changed.
+    pub(super) fn disturb(&mut self) {
+        self.calm_until = None;
     }
 
     fn correct_lanes<const N: usize>(
@@ -223,6 +248,9 @@ impl Corrector {
         out.gyro_parity.clear();
         out.accel_parity.clear();
         out.flags = if self.thermal.warming_up { TickFlags::WARM_UP } else { TickFlags::empty() };
+        if let Some(held) = self.motion.held.as_mut().filter(|_| missed > 0) {
+            held.interrupt();
+        }
         let shares = self.thermal.paces.shares(raw.end_time);
         let felt = self.accels_feel::<N>(calibration, tick, &shares, counters, out);
         if let Some(felt) = felt.as_ref().filter(|felt| self.moves & felt.within) {
@@ -242,7 +270,9 @@ impl Corrector {
         seen.mode = raw.mode;
         seen.angular_rate = out.delta_angle.map(|angle| angle * per_second);
         seen.flags = out.flags;
-        seen.flags.set(TickFlags::RESTART, restart);
+        if restart {
+            seen.flags |= TickFlags::RESTART;
+        }
     }
 
     /// The swap that is on its way at the present tick.

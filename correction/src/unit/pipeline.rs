@@ -112,6 +112,9 @@ impl Pipeline {
             }
             self.waiting.push(reading, &mut self.counters);
         }
+        if let Some(active) = &mut self.active {
+            active.corrector.disturb();
+        }
     }
 
     /// Whether a gyro tick fits the calibration that will correct it, as things stand.

@@ -50,9 +50,14 @@ impl Waiting {
         }
     }
 
+    /// Ticks that end later feel the next reading.
+    pub(super) fn due_after(&self, delay: Span) -> Timestamp {
+        self.readings.front().map_or(Timestamp::from_ns(i64::MAX), |reading| reading.time + delay)
+    }
+
     /// Whether a reading takes effect before a tick which ends at `end_time`.
     pub(super) fn is_due(&self, end_time: Timestamp, delay: Span) -> bool {
-        self.readings.front().is_some_and(|reading| reading.time + delay < end_time)
+        end_time > self.due_after(delay)
     }
 
     /// The next reading that takes effect before a tick which ends at `end_time`.

@@ -116,8 +116,8 @@ impl Corrector {
         seen.flags = flags;
         out.accel_flags = of_sensors(flags, count);
         if self.moves {
-            self.remove_squares(calibration, shares, &mut forces);
-            if self.holds_back(calibration) {
+            self.remove_squares(shares, &mut forces);
+            if self.holds_back() {
                 let held = (&mut forces, &mut usable);
                 self.hold_accels_back(calibration, tick.released, duration_s, held);
             }
@@ -157,7 +157,9 @@ impl Corrector {
             slewing.axes(force, old, usable, &forces[..orientation.sensors()])
         });
         out.delta_velocity = force.map(|f| f * duration_s);
-        out.flags.set(TickFlags::VELOCITY_INVALID, !trusted);
+        if !trusted {
+            out.flags |= TickFlags::VELOCITY_INVALID;
+        }
         self.seen.specific_force = trusted.then_some(force);
         if excluded {
             counters.sensors_excluded += 1;

@@ -7,7 +7,7 @@ use super::{Corrector, OnItsWay, of_sensors};
 use crate::calibration::Calibration;
 use crate::lanes::{narrow, of_readings, put};
 use crate::orientation::SensorMask;
-use crate::reversal::{Substitution, TickInput};
+use crate::reversal::{Reversal, Substitution, TickInput};
 use crate::sample::{
     CorrectedTick, GyroTick, LasingMode, MAX_SENSORS, MIN_SENSORS, OutputKind, SensorFlags, TickFlags,
 };
@@ -57,8 +57,8 @@ impl Corrector {
         let raw = tick.released.tick;
         let (time, duration_s) = (raw.end_time, raw.duration.as_s());
         let count = calibration.gyros.len();
-        let input = input(tick.released);
-        let lost = calibration.reversal.as_ref().is_some_and(|r| self.substitution.is_lost(r, &input));
+        let reversal = calibration.reversal.as_ref().map(|reversal| (reversal, input(tick.released)));
+        let lost = reversal.is_some_and(|(reversal, input)| self.substitution.is_lost(reversal, &input));
 
         let [weight, bias, magnetic, meander] =
             self.gyro_terms::<N>(calibration, shares, tick.since_turn_on_s);
@@ -75,13 +75,15 @@ impl Corrector {
             let limits = narrow::<N>(&calibration.gyro_limits);
             let within = |lane: usize| readings[lane].max(-limits[lane]).min(limits[lane]);
             let rates = array::from_fn(|lane| scaled(lane, within(lane)) / duration_s);
-            clamped = self.gyros_in_motion::<N>(calibration, shares, &rates, &mut bias);
+            (bias, clamped) = self.gyros_in_motion::<N>(calibration, shares, &rates, bias);
         }
         self.servo.advance(lost, time, raw.duration);
         if let Some(settles_s) = calibration.servos_settle_s.filter(|_| !lost)
             && !self.servo.pass_settled(settles_s, (time, raw.duration), &raw.half_periods)
         {
-            out.flags |= self.servo_transients(calibration, raw, &weight, &mut bias);
+            let (disturbed, flags) = self.servo_transients(calibration, raw, &weight, bias);
+            bias = disturbed;
+            out.flags |= flags;
         }
         let drift: [f64; N] = if self.drift.subtracts() {
             array::from_fn(|i| self.drift.subtrahend(i, time))
@@ -136,15 +138,14 @@ impl Corrector {
         put::<N>(&mut seen.rate, array::from_fn(|i| rates[i] + subtrahend[i]));
         put(&mut seen.bias, bias);
         put(&mut seen.drift, drift);
-        seen.temperature_deg_c = self.thermal.gyro_footing.temperature_deg_c;
         seen.flags = flags;
         out.gyro_flags = of_sensors(flags, count);
 
-        out.flags |= self.substitute(calibration, input, &mut increments[..count]);
+        out.flags |= self.substitute(reversal, &mut increments[..count]);
         if out.flags.intersects(SWITCHING) {
             count_switch_flags(out.flags, counters);
         }
-        if self.moves && self.holds_back(calibration) {
+        if self.moves && self.holds_back() {
             let held = (&mut increments, &mut usable);
             let held = self.hold_gyros_back(calibration, tick.released, &mut out.flags, held);
             rates = held.unwrap_or(rates);
@@ -160,11 +161,11 @@ impl Corrector {
         calibration: &Calibration,
         tick: &GyroTick,
         weight: &[f64; N],
-        bias: &mut [f64; N],
-    ) -> TickFlags {
+        mut bias: [f64; N],
+    ) -> ([f64; N], TickFlags) {
         let mut flags = TickFlags::empty();
         let temperatures = &self.thermal.gyro_footing.temperature_deg_c;
-        let lanes = calibration.gyros.iter().zip(weight).zip(temperatures).zip(bias).enumerate();
+        let lanes = calibration.gyros.iter().zip(weight).zip(temperatures).zip(&mut bias).enumerate();
         for (lane, (((model, weight), temperature_deg_c), bias)) in lanes {
             let Some(servo) = &model.servo else { continue };
             let servo_tick = ServoTick {
@@ -182,18 +183,13 @@ impl Corrector {
                 Transient::Unmeasured => TickFlags::SERVO_UNMEASURED,
             };
         }
-        flags
+        (bias, flags)
     }
 
     /// Bridges a mode switch (models §5).
-    fn substitute(
-        &mut self,
-        calibration: &Calibration,
-        input: TickInput,
-        increments: &mut [f64],
-    ) -> TickFlags {
-        match &calibration.reversal {
-            Some(reversal) => self.substitution.tick(reversal, input, increments),
+    fn substitute(&mut self, reversal: Option<(&Reversal, TickInput)>, increments: &mut [f64]) -> TickFlags {
+        match reversal {
+            Some((reversal, input)) => self.substitution.tick(reversal, input, increments),
             // A swap took the substitution away in the middle of a transition.
             None if !self.substitution.is_settled() => {
                 self.substitution = Substitution::new();
@@ -223,7 +219,9 @@ impl Corrector {
         out.delta_angle = self.slewing().map_or(angle, |slewing| {
             slewing.axes(angle, slewing.from.gyro_axes.as_ref(), usable, &increments[..orientation.sensors()])
         });
-        out.flags.set(TickFlags::ANGLE_INVALID, !trusted);
+        if !trusted {
+            out.flags |= TickFlags::ANGLE_INVALID;
+        }
         if excluded {
             counters.sensors_excluded += 1;
             self.thermal.note_footing(calibration);

@@ -98,8 +98,8 @@ impl HeldBack {
 impl Corrector {
     /// Whether sensors are held back, or something of them still is.
     #[inline]
-    pub(super) fn holds_back(&self, calibration: &Calibration) -> bool {
-        self.motion.held.is_some() || self.motions(calibration).any(|motion| motion.holds_back)
+    pub(super) fn holds_back(&self) -> bool {
+        self.motion.held.is_some() || self.follows.delays
     }
 
     /// What is held back; before a tick that is the first of its series, nothing.
@@ -127,6 +127,7 @@ impl Corrector {
         let none = gyros.iter().chain(&accels).all(|ticks| *ticks == 0.0);
         if none && held.gyros.owes_nothing() && held.accels.owes_nothing() {
             self.motion.held = None;
+            self.disturb();
         }
         let per_second = 1.0 / released.tick.duration.as_s();
         (!flags.intersects(CARRIED)).then(|| increments.map(|increment| increment * per_second))

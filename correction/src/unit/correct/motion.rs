@@ -36,6 +36,21 @@ pub(super) struct MotionMemory {
     pub(super) held: Option<Box<HeldBack>>,
 }
 
+/// What of a unit follows motion, under its calibration or one that a swap leads away from.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Follows {
+    /// Drift with the specific force.
+    force: bool,
+    /// Weights of gyros over their rate.
+    curves: bool,
+    /// Second-order terms of accelerometers.
+    squares: bool,
+    /// Accelerometers away from the reference point.
+    positions: bool,
+    /// Sensors that lag less than another.
+    pub(super) delays: bool,
+}
+
 impl MotionMemory {
     /// Angular acceleration at the middle of the tick (rad/s²), from its rate and those of up to two ticks before it: the slope of the
     /// parabola through the three, of the line through two, zero without.
@@ -108,10 +123,19 @@ impl Corrector {
         terms
     }
 
-    /// What follows motion, and what did before a swap that is on its way.
-    pub(super) fn motions<'a>(&'a self, calibration: &'a Calibration) -> impl Iterator<Item = &'a Motion> {
+    /// Notes what follows motion, and what did before a swap that is on its way.
+    pub(super) fn follow_motion(&mut self, calibration: &Calibration) {
         let old = self.slew_from_motion().map(|old| &old.motion);
-        calibration.motion.as_deref().into_iter().chain(old)
+        let motions = || calibration.motion.as_deref().into_iter().chain(old);
+        let follows = Follows {
+            force: motions().any(|motion| motion.feels_force),
+            curves: motions().any(Motion::has_curves),
+            squares: motions().any(Motion::has_squares),
+            positions: motions().any(|motion| motion.has_positions),
+            delays: motions().any(|motion| motion.holds_back),
+        };
+        self.moves = motions().next().is_some() || self.motion.held.is_some();
+        self.follows = follows;
     }
 
     /// A number of each sensor, on its way from the old one.
@@ -136,19 +160,19 @@ impl Corrector {
         calibration: &Calibration,
         shares: &Shares,
         rates: &[f64; N],
-        bias: &mut [f64; N],
-    ) -> SensorMask {
+        bias: [f64; N],
+    ) -> ([f64; N], SensorMask) {
         let [x, y, z, asymmetry] = self.gyro_motion::<N>(shares);
         let (force, mut clamped, mut errors) = (self.motion.force, SensorMask::NONE, [0.0; N]);
-        if self.motions(calibration).any(Motion::has_curves) {
+        if self.follows.curves {
             clamped = self.errors_over_rate(calibration, rates, &mut errors);
         }
-        *bias = array::from_fn(|lane| {
+        let bias = array::from_fn(|lane| {
             let by_force = x[lane] * force[0] + y[lane] * force[1] + z[lane] * force[2];
             let rate = rates[lane];
             bias[lane] + (by_force - asymmetry[lane] * rate.abs() - errors[lane] * rate)
         });
-        clamped
+        (bias, clamped)
     }
 
     /// Relative errors of the gyros' weights at their rates (rad/s), and the gyros whose rate is outside the range of its curve.
@@ -183,7 +207,7 @@ impl Corrector {
         forces: &[f64; N],
         time: Timestamp,
     ) {
-        if !self.motions(calibration).any(|motion| motion.feels_force) {
+        if !self.follows.force {
             return;
         }
         let (Some(orientation), Some(axes)) = (&calibration.accel_orientation, &mut self.thermal.accel_axes)
@@ -199,13 +223,8 @@ impl Corrector {
     /// Takes second-order terms out of the forces that the accelerometers feel (m/s²): m = f + K2·f² has the solution
     /// f = 2m/(1 + √(1 + 4·K2·m)) next to m.
     #[inline(never)]
-    pub(super) fn remove_squares<const N: usize>(
-        &self,
-        calibration: &Calibration,
-        shares: &Shares,
-        forces: &mut [f64; N],
-    ) {
-        if !self.motions(calibration).any(Motion::has_squares) {
+    pub(super) fn remove_squares<const N: usize>(&self, shares: &Shares, forces: &mut [f64; N]) {
+        if !self.follows.squares {
             return;
         }
         let [second_order] = self.accel_motion::<N>(shares);
@@ -224,7 +243,7 @@ impl Corrector {
         out: &CorrectedTick,
         forces: &mut [f64; N],
     ) {
-        if !self.motions(calibration).any(|motion| motion.has_positions) {
+        if !self.follows.positions {
             return;
         }
         let positions: [[f64; N]; 3] =
