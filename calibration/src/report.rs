@@ -9,12 +9,14 @@
 //! | [`curve`] | before and after over time and temperature, taken from a corrected run |
 //! | [`batch`] | several units at once, and the table that closes them |
 //! | [`sheet`] | a line, tables and charts where nothing was fitted |
+//! | [`figures`] | digits, tables |
 //! | [`sigma`] | standard errors as documents keep them |
 //! | `words` | one sentence for all gyros, or logs, that it holds of |
 //! | `page`, `json` | the report as a page and as JSON |
 
 pub mod batch;
 pub mod curve;
+pub mod figures;
 mod json;
 mod page;
 pub mod sheet;
@@ -34,7 +36,7 @@ pub use sheet::Sheet;
 pub use sigma::Sigmas;
 pub use verdict::{FLAT, Figure, SAME_SHARE, Verdict, residuals};
 
-use crate::drift::figures::{short, table};
+use crate::report::figures::{short, table};
 
 /// One fitted coefficient.
 #[derive(Debug, Clone, PartialEq)]

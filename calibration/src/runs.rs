@@ -4,10 +4,12 @@
 //! |---|---|
 //! | [`series`] | its raw readings as columns, tick by tick |
 //! | [`table`] | its corrected outputs as columns, by windows or tick by tick |
+//! | [`swapped`] | columns that look swapped |
 //! | [`cut`] | where a log was cut short |
 
 pub mod cut;
 pub mod series;
+pub mod swapped;
 pub mod table;
 mod together;
 
@@ -29,8 +31,8 @@ use isotherm_protocol::codec;
 use isotherm_protocol::key::{RawStream, UnitId};
 use isotherm_protocol::raw::{AccelBatch, GyroBatch};
 
-use crate::drift::figures::six;
 use crate::error::Error;
+use crate::report::figures::six;
 use crate::robust::median;
 use cut::Cut;
 use series::Series;

@@ -12,17 +12,17 @@ use isotherm_correction::earth::Place;
 use isotherm_correction::units::{AngularRate, STANDARD_GRAVITY_M_PER_S2};
 use isotherm_protocol::document::{Document, Sample};
 
-use crate::drift::figures::short;
+use crate::document::written::Written;
 use crate::error::Error;
+use crate::fits::thermal::Stand;
+use crate::fits::thermal::checks::judging;
+use crate::report::figures::short;
 use crate::report::{Curve, FLAT, Figure, FitReport, Rest, SAME_SHARE, Verdict};
 use crate::robust::is_white;
 use crate::runs::Watch;
+use crate::runs::swapped::{Shown, up};
 use crate::runs::table::{Rows, Table, Takes, is_one_g, usual_window_s};
 use crate::size::Size;
-use crate::swapped::{Shown, up};
-use crate::thermal::Stand;
-use crate::thermal::checks::judging;
-use crate::written::Written;
 use coverage::Coverage;
 pub use runs::JudgedLog;
 

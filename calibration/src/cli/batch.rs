@@ -10,11 +10,11 @@ use super::bar::Bar;
 use super::output::OutputArgs;
 use super::print;
 use super::runs::Reading;
+use crate::document::written::{Written, write_file};
 use crate::error::Error;
 use crate::report::{BatchTable, UnitReport, in_parallel, of_unit};
 use crate::runs::Run;
 use crate::runs::cut::Cut;
-use crate::written::{Written, write_file};
 
 /// What a command has to work on of one unit.
 pub(super) struct Work {

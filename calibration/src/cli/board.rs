@@ -9,9 +9,9 @@ use super::batch::{Batch, Named, Work};
 use super::output::{About, Fitted, OutputArgs};
 use super::runs::LogArgs;
 use super::thermal::StandArgs;
-use crate::board::{Wanted, fit};
 use crate::error::Error;
-use crate::thermal::Site;
+use crate::fits::board::{Wanted, fit};
+use crate::fits::thermal::Site;
 
 /// Ratio of the accelerometers' board over its temperature, from cycles of the chamber in two positions
 #[derive(Debug, Args)]

@@ -7,9 +7,9 @@ use clap::Args;
 
 use super::page::PageArgs;
 use super::print;
-use crate::diff::series::Series;
+use crate::document::diff::series::Series;
+use crate::document::written::Written;
 use crate::error::Error;
-use crate::written::Written;
 
 /// Compare calibration documents in order of time, such as those before, between and after shock and vibration
 #[derive(Debug, Args)]

@@ -11,17 +11,17 @@ use super::bar::Bar;
 use super::batch::{Batch, Named, Names, Unit, Work};
 use super::output::OutputArgs;
 use super::runs::LogArgs;
-use crate::drift::analysis::{Wanted, analyse};
-use crate::drift::columns::{Columns, Kind, unnamed};
-use crate::drift::page::page;
-use crate::drift::parameters::{Parameters, put};
-use crate::drift::pieces::Grid;
-use crate::drift::report::Report;
-use crate::drift::trend::FIT_H;
+use crate::document::provenance::{TOOL, command_line, origin};
+use crate::document::written::Written;
 use crate::error::Error;
-use crate::provenance::{TOOL, command_line, origin};
+use crate::fits::drift::columns::{Columns, Kind, unnamed};
+use crate::fits::drift::document::{Parameters, put};
+use crate::fits::drift::fit::{Wanted, analyse};
+use crate::fits::drift::page::page;
+use crate::fits::drift::pieces::Grid;
+use crate::fits::drift::report::Report;
+use crate::fits::drift::trend::FIT_H;
 use crate::runs::Watch;
-use crate::written::Written;
 
 /// Noise and drift of a log at rest: Allan deviation, Markov drift, trend, spectrum, estimator parameters
 #[derive(Debug, Args)]

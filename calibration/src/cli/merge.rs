@@ -7,9 +7,9 @@ use clap::Args;
 use super::output::date;
 use super::page::writable;
 use super::print;
+use crate::document::merge::{Merged, Named, Take, merge};
+use crate::document::written::Written;
 use crate::error::Error;
-use crate::merge::{Merged, Named, Take, merge};
-use crate::written::Written;
 
 /// Put parts of a calibration that different commands have made into one document
 #[derive(Debug, Args)]

@@ -12,9 +12,9 @@ use super::output::{About, Fitted, OutputArgs};
 use super::place::PlaceArgs;
 use super::runs::LogArgs;
 use crate::error::Error;
-use crate::modes::document::{details, sigmas};
-use crate::modes::fit::Asked;
-use crate::modes::make::{Wanted, make};
+use crate::fits::modes::document::{details, sigmas};
+use crate::fits::modes::fit::{Wanted, make};
+use crate::fits::modes::model::Asked;
 
 /// Magnetic and non-magnetic drift over temperature, slow meander and switch parameters of a mode-reversed laser gyro
 #[derive(Debug, Args)]

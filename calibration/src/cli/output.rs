@@ -11,10 +11,10 @@ use toml::Table;
 
 use super::batch::{Names, Work};
 use super::page::{keep, writable};
+use crate::document::provenance::{command_line, origin};
+use crate::document::written::{Written, write_file};
 use crate::error::Error;
-use crate::provenance::{command_line, origin};
 use crate::report::{FitReport, Sigmas, of_unit, residuals};
-use crate::written::{Written, write_file};
 
 /// What a fit writes.
 #[derive(Debug, Clone, Args)]

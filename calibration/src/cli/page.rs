@@ -7,9 +7,9 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use isotherm_log::file::refuse_overwriting;
 
+use crate::document::written::write_file;
 use crate::error::Error;
 use crate::report::of_unit;
-use crate::written::write_file;
 
 /// The page of a command that writes nothing else.
 #[derive(Debug, Clone, Args)]

@@ -13,9 +13,9 @@ use super::output::{About, Fitted, OutputArgs};
 use super::place::PlaceArgs;
 use super::runs::LogArgs;
 use crate::error::Error;
-use crate::rates::document::{details, nominal, sigmas};
-use crate::rates::make::{Wanted, make};
-use crate::rates::steps::{Step, listed, read};
+use crate::fits::rates::document::{details, nominal, sigmas};
+use crate::fits::rates::fit::{Wanted, make};
+use crate::fits::rates::steps::{Step, listed, read};
 use crate::runs::Run;
 
 /// Scale factor, asymmetry, linearity, input axes and bias of gyros from runs on a rate table

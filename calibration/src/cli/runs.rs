@@ -12,8 +12,8 @@ use isotherm_log::source::Log;
 use isotherm_protocol::key::UnitId;
 
 use super::bar::Bar;
+use crate::document::provenance::recordings_in;
 use crate::error::Error;
-use crate::provenance::recordings_in;
 use crate::runs::{Run, units_of};
 
 /// Gyro ticks in a batch of a text log.

@@ -6,9 +6,9 @@ use clap::Args;
 
 use super::page::PageArgs;
 use super::print;
+use crate::document::show::show;
+use crate::document::written::Written;
 use crate::error::Error;
-use crate::show::show;
-use crate::written::Written;
 
 /// Show a calibration document in words, as tables and as curves
 #[derive(Debug, Args)]

@@ -10,10 +10,10 @@ use isotherm_correction::units::Span;
 use super::batch::{Batch, Named, Names, Work};
 use super::output::OutputArgs;
 use super::runs::{LogArgs, Reading};
+use crate::document::provenance::{command_line, origin};
 use crate::error::Error;
-use crate::provenance::{command_line, origin};
+use crate::fits::thermal::{Fitted, Method, Settings, Terms, fit};
 use crate::report::FitReport;
-use crate::thermal::{Fitted, Method, Settings, Terms, fit};
 pub(super) use stands::StandArgs;
 
 /// Bias and scale factor over temperature from chamber runs of units at rest or on a rate table

@@ -12,15 +12,15 @@ use super::batch::{Batch, Named, Names, Work};
 use super::output::{About, Fitted, OutputArgs};
 use super::place::GravityArgs;
 use super::runs::LogArgs;
+use crate::document::written::Written;
 use crate::error::Error;
-use crate::positions::bare::bare;
-use crate::positions::still::StillLimits;
-use crate::positions::track::Track;
+use crate::fits::positions::bare::bare;
+use crate::fits::positions::still::StillLimits;
+use crate::fits::positions::track::Track;
+use crate::fits::tumble::document::{before, complete};
+use crate::fits::tumble::fit::{Settings, analyse};
+use crate::fits::tumble::report::{Left, details, report, sigmas};
 use crate::runs::Run;
-use crate::tumble::analysis::{Settings, analyse};
-use crate::tumble::document::{before, complete};
-use crate::tumble::report::{Left, details, report, sigmas};
-use crate::written::Written;
 
 /// Axes, scale factors and biases of a unit that was put down in many ways by hand: accelerometers from |f| = g, gyros against them
 #[derive(Debug, Args)]

@@ -12,11 +12,11 @@ use super::page::PageArgs;
 use super::place::PlaceArgs;
 use super::print;
 use super::runs::Reading;
+use crate::document::written::Written;
 use crate::error::Error;
 use crate::report::{FitReport, in_parallel};
 use crate::runs::{Run, Watch};
 use crate::validate::{JudgedLog, Wanted, validate};
-use crate::written::Written;
 
 /// Judge a calibration document on logs that it was not made from
 #[derive(Debug, Args)]

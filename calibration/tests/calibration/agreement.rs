@@ -1,13 +1,13 @@
 //! The fit and the service agree: what a report states of its residuals is what `isotherm-replay correct` leaves of the log with the
-//! document that was written, both run as their users run them. `thermal` has the same in [`crate::thermal`], by method.
+//! document that was written, both run as their users run them. `thermal` has the same in [`crate::fits::thermal`], by method.
 
 use std::fmt::Write as _;
 use std::path::Path;
 
-use isotherm_calibration::positions::budget::ARCSEC_PER_RAD;
-use isotherm_calibration::positions::plan::Plan;
+use isotherm_calibration::document::written::Written;
+use isotherm_calibration::fits::positions::budget::ARCSEC_PER_RAD;
+use isotherm_calibration::fits::positions::plan::Plan;
 use isotherm_calibration::size::Size;
-use isotherm_calibration::written::Written;
 use isotherm_correction::sample::CorrectedTick;
 use isotherm_protocol::document::{Document, Residual, Sample};
 use isotherm_simulator::Scenario;

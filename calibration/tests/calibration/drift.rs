@@ -2,19 +2,19 @@
 
 use std::path::Path;
 
-use isotherm_calibration::allan::deviation::lengths;
-use isotherm_calibration::allan::{Coefficient, Estimator, NoiseFit, Phase, Term};
-use isotherm_calibration::drift::markov::{Beside, Fit};
-use isotherm_calibration::drift::parameters::Trend;
-use isotherm_calibration::drift::slow::Slow;
-use isotherm_calibration::impact::monte_carlo::drift;
-use isotherm_calibration::impact::scenario::Care;
+use isotherm_calibration::fits::drift::allan::deviation::lengths;
+use isotherm_calibration::fits::drift::allan::{Coefficient, Estimator, NoiseFit, Phase, Term};
+use isotherm_calibration::fits::drift::document::Trend;
+use isotherm_calibration::fits::drift::markov::{Beside, Fit};
+use isotherm_calibration::fits::drift::slow::Slow;
+use isotherm_calibration::fits::impact::monte_carlo::drift;
+use isotherm_calibration::fits::impact::scenario::Care;
 use isotherm_protocol::document::Document;
 use serde_json::Value;
 
 use crate::command::{calibrate, data, json, root};
 use crate::drift_generator::{Markov, Normal, recording};
-use crate::impact::{VOYAGE, parts};
+use crate::fits::impact::{VOYAGE, parts};
 
 fn fit(readings: &[f64], tick_s: f64) -> NoiseFit {
     let phase = Phase::new([readings], 0.0);

@@ -1,13 +1,13 @@
 //! `positions`: a simulated stand with its errors, from the log to the document.
 
-use isotherm_calibration::positions::analysis::{Analysis, Settings, analyse};
-use isotherm_calibration::positions::document::complete;
-use isotherm_calibration::positions::judged::judge;
-use isotherm_calibration::positions::model::SMALL;
-use isotherm_calibration::positions::plan::Plan;
-use isotherm_calibration::positions::times::Times;
-use isotherm_calibration::positions::track::Track;
-use isotherm_calibration::written::Written;
+use isotherm_calibration::document::written::Written;
+use isotherm_calibration::fits::positions::document::complete;
+use isotherm_calibration::fits::positions::fit::{Analysis, Settings, analyse};
+use isotherm_calibration::fits::positions::judged::judge;
+use isotherm_calibration::fits::positions::model::SMALL;
+use isotherm_calibration::fits::positions::plan::Plan;
+use isotherm_calibration::fits::positions::times::Times;
+use isotherm_calibration::fits::positions::track::Track;
 use isotherm_correction::unit::UnitSettings;
 use isotherm_log::offline::Offline;
 use nalgebra::DVector;

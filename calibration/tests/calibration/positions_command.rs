@@ -3,9 +3,9 @@
 use std::path::Path;
 use std::process::Output;
 
-use isotherm_calibration::positions::plan::Plan;
+use isotherm_calibration::document::written::Written;
+use isotherm_calibration::fits::positions::plan::Plan;
 use isotherm_calibration::report::Sigmas;
-use isotherm_calibration::written::Written;
 use isotherm_protocol::document::Document;
 
 use crate::command::program;

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use isotherm_calibration::drift::columns::{Columns, Kind};
-use isotherm_calibration::drift::pieces::Spacing;
-use isotherm_calibration::drift::pieces::checks::{at_rest, frozen};
+use isotherm_calibration::fits::drift::columns::{Columns, Kind};
+use isotherm_calibration::fits::drift::pieces::Spacing;
+use isotherm_calibration::fits::drift::pieces::checks::{at_rest, frozen};
 
 use crate::command::{fails, shipped, succeeds};
 use crate::drift_generator::{Normal, recording};

@@ -3,15 +3,15 @@
 
 use std::path::Path;
 
-use isotherm_calibration::written::Written;
+use isotherm_calibration::document::written::Written;
 use isotherm_log::text::LogEvent;
 use serde_json::Value;
 
 use crate::command::{calibrate, fails, json, shipped, succeeds, words};
+use crate::fits::tumble::tumbled_log;
 use crate::modes_rates::{self, table};
 use crate::simulated_logs::{events, fibre_optic, record_units};
 use crate::stand::GRAVITY;
-use crate::tumble::tumbled_log;
 
 const UNITS: [&str; 2] = ["FOG-0001", "FOG-0002"];
 

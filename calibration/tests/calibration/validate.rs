@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use isotherm_calibration::provenance::origin;
+use isotherm_calibration::document::provenance::origin;
+use isotherm_calibration::document::written::Written;
 use isotherm_calibration::runs::Run;
 use isotherm_calibration::runs::table::Table;
-use isotherm_calibration::written::Written;
 use isotherm_correction::sample::OutputKind;
 use isotherm_log::offline::unit_id;
 use isotherm_log::part::{LogFiles, Part};

@@ -2,7 +2,7 @@
 
 use clap::Args;
 
-use crate::positions::budget::Budget;
+use crate::fits::positions::budget::Budget;
 
 /// A calibration that is planned; the defaults are the example of 004.
 #[derive(Debug, Args)]

@@ -4,14 +4,14 @@ use isotherm_correction::sample::OutputKind;
 use isotherm_protocol::document::{AccelOutput, Document};
 
 use crate::cli::bar::Bar;
+use crate::document::written::Written;
 use crate::error::Error;
-use crate::positions::analysis::{Analysis, Settings};
-use crate::positions::bare::bare;
-use crate::positions::judged::{Judgement, judge};
-use crate::positions::pose::Pose;
-use crate::positions::track::Track;
+use crate::fits::positions::bare::bare;
+use crate::fits::positions::fit::{Analysis, Settings};
+use crate::fits::positions::judged::{Judgement, judge};
+use crate::fits::positions::pose::Pose;
+use crate::fits::positions::track::Track;
 use crate::runs::Run;
-use crate::written::Written;
 
 /// A document where there is none.
 pub(super) fn first_document(runs: &[Run], output: AccelOutput, bar: Bar) -> Result<Document, Error> {

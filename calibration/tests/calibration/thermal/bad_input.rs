@@ -1,8 +1,8 @@
 //! Logs that do not allow what is asked for: every one is refused, or warned of, in words that say what to do.
 
 use isotherm_calibration::error::Error;
+use isotherm_calibration::fits::thermal::{Fitted, Method, Settings, Terms, fit};
 use isotherm_calibration::runs::Run;
-use isotherm_calibration::thermal::{Fitted, Method, Settings, Terms, fit};
 use isotherm_calibration::validate::{JudgedLog, Wanted, validate};
 use isotherm_correction::sample::{AccelTick, GyroTick, OutputKind, TemperatureReading};
 use isotherm_correction::units::{Span, Timestamp};

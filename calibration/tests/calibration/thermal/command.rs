@@ -4,7 +4,7 @@ use std::path::Path;
 use std::process::{Command, Output};
 use std::time::SystemTime;
 
-use isotherm_calibration::written::Written;
+use isotherm_calibration::document::written::Written;
 use isotherm_correction::units::Span;
 use isotherm_log::part::{LogFiles, Part};
 use isotherm_log::recording::{RecordingOptions, RecordingWriter};

@@ -1,8 +1,8 @@
 //! Scale factors over temperature: from gravity in two attitudes, and from a rate table.
 
+use isotherm_calibration::fits::thermal::{Fitted, Method, Settings, Site, Stand, Turning, fit};
 use isotherm_calibration::report::FitReport;
 use isotherm_calibration::runs::Run;
-use isotherm_calibration::thermal::{Fitted, Method, Settings, Site, Stand, Turning, fit};
 use isotherm_correction::sample::OutputKind;
 use isotherm_correction::unit::UnitSettings;
 use isotherm_log::offline::{Offline, load_calibration, unit_id};
