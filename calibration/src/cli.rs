@@ -1,15 +1,16 @@
 //! The command line: arguments in, exit code out.
 
 mod bar;
-mod batch;
 mod board;
 mod diff;
 mod drift;
+mod driver;
+mod files;
 mod impact;
+mod limits;
 mod merge;
 mod modes;
 mod output;
-mod page;
 mod place;
 mod positions;
 mod rates;
@@ -17,6 +18,7 @@ mod runs;
 mod show;
 mod thermal;
 mod tumble;
+mod units;
 mod validate;
 
 use std::io::{self, Write};
@@ -75,25 +77,10 @@ fn run(cli: Cli) -> Result<(), Error> {
         Command::Validate(args) => args.run(),
         Command::Common(common) => {
             let done = common.run::<Cli>();
-            print(&done.map_err(|(path, source)| Error::file(&path, "write manual pages into", source))?)
+            driver::print(
+                &done.map_err(|(path, source)| Error::file(&path, "write manual pages into", source))?,
+            )
         }
-    }
-}
-
-/// Refuses an argument that is no number above 0.
-pub(crate) fn above_0(name: &str, value: f64) -> Result<(), Error> {
-    if value.is_finite() && value > 0.0 {
-        return Ok(());
-    }
-    Err(Error::Usage(format!("{name} is {value}, must be a number above 0")))
-}
-
-/// Writes to standard output; a reader that has gone away is no error.
-pub(crate) fn print(text: &[u8]) -> Result<(), Error> {
-    let mut stdout = io::stdout().lock();
-    match stdout.write_all(text).and_then(|()| stdout.flush()) {
-        Err(source) if source.kind() != io::ErrorKind::BrokenPipe => Err(Error::Stdout { source }),
-        _ => Ok(()),
     }
 }
 
@@ -113,9 +100,25 @@ pub fn main() -> ExitCode {
 mod tests {
     use std::path::Path;
 
+    use clap::CommandFactory;
     use isotherm_protocol::document::Document;
 
     use super::*;
+
+    #[test]
+    fn rare_options_are_in_the_advanced_help() {
+        let help = |command: &str, flag: &str| {
+            let program = isotherm_document::advanced::command::<Cli>();
+            program.try_get_matches_from(["isotherm-calibrate", command, flag]).unwrap_err().to_string()
+        };
+        for (command, rare) in
+            [("thermal", "--fit-window"), ("positions", "--still-rate"), ("merge", "--created")]
+        {
+            let (short, long) = (help(command, "--help"), help(command, "--help-advanced"));
+            assert!(short.contains("--help-advanced") && !short.contains(rare), "{command}: {short}");
+            assert!(long.contains(rare) && long.contains("--out"), "{command}: {long}");
+        }
+    }
 
     #[test]
     fn the_full_example_names_a_command_and_files_that_there_are() {
@@ -123,6 +126,7 @@ mod tests {
         let text = std::fs::read_to_string(root.join("config/calibration/example-full.toml")).unwrap();
         let origin = Document::parse(&text, None).unwrap().document.origin.unwrap();
         let command = origin.command.unwrap();
+        Cli::command().debug_assert();
         let arguments = Cli::try_parse_from(command.split_whitespace()).unwrap();
         assert!(matches!(arguments.command, Command::Thermal(_)), "{command}");
         for file in command.split_whitespace().filter(|word| word.contains('/')) {

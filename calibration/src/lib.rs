@@ -6,6 +6,7 @@
 //! | module | holds |
 //! |---|---|
 //! | [`runs`] | what a log has of one unit, to be corrected again and again; as columns, raw and corrected |
+//! | [`axes`] | case axes, and what sensors are called |
 //! | [`lsq`] | least squares: coefficients, covariance, cross-validation |
 //! | [`robust`], [`size`] | middle and scatter of numbers among which some may be wrong; mean, rms, deviation |
 //! | [`finding`] | what can be wrong or is worth telling, and its words |
@@ -15,6 +16,7 @@
 //! | [`validate`] | a document judged on other logs |
 //! | [`error`], [`cli`] | what can go wrong; the command line |
 
+pub mod axes;
 pub mod cli;
 pub mod document;
 pub mod error;

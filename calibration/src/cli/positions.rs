@@ -3,18 +3,18 @@
 mod planned;
 mod steps;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Arg, Args};
 use isotherm_protocol::document::AccelOutput;
 
-use super::above_0;
 use super::bar::Bar;
-use super::batch::{Batch, Named, Work};
+use super::driver::{Job, Task, emit};
+use super::limits::above_0;
 use super::output::{About, Fitted, OutputArgs};
 use super::place::GravityArgs;
-use super::print;
-use super::runs::Reading;
+use super::runs::{BaseArgs, JudgeArgs, LogArgs};
+use super::units::Logs;
 use crate::document::written::Written;
 use crate::error::Error;
 use crate::fits::positions::budget::ARCSEC_PER_RAD;
@@ -38,13 +38,11 @@ use steps::{first_document, judged, tracks};
     isotherm-calibrate positions cold.mcap room.mcap hot.mcap --calibration unit.toml --latitude 55.75 --out unit-positions.toml --html positions.html\n  \
     isotherm-calibrate positions stand.mcap --plan my-plan.toml --gravity 9.8154 --times held.csv\n\n\
     Still poses are found in the logs and known by the gyros' turns between them. Every set of positions works that shows each axis up \
-    and down; nine or more tell the stand's errors from the axes.")]
+    and down; nine or more tell the stand's errors from the axes.",
+    mut_arg("log", |log: Arg| log.required(false).required_unless_present("budget")))]
 pub(super) struct PositionsArgs {
-    /// Recordings (.mcap), or the files of a text log in the order of its mapping: each temperature may be a log of its own
-    #[arg(value_name = "LOG", required_unless_present = "budget")]
-    log: Vec<PathBuf>,
     #[command(flatten)]
-    reading: Reading,
+    log: LogArgs,
     /// Print what a planned calibration will come to, and nothing else; the defaults are the example of 004
     #[arg(long, conflicts_with_all = ["log", "document", "out", "judge", "html", "times"])]
     budget: bool,
@@ -56,13 +54,10 @@ pub(super) struct PositionsArgs {
     /// do not have the turns, unless one log has all positions in their order
     #[arg(long, value_name = "FILE")]
     times: Option<PathBuf>,
-    /// Calibration document (TOML) that is completed, without it the accelerometers must stand along the case axes; for several
-    /// units the folder that has UNIT.toml of each
-    #[arg(long = "calibration", short = 'c', alias = "document", short_alias = 'd', value_name = "FILE")]
-    document: Option<PathBuf>,
-    /// Log that the fit must not see, to judge it by; may be repeated
-    #[arg(long, value_name = "LOG")]
-    judge: Vec<PathBuf>,
+    #[command(flatten)]
+    base: BaseArgs,
+    #[command(flatten)]
+    judge: JudgeArgs,
     #[command(flatten)]
     gravity: GravityArgs,
     /// σ1: standard deviation of the stand's positioning (″)
@@ -72,28 +67,28 @@ pub(super) struct PositionsArgs {
     #[arg(long, value_name = "ARCSEC", default_value_t = 2.0)]
     run_out: f64,
     /// How far the stand may be out of level (″, one sigma)
-    #[arg(long, value_name = "ARCSEC", default_value_t = 60.0)]
+    #[arg(long, hide_short_help = true, value_name = "ARCSEC", default_value_t = 60.0)]
     levelling: f64,
     /// Window that stillness is looked for in (s)
-    #[arg(long, value_name = "SECONDS", default_value_t = 1.0)]
+    #[arg(long, hide_short_help = true, value_name = "SECONDS", default_value_t = 1.0)]
     window: f64,
     /// Variance over a window that is still, relative to that of the log's quietest fifth
-    #[arg(long, value_name = "FACTOR", default_value_t = 4.0)]
+    #[arg(long, hide_short_help = true, value_name = "FACTOR", default_value_t = 4.0)]
     threshold: f64,
     /// Rate beyond which the unit turns (°/s)
-    #[arg(long, value_name = "DEG_PER_S", default_value_t = 0.2)]
+    #[arg(long, hide_short_help = true, value_name = "DEG_PER_S", default_value_t = 0.2)]
     still_rate: f64,
     /// Taken off the beginning of each pose (s)
-    #[arg(long, value_name = "SECONDS", default_value_t = 2.0)]
+    #[arg(long, hide_short_help = true, value_name = "SECONDS", default_value_t = 2.0)]
     settle: f64,
     /// Shortest pose (s)
-    #[arg(long, value_name = "SECONDS", default_value_t = 10.0)]
+    #[arg(long, hide_short_help = true, value_name = "SECONDS", default_value_t = 10.0)]
     least: f64,
     /// Temperature channels whose mean the axes follow; those of the document, or of the accelerometers, without it
     #[arg(long, value_name = "CHANNEL")]
     channel: Vec<String>,
     /// Temperature that all polynomials are about (°C)
-    #[arg(long, value_name = "DEG_C", allow_hyphen_values = true)]
+    #[arg(long, hide_short_help = true, value_name = "DEG_C", allow_hyphen_values = true)]
     reference: Option<f64>,
     /// What a mean of an accelerometer is measured in, where there is no document: "V", or "m/s2"
     #[arg(long, value_name = "UNIT", default_value = "V", value_parser = ["V", "m/s2"])]
@@ -107,54 +102,49 @@ pub(super) struct PositionsArgs {
 impl PositionsArgs {
     /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
-        self.check()?;
+        self.limits()?;
         let plan = Plan::named(&self.plan)?;
         if self.budget {
             return self.print_budget(&plan);
         }
         let (settings, about_gravity) = self.settings(plan)?;
-        let named = Named::apart(&self.reading, &self.log, &self.judge, self.document.as_ref());
-        let batch =
-            Batch { output: &self.output, title: "Accelerometers of several units", accept_partial: false };
-        batch.carry_out(named.units()?, |work, names, bar| {
-            self.output.keep(self.fit(work, &settings, about_gravity.as_ref(), bar)?, work, names)
-        })
+        let logs = Logs::apart(&self.log, &self.judge, &self.base);
+        let task = Task {
+            beside: self.times.as_deref(),
+            ..Task::new("Accelerometers of several units", self.output.files(), logs)
+        };
+        task.run(|job| self.fit(job, &settings, about_gravity.as_ref())?.done(&self.output, job))
     }
 
-    /// What the arguments must hold before anything is read.
-    fn check(&self) -> Result<(), Error> {
-        let positive = [
-            ("--positioning", self.positioning),
-            ("--levelling", self.levelling),
-            ("--window", self.window),
-            ("--threshold", self.threshold),
-            ("--still-rate", self.still_rate),
-            ("--least", self.least),
-            ("--noise", self.planned.noise),
-            ("--seconds", self.planned.seconds),
-            ("--scale", self.planned.scale),
-        ];
-        positive.into_iter().try_for_each(|(name, value)| above_0(name, value))?;
+    fn limits(&self) -> Result<(), Error> {
+        above_0(
+            [
+                ("--positioning", self.positioning),
+                ("--levelling", self.levelling),
+                ("--window", self.window),
+                ("--threshold", self.threshold),
+                ("--still-rate", self.still_rate),
+                ("--least", self.least),
+                ("--noise", self.planned.noise),
+                ("--seconds", self.planned.seconds),
+                ("--scale", self.planned.scale),
+            ]
+            .map(|(name, value)| (name, Some(value))),
+        )?;
         let planned = ("--hysteresis", self.planned.hysteresis);
         for (name, value) in [("--run-out", self.run_out), ("--settle", self.settle), planned] {
             if !(value.is_finite() && value >= 0.0) {
                 return Err(Error::Usage(format!("{name} is {value}, must be a number, 0 or above")));
             }
         }
-        let inputs: Vec<&Path> =
-            (self.log.iter().chain(&self.judge).chain(&self.document).chain(&self.times))
-                .map(PathBuf::as_path)
-                .collect();
-        self.output.check(&inputs)
+        Ok(())
     }
 
     fn print_budget(&self, plan: &Plan) -> Result<(), Error> {
         let budget = self.planned.budget(self.positioning, self.run_out);
         let levelling_rad = self.levelling / ARCSEC_PER_RAD;
-        if self.output.json {
-            return print(format!("{}\n", budget.to_json(plan, levelling_rad)).as_bytes());
-        }
-        print(budget.to_text(plan, levelling_rad).as_bytes())
+        let json = || budget.to_json(plan, levelling_rad);
+        emit(self.output.files().json, json, || budget.to_text(plan, levelling_rad))
     }
 
     fn settings(&self, plan: Plan) -> Result<(Settings, Option<String>), Error> {
@@ -180,11 +170,11 @@ impl PositionsArgs {
 
     fn fit(
         &self,
-        work: &Work,
+        job: &Job<'_>,
         settings: &Settings,
         about_gravity: Option<&String>,
-        bar: fn() -> Bar,
     ) -> Result<Fitted, Error> {
+        let (work, bar) = (job.work, || job.bar());
         let runs = &work.runs;
         let output = if self.accelerometer_unit == "V" {
             AccelOutput::Volts
@@ -229,7 +219,6 @@ impl PositionsArgs {
             details: details(&analysis, settings, &report)?,
             sigmas: sigmas(&document, &analysis, settings),
             range_deg_c: Some(range(&analysis)),
-            logs: work.logs(),
         };
         let accepted = report.verdicts.iter().all(|verdict| verdict.accepted);
         let written = if accepted { after } else { Written::of(&base.document)? };
@@ -243,7 +232,7 @@ fn outside(
     analysis: &Analysis,
     runs: &[Run],
     [before, after, base]: [&Written; 3],
-    bar: fn() -> Bar,
+    bar: impl Fn() -> Bar + Copy,
 ) -> Result<Option<Vec<Judgement>>, Error> {
     if runs.is_empty() {
         return Ok(None);

@@ -84,11 +84,7 @@ pub struct Changes {
 ///
 /// # Errors
 /// [`Error::Document`] where a document cannot be written as a tree.
-pub fn changes(
-    names: [String; 2],
-    [before, after]: [&Written; 2],
-    axis_sigma: Option<f64>,
-) -> Result<Changes, Error> {
+pub fn changes([before, after]: [&Written; 2], axis_sigma: Option<f64>) -> Result<Changes, Error> {
     let ranges = [before, after].map(|written| Ok::<_, Error>(range_of(&terms(&tree(&written.document)?))));
     let [first, second] = ranges;
     let ([a, b], [c, d]) = (first?, second?);
@@ -124,6 +120,7 @@ pub fn changes(
     }
     values.retain(|value| value.change.iter().chain([&value.at_reference]).any(|change| *change != 0.0));
     let entries = difference(&before.document, &after.document);
+    let names = [before, after].map(|written| written.name.clone());
     let units = [before, after].map(|written| written.document.unit.clone());
     Ok(Changes { names, units, reference_deg_c: reference, temperature_deg_c: at, axes, values, entries })
 }

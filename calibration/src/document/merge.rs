@@ -24,15 +24,6 @@ use crate::error::Error;
 use check::{check, same_unit};
 use sections::{Sections, build, group, sections};
 
-/// A document with the name that it is called by.
-#[derive(Debug, Clone)]
-pub struct Named {
-    /// Name, as its file is called.
-    pub name: String,
-    /// The document.
-    pub written: Written,
-}
-
 /// Which part decides over keys that begin so.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Take {
@@ -60,14 +51,12 @@ pub struct Merged {
 /// # Errors
 /// [`Error::Refused`] with every conflict, or where the documents are not of one unit with the same sensors;
 /// [`Error::Usage`] for a `take` that names nothing; [`Error::Document`] where the result does not hold.
-pub fn merge(base: &Named, parts: &[Named], take: &[Take]) -> Result<Merged, Error> {
+pub fn merge(base: &Written, parts: &[Written], take: &[Take]) -> Result<Merged, Error> {
     same_unit(base, parts)?;
     check(base, parts, take)?;
-    let old = sections(&tree(&base.written.document)?);
-    let new: Vec<Sections> = parts
-        .iter()
-        .map(|part| Ok(sections(&tree(&part.written.document)?)))
-        .collect::<Result<_, Error>>()?;
+    let old = sections(&tree(&base.document)?);
+    let new: Vec<Sections> =
+        parts.iter().map(|part| Ok(sections(&tree(&part.document)?))).collect::<Result<_, Error>>()?;
     let mut picked = Picked { sections: old.clone(), ..Picked::default() };
     for key in old.keys() {
         picked.from.insert(key.clone(), base.name.clone());
@@ -83,7 +72,7 @@ pub fn merge(base: &Named, parts: &[Named], take: &[Take]) -> Result<Merged, Err
         return Err(Error::Refused(conflicts));
     }
     let Picked { sections, from, gone, warnings } = picked;
-    let mut tree = build(&tree(&base.written.document)?, &sections);
+    let mut tree = build(&tree(&base.document)?, &sections);
     tree.insert("origin".to_owned(), origin::origin(base, parts, &from)?);
     let words = |found: Vec<isotherm_protocol::document::Problem>| {
         Error::Document(found.iter().map(ToString::to_string).collect())
@@ -107,8 +96,8 @@ impl Picked {
     fn decide(
         &mut self,
         of: &str,
-        (base, old): (&Named, &Sections),
-        (parts, new): (&[Named], &[Sections]),
+        (base, old): (&Written, &Sections),
+        (parts, new): (&[Written], &[Sections]),
         take: &[Take],
         conflicts: &mut Vec<String>,
     ) {
@@ -118,7 +107,7 @@ impl Picked {
         };
         let before = mine(old);
         // Of each part, what it has made of the group: new values, and what it does without.
-        let mut made: Vec<(&Named, Sections, Vec<String>)> = Vec::new();
+        let mut made: Vec<(&Written, Sections, Vec<String>)> = Vec::new();
         for (part, sections) in parts.iter().zip(new) {
             let after = mine(sections);
             let changed: Sections =
@@ -139,7 +128,7 @@ impl Picked {
         let keys: BTreeSet<&String> =
             made.iter().flat_map(|(_, changed, without)| changed.keys().chain(without)).collect();
         for key in keys {
-            let says = |(part, changed, without): &(&Named, Sections, Vec<String>)| {
+            let says = |(part, changed, without): &(&Written, Sections, Vec<String>)| {
                 let touched = changed.contains_key(key) || without.contains(key);
                 touched.then(|| (part.name.clone(), changed.get(key).cloned()))
             };
@@ -186,8 +175,8 @@ impl Picked {
     }
 
     /// Terms of Ṫ, T̈ and lags hold with the filter that they were fitted with, and with no other.
-    fn filters(&self, base: &Named, parts: &[Named], conflicts: &mut Vec<String>) {
-        let filter_of = |document: &Named| document.written.document.temperature.filter.clone();
+    fn filters(&self, base: &Written, parts: &[Written], conflicts: &mut Vec<String>) {
+        let filter_of = |document: &Written| document.document.temperature.filter.clone();
         let Some(from) = self.from.get("temperature.filter") else { return };
         let find = |name: &str| parts.iter().chain([base]).find(|document| document.name == name);
         let filter = find(from).and_then(filter_of);

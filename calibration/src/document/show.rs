@@ -46,8 +46,8 @@ impl Shown {
 ///
 /// # Errors
 /// [`Error::Document`] where it cannot be written as a tree.
-pub fn show(name: &str, written: &Written) -> Result<Shown, Error> {
-    let document = &written.document;
+pub fn show(written: &Written) -> Result<Shown, Error> {
+    let Written { name, document, .. } = written;
     let tree = tree(document)?;
     let terms = terms(&tree);
     let range = range_of(&terms);

@@ -18,6 +18,8 @@ const DIGITS: usize = 12;
 /// A document beside its text and the calibration that the service makes of it.
 #[derive(Debug, Clone)]
 pub struct Written {
+    /// Name of the file that it was read from; empty where it is new.
+    pub name: String,
     /// The text.
     pub text: String,
     /// The document as it is read back from the text.
@@ -35,7 +37,7 @@ impl Written {
         let body = document.to_toml().map_err(|error| Error::Document(vec![error.to_string()]))?;
         let text = format!("{SCHEMA_LINE}{body}");
         let parsed = Document::parse(&text, None).map_err(|found| Error::Document(words(&found)))?;
-        Self::from_parts(text, parsed)
+        Self::from_parts(String::new(), text, parsed)
     }
 
     /// The calibration of a document that is only worked with, and never written.
@@ -62,10 +64,11 @@ impl Written {
         let text = read_small_text(path, "read the calibration document")?;
         let parsed = Document::parse(&text, Some(&path.display().to_string()))
             .map_err(|found| isotherm_log::error::Error::Calibration(words(&found)))?;
-        Self::from_parts(text, parsed)
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        Self::from_parts(name, text, parsed)
     }
 
-    fn from_parts(text: String, parsed: Parsed) -> Result<Self, Error> {
+    fn from_parts(name: String, text: String, parsed: Parsed) -> Result<Self, Error> {
         let mut digest = [0; 8];
         digest.copy_from_slice(parsed.digest.first_chunk::<8>().unwrap_or(&[0; 8]));
         let loaded = Loaded {
@@ -74,7 +77,7 @@ impl Written {
             unit: unit_id(&parsed.document.unit)?,
             warnings: parsed.warnings,
         };
-        Ok(Self { text, document: parsed.document, loaded })
+        Ok(Self { name, text, document: parsed.document, loaded })
     }
 
     /// Writes it to a file; one that is there only where that is allowed.

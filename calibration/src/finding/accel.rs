@@ -2,7 +2,7 @@
 
 use std::fmt::{self, Display, Formatter};
 
-use super::words::AXES;
+use crate::axes::AXES;
 use crate::report::figures::{fixed, short};
 
 /// What was found of an accelerometer. Temperatures are in °C, forces in m/s², angles in ″.

@@ -3,11 +3,10 @@
 use std::fmt::{self, Display, Formatter};
 
 use super::{Finding, Instead, Kind, Place};
-use crate::fits::modes::document::main_axis;
+use crate::axes::{AXES, main_axis};
 use crate::fits::rates::plateaus::Plateau;
 use crate::report::figures::{counted, fixed, short};
 
-pub(super) const AXES: [&str; 3] = ["x", "y", "z"];
 /// Plateaus that are listed at most, and the share of the fastest one below which one is not worth telling.
 const MOST: usize = 12;
 const SEEN: f64 = 0.01;

@@ -22,6 +22,8 @@ pub trait UnitReport {
     fn to_text(&self) -> String;
     /// Everything as JSON.
     fn to_json(&self) -> Value;
+    /// Everything as a page.
+    fn to_html(&self) -> String;
     /// What was refused and why, for the end of a command.
     fn refusals(&self) -> Vec<String>;
     /// A row for each sensor.
@@ -145,6 +147,10 @@ impl UnitReport for FitReport {
 
     fn to_json(&self) -> Value {
         Self::to_json(self)
+    }
+
+    fn to_html(&self) -> String {
+        Self::to_html(self)
     }
 
     fn refusals(&self) -> Vec<String> {

@@ -4,6 +4,7 @@ use std::fmt::{self, Display, Formatter};
 
 use isotherm_correction::earth::{Place, Tilt};
 
+use crate::axes::AXES;
 use crate::report::figures::fixed;
 use crate::size::Size;
 
@@ -127,7 +128,7 @@ fn size(vector: [f64; 3]) -> f64 {
 /// The axes that are not in their places, in words.
 #[must_use]
 pub fn moved(order: [usize; 3]) -> String {
-    let names = ["x", "y", "z"].into_iter().zip(order).enumerate();
+    let names = AXES.into_iter().zip(order).enumerate();
     let moved: Vec<&str> = names.filter(|(axis, (_, of))| axis != of).map(|(_, (name, _))| name).collect();
     moved.join(" and ")
 }

@@ -1,5 +1,5 @@
 //! The fit and the service agree: what a report states of its residuals is what `isotherm-replay correct` leaves of the log with the
-//! document that was written, both run as their users run them. `thermal` has the same in [`crate::fits::thermal`], by method.
+//! document that was written, both run as their users run them. `thermal` has the same in [`crate::thermal`], by method.
 
 use std::fmt::Write as _;
 use std::path::Path;

@@ -14,7 +14,7 @@ use serde_json::Value;
 
 use crate::command::{calibrate, data, json, root};
 use crate::drift_generator::{Markov, Normal, recording};
-use crate::fits::impact::{VOYAGE, parts};
+use crate::impact::{VOYAGE, parts};
 
 fn fit(readings: &[f64], tick_s: f64) -> NoiseFit {
     let phase = Phase::new([readings], 0.0);

@@ -11,7 +11,7 @@ use isotherm_simulator::presets::{mems_chamber, zeeman_rest};
 use isotherm_simulator::{Scenario, Simulation};
 use serde_json::Value;
 
-use crate::command::{calibrate, fails, shipped, succeeds, words};
+use crate::command::{calibrate, fails, shipped, snapshot, succeeds, words};
 use crate::simulated_logs::record_events;
 
 /// Scenarios one after the other, as one recording; each starts where the last one ended.
@@ -120,7 +120,8 @@ fn modes_are_fitted_judged_written_and_reported() {
     // One sentence to a line in the text, all of them in JSON; powers and names as in all reports.
     assert!(json["verdict"].as_str().unwrap().starts_with(said.lines().next().unwrap()), "{json}");
     assert_eq!(said.lines().take_while(|line| line.starts_with("gyro ")).count(), 3, "{said}");
-    for text in [&said, &page] {
+    snapshot("modes", &said);
+    for text in [&json.to_string(), &page] {
         assert!(text.contains("static bias, power 2") && text.contains("°/h/°C²"), "{text}");
         assert!(!text.contains("°C^") && !text.contains("static_bias,"), "{text}");
     }
@@ -218,8 +219,7 @@ fn rates_are_fitted_written_and_reported() {
     let logs: Vec<&str> = logs.iter().map(|path| text(path)).collect();
     let fit = [&["rates"][..], &logs, &table, &attitude].concat();
     let said = succeeds(&[&fit[..], &["--out", text(&out)]].concat());
-    assert!(said.contains("12 steps of the table and 12 rests"), "{said}");
-    assert!(said.contains("Linearity of gyro y"));
+    snapshot("rates", &said);
     let document = Document::parse(&std::fs::read_to_string(&out).unwrap(), None).unwrap().document;
     let weight = document.gyro.sensor[0].increment_weight_rad_per_rad.unwrap();
     assert!((weight - 1.0015).abs() < 4e-4, "{weight}");
@@ -231,6 +231,8 @@ fn rates_are_fitted_written_and_reported() {
     assert!(document.origin.unwrap().details.unwrap()["rates"]["gyro"][2]["asymmetry_ppm"].is_float());
     let json: Value = serde_json::from_str(&succeeds(&[&fit[..], &["--json"]].concat())).unwrap();
     assert_eq!(json["accepted"], true);
+    assert!(json["notes"].to_string().contains("12 steps of the table and 12 rests"), "{json}");
+    assert!(json["tables"].to_string().contains("Linearity of gyro y"), "{json}");
 
     let steps = place("steps.csv");
     std::fs::write(
@@ -238,7 +240,7 @@ fn rates_are_fitted_written_and_reported() {
         "axis,rate_deg_per_s,begin_s,end_s\nz,36,11,19\nz,-36,31,39\nz,0,1,9\nz,108,51,59\n",
     )
     .unwrap();
-    let by_file = succeeds(&["rates", logs[2], "--steps", text(&steps), "--remove-mean"]);
+    let by_file = succeeds(&["rates", logs[2], "--steps", text(&steps), "--remove-mean", "--json"]);
     assert!(
         by_file.contains("gyro z increment weight")
             && by_file.contains("gyros x, y: the input axis is across"),

@@ -268,7 +268,7 @@ fn what_cannot_be_fitted_is_refused_with_what_to_do() {
     let short = refused(&all, &Stand { hold_s: 3.0, ..driven(3) }, &none);
     assert!(short.contains("stands still nowhere") && short.contains("--least"), "{short}");
     let dead = refused(&all, &driven(3), &|track| track.outputs[1].fill(0.0));
-    assert!(dead.contains("accelerometer y: one value in every tick, 0: dead"), "{dead}");
+    assert!(dead.contains("accelerometer y: every reading is 0: the sensor is dead"), "{dead}");
     let gaps = refused(&all, &driven(3), &|track| {
         track.outputs[2].iter_mut().step_by(20).for_each(|x| *x = f64::NAN);
     });

@@ -8,8 +8,8 @@ use isotherm_calibration::fits::tumble::report::{Left, report};
 use isotherm_calibration::report::Verdict;
 use isotherm_protocol::document::{AccelOutput, Document};
 
-use crate::fits::tumble::{how, settings, tumbled, tumbled_log};
 use crate::stand;
+use crate::tumble::{how, settings, tumbled, tumbled_log};
 
 /// A log that was changed, and the document without anything known.
 fn changed(seed: u64, change: &dyn Fn(&mut Track)) -> (Document, Tumble) {

@@ -7,11 +7,11 @@ use isotherm_calibration::document::written::Written;
 use isotherm_log::text::LogEvent;
 use serde_json::Value;
 
-use crate::command::{calibrate, fails, json, shipped, succeeds, words};
-use crate::fits::tumble::tumbled_log;
+use crate::command::{calibrate, fails, json, shipped, snapshot, succeeds, words};
 use crate::modes_rates::{self, table};
 use crate::simulated_logs::{events, fibre_optic, record_units};
 use crate::stand::GRAVITY;
+use crate::tumble::tumbled_log;
 
 const UNITS: [&str; 2] = ["FOG-0001", "FOG-0002"];
 
@@ -54,7 +54,7 @@ fn noise_and_drift_of_both_end_with_one_table() {
     let of = |name: &str| Written::read(&folder.path().join(name)).unwrap().document;
     let (one, alone) = (format!("{documents}/FOG-0002.toml"), path("alone.toml"));
     let said = succeeds(&["drift", &log, "--calibration", &one, "--out", &alone]);
-    assert!(said.contains("the logs have unit FOG-0001 too, which is left alone"), "{said}");
+    snapshot("drift", &said);
     assert_eq!(of("new-FOG-0002.toml").gyro, of("alone.toml").gyro);
     assert!(
         of("new-FOG-0001.toml").gyro.sensor[0].drift.is_some()
@@ -93,6 +93,7 @@ fn both_put_down_by_hand_end_with_one_table() {
     assert_eq!(accel("alone.toml"), accel("new-FOG-0002.toml"));
     let said = succeeds(&[&fit[..], &["--calibration", &alone]].concat());
     assert!(said.contains("warning: the logs have unit FOG-0001 too, which is left alone"), "{said}");
+    snapshot("tumble", &said);
 }
 
 #[test]

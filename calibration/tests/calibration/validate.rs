@@ -15,7 +15,7 @@ use isotherm_simulator::Simulation;
 use isotherm_simulator::failure::{FailingSensor, Failure, Fault};
 use serde_json::Value;
 
-use crate::command::{calibrate, json, shipped, words};
+use crate::command::{calibrate, json, shipped, snapshot, succeeds, words};
 use crate::simulated_logs::{fibre_optic, record, write_text};
 
 /// Length of the runs: a hold, and most of a ramp.
@@ -46,6 +46,7 @@ fn a_good_document_is_accepted_and_a_bad_one_is_not() {
     let html = std::fs::read_to_string(path("judge.html")).unwrap();
     assert!(html.contains("Spectrum of what is left") && html.contains("Over temperature"));
     assert_eq!(calibrate(&arguments).stdout, calibrate(&arguments).stdout, "the same bytes");
+    snapshot("validate", &succeeds(&arguments[..5]));
     // With the place known, the bias itself is judged.
     let place = ["--latitude", "55.75", "--heading", "30"];
     let placed = json(&[&arguments[..6], &place].concat());
@@ -252,7 +253,7 @@ fn faults_of_the_log_that_judges_are_told() {
         "{clean}"
     );
     let zero = warnings("zero.mcap", &|_, event| Some(gyro(event, &|tick| tick.readings[1] = 0.0)));
-    assert!(zero.contains("zero.mcap: gyro y: it reads zero throughout: dead, not connected"), "{zero}");
+    assert!(zero.contains("zero.mcap: gyro y: every reading is 0: the sensor is dead"), "{zero}");
     let nan = warnings("nan.mcap", &|_, event| {
         Some(gyro(event, &|tick| {
             if tick.sequence % 300 == 7 {

@@ -20,14 +20,12 @@ pub struct Series {
 }
 
 impl Series {
-    /// Compares documents in the order of time, each with its name; `axis_sigma` as of [`changes`].
+    /// Compares documents in the order of time; `axis_sigma` as of [`changes`].
     ///
     /// # Errors
     /// As [`changes`]; [`Error::Usage`] for fewer than two.
-    pub fn of(documents: &[(String, Written)], axis_sigma: Option<f64>) -> Result<Self, Error> {
-        let between = |(a, before): &(String, Written), (b, after): &(String, Written)| {
-            changes([a.clone(), b.clone()], [before, after], axis_sigma)
-        };
+    pub fn of(documents: &[Written], axis_sigma: Option<f64>) -> Result<Self, Error> {
+        let between = |before: &Written, after: &Written| changes([before, after], axis_sigma);
         let (Some(first), Some(last)) = (documents.first(), documents.last()) else {
             return Err(Error::Usage("no documents are given".to_owned()));
         };
@@ -135,8 +133,8 @@ mod tests {
         let angle = (60.0 / 3600.0_f64).to_radians();
         accel.orientation.rows[2] = [x * angle.cos() + z * angle.sin(), y, z * angle.cos() - x * angle.sin()];
         let between = Written::of(&document).unwrap();
-        let documents =
-            [("a", before.clone()), ("b", between), ("c", before)].map(|(name, of)| (name.to_owned(), of));
+        let documents = [("a", before.clone()), ("b", between), ("c", before)]
+            .map(|(name, of)| Written { name: name.to_owned(), ..of });
         let series = Series::of(&documents, Some(4.0)).unwrap();
         let turned = |step: &Changes| {
             step.axes.iter().find(|axis| axis.of == "accelerometer z").unwrap().turned_arcsec

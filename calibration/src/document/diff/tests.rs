@@ -25,10 +25,6 @@ fn turn(document: &mut Document, arcsec: f64) {
     row[1] += arcsec * ARCSEC;
 }
 
-fn names() -> [String; 2] {
-    ["before.toml".into(), "after.toml".into()]
-}
-
 #[test]
 fn an_axis_that_was_knocked_is_told_beside_its_uncertainty() {
     let before = written(|document| sigma(document, 3.0));
@@ -37,7 +33,7 @@ fn an_axis_that_was_knocked_is_told_beside_its_uncertainty() {
             sigma(document, 4.0);
             turn(document, by);
         });
-        let changes = changes(names(), [&before, &after], None).unwrap();
+        let changes = changes([&before, &after], None).unwrap();
         let axis = changes.axes.iter().find(|axis| axis.of == "accelerometer x").unwrap();
         assert!((axis.change_arcsec[1] - by).abs() < 0.05, "{axis:?}");
         assert!((axis.turned_arcsec - by.abs()).abs() < 0.05, "{axis:?}");
@@ -59,10 +55,10 @@ fn an_axis_that_was_knocked_is_told_beside_its_uncertainty() {
 #[test]
 fn without_stated_errors_those_of_the_stand_hold() {
     let (before, after) = (written(|_| ()), written(|document| turn(document, 60.0)));
-    let unknown = changes(names(), [&before, &after], None).unwrap();
+    let unknown = changes([&before, &after], None).unwrap();
     assert!(unknown.headline().contains("no document states how sure that is"), "{}", unknown.headline());
     assert_eq!(unknown.axes[3].significance, None);
-    let stand = changes(names(), [&before, &after], Some(12.0)).unwrap();
+    let stand = changes([&before, &after], Some(12.0)).unwrap();
     assert!((stand.axes[3].significance.unwrap() - 60.0 / (12.0 * 2.0_f64.sqrt())).abs() < 0.01);
 }
 
@@ -83,7 +79,7 @@ fn biases_and_scale_factors_change_over_temperature() {
         };
         *scale = scale.plus(per_million);
     });
-    let changes = changes(names(), [&before, &after], None).unwrap();
+    let changes = changes([&before, &after], None).unwrap();
     let of = |name: &str| changes.values.iter().find(|value| value.of == name).unwrap();
     let bias = of("gyro y bias");
     assert!((bias.at_reference - 2.0).abs() < 1e-9, "{bias:?}");
@@ -100,7 +96,7 @@ fn biases_and_scale_factors_change_over_temperature() {
 #[test]
 fn equal_documents_are_told_as_such() {
     let one = written(|_| ());
-    let changes = changes(names(), [&one, &one], None).unwrap();
-    assert_eq!(changes.headline(), "before.toml and after.toml state the same.");
+    let changes = changes([&one, &one], None).unwrap();
+    assert!(changes.headline().ends_with(" state the same."), "{}", changes.headline());
     assert!(changes.values.is_empty() && changes.axes.iter().all(|axis| axis.turned_arcsec == 0.0));
 }

@@ -4,14 +4,15 @@ use std::collections::BTreeSet;
 
 use isotherm_protocol::document::{AccelOutput, GyroOutput};
 
+use super::Take;
 use super::sections::is_about;
-use super::{Named, Take};
+use crate::document::written::Written;
 use crate::error::Error;
 
 /// Refuses documents that are not of one unit, or of other sensors.
-pub(super) fn same_unit(base: &Named, parts: &[Named]) -> Result<(), Error> {
-    let shape = |named: &Named| {
-        let document = &named.written.document;
+pub(super) fn same_unit(base: &Written, parts: &[Written]) -> Result<(), Error> {
+    let shape = |named: &Written| {
+        let document = &named.document;
         let gyros: Vec<String> = document.gyro.sensor.iter().map(|sensor| sensor.name.clone()).collect();
         let accels = document.accel.as_ref().map(|accel| {
             let names = accel.sensor.iter().map(|sensor| sensor.name.clone()).collect::<Vec<_>>();
@@ -76,7 +77,7 @@ fn differing(key: &str, here: &str, base: &str, there: &str, part: &str) -> Stri
 }
 
 /// Refuses choices that choose nothing, and documents of the same name.
-pub(super) fn check(base: &Named, parts: &[Named], take: &[Take]) -> Result<(), Error> {
+pub(super) fn check(base: &Written, parts: &[Written], take: &[Take]) -> Result<(), Error> {
     let names: Vec<&str> = parts.iter().chain([base]).map(|document| document.name.as_str()).collect();
     let distinct: BTreeSet<&&str> = names.iter().collect();
     if distinct.len() < names.len() {

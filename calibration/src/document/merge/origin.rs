@@ -5,9 +5,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use isotherm_protocol::document::Document;
 use toml::{Table, Value};
 
-use super::Named;
 use crate::document::provenance::{TOOL, command_line};
 use crate::document::show::terms::tree;
+use crate::document::written::Written;
 use crate::error::Error;
 use crate::report::Sigmas;
 
@@ -15,11 +15,15 @@ use crate::report::Sigmas;
 const MOST_LOGS: usize = 64;
 
 /// The origin of the merged document.
-pub(super) fn origin(base: &Named, parts: &[Named], from: &BTreeMap<String, String>) -> Result<Value, Error> {
-    let documents: Vec<&Named> = [base].into_iter().chain(parts).collect();
+pub(super) fn origin(
+    base: &Written,
+    parts: &[Written],
+    from: &BTreeMap<String, String>,
+) -> Result<Value, Error> {
+    let documents: Vec<&Written> = [base].into_iter().chain(parts).collect();
     let (mut kept, mut logs, mut seen) = (Table::new(), Vec::new(), BTreeSet::new());
     for document in &documents {
-        let mut own = tree(&document.written.document)?;
+        let mut own = tree(&document.document)?;
         let mut about =
             own.remove("origin").and_then(|origin| origin.as_table().cloned()).unwrap_or_default();
         for log in about.get("log").and_then(Value::as_array).into_iter().flatten() {
@@ -63,17 +67,17 @@ pub(super) fn origin(base: &Named, parts: &[Named], from: &BTreeMap<String, Stri
 }
 
 /// The range that all documents cover together.
-fn widest(documents: &[&Named], of: fn(&Document) -> Option<[f64; 2]>) -> Option<Value> {
-    let ranges = documents.iter().filter_map(|document| of(&document.written.document));
+fn widest(documents: &[&Written], of: fn(&Document) -> Option<[f64; 2]>) -> Option<Value> {
+    let ranges = documents.iter().filter_map(|document| of(&document.document));
     let [low, high] = ranges.reduce(|[a, b], [c, d]| [a.min(c), b.max(d)])?;
     Some(Value::Array(vec![Value::Float(low), Value::Float(high)]))
 }
 
 /// Standard errors of what was taken, each from where it was taken.
-fn sigmas(documents: &[&Named], from: &BTreeMap<String, String>) -> Sigmas {
+fn sigmas(documents: &[&Written], from: &BTreeMap<String, String>) -> Sigmas {
     let mut sigmas = Sigmas::default();
     for document in documents {
-        for ((kind, sensor, term), values) in Sigmas::of(&document.written.document).iter() {
+        for ((kind, sensor, term), values) in Sigmas::of(&document.document).iter() {
             let key = match term {
                 "axis_arcsec" => format!("{kind}.orientation.rows"),
                 "increment_weight_ppm" => {

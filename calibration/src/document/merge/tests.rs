@@ -3,7 +3,7 @@ use isotherm_protocol::document::{Branches, Curve, GyroOutput, Lag, Shape};
 use super::*;
 use crate::report::Sigmas;
 
-fn named(name: &str, change: impl FnOnce(&mut Document)) -> Named {
+fn named(name: &str, change: impl FnOnce(&mut Document)) -> Written {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/calibration/MEMS-0001.toml");
     let mut document = Written::read(path.as_ref()).unwrap().document;
     for gyro in &mut document.gyro.sensor {
@@ -12,7 +12,7 @@ fn named(name: &str, change: impl FnOnce(&mut Document)) -> Named {
         gyro.lag.clear();
     }
     change(&mut document);
-    Named { name: name.into(), written: Written::of(&document).unwrap() }
+    Written { name: name.into(), ..Written::of(&document).unwrap() }
 }
 
 fn constant<Q: isotherm_protocol::document::Quantity>(value: f64) -> Curve<Q> {
@@ -30,7 +30,7 @@ fn from<'a>(merged: &'a Merged, key: &str) -> &'a str {
 #[test]
 fn what_the_readings_stand_for_is_told_in_words_of_documents() {
     let mut counts = named("counts.toml", |_| ());
-    counts.written.document.gyro.output = GyroOutput::Counts;
+    counts.document.gyro.output = GyroOutput::Counts;
     let error = same_unit(&named("base.toml", |_| ()), &[counts]).unwrap_err().to_string();
     assert!(error.contains("gyro.output is mean rate in base.toml and counts in counts.toml"), "{error}");
 }
@@ -53,10 +53,10 @@ fn parts_made_from_one_base_go_together() {
     });
     let merged = merge(&base, &[thermal.clone(), positions.clone()], &[]).unwrap();
     let document = &merged.written.document;
-    assert_eq!(document.gyro.sensor[0].static_bias, thermal.written.document.gyro.sensor[0].static_bias);
+    assert_eq!(document.gyro.sensor[0].static_bias, thermal.document.gyro.sensor[0].static_bias);
     assert_eq!(
         document.accel.as_ref().unwrap().orientation,
-        positions.written.document.accel.as_ref().unwrap().orientation
+        positions.document.accel.as_ref().unwrap().orientation
     );
     assert_eq!(from(&merged, "gyro.sensor.x.static_bias"), "thermal.toml");
     assert_eq!(from(&merged, "accel.orientation.rows"), "positions.toml");
@@ -71,9 +71,9 @@ fn parts_made_from_one_base_go_together() {
     assert_eq!(sigmas.get("gyro", "x", "static_bias"), None);
     // All of the base that nobody touched is there as it was.
     let mut back = document.clone();
-    back.origin.clone_from(&base.written.document.origin);
+    back.origin.clone_from(&base.document.origin);
     bias(7.0)(&mut back);
-    let mut expected = base.written.document.clone();
+    let mut expected = base.document.clone();
     bias(7.0)(&mut expected);
     expected.accel.as_mut().unwrap().orientation.rows[0] = [1.0, 1e-5, 0.0];
     assert_eq!(back, expected);
@@ -90,7 +90,7 @@ fn the_same_key_made_twice_is_a_conflict_until_someone_decides() {
     let merged = merge(&base, &parts, &[take("b.toml")]).unwrap();
     assert_eq!(from(&merged, "gyro.sensor.x.static_bias"), "b.toml");
     let merged = merge(&base, &parts, &[take("base.toml")]).unwrap();
-    assert_eq!(merged.written.document.gyro, base.written.document.gyro);
+    assert_eq!(merged.written.document.gyro, base.document.gyro);
     assert!(matches!(merge(&base, &parts, &[take("c.toml")]), Err(Error::Usage(_))));
     // What both made alike is no conflict.
     let alike = [named("a.toml", bias(7.0)), named("b.toml", bias(7.0))];

@@ -5,10 +5,10 @@ use isotherm_protocol::document::{AccelSensor, Document, Sample};
 use toml::{Table, Value};
 
 use super::model::{Ratio, Rows};
+use crate::axes::{main_axis, output_name};
 use crate::document::written::{Written, tidy};
 use crate::error::Error;
 use crate::finding::AccelKind;
-use crate::fits::modes::document::main_axis;
 use crate::fits::thermal::samples::Samples;
 use crate::fits::thermal::target::axes;
 use crate::fits::thermal::{Site, Stand};
@@ -89,7 +89,9 @@ pub fn fit(wanted: &Wanted<'_>, mut watch: impl Watch) -> Result<Made, Error> {
         wanted.base.accel.iter().flat_map(|accel| accel.orientation.rows.iter().map(main_axis)).collect();
     let mut verdicts = Curve::verdicts(&curves);
     let worse: Vec<usize> = (0..3)
-        .filter(|axis| verdicts.iter().any(|verdict| !verdict.accepted && verdict.of == name_of(*axis)))
+        .filter(|axis| {
+            verdicts.iter().any(|verdict| !verdict.accepted && verdict.of == output_name(false, *axis))
+        })
         .collect();
     if !worse.is_empty() {
         // Verdicts of these axes stay; the others are judged again, without them.
@@ -115,11 +117,6 @@ pub fn fit(wanted: &Wanted<'_>, mut watch: impl Watch) -> Result<Made, Error> {
     report.warnings = troubled;
     tell(&mut report, (wanted, sensors, &mains), &found);
     Ok(Made { written, found, report })
-}
-
-/// Name of the output along a case axis.
-fn name_of(axis: usize) -> String {
-    format!("accelerometer {}", ["x", "y", "z"].get(axis).copied().unwrap_or_default())
 }
 
 /// What the windows of all runs have of one accelerometer, and the channels of its board and its own.
@@ -200,7 +197,8 @@ fn tell(
         match found {
             Err(kind) => {
                 report.warnings.push(format!("{}; its ratio stays", kind.clone().of(name)));
-                let verdict = report.verdicts.iter_mut().find(|verdict| verdict.of == name_of(*axis));
+                let verdict =
+                    report.verdicts.iter_mut().find(|verdict| verdict.of == output_name(false, *axis));
                 if let Some(verdict) = verdict.filter(|verdict| verdict.accepted) {
                     *verdict = verdict.clone().refused(kind.to_string());
                 }

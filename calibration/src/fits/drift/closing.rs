@@ -5,6 +5,7 @@ use serde_json::{Value, json};
 use super::columns::stated_in;
 use super::document::{Trend, markov, trend};
 use super::fit::Analysis;
+use super::page::page;
 use super::report::Report;
 use crate::fits::drift::allan::{Coefficient, Term};
 use crate::report::figures::short;
@@ -21,6 +22,10 @@ impl UnitReport for Report {
 
     fn to_json(&self) -> Value {
         Self::to_json(self)
+    }
+
+    fn to_html(&self) -> String {
+        page(self)
     }
 
     fn refusals(&self) -> Vec<String> {

@@ -10,6 +10,7 @@ use isotherm_protocol::key::UnitId;
 use super::DEG_PER_H_IN_RAD_PER_S;
 use super::allan::Term;
 use super::pieces::checks;
+use crate::axes::{AXES, sensor_name};
 use crate::error::Error;
 use crate::runs::cut::Cut;
 use crate::runs::series::{Series, Ticks};
@@ -71,8 +72,6 @@ pub fn unnamed() -> Result<UnitId, Error> {
     Ok(unit_id("unnamed")?)
 }
 
-/// Names of the case axes.
-const AXES: [&str; 3] = ["x", "y", "z"];
 /// ″ per count and s in °/h: 1 ″/s is 1 °/h.
 const DEG_PER_H_IN_ARCSEC_PER_S: f64 = 1.0;
 
@@ -130,7 +129,8 @@ impl Columns {
 
     fn build(unit: UnitId, kind: Kind, ticks: Ticks, scale: Scale) -> Self {
         let Ticks { end_ns, duration_s, readings, .. } = ticks;
-        let names: Vec<String> = (0..readings.len()).map(|index| name(index, readings.len())).collect();
+        let names: Vec<String> =
+            (0..readings.len()).map(|index| sensor_name(index, readings.len())).collect();
         let looked = names.iter().zip(&readings);
         let frozen = looked
             .filter_map(|(name, column)| {
@@ -155,26 +155,15 @@ impl Columns {
 
     /// From the run of a unit, corrected with a document by the same stream as the service's.
     ///
-    /// The raw readings are looked at first, `watches[0]` sees that: behind a correction a dead sensor still shows a little of the others.
+    /// The raw readings decide first: behind a correction a dead sensor still shows a little of the others.
     ///
     /// # Errors
     /// As [`Run::correct`] and [`checks::raw`].
-    pub fn corrected_by(
-        run: &Run,
-        loaded: &Loaded,
-        kind: Kind,
-        watches: [impl Watch; 2],
-    ) -> Result<Self, Error> {
-        let [first, second] = watches;
-        let frozen = match (run.series(first), kind) {
-            (Ok(series), Kind::Rate) => checks::raw(kind, &series.gyros)?,
-            (Ok(series), Kind::Force) => checks::raw(kind, &series.accels)?,
-            // The correction says what is wrong with the log.
-            (Err(_), _) => Vec::new(),
-        };
+    pub fn corrected_by(run: &Run, loaded: &Loaded, kind: Kind, watch: impl Watch) -> Result<Self, Error> {
         let mut columns = Self::empty(loaded.unit.clone(), kind);
-        columns.notes = run.correct(loaded, second, |tick, _| columns.push(tick))?;
-        columns.frozen = frozen;
+        let (series, troubles) = run.correct_with_series(loaded, watch, |tick, _| columns.push(tick));
+        columns.frozen = checks::raw(kind, if kind == Kind::Rate { &series.gyros } else { &series.accels })?;
+        columns.notes = troubles?;
         if run.unit != loaded.unit {
             columns.notes.push(format!("The log is of unit {}, the document for {}.", run.unit, loaded.unit));
         }
@@ -312,15 +301,6 @@ enum Scale {
     Mean(f64),
     /// Counts: times this over the tick's duration.
     PerSecond(f64),
-}
-
-/// x, y, z for three sensors, numbers from 1 for more.
-#[must_use]
-pub fn name(index: usize, of: usize) -> String {
-    match AXES.get(index).filter(|_| of == AXES.len()) {
-        Some(axis) => (*axis).to_owned(),
-        None => (index + 1).to_string(),
-    }
 }
 
 fn nothing(what: &str, advice: &str) -> Error {

@@ -4,6 +4,7 @@ use isotherm_protocol::document::{Document, Drift};
 
 use super::fit::Analysis;
 use super::markov::{Estimate, Fit};
+use crate::axes::AXES;
 use crate::error::Error;
 use crate::fits::drift::allan::{Coefficient, Term};
 use crate::report::figures::short;
@@ -141,15 +142,6 @@ impl Parameters {
         };
         Ok(Self { drift, notes })
     }
-
-    /// As it stands in a document.
-    ///
-    /// # Errors
-    /// [`Error::Document`] where the serialiser refuses it; not to be reached.
-    pub fn to_toml(&self, name: &str) -> Result<String, Error> {
-        let body = toml::to_string(&self.drift).map_err(|error| Error::Document(vec![error.to_string()]))?;
-        Ok(format!("# gyro {name}\n[gyro.sensor.drift]\n{body}"))
-    }
 }
 
 /// N (°/h·√s).
@@ -236,11 +228,11 @@ pub fn put(
     let mut reasons = Vec::new();
     for (index, sensor) in document.gyro.sensor.iter_mut().enumerate() {
         let row = rows.get(index).copied().unwrap_or_default();
-        let along = ["x", "y", "z"].into_iter().zip(row).find(|(_, cosine)| cosine.abs() >= SMALLEST_COSINE);
+        let along = AXES.into_iter().zip(row).find(|(_, cosine)| cosine.abs() >= SMALLEST_COSINE);
         let Some((axis, _)) = along else {
             reasons.push(format!(
                 "gyro {} of the document lies along no case axis ({row:?}), so its own drift cannot be told from corrected \
-                 rates: analyse the raw readings (without --calibration) and put the printed table in by hand",
+                 rates: analyse the raw readings (without --calibration) and put the figures of its page (--html) in by hand",
                 sensor.name
             ));
             continue;

@@ -7,6 +7,7 @@ pub(crate) mod steps;
 use super::columns::Columns;
 use crate::error::Error;
 use crate::report::figures::{counted, short};
+use crate::runs::faults::{self, Fault};
 
 /// Fewest ticks of a log.
 pub const FEWEST_TICKS: usize = 64;
@@ -14,8 +15,6 @@ pub const FEWEST_TICKS: usize = 64;
 const LONGEST_BRIDGE: usize = 10;
 /// Most of a log that may be bridged; beyond it every missing tick is a gap.
 const LARGEST_BRIDGED_SHARE: f64 = 1e-3;
-/// Most of a sensor's readings that may be no numbers.
-const LARGEST_BAD_SHARE: f64 = 0.01;
 /// Ticks whose lengths differ by more than this from the middle one are told.
 const UNEVEN: f64 = 0.05;
 
@@ -214,19 +213,9 @@ fn words(gaps: &[Gap], bridge: bool, tick_s: f64) -> Vec<String> {
 }
 
 /// How many readings of a column are no numbers, or why it cannot be analysed.
-#[expect(clippy::cast_precision_loss, reason = "counts of ticks are far below 2⁵³")]
 pub(crate) fn check(called: &str, column: &[f64]) -> Result<usize, String> {
-    let bad = column.iter().filter(|reading| !reading.is_finite()).count();
-    let share = bad as f64 / column.len().max(1) as f64;
-    if share > LARGEST_BAD_SHARE {
-        return Err(format!(
-            "{called}: {bad} of {} readings ({:.1} %) are no good numbers, at most 1 % may be: look for a broken column or a \
-             sensor beyond its limit",
-            column.len(),
-            share * 100.0
-        ));
-    }
-    checks::dead(called, column).map_or(Ok(bad), Err)
+    let fault = Fault::of(column).map(|fault| format!("{called}: {}", fault.words("sensor", 1)));
+    fault.map_or_else(|| Ok(faults::missing(column)), Err)
 }
 
 /// Cuts a column; readings that are no numbers count as missing.

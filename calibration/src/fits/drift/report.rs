@@ -11,6 +11,7 @@ use super::document::{Parameters, Trend, markov, trend};
 use super::fit::{Analysis, Deviation};
 use crate::fits::drift::allan::{Coefficient, Term};
 use crate::report::figures::{short, table, within};
+use crate::report::words::dozen;
 
 /// What is said of the log as a whole.
 #[derive(Debug, Clone, Serialize)]
@@ -268,42 +269,30 @@ impl Report {
         words
     }
 
-    /// Everything as text.
+    /// What a terminal shows: what was found, the noise coefficients, and what is to be looked at.
     #[must_use]
     pub fn to_text(&self) -> String {
-        let mut text = format!("{}.\n\n", self.sentences().join(".\n"));
-        let _ = writeln!(
-            text,
-            "unit {}, {} ticks of {} s: {:.2} h{}",
+        let mut found: Vec<String> =
+            self.sentences().into_iter().map(|sentence| format!("{sentence}.")).collect();
+        if !self.sensors.is_empty() {
+            let (head, rows) = self.noise_rows();
+            found.extend(table(&head, &rows).lines().map(str::to_owned));
+        }
+        let parameters = self.parameters.iter();
+        let notes = parameters
+            .flat_map(|(name, found)| found.notes.iter().map(move |note| format!("gyro {name}: {note}.")));
+        let all = self.notes.iter().cloned().chain(self.noise_words()).chain(notes).chain(self.line_words());
+        let (mut told, others): (Vec<String>, Vec<String>) =
+            all.partition(|words| words.starts_with("warning: "));
+        told.extend(others);
+        let rest = format!(
+            "Unit {}, {:.2} h in ticks of {} s{}: deviations, drift, lines and what the estimator is to expect",
             self.unit,
-            self.ticks,
-            short(self.tick_s),
             self.length_h,
+            short(self.tick_s),
             if self.corrected { ", corrected, along the case axes" } else { "" }
         );
-        for note in &self.notes {
-            let _ = writeln!(text, "{note}");
-        }
-        let measure = self.kind.measure();
-        let mut part = |title: &str, (head, rows): (Vec<String>, Vec<Vec<String>>)| {
-            if !rows.is_empty() {
-                let _ = writeln!(text, "\n{title}\n{}", table(&head, &rows));
-            }
-        };
-        part(&format!("Allan deviation, {measure}"), self.allan_rows());
-        part("Noise coefficients (95 % confidence)", self.noise_rows());
-        part("Drift", self.drift_rows());
-        part("A straight line through the beginning, extrapolated", self.extrapolation_rows());
-        for line in self.noise_words().into_iter().chain(self.line_words()) {
-            let _ = writeln!(text, "\n{line}");
-        }
-        for (name, parameters) in &self.parameters {
-            let _ = write!(text, "\n{}", parameters.to_toml(name).unwrap_or_default());
-            for note in &parameters.notes {
-                let _ = writeln!(text, "# {note}");
-            }
-        }
-        text
+        dozen(&found, &told, &rest)
     }
 
     /// Everything as JSON.

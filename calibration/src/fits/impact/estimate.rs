@@ -3,6 +3,7 @@
 //! The estimator is `isotherm_correction::drift::DriftEstimator` itself, fed tick by tick as the service feeds it: the
 //! residual rate of each gyro in, a reference each minute while the true rate is known, what it would subtract out.
 
+use crate::axes::AXES;
 use isotherm_correction::drift::{DriftEstimator, DriftModel, DriftParts, DriftSettings, Reference};
 use isotherm_correction::observation::{GyroSeen, Observation};
 use isotherm_correction::sample::{SensorFlags, Sensors};
@@ -41,7 +42,7 @@ pub fn residual(
 ) -> Result<Vec<[f64; 3]>, Vec<String>> {
     let mut errors = Vec::new();
     let mut models = Vec::new();
-    for (axis, parts) in ["x", "y", "z"].into_iter().zip(parts) {
+    for (axis, parts) in AXES.into_iter().zip(parts) {
         match DriftModel::new(parts) {
             Ok(model) => models.push(model),
             Err(found) => errors.extend(found.iter().map(|error| format!("drift of gyro {axis}: {error}"))),

@@ -13,6 +13,7 @@ use serde::Serialize;
 
 use super::estimate::TICK_S;
 use super::scenario::{Drift, Voyage};
+use crate::axes::AXES;
 use crate::fits::drift::DEG_PER_H_IN_RAD_PER_S;
 use crate::fits::drift::markov::{Beside, Fit, Noise};
 use crate::fits::drift::slow::Slow;
@@ -79,7 +80,7 @@ impl Choice {
             let rates: Vec<f64> = rates.collect();
             Self::of_slow(gyro, &Slow::of(&[(0, &rates)], rates.len(), TICK_S))
         };
-        ["x", "y", "z"].into_iter().enumerate().filter_map(of).collect()
+        AXES.into_iter().enumerate().filter_map(of).collect()
     }
 
     /// In words.

@@ -10,6 +10,7 @@ use super::ins::Errors;
 use super::models::{Choice, TABLE_3, table_3, table_3_gains};
 use super::monte_carlo::Spread;
 use super::scenario::{CARES, Care, Course, Figures, Voyage};
+use crate::axes::AXES;
 use crate::fits::drift::DEG_PER_H_IN_RAD_PER_S;
 use crate::report::figures::{short, table};
 
@@ -263,7 +264,7 @@ impl Report {
             let left = course.points.iter().zip(&course.left);
             left.map(|((hours, _), left)| (*hours, left[axis] * DEG_PER_H_IN_RAD_PER_S)).collect::<Vec<_>>()
         };
-        let title = format!("drift of gyro {} that is left", ["x", "y", "z"][axis]);
+        let title = format!("drift of gyro {} that is left", AXES[axis]);
         let panel = |title: &str, unit: &str, content| Panel {
             title: title.to_owned(),
             unit: unit.to_owned(),

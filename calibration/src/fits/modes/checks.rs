@@ -9,6 +9,7 @@ use super::model::deg_per_h;
 use super::seen::Stay;
 use super::switches::{Switches, real};
 use super::{steps, units};
+use crate::axes::AXES;
 use crate::report::figures::{counted, short, six};
 use crate::robust::{median, scatter_of_steps};
 use crate::runs::swapped::Shown;
@@ -242,7 +243,7 @@ fn motion(seconds: &[Second], names: [&str; 3], count_arcsec: [f64; 3]) -> Vec<S
                  with --start and --duration",
                 second.time_s,
                 short(value),
-                ["x", "y", "z"][axis],
+                AXES[axis],
                 short(limit)
             ));
         }

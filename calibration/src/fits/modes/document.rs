@@ -168,12 +168,6 @@ pub fn count_arcsec(document: &Document, sensor: usize) -> f64 {
     sensor.and_then(|sensor| sensor.increment_weight_arcsec_per_count).map_or(0.0, f64::abs)
 }
 
-/// The case axis (0…2) that an input axis looks along more than along the others.
-#[must_use]
-pub fn main_axis(row: &[f64; 3]) -> usize {
-    (0..3).fold(0, |best, axis| if row[axis].abs() > row[best].abs() { axis } else { best })
-}
-
 /// Input axis of a gyro at a temperature; at its reference where that is no number.
 #[must_use]
 pub fn row(document: &Document, sensor: usize, deg_c: f64) -> [f64; 3] {

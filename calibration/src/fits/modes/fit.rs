@@ -13,6 +13,7 @@ use super::prepare::{check, earth_of, earth_rate, gaps, groups, provisional, tra
 use super::servo::{self, Transient};
 use super::switches::Switches;
 use super::{temperatures, units};
+use crate::axes::{main_axis, output_name};
 use crate::document::written::Written;
 use crate::error::Error;
 use crate::report::{Curve as Residual, FitReport};
@@ -217,7 +218,7 @@ impl Made {
             return Ok(());
         }
         for (sensor, row) in wanted.base.gyro.orientation.rows.iter().enumerate() {
-            let axis = format!("gyro {}", ["x", "y", "z"][document::main_axis(row)]);
+            let axis = output_name(true, main_axis(row));
             if worse.contains(&axis) {
                 self.gyros[sensor] =
                     Err(format!("its terms make {axis} worse than it was: it keeps the old ones"));

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use isotherm_protocol::document::Sample;
 
+use crate::axes::AXES;
 use crate::document::written::Written;
 use crate::error::Error;
 use crate::report::Curve;
@@ -57,5 +58,5 @@ pub fn judged<W: Watch>(
         after: less(after_of.rate(axis), axis),
     };
     let with_values = |curve: &Curve| curve.after.iter().any(|value| value.is_finite());
-    Ok(["x", "y", "z"].into_iter().enumerate().map(curve).filter(with_values).collect())
+    Ok(AXES.into_iter().enumerate().map(curve).filter(with_values).collect())
 }

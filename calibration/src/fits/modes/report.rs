@@ -2,9 +2,9 @@
 
 use isotherm_pages::Table;
 
-use super::document::main_axis;
 use super::fit::{Made, ServoFit};
 use super::model::{GyroFit, Term};
+use crate::axes::{main_axis, output_name};
 use crate::report::figures::{counted, fixed, per_deg_c, short};
 use crate::report::words::together;
 use crate::report::{Coefficient, Curve, Figure, FitReport};
@@ -144,7 +144,7 @@ fn transient(name: &str, servo: &ServoFit, report: &mut FitReport) {
 /// A gyro that keeps its old terms.
 fn refuse(made: &Made, sensor: usize, reason: &str, report: &mut FitReport) {
     let row = made.written.document.gyro.orientation.rows.get(sensor).copied().unwrap_or_default();
-    let axis = format!("gyro {}", ["x", "y", "z"][main_axis(&row)]);
+    let axis = output_name(true, main_axis(&row));
     for verdict in report.verdicts.iter_mut().filter(|verdict| verdict.of == axis) {
         *verdict = verdict.clone().refused(reason);
     }

@@ -3,6 +3,7 @@
 //! Compared are means in which the modes cancel, by the rule of `drift`.
 
 use super::cells::Second;
+use crate::axes::AXES;
 use crate::fits::drift::pieces::steps::step;
 use crate::report::figures::fixed;
 
@@ -38,7 +39,7 @@ pub(super) fn found(seconds: &[Second], names: [&str; 3]) -> Vec<String> {
                  gyro fail, or was the unit turned? Cut the log there with --start and --duration"
             )
         }));
-        let axes = ["x", "y", "z"].map(|axis| format!("along {axis}"));
+        let axes = AXES.map(|axis| format!("along {axis}"));
         let forces = stepping(&parts(run), (&axes, "m/s²", 3), FORCE_M_PER_S2, |pair| pair.force);
         words.extend(forces.map(|(at_s, steps)| {
             format!(

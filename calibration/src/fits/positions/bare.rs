@@ -7,6 +7,7 @@ use isotherm_protocol::document::{
 
 use isotherm_correction::sample::{MAX_SENSORS, MIN_SENSORS, OutputKind};
 
+use crate::axes::AXES;
 use crate::error::Error;
 use crate::runs::series::Series;
 
@@ -65,7 +66,7 @@ pub fn bare(series: &Series, accel_output: AccelOutput) -> Result<Document, Erro
         return Err(Error::Refused(reasons));
     }
     let follows = |kind: &str, index: usize| follows(&channels, kind, index);
-    let names = || ["x", "y", "z"].into_iter().enumerate();
+    let names = || AXES.into_iter().enumerate();
     let scale_unit = match accel_output {
         AccelOutput::Counts => Unit::CountsPerSPerMPerS2,
         AccelOutput::Volts => Unit::VPerMPerS2,

@@ -6,9 +6,8 @@ use super::budget::ARCSEC_PER_RAD;
 use super::fit::{Analysis, Settings};
 use super::judged::Judgement;
 use super::solve::Fit;
-use crate::fits::modes::document::main_axis;
+use crate::axes::{AXES, main_axis};
 
-pub(super) const AXES: [&str; 3] = ["x", "y", "z"];
 /// Points of a curve over temperature.
 const POINTS: u32 = 60;
 

@@ -9,7 +9,8 @@ use super::plan::Plan;
 use super::sense::{self, Beside};
 use super::solve::Fit;
 use super::temperature::Temperatures;
-use super::{budget, faults, measure, model};
+use super::{budget, measure, model};
+use crate::axes::{AXES, sensor_name, several};
 use crate::lsq::linear;
 use crate::lsq::nonlinear::NoSolution;
 use crate::report::figures::{counted, short};
@@ -114,7 +115,7 @@ pub(super) fn turned(fit: &Fit, document: &Document, gravity: f64, warnings: &mu
     if turned.is_empty() {
         return;
     }
-    let who = faults::several("accelerometer", &turned);
+    let who = several("accelerometer", &turned, beside.len());
     let one = turned.len() == 1;
     let moved = sense::places(&beside).map(|(order, same_way)| (sense::out_of_place(order), same_way));
     let what = match moved {
@@ -163,12 +164,12 @@ pub(super) fn unseen(plan: &Plan, positions: &[usize]) -> Vec<String> {
     (0..3)
         .flat_map(|axis| [(axis, 1.0, "up"), (axis, -1.0, "down")])
         .filter(|(axis, sign, _)| !seen(*axis, *sign))
-        .map(|(axis, _, way)| format!("{} {way}", faults::name(axis)))
+        .map(|(axis, _, way)| format!("{} {way}", AXES[axis]))
         .collect()
 }
 
 /// Sensors whose positions do not spread, in words.
-pub(super) fn spread(plan: &Plan, taken: &[Taken], bad: &[usize]) -> Vec<String> {
+pub(super) fn spread(plan: &Plan, taken: &[Taken], (bad, sensors): (&[usize], usize)) -> Vec<String> {
     let positions: Vec<usize> = taken.iter().map(|taken| taken.position).collect();
     let lacking = unseen(plan, &positions);
     let lacking = if lacking.is_empty() {
@@ -179,7 +180,7 @@ pub(super) fn spread(plan: &Plan, taken: &[Taken], bad: &[usize]) -> Vec<String>
     vec![format!(
         "{} not determine scale factor, bias and axis of {}: {lacking}",
         if taken.len() == 1 { "1 position does".to_owned() } else { format!("{} positions do", taken.len()) },
-        faults::several("accelerometer", bad)
+        several("accelerometer", bad, sensors)
     )]
 }
 
@@ -207,7 +208,7 @@ pub(super) fn sound(analysis: &Analysis) -> Result<(), Vec<String>> {
     };
     Err(vec![format!(
         "{}: {} known to {} % only, at most {} % is a result: {why}",
-        faults::several("accelerometer", &bad),
+        several("accelerometer", &bad, fit.guess.len()),
         if bad.len() == 1 { "its scale factor is" } else { "their scale factors are" },
         known.join(", "),
         LARGEST_SIGMA * 100.0
@@ -228,7 +229,7 @@ pub(super) fn no_solution(why: &NoSolution, degrees: Degrees, sensors: usize) ->
             place => ("the axis", (place - 2 * own) % (degrees.axes + 1)),
         };
         let over = if power > 0 { " over temperature" } else { "" };
-        format!("{what} of accelerometer {}{over}", faults::name(sensor))
+        format!("{what} of accelerometer {}{over}", sensor_name(sensor, sensors))
     };
     why.words(
         "the positions",

@@ -2,69 +2,22 @@
 
 use super::pose::Pose;
 use super::track::Track;
+use crate::axes::{sensor_name, several};
 use crate::report::figures::{counted, six};
+use crate::runs::faults::{self, Fault};
 
-/// Share of readings that may be no number.
-const NOT_FINITE_SHARE: f64 = 0.01;
-
-/// What is wrong with a sensor, and what to do. Two are one fault whatever the numbers.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Fault {
-    /// One value in every tick.
-    Dead(f64),
-    /// The same in every tick as another sensor, by number.
-    Twin(usize),
-    /// How many readings are no numbers, and of how many.
-    Missing([usize; 2]),
-}
-
-impl Fault {
-    fn of(columns: &[Vec<f64>], index: usize) -> Option<Self> {
-        let column = columns.get(index)?;
-        let missing = column.iter().filter(|value| !value.is_finite()).count();
-        #[expect(clippy::cast_precision_loss, reason = "ticks of a run")]
-        if missing as f64 > NOT_FINITE_SHARE * column.len() as f64 {
-            return Some(Self::Missing([missing, column.len()]));
-        }
-        if same(column) {
-            return column.first().copied().map(Self::Dead);
-        }
-        columns[..index].iter().position(|other| equal(other, column)).map(Self::Twin)
-    }
-
-    /// Takes another of the same kind in; false where it is another fault.
-    fn takes(&mut self, other: Self) -> bool {
-        match (self, other) {
-            (Self::Dead(one), Self::Dead(other)) => one.total_cmp(&other).is_eq(),
-            (Self::Twin(one), Self::Twin(other)) => *one == other,
-            (Self::Missing(one), Self::Missing(other)) => {
-                if other[0] > one[0] {
-                    *one = other;
-                }
-                true
+/// Takes another fault of the same kind in; false where it is another one.
+fn takes(known: &mut Fault, other: Fault) -> bool {
+    match (known, other) {
+        (Fault::Dead(one), Fault::Dead(other)) => one.total_cmp(&other).is_eq(),
+        (Fault::Twin(one), Fault::Twin(other)) => *one == other,
+        (Fault::Missing(one), Fault::Missing(other)) => {
+            if other[0] > one[0] {
+                *one = other;
             }
-            _ => false,
+            true
         }
-    }
-
-    fn words(self, kind: &str) -> String {
-        match self {
-            Self::Dead(value) => format!(
-                "one value in every tick, {}: dead, or the wrong column; look at the mapping, or replace the sensor",
-                six(value)
-            ),
-            Self::Twin(twin) => {
-                format!(
-                    "the same in every tick as {kind} {}: does the mapping have a column twice?",
-                    name(twin)
-                )
-            }
-            Self::Missing([missing, all]) => format!(
-                "{missing} of {all} readings are no numbers, at most {} % may be: look at the recording, or cut it with --start and \
-                 --duration",
-                NOT_FINITE_SHARE * 100.0
-            ),
-        }
+        _ => false,
     }
 }
 
@@ -72,13 +25,14 @@ impl Fault {
 /// Those with one fault are named together, and so are runs.
 #[must_use]
 pub fn dead(tracks: &[Track]) -> Vec<String> {
-    let mut faults: Vec<(&str, Vec<usize>, Vec<&str>, Fault)> = Vec::new();
+    let mut faults: Vec<((&str, usize), Vec<usize>, Vec<&str>, Fault)> = Vec::new();
     for track in tracks {
         for (kind, columns) in [("accelerometer", &track.outputs), ("gyro", &track.gyros)] {
+            let kind = (kind, columns.len());
             for index in 0..columns.len() {
-                let Some(fault) = Fault::of(columns, index) else { continue };
+                let Some(fault) = Fault::among(columns, index) else { continue };
                 let known = faults.iter_mut().find_map(|(of, sensors, runs, known)| {
-                    (*of == kind && known.takes(fault)).then_some((sensors, runs))
+                    (*of == kind && takes(known, fault)).then_some((sensors, runs))
                 });
                 let Some((sensors, runs)) = known else {
                     faults.push((kind, vec![index], vec![&track.run], fault));
@@ -93,9 +47,9 @@ pub fn dead(tracks: &[Track]) -> Vec<String> {
             }
         }
     }
-    let words = |(kind, mut sensors, runs, fault): (&str, Vec<usize>, Vec<&str>, Fault)| {
+    let words = |((kind, of), mut sensors, runs, fault): ((&str, usize), Vec<usize>, Vec<&str>, Fault)| {
         sensors.sort_unstable();
-        format!("{}: {}: {}", logs(&runs), several(kind, &sensors), fault.words(kind))
+        format!("{}: {}: {}", logs(&runs), several(kind, &sensors, of), fault.words(kind, of))
     };
     faults.into_iter().map(words).collect()
 }
@@ -119,7 +73,10 @@ pub fn clipped(tracks: &[Track], poses: &[Pose]) -> Vec<String> {
     for sensor in 0..sensors {
         let constant = |pose: &&Pose| {
             let column = tracks.get(pose.run).and_then(|track| track.outputs.get(sensor));
-            column.and_then(|column| column.get(pose.interval.first..pose.interval.end)).is_some_and(same)
+            column
+                .and_then(|column| column.get(pose.interval.first..pose.interval.end))
+                .and_then(faults::dead)
+                .is_some()
         };
         let value = |pose: &Pose| {
             let column = tracks.get(pose.run).and_then(|track| track.outputs.get(sensor));
@@ -130,7 +87,7 @@ pub fn clipped(tracks: &[Track], poses: &[Pose]) -> Vec<String> {
             reasons.push(format!(
                 "accelerometer {} reads exactly {} throughout {} of {} poses: it is at its limit there; use a wider range, or leave \
                  these poses out",
-                name(sensor),
+                sensor_name(sensor, sensors),
                 six(value(first)),
                 at.len(),
                 poses.len()
@@ -138,33 +95,6 @@ pub fn clipped(tracks: &[Track], poses: &[Pose]) -> Vec<String> {
         }
     }
     reasons
-}
-
-/// Whether all values are one.
-fn same(column: &[f64]) -> bool {
-    column.first().is_some_and(|first| column.iter().all(|value| value.total_cmp(first).is_eq()))
-}
-
-/// Whether two columns are one.
-fn equal(one: &[f64], other: &[f64]) -> bool {
-    one.len() == other.len() && one.iter().zip(other).all(|(a, b)| a.total_cmp(b).is_eq())
-}
-
-/// Sensors of a kind by their numbers: "gyro x", "gyros x and z", "gyros x, y and z".
-#[must_use]
-pub fn several(kind: &str, sensors: &[usize]) -> String {
-    let names: Vec<String> = sensors.iter().map(|sensor| name(*sensor)).collect();
-    match names.as_slice() {
-        [] => String::new(),
-        [one] => format!("{kind} {one}"),
-        [first @ .., last] => format!("{kind}s {} and {last}", first.join(", ")),
-    }
-}
-
-/// Name of a sensor by its number: x, y, z, then numbers.
-#[must_use]
-pub fn name(index: usize) -> String {
-    ["x", "y", "z"].get(index).map_or_else(|| index.to_string(), |name| (*name).to_owned())
 }
 
 #[cfg(test)]
@@ -184,10 +114,7 @@ mod tests {
         let all = [track.clone(), Track { run: "other".to_owned(), ..track }];
         assert_eq!(logs(&["a", "b", "c", "d"]), "a and 3 other logs");
         let [dead, none, twice] = &dead(&all)[..] else { panic!("{:?}", dead(&all)) };
-        assert!(
-            dead.starts_with("log, other: accelerometers x, y and z: one value in every tick, 0: "),
-            "{dead}"
-        );
+        assert!(dead.starts_with("log, other: accelerometers x, y and z: every reading is 0: "), "{dead}");
         assert!(none.starts_with("log, other: gyro y: 200 of 200 readings are no numbers"), "{none}");
         assert!(twice.starts_with("log, other: gyro z: the same in every tick as gyro x"), "{twice}");
     }

@@ -126,7 +126,7 @@ pub fn analyse(tracks: &[Track], document: &Document, settings: &Settings) -> Re
         levelling_rad: settings.levelling_rad,
     };
     let stand = &settings.plan;
-    let guess = guesses(stand, &taken, sensors).map_err(|bad| spread(stand, &taken, &bad))?;
+    let guess = guesses(stand, &taken, sensors).map_err(|bad| spread(stand, &taken, (&bad, sensors)))?;
     let most = levels_deg_c.len() - 1;
     let degrees = Degrees { sensor: most.min(2), axes: most.min(1) };
     let all = Positions { plan: stand, taken: &taken, guess: &guess, weights: &weights };

@@ -7,9 +7,8 @@ use isotherm_protocol::document::Sample;
 use super::plan::{Plan, StandErrors};
 use super::pose::Pose;
 use super::track::Track;
+use crate::axes::AXES;
 use crate::report::Curve;
-
-const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// One position, judged.
 #[derive(Debug, Clone, PartialEq)]

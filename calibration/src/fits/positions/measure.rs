@@ -2,7 +2,7 @@
 
 use isotherm_protocol::document::AccelOutput;
 
-use super::faults;
+use crate::axes::sensor_name;
 use crate::report::figures::short;
 
 /// Times that a scale factor may be away from what is stated, and one sensor's from another's: beyond it, it is another unit of
@@ -91,8 +91,8 @@ impl Beside {
             format!(
                 "{kind} {} and {kind} {}: their readings are {} and {} times what the document at hand, or else the log, states, {} \
                  times apart: is the unit of measure of each column in the mapping the right one?",
-                faults::name(most),
-                faults::name(least),
+                sensor_name(most, self.times.len()),
+                sensor_name(least, self.times.len()),
                 short(size(&most)),
                 short(size(&least)),
                 short(ratio),

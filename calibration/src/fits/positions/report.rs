@@ -4,12 +4,13 @@ use isotherm_pages::Table;
 use isotherm_protocol::document::{Document, Sample};
 
 use super::budget::ARCSEC_PER_RAD;
-use super::charts::{AXES, across, axes_chart, bend, left_chart, shown};
+use super::charts::{across, axes_chart, bend, left_chart, shown};
 use super::doubts::LARGEST_LEFT_SHARE;
 use super::fit::{Analysis, Settings};
 use super::hysteresis::Return;
 use super::judged::{Judgement, curves, lengths};
 use super::solve::Fit;
+use crate::axes::AXES;
 use crate::report::figures::{counted, fixed, per_deg_c, short, six};
 use crate::report::{Coefficient, Curve, Figure, FitReport, Verdict, output_unit};
 

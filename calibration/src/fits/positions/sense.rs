@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::doubts::LARGEST_TURN_DEG;
-use super::faults::name;
+use crate::axes::sensor_name;
 use crate::report::figures::{fixed, short};
 
 /// One sensor beside what the document at hand states of it.
@@ -31,7 +31,11 @@ pub(crate) fn found_along(kind: &str, sensors: &[Beside], which: &[usize]) -> St
     let along = |index: &usize| {
         let [x, y, z]: [f64; 3] = sensors[*index].senses[0].into();
         let [x, y, z] = [x, y, z].map(|c| fixed(c, 2));
-        format!("of {kind} {} along ({x}, {y}, {z}), K = {}", name(*index), short(sensors[*index].scale))
+        format!(
+            "of {kind} {} along ({x}, {y}, {z}), K = {}",
+            sensor_name(*index, sensors.len()),
+            short(sensors[*index].scale)
+        )
     };
     format!("A positive output is found {}", which.iter().map(along).collect::<Vec<_>>().join("; "))
 }

@@ -4,9 +4,9 @@ use std::collections::BTreeSet;
 
 use isotherm_protocol::document::Document;
 
-use super::faults;
 use super::fit::Settings;
 use super::pose::Pose;
+use crate::axes::several;
 use crate::report::figures::fixed;
 
 /// Distance of temperatures that are two (°C).
@@ -102,7 +102,7 @@ pub(super) fn blind(document: &Document, own: &[Vec<f64>], levels: usize) -> Vec
         format!(
             "{}: what K and S follow is {channel}, which goes from {} to {} °C over {levels} temperatures of the axes, more than \
              {LEVEL_GAP_DEG_C} °C are needed: name the channel that measures it in the document, or give the logs of one temperature",
-            faults::several("accelerometer", &sensors),
+            several("accelerometer", &sensors, own.len()),
             fixed(low, 1),
             fixed(high, 1)
         )
@@ -127,7 +127,7 @@ pub(super) fn stuck(channels: &[String], axes: &[f64], own: &[Vec<f64>]) -> Opti
             names(channels),
             fixed(low, 1),
             fixed(high, 1),
-            faults::several("accelerometer", &sensors),
+            several("accelerometer", &sensors, own.len()),
             fixed(*from, 1),
             fixed(*to, 1)
         )

@@ -8,8 +8,9 @@ use super::measure::in_case;
 use super::model::GyroRates;
 use super::plateaus::scatter;
 use super::steps::Step;
+use crate::axes::main_axis;
 use crate::finding::{Instead, Kind};
-use crate::fits::modes::document::{main_axis, row};
+use crate::fits::modes::document::row;
 use crate::robust::median;
 use crate::size::Size;
 

@@ -9,6 +9,7 @@ use toml::{Table, Value};
 use super::fit::Made;
 use super::model::GyroRates;
 use super::over_temperature::Level;
+use crate::axes::AXES;
 use crate::document::written::tidy;
 use crate::finding::Kind;
 use crate::report::Sigmas;
@@ -77,11 +78,7 @@ pub fn nominal(unit: &str, output: GyroOutput) -> Document {
         origin: None,
         auxiliary: Vec::new(),
         temperature: Temperature { assumed_deg_c: ASSUMED_DEG_C, filter: None, channel: Vec::new() },
-        gyro: Gyro {
-            output,
-            sensor: ["x", "y", "z"].map(sensor).to_vec(),
-            orientation: Orientation::along_case_axes(),
-        },
+        gyro: Gyro { output, sensor: AXES.map(sensor).to_vec(), orientation: Orientation::along_case_axes() },
         accel: None,
         mode_reversal: None,
         self_test: None,

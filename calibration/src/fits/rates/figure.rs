@@ -4,12 +4,11 @@ use isotherm_pages::{Axis, Chart, Content, Form, Ink, Panel, Samples, Series, Ta
 use isotherm_protocol::document::Document;
 
 use super::over_temperature::{Level, OverTemperature};
-use crate::fits::modes::document::main_axis;
+use crate::axes::{AXES, main_axis};
 use crate::fits::positions::budget::ARCSEC_PER_RAD;
 use crate::report::Sigmas;
 use crate::report::figures::fixed;
 
-const AXES: [&str; 3] = ["x", "y", "z"];
 /// Height of a panel (CSS pixels).
 const HEIGHT: u32 = 150;
 /// Standard errors of a 95 % interval.

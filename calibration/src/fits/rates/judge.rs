@@ -2,6 +2,7 @@
 
 use super::bins::means_within;
 use super::fit::Measured;
+use crate::axes::AXES;
 use crate::document::written::Written;
 use crate::error::Error;
 use crate::report::{Figure, Verdict};
@@ -37,7 +38,7 @@ pub(super) fn verdicts(steps: &[Measured], judged: &[Measured]) -> Vec<Verdict> 
         let mean = Size::of(&errors).mean;
         errors.iter().map(|error| error - mean).collect()
     };
-    ["x", "y", "z"]
+    AXES
         .iter()
         .enumerate()
         .map(|(axis, name)| {

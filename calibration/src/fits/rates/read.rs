@@ -9,7 +9,7 @@ use super::steps::Step;
 use crate::error::Error;
 use crate::finding::{Finding, Kind};
 use crate::fits::modes::document::count_arcsec;
-use crate::fits::modes::fit::deg_per_h;
+use crate::fits::modes::model::deg_per_h;
 use crate::runs::{Run, Watch};
 
 /// Share of a step's ticks that may be lost.

@@ -7,8 +7,8 @@ use super::figure;
 use super::fit::{Made, Measured};
 use super::model::GyroRates;
 use super::over_temperature::OverTemperature;
+use crate::axes::{AXES, main_axis};
 use crate::finding::Kind;
-use crate::fits::modes::document::main_axis;
 use crate::report::figures::{counted, fixed, per_deg_c, short};
 use crate::report::words::{gyros, together};
 use crate::report::{Coefficient, FitReport};
@@ -105,7 +105,7 @@ fn over_temperature(made: &Made, over: &OverTemperature, report: &mut FitReport)
         let main = main_axis(&line.axis);
         for along in (0..3).filter(|along| *along != main) {
             let arcsec = |rad: f64| Angle::from_rad(rad).as_arcsec();
-            let name = format!("C1 along {}", ["x", "y", "z"][along]);
+            let name = format!("C1 along {}", AXES[along]);
             add(name, per_deg_c("″", 1), arcsec(line.slope[along]), arcsec(line.slope_sigma[along]));
         }
     }
@@ -154,7 +154,7 @@ fn coefficients(name: &str, found: &GyroRates, weight: Option<(f64, &str)>, repo
     }
     add("bias left", "°/h", found.bias[0], found.bias[1]);
     if let Some(axis) = found.axis {
-        for (element, (of, sigma)) in ["x", "y", "z"].iter().zip(axis.iter().zip(found.axis_sigma)) {
+        for (element, (of, sigma)) in AXES.iter().zip(axis.iter().zip(found.axis_sigma)) {
             // Near one the element itself says nothing about the angle.
             if of.abs() < 0.99 {
                 let arcsec = |rad: f64| Angle::from_rad(rad).as_arcsec();

@@ -136,7 +136,7 @@ fn scale_axes_and_bias_are_recovered_within_what_is_stated() {
                 of.push((found.axis.unwrap()[element] - truth) / found.axis_sigma[element]);
             }
             let drift = temperatures.gyro_drift_rad_per_s[sensor];
-            of.push((found.bias[0] - crate::fits::modes::fit::deg_per_h(drift)) / found.bias[1]);
+            of.push((found.bias[0] - crate::fits::modes::model::deg_per_h(drift)) / found.bias[1]);
             let [asymmetry, sigma] = found.asymmetry.unwrap();
             of.push(asymmetry / sigma);
             beyond += of.iter().filter(|error| error.abs() > 3.0).count();

@@ -7,11 +7,10 @@ use isotherm_protocol::document::{
 };
 
 use super::checks::median_step_s;
+use crate::axes::AXES;
 use crate::error::Error;
 use crate::runs::{self, series::Series};
 
-/// Names of the sensors of a unit with three.
-const AXES: [&str; 3] = ["x", "y", "z"];
 /// Longest step of a grid that a document may state (s).
 const LONGEST_GRID_STEP_S: f64 = 3600.0;
 /// Grid points between two readings that they can carry: between readings there are only straight lines.

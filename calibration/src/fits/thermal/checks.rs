@@ -6,11 +6,12 @@ use isotherm_protocol::document::Document;
 
 use super::samples::Samples;
 use super::stand::Stand;
-use crate::fits::drift::columns::name as sensor_name;
+use crate::axes::sensor_name;
 use crate::fits::drift::pieces::checks::moves;
 use crate::report::Rest;
-use crate::report::figures::{counted, short, six};
+use crate::report::figures::{counted, short};
 use crate::robust::{median, median_if_any};
+use crate::runs::faults::{self, Fault};
 use crate::runs::series::{Series, Ticks};
 use crate::runs::swapped::{Looks, Shown};
 use crate::size::Size;
@@ -102,7 +103,7 @@ pub fn judging(name: &str, series: &Series, stand: &Stand) -> Vec<String> {
 
 #[expect(clippy::cast_precision_loss, reason = "readings of a log are far below 2⁵³")]
 fn sensor(found: &mut Findings, name: &str, (gyro, of, index): (bool, &str, usize), readings: &[f64]) {
-    let bad = readings.iter().filter(|reading| !reading.is_finite()).count();
+    let bad = faults::missing(readings);
     let share = bad as f64 / readings.len().max(1) as f64;
     if share > 0.5 {
         let why = format!(
@@ -118,13 +119,8 @@ fn sensor(found: &mut Findings, name: &str, (gyro, of, index): (bool, &str, usiz
             100.0 * share
         ));
     }
-    let first = readings.iter().find(|reading| reading.is_finite());
-    if let Some(first) = first
-        && readings.iter().filter(|r| r.is_finite()).all(|reading| (reading - first).abs() <= 0.0)
-    {
-        let what = if *first == 0.0 { "reads zero".to_owned() } else { format!("reads {}", six(*first)) };
-        let why = format!("it {what} throughout: dead, not connected, or the wrong column");
-        found.dead.push((gyro, index, why));
+    if let Some(value) = faults::dead(readings) {
+        found.dead.push((gyro, index, Fault::Dead(value).words("sensor", 1)));
     }
 }
 

@@ -8,6 +8,7 @@ use isotherm_protocol::document::{Document, Sample};
 use super::columns::Term;
 use super::outcome::{Outcome, axis_of};
 use super::stand::Stand;
+use crate::axes::output_name;
 use crate::document::written::Written;
 use crate::error::Error;
 use crate::report::figures::short;
@@ -17,7 +18,7 @@ use crate::runs::table::{Rows as Windows, Table, Takes};
 use crate::runs::{Run, Watch};
 
 /// Axes: gyros, then accelerometers.
-const AXES: usize = 6;
+const COLUMNS: usize = 6;
 /// What is compared, in the order of the columns; a document of each but of the mean, which needs none.
 const HEAD: [&str; 5] = ["raw", "mean", "cubic", "cubic + Ṫ", "this document"];
 
@@ -47,8 +48,8 @@ struct Stage<'a> {
 /// it was fitted.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Compared {
-    rms: [Option<[f64; 5]>; AXES],
-    levels: [[f64; 2]; AXES],
+    rms: [Option<[f64; 5]>; COLUMNS],
+    levels: [[f64; 2]; COLUMNS],
 }
 
 /// Which of the rivals.
@@ -65,7 +66,7 @@ impl Compared {
         mut watch: impl Watch,
     ) -> Result<Self, Error> {
         let loaded: Vec<Loaded> = documents.into_iter().map(Written::compiled).collect::<Result<_, _>>()?;
-        let mut levels = [[(0.0, 0.0); 4]; AXES];
+        let mut levels = [[(0.0, 0.0); 4]; COLUMNS];
         for stage in fitted {
             let tables = stage.tables(&loaded, &mut watch)?;
             for (axis, levels) in levels.iter_mut().enumerate().filter(|(axis, _)| stage.counts(*axis)) {
@@ -78,11 +79,11 @@ impl Compared {
         }
         let levels =
             levels.map(|axis| axis.map(|(sum, count)| if count > 0.0 { sum / count } else { f64::NAN }));
-        let mut sums: [[Sum; 5]; AXES] = Default::default();
+        let mut sums: [[Sum; 5]; COLUMNS] = Default::default();
         for stage in judging {
             let tables = stage.tables(&loaded, &mut watch)?;
             let shared = fitted.iter().any(|other| stage.run.shares_log(other.run));
-            for axis in (0..AXES).filter(|axis| stage.counts(*axis)) {
+            for axis in (0..COLUMNS).filter(|axis| stage.counts(*axis)) {
                 add(&mut sums[axis], &tables, (axis, truth(&stage.rest, axis)), levels[axis], shared);
             }
         }
@@ -94,7 +95,7 @@ impl Compared {
     }
 
     /// Levels before and after, for a run that is another part of a log of the fit.
-    pub(super) fn levels(&self) -> [[f64; 2]; AXES] {
+    pub(super) fn levels(&self) -> [[f64; 2]; COLUMNS] {
         self.levels
     }
 
@@ -115,8 +116,7 @@ impl Compared {
         let judged = curves.iter().any(|curve| curve.sample == Sample::Out);
         let mut rows = Vec::new();
         for (axis, rms) in self.rms.iter().enumerate() {
-            let (kind, name) = (["gyro", "accelerometer"][axis / 3], ["x", "y", "z"][axis % 3]);
-            let of = format!("{kind} {name}");
+            let of = output_name(axis < 3, axis % 3);
             let deciding = |curve: &&Curve| curve.of == of && (curve.sample == Sample::Out) == judged;
             let mine: Vec<&Curve> = curves.iter().filter(deciding).collect();
             let Some(first) = mine.first() else { continue };

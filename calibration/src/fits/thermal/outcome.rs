@@ -11,6 +11,7 @@ use super::found::Found;
 use super::model::{put_accel, put_gyro};
 use super::settings::Settings;
 use super::stand::Stand;
+use crate::axes::output_name;
 use crate::document::written::Written;
 use crate::error::Error;
 use crate::report::{Curve, FLAT, Figure, Rest, Verdict, judge};
@@ -305,6 +306,5 @@ pub(super) fn axis_of(sensor: &Sensor) -> Option<usize> {
 
 /// The same, as the curves call it.
 fn axis_name(sensor: &Sensor) -> Option<String> {
-    let axis = ["x", "y", "z"].get(sensor.index)?;
-    Some(format!("{} {axis}", if sensor.gyro { "gyro" } else { "accelerometer" }))
+    (sensor.index < 3).then(|| output_name(sensor.gyro, sensor.index))
 }

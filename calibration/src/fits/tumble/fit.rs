@@ -3,6 +3,7 @@
 pub(super) mod doubts;
 pub(super) mod odd;
 
+use crate::axes::AXES;
 use crate::fits::positions::faults;
 use crate::fits::positions::pose::Pose;
 use crate::fits::positions::still::{StillLimits, still};
@@ -26,7 +27,6 @@ const SHORTEST_TURN_RAD: f64 = 0.1;
 const ALIKE_RAD: f64 = core::f64::consts::PI / 12.0;
 /// Longest transition (s): beyond it the gyros' drift is what is measured.
 const LONGEST_TRANSITION_S: f64 = 60.0;
-const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// How a tumble log is looked at.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -210,7 +210,7 @@ fn flat(poses: &[Pose]) -> Option<String> {
         return None;
     }
     let direction = eigen.eigenvectors.column(index);
-    let axis = faults::name(direction.iamax());
+    let axis = AXES.get(direction.iamax()).copied().unwrap_or_default();
     Some(format!(
         "the poses lie in one plane: along {axis} the specific force is {:.2} g rms, at least {:.2} g is needed; put the unit down \
          with its {axis} axis up, down and slanting",

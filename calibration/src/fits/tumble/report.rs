@@ -10,6 +10,7 @@ use super::accel::norm;
 use super::acceleration::GyroDrift;
 use super::fit::{Settings, Tumble, transitions};
 use super::gyro::{GyroFit, angle_of};
+use crate::axes::AXES;
 use crate::document::written::tidy;
 use crate::error::Error;
 use crate::fits::positions::budget::ARCSEC_PER_RAD;
@@ -20,7 +21,6 @@ use crate::report::figures::{counted, fixed, short, six};
 use crate::report::{Coefficient, Curve, Figure, FitReport, SAME_SHARE, Sigmas, Verdict};
 use crate::size::Size;
 
-const AXES: [&str; 3] = ["x", "y", "z"];
 /// Times by which the rms may grow in poses that the fit has not seen.
 const LARGEST_GROWTH: f64 = 2.0;
 

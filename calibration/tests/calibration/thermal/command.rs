@@ -11,6 +11,7 @@ use isotherm_log::recording::{RecordingOptions, RecordingWriter};
 use isotherm_protocol::history::WallTime;
 
 use super::service::text_log;
+use crate::command::snapshot;
 
 fn calibrate(folder: &Path, args: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_isotherm-calibrate")).current_dir(folder).args(args).output().unwrap()
@@ -58,6 +59,7 @@ fn folders_recordings_and_several_units() {
     std::fs::copy(&log, at.join("chamber/log.csv")).unwrap();
     let (words, code) = said(at, &with(&["chamber", "--out", "of-folder.toml"]));
     assert_eq!(code, Some(0), "{words}");
+    snapshot("thermal", &words);
     let (words, code) = said(at, &with(&["log.csv", "--out", "of-file.toml"]));
     assert_eq!(code, Some(0), "{words}");
     let read = |name: &str| std::fs::read_to_string(at.join(name)).unwrap();
@@ -144,6 +146,26 @@ fn folders_recordings_and_several_units() {
         "{words}"
     );
     assert!(!at.join("none.toml").exists() && at.join("none.html").exists());
+
+    // One gyro is dead: the others are written, and the command says whether that is enough.
+    let log = read("log.csv");
+    let dead = log.lines().enumerate().map(|(row, line)| {
+        let mut cells: Vec<&str> = line.split(',').collect();
+        if row > 0 {
+            cells[2] = "0";
+        }
+        cells.join(",") + "\n"
+    });
+    std::fs::write(at.join("dead.csv"), dead.collect::<String>()).unwrap();
+    for (accept, wanted) in [(&[][..], 1), (&["--accept-partial"], 0)] {
+        let out = format!("part-{wanted}.toml");
+        let args =
+            [&["dead.csv", "--mapping", "mapping.toml", "--unit", "UNIT", "--out", &out], accept].concat();
+        let (words, code) = said(at, &args);
+        assert!(code == Some(wanted) && words.contains("gyro y: refused: every reading is 0"), "{words}");
+        let gyros = Written::read(&at.join(&out)).unwrap().document.gyro.sensor;
+        assert_eq!([0, 1].map(|gyro| gyros[gyro].static_bias.is_some()), [true, false]);
+    }
 
     // Of several units one is not judged: it is fitted, and that is said.
     let (words, _) = said(

@@ -2,10 +2,12 @@
 
 use super::far::{self, Far};
 use super::{Spacing, steps};
+use crate::axes::sensor_name;
 use crate::error::Error;
-use crate::fits::drift::columns::{Columns, Kind, name};
+use crate::fits::drift::columns::{Columns, Kind};
 use crate::report::figures::{short, six};
 use crate::robust::{median, middle_and_scatter, scatter_of_steps};
+use crate::runs::faults::{self, Fault};
 use crate::runs::series::Ticks;
 use crate::runs::table::is_one_g;
 
@@ -34,26 +36,17 @@ const LARGEST_MISSING: f64 = 0.01;
 /// # Errors
 /// [`Error::Refused`] with every sensor whose readings never change.
 pub fn raw(kind: Kind, ticks: &Ticks) -> Result<Vec<String>, Error> {
-    let called = |index| format!("{} {}", kind.sensor(), name(index, ticks.readings.len()));
+    let called = |index| format!("{} {}", kind.sensor(), sensor_name(index, ticks.readings.len()));
     let columns = || ticks.readings.iter().enumerate();
-    let dead: Vec<String> = columns().filter_map(|(index, column)| dead(&called(index), column)).collect();
+    let words = |(index, column): (usize, &Vec<f64>)| {
+        let dead = Fault::Dead(faults::dead(column)?).words(kind.sensor(), ticks.readings.len());
+        Some(format!("{}: {dead}", called(index)))
+    };
+    let dead: Vec<String> = columns().filter_map(words).collect();
     if !dead.is_empty() {
         return Err(Error::Refused(dead));
     }
     Ok(columns().filter_map(|(index, column)| frozen(&called(index), &ticks.end_ns, column)).collect())
-}
-
-/// Why a sensor whose readings never change is no use; `None` where they do, or where there is none.
-#[must_use]
-pub fn dead(called: &str, column: &[f64]) -> Option<String> {
-    let mut good = column.iter().filter(|reading| reading.is_finite());
-    let first = good.next()?;
-    good.all(|reading| (reading - first).abs() <= 0.0).then(|| {
-        format!(
-            "{called}: every reading is {}: the sensor is dead, or the mapping names the wrong column",
-            six(*first)
-        )
-    })
 }
 
 /// Where a reading stays exactly the same for long, though elsewhere it changes from tick to tick.

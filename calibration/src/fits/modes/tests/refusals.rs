@@ -207,7 +207,7 @@ fn documents_that_do_not_fit_the_log_are_refused() {
 #[test]
 fn a_constant_temperature_leaves_the_constants() {
     let made = fitted(&short(), &base());
-    let text = made.report().to_text();
+    let text = made.report().to_json().to_string();
     assert!(text.contains("temperature spans 0.0 °C only: only the constants are fitted"), "{text}");
     for fit in made.gyros.iter().flatten() {
         assert_eq!(
@@ -235,7 +235,7 @@ fn without_an_attitude_the_constant_stays_and_the_rest_is_fitted() {
         let [got, sigma] = fit.coefficient(Term::Magnetic, 0).unwrap();
         assert!(got.abs() > 100.0 * sigma);
     }
-    let report = made.report().to_text();
+    let report = made.report().to_json().to_string();
     assert!(report.contains("gyro x static bias, power 0, with the Earth's rate: not written"), "{report}");
     let sigmas = crate::fits::modes::document::sigmas(&made);
     assert!(

@@ -3,7 +3,8 @@
 use isotherm_correction::orientation::CONDITION_LIMIT;
 use nalgebra::{DMatrix, DVector, Matrix3};
 
-use super::{AXES, AccelFit, GyroFit};
+use super::{AccelFit, GyroFit};
+use crate::axes::AXES;
 use crate::fits::positions::pose::{Pose, intensities};
 use crate::fits::positions::track::Track;
 use crate::fits::tumble::gyro::LARGEST_LEFT_DEG;

@@ -2,8 +2,8 @@
 
 use isotherm_protocol::document::Document;
 
-use super::{AXES, Tumble};
-use crate::fits::positions::faults::several;
+use super::Tumble;
+use crate::axes::{AXES, several};
 use crate::fits::positions::measure;
 use crate::fits::positions::sense::{Beside, found_along, out_of_place, places, turned};
 use crate::report::figures::short;
@@ -17,20 +17,20 @@ fn mistakes(order: [usize; 3], same_way: [bool; 3]) -> String {
     let wrong: Vec<usize> = (0..3).filter(|axis| !same_way[*axis]).collect();
     let right: Vec<usize> = (0..3).filter(|axis| same_way[*axis]).collect();
     match (moved.len(), wrong.as_slice()) {
-        (0, [_]) => format!("{} is found with the other sign: is its sign missing in the mapping?", several("gyro", &wrong)),
+        (0, [_]) => format!("{} is found with the other sign: is its sign missing in the mapping?", several("gyro", &wrong, 3)),
         (0, [_, _]) => format!(
             "{} are found with the other sign: is the sign of {} missing in the mapping, or are those of both gyros?",
-            several("gyro", &wrong),
-            several("accelerometer", &right)
+            several("gyro", &wrong, 3),
+            several("accelerometer", &right, 3)
         ),
-        (0, _) => format!("{} are found with the other sign: are their signs missing in the mapping?", several("gyro", &wrong)),
-        (2, []) => format!("{} look swapped: check the columns in the mapping", several("gyro", &moved)),
-        (2, [_, _, _]) => format!("{} look swapped: check the columns in the mapping", several("accelerometer", &moved)),
+        (0, _) => format!("{} are found with the other sign: are their signs missing in the mapping?", several("gyro", &wrong, 3)),
+        (2, []) => format!("{} look swapped: check the columns in the mapping", several("gyro", &moved, 3)),
+        (2, [_, _, _]) => format!("{} look swapped: check the columns in the mapping", several("accelerometer", &moved, 3)),
         (3, []) => "the columns of the gyros, or of the accelerometers, look as if they were in another order: check them in the mapping".to_owned(),
         (2, _) => format!(
             "{} look swapped, or accelerometers, and a sign is the other one: check the columns in the mapping, or state how the gyros \
              lie in the document",
-            several("gyro", &moved)
+            several("gyro", &moved, 3)
         ),
         _ => "columns of gyros or accelerometers look as if they were in another order, and a sign is the other one: check them in the \
               mapping"
@@ -57,7 +57,7 @@ fn gyros(sensors: &[Beside]) -> Result<Option<String>, String> {
             format!(
                 "{} far from where the document at hand, or else {} it: are columns of the mapping swapped, of the accelerometers \
                  too, or is a sign the other one?",
-                if turned.len() == 1 { format!("{} is", several("gyro", &turned)) } else { format!("{} are", several("gyro", &turned)) },
+                if turned.len() == 1 { format!("{} is", several("gyro", &turned, sensors.len())) } else { format!("{} are", several("gyro", &turned, sensors.len())) },
                 if turned.len() == 1 { "its column, has" } else { "their columns, have" },
             )
         },
@@ -95,7 +95,7 @@ pub(in crate::fits::tumble) fn odd(
         if !turned.is_empty() {
             words.push(format!(
                 "{}: are columns of the mapping swapped, or is a sign the other one? {}",
-                several("accelerometer", &turned),
+                several("accelerometer", &turned, beside.len()),
                 found_along("accelerometer", &beside, &turned)
             ));
         }
@@ -125,7 +125,7 @@ fn far_from_zero(tumble: &Tumble) -> Option<String> {
     Some(format!(
         "{}: at rest {} reads {} °/s, and no turn takes it further than {} °/s away from that: is its zero at mid-scale? State \
          mid_scale in the mapping",
-        several("gyro", &far),
+        several("gyro", &far, AXES.len()),
         if far.len() > 1 { "the first" } else { "it" },
         short(gyro.rest[first].to_degrees()),
         short(tumble.largest_rate[first].to_degrees())

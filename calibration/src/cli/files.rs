@@ -1,4 +1,4 @@
-//! Files that a command writes: what must hold of them before anything is read.
+//! Files that a command writes, and what must hold of them before anything is read.
 
 use std::fs::OpenOptions;
 use std::io;
@@ -11,7 +11,20 @@ use crate::document::written::write_file;
 use crate::error::Error;
 use crate::report::of_unit;
 
-/// The page of a command that writes nothing else.
+/// Where what a command comes to goes.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Files<'a> {
+    /// The new document.
+    pub(super) out: Option<&'a Path>,
+    /// The page.
+    pub(super) html: Option<&'a Path>,
+    /// Whether they may replace others.
+    pub(super) overwrite: bool,
+    /// Whether one JSON object is printed instead of text.
+    pub(super) json: bool,
+}
+
+/// What a command prints that writes nothing but a page.
 #[derive(Debug, Clone, Args)]
 pub(super) struct PageArgs {
     /// Write everything with its diagrams as one HTML file; of several units each to FILE-UNIT.html, and the table to FILE
@@ -20,38 +33,41 @@ pub(super) struct PageArgs {
     /// Replace a page that is there already
     #[arg(long, requires = "html")]
     overwrite: bool,
+    /// Print everything as one JSON object
+    #[arg(long)]
+    json: bool,
 }
 
 impl PageArgs {
-    /// Checks before anything is read; `inputs` may not be overwritten.
+    /// As files.
+    pub(super) fn files(&self) -> Files<'_> {
+        Files { out: None, html: self.html.as_deref(), overwrite: self.overwrite, json: self.json }
+    }
+}
+
+impl Files<'_> {
+    /// Checks before anything is read; `inputs` may not be replaced.
     pub(super) fn check(&self, inputs: &[&Path]) -> Result<(), Error> {
-        self.html.iter().try_for_each(|html| writable(html, inputs, self.overwrite))
+        if let Some(out) = self.out {
+            let inputs: Vec<&Path> = inputs.iter().copied().chain(self.html).collect();
+            writable(out, &inputs, self.overwrite)?;
+        }
+        self.html.map_or(Ok(()), |html| writable(html, inputs, self.overwrite))
     }
 
-    /// Checks the page of one unit of several, before any of them is looked at.
+    /// Checks the files of one unit of several, before any of them is looked at.
     pub(super) fn check_unit(&self, unit: &str) -> Result<(), Error> {
-        self.html.iter().try_for_each(|html| keep(&of_unit(html, unit), self.overwrite))
+        let mut outputs = self.out.into_iter().chain(self.html);
+        outputs.try_for_each(|out| keep(&of_unit(out, unit), self.overwrite))
     }
 
-    /// Writes the page, where one is wanted.
-    pub(super) fn write(&self, page: impl FnOnce() -> String) -> Result<(), Error> {
-        match &self.html {
-            Some(html) => write_file(html, page().as_bytes(), self.overwrite),
-            None => Ok(()),
-        }
-    }
-
-    /// Writes the page of one unit of several.
-    pub(super) fn write_unit(&self, unit: &str, page: impl FnOnce() -> String) -> Result<(), Error> {
-        match &self.html {
-            Some(html) => write_file(&of_unit(html, unit), page().as_bytes(), self.overwrite),
-            None => Ok(()),
-        }
-    }
-
-    /// The page of a batch's table, and whether it may replace another.
-    pub(super) fn table(&self) -> (Option<&Path>, bool) {
-        (self.html.as_deref(), self.overwrite)
+    /// Writes the page, where one is wanted, under what its name is turned into.
+    pub(super) fn page(
+        &self,
+        name: impl FnOnce(&Path) -> PathBuf,
+        page: impl FnOnce() -> String,
+    ) -> Result<(), Error> {
+        self.html.map_or(Ok(()), |html| write_file(&name(html), page().as_bytes(), self.overwrite))
     }
 }
 
@@ -84,7 +100,7 @@ pub(super) fn writable(out: &Path, inputs: &[&Path], overwrite: bool) -> Result<
 }
 
 /// Leaves a file alone that is there, unless it may be written over.
-pub(super) fn keep(out: &Path, overwrite: bool) -> Result<(), Error> {
+fn keep(out: &Path, overwrite: bool) -> Result<(), Error> {
     if out.exists() && !overwrite {
         return Err(Error::Usage(format!(
             "{} is there already: give another name, or --overwrite",

@@ -1,18 +1,13 @@
-//! One unit or several: what each has to work on, and how a command does the same to all of them.
+//! The units of a command's logs, and what each has to work on.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use isotherm_protocol::key::UnitId;
-use serde_json::json;
 
-use super::bar::Bar;
-use super::output::OutputArgs;
-use super::print;
-use super::runs::Reading;
-use crate::document::written::{Written, write_file};
+use super::runs::{BaseArgs, JudgeArgs, LogArgs, Reading};
+use crate::document::written::Written;
 use crate::error::Error;
-use crate::report::{BatchTable, UnitReport, in_parallel, of_unit};
 use crate::runs::Run;
 use crate::runs::cut::Cut;
 
@@ -31,7 +26,7 @@ pub(super) struct Work {
 }
 
 /// Logs and documents as a command line names them.
-pub(super) struct Named<'a> {
+pub(super) struct Logs<'a> {
     /// How logs are read.
     pub(super) reading: &'a Reading,
     /// Logs.
@@ -50,9 +45,6 @@ pub(super) struct Named<'a> {
 
 /// A unit with its work, or with why there is none.
 pub(super) type Unit = (UnitId, Result<Work, Error>);
-
-/// What came of a unit.
-pub(super) type Outcome<R> = (String, Result<R, Error>);
 
 type Runs = BTreeMap<UnitId, Vec<Run>>;
 
@@ -99,21 +91,38 @@ impl Work {
     }
 }
 
-impl<'a> Named<'a> {
+impl<'a> Logs<'a> {
     /// Logs that are one run of each unit.
-    pub(super) fn together(reading: &'a Reading, logs: &'a [PathBuf], document: Option<&'a PathBuf>) -> Self {
-        let document = document.map(PathBuf::as_path);
-        Self { reading, logs, together: true, judging: reading, judge: &[], document, unnamed: None }
+    pub(super) fn together(log: &'a LogArgs, base: &'a BaseArgs) -> Self {
+        Self { together: true, document: base.document.as_deref(), ..Self::of(log) }
     }
 
     /// Logs of which each is a run, and others to judge on.
-    pub(super) fn apart(
-        reading: &'a Reading,
-        logs: &'a [PathBuf],
-        judge: &'a [PathBuf],
-        document: Option<&'a PathBuf>,
-    ) -> Self {
-        Self { together: false, judge, ..Self::together(reading, logs, document) }
+    pub(super) fn apart(log: &'a LogArgs, judge: &'a JudgeArgs, base: &'a BaseArgs) -> Self {
+        Self { judge: &judge.judge, document: base.document.as_deref(), ..Self::of(log) }
+    }
+
+    /// Logs to judge a document on, or the documents of a folder.
+    pub(super) fn judging(log: &'a LogArgs, document: &'a Path) -> Self {
+        Self { document: Some(document), ..Self::of(log) }
+    }
+
+    fn of(log: &'a LogArgs) -> Self {
+        let LogArgs { log, reading } = log;
+        Self {
+            reading,
+            logs: log,
+            together: false,
+            judging: reading,
+            judge: &[],
+            document: None,
+            unnamed: None,
+        }
+    }
+
+    /// All that is read.
+    pub(super) fn inputs(&self) -> Vec<&'a Path> {
+        self.logs.iter().chain(self.judge).map(PathBuf::as_path).chain(self.document).collect()
     }
 
     /// The units that there is something to do of: that of the document, else all that the logs have.
@@ -214,115 +223,4 @@ fn of_folder(folder: &Path, unit: &UnitId) -> Result<Written, Error> {
         )]));
     }
     Ok(written)
-}
-
-/// What the files of a unit are called: as they were given, or with its serial where there are several units.
-pub(super) struct Names<'a>(Option<&'a str>);
-
-impl Names<'_> {
-    /// The name of one of them.
-    pub(super) fn of(&self, given: &Path) -> PathBuf {
-        self.0.map_or_else(|| given.to_path_buf(), |unit| of_unit(given, unit))
-    }
-
-    /// A bar over what is done without an end in sight, where it is the only unit: bars of several would fall over each other.
-    pub(super) fn at_work(&self, message: &'static str) -> Bar {
-        if self.0.is_none() { Bar::at_work(message) } else { Bar::hidden() }
-    }
-}
-
-/// How a command does the same to all units.
-pub(super) struct Batch<'a> {
-    /// Where what comes of it goes.
-    pub(super) output: &'a OutputArgs,
-    /// Heading of the page that has the table of several units.
-    pub(super) title: &'a str,
-    /// Whether a refused sensor is no failure.
-    pub(super) accept_partial: bool,
-}
-
-impl Batch<'_> {
-    /// Does `one` to all units, as many at a time as there are processors, and closes several with one table. `one` writes what
-    /// comes of a unit under the names that it is told, with the bars that it is told; a unit that comes to nothing does not stop the
-    /// others.
-    pub(super) fn carry_out<R: UnitReport + Send>(
-        &self,
-        mut units: Vec<Unit>,
-        one: impl Fn(&Work, &Names<'_>, fn() -> Bar) -> Result<R, Error> + Sync,
-    ) -> Result<(), Error> {
-        if units.len() == 1
-            && let Some((_, work)) = units.pop()
-        {
-            let work = work?;
-            let report =
-                one(&work, &Names(None), Bar::reading).map_err(|error| error.beside(&work.cuts()))?;
-            let json = self.output.json;
-            print(if json { format!("{}\n", report.to_json()) } else { report.to_text() }.as_bytes())?;
-            return Error::end(refusals(&report, self.accept_partial), work.cuts());
-        }
-        units.iter().try_for_each(|(unit, _)| self.output.check_unit(unit.as_str()))?;
-        let bar = Bar::counting("units done", units.len());
-        let came = in_parallel(
-            &units,
-            |ready| bar.at(ready),
-            |(unit, work)| {
-                let work = work.as_ref().map_err(|error| Error::Refused(vec![error.to_string()]))?;
-                one(work, &Names(Some(unit.as_str())), Bar::hidden)
-                    .map_err(|error| error.beside(&work.cuts()))
-            },
-        );
-        bar.finish();
-        let mut cuts: Vec<String> =
-            units.iter().filter_map(|(_, work)| work.as_ref().ok()).flat_map(Work::cuts).collect();
-        cuts.sort();
-        cuts.dedup();
-        let names = units.into_iter().map(|(unit, _)| unit.to_string());
-        let came = names.zip(came).collect::<Vec<_>>();
-        let page = self.output.page();
-        Error::end(close(self.title, &came, (page, self.output.json), self.accept_partial)?, cuts)
-    }
-}
-
-/// What was refused of a unit. A part of the sensors is no failure where that is accepted; all of them are.
-fn refusals<R: UnitReport>(report: &R, accept_partial: bool) -> Vec<String> {
-    let partial = accept_partial && report.rows().iter().any(|row| row.accepted);
-    if partial { Vec::new() } else { report.refusals() }
-}
-
-/// Prints what came of several units, the table that closes them last; `html` is a page of that table, and whether it may replace
-/// another. What was refused comes back, and after that the units that came to nothing.
-pub(super) fn close<R: UnitReport>(
-    title: &str,
-    units: &[Outcome<R>],
-    (html, as_json): ((Option<&Path>, bool), bool),
-    accept_partial: bool,
-) -> Result<Vec<String>, Error> {
-    let mut batch = BatchTable::of::<R>();
-    let (mut refused, mut failed, mut reports) = (Vec::new(), Vec::new(), Vec::new());
-    for (unit, came) in units {
-        match came {
-            Ok(report) => {
-                if as_json {
-                    reports.push(report.to_json());
-                } else {
-                    print(format!("{}\n", report.to_text()).as_bytes())?;
-                }
-                batch.add(unit, Ok(report.rows()));
-                refused.extend(refusals(report, accept_partial));
-            }
-            Err(error) => {
-                batch.add(unit, Err(error.to_string()));
-                failed.push(format!("{unit}: {error}"));
-            }
-        }
-    }
-    if let (Some(html), overwrite) = html {
-        write_file(html, batch.to_html(title).as_bytes(), overwrite)?;
-    }
-    if as_json {
-        print(format!("{}\n", json!({ "batch": batch.to_json(), "reports": reports })).as_bytes())?;
-    } else {
-        print(batch.to_text().as_bytes())?;
-    }
-    Ok([refused, failed].concat())
 }
