@@ -21,21 +21,18 @@ mod tumble;
 mod units;
 mod validate;
 
-use std::io::{self, Write};
-use std::process::ExitCode;
-
 use clap::{Parser, Subcommand};
-use isotherm_document::program::Common;
+use isotherm_cli::{Common, Exit, failed_lines, parse};
 
 use crate::error::Error;
 
-/// Makes calibration documents from logs, and judges them.
+/// Makes calibration documents from logs, judges and compares them.
 #[derive(Debug, Parser)]
 #[command(
     name = "isotherm-calibrate",
     version,
-    after_help = "Exit codes: 0 ok, 1 failed, or the data do not allow what was asked for, 2 usage, 3 finished with data loss, \
-        78 bad mapping or calibration document."
+    after_help = "Exit codes: 0 ok, 1 failed, or the data do not allow the fit, 2 usage, 3 finished with data loss, \
+                  78 bad mapping or calibration document."
 )]
 struct Cli {
     #[command(subcommand)]
@@ -61,7 +58,7 @@ enum Command {
 }
 
 /// Runs the command that the arguments name.
-fn run(cli: Cli) -> Result<(), Error> {
+fn run(cli: Cli) -> Result<Exit, Error> {
     match cli.command {
         Command::Board(args) => args.run(),
         Command::Diff(args) => args.run(),
@@ -75,25 +72,15 @@ fn run(cli: Cli) -> Result<(), Error> {
         Command::Thermal(args) => args.run(),
         Command::Tumble(args) => args.run(),
         Command::Validate(args) => args.run(),
-        Command::Common(common) => {
-            let done = common.run::<Cli>();
-            driver::print(
-                &done.map_err(|(path, source)| Error::file(&path, "write manual pages into", source))?,
-            )
-        }
+        Command::Common(common) => return Ok(common.run::<Cli>()),
     }
+    .map(|()| Exit::Ok)
 }
 
-/// Runs the program and maps what came of it to its exit code.
+/// Runs the program and says how it ended.
 #[must_use]
-pub fn main() -> ExitCode {
-    match run(isotherm_document::advanced::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            let _ = writeln!(io::stderr(), "isotherm-calibrate: {error}");
-            ExitCode::from(error.exit_code())
-        }
-    }
+pub fn main() -> Exit {
+    run(parse()).unwrap_or_else(|error| failed_lines(&error, error.exit()))
 }
 
 #[cfg(test)]
@@ -108,7 +95,7 @@ mod tests {
     #[test]
     fn rare_options_are_in_the_advanced_help() {
         let help = |command: &str, flag: &str| {
-            let program = isotherm_document::advanced::command::<Cli>();
+            let program = isotherm_cli::advanced::command::<Cli>();
             program.try_get_matches_from(["isotherm-calibrate", command, flag]).unwrap_err().to_string()
         };
         for (command, rare) in

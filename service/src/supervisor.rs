@@ -76,7 +76,7 @@ impl Watch {
 
 fn tell(state: &[NotifyState<'_>]) {
     if let Err(error) = sd_notify::notify(state) {
-        tracing::debug!("the manager cannot be told: {error}");
+        tracing::debug!("systemd cannot be notified: {error}");
     }
 }
 

@@ -29,7 +29,7 @@ pub(super) struct BoardArgs {
     /// Temperature of the board at which the ratio is 1 (°C) (default: the middle of its range)
     #[arg(long, hide_short_help = true, value_name = "DEG_C", allow_negative_numbers = true)]
     reference: Option<f64>,
-    /// Windows of the fit (s)
+    /// Length of the windows of the fit (s)
     #[arg(long, hide_short_help = true, value_name = "SECONDS", default_value_t = 10.0)]
     fit_window: f64,
     #[command(flatten)]

@@ -18,7 +18,6 @@ use crate::fits::drift::fit::{Wanted, analyse};
 use crate::fits::drift::pieces::Grid;
 use crate::fits::drift::report::Report;
 use crate::fits::drift::trend::FIT_H;
-use crate::runs::Watch;
 
 /// Noise and drift of a log at rest: Allan deviation, Markov drift, trend, spectrum, estimator parameters
 #[derive(Debug, Args)]
@@ -26,29 +25,29 @@ use crate::runs::Watch;
     isotherm-calibrate drift static.mcap --html drift.html\n  \
     isotherm-calibrate drift rlg-static.imu.gz --mapping config/mappings/rlg-static.toml --increment-weight 0.1\n  \
     isotherm-calibrate drift static.mcap --calibration unit.toml --out unit-drift.toml\n\n\
-    With --calibration the log is corrected first, by the service's own code, and what is analysed is what the calibration leaves. \
+    With --calibration the log is first corrected by the service's own code, and the remainder is analysed. \
     Rates are in °/h, N in °/√h, K in °/h/√h, R in °/h², Q in ″.")]
 pub(super) struct DriftArgs {
     #[command(flatten)]
     log: LogArgs,
-    /// Look at the accelerometers instead of the gyros
+    /// Analyse the accelerometers instead of the gyros
     #[arg(long)]
     accelerometers: bool,
-    /// The log holds corrected ticks, as isotherm-replay correct writes them (its CSV is known by itself)
+    /// The recording has corrected ticks (a CSV of isotherm-replay correct is recognised)
     #[arg(long, conflicts_with_all = ["document", "increment_weight"])]
     corrected: bool,
-    /// Angle that one count of a gyro stands for (″), where the readings are counts and there is no document
+    /// Gyro angle per count (″), for counts without a document
     #[arg(long, value_name = "ARCSEC", conflicts_with = "document")]
     increment_weight: Option<f64>,
     #[command(flatten)]
     base: BaseArgs,
-    /// Sigma of the constant part when the estimator starts (°/h), where you know it from several starts
+    /// Sigma of the constant part at start (°/h), if known from several starts
     #[arg(long, hide_short_help = true, value_name = "DEG_PER_H")]
     initial_sigma: Option<f64>,
-    /// Distance of the averaging times
+    /// Spacing of the averaging times
     #[arg(long, hide_short_help = true, value_enum, default_value_t = Taus::Octave)]
     taus: Taus,
-    /// Hours that the trend is fitted to before it is extrapolated
+    /// Length of the trend fit before extrapolation (h)
     #[arg(long, hide_short_help = true, value_name = "HOURS", default_value_t = FIT_H)]
     fit_hours: f64,
     #[command(flatten)]

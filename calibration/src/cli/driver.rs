@@ -1,12 +1,12 @@
 //! One driver for all commands that work on logs: outputs are checked before anything is read, each unit is worked on, what came of it is
 //! written and printed, several units are closed with one table, and the exit code says how it ended. A command supplies the rest.
 
-use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+use isotherm_cli::{Bar, to_stdout};
 use serde_json::{Value, json};
 
-use super::bar::Bar;
+use super::bar;
 use super::files::Files;
 use super::units::{Logs, Unit, Work};
 use crate::document::written::Written;
@@ -44,7 +44,7 @@ pub(super) struct Job<'a> {
 impl Job<'_> {
     /// A bar over the readings of its logs.
     pub(super) fn bar(&self) -> Bar {
-        if self.among.is_none() { Bar::reading() } else { Bar::hidden() }
+        if self.among.is_none() { bar::reading() } else { Bar::hidden() }
     }
 
     /// A bar over what is done without an end in sight.
@@ -101,7 +101,7 @@ impl<'a> Task<'a> {
         let bar = Bar::counting("units done", units.len());
         let came = in_parallel(
             &units,
-            |ready| bar.at(ready),
+            |ready| bar.at(ready as u64),
             |(unit, work)| {
                 let work = work.as_ref().map_err(|error| Error::Refused(vec![error.to_string()]))?;
                 written(&Job { work, among: Some(unit.as_str()) })
@@ -161,10 +161,6 @@ pub(super) fn emit(
 }
 
 /// Writes to standard output; a reader that has gone away is no error.
-pub(super) fn print(text: &[u8]) -> Result<(), Error> {
-    let mut stdout = io::stdout().lock();
-    match stdout.write_all(text).and_then(|()| stdout.flush()) {
-        Err(source) if source.kind() != io::ErrorKind::BrokenPipe => Err(Error::Stdout { source }),
-        _ => Ok(()),
-    }
+fn print(text: &[u8]) -> Result<(), Error> {
+    to_stdout(text).map_err(|source| Error::Stdout { source })
 }

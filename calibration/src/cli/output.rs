@@ -22,13 +22,13 @@ pub(super) struct OutputArgs {
     /// Write the new document; of several units each to NEW-UNIT.toml
     #[arg(long, short, value_name = "NEW")]
     out: Option<PathBuf>,
-    /// Replace documents and reports that are there already
+    /// Replace existing documents and reports
     #[arg(long)]
     overwrite: bool,
-    /// Date that the new document states (YYYY-MM-DD; default: today, UTC)
+    /// Date of the new document (YYYY-MM-DD; default: today, UTC)
     #[arg(long, hide_short_help = true, value_name = "DATE", requires = "out", value_parser = a_date)]
     created: Option<Created>,
-    /// Write the report with its diagrams as one HTML file; of several units each to FILE-UNIT.html, and the table to FILE
+    /// HTML report to write, one file; several units: FILE-UNIT.html each, and a table in FILE
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
     /// Print everything as one JSON object

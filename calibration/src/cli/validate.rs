@@ -22,16 +22,14 @@ use crate::validate::{JudgedLog, Wanted, validate};
     isotherm-calibrate validate FOG-0001.toml judging.mcap --html judgement.html\n  \
     isotherm-calibrate validate chamber-mems.toml chamber.tsv --mapping config/mappings/chamber-mems.toml\n  \
     isotherm-calibrate validate config/calibration fleet-1.mcap fleet-2.mcap --json\n\n\
-    The unit is at rest in the logs. Before is nominal: the document without what knows of temperature, bias or mode. \
-    Exit code 1 where the document makes an axis worse than nominal. With a folder of documents every unit of the logs is judged \
-    by the document of its serial, several at a time; each has an HTML file of its own, FILE-SERIAL.html.")]
+    The unit is at rest in the logs. Before is nominal: the document without its temperature, bias and mode terms. Exit code 1 if the document makes an axis worse than nominal. With a folder of documents every unit of the logs is judged by its own document, with its own HTML file, FILE-SERIAL.html.")]
 pub(super) struct ValidateArgs {
     /// The document, or a folder with the documents of several units
     #[arg(value_name = "DOC")]
     document: PathBuf,
     #[command(flatten)]
     log: LogArgs,
-    /// Length of the windows that are averaged over; without it 10 s, in logs of an hour and more up to 100 s, as thermal has them
+    /// Averaging windows (s) (default: 10, up to 100 in logs of an hour and more)
     #[arg(long, hide_short_help = true, value_name = "SECONDS")]
     window: Option<f64>,
     #[command(flatten)]
@@ -100,7 +98,7 @@ impl ValidateArgs {
             let unit = written.document.unit.clone();
             if let Some(other) = documents.get(&unit) {
                 return Err(Error::Refused(vec![format!(
-                    "{} and {} are both for unit {unit}: name the one to judge",
+                    "{} and {} are both for unit {unit}: choose the one to judge",
                     other.name, written.name
                 )]));
             }

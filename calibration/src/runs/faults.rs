@@ -52,8 +52,8 @@ impl Fault {
                 sensor_name(twin, of)
             ),
             Self::Missing([missing, all]) => format!(
-                "{missing} of {all} readings are no numbers, at most {} % may be: look for a broken column or a sensor beyond its limit, \
-                 or cut the log with --start and --duration",
+                "{missing} of {all} readings are not numbers, at most {} % may be: look for a broken column or a sensor beyond its \
+                 limit, or cut the log with --start and --duration",
                 LARGEST_MISSING * 100.0
             ),
         }

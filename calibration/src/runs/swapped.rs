@@ -114,8 +114,7 @@ impl Display for Looks {
             ),
             None => write!(
                 f,
-                "the {kind} do not fit the attitude: {means}; is the attitude that of another log, a sign the other one, or the unit of \
-                 measure wrong?"
+                "the {kind} do not fit the attitude: {means}; check attitude, signs and unit of measure"
             ),
         }
     }

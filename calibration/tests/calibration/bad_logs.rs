@@ -41,10 +41,7 @@ fn nothing_is_replaced_without_overwrite() {
     for command in commands {
         let html = |more: &[&'static str]| [command, &["--html", &notes], more].concat();
         let refused = fails(&html(&[]), 2);
-        assert!(
-            refused.contains("notes.txt is there already") && refused.contains("--overwrite"),
-            "{refused}"
-        );
+        assert!(refused.contains("notes.txt exists") && refused.contains("--overwrite"), "{refused}");
         assert_eq!(std::fs::read_to_string(&notes).unwrap(), "mine", "{command:?}");
         calibrate(&html(&["--overwrite"]));
         assert!(std::fs::read_to_string(&notes).unwrap().contains("<html"), "{command:?}");
@@ -70,11 +67,14 @@ fn outputs_are_checked_before_anything_is_read() {
     ];
     for command in commands {
         let refused = fails(command, 2);
-        assert!(refused.contains(&format!("make the folder first: mkdir -p {}", path("made"))), "{refused}");
+        assert!(
+            refused.contains(&format!("first create the folder with mkdir -p {}", path("made"))),
+            "{refused}"
+        );
     }
     let both = path("both");
     let refused = fails(&["thermal", &log, "--out", &both, "--html", &both], 2);
-    assert!(refused.contains("would be written over"), "{refused}");
+    assert!(refused.contains("would be overwritten"), "{refused}");
 }
 
 #[test]

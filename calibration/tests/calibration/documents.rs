@@ -82,7 +82,7 @@ fn diff_tells_what_has_changed() {
     assert!(std::fs::read_to_string(&html).unwrap().contains("gyro x bias"));
     snapshot("diff", &succeeds(&["diff", &before, &after, "--axis-sigma", "5"]));
     let same = calibrate(&["diff", &before, &before]);
-    assert!(String::from_utf8_lossy(&same.stdout).contains("state the same."));
+    assert!(String::from_utf8_lossy(&same.stdout).contains("are the same."));
     assert_eq!(calibrate(&["diff", &before, &after, "--axis-sigma", "-1"]).status.code(), Some(2));
 }
 

@@ -129,7 +129,7 @@ pub fn read_tick(row: &str) -> Result<CorrectedTick, String> {
     tick.revision = cells.value()?;
     tick.sigma = cells.sigma()?;
     match cells.cells.next() {
-        Some(extra) => Err(format!("there is {extra:?} behind the last column")),
+        Some(extra) => Err(format!("there is {extra:?} after the last column")),
         None => Ok(tick),
     }
 }

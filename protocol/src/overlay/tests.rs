@@ -162,7 +162,7 @@ fn a_wrong_base_is_refused_with_what_to_do() {
     let text = overlay_of(FULL);
     let problems = refuse(&text, None);
     assert_eq!((problems[0].line, problems[0].key.as_str()), (2, "overlay_of"));
-    assert!(problems[0].message.contains("the unit has no document in force: put"), "{}", problems[0]);
+    assert!(problems[0].message.contains("the unit has no document in force: first put"), "{}", problems[0]);
 
     let other = FULL.replacen("# Every key", "# every key", 1);
     let problems = refuse(&text, Some(&other));
@@ -170,7 +170,7 @@ fn a_wrong_base_is_refused_with_what_to_do() {
     let shown = problems[0].to_string();
     assert!(shown.starts_with("field.toml:2:14: overlay_of: is "), "{shown}");
     assert!(shown.contains(&hex(&digest(FULL))) && shown.contains(&hex(&digest(&other))), "{shown}");
-    assert!(shown.contains("put the document that the overlay was made for in force first"), "{shown}");
+    assert!(shown.contains("first put the document of the overlay in force"), "{shown}");
 
     let problems = refuse(&overlay_of("schema = 1"), Some("schema = 1"));
     assert!(problems.iter().all(|problem| problem.file.as_deref() == Some("document in force")));

@@ -15,7 +15,7 @@ use crate::key::RawStream;
 #[derive(Debug, Error)]
 pub enum BatchError {
     /// A reading that is said to be a count and is none.
-    #[error("tick {sequence}: its readings are no counts of 32 bits")]
+    #[error("tick {sequence}: its readings are not counts of 32 bits")]
     NotCounts {
         /// Sequence number of the first tick of the batch.
         sequence: u64,

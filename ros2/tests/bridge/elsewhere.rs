@@ -41,7 +41,7 @@ async fn a_service_elsewhere_and_a_zenoh_configuration_of_ones_own() {
     for tick in &expected {
         assert_eq!(bits(&corrected.imu().await), bits(&Imu::of_tick(header(tick.end_time.as_ns()), tick)));
     }
-    driver_and_services(&driver, &mut diagnostics).await;
+    driver_and_services(&driver, &mut diagnostics, folder.path()).await;
     let (code, totals) = bridge.stop();
     assert_eq!(
         (code, &totals["imu_out"], &totals["lost"]),

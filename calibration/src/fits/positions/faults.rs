@@ -85,8 +85,8 @@ pub fn clipped(tracks: &[Track], poses: &[Pose]) -> Vec<String> {
         let at: Vec<&Pose> = poses.iter().filter(constant).collect();
         if let (Some(first), true) = (at.first(), at.len() < poses.len()) {
             reasons.push(format!(
-                "accelerometer {} reads exactly {} throughout {} of {} poses: it is at its limit there; use a wider range, or leave \
-                 these poses out",
+                "accelerometer {} reads exactly {} throughout {} of {} poses: it is at its limit there: use a wider \
+                 range, or leave these poses out",
                 sensor_name(sensor, sensors),
                 six(value(first)),
                 at.len(),
@@ -115,7 +115,7 @@ mod tests {
         assert_eq!(logs(&["a", "b", "c", "d"]), "a and 3 other logs");
         let [dead, none, twice] = &dead(&all)[..] else { panic!("{:?}", dead(&all)) };
         assert!(dead.starts_with("log, other: accelerometers x, y and z: every reading is 0: "), "{dead}");
-        assert!(none.starts_with("log, other: gyro y: 200 of 200 readings are no numbers"), "{none}");
+        assert!(none.starts_with("log, other: gyro y: 200 of 200 readings are not numbers"), "{none}");
         assert!(twice.starts_with("log, other: gyro z: the same in every tick as gyro x"), "{twice}");
     }
 }

@@ -20,7 +20,7 @@ pub(super) const EDITS: [Edit; 28] = [
         "name = \"board\"",
         "name = \"board\"\nconversion_deg_c = [-150.0, 100.0]\nrange_deg_c = [-70.0, 130.0]\nspike_limit_deg_c = 1.0\n\n[gyro]",
         "temperature.channel[7].name",
-        "is the name of channel 6 too",
+        "is also the name of channel 6",
     ),
     (
         "name too long",
@@ -164,7 +164,7 @@ pub(super) const EDITS: [Edit; 28] = [
         "coefficients_v_per_m_per_s2 = [0.1]",
         "coefficients_v_per",
         "accel.sensor[1].scale_factor.coefficients_v_per_m_per_s2",
-        "but the output calls for (counts/s)/(m/s²)",
+        "but the output needs (counts/s)/(m/s²)",
     ),
     (
         "scale factor of zero",

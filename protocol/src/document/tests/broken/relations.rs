@@ -9,7 +9,7 @@ pub(super) const CASES: [Case; 32] = [
         "name = \"block\"",
         "# digital sensor",
         "temperature.channel[1].name",
-        "is the name of channel 0 too",
+        "is also the name of channel 0",
     ),
     (
         "name too long",
@@ -153,7 +153,7 @@ pub(super) const CASES: [Case; 32] = [
         "regressor = [{ channel = \"supply\", gain = { kind = \"constant\", value_deg_per_h_per_unit = 1.0 } }]",
         "supply",
         "gyro.sensor[3].regressor[0].channel",
-        "is \"supply\", which is no channel; the channels are: block, coil, accel, board",
+        "is \"supply\", not a channel; the channels are: block, coil, accel, board",
     ),
     (
         "difference to no channel",
@@ -161,7 +161,7 @@ pub(super) const CASES: [Case; 32] = [
         "regressor = [{ channel = \"coil\", minus = \"air\", gain = { kind = \"constant\", value_deg_per_h_per_unit = 1.0 } }]",
         "\"air\"",
         "gyro.sensor[3].regressor[0].minus",
-        "which is no channel",
+        "not a channel",
     ),
     (
         "reference that is no number",
@@ -217,7 +217,7 @@ pub(super) const CASES: [Case; 32] = [
         "scale_factor = { kind = \"constant\", value_v_per_m_per_s2 = 0.1 }",
         "value_v_per",
         "accel.sensor[2].scale_factor.value_v_per_m_per_s2",
-        "is in V/(m/s²), but the output calls for (counts/s)/(m/s²)",
+        "is in V/(m/s²), but the output needs (counts/s)/(m/s²)",
     ),
     (
         "scale factor of zero",
