@@ -110,7 +110,7 @@ impl DriftArgs {
         let columns = self.columns(job)?;
         let (unit, kind, corrected) = (columns.unit.to_string(), columns.kind, columns.corrected);
         let mut grid = Grid::of(columns)?;
-        grid.notes.extend(job.work.told());
+        grid.notes.splice(0..0, job.work.told());
         let working = job.at_work("Allan deviations, drift, spectrum");
         let factor = if self.taus == Taus::Decade { 10 } else { 2 };
         let sensors = analyse(&grid, Wanted { factor, fit_h: self.fit_hours });

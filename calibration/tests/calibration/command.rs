@@ -62,16 +62,6 @@ pub(crate) fn fails(arguments: &[&str], code: i32) -> String {
     errors
 }
 
-/// Compares what a command says with what it said before. `ISOTHERM_WORDS=1` writes the file anew: read it.
-#[track_caller]
-pub(crate) fn snapshot(name: &str, said: &str) {
-    let path = root().join("calibration/tests/calibration/words").join(format!("{name}.txt"));
-    if std::env::var_os("ISOTHERM_WORDS").is_some() {
-        std::fs::write(&path, said).unwrap();
-    }
-    assert_eq!(said, std::fs::read_to_string(&path).unwrap(), "{}", path.display());
-}
-
 /// Runs the program, which must succeed and print JSON.
 #[track_caller]
 pub(crate) fn json(arguments: &[&str]) -> Value {

@@ -275,8 +275,10 @@ impl Report {
     pub fn to_text(&self) -> String {
         let mut found: Vec<String> =
             self.sentences().into_iter().map(|sentence| format!("{sentence}.")).collect();
-        if !self.sensors.is_empty() {
-            let (head, rows) = self.noise_rows();
+        let (head, mut rows) = self.noise_rows();
+        // What no sensor shows is on the page, with its limits.
+        rows.retain(|row| row.iter().skip(1).any(|cell| !cell.starts_with("not ")));
+        if !rows.is_empty() {
             found.extend(table(&head, &rows).lines().map(str::to_owned));
         }
         let parameters = self.parameters.iter();

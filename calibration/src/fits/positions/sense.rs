@@ -37,7 +37,7 @@ pub(crate) fn found_along(kind: &str, sensors: &[Beside], which: &[usize]) -> St
             short(sensors[*index].scale)
         )
     };
-    format!("Positive output is {}", which.iter().map(along).collect::<Vec<_>>().join("; "))
+    format!("Positive output {}", which.iter().map(along).collect::<Vec<_>>().join("; "))
 }
 
 /// Places of three sensors among the stated ones: whose stated axis each lies along, and whether the same way round. `None` where
